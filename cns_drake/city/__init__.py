@@ -1,0 +1,1 @@
+"""The city generator: road networks, streets, structures, stages, SDF."""

@@ -1,0 +1,51 @@
+"""Semantic classes of structures, with SemanticKITTI's names and ids."""
+
+# Name -> id as in SemanticKITTI's published label table, so that tools and
+# trained networks of that dataset understand our labels unchanged.
+CLASS_IDS = {
+    "unlabeled": 0,
+    "car": 10,
+    "bicycle": 11,
+    "bus": 13,
+    "truck": 18,
+    "other-vehicle": 20,
+    "person": 30,
+    "road": 40,
+    "parking": 44,
+    "sidewalk": 48,
+    "other-ground": 49,
+    "building": 50,
+    "fence": 51,
+    "other-structure": 52,
+    "vegetation": 70,
+    "trunk": 71,
+    "terrain": 72,
+    "pole": 80,
+    "traffic-sign": 81,
+    "other-object": 99,
+}
+
+# Colours by class for pictures and the 3-D page, chosen to differ in
+# lightness as well as in hue.
+CLASS_RGB = {
+    "unlabeled": (0.55, 0.55, 0.55),
+    "car": (0.30, 0.45, 0.75),
+    "bicycle": (0.35, 0.60, 0.80),
+    "bus": (0.30, 0.45, 0.75),
+    "truck": (0.30, 0.45, 0.75),
+    "other-vehicle": (0.30, 0.45, 0.75),
+    "person": (0.85, 0.35, 0.25),
+    "road": (0.33, 0.33, 0.36),
+    "parking": (0.42, 0.40, 0.44),
+    "sidewalk": (0.68, 0.66, 0.63),
+    "other-ground": (0.60, 0.57, 0.52),
+    "building": (0.83, 0.76, 0.66),
+    "fence": (0.55, 0.42, 0.30),
+    "other-structure": (0.72, 0.60, 0.52),
+    "vegetation": (0.35, 0.55, 0.27),
+    "trunk": (0.45, 0.33, 0.22),
+    "terrain": (0.56, 0.62, 0.42),
+    "pole": (0.50, 0.52, 0.55),
+    "traffic-sign": (0.85, 0.65, 0.20),
+    "other-object": (0.60, 0.45, 0.55),
+}

@@ -1,0 +1,1 @@
+"""Place-recognition methods, one module per method."""
