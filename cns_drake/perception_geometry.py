@@ -1,0 +1,230 @@
+"""What a LiDAR can see: the perception geometry that a SceneGraph holds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from pydrake.geometry import (
+    Box,
+    Capsule,
+    Cylinder,
+    Ellipsoid,
+    FrameId,
+    GeometryId,
+    Mesh,
+    ReadObjToTriangleSurfaceMesh,
+    Role,
+    SceneGraphInspector,
+    Shape,
+    Sphere,
+)
+from pydrake.math import RigidTransform
+
+from cns_drake.errors import InputError
+
+# The corners of a unit cube and its faces, counter-clockwise from outside.
+_CUBE_CORNERS = np.array(
+    [(x, y, z) for z in (-0.5, 0.5) for y in (-0.5, 0.5) for x in (-0.5, 0.5)]
+)
+_CUBE_TRIANGLES = np.array(
+    [
+        (0, 2, 3), (0, 3, 1), (4, 5, 7), (4, 7, 6), (0, 1, 5), (0, 5, 4),
+        (2, 6, 7), (2, 7, 3), (0, 4, 6), (0, 6, 2), (1, 3, 7), (1, 7, 5),
+    ]
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class TriangleSurface:
+    """Triangles in the geometry frame G.
+
+    Attributes:
+        p_GVset: (N, 3) float64 vertex positions [m].
+        triangles: (M, 3) int32 vertex indices, counter-clockwise seen from
+            outside.
+    """
+
+    p_GVset: np.ndarray
+    triangles: np.ndarray
+
+
+@dataclass(frozen=True)
+class EllipsoidSurface:
+    """An ellipsoid (or sphere) centred on G with semi-axes along G's."""
+
+    semi_axes: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class CylinderSurface:
+    """A closed cylinder centred on G, its axis along z of G."""
+
+    radius: float
+    length: float
+
+
+@dataclass(frozen=True)
+class CapsuleSurface:
+    """A capsule centred on G; `length` is that of the cylindrical part."""
+
+    radius: float
+    length: float
+
+
+Surface = (
+    TriangleSurface | EllipsoidSurface | CylinderSurface | CapsuleSurface
+)
+
+
+@dataclass(frozen=True)
+class PerceptionGeometry:
+    """One geometry of `Role.kPerception`.
+
+    Attributes:
+        geometry_id: its id in the SceneGraph.
+        name: scoped name, `<model>::<visual>`.
+        frame_id: the frame F on which it is fixed.
+        X_FG: its pose in F.
+        surface: its shape in G.
+        rgb: diffuse colour, None where the model gives none.
+    """
+
+    geometry_id: GeometryId
+    name: str
+    frame_id: FrameId
+    X_FG: RigidTransform
+    surface: Surface
+    rgb: tuple[float, float, float] | None
+
+    @property
+    def structure(self) -> str:
+        return structure_name(self.name)
+
+
+def structure_name(geometry_name: str) -> str:
+    """Returns the name of the structure that a geometry belongs to.
+
+    A visual named `tower_017/storey_03` belongs to `tower_017`; a visual
+    without a slash belongs to the model that it is in.
+    """
+    model, _, visual = geometry_name.rpartition("::")
+    structure, slash, _ = visual.partition("/")
+    if slash:
+        return structure
+    return model.rpartition("::")[2] or visual
+
+
+def read_perception_geometry(
+    inspector: SceneGraphInspector,
+    keep_frame: Callable[[FrameId], bool] = lambda frame_id: True,
+) -> tuple[PerceptionGeometry, ...]:
+    """Reads every geometry of `Role.kPerception` on the frames to keep.
+
+    The order is that of `GetAllGeometryIds`, which Drake documents as
+    stable; the result depends on nothing but the model.
+
+    Raises:
+        InputError: a shape is of a kind that no ray can be cast on, or a
+            mesh file is missing or cannot be read; the geometry is named.
+    """
+    meshes = _MeshFiles()
+    geometries = []
+    for geometry_id in inspector.GetAllGeometryIds(Role.kPerception):
+        frame_id = inspector.GetFrameId(geometry_id)
+        if not keep_frame(frame_id):
+            continue
+        name = inspector.GetName(geometry_id)
+        geometries.append(
+            PerceptionGeometry(
+                geometry_id=geometry_id,
+                name=name,
+                frame_id=frame_id,
+                X_FG=inspector.GetPoseInFrame(geometry_id),
+                surface=_surface(name, inspector.GetShape(geometry_id), meshes),
+                rgb=_diffuse_rgb(inspector, geometry_id),
+            )
+        )
+    return tuple(geometries)
+
+
+def _diffuse_rgb(inspector, geometry_id):
+    properties = inspector.GetPerceptionProperties(geometry_id)
+    if not properties.HasProperty("phong", "diffuse"):
+        return None
+    rgba = properties.GetProperty("phong", "diffuse")
+    return (rgba.r(), rgba.g(), rgba.b())
+
+
+def _surface(name: str, shape: Shape, meshes: _MeshFiles) -> Surface:
+    if isinstance(shape, Box):
+        return TriangleSurface(_CUBE_CORNERS * shape.size(), _CUBE_TRIANGLES)
+    if isinstance(shape, Sphere):
+        return EllipsoidSurface((shape.radius(),) * 3)
+    if isinstance(shape, Ellipsoid):
+        return EllipsoidSurface((shape.a(), shape.b(), shape.c()))
+    if isinstance(shape, Cylinder):
+        return CylinderSurface(shape.radius(), shape.length())
+    if isinstance(shape, Capsule):
+        return CapsuleSurface(shape.radius(), shape.length())
+    if isinstance(shape, Mesh):
+        return meshes.read(name, shape)
+    raise InputError(
+        f"geometry '{name}': a LiDAR cannot be cast on a "
+        f"{type(shape).__name__}; use a box, sphere, cylinder, capsule, "
+        "ellipsoid or mesh"
+    )
+
+
+class _MeshFiles:
+    """Reads mesh files, each once however many geometries refer to it."""
+
+    def __init__(self):
+        self._unscaled: dict[Path, TriangleSurface] = {}
+
+    def read(self, name: str, shape: Mesh) -> TriangleSurface:
+        if not shape.source().is_path():
+            raise InputError(f"geometry '{name}': its mesh is not a file")
+        path = Path(shape.source().path())
+        surface = self._unscaled.get(path)
+        if surface is None:
+            surface = self._unscaled[path] = _read_mesh_file(name, path)
+        triangles = surface.triangles
+        scale = shape.scale3()
+        if np.prod(scale) < 0.0:  # A reflection turns the faces inside out.
+            triangles = triangles[:, ::-1]
+        return TriangleSurface(surface.p_GVset * scale, triangles)
+
+
+def _read_mesh_file(name: str, path: Path) -> TriangleSurface:
+    if not path.is_file():
+        raise InputError(f"{path}: geometry '{name}': no such mesh file")
+    read = _read_obj if path.suffix.lower() == ".obj" else _read_with_open3d
+    try:
+        p_GVset, triangles = read(path)
+    except (RuntimeError, ValueError) as error:
+        fault = " ".join(str(error).split())
+        raise InputError(f"{path}: geometry '{name}': {fault}") from error
+    if len(triangles) == 0:
+        raise InputError(f"{path}: geometry '{name}': holds no triangles")
+    if not np.isfinite(p_GVset).all():
+        raise InputError(f"{path}: geometry '{name}': a vertex is not finite")
+    return TriangleSurface(p_GVset, triangles)
+
+
+def _read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    mesh = ReadObjToTriangleSurfaceMesh(path)
+    triangles = [[t.vertex(k) for k in range(3)] for t in mesh.triangles()]
+    return (
+        np.asarray(mesh.vertices(), dtype=float).reshape(-1, 3),
+        np.asarray(triangles, dtype=np.int32).reshape(-1, 3),
+    )
+
+
+def _read_with_open3d(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    import open3d  # Slow to import, and only foreign mesh formats need it.
+
+    mesh = open3d.io.read_triangle_mesh(str(path))
+    return np.asarray(mesh.vertices), np.asarray(mesh.triangles, np.int32)
