@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+import math
 
+from shapely.affinity import affine_transform
 from shapely.geometry import Polygon
 
 from cns_drake.city.mesh import Mesh
@@ -95,3 +97,20 @@ class Structure:
     xyz: tuple[float, float, float]
     yaw: float = 0.0
     tags: tuple[str, ...] = field(default=())
+
+    @property
+    def footprint_W(self) -> Polygon:
+        """The ground area of the model, in the world [m]."""
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        x, y, _ = self.xyz
+        return affine_transform(self.model.footprint, [c, -s, s, c, x, y])
+
+    def p_WP(self, p_SP) -> tuple[float, float, float]:
+        """Returns the position in the world of a point P given in S [m]."""
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        x, y, z = p_SP
+        return (
+            self.xyz[0] + c * x - s * y,
+            self.xyz[1] + s * x + c * y,
+            self.xyz[2] + z,
+        )
