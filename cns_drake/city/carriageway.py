@@ -1,0 +1,205 @@
+"""Areas of a road network: carriageway, sidewalks, medians, bays, lanes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import itertools
+
+import numpy as np
+from shapely import unary_union
+from shapely.geometry import LineString, MultiPolygon, Point, Polygon
+
+# Segments of a quarter circle in rounded outlines: a kerb of 13 m radius is
+# then true to 6 cm.
+_QUADRANT_SEGMENTS = 8
+# Vertices closer to the outline than this are dropped [m].
+_SIMPLIFY = 0.01
+# Areas that meet are joined over gaps up to twice this width [m].
+_SEAM = 0.005
+# A parking bay keeps clear of the junction at each end of its road [m].
+_BAY_CLEARANCE = 3.0
+
+
+@dataclass(frozen=True)
+class Areas:
+    """What `RoadNetwork` exposes by the same names."""
+
+    carriageway: MultiPolygon
+    sidewalks: MultiPolygon
+    medians: MultiPolygon
+    parking_bays: dict[tuple[str, str], Polygon]
+
+
+def corner_setback(half_width, other_half_width, angle, kerb_radius) -> float:
+    """Returns how far from a junction's position a road must end [m].
+
+    There the kerb of the given radius between two neighbouring roads
+    touches the road's edge. The edges meet at (b + a cos(angle)) /
+    sin(angle) along the road, and the arc begins r / tan(angle / 2) behind.
+
+    Args:
+        half_width, other_half_width: a of the road, b of its neighbour [m].
+        angle: between the two roads [rad].
+        kerb_radius: r [m].
+    """
+    # Towards a straight angle the corner, and with it the need, vanishes.
+    if angle > np.radians(150.0):
+        return kerb_radius
+    edge = (other_half_width + half_width * np.cos(angle)) / np.sin(angle)
+    return max(kerb_radius, edge + kerb_radius / np.tan(angle / 2))
+
+
+def road_strip(road) -> Polygon:
+    """Returns a road's carriageway between its junctions, without bays."""
+    return _band(road, -road.half_width, road.half_width)
+
+
+def _band(road, right, left, clearance=0.0) -> Polygon:
+    """Returns the area between two lateral offsets of the centreline."""
+    stations = road.stations()
+    stations = stations[
+        (stations >= road.first_station + clearance)
+        & (stations <= road.last_station - clearance)
+    ]
+    outline = [
+        road.evaluate(stations, left)[:, :2],
+        road.evaluate(stations, right)[::-1, :2],
+    ]
+    return Polygon(np.concatenate(outline)).simplify(_SIMPLIFY)
+
+
+def junction_area(roads, junction) -> Polygon:
+    """Returns the area between the ends of a junction's roads.
+
+    The straight continuations of the roads to the junction's position are
+    united, the corners between them filled up to a kerb of the junction's
+    radius, and the roads themselves cut away.
+    """
+    stubs = [_stub(roads[arm.road], arm) for arm in junction.arms]
+    parts = [
+        line.buffer(arm.half_width, cap_style="flat")
+        for line, arm in zip(stubs, junction.arms, strict=True)
+    ]
+    # Bends of a through road leave a wedge at the outside; close it.
+    for (a, line_a), (b, line_b) in itertools.combinations(
+        zip(junction.arms, stubs, strict=True), 2
+    ):
+        through = LineString([*line_a.coords[::-1], *line_b.coords[1:]])
+        width = min(a.half_width, b.half_width)
+        parts.append(through.buffer(width, cap_style="flat"))
+    area = unary_union(parts)
+    radius = junction.kerb_radius
+    area = area.buffer(radius, quad_segs=4 * _QUADRANT_SEGMENTS).buffer(
+        -radius, quad_segs=_QUADRANT_SEGMENTS
+    )
+    for line, arm in zip(stubs, junction.arms, strict=True):
+        area = area.difference(_beyond(line, arm))
+    # Cutting can leave crumbs beside a road's end.
+    pieces = getattr(area, "geoms", [area])
+    centre = Point(junction.position)
+    return min(pieces, key=lambda piece: piece.distance(centre)).simplify(
+        _SIMPLIFY
+    )
+
+
+def _stub(road, arm) -> LineString:
+    """Returns an arm's centreline, from the junction to past its setback."""
+    reach = arm.setback + 2.0
+    stations = np.linspace(0.0, reach, int(np.ceil(reach)) + 1)
+    if arm.end == "end":
+        stations = road.full_length - stations
+    return LineString(road.evaluate(stations)[:, :2])
+
+
+def _beyond(line: LineString, arm) -> Polygon:
+    """Returns a box over the end of a stub that belongs to the road."""
+    p = np.asarray(line.interpolate(arm.setback).coords[0])
+    q = np.asarray(line.coords[-1])
+    along = (q - p) / np.linalg.norm(q - p)
+    across = np.array([-along[1], along[0]]) * (arm.half_width + 1.0)
+    far = p + along * 6.0
+    return Polygon([p - across, far - across, far + across, p + across])
+
+
+def make_areas(roads, junction_areas) -> Areas:
+    """Returns the areas of a whole network.
+
+    Args:
+        roads: the roads by name.
+        junction_areas: the area of each junction by name.
+    """
+    lanes = {name: road_strip(road) for name, road in roads.items()}
+    bays = {}
+    for name, road in roads.items():
+        if road.parking > 0:
+            edge, far = road.half_width, road.half_width + road.parking
+            for side, offsets in (
+                ("right", (-far, -edge)),
+                ("left", (edge, far)),
+            ):
+                bays[name, side] = _band(road, *offsets, _BAY_CLEARANCE)
+    medians = [_median(road) for road in roads.values() if road.median > 0]
+    without_bays = _join([*lanes.values(), *junction_areas.values()])
+    carriageway = _join([without_bays, *bays.values()])
+    walks = [
+        lanes[name].buffer(road.sidewalk, quad_segs=_QUADRANT_SEGMENTS)
+        for name, road in roads.items()
+    ]
+    for name, area in junction_areas.items():
+        width = min(
+            road.sidewalk
+            for road in roads.values()
+            if name in (road.start, road.end)
+        )
+        walks.append(area.buffer(width, quad_segs=_QUADRANT_SEGMENTS))
+    sidewalks = _join(walks).difference(carriageway)
+    medians = unary_union(medians)
+    return Areas(
+        carriageway=_multi(carriageway.difference(medians)),
+        sidewalks=_multi(sidewalks.simplify(_SIMPLIFY)),
+        medians=_multi(medians),
+        parking_bays=bays,
+    )
+
+
+def _median(road) -> Polygon:
+    """Returns a median with round noses, between the ends of its road."""
+    half = road.median / 2
+    shift = (
+        road.lane_width * (road.lanes["forward"] - road.lanes["backward"]) / 2
+    )
+    stations = road.stations()
+    stations = stations[
+        (stations >= road.first_station + half)
+        & (stations <= road.last_station - half)
+    ]
+    line = LineString(road.evaluate(stations, shift)[:, :2])
+    return line.buffer(half, quad_segs=_QUADRANT_SEGMENTS).simplify(_SIMPLIFY)
+
+
+def lane_area(roads, connections, medians) -> MultiPolygon:
+    """Returns the union of all lanes and of all ways through junctions."""
+    parts = [road_strip(road) for road in roads.values()]
+    for connection in connections:
+        width = roads[connection.outgoing.road].lane_width
+        line = LineString(connection.points[:, :2])
+        parts.append(line.buffer(width / 2, cap_style="flat"))
+    return _multi(_join(parts).difference(medians))
+
+
+def _join(parts):
+    """Returns the union, with hairline gaps between neighbours closed."""
+    grown = unary_union(
+        [part.buffer(_SEAM, join_style="mitre") for part in parts]
+    )
+    return grown.buffer(-_SEAM, join_style="mitre")
+
+
+def _multi(area) -> MultiPolygon:
+    """Returns an area as a MultiPolygon, whatever shapely made of it."""
+    pieces = [
+        piece
+        for piece in getattr(area, "geoms", [area])
+        if isinstance(piece, Polygon) and not piece.is_empty
+    ]
+    return MultiPolygon(pieces)
