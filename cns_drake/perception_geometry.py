@@ -57,6 +57,10 @@ class EllipsoidSurface:
 
     semi_axes: tuple[float, float, float]
 
+    @property
+    def is_sphere(self) -> bool:
+        return len(set(self.semi_axes)) == 1
+
 
 @dataclass(frozen=True)
 class CylinderSurface:
@@ -74,9 +78,7 @@ class CapsuleSurface:
     length: float
 
 
-Surface = (
-    TriangleSurface | EllipsoidSurface | CylinderSurface | CapsuleSurface
-)
+Surface = TriangleSurface | EllipsoidSurface | CylinderSurface | CapsuleSurface
 
 
 @dataclass(frozen=True)

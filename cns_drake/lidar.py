@@ -1,0 +1,198 @@
+"""A spinning multi-beam LiDAR on the geometry that a SceneGraph holds."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.geometry import FrameId, QueryObject, Role
+from pydrake.math import RigidTransform
+from pydrake.perception import PointCloud
+from pydrake.systems.framework import Context, LeafSystem, ValueProducer
+
+from cns_drake.beam_pattern import POINT_DTYPE, BeamPattern
+from cns_drake.errors import InputError
+from cns_drake.perception_geometry import read_perception_geometry
+from cns_drake.ray_casting import RayCastingScene
+from cns_drake.structure_table import StructureTable
+
+# Intensity falls with distance as in CARLA's ray-cast LiDAR with its default
+# atmosphere: exp(-a d), a = 0.004 / m (docs/ref_sensors of CARLA).
+_ATTENUATION_PER_M = 0.004
+
+
+class Lidar(LeafSystem):
+    """A LiDAR that sees every perception geometry but its own vehicle's.
+
+    .. pydrake_system::
+
+        name: Lidar
+        input_ports:
+        - geometry_query
+        output_ports:
+        - scan
+        - point_cloud_S
+
+    Frames: W is the world, P the parent frame, S the sensor frame (x
+    forward, y left, z up). All beams of a turn are cast from the pose of S
+    at the time of the output (a deskewed scan). `scan` is a structured array
+    of `POINT_DTYPE`, one record per return in firing order; beams whose
+    nearest surface is closer than the minimum range or farther than the
+    maximum range return nothing. `point_cloud_S` holds the same positions as
+    a Drake point cloud.
+
+    Drake cannot cast rays, so the system reads shapes and poses from the
+    QueryObject and casts on a hierarchy of its own, built once per version
+    of the perception geometry.
+    """
+
+    def __init__(
+        self,
+        parent_frame_id: FrameId,
+        X_PS: RigidTransform,
+        pattern: BeamPattern,
+        *,
+        structures: StructureTable | None = None,
+        anchored_frames: Collection[FrameId] = (),
+    ):
+        """Constructs the LiDAR.
+
+        Args:
+            parent_frame_id: the frame P that carries the sensor. Geometry of
+                the model that P belongs to is invisible.
+            X_PS: pose of the sensor in P.
+            pattern: the beams.
+            structures: gives labels and instance ids to returns.
+            anchored_frames: frames that never move, besides the world's;
+                their geometry is cheaper to cast on.
+        """
+        super().__init__()
+        self._parent_frame_id = parent_frame_id
+        self._X_PS = X_PS
+        self._pattern = pattern
+        structures = structures or StructureTable(())
+        self._d_Sset = pattern.d_Sset.astype(np.float32)
+
+        self._geometry_query = self.DeclareAbstractInputPort(
+            "geometry_query", Value(QueryObject())
+        )
+        # Nothing in a Context invalidates the scene: a new version of the
+        # geometry is noticed when a scan is made, and poses are set then.
+        self._scene = self.DeclareCacheEntry(
+            description="ray-casting scene",
+            value_producer=ValueProducer(
+                allocate=lambda: Value(object()),
+                calc=lambda context, value: value.set_value(
+                    _VersionedScene(
+                        parent_frame_id, structures, anchored_frames
+                    )
+                ),
+            ),
+            prerequisites_of_calc={self.nothing_ticket()},
+        )
+        scan = self.DeclareAbstractOutputPort(
+            "scan",
+            alloc=lambda: Value(np.empty(0, POINT_DTYPE)),
+            calc=self._calc_scan,
+            prerequisites_of_calc={self._geometry_query.ticket()},
+        )
+        self._scan = scan
+        self.DeclareAbstractOutputPort(
+            "point_cloud_S",
+            alloc=lambda: Value(PointCloud()),
+            calc=self._calc_point_cloud,
+            prerequisites_of_calc={
+                self.cache_entry_ticket(scan.cache_entry().cache_index())
+            },
+        )
+
+    @property
+    def pattern(self) -> BeamPattern:
+        return self._pattern
+
+    def _calc_scan(self, context: Context, output) -> None:
+        query_object = self._geometry_query.Eval(context)
+        seen = self._scene.Eval(context)
+        seen.update(query_object)
+        X_WS = query_object.GetPoseInWorld(self._parent_frame_id) @ self._X_PS
+        d_Wset = self._pattern.d_Sset @ X_WS.rotation().matrix().T
+        # Beyond the maximum by a hair, so that the limit itself is decided
+        # below and not by the rounding inside the ray caster.
+        reach = self._pattern.max_range * (1.0 + 1e-5)
+        hits = seen.scene.cast_rays(X_WS.translation(), d_Wset, reach)
+        returned = np.flatnonzero(
+            (hits.ranges >= self._pattern.min_range)
+            & (hits.ranges <= self._pattern.max_range)
+        )
+        ranges = hits.ranges[returned]
+        geometry = hits.geometry[returned]
+        p_SRset = self._d_Sset[returned] * ranges[:, None]
+        # Zeros, so that the padding between fields is defined, too.
+        scan = np.zeros(len(returned), POINT_DTYPE)
+        scan["x"], scan["y"], scan["z"] = p_SRset.T
+        scan["intensity"] = np.exp(-_ATTENUATION_PER_M * ranges)
+        scan["ring"] = self._pattern.ring[returned]
+        scan["t"] = self._pattern.t_ns[returned]
+        scan["label"] = seen.label[geometry]
+        scan["instance"] = seen.instance[geometry]
+        output.set_value(scan)
+
+    def _calc_point_cloud(self, context: Context, output) -> None:
+        scan = self._scan.Eval(context)
+        point_cloud = output.get_mutable_value()
+        point_cloud.resize(len(scan))
+        for axis, name in enumerate("xyz"):
+            point_cloud.mutable_xyzs()[axis] = scan[name]
+
+
+class _VersionedScene:
+    """What a LiDAR sees, for one version of the perception geometry.
+
+    Attributes:
+        scene: casts rays; its geometry indices select from:
+        label: (num_geometries,) uint8 class of each geometry.
+        instance: (num_geometries,) uint16 structure of each geometry.
+    """
+
+    def __init__(self, own_frame_id, structures, anchored_frames):
+        self._own_frame_id = own_frame_id
+        self._structures = structures
+        self._anchored_frames = frozenset(anchored_frames)
+        self._version = None
+
+    def update(self, query_object: QueryObject) -> None:
+        """Rebuilds the scene if need be, and moves what moves."""
+        version = query_object.inspector().geometry_version()
+        if self._version is not None and version.IsSameAs(
+            self._version, Role.kPerception
+        ):
+            self.scene.set_frame_poses(query_object.GetPoseInWorld)
+            return
+        self._build(query_object)
+        self._version = version
+
+    def _build(self, query_object: QueryObject) -> None:
+        inspector = query_object.inspector()
+        world = inspector.world_frame_id()
+        own_model = None
+        if self._own_frame_id != world:
+            own_model = inspector.GetFrameGroup(self._own_frame_id)
+        geometries = read_perception_geometry(
+            inspector,
+            lambda frame_id: inspector.GetFrameGroup(frame_id) != own_model,
+        )
+        if not geometries:
+            raise InputError(
+                "the world has no perception geometry that a LiDAR can see; "
+                "give its links visuals"
+            )
+        names = [geometry.structure for geometry in geometries]
+        table = self._structures.completed(names)
+        self.label = np.array([table[n].label for n in names], np.uint8)
+        self.instance = np.array([table[n].instance for n in names], np.uint16)
+        self.scene = RayCastingScene(
+            geometries,
+            self._anchored_frames | {world},
+            query_object.GetPoseInWorld,
+        )

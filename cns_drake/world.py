@@ -1,0 +1,95 @@
+"""Loading an SDF world, and the vehicle in it, into a SceneGraph."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydrake.geometry import FrameId, Role, SceneGraph
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import ModelInstanceIndex
+
+from cns_drake.errors import InputError
+from cns_drake.structure_table import StructureTable, load_structure_table
+
+
+@dataclass(frozen=True)
+class World:
+    """Parsed models, ready to be wired.
+
+    Attributes:
+        scene_graph: holds the geometry; add it to a DiagramBuilder.
+        plant: owns bodies and frames; finalized, not meant for a Diagram.
+        vehicle: the vehicle's model instance, None where there is none.
+        structures: class and instance id of every structure in the world.
+    """
+
+    scene_graph: SceneGraph
+    plant: MultibodyPlant
+    vehicle: ModelInstanceIndex | None
+    structures: StructureTable
+
+    def anchored_frames(self) -> frozenset[FrameId]:
+        """Returns the geometry frames that can never move."""
+        bodies = self.plant.GetBodiesWeldedTo(self.plant.world_body())
+        frames = (
+            self.plant.GetBodyFrameIdIfExists(body.index()) for body in bodies
+        )
+        return frozenset(frame for frame in frames if frame is not None)
+
+
+def load_world(
+    sdf: Path, *, vehicle: Path | None = None, structures: Path | None = None
+) -> World:
+    """Parses a world and, in it, a vehicle.
+
+    Args:
+        sdf: the world or model file.
+        vehicle: the vehicle's model file.
+        structures: table of structures; by default `structures.csv` beside
+            the world, if there is one.
+
+    Raises:
+        InputError: a file is missing or cannot be parsed, or the world has
+            nothing to see.
+    """
+    scene_graph = SceneGraph()
+    # The plant parses models and knows their frames. It stays out of the
+    # Diagram: motion is prescribed, for which a plant has no port, and a
+    # plant of many models makes Build() slow.
+    plant = MultibodyPlant(time_step=0.0)
+    plant.RegisterAsSourceForSceneGraph(scene_graph)
+    parser = Parser(plant)
+    _parse(parser, sdf)
+    inspector = scene_graph.model_inspector()
+    if not inspector.GetAllGeometryIds(Role.kPerception):
+        raise InputError(
+            f"{sdf}: no visual: the world has no perception geometry that a "
+            "LiDAR can see"
+        )
+    vehicle_model = None
+    if vehicle is not None:
+        vehicle_model = _parse(parser, vehicle)[0]
+    plant.Finalize()
+
+    table = structures or sdf.parent / "structures.csv"
+    if structures is not None or table.is_file():
+        entries = load_structure_table(table)
+    else:
+        entries = StructureTable(())
+    return World(scene_graph, plant, vehicle_model, entries)
+
+
+def _parse(parser: Parser, path: Path) -> list[ModelInstanceIndex]:
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    try:
+        models = parser.AddModels(str(path))
+    except RuntimeError as error:
+        fault = " ".join(str(error).split())
+        fault = fault.removeprefix(f"{path}:").removeprefix("error:").strip()
+        raise InputError(f"{path}: cannot be parsed: {fault}") from error
+    if not models:
+        raise InputError(f"{path}: holds no model")
+    return models
