@@ -1,0 +1,64 @@
+"""The building stock: parametric buildings, one archetype a module.
+
+`sample` draws an archetype's parameters and builds it:
+
+    footprint = shapely.box(-12, -9, 12, 9)     # front: the edge of least y
+    model = sample("brick_block", footprint, 24.0, rng, name="block_003")
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+from shapely.geometry import Polygon
+
+from cns_drake.city.buildings.brick_block import BRICK_BLOCK
+from cns_drake.city.buildings.site import Archetype, Site
+from cns_drake.city.structures import Model
+
+ARCHETYPES: dict[str, Archetype] = {
+    archetype.name: archetype for archetype in (BRICK_BLOCK,)
+}
+
+
+def sample(
+    archetype: str,
+    footprint: Polygon,
+    height: float,
+    rng: np.random.Generator,
+    name: str = "building",
+    blind_edges: Collection[int] = (),
+) -> Model:
+    """Draws one building of an archetype and builds it.
+
+    Args:
+        archetype: key of `ARCHETYPES`.
+        footprint: the ground it gets, in the building's frame S [m]; edge 0
+            counter-clockwise is the street front, a rectangle's front is
+            its edge of least y. Eaves, balconies and canopies reach out of
+            it by at most the archetype's `overhang`.
+        height: top of the walls, parapet or spire [m].
+        rng: the only source of variation.
+        name: the structure's name, which its own meshes carry.
+        blind_edges: edges against a neighbour, built as plain walls.
+
+    Raises:
+        ValueError: the archetype needs a rectangle and gets none, or the
+            footprint or the height is outside what it can fill.
+    """
+    kind = ARCHETYPES[archetype]
+    x0, y0, x1, y1 = footprint.bounds
+    low, high = kind.widths
+    if min(x1 - x0, y1 - y0) < low or max(x1 - x0, y1 - y0) > high:
+        raise ValueError(f"{name}: {archetype} has sides of {low} to {high} m")
+    low, high = kind.heights
+    if not low <= height <= high:
+        raise ValueError(f"{name}: {archetype} is {low} to {high} m high")
+    site = Site(footprint, name, frozenset(blind_edges))
+    return kind.build(kind.draw(site, height, rng), site, rng)
+
+
+def metropolis_stock() -> tuple[str, ...]:
+    """Returns the archetypes that Metropolis is built of."""
+    return tuple(ARCHETYPES)

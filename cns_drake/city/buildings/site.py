@@ -1,0 +1,144 @@
+"""What every building builder takes and how it returns its model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from shapely.geometry import Polygon
+from shapely.geometry.polygon import orient
+
+from cns_drake.city.mesh import Mesh
+from cns_drake.city.structures import MeshShape, Model, Part, Shape
+
+# Buildings reach below their own ground level, for the ground has relief.
+FOUNDATION_M = 0.5
+
+
+@dataclass(frozen=True)
+class Site:
+    """The ground a building gets.
+
+    Attributes:
+        footprint: simple polygon in the building's frame S [m]. Edge 0, from
+            its first to its second counter-clockwise corner, is the front;
+            a rectangle's front is its edge of least y.
+        name: the structure's name; its own meshes are called `<name>_...`.
+        blind_edges: edges built against a neighbour: plain walls.
+    """
+
+    footprint: Polygon
+    name: str
+    blind_edges: frozenset[int] = frozenset()
+
+    @property
+    def outline(self) -> np.ndarray:
+        """The (N, 2) corners, counter-clockwise, the front edge first."""
+        ring = orient(self.footprint).exterior.coords[:-1]
+        points = np.array(ring, dtype=float)
+        if self.is_rectangle:
+            # The corner from which the edge of least y starts.
+            start = int(np.lexsort((points[:, 0], points[:, 1]))[0])
+            points = np.roll(points, -start, axis=0)
+        return points
+
+    @property
+    def is_rectangle(self) -> bool:
+        """Whether the footprint is a rectangle along the axes of S."""
+        box = self.footprint.envelope
+        return bool(
+            len(self.footprint.exterior.coords) == 5
+            and self.footprint.area > 0.999 * box.area
+        )
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """x0, y0, x1, y1 of a rectangular footprint [m].
+
+        Raises:
+            ValueError: the footprint is no rectangle along the axes.
+        """
+        if not self.is_rectangle:
+            raise ValueError(f"{self.name} needs a rectangular footprint")
+        return self.footprint.bounds
+
+
+@dataclass(frozen=True)
+class Archetype:
+    """A kind of building: how to draw its parameters and how to build it.
+
+    Attributes:
+        name: key in the registry.
+        draw: (site, height, rng) -> parameters; height is that of the
+            walls, parapet or spire; only roof equipment may rise above.
+        build: (parameters, site, rng) -> model.
+        heights: least and greatest sensible height [m].
+        widths: least and greatest sensible side of the footprint [m].
+        overhang: how far eaves, balconies, canopies and pilasters reach
+            outside the footprint [m]; near the ground at most
+            `GROUND_OVERHANG_M`.
+        any_outline: whether it follows any polygon; else rectangles only.
+    """
+
+    name: str
+    draw: Callable[[Site, float, np.random.Generator], Any]
+    build: Callable[[Any, Site, np.random.Generator], Model]
+    heights: tuple[float, float]
+    widths: tuple[float, float]
+    overhang: float = 1.5
+    any_outline: bool = False
+
+
+# Plinths and pilasters may stand this far outside the footprint; above
+# `HEAD_ROOM_M` the archetype's own overhang holds.
+GROUND_OVERHANG_M = 0.35
+HEAD_ROOM_M = 2.3
+
+
+@dataclass
+class Assembly:
+    """Collects the parts and meshes of one building."""
+
+    name: str
+    rgb: tuple[float, float, float] | None = None
+    glass_rgb: tuple[float, float, float] = (0.20, 0.26, 0.31)
+    parts: list[Part] = field(default_factory=list)
+    meshes: dict[str, Mesh] = field(default_factory=dict)
+
+    def add(self, part: str, mesh: Mesh, z: float = 0.0, rgb=None) -> None:
+        """Adds a mesh of this building's own and places it once."""
+        key = self.define(part, mesh)
+        self.place(part, MeshShape(key), (0.0, 0.0, z), rgb=rgb)
+
+    def define(self, key: str, mesh: Mesh) -> str:
+        """Adds a mesh of this building's own; returns its full name."""
+        name = f"{self.name}_{key}"
+        if name in self.meshes:
+            raise ValueError(f"mesh {name} is defined twice")
+        self.meshes[name] = mesh
+        return name
+
+    def stack(self, part: str, mesh: Mesh, z0: float, step: float, count: int):
+        """Adds a mesh and places it `count` times, one above another."""
+        key = self.define(part, mesh)
+        for k in range(count):
+            shape = MeshShape(key)
+            self.place(f"{part}_{k:02d}", shape, (0.0, 0.0, z0 + k * step))
+
+    def share(self, mesh_name: str, mesh: Mesh) -> None:
+        """Adds a mesh that other buildings use too, by its common name."""
+        self.meshes[mesh_name] = mesh
+
+    def place(
+        self, part: str, shape: Shape, xyz, yaw: float = 0.0, rgb=None
+    ) -> None:
+        """Places a shape as one visual."""
+        x, y, z = (round(float(v), 3) for v in xyz)
+        rpy = (0.0, 0.0, round(float(yaw), 5))
+        self.parts.append(Part(part, shape, (x, y, z), rpy, rgb or self.rgb))
+
+    def model(self, site: Site) -> Model:
+        """Returns the finished building."""
+        return Model(tuple(self.parts), dict(self.meshes), site.footprint)

@@ -1,0 +1,132 @@
+"""Stacks storeys into a building: ground floor, storeys, crown, roof."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from cns_drake.city import massing
+from cns_drake.city.buildings.site import FOUNDATION_M, Assembly
+from cns_drake.city.facades import Band, Facade, facade_mesh, glass_mesh
+from cns_drake.city.mesh import Mesh, merge_meshes
+
+# A pane cuts this far into the reveals in front of it, lest rays slip
+# between the two [m].
+_PANE_OVERLAP = 0.004
+
+
+def divided(
+    height: float, storey: float, most: int = 10
+) -> tuple[int, int, float]:
+    """Divides a height into storeys, and these into equal groups.
+
+    Args:
+        height: to be filled exactly [m].
+        storey: wanted height of a storey [m].
+        most: greatest number of groups; a group becomes one visual.
+
+    Returns:
+        Number of groups, storeys in a group, height of a storey [m].
+    """
+    count = max(1, round(height / storey))
+    per_group = -(-count // most)
+    groups = max(1, round(count / per_group))
+    return groups, per_group, height / (groups * per_group)
+
+
+def add_ground(
+    assembly: Assembly,
+    outline,
+    facade: Facade,
+    extras: Sequence[Mesh] = (),
+    part: str = "ground",
+) -> float:
+    """Adds the ground floor on its foundation; returns its top [m]."""
+    base = massing.skirt(outline, outline, -FOUNDATION_M, 0.0)
+    walls = facade_mesh(outline, facade)
+    assembly.add(part, merge_meshes([base, walls, *extras]))
+    _add_glass(assembly, outline, facade, 0.0, part)
+    return facade.height
+
+
+def add_storeys(
+    assembly: Assembly,
+    outline,
+    facade: Facade,
+    z0: float,
+    groups: int,
+    per_group: int,
+    extras: Sequence[Mesh] = (),
+    part: str = "storey",
+) -> float:
+    """Adds `groups` times `per_group` storeys; returns their top [m].
+
+    All glass of the storeys lies at one depth, so that one pane behind the
+    walls closes their windows. `extras` belong to one storey, in its own
+    height.
+    """
+    pieces = [facade_mesh(outline, facade.stacked(per_group))]
+    for k in range(per_group):
+        pieces += [e.moved((0.0, 0.0, k * facade.height)) for e in extras]
+    step = per_group * facade.height
+    assembly.stack(part, merge_meshes(pieces), z0, step, groups)
+    top = z0 + groups * step
+    if facade.glass:
+        (depth,) = facade.glass
+        pane = massing.inset(outline, depth - _PANE_OVERLAP)
+        assembly.add(
+            f"{part}_glass",
+            massing.skirt(pane, pane, z0, top),
+            rgb=assembly.glass_rgb,
+        )
+    return top
+
+
+def add_crown(
+    assembly: Assembly,
+    outline,
+    facade: Facade,
+    z0: float,
+    parapet: float,
+    extras: Sequence[Mesh] = (),
+    part: str = "crown",
+    thickness: float = 0.3,
+) -> float:
+    """Adds the top of the walls and the roof; returns the roof's height [m].
+
+    The roof lies `parapet` below the top of the facade; `extras` are given
+    in heights above z0.
+    """
+    roof = facade.height - parapet
+    mesh = merge_meshes(
+        [
+            facade_mesh(outline, facade),
+            massing.roof_pan(outline, roof, facade.height, thickness),
+            *extras,
+        ]
+    )
+    assembly.add(part, mesh, z0)
+    _add_glass(assembly, outline, facade, z0, part)
+    return z0 + roof
+
+
+def _add_glass(assembly, outline, facade: Facade, z0: float, part: str):
+    if facade.glass:
+        glass = glass_mesh(outline, facade)
+        if glass.faces:
+            rgb = assembly.glass_rgb
+            assembly.add(f"{part}_glass", glass, z0, rgb=rgb)
+
+
+def cornice(
+    height: float, reach: float, *, thickness: float = 0.9, steps: int = 3
+) -> tuple[Band, ...]:
+    """Returns bands that step out towards `reach` below `height`."""
+    step = thickness / steps
+    return tuple(
+        Band(
+            round(height - thickness + k * step, 3),
+            round(height - thickness + (k + 1) * step, 3),
+            -round(reach * (k + 1) / steps, 3),
+        )
+        for k in range(steps)
+    )
