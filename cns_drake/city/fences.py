@@ -13,7 +13,7 @@ from functools import cache
 
 import numpy as np
 
-from cns_drake.city.lofts import prism, tube
+from cns_drake.city.lofts import along_x, prism, side_prism, tube
 from cns_drake.city.mesh import Mesh, box_mesh, merge_meshes
 from cns_drake.city.object_parts import ROOT_DEPTH, Builder, assemble
 from cns_drake.city.structures import MeshShape, Model, Part
@@ -110,20 +110,14 @@ def _picket(count: int) -> Mesh:
         pieces.append(_box(x, x + 0.1, -0.12, -0.05, -ROOT_DEPTH, 1.1))
         for m in range(12):
             p = x + 0.02 + m * 2.0 / 12
-            board = prism(
-                [
-                    (p, 0.08),
-                    (p + 0.1, 0.08),
-                    (p + 0.1, 1.12),
-                    (p + 0.05, 1.2),
-                    (p, 1.12),
-                ],
-                -0.01,
-                0.015,
-            )
-            # From the (x, z) plane, extruded along y.
-            v = board.vertices[:, [0, 2, 1]] * (1, -1, 1)
-            pieces.append(Mesh(v, board.faces))
+            outline = [
+                (p, 0.08),
+                (p + 0.1, 0.08),
+                (p + 0.1, 1.12),
+                (p + 0.05, 1.2),
+                (p, 1.12),
+            ]
+            pieces.append(side_prism(outline, -0.01, 0.015))
     return merge_meshes(pieces)
 
 
@@ -200,7 +194,7 @@ def _concrete_barrier(count: int) -> Mesh:
         # Two convex halves: the foot and the stem.
         for rows in ((0, 1, 6, 7), (1, 2, 5, 6), (2, 3, 4, 5)):
             solid = prism(profile[list(rows)], 2.0 * k + 0.01, 2.0 * k + 1.97)
-            pieces.append(Mesh(solid.vertices[:, [2, 0, 1]], solid.faces))
+            pieces.append(along_x(solid))
     return merge_meshes(pieces)
 
 

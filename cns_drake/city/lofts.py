@@ -95,6 +95,30 @@ def prism(outline, bottom: float, top: float) -> Mesh:
     )
 
 
+def side_prism(outline, right: float, left: float) -> Mesh:
+    """Returns a prism over a convex outline in the x-z plane.
+
+    Args:
+        outline: (M, 2) corners x, z [m], counter-clockwise with x to the
+            right and z up.
+        right: y of the cap on the right-hand side (seen along +x) [m].
+        left: y of the other cap, greater than `right` [m].
+    """
+    flat = prism(outline, -left, -right)
+    x, y, z = flat.vertices.T
+    return Mesh(np.column_stack([x, -z, y]), flat.faces)
+
+
+def along_x(mesh: Mesh) -> Mesh:
+    """Returns the mesh with its z axis turned to x (and x to y)."""
+    return Mesh(mesh.vertices[:, [2, 0, 1]], mesh.faces)
+
+
+def along_y(mesh: Mesh) -> Mesh:
+    """Returns the mesh with its z axis turned to y (and y to x)."""
+    return Mesh(mesh.vertices[:, [1, 2, 0]], mesh.faces)
+
+
 def beam(start, end, width: float, depth: float) -> Mesh:
     """Returns a straight bar of rectangular section between two points.
 

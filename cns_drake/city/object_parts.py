@@ -83,6 +83,17 @@ def block(name: str, size, center, yaw: float = 0.0, rgb=None) -> Part:
     )
 
 
+def single(
+    mesh_name: str,
+    mesh: Mesh,
+    rgb,
+    scale=(1.0, 1.0, 1.0),
+) -> Model:
+    """Returns a model of one mesh."""
+    part = Part("body", MeshShape(mesh_name, tuple(scale)), rgb=rgb)
+    return assemble((part,), {mesh_name: mesh})
+
+
 def assemble(
     parts: Sequence[Part], meshes: Mapping[str, Mesh] | None = None
 ) -> Model:

@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from cns_drake.city.lofts import lathe, prism
+from cns_drake.city.lofts import along_x, along_y, lathe, prism
 from cns_drake.city.mesh import Mesh, box_mesh, merge_meshes
 from cns_drake.city.object_parts import Builder, assemble, bar, block, post
 from cns_drake.city.structures import CylinderShape, MeshShape, Model, Part
@@ -182,10 +182,8 @@ def _signal_head(lamps: int) -> Mesh:
     ]
     for k in range(lamps):
         hood = lathe([(0.13, 0.0), (0.13, 0.18)], 8)
-        # The axis of the hood turns from z to y.
-        turned = Mesh(hood.vertices[:, [1, 2, 0]], hood.faces)
         z = (k - (lamps - 1) / 2) * pitch
-        pieces.append(turned.moved((0.0, 0.09, z)))
+        pieces.append(along_y(hood).moved((0.0, 0.09, z)))
     return merge_meshes(pieces)
 
 
@@ -197,7 +195,7 @@ def _plate(corners: int, radius: float) -> Mesh:
     flat = prism(
         radius * np.column_stack([np.cos(angle), np.sin(angle)]), -0.015, 0.015
     )
-    return Mesh(flat.vertices[:, [2, 0, 1]], flat.faces)
+    return along_x(flat)
 
 
 TRAFFIC_SIGNALS = {
