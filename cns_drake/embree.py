@@ -111,14 +111,15 @@ def cast_packets(
     """Casts rays in packets of 16; see `RayCastingScene.cast_rays`.
 
     A packet is an RTCRayHit16: 12 ray fields and 9 hit fields (10 with room
-    for the primitive of an instance array) of 16 lanes, 64-byte aligned.
+    for the primitive of an instance array) of 16 lanes; like the lanes' mask it is aligned
+    to 64 bytes, as Embree's vector loads demand.
     """
     lanes = 16
-    storage = np.zeros((12 + 10 + 2) * lanes, np.float32)
+    storage = np.zeros((12 + 10 + 1 + 1) * lanes, np.float32)
     start = (-storage.ctypes.data % 64) // 4
-    packet = storage[start : start + 22 * lanes].reshape(22, lanes)
+    aligned = storage[start : start + 23 * lanes].reshape(23, lanes)
+    packet, valid = aligned[:22], aligned[22].view(np.int32)
     packet_id = packet.view(np.uint32)
-    valid = np.empty(lanes, np.int32)
     num_rays = d_set.shape[0]
     one_origin = p_set.shape[0] == 1
     for begin in range(0, num_rays, lanes):

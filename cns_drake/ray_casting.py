@@ -88,7 +88,7 @@ class RayCastingScene:
         # One level is faster than two. With two, the merged geometry is an
         # instance like the others, so that moving those never rebuilds it.
         self._instances: list[tuple[_Group, int]] = []
-        if len(groups) == 1 and groups[0].frame_id is None:
+        if len(groups) == 1 and groups[0].is_merged_world:
             self._top = scenes[0]
         else:
             self._top = self._new_scene()
@@ -234,12 +234,14 @@ class _Group:
         X_FL: (4, 4) affine map from L to F; not rigid for an ellipsoid,
             which in L is the unit sphere.
         members: what the group holds, posed in L.
+        is_merged_world: whether L is the world, moved to O.
         X_OL: (3, 4) affine map from L to the scene's origin, once placed.
     """
 
     frame_id: FrameId | None
     X_FL: np.ndarray
     members: list[_Member]
+    is_merged_world: bool = False
     X_OL: np.ndarray | None = None
 
 
@@ -280,7 +282,9 @@ def _group(geometries, anchored_frames, calc_X_WF):
             else:
                 rest.append((index, X_LF @ X_FG, surface))
         if rest:
-            groups.append(_Group(frame_id, X_FL.GetAsMatrix4(), rest))
+            groups.append(
+                _Group(frame_id, X_FL.GetAsMatrix4(), rest, frame_id is None)
+            )
     return p_WO, groups + ellipsoids
 
 
