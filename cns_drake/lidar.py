@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+import copy
 
 import numpy as np
 from pydrake.common.value import Value
@@ -170,7 +171,8 @@ class _VersionedScene:
             self.scene.set_frame_poses(query_object.GetPoseInWorld)
             return
         self._build(query_object)
-        self._version = version
+        # A copy: what the inspector returns changes with the geometry.
+        self._version = copy.copy(version)
 
     def _build(self, query_object: QueryObject) -> None:
         inspector = query_object.inspector()
