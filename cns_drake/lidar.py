@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-import copy
 
 import numpy as np
 from pydrake.common.value import Value
@@ -44,8 +43,8 @@ class Lidar(LeafSystem):
     a Drake point cloud.
 
     Drake cannot cast rays, so the system reads shapes and poses from the
-    QueryObject and casts on a hierarchy of its own, built once per version
-    of the perception geometry.
+    QueryObject and casts on a hierarchy of its own, built anew only when
+    perception geometry is added or removed.
     """
 
     def __init__(
@@ -78,16 +77,14 @@ class Lidar(LeafSystem):
         self._geometry_query = self.DeclareAbstractInputPort(
             "geometry_query", Value(QueryObject())
         )
-        # Nothing in a Context invalidates the scene: a new version of the
-        # geometry is noticed when a scan is made, and poses are set then.
+        # Nothing in a Context invalidates the scene: whether geometry came or
+        # went is checked when a scan is made, and poses are set then.
         self._scene = self.DeclareCacheEntry(
             description="ray-casting scene",
             value_producer=ValueProducer(
                 allocate=lambda: Value(object()),
                 calc=lambda context, value: value.set_value(
-                    _VersionedScene(
-                        parent_frame_id, structures, anchored_frames
-                    )
+                    _SeenGeometry(parent_frame_id, structures, anchored_frames)
                 ),
             ),
             prerequisites_of_calc={self.nothing_ticket()},
@@ -147,8 +144,8 @@ class Lidar(LeafSystem):
             point_cloud.mutable_xyzs()[axis] = scan[name]
 
 
-class _VersionedScene:
-    """What a LiDAR sees, for one version of the perception geometry.
+class _SeenGeometry:
+    """What a LiDAR sees, as long as no geometry is added or removed.
 
     Attributes:
         scene: casts rays; its geometry indices select from:
@@ -160,19 +157,19 @@ class _VersionedScene:
         self._own_frame_id = own_frame_id
         self._structures = structures
         self._anchored_frames = frozenset(anchored_frames)
-        self._version = None
+        self._count = None
 
     def update(self, query_object: QueryObject) -> None:
         """Rebuilds the scene if need be, and moves what moves."""
-        version = query_object.inspector().geometry_version()
-        if self._version is not None and version.IsSameAs(
-            self._version, Role.kPerception
-        ):
+        # SceneGraph's own geometry version does not change with perception
+        # geometry unless a render engine is there to accept it (measured on
+        # 1.51.1), so that the count has to tell.
+        count = query_object.inspector().NumGeometriesWithRole(Role.kPerception)
+        if count == self._count:
             self.scene.set_frame_poses(query_object.GetPoseInWorld)
             return
         self._build(query_object)
-        # A copy: what the inspector returns changes with the geometry.
-        self._version = copy.copy(version)
+        self._count = count
 
     def _build(self, query_object: QueryObject) -> None:
         inspector = query_object.inspector()
