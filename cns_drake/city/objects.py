@@ -3,6 +3,7 @@
 from cns_drake.city.fences import FENCES
 from cns_drake.city.monuments import MONUMENTS
 from cns_drake.city.object_parts import Builder
+from cns_drake.city.parked_cars import PARKED_CARS
 from cns_drake.city.pavilions import PAVILIONS
 from cns_drake.city.shrubs import SHRUBS
 from cns_drake.city.street_furniture import STREET_FURNITURE
@@ -19,4 +20,5 @@ OBJECTS: dict[str, Builder] = {
     **STREET_FURNITURE,
     **PAVILIONS,
     **MONUMENTS,
+    **PARKED_CARS,
 }
