@@ -25,6 +25,7 @@ class Areas:
     """What `RoadNetwork` exposes by the same names."""
 
     carriageway: MultiPolygon
+    lane_area: MultiPolygon
     sidewalks: MultiPolygon
     medians: MultiPolygon
     parking_bays: dict[tuple[str, str], Polygon]
@@ -92,8 +93,8 @@ def junction_area(roads, junction) -> Polygon:
     area = area.buffer(radius, quad_segs=4 * _QUADRANT_SEGMENTS).buffer(
         -radius, quad_segs=_QUADRANT_SEGMENTS
     )
-    for line, arm in zip(stubs, junction.arms, strict=True):
-        area = area.difference(_beyond(line, arm))
+    for arm in junction.arms:
+        area = area.difference(_beyond(roads[arm.road], arm))
     # Cutting can leave crumbs beside a road's end.
     pieces = getattr(area, "geoms", [area])
     centre = Point(junction.position)
@@ -111,14 +112,17 @@ def _stub(road, arm) -> LineString:
     return LineString(road.evaluate(stations)[:, :2])
 
 
-def _beyond(line: LineString, arm) -> Polygon:
-    """Returns a box over the end of a stub that belongs to the road."""
-    p = np.asarray(line.interpolate(arm.setback).coords[0])
-    q = np.asarray(line.coords[-1])
-    along = (q - p) / np.linalg.norm(q - p)
+def _beyond(road, arm) -> Polygon:
+    """Returns a box over the part of an arm's stub that belongs to the road."""
+    if arm.end == "start":
+        x, y, _, outward = road.evaluate([road.first_station])[0]
+    else:
+        x, y, _, heading = road.evaluate([road.last_station])[0]
+        outward = heading + np.pi
+    along = np.array([np.cos(outward), np.sin(outward)])
     across = np.array([-along[1], along[0]]) * (arm.half_width + 1.0)
-    far = p + along * 6.0
-    return Polygon([p - across, far - across, far + across, p + across])
+    near, far = np.array([x, y]), np.array([x, y]) + along * 6.0
+    return Polygon([near - across, far - across, far + across, near + across])
 
 
 def make_areas(roads, junction_areas) -> Areas:
@@ -152,11 +156,12 @@ def make_areas(roads, junction_areas) -> Areas:
             if name in (road.start, road.end)
         )
         walks.append(area.buffer(width, quad_segs=_QUADRANT_SEGMENTS))
-    sidewalks = _join(walks).difference(carriageway)
     medians = unary_union(medians)
+    outline = _join(walks).simplify(_SIMPLIFY)
     return Areas(
         carriageway=_multi(carriageway.difference(medians)),
-        sidewalks=_multi(sidewalks.simplify(_SIMPLIFY)),
+        lane_area=_multi(without_bays.difference(medians)),
+        sidewalks=_multi(outline.difference(carriageway)),
         medians=_multi(medians),
         parking_bays=bays,
     )
@@ -175,16 +180,6 @@ def _median(road) -> Polygon:
     ]
     line = LineString(road.evaluate(stations, shift)[:, :2])
     return line.buffer(half, quad_segs=_QUADRANT_SEGMENTS).simplify(_SIMPLIFY)
-
-
-def lane_area(roads, connections, medians) -> MultiPolygon:
-    """Returns the union of all lanes and of all ways through junctions."""
-    parts = [road_strip(road) for road in roads.values()]
-    for connection in connections:
-        width = roads[connection.outgoing.road].lane_width
-        line = LineString(connection.points[:, :2])
-        parts.append(line.buffer(width / 2, cap_style="flat"))
-    return _multi(_join(parts).difference(medians))
 
 
 def _join(parts):

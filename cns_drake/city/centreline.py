@@ -111,17 +111,26 @@ def sample_stations(start: float, end: float, spacing: float) -> np.ndarray:
     return np.linspace(start, end, count)
 
 
-def blend(p_start, heading_start, p_end, heading_end) -> np.ndarray:
-    """Returns a smooth curve between two directed points, about 1 m apart.
+def blend(
+    p_start,
+    heading_start,
+    p_end,
+    heading_end,
+    spacing: float = 1.0,
+    max_radius: float = np.inf,
+) -> np.ndarray:
+    """Returns a smooth curve between two directed points.
 
     Where the straight continuations meet ahead of the start and behind the
-    end, the curve is the widest arc that touches both, with a line in front
-    of or behind it: what a driver does on a turn. Otherwise (parallel lanes
+    end, the curve is the widest allowed arc that touches both, with lines in
+    front of and behind it: what a driver does on a turn. Otherwise (parallel lanes
     that are offset, S-bends) it is a cubic Hermite curve.
 
     Args:
         p_start, p_end: (2,) points [m].
         heading_start, heading_end: directions of travel [rad].
+        spacing: about the distance between the returned points [m].
+        max_radius: of the arc [m].
 
     Returns:
         (N, 2) points [m], both ends included.
@@ -137,13 +146,14 @@ def blend(p_start, heading_start, p_end, heading_end) -> np.ndarray:
         tangent = min(ahead, behind)
         if tangent > 0.5:
             cosine = float(d_start @ d_end)
-            radius = tangent / np.tan(np.arctan2(abs(sine), cosine) / 2)
+            widest = tangent / np.tan(np.arctan2(abs(sine), cosine) / 2)
             corner = p_start + ahead * d_start
+            radius = min(widest, max_radius)
             curve = Centreline([p_start, corner, p_end], [radius])
-            stations = sample_stations(0.0, curve.length, 1.0)
+            stations = sample_stations(0.0, curve.length, spacing)
             return curve.evaluate(stations)[:, :2]
     distance = float(np.hypot(*gap))
-    u = sample_stations(0.0, 1.0, 1.0 / max(distance, 1.0))[:, None]
+    u = sample_stations(0.0, 1.0, spacing / max(distance, spacing))[:, None]
     return (
         (2 * u**3 - 3 * u**2 + 1) * p_start
         + (u**3 - 2 * u**2 + u) * distance * d_start

@@ -64,7 +64,7 @@ class Connection:
         junction: name of the junction.
         incoming, outgoing: the lanes that it joins.
         turn: whether it bends left, right or neither.
-        points: (N, 3) positions, about 1 m apart, both lane ends included.
+        points: (N, 3) positions, both lane ends included [m].
     """
 
     junction: str
@@ -91,8 +91,14 @@ class RoadNetwork:
         road = self.roads[lane.road]
         return road.start if lane.direction == "forward" else road.end
 
-    def connection(self, incoming: LaneRef, outgoing: LaneRef) -> Connection:
+    def connection(
+        self, incoming: LaneRef, outgoing: LaneRef, spacing: float = 1.0
+    ) -> Connection:
         """Returns the way from one lane to another, legal or not.
+
+        Args:
+            incoming, outgoing: the lanes to join.
+            spacing: about the distance between its points [m].
 
         Raises:
             ValueError: a lane does not exist, the lanes do not meet in a
@@ -112,9 +118,13 @@ class RoadNetwork:
             raise ValueError(f"U-turn on road {incoming.road}")
         a = self.roads[incoming.road].lane_end(*incoming[1:], "exit")
         b = self.roads[outgoing.road].lane_end(*outgoing[1:], "entry")
-        xy = blend(a[:2], a[3], b[:2], b[3])
-        z = np.full((len(xy), 1), self.junctions[junction].height)
-        turn = _classify(b[3] - a[3], len(self.junctions[junction].arms))
+        place = self.junctions[junction]
+        turn = _classify(b[3] - a[3], len(place.arms))
+        # To the right, the outermost lane follows the kerb.
+        width = self.roads[outgoing.road].lane_width
+        radius = place.kerb_radius + width / 2 if turn == "right" else np.inf
+        xy = blend(a[:2], a[3], b[:2], b[3], spacing, radius)
+        z = np.full((len(xy), 1), place.height)
         return Connection(
             junction, incoming, outgoing, turn, np.hstack([xy, z])
         )
@@ -166,11 +176,6 @@ class RoadNetwork:
     def _areas(self) -> carriageway.Areas:
         return carriageway.make_areas(self.roads, self._junction_areas)
 
-    @cached_property
-    def _lane_area(self) -> MultiPolygon:
-        ways = [w for name in self.junctions for w in self.connections(name)]
-        return carriageway.lane_area(self.roads, ways, self.medians())
-
     def junction_area(self, junction: str) -> Polygon:
         """Returns a junction's area between the roads' ends and the kerbs."""
         return self._junction_areas[junction]
@@ -192,8 +197,8 @@ class RoadNetwork:
         return self._areas.parking_bays
 
     def lane_area(self) -> MultiPolygon:
-        """Returns where vehicles drive: all lanes, all ways, no bays."""
-        return self._lane_area
+        """Returns where vehicles drive: the carriageway without the bays."""
+        return self._areas.lane_area
 
 
 def _classify(turn_angle: float, num_arms: int) -> Turn:

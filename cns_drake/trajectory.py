@@ -1,0 +1,188 @@
+"""Where a vehicle is, how it moves and accelerates at every time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.multibody.math import SpatialAcceleration, SpatialVelocity
+
+from cns_drake.city.road_network import RoadNetwork
+from cns_drake.path_geometry import PathIntegral, PathJet, SmoothPath
+from cns_drake.route import LanePath, Route, make_lane_path
+from cns_drake.speed_profile import Speeds, make_time_scaling
+from cns_drake.uniform_spline import SplineDerivatives
+
+# Distance of the path's control points [m]: the curvature then builds up
+# over about 10 m, as a driver turns the wheel, and in the tightest bends of a
+# town the path leaves the middle of the lane by less than 10 cm.
+_POINT_SPACING = 2.0
+
+
+@dataclass(frozen=True)
+class AngleMotion:
+    """An angle [rad], its rate [rad/s] and acceleration [rad/s^2]."""
+
+    angle: np.ndarray
+    rate: np.ndarray
+    acceleration: np.ndarray
+
+
+class Trajectory:
+    """The motion X_WB(t) of a vehicle along a lane path.
+
+    B is the vehicle frame: its origin on the ground follows the path, x
+    along the tangent, y horizontal to the left. On a slope the pitch follows
+    the road; there is no roll. The motion is exact: derivatives are taken
+    of the splines, not of samples. It starts and ends at rest.
+    """
+
+    def __init__(self, lane_path: LanePath, speeds: Speeds):
+        """Makes the trajectory."""
+        self._path = SmoothPath(lane_path.points, lane_path.spacing)
+        self._time_scaling = SplineDerivatives(
+            make_time_scaling(self._path, lane_path.speed_limits, speeds), 2
+        )
+        self._travelled = PathIntegral(self._path, lambda jet: jet.speed)
+
+    @property
+    def duration(self) -> float:
+        """The time from rest to rest [s]."""
+        return self._time_scaling.end
+
+    @property
+    def length(self) -> float:
+        """The length of the path [m]."""
+        return self._travelled.total
+
+    @property
+    def path(self) -> SmoothPath:
+        """The path."""
+        return self._path
+
+    def path_parameter(self, t) -> list[np.ndarray]:
+        """Returns the path parameter u and its rates u', u'' at (N,) times."""
+        values = self._time_scaling.evaluate(np.atleast_1d(t))
+        return [value[:, 0] for value in values]
+
+    def travelled(self, t) -> np.ndarray:
+        """Returns the (N,) distances travelled at (N,) times [m]."""
+        return self._travelled.evaluate(self.path_parameter(t)[0])
+
+    def positions(self, t) -> np.ndarray:
+        """Returns the (N, 3) positions p_WB at (N,) times [m]."""
+        return self._path.evaluate(self.path_parameter(t)[0]).p
+
+    def pose(self, t: float) -> RigidTransform:
+        """Returns X_WB at a time."""
+        jet, _, _ = self._at(t)
+        return RigidTransform(
+            RollPitchYaw(0.0, -jet.climb[0], jet.yaw[0]), jet.p[0]
+        )
+
+    def spatial_velocity(self, t: float) -> SpatialVelocity:
+        """Returns V_WB, expressed in the world [rad/s, m/s]."""
+        jet, rate, _ = self._at(t)
+        yaw_rate, pitch_rate = jet.dyaw[0] * rate, -jet.dclimb[0] * rate
+        w = yaw_rate * _UP + pitch_rate * _left(jet)
+        return SpatialVelocity(w, jet.dp[0] * rate)
+
+    def spatial_acceleration(self, t: float) -> SpatialAcceleration:
+        """Returns A_WB, expressed in the world [rad/s^2, m/s^2]."""
+        jet, rate, acceleration = self._at(t)
+        yaw_rate, pitch_rate = jet.dyaw[0] * rate, -jet.dclimb[0] * rate
+        left = _left(jet)
+        alpha = (
+            (jet.ddyaw[0] * rate**2 + jet.dyaw[0] * acceleration) * _UP
+            - (jet.ddclimb[0] * rate**2 + jet.dclimb[0] * acceleration) * left
+            # The pitch axis turns with the vehicle.
+            + yaw_rate * pitch_rate * np.cross(_UP, left)
+        )
+        a = jet.ddp[0] * rate**2 + jet.dp[0] * acceleration
+        return SpatialAcceleration(alpha, a)
+
+    def _at(self, t: float) -> tuple[PathJet, float, float]:
+        u, rate, acceleration = self.path_parameter(t)
+        return self._path.evaluate(u), rate[0], acceleration[0]
+
+
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+def _left(jet: PathJet) -> np.ndarray:
+    return np.array([-np.sin(jet.yaw[0]), np.cos(jet.yaw[0]), 0.0])
+
+
+def make_trajectory(
+    network: RoadNetwork, route: Route, speeds: Speeds, source="route"
+) -> Trajectory:
+    """Returns the trajectory of a route.
+
+    Args:
+        network: the roads.
+        route: the legs.
+        speeds: the bounds on speed and acceleration.
+        source: the file that errors name.
+
+    Raises:
+        InputError: the route does not suit the network; see
+            `cns_drake.route.make_lane_path`.
+    """
+    lane_path = make_lane_path(network, route, _POINT_SPACING, source)
+    return Trajectory(lane_path, speeds)
+
+
+class WheelMotion:
+    """Steering and rolling of one wheel that does not slip.
+
+    The wheel's centre is at p_BC = (x, y, r) in the vehicle frame, r its
+    radius. With path speed s, turn rate m about the vehicle's z and steering
+    angle d (all per path parameter), the ground below the wheel passes with
+    (s - m y, m x): tan(d) = m x / (s - m y), so a wheel on the rear axle
+    (x = 0) needs no steering, and it rolls by the length of that vector
+    divided by r.
+    """
+
+    def __init__(self, trajectory: Trajectory, p_BC):
+        """Prepares the wheel.
+
+        Args:
+            trajectory: of the vehicle.
+            p_BC: position of the wheel's centre in the vehicle frame [m].
+        """
+        self._trajectory = trajectory
+        self._x, self._y, self._radius = p_BC
+        self._rolled = PathIntegral(
+            trajectory.path, lambda jet: np.hypot(*self._ground_velocity(jet))
+        )
+
+    def _ground_velocity(self, jet: PathJet) -> tuple[np.ndarray, np.ndarray]:
+        return jet.speed - jet.turn * self._y, jet.turn * self._x
+
+    def evaluate(self, t) -> tuple[AngleMotion, AngleMotion]:
+        """Returns the motions of steering and rolling at (N,) times.
+
+        Steering is positive to the left, rolling positive forwards and zero
+        at the start.
+        """
+        u, rate, acceleration = self._trajectory.path_parameter(t)
+        jet = self._trajectory.path.evaluate(u)
+        a, b = self._ground_velocity(jet)
+        da, db = jet.dspeed - jet.dturn * self._y, jet.dturn * self._x
+        dda, ddb = jet.ddspeed - jet.ddturn * self._y, jet.ddturn * self._x
+        g = np.hypot(a, b)
+        dg = (a * da + b * db) / g
+        dsteer = (a * db - b * da) / g**2
+        ddsteer = (a * ddb - b * dda) / g**2 - 2 * dsteer * dg / g
+        steering = AngleMotion(
+            angle=np.arctan2(b, a),
+            rate=dsteer * rate,
+            acceleration=ddsteer * rate**2 + dsteer * acceleration,
+        )
+        rolling = AngleMotion(
+            angle=self._rolled.evaluate(u) / self._radius,
+            rate=g * rate / self._radius,
+            acceleration=(dg * rate**2 + g * acceleration) / self._radius,
+        )
+        return steering, rolling
