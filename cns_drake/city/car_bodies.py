@@ -37,6 +37,8 @@ class CarForm:
         pillars: x at the belt of the pillars between the first and the
             last one [m].
         panelled: side windows only beside the front seats, as on vans.
+        bed_wall: height of the walls around an open bed behind the cabin,
+            0 for none [m].
     """
 
     length: float
@@ -50,6 +52,7 @@ class CarForm:
     cabin_roof: tuple[float, float]
     pillars: tuple[float, ...]
     panelled: bool = False
+    bed_wall: float = 0.0
 
     def belt(self, x: float) -> float:
         """Returns the height of the lower body's upper edge at `x` [m]."""
@@ -65,13 +68,15 @@ class CarForm:
 
 def car_meshes(form: CarForm) -> tuple[Mesh, Mesh]:
     """Returns the painted body and the dark trim (glass, wheels)."""
-    paint = [_lower_body(form), *_mirrors(form)]
-    trim = _wheels(form)
+    paint = [_lower_body(form), _roof(form), *_mirrors(form)]
+    trim = [*_wheels(form), *_lamps(form)]
+    if form.bed_wall > 0:
+        paint += _bed(form)
     if form.panelled:
         paint.append(_cabin(form, 0.0))
         trim += _van_windows(form)
     else:
-        paint += [_roof(form), *_pillars(form)]
+        paint += _pillars(form)
         trim.append(_cabin(form, 0.025))
     return merge_meshes(paint), merge_meshes(trim)
 
@@ -139,19 +144,17 @@ def _cabin_outline(form: CarForm, level: float, inset: float) -> np.ndarray:
 
 def _cabin(form: CarForm, inset: float) -> Mesh:
     """Returns the closed cabin from just below the belt to the roof."""
-    top = _cabin_outline(form, 1.0, inset)
-    levels = [_cabin_outline(form, t, inset) for t in (0.0, 0.6)]
-    crown = top * (0.96, 0.9, 1.0) + (0.0, 0.0, 0.055)
-    return loft([*levels, top, crown])
+    return loft([_cabin_outline(form, t, inset) for t in (0.0, 0.6, 1.0)])
 
 
 def _roof(form: CarForm) -> Mesh:
-    """Returns the roof panel, a little wider than the glass below it."""
+    """Returns the roof panel, a little wider than the cabin below it."""
     edge = _cabin_outline(form, 1.0, -0.01)
     middle = edge.mean(axis=0)
+    low = edge - np.array([0.0, 0.0, 0.025])
     crown = middle + (edge - middle) * (0.9, 0.8, 1.0)
-    low = edge + np.array([0.0, 0.0, -0.025])
-    return loft([low, edge, crown + np.array([0.0, 0.0, 0.06])])
+    crown[:, 2] = form.height
+    return loft([low, edge, crown])
 
 
 def _pillars(form: CarForm) -> list[Mesh]:
@@ -213,22 +216,44 @@ def _mirrors(form: CarForm) -> list[Mesh]:
     ]
 
 
+def _bed(form: CarForm) -> list[Mesh]:
+    """Returns the side walls and the tailgate of an open bed."""
+    rear, front = 0.05 - form.length / 2, form.cabin_base[0]
+    z = form.belt(rear + 0.3)
+    half = form.width / 2 - 0.1
+    long = (front - rear, 0.07, form.bed_wall)
+    middle = z + form.bed_wall / 2
+    walls = [
+        box_mesh(long, ((rear + front) / 2, side * half, middle))
+        for side in (1, -1)
+    ]
+    gate = (0.07, 2 * half + 0.07, form.bed_wall)
+    return [*walls, box_mesh(gate, (rear + 0.035, 0.0, middle))]
+
+
+def _lamps(form: CarForm) -> list[Mesh]:
+    """Returns grille and number plate, head and rear lamps."""
+    nose, tail = form.length / 2, -form.length / 2
+    front, rear = form.belt(nose) - 0.04, form.belt(tail) - 0.02
+    y = form.half_width(nose) - 0.22
+    pieces = [
+        box_mesh((0.06, 0.7, 0.16), (nose - 0.015, 0, front - 0.06)),
+        box_mesh((0.06, 0.5, 0.11), (tail + 0.015, 0, rear - 0.12)),
+    ]
+    pieces += [
+        box_mesh((0.1, 0.24, 0.1), (x, side * y, z))
+        for x, z in ((nose - 0.045, front), (tail + 0.045, rear))
+        for side in (1, -1)
+    ]
+    return pieces
+
+
 def _wheels(form: CarForm) -> list[Mesh]:
     r, half = form.wheel_radius, _TYRE_WIDTH / 2
-    wheel = along_y(
-        lathe(
-            [
-                (0.9 * r, -half),
-                (r, -half + 0.03),
-                (r, half - 0.03),
-                (0.9 * r, half),
-            ],
-            10,
-        )
-    )
+    left = along_y(lathe([(r, -half), (r, half - 0.03), (0.85 * r, half)], 10))
     track = form.width / 2 - half - 0.03
     return [
-        wheel.moved((axle, side * track, r))
+        left.moved((axle, side * track, r), yaw)
         for axle in form.axles
-        for side in (1, -1)
+        for side, yaw in ((1, 0.0), (-1, np.pi))
     ]
