@@ -111,8 +111,8 @@ def cast_packets(
     """Casts rays in packets of 16; see `RayCastingScene.cast_rays`.
 
     A packet is an RTCRayHit16: 12 ray fields and 9 hit fields (10 with room
-    for the primitive of an instance array) of 16 lanes; like the lanes' mask it is aligned
-    to 64 bytes, as Embree's vector loads demand.
+    for the primitive of an instance array) of 16 lanes. It and the mask of
+    lanes are aligned to 64 bytes, as Embree's vector loads demand.
     """
     lanes = 16
     storage = np.zeros((12 + 10 + 1 + 1) * lanes, np.float32)

@@ -18,6 +18,8 @@ def describe_validation_error(source, error) -> str:
     """
     fault = error.errors()[0]
     field = ".".join(str(part) for part in fault["loc"]) or "(top level)"
+    # pydantic puts this before what our own validators say.
+    message = fault["msg"].removeprefix("Value error, ")
     more = error.error_count() - 1
     tail = f" (and {more} more)" if more else ""
-    return f"{source}: {field}: {fault['msg']}{tail}"
+    return f"{source}: {field}: {message}{tail}"

@@ -119,6 +119,23 @@ def structure_name(geometry_name: str) -> str:
     return model.rpartition("::")[2] or visual
 
 
+def check_shape(name: str, shape: Shape) -> None:
+    """Checks that rays can be cast on a shape.
+
+    Args:
+        name: of the geometry.
+        shape: its shape.
+
+    Raises:
+        InputError: they cannot; the geometry is named.
+    """
+    if not isinstance(shape, (Box, Sphere, Ellipsoid, Cylinder, Capsule, Mesh)):
+        raise InputError(
+            f"geometry '{name}': a LiDAR cannot see a {type(shape).__name__}; "
+            "use a box, sphere, cylinder, capsule, ellipsoid or mesh"
+        )
+
+
 def read_perception_geometry(
     inspector: SceneGraphInspector,
     keep_frame: Callable[[FrameId], bool] = lambda frame_id: True,
@@ -161,6 +178,9 @@ def _diffuse_rgb(inspector, geometry_id):
 
 
 def _surface(name: str, shape: Shape, meshes: _MeshFiles) -> Surface:
+    check_shape(name, shape)
+    if isinstance(shape, Mesh):
+        return meshes.read(name, shape)
     if isinstance(shape, Box):
         return TriangleSurface(_CUBE_CORNERS * shape.size(), _CUBE_TRIANGLES)
     if isinstance(shape, Sphere):
@@ -169,15 +189,7 @@ def _surface(name: str, shape: Shape, meshes: _MeshFiles) -> Surface:
         return EllipsoidSurface((shape.a(), shape.b(), shape.c()))
     if isinstance(shape, Cylinder):
         return CylinderSurface(shape.radius(), shape.length())
-    if isinstance(shape, Capsule):
-        return CapsuleSurface(shape.radius(), shape.length())
-    if isinstance(shape, Mesh):
-        return meshes.read(name, shape)
-    raise InputError(
-        f"geometry '{name}': a LiDAR cannot be cast on a "
-        f"{type(shape).__name__}; use a box, sphere, cylinder, capsule, "
-        "ellipsoid or mesh"
-    )
+    return CapsuleSurface(shape.radius(), shape.length())
 
 
 class _MeshFiles:

@@ -11,6 +11,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 
 from cns_drake.errors import InputError
+from cns_drake.perception_geometry import check_shape
 from cns_drake.structure_table import StructureTable, load_structure_table
 
 
@@ -68,6 +69,13 @@ def load_world(
             f"{sdf}: no visual: the world has no perception geometry that a "
             "LiDAR can see"
         )
+    for geometry_id in inspector.GetAllGeometryIds(Role.kPerception):
+        try:
+            check_shape(
+                inspector.GetName(geometry_id), inspector.GetShape(geometry_id)
+            )
+        except InputError as error:
+            raise InputError(f"{sdf}: {error}") from None
     vehicle_model = None
     if vehicle is not None:
         vehicle_model = _parse(parser, vehicle)[0]

@@ -1,0 +1,155 @@
+"""The command `cns-drake`.
+
+Everything slow to import is imported by the command that needs it, so that
+`--help` and `list` answer at once.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cns_drake import terminal
+from cns_drake.errors import InputError
+
+app = typer.Typer(
+    help="Cities that change, driven and recorded by simulated LiDAR.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+Output = Annotated[
+    Path, typer.Option(help="Folder for recordings; created if need be.")
+]
+Frames = Annotated[
+    int | None,
+    typer.Option(min=1, help="Record only the first N frames (20 a second)."),
+]
+LidarPreset = Annotated[
+    str | None,
+    typer.Option(
+        help="Replace the LiDAR: cns, os1-32, os1-64, os1-128, vlp-16, hdl-64e."
+    ),
+]
+Recording = Annotated[
+    Path | None,
+    typer.Option(help="Also save a web page of the drive, FILE.html."),
+]
+Graphviz = Annotated[
+    Path | None,
+    typer.Option(help="Also save the Diagram as Graphviz text."),
+]
+Overwrite = Annotated[
+    bool, typer.Option("--overwrite", help="Replace an existing recording.")
+]
+
+
+@app.command("list")
+def list_sequences() -> None:
+    """List the shipped sequences."""
+    from rich.console import Console
+    from rich.table import Table
+    import yaml
+
+    from cns_drake.paths import shipped_sequences
+
+    table = Table("sequence", "map", "stage", "title")
+    for name, path in shipped_sequences().items():
+        fields = yaml.load(path.read_text(encoding="utf-8"), yaml.CSafeLoader)
+        table.add_row(name, fields["map"], fields["stage"], fields["title"])
+    Console().print(table)
+
+
+@app.command()
+def simulate(
+    scenario: Annotated[
+        str,
+        typer.Argument(
+            metavar="NAME|SCENARIO.yaml",
+            help="A shipped sequence, or a scenario file of your own.",
+        ),
+    ],
+    output: Output,
+    frames: Frames = None,
+    lidar: LidarPreset = None,
+    recording: Recording = None,
+    graphviz: Graphviz = None,
+    overwrite: Overwrite = False,
+) -> None:
+    """Drive a sequence and record it as a rosbag2 folder of MCAP."""
+    from cns_drake.sequence_script import run_sequence
+
+    run_sequence(
+        scenario,
+        output,
+        frames=frames,
+        lidar=lidar,
+        recording=recording,
+        graphviz=graphviz,
+        overwrite=overwrite,
+    )
+
+
+@app.command()
+def scan(
+    world: Annotated[
+        Path, typer.Argument(metavar="WORLD.sdf", help="Any SDF world.")
+    ],
+    pose: Annotated[
+        tuple[float, float, float, float, float, float],
+        typer.Option(
+            metavar="X Y Z ROLL PITCH YAW",
+            help="The sensor's pose in the world [m, rad].",
+        ),
+    ],
+    output: Annotated[
+        Path, typer.Option(help="Where to save: .pcd, .bin or .npy.")
+    ],
+    lidar: LidarPreset = "cns",
+) -> None:
+    """Take one scan of any SDF world."""
+    import numpy as np
+    from pydrake.math import RigidTransform, RollPitchYaw
+
+    from cns_drake.scanning import check_ending, save_scan, scan_world
+    from cns_drake.scenario import make_lidar_config
+    from cns_drake.world import load_world
+
+    if not np.isfinite(pose).all():
+        raise InputError("--pose: not finite")
+    check_ending(output)
+    pattern = make_lidar_config(lidar).pattern()
+    X_WS = RigidTransform(RollPitchYaw(*pose[3:]), pose[:3])
+    points = scan_world(load_world(world), X_WS, pattern)
+    save_scan(points, output)
+    typer.echo(f"{output}: {len(points)} points")
+
+
+@app.command()
+def reproduce(
+    maps: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[MAP]...", help="Which maps; all by default."),
+    ] = None,
+    *,
+    output: Output,
+    jobs: Annotated[
+        int, typer.Option(min=1, help="Sequences simulated side by side.")
+    ] = 2,
+) -> None:
+    """Simulate a map's sequences, evaluate them and report."""
+    from cns_drake.reproduction import reproduce_maps
+
+    reproduce_maps(maps, output, jobs)
+
+
+def main() -> None:
+    """Runs the command line."""
+    terminal.run(app)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,48 @@
+"""Where the shipped worlds are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+def worlds_folder() -> Path:
+    """Returns the folder of shipped maps.
+
+    In a wheel it lies inside the package, in a checkout beside it.
+    """
+    package = Path(__file__).resolve().parent
+    inside = package / "worlds"
+    return inside if inside.is_dir() else package.parent / "worlds"
+
+
+def vehicle_file() -> Path:
+    """Returns the SDF file of the vehicle."""
+    return worlds_folder() / "vehicle.sdf"
+
+
+def shipped_maps() -> dict[str, Path]:
+    """Returns the folder of each shipped map, by name."""
+    return {
+        path.parent.name: path.parent
+        for path in sorted(worlds_folder().glob("*/roads.yaml"))
+    }
+
+
+def shipped_sequences() -> dict[str, Path]:
+    """Returns the file of each shipped sequence, by name (`<map>_<NN>`)."""
+    return {
+        sequence_name(path): path
+        for folder in shipped_maps().values()
+        for path in sorted(folder.glob("sequence_*.yaml"))
+    }
+
+
+def sequence_name(path: Path) -> str:
+    """Returns the name of the sequence that a scenario file describes.
+
+    `<map>/sequence_04.yaml` is `<map>_04`; any other file has the name of
+    its stem.
+    """
+    if path.stem.startswith("sequence_"):
+        return f"{path.parent.name}_{path.stem.removeprefix('sequence_')}"
+    return path.stem

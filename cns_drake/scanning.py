@@ -1,0 +1,115 @@
+"""A single scan of any SDF world from any pose."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource
+from pydrake.systems.rendering import MultibodyPositionToGeometryPose
+
+from cns_drake.beam_pattern import BeamPattern
+from cns_drake.errors import InputError
+from cns_drake.files import complete_part, part_path, user_errors
+from cns_drake.lidar import Lidar
+from cns_drake.world import World
+
+
+def scan_world(
+    world: World, X_WS: RigidTransform, pattern: BeamPattern
+) -> np.ndarray:
+    """Returns one scan, taken with the world's models as they start.
+
+    Args:
+        world: what to scan.
+        X_WS: the sensor's pose in the world.
+        pattern: the beams.
+
+    Returns:
+        Structured array of `POINT_DTYPE`, in the sensor frame.
+    """
+    plant, scene_graph = world.plant, world.scene_graph
+    builder = DiagramBuilder()
+    builder.AddNamedSystem("scene_graph", scene_graph)
+    positions = plant.GetPositions(plant.CreateDefaultContext())
+    source = builder.AddNamedSystem("position", ConstantVectorSource(positions))
+    to_pose = builder.AddNamedSystem(
+        "geometry_pose", MultibodyPositionToGeometryPose(plant)
+    )
+    builder.Connect(source.get_output_port(), to_pose.get_input_port())
+    builder.Connect(
+        to_pose.get_output_port(),
+        scene_graph.get_source_pose_port(plant.get_source_id()),
+    )
+    lidar = builder.AddNamedSystem(
+        "lidar",
+        Lidar(
+            scene_graph.world_frame_id(),
+            X_WS,
+            pattern,
+            structures=world.structures,
+            anchored_frames=world.anchored_frames(),
+        ),
+    )
+    builder.Connect(
+        scene_graph.get_query_output_port(),
+        lidar.GetInputPort("geometry_query"),
+    )
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    return lidar.GetOutputPort("scan").Eval(lidar.GetMyContextFromRoot(context))
+
+
+def check_ending(path: Path) -> None:
+    """Checks that `save_scan` knows the format of a file.
+
+    Raises:
+        InputError: it does not.
+    """
+    if path.suffix not in _WRITERS:
+        raise InputError(
+            f"{path}: unknown ending '{path.suffix}'; known: "
+            f"{', '.join(_WRITERS)}"
+        )
+
+
+def save_scan(scan: np.ndarray, path: Path) -> None:
+    """Saves a scan's x, y, z and intensity; the ending tells the format.
+
+    `.bin` is KITTI's float32 x y z intensity, `.npy` the same numbers as an
+    N x 4 array, `.pcd` a binary PCD file.
+
+    Raises:
+        InputError: the ending is none of these, or the file cannot be
+            written.
+    """
+    xyzi = np.stack([scan[name] for name in ("x", "y", "z", "intensity")], 1)
+    check_ending(path)
+    with user_errors(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _WRITERS[path.suffix](xyzi, part_path(path))
+    complete_part(path)
+
+
+def _save_bin(xyzi: np.ndarray, part: Path) -> None:
+    part.write_bytes(xyzi.astype("<f4").tobytes())
+
+
+def _save_npy(xyzi: np.ndarray, part: Path) -> None:
+    with part.open("wb") as file:  # np.save would add an ending of its own.
+        np.save(file, xyzi)
+
+
+def _save_pcd(xyzi: np.ndarray, part: Path) -> None:
+    header = (
+        "# .PCD v0.7 - Point Cloud Data file format\n"
+        "VERSION 0.7\nFIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F F\n"
+        f"COUNT 1 1 1 1\nWIDTH {len(xyzi)}\nHEIGHT 1\n"
+        f"VIEWPOINT 0 0 0 1 0 0 0\nPOINTS {len(xyzi)}\nDATA binary\n"
+    )
+    part.write_bytes(header.encode() + xyzi.astype("<f4").tobytes())
+
+
+_WRITERS = {".bin": _save_bin, ".npy": _save_npy, ".pcd": _save_pcd}

@@ -1,0 +1,250 @@
+"""A scenario: everything that one recorded sequence depends on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+import re
+from typing import Annotated
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    StringConstraints,
+    ValidationError,
+    field_validator,
+)
+from pydrake.math import RigidTransform, RollPitchYaw
+import yaml
+
+from cns_drake.beam_pattern import (
+    LIDAR_PRESETS,
+    BeamPattern,
+    make_beam_pattern,
+)
+from cns_drake.errors import InputError, describe_validation_error
+from cns_drake.frame_clock import FRAME_PERIOD
+from cns_drake.paths import sequence_name, shipped_maps, shipped_sequences
+from cns_drake.route import Route
+from cns_drake.speed_profile import Speeds
+
+Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_]*$")]
+Triple = tuple[float, float, float]
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Mount(_Model):
+    """Where a sensor sits on the vehicle.
+
+    Attributes:
+        xyz: position in base_link [m].
+        rpy_deg: roll, pitch, yaw in base_link [deg].
+    """
+
+    xyz: Triple
+    rpy_deg: Triple = (0.0, 0.0, 0.0)
+
+    def pose(self) -> RigidTransform:
+        """Returns the sensor's pose in base_link."""
+        roll, pitch, yaw = (angle * _RAD_PER_DEG for angle in self.rpy_deg)
+        return RigidTransform(RollPitchYaw(roll, pitch, yaw), self.xyz)
+
+
+class LidarConfig(Mount):
+    """A LiDAR.
+
+    Attributes:
+        preset: which unit, a key of `LIDAR_PRESETS`.
+        columns: columns in a turn, in place of the preset's.
+        min_range: nearest range, in place of the preset's [m].
+        max_range: farthest range, in place of the preset's [m].
+    """
+
+    xyz: Triple = (0.0, 0.0, 1.6)
+    preset: str = "cns"
+    columns: int | None = Field(None, ge=4, le=8192)
+    min_range: float | None = Field(None, ge=0.0)
+    max_range: float | None = Field(None, gt=0.0, le=1000.0)
+
+    @field_validator("preset")
+    @classmethod
+    def _known(cls, preset: str) -> str:
+        if preset not in LIDAR_PRESETS:
+            known = ", ".join(LIDAR_PRESETS)
+            raise ValueError(f"unknown preset '{preset}'; known: {known}")
+        return preset
+
+    def pattern(self) -> BeamPattern:
+        """Returns the beams of one turn, which takes one frame."""
+        return make_beam_pattern(
+            self.preset,
+            FRAME_PERIOD,
+            num_columns=self.columns,
+            min_range=self.min_range,
+            max_range=self.max_range,
+        )
+
+
+class ImuConfig(Mount):
+    """An ideal IMU."""
+
+    xyz: Triple = (-1.0, 0.0, 1.6)
+
+
+class Scenario(_Model):
+    """A vehicle with sensors that follows a route through a stage.
+
+    Attributes:
+        name: of the sequence; file and folder names derive from it.
+        map: name of a shipped map, or the path of a folder laid out like
+            one (`roads.yaml`, `stage_<stage>.sdf`, `structures.csv`).
+        stage: which stage of the map.
+        title: what the sequence shows, in words.
+        route: the lanes to follow.
+        speeds: how fast.
+        lidars: the LiDARs by name; the name gives frame and topic.
+        imu: the IMU.
+        frames: how many frames to record; all of the route by default.
+        seed: of everything random; the shipped sensors have no noise.
+    """
+
+    name: Name
+    map: str
+    stage: Name
+    title: str = ""
+    route: Route
+    speeds: Speeds
+    lidars: dict[Name, LidarConfig] = Field(
+        default={"lidar": LidarConfig()}, min_length=1
+    )
+    imu: ImuConfig = ImuConfig()
+    frames: int | None = Field(None, ge=1)
+    seed: int = Field(0, ge=0)
+
+    @field_validator("lidars")
+    @classmethod
+    def _frames_differ(cls, lidars: dict) -> dict:
+        taken = {"map", "base_link", "imu"} & lidars.keys()
+        if taken:
+            raise ValueError(f"'{taken.pop()}' is the name of another frame")
+        return lidars
+
+    @property
+    def map_folder(self) -> Path:
+        """The folder of the map."""
+        return shipped_maps().get(self.map, Path(self.map))
+
+    @property
+    def world_file(self) -> Path:
+        """The SDF file of the stage."""
+        return self.map_folder / f"stage_{self.stage}.sdf"
+
+    @property
+    def roads_file(self) -> Path:
+        """The road network of the map."""
+        return self.map_folder / "roads.yaml"
+
+    def with_lidar_preset(self, preset: str) -> Scenario:
+        """Returns the scenario with every LiDAR replaced by a preset.
+
+        Raises:
+            InputError: the preset is not known.
+        """
+        replacement = make_lidar_config(preset)
+        lidars = {
+            name: replacement.model_copy(
+                update={"xyz": config.xyz, "rpy_deg": config.rpy_deg}
+            )
+            for name, config in self.lidars.items()
+        }
+        return self.model_copy(update={"lidars": lidars})
+
+    def check_files(self) -> None:
+        """Checks that the map and its stage exist.
+
+        Raises:
+            InputError: they do not.
+        """
+        folder = self.map_folder
+        if not folder.is_dir():
+            known = ", ".join(shipped_maps())
+            raise InputError(
+                f"{self.name}: map: '{self.map}' is neither a shipped map "
+                f"({known}) nor a folder"
+            )
+        if not self.world_file.is_file():
+            stages = sorted(
+                path.stem.removeprefix("stage_")
+                for path in folder.glob("stage_*.sdf")
+            )
+            raise InputError(
+                f"{self.name}: stage: map '{self.map}' has no stage "
+                f"'{self.stage}'; it has: {', '.join(stages) or 'none'}"
+            )
+
+
+_RAD_PER_DEG = 0.017453292519943295
+
+
+def make_lidar_config(preset: str) -> LidarConfig:
+    """Returns a LiDAR of a preset.
+
+    Raises:
+        InputError: the preset is not known.
+    """
+    try:
+        return LidarConfig(preset=preset)
+    except ValidationError as error:
+        raise InputError(describe_validation_error("--lidar", error)) from None
+
+
+def make_scenario(values: dict, source) -> Scenario:
+    """Validates a scenario.
+
+    Args:
+        values: the fields.
+        source: the file or argument that errors name.
+
+    Raises:
+        InputError: a field is missing, unknown or not usable.
+    """
+    try:
+        return Scenario.model_validate(values)
+    except ValidationError as error:
+        raise InputError(describe_validation_error(source, error)) from None
+
+
+def load_scenario(name_or_file: str | Path) -> Scenario:
+    """Loads a shipped sequence by name, or a scenario file.
+
+    Raises:
+        InputError: there is no such sequence or file, or the file is not a
+            usable scenario.
+    """
+    shipped = shipped_sequences()
+    path = shipped.get(str(name_or_file), Path(name_or_file))
+    if not path.is_file():
+        if re.fullmatch(r"\w+", str(name_or_file)):
+            raise InputError(
+                f"unknown sequence '{name_or_file}'; known: "
+                f"{', '.join(shipped)}; or give a scenario file"
+            )
+        raise InputError(f"{path}: no such scenario file")
+    try:
+        values = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        fault = " ".join(str(error).split())
+        raise InputError(f"{path}: not readable as YAML: {fault}") from None
+    if not isinstance(values, dict):
+        raise InputError(f"{path}: not a mapping of scenario fields")
+    values.setdefault("name", sequence_name(path))
+    map_name = values.get("map")
+    if isinstance(map_name, str) and map_name not in shipped_maps():
+        # Relative to the file, and independent of where it is read from.
+        values["map"] = str((path.parent / map_name).resolve())
+    scenario = make_scenario(values, path)
+    scenario.check_files()
+    return scenario

@@ -1,0 +1,174 @@
+"""Running a scenario from its first frame to its last."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+import math
+from pathlib import Path
+import time
+
+from pydrake.systems.analysis import Simulator
+
+from cns_drake import __version__
+from cns_drake.bag_writer import BagWriter, check_folder
+from cns_drake.errors import InputError
+from cns_drake.files import check_writable, complete_part, write_part
+from cns_drake.frame_clock import FRAME_PERIOD, START_NS
+from cns_drake.mcap_recorder import make_calibration, recording_topics
+from cns_drake.meshcat_recording import MeshcatRecorder
+from cns_drake.scenario import Scenario
+from cns_drake.station import load_stage, make_station, plan_drive
+from cns_drake.world import World
+
+# Reports that so many frames of so many are done.
+ProgressCallback = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a simulation did.
+
+    Attributes:
+        name: of the sequence.
+        folder: the recording.
+        num_frames: frames recorded.
+        simulated_s: simulated time from the first frame to the last [s].
+        wall_s: time that took, without loading [s].
+        loading_s: time to load the stage and plan the drive [s].
+    """
+
+    name: str
+    folder: Path
+    num_frames: int
+    simulated_s: float
+    wall_s: float
+    loading_s: float
+
+    @property
+    def real_time_factor(self) -> float:
+        """Simulated seconds per second."""
+        return self.simulated_s / self.wall_s if self.wall_s > 0 else math.inf
+
+
+def simulate(
+    scenario: Scenario,
+    output: Path,
+    *,
+    page_file: Path | None = None,
+    graphviz_file: Path | None = None,
+    overwrite: bool = False,
+    on_frame: ProgressCallback = lambda done, total: None,
+) -> Run:
+    """Simulates a scenario and records it as `<output>/<name>/`.
+
+    Args:
+        scenario: what to run.
+        output: the folder of recordings.
+        page_file: where to save a web page of the drive, if anywhere.
+        graphviz_file: where to save the Diagram as Graphviz text, if
+            anywhere.
+        overwrite: replace an existing recording of that name.
+        on_frame: is told about progress.
+
+    Raises:
+        InputError: the scenario cannot be run or its output not be written.
+    """
+    folder = output / scenario.name
+    start = time.perf_counter()
+    for file in (page_file, graphviz_file):
+        if file is not None:
+            check_writable(file)
+    # What can be found wrong at once is found before anything slow.
+    check_folder(folder, overwrite)
+    scenario.check_files()
+    trajectory = plan_drive(scenario)
+    available = math.floor(trajectory.duration / FRAME_PERIOD) + 1
+    num_frames = scenario.frames or available
+    if num_frames > available:
+        raise InputError(
+            f"{scenario.name}: frames: {num_frames} asked for, but the route "
+            f"takes only {available}"
+        )
+    scenario = scenario.model_copy(update={"frames": num_frames})
+    world = load_stage(scenario)
+    X_BSs = {name: lidar.pose() for name, lidar in scenario.lidars.items()}
+    bag = BagWriter(
+        folder,
+        recording_topics(scenario.lidars),
+        start_ns=START_NS,
+        attachments={
+            "scenario.json": scenario.model_dump(mode="json"),
+            "structures.json": _structure_list(world),
+            "calibration.json": make_calibration(X_BSs, scenario.imu.pose()),
+        },
+        scenario=scenario.model_dump(mode="json"),
+        custom_data={
+            "cns_drake_version": __version__,
+            "map": scenario.map,
+            "stage": scenario.stage,
+            "seed": str(scenario.seed),
+        },
+        overwrite=overwrite,
+    )
+    page = None
+    if page_file is not None:
+        page = MeshcatRecorder(
+            world,
+            X_BSs=X_BSs,
+            period=FRAME_PERIOD,
+            other_stage=_other_stage(scenario),
+        )
+    with bag:
+        diagram = make_station(
+            scenario, world=world, trajectory=trajectory, bag=bag, page=page
+        )
+        if graphviz_file is not None:
+            write_part(graphviz_file, diagram.GetGraphvizString())
+            complete_part(graphviz_file)
+        simulator = Simulator(diagram)
+        loaded = time.perf_counter()
+
+        def monitor(context):
+            done = round(context.get_time() / FRAME_PERIOD) + 1
+            on_frame(min(done, num_frames), num_frames)
+
+        simulator.set_monitor(monitor)
+        # Frame k is recorded at k periods; ending with the last one's time,
+        # no rounding can add or drop a frame.
+        end = (num_frames - 1) * FRAME_PERIOD
+        simulator.AdvanceTo(end)
+    finished = time.perf_counter()
+    if page is not None:
+        page.save(page_file)
+    return Run(
+        name=scenario.name,
+        folder=folder,
+        num_frames=num_frames,
+        simulated_s=end,
+        wall_s=finished - loaded,
+        loading_s=loaded - start,
+    )
+
+
+def _structure_list(world: World) -> list[dict]:
+    return [
+        {
+            "instance": entry.instance,
+            "name": entry.name,
+            "class": entry.semantic_class,
+            "label": entry.label,
+        }
+        for entry in world.structures
+    ]
+
+
+def _other_stage(scenario: Scenario) -> World | None:
+    """Returns the stage to compare with: the last, or else the first."""
+    stages = sorted(scenario.map_folder.glob("stage_*.sdf"))
+    last = stages[-1] if stages[-1] != scenario.world_file else stages[0]
+    if last == scenario.world_file:
+        return None
+    return load_stage(
+        scenario.model_copy(update={"stage": last.stem.removeprefix("stage_")})
+    )

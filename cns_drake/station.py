@@ -1,0 +1,134 @@
+"""The Diagram: the one place where systems are wired."""
+
+from __future__ import annotations
+
+from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.rendering import MultibodyPositionToGeometryPose
+
+from cns_drake.bag_writer import BagWriter
+from cns_drake.city.road_network import load_road_network
+from cns_drake.frame_clock import FRAME_PERIOD, START_NS
+from cns_drake.imu import add_imu
+from cns_drake.lidar import Lidar
+from cns_drake.mcap_recorder import McapRecorder
+from cns_drake.meshcat_recording import MeshcatRecorder
+from cns_drake.odometry import add_odometry
+from cns_drake.paths import vehicle_file
+from cns_drake.scenario import Scenario
+from cns_drake.trajectory import Trajectory, make_trajectory
+from cns_drake.vehicle_motion import VehicleMotion
+from cns_drake.world import World, load_world
+
+
+def make_station(
+    scenario: Scenario,
+    *,
+    world: World | None = None,
+    trajectory: Trajectory | None = None,
+    bag: BagWriter | None = None,
+    page: MeshcatRecorder | None = None,
+) -> Diagram:
+    """Makes the Diagram of a scenario.
+
+    Systems: `scene_graph` holds the stage and the vehicle, `vehicle_motion`
+    prescribes where the vehicle is, `geometry_pose` passes that on to the
+    SceneGraph; a `Lidar` for each entry of `scenario.lidars` under its name,
+    an accelerometer and a gyroscope, and `odometry` measure; `mcap_recorder`
+    and `meshcat_recorder` take down what they measure.
+
+    Exported output ports: `<lidar>_scan`, `specific_force`,
+    `angular_velocity`, `odometry`, `geometry_query`.
+
+    Args:
+        scenario: what to build.
+        world: the stage with the vehicle, if already loaded; its SceneGraph
+            passes to the Diagram.
+        trajectory: the drive, if already planned.
+        bag: an open recording of the scenario's topics.
+        page: a recorder of the same world for a web page.
+
+    Raises:
+        InputError: the scenario's files cannot be used.
+    """
+    world = world or load_stage(scenario)
+    trajectory = trajectory or plan_drive(scenario)
+    X_BSs = {name: lidar.pose() for name, lidar in scenario.lidars.items()}
+    X_BI = scenario.imu.pose()
+    plant = world.plant
+    base = plant.GetBodyByName("base_link", world.vehicle)
+
+    builder = DiagramBuilder()
+    scene_graph = builder.AddNamedSystem("scene_graph", world.scene_graph)
+    motion = builder.AddNamedSystem(
+        "vehicle_motion", VehicleMotion(plant, world.vehicle, trajectory)
+    )
+    to_pose = builder.AddNamedSystem(
+        "geometry_pose", MultibodyPositionToGeometryPose(plant)
+    )
+    builder.Connect(motion.GetOutputPort("position"), to_pose.get_input_port())
+    builder.Connect(
+        to_pose.get_output_port(),
+        scene_graph.get_source_pose_port(plant.get_source_id()),
+    )
+
+    # What is measured, by name: also the names of the exported ports.
+    measured = {"geometry_query": scene_graph.get_query_output_port()}
+    for name, config in scenario.lidars.items():
+        lidar = builder.AddNamedSystem(
+            name,
+            Lidar(
+                plant.GetBodyFrameIdOrThrow(base.index()),
+                X_BSs[name],
+                config.pattern(),
+                structures=world.structures,
+                anchored_frames=world.anchored_frames(),
+            ),
+        )
+        builder.Connect(
+            measured["geometry_query"], lidar.GetInputPort("geometry_query")
+        )
+        measured[f"{name}_scan"] = lidar.GetOutputPort("scan")
+    accelerometer, gyroscope = add_imu(builder, plant, motion, base, X_BI)
+    measured["specific_force"] = accelerometer.get_measurement_output_port()
+    measured["angular_velocity"] = gyroscope.get_measurement_output_port()
+    odometry = add_odometry(builder, motion, base)
+    measured["odometry"] = odometry.GetOutputPort("odometry")
+
+    recorders = {"meshcat_recorder": page}
+    if bag is not None:
+        recorders["mcap_recorder"] = McapRecorder(
+            bag,
+            X_BSs=X_BSs,
+            X_BI=X_BI,
+            period=FRAME_PERIOD,
+            start_ns=START_NS,
+        )
+    for name, recorder in recorders.items():
+        if recorder is not None:
+            _connect(builder, name, recorder, measured)
+    for name, port in measured.items():
+        builder.ExportOutput(port, name)
+    diagram = builder.Build()
+    diagram.set_name(scenario.name)
+    return diagram
+
+
+def load_stage(scenario: Scenario) -> World:
+    """Loads the stage of a scenario with the vehicle in it."""
+    return load_world(scenario.world_file, vehicle=vehicle_file())
+
+
+def plan_drive(scenario: Scenario) -> Trajectory:
+    """Plans the drive of a scenario along its route."""
+    network = load_road_network(scenario.roads_file)
+    return make_trajectory(
+        network, scenario.route, scenario.speeds, scenario.name
+    )
+
+
+def _connect(builder, name, recorder, measured) -> None:
+    """Adds a recorder and connects its inputs to the ports of their names."""
+    builder.AddNamedSystem(name, recorder)
+    for k in range(recorder.num_input_ports()):
+        port = recorder.get_input_port(k)
+        builder.Connect(measured[port.get_name()], port)

@@ -1,0 +1,14 @@
+"""Metropolis, stage 01: the city before its towers.
+
+The oldest stage that the map has. A drive around the ring and along both
+avenues past cleared lots and young streets; `diagrams/metropolis_04.py`
+drives through the finished city on a route that overlaps with this one.
+
+What is driven is data, `worlds/metropolis/sequence_01.yaml`; how it is wired
+is `cns_drake.station.make_station`.
+"""
+
+from cns_drake.sequence_script import main
+
+if __name__ == "__main__":
+    main("metropolis_01", __doc__)
