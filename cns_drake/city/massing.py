@@ -64,10 +64,12 @@ def rounded(points, corners: dict[int, float], step: float) -> np.ndarray:
         step: longest chord of the arcs [m].
 
     Returns:
-        The outline with each of these corners replaced by chords.
+        The outline with each of these corners replaced by chords; its first
+        edge is what the arcs leave of the first edge given.
     """
     points = np.asarray(points, dtype=float)
     result: list[np.ndarray] = []
+    front = 0
     for k, p in enumerate(points):
         if k not in corners:
             result.append(p)
@@ -89,7 +91,9 @@ def rounded(points, corners: dict[int, float], step: float) -> np.ndarray:
             angle = start + turn * i / count
             arm = np.array([math.cos(angle), math.sin(angle)])
             result.append(center + radius * arm)
-    return np.array(result)
+        if k == 0:
+            front = len(result) - 1
+    return np.roll(np.array(result), -front, axis=0)
 
 
 def flat(points, z: float, *, up: bool = True) -> Mesh:
@@ -195,6 +199,28 @@ def prism(points, z0: float, z1: float, *, bottom: bool = False) -> Mesh:
 def frustum(lower, upper, z0: float, z1: float) -> Mesh:
     """Returns a tapering solid without a bottom."""
     return merge_meshes([skirt(lower, upper, z0, z1), flat(upper, z1)])
+
+
+def sloped_prism(points, z0: float, height: float, low: float) -> Mesh:
+    """Returns a solid under a plane that rises along y.
+
+    Its top is `height` above z0 at the outline's greatest y and the
+    fraction `low` of it at the least.
+    """
+    points = np.asarray(points, dtype=float)
+    n, y = len(points), points[:, 1]
+    share = (y - y.min()) / (y.max() - y.min())
+    top = flat(points, 0.0)
+    z1 = z0 + height * (low + (1.0 - low) * share)
+    vertices = np.vstack(
+        [
+            np.column_stack([points, np.full(n, z0)]),
+            np.column_stack([points, z1]),
+        ]
+    )
+    walls = tuple((k, (k + 1) % n, n + (k + 1) % n, n + k) for k in range(n))
+    roof = tuple(tuple(n + i for i in face) for face in top.faces)
+    return Mesh(vertices, (*walls, *roof))
 
 
 def spire(points, tip, z0: float, z1: float) -> Mesh:

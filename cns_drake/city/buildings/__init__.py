@@ -13,12 +13,23 @@ from collections.abc import Collection
 import numpy as np
 from shapely.geometry import Polygon
 
+from cns_drake.city.buildings.art_deco_tower import ART_DECO_TOWER
 from cns_drake.city.buildings.brick_block import BRICK_BLOCK
+from cns_drake.city.buildings.glass_skyscraper import GLASS_SKYSCRAPER
+from cns_drake.city.buildings.office import OFFICE
 from cns_drake.city.buildings.site import Archetype, Site
+from cns_drake.city.buildings.slab_tower import SLAB_TOWER
 from cns_drake.city.structures import Model
 
 ARCHETYPES: dict[str, Archetype] = {
-    archetype.name: archetype for archetype in (BRICK_BLOCK,)
+    archetype.name: archetype
+    for archetype in (
+        ART_DECO_TOWER,
+        BRICK_BLOCK,
+        GLASS_SKYSCRAPER,
+        OFFICE,
+        SLAB_TOWER,
+    )
 }
 
 

@@ -74,6 +74,11 @@ def window(
     return bay
 
 
+def ribbon(sill: float, head: float, depth: float, post: float) -> Bay:
+    """A band of glass with a post between one bay and the next."""
+    return window(1e3, sill, head, depth, pier=post / 2)
+
+
 def arched(
     width: float,
     bottom: float,
@@ -145,12 +150,12 @@ def entrance(
     return bay
 
 
-def corbel(width: float, z0: float, z1: float, reach: float) -> Bay:
-    """A bracket that stands out of the wall."""
+def bar(width: float, z0: float, z1: float, depth: float) -> Bay:
+    """An upright bar in the middle of the bay, at its own depth."""
 
     def bay(x0: float, x1: float) -> list[Relief]:
         a, b = _centred(x0, x1, width)
-        return [Patch(a, b, z0, z1, -reach)]
+        return [Patch(a, b, z0, z1, depth)]
 
     return bay
 
@@ -195,6 +200,11 @@ def stretches(
         return []
     step = room / count
     return [(margin + k * step, margin + (k + 1) * step) for k in range(count)]
+
+
+def plain(edge: int, length: float) -> list[Relief]:
+    """The layout of a wall without openings."""
+    return []
 
 
 def rhythm(pitch: float, bays: Sequence[Bay], margin: float = 0.5) -> Layout:

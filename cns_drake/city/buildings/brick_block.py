@@ -10,7 +10,7 @@ from cns_drake.city.buildings import bays, details, tiers
 from cns_drake.city.buildings.roof_equipment import equip_roof
 from cns_drake.city.buildings.site import Archetype, Assembly, Site
 from cns_drake.city.facades import Band, Facade
-from cns_drake.city.structures import Model
+from cns_drake.city.structures import MeshShape, Model
 
 _BRICKS = (
     (0.56, 0.33, 0.27),
@@ -36,6 +36,7 @@ class BrickBlock:
     transom: float | None
     ledge: float
     hood: float
+    sill_course: float
     corbels: bool
     pilasters: bool
     cornice_reach: float
@@ -64,9 +65,10 @@ def draw(site: Site, height: float, rng: np.random.Generator) -> BrickBlock:
         head=round(float(rng.uniform(2.4, 2.7)), 2),
         recess=round(float(rng.uniform(0.18, 0.35)), 2),
         mullions=1 if style == 0 else 0,
-        transom=1.65 if style in (1, 2) else None,
-        ledge=0.0 if style == 2 else 0.12,
-        hood=0.12 if style == 2 else 0.0,
+        transom=1.65 if style == 1 else None,
+        ledge=0.12 if style == 2 else 0.0,
+        hood=0.12 if style == 3 else 0.0,
+        sill_course=0.1 if style < 2 else 0.0,
         corbels=bool(rng.random() < 0.4),
         pilasters=bool(rng.random() < 0.5),
         cornice_reach=round(float(rng.uniform(0.5, 1.0)), 2),
@@ -131,11 +133,12 @@ def build(p: BrickBlock, site: Site, rng: np.random.Generator) -> Model:
     layout = bays.by_edge(
         {}, bays.rhythm(p.pitch, [sash], margin=0.9), site.blind_edges
     )
-    walls = Facade(storey, (), layout, glass=(p.recess,))
+    course = Band(p.sill - 0.2, p.sill, -p.sill_course)
+    walls = Facade(storey, (course,), layout, glass=(p.recess,))
     bottom = top
     top = tiers.add_storeys(assembly, outline, walls, top, groups, per_group)
 
-    corbel = bays.corbel(0.35, 0.0, crown_height - p.parapet - 0.9, 0.3)
+    corbel = bays.bar(0.35, 0.0, crown_height - p.parapet - 0.9, -0.3)
     frieze = Facade(
         crown_height,
         (*tiers.cornice(crown_height - p.parapet, p.cornice_reach),),
@@ -152,10 +155,17 @@ def _add_fire_stairs(assembly, p, site, bottom, storey, top) -> None:
     wall = details.WallFrame(site.outline, p.stairs_edge)
     if wall.length < 9.0:
         return
-    x = p.stairs_at * (wall.length - 5.0)
-    floors = list(np.arange(bottom, top - 0.5 * storey, storey))
-    stairs = details.fire_stairs(x + 0.6, x + 4.6, 1.1, floors, 1.8)
-    assembly.add("fire_stairs", wall.place(stairs), rgb=(0.2, 0.2, 0.22))
+    x, y = wall.point(2.8 + p.stairs_at * (wall.length - 5.6), 0.0)
+    assembly.share("fire_stairs_flight", details.fire_stairs_flight())
+    scale = (1.0, 1.0, round(storey / details.FIRE_STAIRS_STOREY_M, 3))
+    for k in range(round((top - bottom) / storey) - 1):
+        assembly.place(
+            f"fire_stairs_{k}",
+            MeshShape("fire_stairs_flight", scale),
+            (x, y, bottom + k * storey),
+            wall.heading,
+            rgb=(0.2, 0.2, 0.22),
+        )
 
 
 BRICK_BLOCK = Archetype(

@@ -6,13 +6,18 @@ along the wall, y outwards and z up.
 
 from __future__ import annotations
 
-import itertools
+from collections.abc import Collection
+import functools
+import math
 
 import numpy as np
 
 from cns_drake.city import massing
 from cns_drake.city.buildings.site import FOUNDATION_M
 from cns_drake.city.mesh import Mesh, box_mesh, merge_meshes
+
+# Height that the shared flight of fire stairs climbs; parts scale it [m].
+FIRE_STAIRS_STOREY_M = 3.4
 
 
 class WallFrame:
@@ -24,6 +29,7 @@ class WallFrame:
 
     def __init__(self, outline, edge: int):
         outline = np.asarray(outline, dtype=float)
+        edge %= len(outline)
         start, end = outline[edge], outline[(edge + 1) % len(outline)]
         self.length = float(np.hypot(*(end - start)))
         self._start = start
@@ -40,6 +46,11 @@ class WallFrame:
         xy = self._start + np.outer(x, self._along) + np.outer(y, self._outward)
         vertices = np.column_stack([xy, height + z])
         return Mesh(vertices, tuple(face[::-1] for face in mesh.faces))
+
+    @property
+    def heading(self) -> float:
+        """Direction of the wall, left to right seen from outside [rad]."""
+        return math.atan2(self._along[1], self._along[0])
 
     def point(self, x: float, y: float) -> np.ndarray:
         """Returns a point given in wall coordinates."""
@@ -69,23 +80,105 @@ def awning(x0: float, x1: float, reach: float, z0: float, z1: float) -> Mesh:
 def balcony(
     x0: float, x1: float, reach: float, z: float, rail: float = 1.05
 ) -> Mesh:
-    """A slab with a solid balustrade around it."""
-    t = 0.1
-    middle, width = (x0 + x1) / 2, x1 - x0
-    return merge_meshes(
-        [
-            box_mesh((width, reach, 0.2), (middle, reach / 2, z - 0.1)),
-            box_mesh((width, t, rail), (middle, reach - t / 2, z + rail / 2)),
-            box_mesh(
-                (t, reach - t, rail),
-                (x0 + t / 2, (reach - t) / 2, z + rail / 2),
-            ),
-            box_mesh(
-                (t, reach - t, rail),
-                (x1 - t / 2, (reach - t) / 2, z + rail / 2),
-            ),
+    """A slab with a solid balustrade on its three free sides."""
+    t, low, high = 0.12, z - 0.2, z + rail
+    outer = [(x0, 0.0), (x0, reach), (x1, reach), (x1, 0.0)]
+    inner = [(x0 + t, 0.0), (x0 + t, reach - t)]
+    inner += [(x1 - t, reach - t), (x1 - t, 0.0)]
+    rings = ((outer, low), (outer, high), (inner, high), (inner, z))
+    vertices = np.array([(x, y, h) for ring, h in rings for x, y in ring])
+    faces = [
+        (4 * ring + k, 4 * ring + 4 + k, 4 * ring + 5 + k, 4 * ring + 1 + k)
+        for ring in range(3)
+        for k in range(3)
+    ]
+    faces += [(0, 1, 2, 3), (12, 15, 14, 13)]
+    return Mesh(vertices, tuple(faces))
+
+
+def piers(
+    outline,
+    pitch: float,
+    width: float,
+    reach: float,
+    z0: float,
+    z1: float,
+    *,
+    depth: float = 0.05,
+    margin: float = 0.4,
+    skip: Collection[int] = (),
+) -> Mesh:
+    """Upright fins or pilasters along all walls of an outline.
+
+    Args:
+        outline: of the walls.
+        pitch: about the distance between them [m].
+        width: along the wall [m].
+        reach: out of the wall [m].
+        z0, z1: bottom and top [m].
+        depth: how far they go into the wall, past recessed glass [m].
+        margin: between the ends of a wall and the middle of a pier [m].
+        skip: edges without piers.
+    """
+    pieces = []
+    for edge in range(len(outline)):
+        wall = WallFrame(outline, edge)
+        if edge in skip or wall.length < 2 * width:
+            continue
+        room = wall.length - 2 * margin
+        count = round(room / pitch)
+        if count < 1:  # A chord of a curve: one pier in its middle.
+            places = [wall.length / 2]
+        else:
+            places = [margin + k * room / count for k in range(count + 1)]
+        for x in places:
+            pier = _pier(round(x, 2), width, depth, reach, z0, z1)
+            pieces.append(wall.place(pier))
+    return merge_meshes(pieces)
+
+
+def corner_piers(
+    outline, width: float, reach: float, depth: float, z0: float, z1: float
+) -> Mesh:
+    """Angled piers around the convex corners of an outline.
+
+    Args:
+        outline: of the walls.
+        width: of each flank along its wall [m].
+        reach: out of the walls [m].
+        depth: into the walls, past recessed glass [m].
+        z0, z1: bottom and top [m].
+    """
+    outline = np.asarray(outline, dtype=float)
+    outer = massing.inset(outline, -reach)
+    inner = massing.inset(outline, depth)
+    pieces = []
+    for k, p in enumerate(outline):
+        before = WallFrame(outline, k - 1)
+        after = WallFrame(outline, k)
+        a, b = p - outline[k - 1], outline[(k + 1) % len(outline)] - p
+        if a[0] * b[1] - a[1] * b[0] < 0.1:
+            continue
+        low, high = before.length - width, width
+        plan = [
+            before.point(low, -depth),
+            before.point(low, reach),
+            outer[k],
+            after.point(high, reach),
+            after.point(high, -depth),
+            inner[k],
         ]
-    )
+        pieces.append(massing.prism(plan, z0, z1, bottom=True))
+    return merge_meshes(pieces)
+
+
+def _pier(x, width, depth, reach, z0, z1) -> Mesh:
+    """A box without its back, in wall coordinates."""
+    a, b = x - width / 2, x + width / 2
+    plan = [(a, -depth), (b, -depth), (b, reach), (a, reach)]
+    vertices = np.array([(x, y, z) for z in (z0, z1) for x, y in plan])
+    faces = ((1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7), (4, 5, 6, 7))
+    return Mesh(vertices, (*faces, (0, 3, 2, 1)))
 
 
 def steps(x0: float, x1: float, reach: float, rise: float, count: int) -> Mesh:
@@ -98,39 +191,32 @@ def steps(x0: float, x1: float, reach: float, rise: float, count: int) -> Mesh:
     return merge_meshes(pieces)
 
 
-def fire_stairs(
-    x0: float, x1: float, reach: float, floors: list[float], drop: float
-) -> Mesh:
-    """Iron landings at the floors, flights between, a ladder at the foot.
+@functools.cache
+def fire_stairs_flight() -> Mesh:
+    """One storey of iron fire stairs, a mesh that all buildings share.
 
-    Args:
-        x0, x1: ends of the landings [m].
-        reach: of the landings from the wall [m].
-        floors: heights of the landings, ascending [m].
-        drop: length of the ladder under the lowest landing [m].
+    In wall coordinates turned right-handed (x along the wall, y into it):
+    a landing 4 m long and 1.1 m deep at z = 0 with its railing, and a
+    flight up to the next one at z = `FIRE_STAIRS_STOREY_M`.
     """
-    pieces = []
-    for z in floors:
-        pieces += [
-            box_mesh((x1 - x0, reach, 0.08), ((x0 + x1) / 2, reach / 2, z)),
-            box_mesh((x1 - x0, 0.05, 0.08), ((x0 + x1) / 2, reach, z + 1.0)),
-            box_mesh((x1 - x0, 0.05, 0.08), ((x0 + x1) / 2, reach, z + 0.5)),
-            *(
-                box_mesh((0.06, 0.06, 1.0), (x, reach, z + 0.5))
-                for x in (x0, (x0 + x1) / 2, x1)
-            ),
-        ]
-    for k, (low, high) in enumerate(itertools.pairwise(floors)):
-        a, b = (x0 + 0.3, x1 - 0.3) if k % 2 else (x1 - 0.3, x0 + 0.3)
-        pieces += [
-            _beam((a, y, low), (b, y, high), 0.12)
-            for y in (0.35 * reach, 0.75 * reach)
-        ]
-    pieces += [
-        box_mesh((0.06, 0.06, drop), (x, reach - 0.1, floors[0] - drop / 2))
-        for x in (x0 + 0.2, x0 + 0.65)
+    length, reach, high = 4.0, 1.1, FIRE_STAIRS_STOREY_M
+    bars = [
+        box_mesh((length, reach, 0.08), (0.0, -reach / 2, 0.0)),
+        *(box_mesh((length, 0.05, 0.06), (0.0, -reach, z)) for z in (0.5, 1.0)),
+        *(
+            box_mesh((0.05, reach, 0.06), (x, -reach / 2, 1.0))
+            for x in (-length / 2, length / 2)
+        ),
+        *(
+            box_mesh((0.06, 0.06, 1.0), (x, -reach, 0.5))
+            for x in (-length / 2, 0.0, length / 2)
+        ),
     ]
-    return merge_meshes(pieces)
+    bars += [
+        _beam((-1.6, y, 0.0), (1.4, y, high), 0.12)
+        for y in (-0.35 * reach, -0.85 * reach)
+    ]
+    return merge_meshes(bars)
 
 
 def column(x: float, y: float, z0: float, z1: float, radius: float) -> Mesh:

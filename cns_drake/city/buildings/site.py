@@ -13,6 +13,8 @@ from shapely.geometry.polygon import orient
 from cns_drake.city.mesh import Mesh
 from cns_drake.city.structures import MeshShape, Model, Part, Shape
 
+Rgb = tuple[float, float, float]
+
 # Buildings reach below their own ground level, for the ground has relief.
 FOUNDATION_M = 0.5
 
@@ -102,8 +104,8 @@ class Assembly:
     """Collects the parts and meshes of one building."""
 
     name: str
-    rgb: tuple[float, float, float] | None = None
-    glass_rgb: tuple[float, float, float] = (0.20, 0.26, 0.31)
+    rgb: Rgb | None = None
+    glass_rgb: Rgb = (0.20, 0.26, 0.31)
     parts: list[Part] = field(default_factory=list)
     meshes: dict[str, Mesh] = field(default_factory=dict)
 
@@ -120,12 +122,20 @@ class Assembly:
         self.meshes[name] = mesh
         return name
 
-    def stack(self, part: str, mesh: Mesh, z0: float, step: float, count: int):
+    def stack(
+        self,
+        part: str,
+        mesh: Mesh,
+        z0: float,
+        step: float,
+        count: int,
+        rgb: Rgb | None = None,
+    ) -> None:
         """Adds a mesh and places it `count` times, one above another."""
-        key = self.define(part, mesh)
+        shape = MeshShape(self.define(part, mesh))
         for k in range(count):
-            shape = MeshShape(key)
-            self.place(f"{part}_{k:02d}", shape, (0.0, 0.0, z0 + k * step))
+            z = z0 + k * step
+            self.place(f"{part}_{k:02d}", shape, (0.0, 0.0, z), rgb=rgb)
 
     def share(self, mesh_name: str, mesh: Mesh) -> None:
         """Adds a mesh that other buildings use too, by its common name."""

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from cns_drake.city import massing
+from cns_drake.city.buildings import details
 from cns_drake.city.buildings.site import FOUNDATION_M, Assembly
 from cns_drake.city.facades import Band, Facade, facade_mesh, glass_mesh
 from cns_drake.city.mesh import Mesh, merge_meshes
@@ -60,8 +62,9 @@ def add_storeys(
 ) -> float:
     """Adds `groups` times `per_group` storeys; returns their top [m].
 
-    All glass of the storeys lies at one depth, so that one pane behind the
-    walls closes their windows. `extras` belong to one storey, in its own
+    Where all glass lies at one depth, one pane behind the walls closes all
+    windows; nothing else may then be deeper. Glass of several depths is
+    repeated with the storeys. `extras` belong to one storey, in its own
     height.
     """
     pieces = [facade_mesh(outline, facade.stacked(per_group))]
@@ -70,15 +73,97 @@ def add_storeys(
     step = per_group * facade.height
     assembly.stack(part, merge_meshes(pieces), z0, step, groups)
     top = z0 + groups * step
-    if facade.glass:
-        (depth,) = facade.glass
-        pane = massing.inset(outline, depth - _PANE_OVERLAP)
-        assembly.add(
-            f"{part}_glass",
-            massing.skirt(pane, pane, z0, top),
-            rgb=assembly.glass_rgb,
-        )
+    if len(facade.glass) == 1:
+        pane = massing.inset(outline, facade.glass[0] - _PANE_OVERLAP)
+        glass = massing.skirt(pane, pane, z0, top)
+        assembly.add(f"{part}_glass", glass, rgb=assembly.glass_rgb)
+    elif facade.glass:
+        glass = glass_mesh(outline, facade.stacked(per_group))
+        rgb = assembly.glass_rgb
+        assembly.stack(f"{part}_glass", glass, z0, step, groups, rgb)
     return top
+
+
+@dataclass(frozen=True)
+class Grooves:
+    """A wall of upright piers with windows over spandrels between them.
+
+    Attributes:
+        storey_height: wanted, of a storey [m].
+        spandrel: height of the wall under the windows [m].
+        ledge: how far a lip under the windows sticks out [m].
+        glass_depth: of the windows behind the spandrels [m].
+        pitch, width, reach: of the piers [m]; none where width is 0.
+        corner: width of solid corners [m]; 0 for glass around the corner.
+    """
+
+    storey_height: float
+    spandrel: float
+    ledge: float
+    glass_depth: float
+    pitch: float
+    width: float
+    reach: float
+    corner: float
+
+
+def add_grooved(
+    assembly: Assembly,
+    outline,
+    wall: Grooves,
+    z0: float,
+    goal: float,
+    part: str,
+    rise: float = 0.0,
+    most: int = 4,
+) -> float:
+    """Adds storeys from z0 to `goal`; their piers rise above it.
+
+    Bands that run around the building and piers as tall as the tier cost a
+    fraction of single windows.
+    """
+    groups, per_group, storey = divided(goal - z0, wall.storey_height, most)
+    depth = wall.glass_depth
+    bands = [Band(0.0, wall.spandrel, 0.0), Band(wall.spandrel, storey, depth)]
+    if wall.ledge > 0:
+        bands.append(Band(0.0, 0.2, -wall.ledge))
+    facade = Facade(storey, tuple(bands), glass=(depth,))
+    add_storeys(assembly, outline, facade, z0, groups, per_group, part=part)
+    pieces, into = [], depth + 0.05
+    if wall.corner > 0:
+        pieces.append(
+            details.corner_piers(
+                outline, wall.corner, wall.reach, into, z0, goal + rise
+            )
+        )
+    if wall.width > 0:
+        margin = max(wall.corner + wall.pitch - wall.width, into + wall.width)
+        pieces.append(
+            details.piers(
+                outline,
+                wall.pitch,
+                wall.width,
+                wall.reach,
+                z0,
+                goal + rise,
+                depth=into,
+                margin=margin,
+            )
+        )
+    if pieces:
+        assembly.add(f"{part}_piers", merge_meshes(pieces))
+    return goal
+
+
+def block(outline, facade: Facade, z0: float) -> Mesh:
+    """Returns walls with a flat lid, glass and all, as one mesh."""
+    pieces = [
+        facade_mesh(outline, facade, z0),
+        massing.flat(outline, z0 + facade.height),
+    ]
+    if facade.glass:
+        pieces.append(glass_mesh(outline, facade, z0))
+    return merge_meshes(pieces)
 
 
 def add_crown(

@@ -1,0 +1,192 @@
+"""The mid-rise office: shops and a lobby below, window bands, a penthouse."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cns_drake.city import massing
+from cns_drake.city.buildings import bays, details, outlines, tiers
+from cns_drake.city.buildings.roof_equipment import equip_roof
+from cns_drake.city.buildings.site import Archetype, Assembly, Site
+from cns_drake.city.facades import Band, Facade
+from cns_drake.city.structures import Model
+
+_PANELS = (
+    (0.78, 0.77, 0.74),
+    (0.66, 0.60, 0.52),
+    (0.50, 0.53, 0.56),
+    (0.73, 0.62, 0.50),
+)
+
+
+@dataclass(frozen=True)
+class Office:
+    """Parameters of an office; lengths in metres.
+
+    `style` is `ribbon` (bands of glass), `frame` (deep square frames) or
+    `grooves` (piers from the first floor to the top).
+    """
+
+    height: float
+    ground_height: float
+    storey_height: float
+    style: str
+    pitch: float
+    recess: float
+    sill: float
+    pier_reach: float
+    penthouse_height: float
+    penthouse_inset: float
+    parapet: float
+    awnings: float
+    roof_items: tuple[str, ...]
+    rgb: tuple[float, float, float]
+
+
+def draw(site: Site, height: float, rng: np.random.Generator) -> Office:
+    """Draws the parameters of one office."""
+    run = outlines.perimeter(site.outline)
+    tall = height > 18.0
+    return Office(
+        height=height,
+        ground_height=round(float(rng.uniform(4.4, 5.4)), 2),
+        storey_height=float(rng.uniform(3.4, 3.9)),
+        style=("ribbon", "frame", "grooves")[int(rng.integers(3))],
+        pitch=max(float(rng.uniform(3.0, 4.4)), run / 42),
+        recess=round(float(rng.uniform(0.25, 0.5)), 2),
+        sill=round(float(rng.uniform(0.75, 1.05)), 2),
+        pier_reach=round(float(rng.uniform(0.15, 0.32)), 2),
+        penthouse_height=round(float(rng.uniform(3.4, 4.4)), 1) * tall,
+        penthouse_inset=round(float(rng.uniform(2.2, 4.0)), 1),
+        parapet=round(float(rng.uniform(0.6, 1.2)), 2),
+        awnings=float(rng.uniform(0.0, 0.7)),
+        roof_items=(
+            "roof_air_handler",
+            "roof_lift_house",
+            "roof_ac_unit",
+            "roof_ac_unit",
+            "roof_vents",
+            "roof_dish",
+        )[: int(rng.integers(3, 7))],
+        rgb=_PANELS[int(rng.integers(len(_PANELS)))],
+    )
+
+
+def build(p: Office, site: Site, rng: np.random.Generator) -> Model:
+    """Builds the office on any outline."""
+    assembly = Assembly(site.name, p.rgb)
+    outline = site.outline
+    top = _add_ground(assembly, p, site, rng)
+    goal = p.height - p.penthouse_height - p.parapet - 0.5
+    if p.style == "grooves":
+        wall = tiers.Grooves(
+            p.storey_height,
+            p.sill,
+            0.0,
+            p.recess,
+            p.pitch,
+            0.5,
+            p.pier_reach,
+            0.8,
+        )
+        top = tiers.add_grooved(
+            assembly, outline, wall, top, goal, "storey", 0.2, most=8
+        )
+    else:
+        top = _add_windows(assembly, p, site, top, goal)
+    edge = Facade(
+        p.parapet + 0.5,
+        (
+            Band(0.1, 0.4, -0.2 if p.style == "ribbon" else 0.0),
+            Band(p.parapet + 0.2, p.parapet + 0.5, -0.35),
+        ),
+    )
+    roof = tiers.add_crown(assembly, outline, edge, top, p.parapet)
+    if p.penthouse_height > 0:
+        outline = massing.inset(outline, p.penthouse_inset)
+        roof = _add_penthouse(assembly, p, outline, roof)
+    equip_roof(assembly, outline, roof, p.roof_items, rng)
+    return assembly.model(site)
+
+
+def _add_ground(assembly, p: Office, site: Site, rng) -> float:
+    outline, h = site.outline, p.ground_height
+    front = details.WallFrame(outline, 0)
+    pitch = 1.6 * p.pitch
+    shops = bays.rhythm(
+        pitch, [bays.shop_front(h - 0.5, 0.5, door=False)], margin=0.7
+    )
+    lobby = bays.entrance(3.2, 3.2, 1.8)
+    sides = bays.rhythm(
+        1.5 * p.pitch, [bays.window(2.2, 1.2, h - 1.2, 0.5)], margin=0.9
+    )
+    ground = Facade(
+        h,
+        (Band(0.0, 0.35, -0.06), Band(h - 0.4, h, -0.15)),
+        bays.by_edge(
+            {0: bays.with_middle(shops, lobby, 5.0)},
+            shops if len(outline) > 4 else sides,
+            site.blind_edges,
+        ),
+        glass=(0.5,),
+    )
+    middle = front.length / 2
+    extras = [
+        front.place(details.canopy(middle - 2.6, middle + 2.6, 1.45, 3.4))
+    ]
+    for x0, x1 in bays.stretches(front.length, pitch, 0.7):
+        free = x1 < middle - 2.6 or x0 > middle + 2.6
+        if rng.random() < p.awnings and free:
+            shade = details.awning(x0 + 0.3, x1 - 0.3, 1.3, 2.7, h - 1.1)
+            extras.append(front.place(shade))
+    return tiers.add_ground(assembly, outline, ground, extras)
+
+
+def _add_windows(assembly, p: Office, site: Site, z0, goal) -> float:
+    groups, per_group, storey = tiers.divided(goal - z0, p.storey_height)
+    head = round(storey - 0.4, 2)
+    if p.style == "ribbon":
+        cells = bays.rhythm(
+            p.pitch, [bays.ribbon(p.sill, head, p.recess, 0.12)], margin=0.8
+        )
+        bands = (Band(p.sill - 0.15, p.sill, -0.08),)
+    else:
+        frame = bays.window(
+            p.pitch - 0.5, 0.45, head, p.recess, pier=0.22, mullions=1
+        )
+        cells = bays.rhythm(p.pitch, [frame], margin=0.6)
+        bands = ()
+    layout = bays.by_edge({}, cells, site.blind_edges)
+    walls = Facade(storey, bands, layout, glass=(p.recess,))
+    return tiers.add_storeys(
+        assembly, site.outline, walls, z0, groups, per_group
+    )
+
+
+def _add_penthouse(assembly, p: Office, outline, roof) -> float:
+    # It starts on the roof; its own parapet ends at the full height.
+    height = p.height - roof
+    eaves = height - 0.9
+    walls = Facade(
+        height,
+        (
+            Band(0.9, eaves - 0.3, 0.3),
+            Band(eaves, eaves + 0.3, -0.7),
+        ),
+        glass=(0.3,),
+    )
+    return tiers.add_crown(
+        assembly, outline, walls, roof, 0.6, part="penthouse"
+    )
+
+
+OFFICE = Archetype(
+    name="office",
+    draw=draw,
+    build=build,
+    heights=(12.0, 45.0),
+    widths=(14.0, 70.0),
+    any_outline=True,
+)

@@ -1,0 +1,109 @@
+"""Plans of buildings made from the outline of a site.
+
+All keep the front edge first.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cns_drake.city import massing
+
+
+def chamfered(points, cut: float) -> np.ndarray:
+    """Cuts every convex corner of an outline, `cut` metres along each edge."""
+    return _replaced(points, lambda p, a, b: [p - a * cut, p + b * cut])
+
+
+def notched(points, depth: float) -> np.ndarray:
+    """Takes a square of side `depth` out of every convex corner."""
+    return _replaced(
+        points,
+        lambda p, a, b: [
+            p - a * depth,
+            p - a * depth + b * depth,
+            p + b * depth,
+        ],
+    )
+
+
+def _replaced(points, corner) -> np.ndarray:
+    points = np.asarray(points, dtype=float)
+    result: list[np.ndarray] = []
+    for k, p in enumerate(points):
+        a = p - points[k - 1]
+        b = points[(k + 1) % len(points)] - p
+        a, b = a / np.hypot(*a), b / np.hypot(*b)
+        convex = a[0] * b[1] - a[1] * b[0] > 0.1
+        result.extend(corner(p, a, b) if convex else [p])
+        if k == 0:
+            front = len(result) - 1
+    return np.roll(np.array(result), -front, axis=0)
+
+
+def stadium(x0, y0, x1, y1, step: float = 3.0) -> np.ndarray:
+    """A rectangle whose short ends are half circles; front first."""
+    if x1 - x0 < y1 - y0:
+        raise ValueError("the long sides lie along x")
+    radius = 0.499 * (y1 - y0)
+    corners = dict.fromkeys(range(4), radius)
+    return massing.rounded(massing.rectangle(x0, y0, x1, y1), corners, step)
+
+
+def u_shape(x0, y0, x1, y1, wing: float, back: float) -> np.ndarray:
+    """A court open to the back: wings left and right of it, front closed."""
+    return np.array(
+        [
+            (x0, y0),
+            (x1, y0),
+            (x1, y1),
+            (x1 - wing, y1),
+            (x1 - wing, y0 + back),
+            (x0 + wing, y0 + back),
+            (x0 + wing, y1),
+            (x0, y1),
+        ]
+    )
+
+
+def l_shape(x0, y0, x1, y1, wing: float, back: float) -> np.ndarray:
+    """A front range and one wing on the left."""
+    return np.array(
+        [
+            (x0, y0),
+            (x1, y0),
+            (x1, y0 + back),
+            (x0 + wing, y0 + back),
+            (x0 + wing, y1),
+            (x0, y1),
+        ]
+    )
+
+
+def mirrored(points) -> np.ndarray:
+    """Mirrors an outline left to right about the middle of its extent."""
+    points = np.asarray(points, dtype=float)
+    middle = (points[:, 0].min() + points[:, 0].max()) / 2
+    flipped = np.column_stack([2 * middle - points[:, 0], points[:, 1]])
+    # Mirroring turns it clockwise; the front edge stays first.
+    return np.roll(flipped[::-1], 2 - len(points), axis=0)
+
+
+def shortest_side(points) -> float:
+    """Returns the shorter side of an outline's bounding box [m]."""
+    span = np.ptp(np.asarray(points, dtype=float), axis=0)
+    return float(min(span))
+
+
+def area(points) -> float:
+    """Returns the area inside an outline [m^2]."""
+    x, y = np.asarray(points, dtype=float).T
+    return float(abs(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))) / 2)
+
+
+def perimeter(points) -> float:
+    """Returns the length of an outline [m]."""
+    points = np.asarray(points, dtype=float)
+    return float(sum(math.dist(p, points[k - 1]) for k, p in enumerate(points)))
