@@ -1,0 +1,93 @@
+"""How the command line talks: results, progress, and one-line errors."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+import json
+import math
+import sys
+from typing import Any
+
+import typer
+
+from evaluation.errors import InputError
+
+# Typer brings click along, under a private name since 0.26: its base class
+# of all usage errors is reached through the one that is public.
+_USAGE_ERRORS = typer.BadParameter.__mro__[2]
+
+
+def run(app: typer.Typer, program: str) -> int:
+    """Runs a command line and returns its exit status.
+
+    Args:
+        app: the commands.
+        program: the name under which errors are reported.
+
+    Returns:
+        0 on success; 2 on bad usage or input, after one line on stderr;
+        130 if the user interrupted.
+    """
+    try:
+        status = app(prog_name=program, standalone_mode=False)
+    except _USAGE_ERRORS as error:
+        if not sys.argv[1:]:
+            # Without arguments the help is shown; that says it all.
+            return 2
+        return _fail(program, error.format_message())
+    except InputError as error:
+        return _fail(program, str(error))
+    except (KeyboardInterrupt, typer.Abort):
+        return _fail(program, "interrupted", status=130)
+    except BrokenPipeError:
+        # Whoever read the results has seen enough of them.
+        sys.stdout = None
+        return 0
+    return status if isinstance(status, int) else 0
+
+
+def track(items: Iterable[Any], description: str, total: int) -> Iterable[Any]:
+    """Shows a progress bar on stderr, if that is a terminal."""
+    from rich.console import Console
+    from rich.progress import track as rich_track
+
+    console = Console(stderr=True)
+    return rich_track(
+        items,
+        description=description,
+        total=total,
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    )
+
+
+def note(message: str) -> None:
+    """Tells the user something that is no result."""
+    print(message, file=sys.stderr)
+
+
+def print_json(values: dict) -> None:
+    """Prints a result as one JSON object."""
+    print(json.dumps(values, indent=2, allow_nan=False))
+
+
+def print_rows(rows: Iterable[tuple[str, str]]) -> None:
+    """Prints a result as lines of a name and a value."""
+    rows = list(rows)
+    width = max(len(name) for name, _ in rows)
+    for name, value in rows:
+        print(f"{name:<{width}}  {value}")
+
+
+def number(value: float | None) -> str:
+    """Returns a ratio with four decimals, as the paper prints them."""
+    if value is None or math.isnan(value):
+        return "undefined"
+    return f"{value:.4f}"
+
+
+def _fail(program: str, message: str, status: int = 2) -> int:
+    line = " ".join(message.split())
+    print(f"{program}: error: {line}", file=sys.stderr)
+    return status

@@ -1,0 +1,274 @@
+"""Maps of whole sequences: the points of all scans, thinned to voxels.
+
+Voxels lie on a grid that is fixed in the world, since the place of the grid
+changes what a coarse voxel map shows: multiples of the voxel size in x and
+y, and in z from -2.5 m on, so that ground at z = 0 lies in the middle of a
+5 m voxel. A voxel is represented by the centroid of its points.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from evaluation import points as point_arrays
+from evaluation.compiled import compiled
+from evaluation.progress import Track, silent
+from evaluation.sequences.sequence import Sequence
+
+VOXEL_SIZE = 5.0
+Z_ORIGIN = -2.5
+
+# A map for pictures shares the grid: so many voxels along a coarse one.
+PICTURE_DIVISIONS = 10
+
+# One slot of the hash table of voxels: the number of a voxel, how many points
+# it has (0: the slot is free), and their sum relative to its corner [m]. All
+# in one record, since the time goes into fetching slots from memory.
+_SLOT = np.dtype(
+    [
+        ("ix", "i4"),
+        ("iy", "i4"),
+        ("iz", "i4"),
+        ("count", "u4"),
+        ("sx", "f8"),
+        ("sy", "f8"),
+        ("sz", "f8"),
+    ],
+    align=True,
+)
+# Points that enter the table at once; it grows between such batches.
+_BATCH = 1 << 15
+# A table is at most this full, as a fraction (numerator, denominator).
+_LOAD = (3, 5)
+
+
+@dataclass(frozen=True)
+class VoxelMap:
+    """The occupied voxels of a cloud, sorted by index.
+
+    Attributes:
+        indices: (V, 3) int32 voxel number along x, y, z.
+        centroids_W: (V, 3) float64 mean of each voxel's points [m].
+        counts: (V,) int64 points in each voxel.
+        voxel_size: length of a voxel's side [m].
+    """
+
+    indices: np.ndarray
+    centroids_W: np.ndarray
+    counts: np.ndarray
+    voxel_size: float
+
+    def __len__(self) -> int:
+        return len(self.counts)
+
+    def coarsen(self, factor: int) -> VoxelMap:
+        """Returns the map on voxels that are `factor` times as long.
+
+        The result is that of the same points on the coarse grid (up to
+        rounding), because both grids have the same origin.
+        """
+        coarse = np.floor_divide(self.indices, factor)
+        # Sorted by fine index is not sorted by coarse one.
+        order = np.lexsort(coarse.T[::-1])
+        sorted_coarse = coarse[order]
+        is_first = np.ones(len(self), dtype=bool)
+        is_first[1:] = (np.diff(sorted_coarse, axis=0) != 0).any(axis=1)
+        starts = np.flatnonzero(is_first)
+        indices = sorted_coarse[starts]
+        voxel_size = self.voxel_size * factor
+        counts = np.add.reduceat(self.counts[order], starts)
+        offsets = self.centroids_W - _corners(coarse, voxel_size)
+        sums = np.add.reduceat(
+            (offsets * self.counts[:, None])[order], starts, axis=0
+        )
+        return VoxelMap(
+            indices=indices,
+            centroids_W=_corners(indices, voxel_size) + sums / counts[:, None],
+            counts=counts,
+            voxel_size=voxel_size,
+        )
+
+
+class VoxelAccumulator:
+    """Sums points into voxels as they come, in memory of the voxels' order.
+
+    Sums are kept relative to each voxel's corner, so that coordinates far
+    from the origin (UTM) lose nothing. The result depends only on the points
+    and their order.
+    """
+
+    def __init__(self, voxel_size: float = VOXEL_SIZE):
+        """Starts an empty map.
+
+        Args:
+            voxel_size: length of a voxel's side [m].
+        """
+        self._voxel_size = voxel_size
+        self._table = np.zeros(2 * _BATCH, dtype=_SLOT)
+        self._size = 0
+
+    def add(self, points: np.ndarray, X_WS: np.ndarray | None = None) -> int:
+        """Adds a cloud.
+
+        Args:
+            points: structured array of shape (N,) with x, y, z [m].
+            X_WS: (4, 4) pose of the frame in which they are expressed;
+                identity if left out.
+
+        Returns:
+            How many points were left out because they are not finite, or
+            farther away than voxels can be numbered.
+        """
+        X = np.array(np.eye(4) if X_WS is None else X_WS, dtype=np.float64)
+        X[2, 3] -= Z_ORIGIN
+        ignored = 0
+        for start in range(0, len(points), _BATCH):
+            batch = point_arrays.xyz(points[start : start + _BATCH])
+            self._reserve(len(batch))
+            self._size, skipped = _add_points(
+                batch, X, self._voxel_size, self._table, self._size
+            )
+            ignored += skipped
+        return ignored
+
+    def to_map(self) -> VoxelMap:
+        """Returns the map of all points so far."""
+        cells = self._table[self._table["count"] > 0]
+        cells = cells[np.lexsort((cells["iz"], cells["iy"], cells["ix"]))]
+        counts = cells["count"].astype(np.int64)
+        sums = np.stack([cells[name] for name in ("sx", "sy", "sz")], axis=1)
+        indices = np.stack([cells[name] for name in ("ix", "iy", "iz")], axis=1)
+        return VoxelMap(
+            indices=indices,
+            centroids_W=_corners(indices, self._voxel_size)
+            + sums / counts[:, None],
+            counts=counts,
+            voxel_size=self._voxel_size,
+        )
+
+    def _reserve(self, number: int) -> None:
+        """Makes room for so many new voxels."""
+        slots = len(self._table)
+        while _LOAD[1] * (self._size + number) > _LOAD[0] * slots:
+            # Powers of two, because slots are found by masking.
+            slots *= 2
+        if slots > len(self._table):
+            larger = np.zeros(slots, dtype=_SLOT)
+            _move(self._table, larger)
+            self._table = larger
+
+
+def voxelise(
+    points: np.ndarray, voxel_size: float = VOXEL_SIZE
+) -> tuple[VoxelMap, int]:
+    """Returns the voxel map of one cloud in the world frame.
+
+    Returns:
+        The map, and how many points were left out as not finite.
+    """
+    accumulator = VoxelAccumulator(voxel_size)
+    ignored = accumulator.add(points)
+    return accumulator.to_map(), ignored
+
+
+def thin(points: np.ndarray, voxel_size: float) -> np.ndarray:
+    """Returns the voxel centroids of a cloud in the frame of a sensor.
+
+    Args:
+        points: (N, 3) [m]; what is not finite is left out.
+        voxel_size: length of a voxel's side [m].
+
+    Returns:
+        (V, 3), sorted by voxel.
+    """
+    cells, _ = voxelise(point_arrays.from_xyz(points), voxel_size)
+    return cells.centroids_W
+
+
+def map_sequence(
+    sequence: Sequence,
+    voxel_size: float = VOXEL_SIZE / PICTURE_DIVISIONS,
+    track: Track = silent,
+) -> VoxelMap:
+    """Returns the world-frame map of all scans of a sequence.
+
+    One pass over the scans, one in memory at a time. The default grid is
+    fine enough for pictures; `coarsen(PICTURE_DIVISIONS)` gives the map on
+    which structural change is defined.
+
+    Raises:
+        InputError: if a scan or a pose cannot be read.
+    """
+    accumulator = VoxelAccumulator(voxel_size)
+    X_WS = sequence.X_WS
+    indices = track(
+        range(len(sequence)), f"mapping {sequence.name}", len(sequence)
+    )
+    for index in indices:
+        accumulator.add(sequence.scan(index), X_WS[index])
+    return accumulator.to_map()
+
+
+def _corners(indices: np.ndarray, voxel_size: float) -> np.ndarray:
+    return np.array([0.0, 0.0, Z_ORIGIN]) + indices * voxel_size
+
+
+@compiled
+def _find(table, ix, iy, iz):
+    """Returns the slot of a voxel, or the free one where it belongs."""
+    mask = len(table) - 1
+    # Large odd factors spread neighbouring voxels; products wrap around.
+    mixed = (
+        np.int64(ix) * np.int64(73856093)
+        ^ np.int64(iy) * np.int64(19349669)
+        ^ np.int64(iz) * np.int64(83492791)
+    )
+    mixed ^= mixed >> 15
+    slot = mixed & mask
+    while table[slot].count != 0 and not (
+        table[slot].ix == ix and table[slot].iy == iy and table[slot].iz == iz
+    ):
+        slot = (slot + 1) & mask
+    return slot
+
+
+@compiled
+def _move(table, larger):
+    """Enters all voxels of one table into another, empty one."""
+    for i in range(len(table)):
+        if table[i].count != 0:
+            slot = _find(larger, table[i].ix, table[i].iy, table[i].iz)
+            larger[slot] = table[i]
+
+
+@compiled
+def _add_points(points, X, voxel_size, table, size):
+    """Adds points (N, 3); returns the new size and how many were skipped."""
+    limit = 2.0**31
+    skipped = 0
+    for i in range(len(points)):
+        px, py, pz = points[i, 0], points[i, 1], points[i, 2]
+        x = X[0, 0] * px + X[0, 1] * py + X[0, 2] * pz + X[0, 3]
+        y = X[1, 0] * px + X[1, 1] * py + X[1, 2] * pz + X[1, 3]
+        z = X[2, 0] * px + X[2, 1] * py + X[2, 2] * pz + X[2, 3]
+        fx = np.floor(x / voxel_size)
+        fy = np.floor(y / voxel_size)
+        fz = np.floor(z / voxel_size)
+        # A comparison with NaN is false.
+        if not (abs(fx) < limit and abs(fy) < limit and abs(fz) < limit):
+            skipped += 1
+            continue
+        ix, iy, iz = np.int32(fx), np.int32(fy), np.int32(fz)
+        slot = _find(table, ix, iy, iz)
+        if table[slot].count == 0:
+            table[slot].ix = ix
+            table[slot].iy = iy
+            table[slot].iz = iz
+            size += 1
+        table[slot].count += 1
+        table[slot].sx += x - fx * voxel_size
+        table[slot].sy += y - fy * voxel_size
+        table[slot].sz += z - fz * voxel_size
+    return size, skipped

@@ -1,0 +1,137 @@
+"""What every place-recognition method offers, and how it is registered."""
+
+from __future__ import annotations
+
+import abc
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar, Generic, TypeVar
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from evaluation.errors import InputError
+
+Descriptor = TypeVar("Descriptor")
+Database = TypeVar("Database")
+
+
+class MethodConfig(BaseModel):
+    """Parameters of a method; each default states where it comes from.
+
+    Attributes:
+        sensor_height: of the LiDAR above the ground [m]. Default: the mount
+            of the CNS vehicle.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    sensor_height: float = 1.6
+
+
+class Method(abc.ABC, Generic[Descriptor, Database]):
+    """Describes scans and compares a query with a database of places.
+
+    Attributes:
+        name: as the command line knows it.
+        Config: type of its parameters.
+        scans_per_place: how many consecutive scans are merged, in the frame
+            of the first, into the cloud that is described.
+        config: the parameters in use.
+    """
+
+    name: ClassVar[str]
+    Config: ClassVar[type[MethodConfig]] = MethodConfig
+    scans_per_place: ClassVar[int] = 1
+
+    def __init__(self, config: MethodConfig | None = None):
+        self.config = self.Config() if config is None else config
+
+    @abc.abstractmethod
+    def describe(self, points: np.ndarray) -> Descriptor:
+        """Describes the scan of a query.
+
+        Args:
+            points: (N, 3) float64, finite, in the frame of the LiDAR (or of
+                the first of the merged scans) [m].
+        """
+
+    def describe_place(self, points: np.ndarray) -> Descriptor:
+        """Describes a scan of the database, where that differs."""
+        return self.describe(points)
+
+    @abc.abstractmethod
+    def build_database(self, places: Sequence[Descriptor]) -> Database:
+        """Returns what a query is compared with: all places, indexed."""
+
+    @abc.abstractmethod
+    def score(
+        self, query: Descriptor, database: Database, *, exhaustive: bool = False
+    ) -> np.ndarray:
+        """Compares a query with every place of a database.
+
+        Args:
+            query: made by `describe`.
+            database: of D places.
+            exhaustive: compare also with places that a search which only
+                saves time would pass over.
+
+        Returns:
+            (D,) float64, higher is more similar; NaN for a place that is no
+            candidate.
+        """
+
+    def relative_pose(
+        self, query: Descriptor, database: Database, place: int
+    ) -> np.ndarray | None:
+        """Returns X_PQ (4, 4), the query's sensor in that of a place.
+
+        None if the method does not estimate it.
+        """
+        del query, database, place
+        return None
+
+
+_METHODS: dict[str, type[Method]] = {}
+
+_MethodClass = TypeVar("_MethodClass", bound=type[Method])
+
+
+def register(name: str) -> Callable[[_MethodClass], _MethodClass]:
+    """Decorates a Method: makes it known by a name."""
+
+    def enter(method: _MethodClass) -> _MethodClass:
+        method.name = name
+        _METHODS[name] = method
+        return method
+
+    return enter
+
+
+def known_methods() -> tuple[str, ...]:
+    """Returns the names of all registered methods."""
+    return tuple(sorted(_METHODS))
+
+
+def make_method(name: str, parameters: Mapping[str, Any]) -> Method:
+    """Returns a method with these parameters, others as by default.
+
+    Raises:
+        InputError: if the method or a parameter is not known, or a value
+            does not fit.
+    """
+    if name not in _METHODS:
+        raise InputError(
+            f"--method: no method {name!r}"
+            f" (known: {', '.join(known_methods())})"
+        )
+    method = _METHODS[name]
+    for key in parameters:
+        if key not in method.Config.model_fields:
+            known = ", ".join(method.Config.model_fields)
+            raise InputError(f"{name}: no parameter {key!r} (known: {known})")
+    try:
+        return method(method.Config(**parameters))
+    except ValidationError as error:
+        fault = error.errors()[0]
+        field = ".".join(str(part) for part in fault["loc"])
+        raise InputError(f"{name}: {field}: {fault['msg']}") from error

@@ -1,0 +1,367 @@
+"""Scan Context++ (Kim, Choi, Kim: T-RO 2022).
+
+A scan becomes a small image of heights around the sensor: over range and
+azimuth (polar context) or along and across the road (cart context). Two
+means of the image index it: one that turning (or lane offset) leaves alone
+finds candidates in a KD-tree, the other finds by how much to shift the
+columns before two images are compared.
+
+The polar context looks different from the next lane. Its augmented form
+stores each place of the database three times: as seen, and from 2 m to
+either side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+from typing import Literal
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from evaluation.maps import thin
+from evaluation.methods.method import Method, MethodConfig, register
+
+# Bounds the memory of an exhaustive comparison.
+_CONTEXTS_AT_ONCE = 512
+
+Variant = Literal["polar", "augmented-polar", "cart", "augmented-cart"]
+
+
+class ScanContextConfig(MethodConfig):
+    """Parameters of Scan Context++.
+
+    Sources: [T] the T-RO program, [C] the C++ program, [E] the evaluation
+    program, all by the method's authors.
+
+    Attributes:
+        variant: which context; augmented forms add copies to the database.
+            Default: what [T] calls A-PC.
+        voxel_size: cell of the thinning before [m]; [T] 0.5.
+        rings: of the polar context; [T], [C] 20.
+        sectors: of the polar context; [T], [C] 60.
+        max_range: of the polar context [m]; [T], [C] 80. What is farther
+            counts in the last ring, as in [T].
+        min_points: that a cell of the polar context needs; [T] 5.
+        cart_cell: length and width of a cell of the cart context [m];
+            [T] 5 and 2.
+        cart_range: half length and half width of the cart context [m];
+            [T] 100 and 40.
+        lateral_shift: offset of the augmenting copies [m]; [T] 2.
+        candidates: places that the KD-tree is asked for; [E] 50. With
+            augmented places, as many times more contexts.
+        search_ratio: part of all shifts that are tried around the best by
+            the aligning key; [C] 0.1.
+    """
+
+    variant: Variant = "augmented-polar"
+    voxel_size: float = 0.5
+    rings: int = 20
+    sectors: int = 60
+    max_range: float = 80.0
+    min_points: int = 5
+    cart_cell: tuple[float, float] = (5.0, 2.0)
+    cart_range: tuple[float, float] = (100.0, 40.0)
+    lateral_shift: float = 2.0
+    candidates: int = 50
+    search_ratio: float = 0.1
+
+
+@dataclass(frozen=True)
+class Contexts:
+    """One or more contexts of one scan.
+
+    Attributes:
+        images: (K, rows, columns) heights above the ground [m], 0 where
+            empty; K is 1 but for augmented places.
+    """
+
+    images: np.ndarray
+
+    @property
+    def retrieval_keys(self) -> np.ndarray:
+        """(K, rows) means that a shift of the columns leaves alone."""
+        return self.images.mean(axis=2)
+
+    @property
+    def aligning_keys(self) -> np.ndarray:
+        """(K, columns) means that shift with the columns."""
+        return self.images.mean(axis=1)
+
+
+@dataclass(frozen=True)
+class ContextDatabase:
+    """All contexts of D places, in one array of M >= D.
+
+    Attributes:
+        columns: (M, rows, columns) images with columns of unit length.
+        filled: (M, columns) float64, 1 where a column is not all zero.
+        aligning_keys: (M, columns).
+        places: (M,) place of each context.
+        tree: of the retrieval keys.
+        num_places: D.
+    """
+
+    columns: np.ndarray
+    filled: np.ndarray
+    aligning_keys: np.ndarray
+    places: np.ndarray
+    tree: cKDTree
+    num_places: int
+
+
+@register("scan-context++")
+class ScanContext(Method[Contexts, ContextDatabase]):
+    """Scan Context++; the score of a pair is 1 - its distance."""
+
+    Config = ScanContextConfig
+    config: ScanContextConfig
+
+    def describe(self, points: np.ndarray) -> Contexts:
+        return Contexts(self._image(self._prepare(points))[None])
+
+    def describe_place(self, points: np.ndarray) -> Contexts:
+        prepared = self._prepare(points)
+        images = [self._image(prepared)]
+        if self.config.variant == "augmented-polar":
+            for shift in (
+                -self.config.lateral_shift,
+                self.config.lateral_shift,
+            ):
+                images.append(self._image(prepared - [0.0, shift, 0.0]))
+        if self.config.variant == "augmented-cart":
+            # As seen by a car that drives the other way.
+            images.append(self._image(prepared * [-1.0, -1.0, 1.0]))
+        return Contexts(np.stack(images))
+
+    def build_database(self, places: Sequence[Contexts]) -> ContextDatabase:
+        images = np.concatenate([place.images for place in places])
+        contexts = Contexts(images)
+        columns, filled = _unit_columns(images)
+        return ContextDatabase(
+            columns=columns,
+            filled=filled,
+            aligning_keys=contexts.aligning_keys,
+            places=np.repeat(
+                np.arange(len(places)), [len(place.images) for place in places]
+            ),
+            tree=cKDTree(contexts.retrieval_keys),
+            num_places=len(places),
+        )
+
+    def score(
+        self,
+        query: Contexts,
+        database: ContextDatabase,
+        *,
+        exhaustive: bool = False,
+    ) -> np.ndarray:
+        num_contexts = len(database.places)
+        wanted = self.config.candidates * num_contexts // database.num_places
+        if exhaustive or wanted >= num_contexts:
+            chosen = np.arange(num_contexts)
+        else:
+            _, found = database.tree.query(query.retrieval_keys[0], k=wanted)
+            chosen = np.sort(np.atleast_1d(found))
+        scores = np.full(database.num_places, np.nan)
+        for start in range(0, len(chosen), _CONTEXTS_AT_ONCE):
+            some = chosen[start : start + _CONTEXTS_AT_ONCE]
+            similarities, _ = self._compare(query, database, some)
+            # fmax: the best context of a place; NaN only where all are.
+            np.fmax.at(scores, database.places[some], similarities)
+        return scores
+
+    def relative_pose(
+        self, query: Contexts, database: ContextDatabase, place: int
+    ) -> np.ndarray | None:
+        """Returns the turn (polar) or the lane offset (cart) of the query.
+
+        None if the two have no filled column in common.
+        """
+        chosen = np.flatnonzero(database.places == place)
+        similarities, shifts = self._compare(query, database, chosen)
+        if np.isnan(similarities).all():
+            return None
+        best = int(np.nanargmax(similarities))
+        num_columns = query.images.shape[2]
+        shift = int(shifts[best])
+        X_PQ = np.eye(4)
+        if self.config.variant in ("polar", "augmented-polar"):
+            # Shift s turns the place's context to the query's: what the
+            # place sees at azimuth a, the query sees at a + s cells.
+            yaw = -2.0 * math.pi * shift / num_columns
+            X_PQ[:2, :2] = [
+                [math.cos(yaw), -math.sin(yaw)],
+                [math.sin(yaw), math.cos(yaw)],
+            ]
+            if best > 0:
+                side = -1.0 if best == 1 else 1.0
+                X_PQ[1, 3] = side * self.config.lateral_shift
+            return X_PQ
+        # Half of the shifts are to the right: 0, 1, ..., -2, -1.
+        signed = (shift + num_columns // 2) % num_columns - num_columns // 2
+        if best > 0:
+            X_PQ[0, 0] = X_PQ[1, 1] = -1.0
+            X_PQ[1, 3] = signed * self.config.cart_cell[1]
+            return X_PQ
+        X_PQ[1, 3] = -signed * self.config.cart_cell[1]
+        return X_PQ
+
+    def _prepare(self, points: np.ndarray) -> np.ndarray:
+        """Returns the thinned points, with z from the ground."""
+        lift = [0.0, 0.0, self.config.sensor_height]
+        return thin(points, self.config.voxel_size) + lift
+
+    def _image(self, points: np.ndarray) -> np.ndarray:
+        if self.config.variant in ("polar", "augmented-polar"):
+            return _polar_context(points, self.config)
+        return _cart_context(points, self.config)
+
+    def _compare(
+        self, query: Contexts, database: ContextDatabase, chosen: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Compares a query with some contexts of a database.
+
+        For each shift s of a context's columns, the similarity is the mean
+        cosine between columns j of the query and j - s of the context, over
+        the columns that are filled in both. Only shifts near that of the
+        aligning keys count.
+
+        Args:
+            chosen: (C,) indices of contexts.
+
+        Returns:
+            (C,) best similarity, NaN without a common column; (C,) its
+            shift, by which the context's columns are rolled.
+        """
+        num_columns = query.images.shape[2]
+        columns, filled = _unit_columns(query.images)
+        first = _key_shift(
+            query.aligning_keys[0], database.aligning_keys[chosen]
+        )
+        half = _round_half_up(0.5 * self.config.search_ratio * num_columns)
+        window = np.arange(-half, half + 1)
+        shifts = (first[:, None] + window) % num_columns
+        cosines = np.einsum(
+            "rj,crk->cjk",
+            columns[0],
+            database.columns[chosen],
+            optimize=True,
+        )
+        column = np.arange(num_columns)
+        partner = (column - shifts[:, :, None]) % num_columns
+        row = np.arange(len(chosen))[:, None, None]
+        sums = cosines[row, column, partner].sum(axis=2)
+        common = (
+            filled[0][column] * database.filled[chosen][row, partner]
+        ).sum(axis=2)
+        with np.errstate(invalid="ignore"):
+            similarities = np.where(common > 0, sums / common, -np.inf)
+        best = similarities.argmax(axis=1)
+        one = np.arange(len(chosen))
+        highest = similarities[one, best]
+        return (
+            np.where(np.isfinite(highest), highest, np.nan),
+            shifts[one, best],
+        )
+
+
+def _polar_context(points: np.ndarray, config: ScanContextConfig) -> np.ndarray:
+    """Returns the highest point of each ring (row) and sector (column)."""
+    r = np.hypot(points[:, 0], points[:, 1])
+    azimuth = np.arctan2(points[:, 1], points[:, 0]) % (2.0 * math.pi)
+    ring = np.minimum(
+        (r * (config.rings / config.max_range)).astype(np.int64),
+        config.rings - 1,
+    )
+    # Sectors are open below and closed above.
+    sector = np.ceil(azimuth * (config.sectors / (2.0 * math.pi))) - 1
+    sector = np.clip(sector, 0, config.sectors - 1).astype(np.int64)
+    return _highest(
+        points[:, 2],
+        ring * config.sectors + sector,
+        (config.rings, config.sectors),
+        config.min_points,
+        floor=-np.inf,
+    )
+
+
+def _cart_context(points: np.ndarray, config: ScanContextConfig) -> np.ndarray:
+    """Returns the highest point of each cell along (row) and across.
+
+    Cells are counted from the axes outwards, so that the ones around the
+    axes are twice as large, and the first row and column stay empty; points
+    below the ground count as ground. Both as in the T-RO program.
+    """
+    shape = tuple(
+        2 * int(half / cell)
+        for half, cell in zip(config.cart_range, config.cart_cell, strict=True)
+    )
+    plane = points[:, :2]
+    kept = ((np.abs(plane) < config.cart_range) & (plane != 0.0)).all(axis=1)
+    plane = plane[kept]
+    outward = np.floor(np.abs(plane) / config.cart_cell)
+    index = (np.sign(plane) * outward).astype(np.int64) + np.array(shape) // 2
+    return _highest(
+        points[kept, 2],
+        index[:, 0] * shape[1] + index[:, 1],
+        shape,
+        min_points=1,
+        floor=0.0,
+    )
+
+
+def _highest(
+    heights: np.ndarray,
+    cells: np.ndarray,
+    shape: tuple[int, int],
+    min_points: int,
+    floor: float,
+) -> np.ndarray:
+    """Returns the greatest height in each cell, 0 where there are too few.
+
+    Args:
+        heights: (N,) [m].
+        cells: (N,) number of each point's cell.
+        shape: of the result.
+        min_points: that a cell needs.
+        floor: what a filled cell holds at least.
+    """
+    size = shape[0] * shape[1]
+    highest = np.full(size, floor)
+    np.maximum.at(highest, cells, heights)
+    enough = np.bincount(cells, minlength=size) >= max(min_points, 1)
+    return np.where(enough, highest, 0.0).reshape(shape)
+
+
+def _unit_columns(images: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns images with columns of length 1 or 0, and which are filled."""
+    norms = np.linalg.norm(images, axis=1)
+    filled = norms > 0.0
+    return (
+        images / np.where(filled, norms, 1.0)[:, None, :],
+        filled.astype(np.float64),
+    )
+
+
+def _key_shift(key: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Returns the shift of each row of `others` that fits `key` best.
+
+    Args:
+        key: (columns,).
+        others: (C, columns).
+
+    Returns:
+        (C,) the s that minimises |key - roll(other, s)|; the lowest of
+        equal ones.
+    """
+    column = np.arange(len(key))
+    rolled = others[:, (column - column[:, None]) % len(key)]
+    distances = ((key - rolled) ** 2).sum(axis=2)
+    return distances.argmin(axis=1)
+
+
+def _round_half_up(value: float) -> int:
+    return math.floor(value + 0.5)

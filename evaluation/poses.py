@@ -1,0 +1,56 @@
+"""Rigid poses as homogeneous 4 x 4 matrices, many at a time."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def make_pose(R: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Returns poses X, shape (..., 4, 4).
+
+    Args:
+        R: rotations, shape (..., 3, 3).
+        p: positions, shape (..., 3) [m].
+    """
+    X = np.zeros((*R.shape[:-2], 4, 4))
+    X[..., :3, :3] = R
+    X[..., :3, 3] = p
+    X[..., 3, 3] = 1.0
+    return X
+
+
+def rotation_from_quaternion(quat_xyzw: np.ndarray) -> np.ndarray:
+    """Returns rotation matrices of quaternions, scaled to unit length.
+
+    Args:
+        quat_xyzw: shape (..., 4), scalar last.
+
+    Returns:
+        Shape (..., 3, 3).
+
+    Raises:
+        ValueError: if a quaternion has no direction (its norm is zero or
+            not finite).
+    """
+    norm = np.linalg.norm(quat_xyzw, axis=-1, keepdims=True)
+    if not np.all(np.isfinite(norm) & (norm > 0.0)):
+        raise ValueError("a quaternion of zero or infinite length")
+    x, y, z, w = np.moveaxis(quat_xyzw / norm, -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+
+def inverse(X: np.ndarray) -> np.ndarray:
+    """Returns the inverse of each pose, shape (..., 4, 4)."""
+    R_transposed = np.swapaxes(X[..., :3, :3], -1, -2)
+    p = -np.einsum("...ij,...j->...i", R_transposed, X[..., :3, 3])
+    return make_pose(R_transposed, p)
+
+
+def transform(X: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Returns the points p (N, 3), expressed through one pose X (4, 4)."""
+    return p @ X[:3, :3].T + X[:3, 3]

@@ -1,0 +1,70 @@
+"""Points of a sensor_msgs/msg/PointCloud2 message."""
+
+from __future__ import annotations
+
+import numpy as np
+
+# Datatype constant of sensor_msgs/msg/PointField -> NumPy type.
+_DATATYPES = {
+    1: "i1",
+    2: "u1",
+    3: "i2",
+    4: "u2",
+    5: "i4",
+    6: "u4",
+    7: "f4",
+    8: "f8",
+}
+
+
+def to_points(message) -> np.ndarray:
+    """Returns the records of a cloud as they are, without copying them.
+
+    Args:
+        message: a deserialised PointCloud2, of any fields and padding.
+
+    Returns:
+        Structured array of shape (height * width,) under the message's field
+        names.
+
+    Raises:
+        ValueError: if the message contradicts itself, or has no scalar
+            floating-point `x`, `y` and `z`.
+    """
+    dtype = _record_type(message)
+    for name in "xyz":
+        if dtype.fields.get(name, (np.dtype("V1"),))[0].kind != "f":
+            raise ValueError(f"the point cloud has no field {name} of floats")
+    data = np.frombuffer(message.data, dtype=np.uint8)
+    if message.row_step < message.width * message.point_step:
+        raise ValueError("the point cloud's rows overlap")
+    if len(data) != message.height * message.row_step:
+        raise ValueError(
+            f"the point cloud has {len(data)} bytes instead of"
+            f" {message.height} x {message.row_step}"
+        )
+    rows = data.reshape(message.height, message.row_step)
+    used = rows[:, : message.width * message.point_step]
+    return np.ascontiguousarray(used).reshape(-1).view(dtype)
+
+
+def _record_type(message) -> np.dtype:
+    order = ">" if message.is_bigendian else "<"
+    formats = []
+    for field in message.fields:
+        if field.datatype not in _DATATYPES:
+            raise ValueError(
+                f"the point cloud's field {field.name} has the unknown"
+                f" datatype {field.datatype}"
+            )
+        scalar = order + _DATATYPES[field.datatype]
+        # Some writers leave the count of a scalar at zero.
+        formats.append((scalar, (field.count,)) if field.count > 1 else scalar)
+    return np.dtype(
+        {
+            "names": [field.name for field in message.fields],
+            "formats": formats,
+            "offsets": [field.offset for field in message.fields],
+            "itemsize": message.point_step,
+        }
+    )

@@ -1,0 +1,96 @@
+"""What every recorded drive offers, whatever format it is stored in."""
+
+from __future__ import annotations
+
+import abc
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from evaluation.errors import InputError
+
+
+class Sequence(abc.ABC):
+    """The scans of one LiDAR on one drive, and where they were taken.
+
+    Frames: world W (shared by all sequences of a place), LiDAR S.
+
+    Scans are read when they are asked for and not kept, so a sequence may be
+    larger than memory.
+
+    Attributes:
+        name: short name for tables and messages, e.g. `metropolis_04`.
+        world_frame: name of W as the recording states it.
+    """
+
+    name: str
+    world_frame: str
+
+    @abc.abstractmethod
+    def __len__(self) -> int:
+        """The number of scans N."""
+
+    @property
+    @abc.abstractmethod
+    def stamps_ns(self) -> np.ndarray:
+        """(N,) int64 time of each scan [ns], strictly increasing."""
+
+    @property
+    @abc.abstractmethod
+    def X_WS(self) -> np.ndarray:
+        """(N, 4, 4) float64 pose of the LiDAR at each scan's stamp."""
+
+    @abc.abstractmethod
+    def scan(self, index: int) -> np.ndarray:
+        """Returns one scan.
+
+        Args:
+            index: 0 <= index < N.
+
+        Returns:
+            Structured array, one record per return, with at least `x`, `y`
+            and `z` [m], expressed in S.
+
+        Raises:
+            InputError: if the scan cannot be read.
+        """
+
+    @property
+    def scenario(self) -> Mapping | None:
+        """How the drive was simulated, if the recording says so.
+
+        Keys used here: `map`, `stage` and `route`.
+        """
+        return None
+
+    @property
+    def instances(self) -> Mapping[int, Mapping] | None:
+        """Instance id -> structure `name` and `class`, if recorded."""
+        return None
+
+
+def check_same_world(first: Sequence, second: Sequence) -> None:
+    """Refuses two sequences whose poses cannot be compared.
+
+    Raises:
+        InputError: if their world frames or their maps differ by name.
+    """
+    if first.world_frame != second.world_frame:
+        raise InputError(
+            f"{second.name}: poses in frame {second.world_frame!r}, those of"
+            f" {first.name} in {first.world_frame!r}"
+        )
+    maps = [_map_name(sequence) for sequence in (first, second)]
+    if None not in maps and maps[0] != maps[1]:
+        raise InputError(
+            f"{second.name}: a drive through {maps[1]}, {first.name} through"
+            f" {maps[0]}"
+        )
+
+
+def _map_name(sequence: Sequence) -> str | None:
+    """Returns the last part of the map's name, which may be a path."""
+    if sequence.scenario is None or "map" not in sequence.scenario:
+        return None
+    return Path(sequence.scenario["map"]).name
