@@ -36,9 +36,9 @@ class Speeds(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
-    cruise: float = Field(gt=0, le=60, allow_inf_nan=False)
-    longitudinal_acceleration: Acceleration
-    lateral_acceleration: Acceleration
+    cruise: float = Field(13.5, gt=0, le=60, allow_inf_nan=False)
+    longitudinal_acceleration: Acceleration = 2.0
+    lateral_acceleration: Acceleration = 3.0
 
 
 def make_time_scaling(

@@ -123,8 +123,8 @@ def blend(
 
     Where the straight continuations meet ahead of the start and behind the
     end, the curve is the widest allowed arc that touches both, with lines in
-    front of and behind it: what a driver does on a turn. Otherwise (parallel lanes
-    that are offset, S-bends) it is a cubic Hermite curve.
+    front of and behind it: what a driver does on a turn. Otherwise (parallel
+    lanes that are offset, S-bends) it is a cubic Hermite curve.
 
     Args:
         p_start, p_end: (2,) points [m].
