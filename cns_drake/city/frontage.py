@@ -1,0 +1,184 @@
+"""Lines along streets, and lots cut off along them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+import itertools
+import math
+
+import numpy as np
+import shapely
+from shapely.affinity import affine_transform
+from shapely.geometry import LineString, Point, Polygon, box
+from shapely.geometry.base import BaseGeometry
+from shapely.ops import linemerge
+
+# A line that turns by more than this at one vertex has a corner there [rad].
+_CORNER = math.radians(25)
+# Round corners of parallel lines: segments per quarter turn.
+_QUAD_SEGMENTS = 16
+# The street may bend away from a lot's straight front by at most this angle
+# at either end; around a tighter curve, or into a corner, houses look askew.
+_BEND = math.radians(17)
+# Headings are taken over twice this length [m].
+_SHORT = 0.25
+
+
+@dataclass(frozen=True)
+class Lot:
+    """A rectangle of ground for one building, its front to the street.
+
+    Attributes:
+        x, y: centre of the rectangle in W [m].
+        yaw: heading in W of the frame S of the lot, whose x axis runs along
+            the front and whose y axis points away from the street [rad].
+        width: size along x of S [m].
+        depth: size along y of S [m].
+    """
+
+    x: float
+    y: float
+    yaw: float
+    width: float
+    depth: float
+
+    @property
+    def footprint(self) -> Polygon:
+        """The rectangle in S [m]."""
+        w, d = self.width / 2, self.depth / 2
+        return box(-w, -d, w, d)
+
+    @property
+    def footprint_W(self) -> Polygon:
+        """The rectangle in W [m]."""
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        return affine_transform(self.footprint, [c, -s, s, c, self.x, self.y])
+
+
+@dataclass(frozen=True)
+class Station:
+    """A place on a line: position, and the heading of the line there.
+
+    Attributes:
+        x, y: position in W [m].
+        yaw: heading of the line [rad].
+        s: arc length from the start of the line [m].
+    """
+
+    x: float
+    y: float
+    yaw: float
+    s: float
+
+
+def lines_along(
+    streets: BaseGeometry, within: BaseGeometry, distance: float
+) -> list[LineString]:
+    """Returns the lines parallel to the edge of the streets.
+
+    Args:
+        streets: the area of the streets in W [m].
+        within: the lines are cut to this area.
+        distance: from the edge of the streets [m].
+
+    Returns:
+        Smooth pieces between corners, in fixed order; whoever walks along
+        a piece has the street on the right.
+    """
+    edge = streets.buffer(distance, quad_segs=_QUAD_SEGMENTS).boundary
+    cut = shapely.set_precision(edge.intersection(within), 0.001)
+    if cut.is_empty:
+        return []
+    lines = [cut] if isinstance(cut, LineString) else shapely.get_parts(cut)
+    merged = linemerge([x for x in lines if isinstance(x, LineString)])
+    pieces = [
+        piece
+        for line in shapely.get_parts(merged)
+        for piece in _split_at_corners(_street_on_right(line, streets))
+        if piece.length > 1.0
+    ]
+    return sorted(pieces, key=lambda p: (*p.coords[0], p.length))
+
+
+def stations(line: LineString, distances) -> Iterator[Station]:
+    """Yields the places at the given arc lengths [m] of a line."""
+    for s in distances:
+        before = line.interpolate(max(s - _SHORT, 0.0))
+        after = line.interpolate(min(s + _SHORT, line.length))
+        at = line.interpolate(s)
+        yaw = math.atan2(after.y - before.y, after.x - before.x)
+        yield Station(at.x, at.y, yaw, float(s))
+
+
+def lot_at(
+    line: LineString, start: float, width: float, depth: float
+) -> Lot | None:
+    """Returns the lot whose front starts at an arc length of a line.
+
+    Returns:
+        The lot, or None where the line ends or bends too much within it.
+    """
+    end = start + width
+    if end > line.length + 1e-6:
+        return None
+    a = np.array(line.interpolate(start).coords[0])
+    b = np.array(line.interpolate(end).coords[0])
+    chord = float(np.hypot(*(b - a)))
+    if chord < 0.9 * width:
+        return None
+    along = (b - a) / chord
+    away = np.array([-along[1], along[0]])
+    yaw = math.atan2(along[1], along[0])
+    ends = stations(line, [start + _SHORT, end - _SHORT])
+    if any(abs(_turn(at.yaw, yaw)) > _BEND for at in ends):
+        return None
+    # On a line that bends around the street the chord comes closer to it
+    # than the line, so the front steps back by as much.
+    between = [
+        np.array(line.interpolate(start + width * u).coords[0]) - a
+        for u in np.linspace(0.1, 0.9, 9)
+    ]
+    step_back = max(0.0, *(float(p @ away) for p in between))
+    centre = (a + b) / 2 + away * (depth / 2 + step_back)
+    return Lot(float(centre[0]), float(centre[1]), yaw, chord, depth)
+
+
+def _turn(to: float, origin: float) -> float:
+    """Returns the angle from one heading to another, in [-pi, pi)."""
+    return (to - origin + math.pi) % (2 * math.pi) - math.pi
+
+
+def _street_on_right(line: LineString, streets: BaseGeometry) -> LineString:
+    at = next(stations(line, [line.length * 0.37]))
+    left = Point(at.x - math.sin(at.yaw) * 0.3, at.y + math.cos(at.yaw) * 0.3)
+    right = Point(at.x + math.sin(at.yaw) * 0.3, at.y - math.cos(at.yaw) * 0.3)
+    if streets.distance(left) < streets.distance(right):
+        return LineString(line.coords[::-1])
+    return line
+
+
+def _split_at_corners(line: LineString) -> list[LineString]:
+    coordinates = np.array(line.coords)[:, :2]
+    edges = np.diff(coordinates, axis=0)
+    heading = np.arctan2(edges[:, 1], edges[:, 0])
+    turn = (np.diff(heading) + math.pi) % (2 * math.pi) - math.pi
+    corners = np.flatnonzero(np.abs(turn) > _CORNER) + 1
+    closed = bool(np.allclose(coordinates[0], coordinates[-1]))
+    if closed and len(corners):
+        # Start a closed line at a corner, so that no piece is cut in two.
+        shift = int(corners[0])
+        coordinates = np.concatenate(
+            [coordinates[shift:-1], coordinates[: shift + 1]]
+        )
+        corners = corners[1:] - shift
+        last_turn = heading[0] - heading[-1]
+        last_turn = (last_turn + math.pi) % (2 * math.pi) - math.pi
+        if abs(last_turn) > _CORNER:
+            corners = np.sort([*corners, len(edges) - shift])
+    bounds = [0, *(int(c) for c in corners), len(coordinates) - 1]
+    return [
+        LineString(coordinates[a : b + 1])
+        for a, b in itertools.pairwise(bounds)
+        if b > a
+    ]

@@ -1,0 +1,136 @@
+"""From a road network and a plan to all structures of a city."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from shapely.ops import unary_union
+
+from cns_drake.city.building_rows import place_buildings
+from cns_drake.city.buildings import ARCHETYPES
+from cns_drake.city.districts import share_out
+from cns_drake.city.draft import Draft
+from cns_drake.city.ground import GroundShape, ground_structures
+from cns_drake.city.junction_furniture import furnish_junctions
+from cns_drake.city.mesh import Mesh
+from cns_drake.city.objects import OBJECTS
+from cns_drake.city.open_ground import furnish
+from cns_drake.city.plan import CityPlan, DistrictPlan, load_plan
+from cns_drake.city.road_network import RoadNetwork, load_road_network
+from cns_drake.city.sidewalks import (
+    furnish_sidewalks,
+    park_along_streets,
+    plant_medians,
+)
+from cns_drake.city.streets import street_structures
+from cns_drake.city.structures import Structure
+from cns_drake.errors import InputError
+
+
+@dataclass(frozen=True)
+class City:
+    """A whole city.
+
+    Attributes:
+        structures: the ground first, then what stands on it; a structure's
+            instance id is its place in this order, counted from 1.
+    """
+
+    structures: tuple[Structure, ...]
+
+    def meshes(self) -> dict[str, Mesh]:
+        """Returns all meshes by name.
+
+        Raises:
+            ValueError: if two different meshes have the same name.
+        """
+        meshes: dict[str, Mesh] = {}
+        for structure in self.structures:
+            for name, mesh in structure.model.meshes.items():
+                known = meshes.setdefault(name, mesh)
+                if known is not mesh and known.to_obj() != mesh.to_obj():
+                    raise ValueError(f"two different meshes are called {name}")
+        return meshes
+
+
+def make_city(world: Path) -> City:
+    """Makes the city of a world folder from `roads.yaml` and `city.yaml`.
+
+    Raises:
+        InputError: if one of the files cannot be used.
+    """
+    network = load_road_network(world / "roads.yaml")
+    source = world / "city.yaml"
+    return lay_out(network, load_plan(source), str(source))
+
+
+def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
+    """Makes a city.
+
+    What needs most room, or has the least choice of place, comes first.
+
+    Args:
+        network: the roads.
+        plan: of the districts.
+        source: the plan's file name, for messages.
+
+    Raises:
+        InputError: if the plan asks for something unknown or impossible.
+    """
+    _check_names(plan, source)
+    draft = Draft(network, plan.seed)
+    districts = share_out(plan, draft.streets, source)
+    for district in districts:
+        place_buildings(draft, district, source)
+    shape = GroundShape(
+        draft.level,
+        districts,
+        unary_union([s.footprint_W for s in draft.structures]),
+        lambda name: draft.rng(name, "relief"),
+    )
+    draft.ground_height = shape
+    furnish_junctions(draft)
+    for district in districts:
+        furnish(draft, district, plan.cars, source)
+    furnish_sidewalks(draft, plan, districts)
+    park_along_streets(draft, plan.cars)
+    plant_medians(draft, plan.medians or plan.street)
+    ground = [
+        *street_structures(network),
+        *ground_structures(districts, shape, plan.water_level),
+    ]
+    return City((*ground, *draft.structures))
+
+
+def _check_names(plan: CityPlan, source: str) -> None:
+    """Raises InputError for names that are in no registry."""
+    streets = [("street", plan.street), ("medians", plan.medians)]
+    for district in plan.districts:
+        field = f"districts.{district.name}"
+        streets.append((f"{field}.street", district.street))
+        for name, used in _used_names(district):
+            registry = ARCHETYPES if name == "rows" else OBJECTS
+            _require(used, registry, f"{source}: {field}.{name}")
+    _require(plan.cars, OBJECTS, f"{source}: cars")
+    for field, street in streets:
+        if street is not None:
+            used = [*street.trees, street.lamp, *street.furniture]
+            _require(used, OBJECTS, f"{source}: {field}")
+
+
+def _used_names(district: DistrictPlan):
+    for row in district.rows:
+        yield "rows", row.archetypes
+    for line in district.lines:
+        yield "lines", line.objects
+    for scatter in district.scatter:
+        yield "scatter", scatter.objects
+    yield "objects", [entry.object for entry in district.objects]
+
+
+def _require(names: Iterable[str], registry, field: str) -> None:
+    for name in names:
+        if name not in registry:
+            raise InputError(f"{field}: unknown name {name}")
