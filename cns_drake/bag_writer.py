@@ -17,6 +17,12 @@ from mcap.writer import CompressionType, Writer
 
 from cns_drake import __version__, messages
 from cns_drake.errors import InputError
+from cns_drake.files import (
+    complete_part,
+    part_path,
+    user_errors,
+    write_part,
+)
 from cns_drake.rosbag2_metadata import (
     Topic,
     make_bag_information,
@@ -89,9 +95,9 @@ class BagWriter:
         Raises:
             InputError: if the folder or the file cannot be written.
         """
-        with _user_errors(self._folder):
+        with user_errors(self._folder):
             self._folder.mkdir(parents=True, exist_ok=self._overwrite)
-        with _user_errors(self._part):
+        with user_errors(self._part):
             self._stream = open(self._part, "wb")
         try:
             with self._writing():
@@ -133,12 +139,13 @@ class BagWriter:
         Raises:
             InputError: if the file cannot be written, e.g. on a full disk.
         """
+        channel_id = self._channel_ids[topic]
         with self._writing():
             if stamp_ns - self._flushed_ns >= _FLUSH_PERIOD_NS:
                 self._writer.flush()
                 self._flushed_ns = stamp_ns
             self._writer.add_message(
-                self._channel_ids[topic], stamp_ns, data, stamp_ns, sequence
+                channel_id, stamp_ns, data, stamp_ns, sequence
             )
         self._counts[topic] += 1
         if self._first_ns is None:
@@ -203,12 +210,12 @@ class BagWriter:
         metadata_file = self._folder / "metadata.yaml"
         scenario_file = self._folder / "scenario.yaml"
         metadata = {"rosbag2_bagfile_information": self._information()}
-        _write_part(scenario_file, to_yaml(self._scenario))
-        _write_part(metadata_file, to_yaml(metadata))
-        metadata_file.unlink(missing_ok=True)
+        write_part(scenario_file, to_yaml(self._scenario))
+        write_part(metadata_file, to_yaml(metadata))
+        with user_errors(metadata_file):
+            metadata_file.unlink(missing_ok=True)
         for path in (self._mcap, scenario_file, metadata_file):
-            with _user_errors(path):
-                os.replace(part_path(path), path)
+            complete_part(path)
 
     def _close_part(self) -> None:
         """Ends an incomplete file as well as its state allows."""
@@ -229,7 +236,7 @@ class BagWriter:
     @contextlib.contextmanager
     def _writing(self):
         self._intact = False
-        with _user_errors(self._part):
+        with user_errors(self._part):
             yield
         self._intact = True
 
@@ -252,7 +259,7 @@ def check_folder(folder: Path, overwrite: bool) -> None:
     Raises:
         InputError: if `folder` is a file, or exists without `overwrite`.
     """
-    with _user_errors(folder):
+    with user_errors(folder):
         if folder.is_dir():
             if not overwrite:
                 raise InputError(
@@ -261,30 +268,6 @@ def check_folder(folder: Path, overwrite: bool) -> None:
                 )
         elif folder.exists():
             raise InputError(f"{folder}: there is a file of this name")
-
-
-def part_path(path: Path) -> Path:
-    """Returns the name of a file that is not complete yet."""
-    return path.with_name(f"{path.name}.part")
-
-
-@contextlib.contextmanager
-def _user_errors(path: Path):
-    """Turns errors of the file system into one line that names the file."""
-    try:
-        yield
-    except OSError as error:
-        fault = error.strerror or str(error)
-        raise InputError(f"{path}: {fault}") from error
-
-
-def _write_part(path: Path, text: str) -> None:
-    """Writes text under the `.part` name of `path`, down to the disk."""
-    part = part_path(path)
-    with _user_errors(part), open(part, "w", encoding="utf-8") as stream:
-        stream.write(text)
-        stream.flush()
-        os.fsync(stream.fileno())
 
 
 def _to_json(value) -> bytes:
