@@ -13,12 +13,15 @@ from functools import cache
 
 import numpy as np
 
-from cns_drake.city.lofts import along_x, prism, side_prism, tube
+from cns_drake.city.lofts import along_x, loft, prism, side_prism, tube
 from cns_drake.city.mesh import Mesh, box_mesh, merge_meshes
-from cns_drake.city.object_parts import ROOT_DEPTH, Builder, assemble
+from cns_drake.city.object_parts import ROOT_DEPTH, Builder, assemble, block
 from cns_drake.city.structures import MeshShape, Model, Part
 
 _LONGEST = 8
+
+# Deep enough for a low fence too: meshes are scaled to the asked height.
+_ROOT = -1.5 * ROOT_DEPTH
 
 
 @dataclass(frozen=True)
@@ -28,18 +31,27 @@ class RunKind:
     Attributes:
         name: stem of the mesh names.
         panel: nominal length of a panel [m].
-        make: `make(count)` returns `count` panels in a row from x = 0.
+        height: nominal height [m].
+        make: `make(count)` returns `count` panels in a row from x = 0;
+            each starts with its post.
         colours: to choose from.
+        end_post: x size, y from, y to, z to of the post that ends the run
+            [m], or None.
     """
 
     name: str
     panel: float
+    height: float
     make: Callable[[int], Mesh]
     colours: tuple[tuple[float, float, float], ...]
+    end_post: tuple[float, float, float, float] | None = None
 
 
 def run(
-    rng: np.random.Generator, kind: RunKind, length: float, height: float = 1.0
+    rng: np.random.Generator,
+    kind: RunKind,
+    length: float,
+    height: float | None = None,
 ) -> Model:
     """Returns a run of panels.
 
@@ -47,11 +59,15 @@ def run(
         rng: draws the colour.
         kind: what it is made of.
         length: of the run [m]; positive.
-        height: factor on the nominal height.
+        height: [m], positive; the nominal one if not given.
     """
-    if not length > 0:
-        raise ValueError(f"{kind.name}: length {length} is not positive")
+    height = kind.height if height is None else height
+    if not (length > 0 and height > 0):
+        raise ValueError(
+            f"{kind.name}: length {length}, height {height}: not positive"
+        )
     colour = kind.colours[int(rng.integers(len(kind.colours)))]
+    tall = round(height / kind.height, 4)
     total = max(1, round(length / kind.panel))
     stretch = length / (total * kind.panel)
     parts, meshes, done = [], {}, 0
@@ -64,12 +80,23 @@ def run(
         parts.append(
             Part(
                 f"run_{len(parts):02d}",
-                MeshShape(name, (round(stretch, 4), 1.0, height)),
+                MeshShape(name, (round(stretch, 4), 1.0, tall)),
                 xyz=(done * kind.panel * stretch - length / 2, 0.0, 0.0),
                 rgb=colour,
             )
         )
         done += count
+    if kind.end_post:
+        x, y0, y1, top = kind.end_post
+        top *= tall
+        parts.append(
+            block(
+                "end",
+                (x, y1 - y0, top + ROOT_DEPTH),
+                (length / 2 - x / 2, (y0 + y1) / 2, (top - ROOT_DEPTH) / 2),
+                rgb=colour,
+            )
+        )
     return assemble(parts, meshes)
 
 
@@ -94,7 +121,7 @@ def _railing(count: int) -> Mesh:
     ]
     for k in range(count):
         x = 2.0 * k
-        pieces.append(_box(x, x + 0.06, -0.03, 0.03, -ROOT_DEPTH, 1.1))
+        pieces.append(_box(x, x + 0.06, -0.03, 0.03, _ROOT, 1.1))
         for m in range(1, 14):
             p = x + 0.03 + m * 2.0 / 14
             pieces.append(tube([(p, 0, 0.14), (p, 0, 1.02)], (0.014, 0.014), 3))
@@ -107,7 +134,7 @@ def _picket(count: int) -> Mesh:
     pieces = [_box(0, end, -0.05, -0.01, z, z + 0.08) for z in (0.3, 0.85)]
     for k in range(count):
         x = 2.0 * k
-        pieces.append(_box(x, x + 0.1, -0.12, -0.05, -ROOT_DEPTH, 1.1))
+        pieces.append(_box(x, x + 0.1, -0.12, -0.05, _ROOT, 1.1))
         for m in range(12):
             p = x + 0.02 + m * 2.0 / 12
             outline = [
@@ -125,13 +152,13 @@ def _garden_wall(count: int) -> Mesh:
     """Returns a brick wall with piers and a coping, 1.5 m high."""
     end = 3.0 * count
     pieces = [
-        _box(0, end, -0.12, 0.12, -ROOT_DEPTH, 1.4),
+        _box(0, end, -0.12, 0.12, _ROOT, 1.4),
         _box(0, end, -0.17, 0.17, 1.4, 1.48),
     ]
     for k in range(count):
         x = 3.0 * k
         pieces += [
-            _box(x, x + 0.4, -0.2, 0.2, -ROOT_DEPTH, 1.62),
+            _box(x, x + 0.4, -0.2, 0.2, _ROOT, 1.62),
             _box(x - 0.04, x + 0.44, -0.24, 0.24, 1.62, 1.7),
         ]
     return merge_meshes(pieces)
@@ -147,7 +174,7 @@ def _hoarding(count: int) -> Mesh:
     for k in range(count):
         x = 2.4 * k
         pieces += [
-            _box(x, x + 0.1, -0.14, 0.05, -ROOT_DEPTH, 2.2),
+            _box(x, x + 0.1, -0.14, 0.05, _ROOT, 2.2),
             _box(x, x + 0.1, -1.0, -0.12, 0.0, 0.08),
             tube(
                 [(x + 0.05, -0.95, 0.04), (x + 0.05, -0.1, 1.7)],
@@ -171,7 +198,7 @@ def _site_fence(count: int) -> Mesh:
             )
         for p in np.linspace(x + 0.06, x + 3.44, 20)[1:-1]:
             pieces.append(tube([(p, 0, 0.15), (p, 0, 1.98)], (0.006, 0.006), 3))
-        pieces.append(_box(x - 0.12, x + 0.12, -0.35, 0.35, -0.02, 0.13))
+        pieces.append(_box(x + 0.02, x + 0.26, -0.35, 0.35, -0.02, 0.13))
     return merge_meshes(pieces)
 
 
@@ -179,14 +206,14 @@ def _concrete_barrier(count: int) -> Mesh:
     """Returns concrete safety barriers, 0.81 m high, 2 m a piece."""
     profile = np.array(
         [
-            (0.3, -ROOT_DEPTH),
+            (0.3, _ROOT),
             (0.3, 0.08),
             (0.12, 0.33),
             (0.075, 0.81),
             (-0.075, 0.81),
             (-0.12, 0.33),
             (-0.3, 0.08),
-            (-0.3, -ROOT_DEPTH),
+            (-0.3, _ROOT),
         ]
     )
     pieces = []
@@ -204,7 +231,7 @@ def _hedge(count: int) -> Mesh:
     step = 0.25
     ring = np.array(
         [
-            (0.40, -0.1),
+            (0.40, _ROOT),
             (0.44, 0.35),
             (0.45, 0.75),
             (0.43, 1.1),
@@ -214,7 +241,7 @@ def _hedge(count: int) -> Mesh:
             (-0.43, 1.1),
             (-0.45, 0.75),
             (-0.44, 0.35),
-            (-0.40, -0.1),
+            (-0.40, _ROOT),
         ]
     )
     num = round(2.0 * count / step) + 1
@@ -225,58 +252,64 @@ def _hedge(count: int) -> Mesh:
     # The ends keep the plain outline, so that neighbours meet.
     noise[[0, -1]] = 0.0
     noise[:, [0, -1]] = 0.0
-    section += noise
-    body, m = [], len(ring)
-    for s in range(num - 1):
-        for k in range(m - 1):
-            a = s * m + k
-            quad = (a, a + 1, a + m + 1, a + m)
-            body += [quad[:3], (quad[0], quad[2], quad[3])]
-    last = (num - 1) * m
-    for k in range(1, m - 1):
-        body.append((0, k + 1, k))
-        body.append((last, last + k, last + k + 1))
-    for s in range(num - 1):
-        a, b = s * m, s * m + m - 1
-        body.append((a, a + m, b + m, b))
-    return Mesh(section.reshape(-1, 3), tuple(body))
+    return loft(section + noise)
 
 
-_GREY = (0.55, 0.55, 0.54)
 RUN_KINDS = {
     kind.name: kind
     for kind in (
         RunKind(
             "railing",
-            2.0,
-            _railing,
-            ((0.15, 0.17, 0.18), (0.35, 0.37, 0.4), (0.16, 0.27, 0.22)),
+            panel=2.0,
+            height=1.1,
+            make=_railing,
+            colours=((0.15, 0.17, 0.18), (0.35, 0.37, 0.4), (0.16, 0.27, 0.22)),
+            end_post=(0.06, -0.03, 0.03, 1.1),
         ),
         RunKind(
             "picket_fence",
-            2.0,
-            _picket,
-            ((0.85, 0.84, 0.8), (0.5, 0.36, 0.24), (0.42, 0.42, 0.4)),
+            panel=2.0,
+            height=1.2,
+            make=_picket,
+            colours=((0.85, 0.84, 0.8), (0.5, 0.36, 0.24), (0.42, 0.42, 0.4)),
+            end_post=(0.1, -0.12, -0.05, 1.1),
         ),
         RunKind(
             "garden_wall",
-            3.0,
-            _garden_wall,
-            ((0.6, 0.38, 0.3), (0.7, 0.64, 0.54), (0.58, 0.56, 0.53)),
+            panel=3.0,
+            height=1.7,
+            make=_garden_wall,
+            colours=((0.6, 0.38, 0.3), (0.7, 0.64, 0.54), (0.58, 0.56, 0.53)),
+            end_post=(0.4, -0.2, 0.2, 1.7),
         ),
         RunKind(
             "hoarding",
-            2.4,
-            _hoarding,
-            ((0.75, 0.72, 0.66), (0.2, 0.36, 0.58), (0.34, 0.5, 0.36)),
+            panel=2.4,
+            height=2.26,
+            make=_hoarding,
+            colours=((0.75, 0.72, 0.66), (0.2, 0.36, 0.58), (0.34, 0.5, 0.36)),
+            end_post=(0.1, -0.14, 0.05, 2.2),
         ),
-        RunKind("site_fence", 3.5, _site_fence, ((0.6, 0.62, 0.63),)),
-        RunKind("concrete_barrier", 2.0, _concrete_barrier, (_GREY,)),
+        RunKind(
+            "site_fence",
+            panel=3.5,
+            height=2.0,
+            make=_site_fence,
+            colours=((0.6, 0.62, 0.63),),
+        ),
+        RunKind(
+            "concrete_barrier",
+            panel=2.0,
+            height=0.81,
+            make=_concrete_barrier,
+            colours=((0.55, 0.55, 0.54),),
+        ),
         RunKind(
             "hedge",
-            2.0,
-            _hedge,
-            ((0.24, 0.4, 0.19), (0.3, 0.44, 0.22), (0.2, 0.34, 0.2)),
+            panel=2.0,
+            height=1.4,
+            make=_hedge,
+            colours=((0.24, 0.4, 0.19), (0.3, 0.44, 0.22), (0.2, 0.34, 0.2)),
         ),
     )
 }
@@ -284,7 +317,10 @@ RUN_KINDS = {
 
 def _builder(kind: RunKind) -> Builder:
     def build(
-        rng: np.random.Generator, *, length: float = 10.0, height: float = 1.0
+        rng: np.random.Generator,
+        *,
+        length: float = 10.0,
+        height: float | None = None,
     ) -> Model:
         return run(rng, kind, length, height)
 
