@@ -57,11 +57,7 @@ def road_strip(road) -> Polygon:
 
 def _band(road, right, left, clearance=0.0) -> Polygon:
     """Returns the area between two lateral offsets of the centreline."""
-    stations = road.stations()
-    stations = stations[
-        (stations >= road.first_station + clearance)
-        & (stations <= road.last_station - clearance)
-    ]
+    stations = road.stations(clearance=clearance)
     outline = [
         road.evaluate(stations, left)[:, :2],
         road.evaluate(stations, right)[::-1, :2],
@@ -135,14 +131,18 @@ def make_areas(roads, junction_areas) -> Areas:
     lanes = {name: road_strip(road) for name, road in roads.items()}
     bays = {}
     for name, road in roads.items():
-        if road.parking > 0:
+        if road.parking > 0 and road.length > 2 * _BAY_CLEARANCE:
             edge, far = road.half_width, road.half_width + road.parking
             for side, offsets in (
                 ("right", (-far, -edge)),
                 ("left", (edge, far)),
             ):
                 bays[name, side] = _band(road, *offsets, _BAY_CLEARANCE)
-    medians = [_median(road) for road in roads.values() if road.median > 0]
+    medians = [
+        _median(road)
+        for road in roads.values()
+        if 0 < road.median < road.length
+    ]
     without_bays = _join([*lanes.values(), *junction_areas.values()])
     carriageway = _join([without_bays, *bays.values()])
     walks = [
@@ -173,11 +173,7 @@ def _median(road) -> Polygon:
     shift = (
         road.lane_width * (road.lanes["forward"] - road.lanes["backward"]) / 2
     )
-    stations = road.stations()
-    stations = stations[
-        (stations >= road.first_station + half)
-        & (stations <= road.last_station - half)
-    ]
+    stations = road.stations(clearance=half)
     line = LineString(road.evaluate(stations, shift)[:, :2])
     return line.buffer(half, quad_segs=_QUADRANT_SEGMENTS).simplify(_SIMPLIFY)
 

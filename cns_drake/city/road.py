@@ -105,9 +105,16 @@ class Road:
         y = y + offset * np.cos(heading)
         return np.stack([x, y, self._height(stations), heading], axis=1)
 
-    def stations(self, spacing: float = 1.0) -> np.ndarray:
-        """Returns the (N,) evenly spaced stations of the road itself."""
-        return sample_stations(self.first_station, self.last_station, spacing)
+    def stations(self, spacing: float = 1.0, clearance: float = 0.0):
+        """Returns the (N,) evenly spaced stations of the road itself.
+
+        Args:
+            spacing: upper bound of their distance [m].
+            clearance: distance to keep from both ends of the road [m].
+        """
+        first = self.first_station + clearance
+        last = self.last_station - clearance
+        return sample_stations(first, last, spacing)
 
     def centreline(self, spacing: float = 1.0) -> np.ndarray:
         """Returns the (N, 3) centreline between the junction areas [m]."""

@@ -1,0 +1,470 @@
+"""Road networks: geometry, legality, areas, faults; Metropolis' numbers."""
+
+import copy
+
+import numpy as np
+import pytest
+from shapely.geometry import LineString, Point
+import yaml
+
+from cns_drake.city.road import LaneRef
+from cns_drake.city.road_network import load_road_network
+from cns_drake.errors import InputError
+from cns_drake.paths import worlds_folder
+
+# A crossing of a four-lane road (west-east) and a two-lane road, joined in
+# a loop so that no road ends in the open.
+CROSS = {
+    "defaults": {"lanes": [1, 1], "lane_width": 3.0, "sidewalk": 2.0},
+    "junctions": {
+        "centre": {"position": [0, 0], "kerb_radius": 6.0},
+        "east": {"position": [80, 0], "kerb_radius": 6.0},
+        "north": {"position": [0, 80], "kerb_radius": 6.0},
+        "west": {"position": [-80, 0], "kerb_radius": 6.0},
+        "south": {"position": [0, -80], "kerb_radius": 6.0},
+    },
+    "roads": {
+        "e": {"start": "centre", "end": "east", "lanes": [2, 2]},
+        "n": {"start": "centre", "end": "north"},
+        "w": {"start": "west", "end": "centre", "lanes": [2, 2]},
+        "s": {"start": "south", "end": "centre"},
+        "ne": {"start": "north", "end": "east", "via": [[80, 80, 40]]},
+        "nw": {"start": "west", "end": "north", "via": [[-80, 80, 40]]},
+        "sw": {"start": "south", "end": "west", "via": [[-80, -80, 40]]},
+        "se": {"start": "east", "end": "south", "via": [[80, -80, 40]]},
+    },
+}
+
+
+@pytest.fixture
+def cross():
+    return copy.deepcopy(CROSS)
+
+
+@pytest.fixture
+def load(tmp_path):
+    def _load(content):
+        path = tmp_path / "roads.yaml"
+        path.write_text(yaml.safe_dump(content))
+        return load_road_network(path)
+
+    return _load
+
+
+@pytest.fixture(scope="module")
+def metropolis():
+    return load_road_network(worlds_folder() / "metropolis" / "roads.yaml")
+
+
+def test_roads_are_cut_back_to_the_kerb_tangents(load, cross):
+    network = load(cross)
+    # Along e: half of n (3 m) plus the kerb radius. Along n: half of e.
+    assert network.roads["e"].first_station == pytest.approx(3 + 6)
+    assert network.roads["n"].first_station == pytest.approx(6 + 6)
+    # w and s end in the centre: their setback is at the far end.
+    road = network.roads["w"]
+    assert road.full_length - road.last_station == pytest.approx(9)
+
+
+def test_a_given_setback_replaces_the_derived_one(load, cross):
+    cross["roads"]["e"]["start_setback"] = 20.0
+    assert load(cross).roads["e"].first_station == 20.0
+
+
+def test_lanes_keep_right_and_count_from_the_middle(load, cross):
+    road = load(cross).roads["w"]
+    # Heading east: forward lanes lie south of the centreline.
+    for direction, side in (("forward", -1), ("backward", 1)):
+        for lane in (1, 2):
+            points = road.lane_centreline(direction, lane)
+            expected = side * (lane - 0.5) * 3.0
+            np.testing.assert_allclose(points[:, 1], expected, atol=1e-9)
+    assert np.all(np.diff(road.lane_centreline("forward", 1)[:, 0]) > 0)
+    assert np.all(np.diff(road.lane_centreline("backward", 1)[:, 0]) < 0)
+    with pytest.raises(ValueError, match="no lane 3"):
+        road.lane_offset("forward", 3)
+
+
+def test_lanes_leave_room_for_a_median(load, cross):
+    cross["roads"]["w"]["median"] = 4.0
+    network = load(cross)
+    road = network.roads["w"]
+    assert road.half_width == 8.0
+    assert road.lane_offset("forward", 1) == pytest.approx(-3.5)
+    assert road.lane_offset("backward", 2) == pytest.approx(6.5)
+    median = network.medians()
+    assert median.area == pytest.approx(4 * (road.length - 4) + 4 * np.pi, 1e-3)
+    # Its noses touch the ends of the road.
+    ends = road.centreline()[[0, -1], 0]
+    np.testing.assert_allclose(median.bounds, [ends[0], -2, ends[1], 2])
+    assert median.intersection(network.carriageway()).area < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("lanes", "forward", "backward"),
+    [
+        ([1, 0], [0.0], []),
+        ([2, 0], [1.5, -1.5], []),
+        ([2, 1], [0.0, -3.0], [3.0]),
+    ],
+)
+def test_the_centreline_is_the_middle_of_the_carriageway(
+    load, cross, lanes, forward, backward
+):
+    cross["roads"]["w"]["lanes"] = lanes
+    road = load(cross).roads["w"]
+    assert road.half_width == 1.5 * sum(lanes)
+    offsets = {
+        direction: [
+            road.lane_offset(direction, lane + 1)
+            for lane in range(road.lanes[direction])
+        ]
+        for direction in ("forward", "backward")
+    }
+    assert offsets == {"forward": forward, "backward": backward}
+
+
+def test_turns_are_legal_from_and_to_their_own_lanes(load, cross):
+    network = load(cross)
+    ways = {
+        (way.incoming, way.outgoing): way.turn
+        for way in network.connections("centre")
+    }
+    from_west = {k: v for k, v in ways.items() if k[0].road == "w"}
+    west = [LaneRef("w", "forward", lane) for lane in (1, 2)]
+    assert from_west == {
+        (west[0], LaneRef("e", "forward", 1)): "straight",
+        (west[1], LaneRef("e", "forward", 2)): "straight",
+        (west[0], LaneRef("n", "forward", 1)): "left",
+        (west[1], LaneRef("s", "backward", 1)): "right",
+    }
+    # From each single-lane arm: left, straight, right.
+    assert len(ways) == 2 * 4 + 2 * 3
+
+
+def test_connections_join_lane_ends_tangentially(load, cross):
+    network = load(cross)
+    for junction in network.junctions:
+        for way in network.connections(junction):
+            for lane, end, point, edge in (
+                (way.incoming, "exit", 0, way.points[1] - way.points[0]),
+                (way.outgoing, "entry", -1, way.points[-1] - way.points[-2]),
+            ):
+                x, y, z, heading = network.roads[lane.road].lane_end(
+                    lane.direction, lane.lane, end
+                )
+                np.testing.assert_allclose(
+                    way.points[point], [x, y, z], atol=1e-9
+                )
+                edge = edge[:2] / np.linalg.norm(edge[:2])
+                along = [np.cos(heading), np.sin(heading)]
+                assert edge @ along > np.cos(np.radians(5.0))
+
+
+def test_a_right_turn_follows_the_kerb(load, cross):
+    network = load(cross)
+    way = network.connection(
+        LaneRef("w", "forward", 2), LaneRef("s", "backward", 1)
+    )
+    # The kerb's arc has its centre 6 m from both kerbs.
+    centre = np.array([-3.0 - 6.0, -6.0 - 6.0])
+    distance = np.linalg.norm(way.points[:, :2] - centre, axis=1)
+    np.testing.assert_allclose(distance, 6.0 + 1.5, atol=1e-9)
+
+
+def test_lanes_that_do_not_meet_are_refused(load, cross):
+    network = load(cross)
+    with pytest.raises(ValueError, match="ends at centre"):
+        network.connection(
+            LaneRef("w", "forward", 1), LaneRef("ne", "forward", 1)
+        )
+    with pytest.raises(ValueError, match="U-turn on road w"):
+        network.connection(
+            LaneRef("w", "forward", 1), LaneRef("w", "backward", 1)
+        )
+
+
+def test_kerb_corners_are_arcs(load, cross):
+    carriageway = load(cross).carriageway()
+    # The corner between e and n: centre of the arc, 6 m from both kerbs.
+    centre = np.array([3 + 6, 6 + 6.0])
+    towards_corner = -np.array([1, 1]) / np.sqrt(2)
+    assert carriageway.contains(Point(centre + 6.05 * towards_corner))
+    assert not carriageway.contains(Point(centre + 5.90 * towards_corner))
+
+
+def test_areas_tile_without_overlap(load, cross):
+    cross["roads"]["w"]["parking"] = 1.0
+    network = load(cross)
+    carriageway, sidewalks = network.carriageway(), network.sidewalks()
+    assert carriageway.is_valid
+    assert sidewalks.is_valid
+    assert carriageway.intersection(sidewalks).area < 1e-6
+    # No gap between the kerb and the sidewalk along e.
+    assert carriageway.distance(Point(40, 6 + 1e-3)) < 2e-3
+    assert sidewalks.contains(Point(40, 6.05))
+    assert sidewalks.contains(Point(40, 7.95))
+    assert not sidewalks.contains(Point(40, 8.05))
+    # Bays are carriageway, but not where vehicles drive.
+    bays = network.parking_bays()
+    assert set(bays) == {("w", "left"), ("w", "right")}
+    for side, y in (("left", 6.5), ("right", -6.5)):
+        assert bays["w", side].contains(Point(-40, y))
+        assert carriageway.contains(Point(-40, y))
+        assert not network.lane_area().contains(Point(-40, y))
+    assert sidewalks.contains(Point(-40, 7.05))
+    assert not sidewalks.contains(Point(-40, 8.05))
+
+
+def test_heights_pass_through_the_profile_and_level_off(load, cross):
+    cross["junctions"]["east"]["height"] = 3.0
+    cross["junctions"]["north"]["height"] = 1.0
+    cross["roads"]["e"]["heights"] = [[40, 2.0]]
+    network = load(cross)
+    road = network.roads["e"]
+    first, last = road.first_station, road.last_station
+    z = road.evaluate([0, first, 40, last, road.full_length])[:, 2]
+    np.testing.assert_allclose(z, [0, 0, 2, 3, 3], atol=1e-12)
+    points = road.centreline(0.01)
+    assert np.all(np.diff(points[:, 2]) >= -1e-12)
+    # Level at the junctions: no kink where a connection takes over.
+    assert abs(points[1, 2] - points[0, 2]) < 1e-5
+    assert abs(points[-1, 2] - points[-2, 2]) < 1e-5
+    way = network.connection(
+        LaneRef("e", "forward", 1), LaneRef("ne", "backward", 1)
+    )
+    np.testing.assert_array_equal(way.points[:, 2], 3.0)
+
+
+def test_a_loop_road_and_a_joint_of_two_roads(load):
+    network = load(
+        {
+            "junctions": {
+                "a": {"position": [0, 0], "kerb_radius": 4.0},
+                "b": {"position": [60, 0], "kerb_radius": 4.0},
+                "c": {"position": [120, 0], "kerb_radius": 4.0},
+            },
+            "roads": {
+                "to_b": {"start": "a", "end": "b"},
+                "to_c": {"start": "b", "end": "c"},
+                "loop_a": {
+                    "start": "a",
+                    "end": "a",
+                    "via": [
+                        [0, 30, 10],
+                        [-40, 30, 10],
+                        [-40, -30, 10],
+                        [0, -30, 10],
+                    ],
+                },
+                "loop_c": {
+                    "start": "c",
+                    "end": "c",
+                    "lanes": [1, 0],
+                    "via": [
+                        [120, 30, 10],
+                        [160, 30, 10],
+                        [160, -30, 10],
+                        [120, -30, 10],
+                    ],
+                },
+            },
+        }
+    )
+    assert [way.turn for way in network.connections("b")] == ["straight"] * 2
+    ways = {
+        (*way.incoming[:2], *way.outgoing[:2]): way.turn
+        for way in network.connections("a")
+    }
+    # Round the loop either way is straight through its own junction.
+    assert ways["loop_a", "forward", "loop_a", "forward"] == "straight"
+    assert ways["to_b", "backward", "loop_a", "forward"] == "right"
+    assert ways["to_b", "backward", "loop_a", "backward"] == "left"
+    # One-way: in at the start, out at the end only.
+    into_loop = [
+        way
+        for way in network.connections("c")
+        if way.outgoing.road == "loop_c" and way.incoming.road == "to_c"
+    ]
+    assert [way.turn for way in into_loop] == ["left"]
+
+
+FAULTS = {
+    "unknown key": (
+        lambda c: c["roads"]["e"].update(colour="red"),
+        r"roads\.e\.colour: Extra inputs",
+    ),
+    "wrong type": (
+        lambda c: c["roads"]["e"].update(lane_width="wide"),
+        r"roads\.e\.lane_width: Input should be a valid number",
+    ),
+    "number as text": (
+        lambda c: c["junctions"]["east"].update(kerb_radius="6"),
+        r"junctions\.east\.kerb_radius: Input should be a valid number",
+    ),
+    "not finite": (
+        lambda c: c["junctions"]["east"].update(position=[float("nan"), 0]),
+        r"junctions\.east\.position\.0: Input should be a finite number",
+    ),
+    "default": (
+        lambda c: c["defaults"].update(lane_width=-3.0),
+        r"defaults\.lane_width: Input should be greater than 0",
+    ),
+    "missing": (
+        lambda c: c["roads"]["e"].pop("end"),
+        r"roads\.e\.end: Field required",
+    ),
+    "unknown junction": (
+        lambda c: c["roads"]["e"].update(end="nowhere"),
+        r"roads\.e\.end: no junction 'nowhere'",
+    ),
+    "dangling": (
+        lambda c: [c["roads"].pop(name) for name in ("ne", "se")],
+        r"junctions\.east: 1 road\(s\) end here",
+    ),
+    "unused junction": (
+        lambda c: c["junctions"].update(far={"position": [900, 900]}),
+        r"junctions\.far: 0 road\(s\) end here",
+    ),
+    "crossing": (
+        lambda c: c["roads"].update(
+            bad={"start": "west", "end": "east", "via": [[0, 40, 10]]}
+        ),
+        r"roads\.\w+: meets road \w+ outside a junction",
+    ),
+    "tight corner": (
+        lambda c: c["roads"]["ne"].update(via=[[80, 80, 90]]),
+        r"roads\.ne\.via: the rounded corners .* need 90\.00 m",
+    ),
+    "no lanes": (
+        lambda c: c["roads"]["e"].update(lanes=[0, 0]),
+        r"roads\.e\.lanes: the road has no lane",
+    ),
+    "too short": (
+        lambda c: c["junctions"]["centre"].update(kerb_radius=70.0),
+        r"roads\.e: its junctions need",
+    ),
+    "heights": (
+        lambda c: c["roads"]["e"].update(heights=[[2, 1.0]]),
+        r"roads\.e: heights must lie between the junctions",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_faults_name_file_field_and_fault(load, cross, fault):
+    spoil, message = FAULTS[fault]
+    spoil(cross)
+    with pytest.raises(InputError, match=r"roads\.yaml: " + message) as error:
+        load(cross)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("roads: [", "not YAML"),
+        ("- 1", r"\(top level\)"),
+        ("", r"\(top level\)"),
+        ("roads: {}\njunctions: {}", "junctions: Dictionary should have at"),
+    ],
+)
+def test_files_that_hold_no_network(tmp_path, text, fault):
+    path = tmp_path / "roads.yaml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=f"roads.yaml: {fault}") as error:
+        load_road_network(path)
+    assert "\n" not in str(error.value)
+
+
+def test_files_that_cannot_be_read(tmp_path):
+    with pytest.raises(InputError, match=r"gone\.yaml: No such file"):
+        load_road_network(tmp_path / "gone.yaml")
+    (tmp_path / "binary.yaml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match="not UTF-8"):
+        load_road_network(tmp_path / "binary.yaml")
+
+
+def test_metropolis_has_the_dimensions_of_town10(metropolis):
+    centrelines = np.concatenate(
+        [
+            road.evaluate(np.linspace(0, road.full_length, 2000))
+            for road in metropolis.roads.values()
+        ]
+    )
+    low, high = centrelines.min(axis=0), centrelines.max(axis=0)
+    np.testing.assert_allclose(low[:3], [-109.3, -136.0, 0], atol=0.3)
+    np.testing.assert_allclose(high[:3], [104.7, 63.5, 0], atol=0.3)
+    # Roads between junctions 0.82 km, 3.1 lane-km; with the ways through
+    # the junctions about 1.3 km.
+    roads = metropolis.roads.values()
+    length = sum(road.length for road in roads)
+    assert length == pytest.approx(823, rel=0.05)
+    lanes = sum(road.length * sum(road.lanes.values()) for road in roads)
+    assert lanes == pytest.approx(3108, rel=0.05)
+    assert sum(road.full_length for road in roads) == pytest.approx(1300, 0.1)
+
+
+def test_metropolis_has_the_junctions_of_town10(metropolis):
+    # Position and size of the junction areas, as OpenDRIVE bounds them.
+    expected = {
+        "north": ((-47.5, 55.1), 3, (39.4, 23.7)),
+        "inner_middle": ((42.6, -60.3), 3, (30.9, 15.6)),
+        "centre": ((-47.8, -20.4), 4, (38.2, 44.3)),
+        "south": ((-50.1, -125.1), 3, (43.2, 20.4)),
+        "east": ((95.6, -18.8), 3, (25.1, 46.7)),
+        "inner_east": ((95.1, -68.1), 3, (18.3, 29.7)),
+        "west": ((-100.6, -20.9), 3, (23.9, 46.2)),
+        "boulevard": ((41.9, -30.5), 3, (31.0, 23.0)),
+        "inner_west": ((-37.0, -67.2), 3, (19.9, 30.9)),
+    }
+    assert metropolis.junctions.keys() == expected.keys()
+    for name, (centre, arms, size) in expected.items():
+        junction = metropolis.junctions[name]
+        assert len(junction.arms) == arms
+        box = metropolis.junction_area(name).bounds
+        found = np.array([box[2] - box[0], box[3] - box[1]])
+        # The reference bounds lane paths, not kerbs: up to a lane and its
+        # shoulder of difference on each side.
+        np.testing.assert_allclose(found, size, atol=9.0)
+        middle = np.array([box[0] + box[2], box[1] + box[3]]) / 2
+        np.testing.assert_allclose(middle, centre, atol=6.5)
+
+
+def test_metropolis_centrelines_pass_through_town10(metropolis):
+    # Points read off Town10HD's centrelines, all round the network.
+    points = [
+        (-108.2, 22.0), (-97.5, 51.1), (-68.8, 63.5), (-9.1, 62.8),
+        (67.2, 62.6), (98.3, 44.9), (104.7, 13.6), (104.3, -45.9),
+        (103.9, -94.1), (92.9, -122.7), (64.7, -136.0), (-7.8, -135.4),
+        (-71.7, -134.0), (-98.3, -114.8), (-109.3, -75.8), (-109.0, -43.9),
+        (-47.0, 28.4), (-46.9, -48.0), (-46.8, -99.8), (-78.0, -18.7),
+        (-1.1, -18.9), (73.2, -19.1), (0.1, -68.0), (74.0, -68.1),
+        (42.2, -45.5),
+    ]  # fmt: skip
+    lines = [
+        LineString(road.evaluate(road.stations())[:, :2])
+        for road in metropolis.roads.values()
+    ]
+    for point in points:
+        assert min(line.distance(Point(point)) for line in lines) < 0.4
+
+
+def test_every_legal_way_of_metropolis_stays_on_the_carriageway(metropolis):
+    area = metropolis.lane_area().buffer(0.02)
+    for junction in metropolis.junctions:
+        for way in metropolis.connections(junction):
+            swept = LineString(way.points[:, :2]).buffer(1.0, cap_style="flat")
+            assert area.contains(swept), way
+
+
+def test_metropolis_blocks_and_sidewalks(metropolis):
+    # Nine arms' worth of streets enclose seven blocks, and three medians.
+    assert len(metropolis.medians().geoms) == 3
+    (carriageway,) = metropolis.carriageway().geoms
+    blocks = len(carriageway.interiors) - 3
+    assert blocks == 6
+    # One sidewalk round each block and one outside the ring.
+    assert len(metropolis.sidewalks().geoms) == blocks + 1
+    for road in metropolis.roads.values():
+        assert (road.sidewalk, road.lane_width) == (6.0, 3.5)
