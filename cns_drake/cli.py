@@ -7,6 +7,7 @@ Everything slow to import is imported by the command that needs it, so that
 from __future__ import annotations
 
 from pathlib import Path
+import sys
 from typing import Annotated
 
 import typer
@@ -16,7 +17,6 @@ from cns_drake.errors import InputError
 
 app = typer.Typer(
     help="Cities that change, driven and recorded by simulated LiDAR.",
-    no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
 )
@@ -148,6 +148,8 @@ def reproduce(
 
 def main() -> None:
     """Runs the command line."""
+    if not sys.argv[1:]:
+        sys.argv.append("--help")
     terminal.run(app)
 
 

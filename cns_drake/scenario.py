@@ -162,8 +162,11 @@ class Scenario(_Model):
         }
         return self.model_copy(update={"lidars": lidars})
 
-    def check_files(self) -> None:
+    def check_files(self, source="scenario") -> None:
         """Checks that the map and its stage exist.
+
+        Args:
+            source: the file or name that errors begin with.
 
         Raises:
             InputError: they do not.
@@ -172,7 +175,7 @@ class Scenario(_Model):
         if not folder.is_dir():
             known = ", ".join(shipped_maps())
             raise InputError(
-                f"{self.name}: map: '{self.map}' is neither a shipped map "
+                f"{source}: map: '{self.map}' is neither a shipped map "
                 f"({known}) nor a folder"
             )
         if not self.world_file.is_file():
@@ -181,7 +184,7 @@ class Scenario(_Model):
                 for path in folder.glob("stage_*.sdf")
             )
             raise InputError(
-                f"{self.name}: stage: map '{self.map}' has no stage "
+                f"{source}: stage: map '{self.map}' has no stage "
                 f"'{self.stage}'; it has: {', '.join(stages) or 'none'}"
             )
 
@@ -246,5 +249,5 @@ def load_scenario(name_or_file: str | Path) -> Scenario:
         # Relative to the file, and independent of where it is read from.
         values["map"] = str((path.parent / map_name).resolve())
     scenario = make_scenario(values, path)
-    scenario.check_files()
+    scenario.check_files(path)
     return scenario

@@ -81,7 +81,7 @@ def simulate(
             check_writable(file)
     # What can be found wrong at once is found before anything slow.
     check_folder(folder, overwrite)
-    scenario.check_files()
+    scenario.check_files(scenario.name)
     trajectory = plan_drive(scenario)
     available = math.floor(trajectory.duration / FRAME_PERIOD) + 1
     num_frames = scenario.frames or available

@@ -38,11 +38,7 @@ def run(app: typer.Typer) -> None:
     the command line does not take, with 130 when interrupted (also by
     SIGTERM, so that recordings are closed).
     """
-
-    def interrupt(signal_number, frame):
-        raise KeyboardInterrupt
-
-    signal.signal(signal.SIGTERM, interrupt)
+    interrupt_on_termination()
     try:
         raise SystemExit(app(standalone_mode=False))
     except InputError as error:
@@ -53,6 +49,15 @@ def run(app: typer.Typer) -> None:
         message, status = "interrupted", _INTERRUPTED
     print(message, file=sys.stderr)
     raise SystemExit(status)
+
+
+def interrupt_on_termination() -> None:
+    """Makes SIGTERM an exception, so that open recordings are closed."""
+
+    def interrupt(signal_number, frame):
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, interrupt)
 
 
 @contextlib.contextmanager

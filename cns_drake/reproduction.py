@@ -1,0 +1,77 @@
+"""The paper's experiments on a map, from simulation to report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+import subprocess
+import sys
+
+from cns_drake.errors import InputError
+from cns_drake.jobs import record_all
+from cns_drake.paths import shipped_maps, shipped_sequences
+from cns_drake.scenario import Scenario, load_scenario
+
+
+def reproduce_maps(
+    maps: Sequence[str] | None, output: Path, num_processes: int
+) -> None:
+    """Records the sequences of maps, evaluates them and reports.
+
+    `<output>/recordings` gets the recordings, `<output>/report` the tables
+    and figures. What is recorded already is not recorded again.
+
+    Args:
+        maps: which maps; all shipped ones if empty.
+        output: the folder for everything.
+        num_processes: how many sequences to simulate side by side.
+
+    Raises:
+        InputError: a map is not known, or a step failed.
+    """
+    known = shipped_maps()
+    for name in maps or ():
+        if name not in known:
+            raise InputError(f"unknown map '{name}'; known: {', '.join(known)}")
+    scenarios = [
+        scenario
+        for name in maps or known
+        for scenario in _scenarios_of_map(name)
+    ]
+    recordings = output / "recordings"
+    record_all(scenarios, recordings, num_processes)
+    # A process of its own: the evaluation stands without the simulator.
+    command = [sys.executable, "-m", "evaluation", "report", str(recordings)]
+    done = subprocess.run(
+        [*command, "--output", str(output / "report")], check=False
+    )
+    if done.returncode != 0:
+        raise InputError(f"{recordings}: the evaluation failed (see above)")
+
+
+def _scenarios_of_map(name: str) -> list[Scenario]:
+    """Returns a map's sequences, and its control drives.
+
+    A control drive is the route of an earlier stage through the last one:
+    compared with the last stage's own sequence, whatever it shows as change
+    is due to the routes and not to the city.
+    """
+    sequences = [
+        load_scenario(sequence)
+        for sequence, path in shipped_sequences().items()
+        if path.parent == shipped_maps()[name]
+    ]
+    last = max(sequences, key=lambda sequence: sequence.stage)
+    controls = [
+        sequence.model_copy(
+            update={
+                "name": f"{sequence.name}_stage_{last.stage}",
+                "stage": last.stage,
+                "title": f"Control: the route of {sequence.name} "
+                f"in stage {last.stage}",
+            }
+        )
+        for sequence in sequences
+        if sequence is not last
+    ]
+    return sequences + controls

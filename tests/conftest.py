@@ -1,0 +1,21 @@
+"""Fixtures that several test modules use."""
+
+import pytest
+from small_map import scenario_values, write_small_map
+
+from cns_drake.scenario import make_scenario
+from cns_drake.simulation import simulate
+
+
+@pytest.fixture(scope="session")
+def small_map(tmp_path_factory):
+    """Folder of a map that loads at once, with stages 01 and 04."""
+    return write_small_map(tmp_path_factory.mktemp("maps") / "small")
+
+
+@pytest.fixture(scope="session")
+def short_recording(small_map, tmp_path_factory):
+    """Folder of a recording of 40 frames with the default LiDAR."""
+    output = tmp_path_factory.mktemp("recordings")
+    values = scenario_values(small_map) | {"frames": 40}
+    return simulate(make_scenario(values, "test"), output).folder

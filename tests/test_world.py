@@ -1,0 +1,71 @@
+"""Loading SDF worlds, and the faults they may have."""
+
+import pytest
+from small_map import box_visual, world_text
+
+from cns_drake.errors import InputError
+from cns_drake.paths import vehicle_file
+from cns_drake.world import load_world
+
+MESH = "<mesh><uri>{}</uri></mesh>"
+
+
+def write_world(tmp_path, geometry):
+    visual = f'<visual name="thing"><geometry>{geometry}</geometry></visual>'
+    path = tmp_path / "world.sdf"
+    path.write_text(world_text([visual]))
+    return path
+
+
+def test_static_models_are_anchored_and_the_vehicle_is_not(small_map):
+    world = load_world(small_map / "stage_04.sdf", vehicle=vehicle_file())
+    plant = world.plant
+    city = plant.GetBodyFrameIdOrThrow(plant.GetBodyByName("city").index())
+    base = plant.GetBodyByName("base_link", world.vehicle)
+    assert city in world.anchored_frames()
+    base_frame = plant.GetBodyFrameIdOrThrow(base.index())
+    assert base_frame not in world.anchored_frames()
+    assert world.structures["tower_003"].label == 50
+
+
+@pytest.mark.parametrize(
+    ("geometry", "fault"),
+    [
+        ("<plane><normal>0 0 1</normal></plane>", "'city::thing'.*HalfSpace"),
+        (MESH.format("missing.obj"), r"missing\.obj"),
+    ],
+)
+def test_geometry_that_no_ray_can_hit(tmp_path, geometry, fault):
+    path = write_world(tmp_path, geometry)
+    with pytest.raises(InputError, match=rf"world\.sdf: .*{fault}") as caught:
+        load_world(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_world_with_nothing_to_see(tmp_path):
+    path = tmp_path / "empty.sdf"
+    path.write_text(world_text([]))
+    with pytest.raises(InputError, match=r"empty\.sdf: no visual"):
+        load_world(path)
+
+
+@pytest.mark.parametrize("text", ["", "<sdf><world>", "hello", "<sdf/>"])
+def test_files_that_are_no_world(tmp_path, text):
+    path = tmp_path / "broken.sdf"
+    path.write_text(text)
+    with pytest.raises(InputError, match=r"broken\.sdf: ") as caught:
+        load_world(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_missing_file(tmp_path):
+    with pytest.raises(InputError, match=r"no\.sdf: no such file"):
+        load_world(tmp_path / "no.sdf")
+
+
+def test_table_beside_the_world_is_optional(tmp_path):
+    path = tmp_path / "world.sdf"
+    path.write_text(
+        world_text([box_visual("hut/wall", (0, 0, 1, 0, 0, 0), (1, 1, 2))])
+    )
+    assert list(load_world(path).structures) == []
