@@ -25,6 +25,7 @@ _ROUTE_HEIGHT = 0.25
 
 _MARKER_HEIGHT = 7.0
 _MARKER_RADIUS = 2.5
+_MARKER_RGBA = Rgba(1.0, 0.75, 0.0)
 
 _POINT_SIZE = 0.22
 # Colours of points repeat over this range of heights above the map's zero.
@@ -86,7 +87,7 @@ def draw_marker(meshcat: Meshcat, path: str) -> None:
     meshcat.SetObject(
         path,
         MeshcatCone(height=_MARKER_HEIGHT, a=_MARKER_RADIUS, b=_MARKER_RADIUS),
-        Rgba(*_START_RGB),
+        _MARKER_RGBA,
     )
 
 

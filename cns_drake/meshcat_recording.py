@@ -67,7 +67,7 @@ class MeshcatRecorder(LeafSystem):
         self._X_BSs = dict(X_BSs)
         self._scan_spacing = scan_spacing
         self._way_to_scan = 0.0
-        self._drive = Drive(
+        self.drive = Drive(
             period, X_WFs={frame_id: [] for frame_id in moving_frames(world)}
         )
 
@@ -97,7 +97,7 @@ class MeshcatRecorder(LeafSystem):
             InputError: if the file cannot be written.
         """
         html = make_drive_page(
-            self._drive,
+            self.drive,
             self._world,
             other_stage=self._other_stage,
             title=title,
@@ -107,11 +107,11 @@ class MeshcatRecorder(LeafSystem):
 
     def _publish(self, context: Context) -> EventStatus:
         query_object = self._geometry_query.Eval(context)
-        for frame_id, X_WFs in self._drive.X_WFs.items():
+        for frame_id, X_WFs in self.drive.X_WFs.items():
             # Copies: what the ports give may be overwritten at the next step.
             X_WFs.append(RigidTransform(query_object.GetPoseInWorld(frame_id)))
         X_WB = RigidTransform(self._odometry.Eval(context).X_WB)
-        X_WBs = self._drive.X_WBs
+        X_WBs = self.drive.X_WBs
         if X_WBs:
             step = X_WB.translation() - X_WBs[-1].translation()
             self._way_to_scan -= float(np.linalg.norm(step))
@@ -127,10 +127,10 @@ class MeshcatRecorder(LeafSystem):
                 for name, scan in self._scans.items()
             ]
         )
-        frame = len(self._drive.X_WBs) - 1
-        self._drive.scans.append((frame, _thinned(p_WRset)))
-        if len(self._drive.scans) > _MAX_SCANS:
-            del self._drive.scans[1::2]
+        frame = len(self.drive.X_WBs) - 1
+        self.drive.scans.append((frame, _thinned(p_WRset)))
+        if len(self.drive.scans) > _MAX_SCANS:
+            del self.drive.scans[1::2]
             self._scan_spacing *= 2.0
         self._way_to_scan = self._scan_spacing
 
