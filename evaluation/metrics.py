@@ -24,6 +24,7 @@ from typing import Literal
 import numpy as np
 
 Mode = Literal["all", "filtered"]
+MODES: tuple[Mode, ...] = ("all", "filtered")
 
 MAX_RANK = 25
 _BOOTSTRAP_SAMPLES = 1000

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 
 from evaluation.errors import InputError
@@ -41,6 +41,10 @@ class PlaceRecognition:
     retrieval: Retrieval
     outcomes: QueryOutcomes
     metrics: PlaceRecognitionMetrics
+
+    def counting(self, mode: Mode) -> PlaceRecognition:
+        """Returns the same outcome with its numbers in a mode."""
+        return replace(self, metrics=evaluate(self.outcomes, mode))
 
     def to_json(self) -> dict:
         """Returns all numbers; NaN becomes None."""

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import csv
-import os
 from pathlib import Path
 
 import numpy as np
 
 from evaluation import points as point_arrays
 from evaluation.errors import InputError
+from evaluation.files import completing
 from evaluation.methods.method import Method
 from evaluation.progress import Track, silent
 from evaluation.retrieval import crop
@@ -50,21 +50,19 @@ def write_scores(
             )
         ]
     )
-    part = output.with_name(f"{output.name}.part")
-    try:
-        with open(part, "w", newline="", encoding="utf-8") as stream:
-            writer = csv.writer(stream, lineterminator="\n")
-            writer.writerow(["query", "database", "score"])
-            for path in track(query_files, "querying", len(query_files)):
-                values = method.score(
-                    method.describe(_read(path)), places, exhaustive=True
-                )
-                for place, value in zip(place_files, values, strict=True):
-                    text = "" if np.isnan(value) else repr(float(value))
-                    writer.writerow([path.stem, place.stem, text])
-        os.replace(part, output)
-    except OSError as error:
-        raise InputError(f"{output}: {error.strerror or error}") from error
+    with (
+        completing(output) as part,
+        open(part, "w", newline="", encoding="utf-8") as stream,
+    ):
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(["query", "database", "score"])
+        for path in track(query_files, "querying", len(query_files)):
+            values = method.score(
+                method.describe(_read(path)), places, exhaustive=True
+            )
+            for place, value in zip(place_files, values, strict=True):
+                text = "" if np.isnan(value) else repr(float(value))
+                writer.writerow([path.stem, place.stem, text])
 
 
 def _read(path: Path) -> np.ndarray:

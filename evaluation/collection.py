@@ -1,0 +1,150 @@
+"""The recordings in a folder: which belong together, and in which role."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+import re
+
+from evaluation import paper
+from evaluation.errors import InputError
+from evaluation.sequences import Sequence, open_sequence
+
+_NAME = re.compile(r"(?P<map>.+)_(?P<stage>[^_]+)")
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A sequence with its place in a collection.
+
+    Attributes:
+        sequence: the drive.
+        map_name: of the city.
+        stage: of the city's life; stages sort by name.
+    """
+
+    sequence: Sequence
+    map_name: str
+    stage: str
+
+    @property
+    def name(self) -> str:
+        return self.sequence.name
+
+    @property
+    def route(self) -> object | None:
+        """What the scenario says about the route; None if it is unknown."""
+        scenario = self.sequence.scenario
+        return None if scenario is None else scenario.get("route")
+
+
+@dataclass(frozen=True)
+class City:
+    """The drives through one map.
+
+    Attributes:
+        name: of the map.
+        stages: one recording a stage, by stage: `<map>_<stage>`.
+        others: further drives through one of the stages, which may serve as
+            controls.
+    """
+
+    name: str
+    stages: dict[str, Recording]
+    others: tuple[Recording, ...]
+
+    def change_pairs(self) -> list[tuple[Recording, Recording]]:
+        """Returns every stage with the last one, as the paper compares."""
+        *earlier, last = (self.stages[key] for key in sorted(self.stages))
+        return [(recording, last) for recording in earlier]
+
+    def recognition_pairs(self) -> list[tuple[Recording, Recording]]:
+        """Returns pairs of database and query.
+
+        Every earlier stage is a database for the last one; the other way
+        round where the paper has it.
+        """
+        pairs = []
+        for earlier, last in self.change_pairs():
+            pairs.append((earlier, last))
+            if any(
+                key[:3] == (self.name, last.stage, earlier.stage)
+                for key in paper.recognition_values()
+            ):
+                pairs.append((last, earlier))
+        return pairs
+
+    def control(self, first: Recording, second: Recording) -> Recording | None:
+        """Returns a drive on the route of one in the stage of the other."""
+        for other in self.others:
+            for stage, route in ((second, first), (first, second)):
+                if (
+                    other.stage == stage.stage
+                    and other.route is not None
+                    and other.route == route.route
+                ):
+                    return other
+        return None
+
+
+def find_cities(folder: Path) -> list[City]:
+    """Opens all recordings in a folder and its direct subfolders.
+
+    A recording states its map and stage in its scenario; without one they
+    are taken from its name, `<map>_<stage>`.
+
+    Returns:
+        The cities by name.
+
+    Raises:
+        InputError: if there is no recording, one cannot be read or placed,
+            or two claim the same place.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise InputError(f"{folder}: no such folder")
+    paths = sorted(
+        path
+        for path in folder.iterdir()
+        if path.suffix == ".mcap"
+        or (path.is_dir() and any(path.glob("*.mcap")))
+    )
+    if not paths:
+        raise InputError(f"{folder}: no recorded sequence in it")
+    recordings = [_place(path) for path in paths]
+    return [
+        _make_city(folder, name, [r for r in recordings if r.map_name == name])
+        for name in sorted({recording.map_name for recording in recordings})
+    ]
+
+
+def _place(path: Path) -> Recording:
+    sequence = open_sequence(path)
+    scenario = sequence.scenario
+    if scenario is not None and {"map", "stage"} <= set(scenario):
+        return Recording(
+            sequence, Path(scenario["map"]).name, str(scenario["stage"])
+        )
+    match = _NAME.fullmatch(sequence.name)
+    if match is None:
+        raise InputError(
+            f"{path}: neither a scenario nor a name <map>_<stage> tells map"
+            " and stage"
+        )
+    return Recording(sequence, match["map"], match["stage"])
+
+
+def _make_city(folder: Path, name: str, recordings: list[Recording]) -> City:
+    stages = {}
+    for stage in sorted({recording.stage for recording in recordings}):
+        candidates = [r for r in recordings if r.stage == stage]
+        named = [r for r in candidates if r.name == f"{name}_{stage}"]
+        if len(candidates) > 1 and len(named) != 1:
+            raise InputError(
+                f"{folder}: {len(candidates)} recordings of {name} at stage"
+                f" {stage}, and not one of them named {name}_{stage}"
+            )
+        stages[stage] = (named or candidates)[0]
+    chosen = {recording.name for recording in stages.values()}
+    others = tuple(r for r in recordings if r.name not in chosen)
+    return City(name, stages, others)

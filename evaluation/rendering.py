@@ -1,0 +1,162 @@
+"""Pictures of large point clouds, drawn by NumPy.
+
+Millions of points are projected orthographically, hidden ones removed by a
+depth buffer, and edges darkened where the depth steps (eye-dome lighting:
+Boucheny 2009), which shows shape without normals.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+import numpy as np
+
+_WHITE = 255
+# How strongly a step in depth darkens: of one metre, by 1 - exp(-strength).
+_STEP_STRENGTH = 0.35
+# Deeper steps darken no more than this [m].
+_STEP_LIMIT = 4.0
+
+
+@dataclass(frozen=True)
+class View:
+    """An orthographic camera that looks at the ground.
+
+    Attributes:
+        azimuth_deg: direction from the scene to the camera, seen from above
+            [deg].
+        elevation_deg: of the camera above the horizon, up to 90 [deg].
+        pixels_per_metre: scale.
+    """
+
+    azimuth_deg: float = -60.0
+    elevation_deg: float = 35.0
+    pixels_per_metre: float = 3.0
+
+    def axes(self) -> np.ndarray:
+        """Returns rows right, up and towards the camera (3, 3), in W."""
+        azimuth = math.radians(self.azimuth_deg)
+        elevation = math.radians(self.elevation_deg)
+        towards = [
+            math.cos(elevation) * math.cos(azimuth),
+            math.cos(elevation) * math.sin(azimuth),
+            math.sin(elevation),
+        ]
+        right = [-math.sin(azimuth), math.cos(azimuth), 0.0]
+        return np.array([right, np.cross(towards, right), towards])
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A rendered cloud.
+
+    Attributes:
+        image: (height, width, 3) uint8; white where there is no point.
+        origin: coordinates along right and up of the lower left corner [m].
+        view: how it was taken.
+    """
+
+    image: np.ndarray
+    origin: np.ndarray
+    view: View
+
+    @property
+    def extent(self) -> tuple[float, float, float, float]:
+        """Left, right, bottom and top of the image, along its axes [m]."""
+        height, width = self.image.shape[:2]
+        scale = self.view.pixels_per_metre
+        left, bottom = self.origin
+        return left, left + width / scale, bottom, bottom + height / scale
+
+    def project(self, points: np.ndarray) -> np.ndarray:
+        """Returns points (N, 3) along right and up (N, 2) [m]."""
+        return points @ self.view.axes()[:2].T
+
+
+def render(
+    points: np.ndarray, rgb: np.ndarray, view: View, size_px: int = 3
+) -> Picture:
+    """Draws a cloud.
+
+    Args:
+        points: (N, 3) in W [m], N > 0.
+        rgb: (N, 3) uint8 colour of each.
+        view: the camera.
+        size_px: side of the square that a point covers.
+    """
+    seen = points @ view.axes().T
+    origin = seen[:, :2].min(axis=0)
+    column, up = (
+        np.floor((seen[:, :2] - origin) * view.pixels_per_metre)
+        .astype(np.int64)
+        .T
+    )
+    width = int(column.max()) + size_px
+    height = int(up.max()) + size_px
+    row = height - size_px - up
+    depth = np.full(height * width, -np.inf)
+    nearest = np.full(height * width, -1, dtype=np.int64)
+    # From back to front: of equal pixels the last one assigned stays.
+    order = np.argsort(seen[:, 2], kind="stable")
+    first = row[order] * width + column[order]
+    for pixel_row in range(size_px):
+        for pixel_column in range(size_px):
+            pixel = first + pixel_row * width + pixel_column
+            candidate = np.full(height * width, -1, dtype=np.int64)
+            candidate[pixel] = order
+            closer = candidate >= 0
+            closer[closer] = seen[candidate[closer], 2] > depth[closer]
+            nearest[closer] = candidate[closer]
+            depth[closer] = seen[candidate[closer], 2]
+    image = np.full((height * width, 3), _WHITE, dtype=np.uint8)
+    filled = nearest >= 0
+    shade = _shade(depth.reshape(height, width)).ravel()
+    image[filled] = (rgb[nearest[filled]] * shade[filled, None]).astype(
+        np.uint8
+    )
+    return Picture(image.reshape(height, width, 3), origin, view)
+
+
+def shade_by_height(
+    rgb: np.ndarray, heights: np.ndarray, darkest: float = 0.75
+) -> np.ndarray:
+    """Returns colours that are darker the lower their points are.
+
+    Args:
+        rgb: (N, 3) uint8.
+        heights: (N,) [m].
+        darkest: factor at the lowest point.
+    """
+    low, high = np.quantile(heights, [0.01, 0.99])
+    part = np.clip((heights - low) / max(high - low, 1e-9), 0.0, 1.0)
+    # Root, because most of a city is near the ground.
+    factor = darkest + (1.0 - darkest) * np.sqrt(part)
+    return (rgb * factor[:, None]).astype(np.uint8)
+
+
+def _shade(depth: np.ndarray) -> np.ndarray:
+    """Returns the brightness of each pixel, 0 to 1, from steps in depth.
+
+    Args:
+        depth: (H, W) towards the camera [m]; -inf where there is nothing.
+    """
+    padded = np.pad(depth, 1, constant_values=-np.inf)
+    height, width = depth.shape
+    steps = np.zeros_like(depth)
+    neighbours = [
+        (0, 1),
+        (1, 0),
+        (1, 2),
+        (2, 1),
+        (0, 0),
+        (0, 2),
+        (2, 0),
+        (2, 2),
+    ]
+    for row, column in neighbours:
+        other = padded[row : row + height, column : column + width]
+        with np.errstate(invalid="ignore"):
+            step = np.nan_to_num(other - depth, nan=0.0, neginf=0.0)
+        steps += np.clip(step, 0.0, _STEP_LIMIT)
+    return np.exp(-_STEP_STRENGTH * steps / len(neighbours))
