@@ -19,20 +19,20 @@ def make_uniform_spline(control_points, spacing: float) -> BsplineTrajectory:
     Such a spline never leaves the convex hull of ORDER neighbouring control
     points, its derivatives never that of their difference quotients, and it
     reproduces a straight line: bounds on the control points are bounds on
-    the curve. It starts at 0 and has its i-th knot at i * spacing. At both
-    ends the control points are continued on a straight line.
+    the curve. It starts at 0 and has its i-th knot at i * spacing. Beyond
+    both ends the control points are mirrored in the last one, so that the
+    curve ends in it.
 
     Args:
-        control_points: (N, D) values at the knots, N >= 2.
+        control_points: (N, D) values at the knots, N > REACH.
         spacing: distance of the knots in the parameter.
     """
     points = np.asarray(control_points, dtype=float)
-    steps = np.arange(1, REACH + 1)[:, None]
     points = np.concatenate(
         [
-            points[0] - steps[::-1] * (points[1] - points[0]),
+            2 * points[0] - points[REACH:0:-1],
             points,
-            points[-1] + steps * (points[-1] - points[-2]),
+            2 * points[-1] - points[-2 : -REACH - 2 : -1],
         ]
     )
     # The domain begins at the last of the first ORDER knots.

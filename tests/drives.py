@@ -26,10 +26,10 @@ def helix_points(radius, slope, count, start=0.3) -> np.ndarray:
     Args:
         radius: of the bend seen from above [m].
         slope: height per horizontal distance.
-        count: how many points, SPACING apart along the horizontal arc.
+        count: how many points, SPACING apart along the helix.
         start: polar angle of the first [rad].
     """
-    arc = SPACING * np.arange(count)
+    arc = SPACING / np.hypot(1.0, slope) * np.arange(count)
     angle = start + arc / radius
     return np.stack(
         [
@@ -41,15 +41,14 @@ def helix_points(radius, slope, count, start=0.3) -> np.ndarray:
     )
 
 
-def smoothed_radius(radius) -> float:
-    """Returns the radius of the quintic spline whose control points lie,
-    SPACING apart, on a circle.
+def smoothed_radius(radius, slope=0.0) -> float:
+    """Returns the radius of the quintic spline on `helix_points`.
 
     A uniform B-spline of order 6 multiplies a sampled wave of angular
     frequency w by sinc(w h / 2)^6 (its Fourier transform); aliases are
     weaker by (h / (2 pi r))^6 and do not matter here.
     """
-    x = SPACING / (2 * radius)
+    x = SPACING / np.hypot(1.0, slope) / (2 * radius)
     return radius * (np.sin(x) / x) ** 6
 
 
@@ -64,8 +63,9 @@ def wavy_points(seed) -> np.ndarray:
             2 * np.pi * s / length + phase
         )
         height += rng.uniform(0.3, 1.0) * np.sin(2 * np.pi * s / length + phase)
-    x = np.cumsum(SPACING * np.cos(heading))
-    y = np.cumsum(SPACING * np.sin(heading))
+    flat = np.sqrt(SPACING**2 - np.diff(height, prepend=height[0]) ** 2)
+    x = np.cumsum(flat * np.cos(heading))
+    y = np.cumsum(flat * np.sin(heading))
     return np.stack([x, y, height], axis=1)
 
 
