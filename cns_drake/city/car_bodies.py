@@ -126,20 +126,16 @@ def _cabin_outline(form: CarForm, level: float, inset: float) -> np.ndarray:
     rear, front = rear + inset, front - inset
     slope = 0.1 if form.panelled else 0.17
     half = form.width / 2 - 0.08 - slope * level - inset
-    z_rear, z_front = (
-        (1 - level) * (form.belt(x) - 0.03) + level * (form.height - 0.06)
-        for x in form.cabin_base
-    )
     bow = 0.07
-    corners = [
-        (front - bow, half, z_front),
-        (rear + bow, half, z_rear),
-        (rear, 0.0, z_rear),
-        (rear + bow, -half, z_rear),
-        (front - bow, -half, z_front),
-        (front, 0.0, z_front),
-    ]
-    return np.array(corners)
+    x = np.array(
+        [front - bow, rear + bow, rear, rear + bow, front - bow, front]
+    )
+    y = half * np.array([1.0, 1.0, 0.0, -1.0, -1.0, 0.0])
+    # One slanted plane from the rear to the front.
+    low = [form.belt(end) - 0.03 for end in form.cabin_base]
+    belt = low[0] + (low[1] - low[0]) * (x - rear) / (front - rear)
+    z = (1 - level) * belt + level * (form.height - 0.06)
+    return np.column_stack([x, y, z])
 
 
 def _cabin(form: CarForm, inset: float) -> Mesh:

@@ -69,7 +69,7 @@ def run(
     colour = kind.colours[int(rng.integers(len(kind.colours)))]
     tall = round(height / kind.height, 4)
     total = max(1, round(length / kind.panel))
-    stretch = length / (total * kind.panel)
+    stretch = round(length / (total * kind.panel), 4)
     parts, meshes, done = [], {}, 0
     while done < total:
         count = _LONGEST
@@ -80,7 +80,7 @@ def run(
         parts.append(
             Part(
                 f"run_{len(parts):02d}",
-                MeshShape(name, (round(stretch, 4), 1.0, tall)),
+                MeshShape(name, (stretch, 1.0, tall)),
                 xyz=(done * kind.panel * stretch - length / 2, 0.0, 0.0),
                 rgb=colour,
             )

@@ -218,7 +218,7 @@ def _flag() -> Mesh:
     sections = [
         [
             (x[k], wave[k] + side * 0.008, droop[k] + z)
-            for side, z in ((1, -1.2), (-1, -1.2), (-1, 0), (1, 0))
+            for side, z in ((1, -1.2), (1, 0), (-1, 0), (-1, -1.2))
         ]
         for k in range(len(x))
     ]

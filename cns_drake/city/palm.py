@@ -11,7 +11,7 @@ from cns_drake.city.mesh import Mesh, merge_meshes
 _HEIGHT = 8.5
 _STEM = 7.0
 _FRONDS = 19
-_LEAFLETS = 9
+_LEAFLETS = 10
 
 
 def grow_palm(rng: np.random.Generator) -> tuple[Mesh, Mesh]:
@@ -66,6 +66,6 @@ def _leaflets(rng: np.random.Generator, rib: np.ndarray, out: np.ndarray):
         droop = -0.35 - 0.3 * rng.uniform(size=(len(at), 1))
         direction = side * across + 0.75 * along + droop * (0.0, 0.0, 1.0)
         normal = np.tile((0.0, 0.0, 1.0), (len(at), 1)) + 0.5 * side * across
-        width = np.full(len(at), 0.17)
+        width = np.full(len(at), 0.21)
         columns.append((base, direction, normal, length, width))
     return [np.concatenate(column) for column in zip(*columns, strict=True)]
