@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+import re
 
 from pydrake.geometry import FrameId, Role, SceneGraph
 from pydrake.multibody.parsing import Parser
@@ -95,8 +96,13 @@ def _parse(parser: Parser, path: Path) -> list[ModelInstanceIndex]:
     try:
         models = parser.AddModels(str(path))
     except RuntimeError as error:
+        # Drake and libsdformat begin with the path and a severity, too.
         fault = " ".join(str(error).split())
-        fault = fault.removeprefix(f"{path}:").removeprefix("error:").strip()
+        fault = re.sub(
+            rf"/*{re.escape(str(path))}:(?:(\d+):)? error: ",
+            lambda match: f"line {match[1]}: " if match[1] else "",
+            fault,
+        )
         raise InputError(f"{path}: cannot be parsed: {fault}") from error
     if not models:
         raise InputError(f"{path}: holds no model")
