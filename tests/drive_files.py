@@ -60,7 +60,9 @@ def write_recording(
     stamps_ns: list[int] | None = None,
     chunk_size: int = 1024 * 1024,
     attachments: dict | None = None,
-    metadata: bool = True,
+    lidar_topic: str = "/lidar/points",
+    world_frame: str = "map",
+    mast: str = "mast",
 ) -> Path:
     """Writes a rosbag2 folder; rotations of X_WBs are about z only.
 
@@ -75,7 +77,9 @@ def write_recording(
         stamps_ns: of the frames; every 50 ms by default.
         chunk_size: of the MCAP file [bytes].
         attachments: name -> JSON value.
-        metadata: whether metadata.yaml is written.
+        lidar_topic: under which the scans are written.
+        world_frame: of the odometry.
+        mast: parent of the sensor's frame; the vehicle carries `mast`.
 
     Returns:
         The path of the .mcap file.
@@ -98,7 +102,9 @@ def write_recording(
                 json.dumps(value).encode(),
             )
         channels = {
-            name: _register(writer, name, kind)
+            name: _register(
+                writer, lidar_topic if name == "/lidar/points" else name, kind
+            )
             for name, kind in {
                 "/lidar/points": "sensor_msgs/msg/PointCloud2",
                 "/odometry": "nav_msgs/msg/Odometry",
@@ -119,20 +125,18 @@ def write_recording(
             if i == 0:
                 add(
                     "/tf_static",
-                    _tf_static(p_BS, quat_xyzw_BS, stamp),
+                    _tf_static(p_BS, quat_xyzw_BS, mast, stamp),
                     stamp,
                     0,
                 )
             add(
                 "/odometry",
-                _odometry(X_WB, stamp + odometry_shift_ns),
+                _odometry(X_WB, world_frame, stamp + odometry_shift_ns),
                 stamp,
                 i,
             )
             add("/lidar/points", point_cloud(scan, stamp), stamp, i)
         writer.finish()
-    if metadata:
-        (folder / "metadata.yaml").write_text("rosbag2_bagfile_information:\n")
     return path
 
 
@@ -173,7 +177,7 @@ def _header(frame_id: str, stamp_ns: int):
     return TYPES.types["std_msgs/msg/Header"](stamp=time, frame_id=frame_id)
 
 
-def _odometry(X_WB: np.ndarray, stamp_ns: int):
+def _odometry(X_WB: np.ndarray, frame_id: str, stamp_ns: int):
     t = TYPES.types
     half_yaw = 0.5 * np.arctan2(X_WB[1, 0], X_WB[0, 0])
     pose = t["geometry_msgs/msg/Pose"](
@@ -186,7 +190,7 @@ def _odometry(X_WB: np.ndarray, stamp_ns: int):
     )
     zero = t["geometry_msgs/msg/Vector3"](x=0.0, y=0.0, z=0.0)
     return t["nav_msgs/msg/Odometry"](
-        header=_header("map", stamp_ns),
+        header=_header(frame_id, stamp_ns),
         child_frame_id="base_link",
         pose=t["geometry_msgs/msg/PoseWithCovariance"](
             pose=pose, covariance=np.zeros(36)
@@ -198,8 +202,8 @@ def _odometry(X_WB: np.ndarray, stamp_ns: int):
     )
 
 
-def _tf_static(p_BS, quat_xyzw_BS, stamp_ns: int):
-    """Returns base_link -> mast -> lidar; the mast is 0.5 m up."""
+def _tf_static(p_BS, quat_xyzw_BS, parent: str, stamp_ns: int):
+    """Returns base_link -> mast, 0.5 m up, and parent -> lidar."""
     t = TYPES.types
 
     def edge(parent, child, p, q):
@@ -216,10 +220,10 @@ def _tf_static(p_BS, quat_xyzw_BS, stamp_ns: int):
             ),
         )
 
-    mast = (0.0, 0.0, 0.5)
+    p_BM = (0.0, 0.0, 0.5)
     return t["tf2_msgs/msg/TFMessage"](
         transforms=[
-            edge("base_link", "mast", mast, (0, 0, 0, 1)),
-            edge("mast", "lidar", np.subtract(p_BS, mast), quat_xyzw_BS),
+            edge("base_link", "mast", p_BM, (0, 0, 0, 1)),
+            edge(parent, "lidar", np.subtract(p_BS, p_BM), quat_xyzw_BS),
         ]
     )
