@@ -140,8 +140,11 @@ def _single_house(
 def _row_houses(
     draft: Draft, district: District, row: RowPlan, rng: np.random.Generator
 ) -> list[_House]:
-    """Walks along the streets and takes a lot wherever one fits."""
-    area = district.area
+    """Walks along the streets and takes a lot wherever one fits.
+
+    Rows keep to the district's own ground: a patch is there to stay open.
+    """
+    area = district.grounds[district.plan.ground]
     if row.within is not None:
         area = area.intersection(corners_area(row.within))
     # Lots that touch the rim of the area must not fail by rounding.
@@ -196,7 +199,8 @@ def _fitting_house(
             (row.width[0], row.depth[0]),
         )
         lot = lot_at(line, start, *np.clip(size, low, high).round(1).tolist())
-        if lot is None:
+        # On a curve a lot's front is its chord, a little less than asked for.
+        if lot is None or lot.width < low:
             continue
         area = lot.footprint_W
         ignore = previous.taken if previous else None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 import itertools
 import math
@@ -63,13 +62,11 @@ class Station:
     Attributes:
         x, y: position in W [m].
         yaw: heading of the line [rad].
-        s: arc length from the start of the line [m].
     """
 
     x: float
     y: float
     yaw: float
-    s: float
 
 
 def lines_along(
@@ -101,14 +98,13 @@ def lines_along(
     return sorted(pieces, key=lambda p: (*p.coords[0], p.length))
 
 
-def stations(line: LineString, distances) -> Iterator[Station]:
-    """Yields the places at the given arc lengths [m] of a line."""
-    for s in distances:
-        before = line.interpolate(max(s - _SHORT, 0.0))
-        after = line.interpolate(min(s + _SHORT, line.length))
-        at = line.interpolate(s)
-        yaw = math.atan2(after.y - before.y, after.x - before.x)
-        yield Station(at.x, at.y, yaw, float(s))
+def station_at(line: LineString, s: float) -> Station:
+    """Returns the place at an arc length [m] of a line."""
+    before = line.interpolate(max(s - _SHORT, 0.0))
+    after = line.interpolate(min(s + _SHORT, line.length))
+    at = line.interpolate(s)
+    yaw = math.atan2(after.y - before.y, after.x - before.x)
+    return Station(at.x, at.y, yaw)
 
 
 def lot_at(
@@ -130,7 +126,7 @@ def lot_at(
     along = (b - a) / chord
     away = np.array([-along[1], along[0]])
     yaw = math.atan2(along[1], along[0])
-    ends = stations(line, [start + _SHORT, end - _SHORT])
+    ends = (station_at(line, s) for s in (start + _SHORT, end - _SHORT))
     if any(abs(_turn(at.yaw, yaw)) > _BEND for at in ends):
         return None
     # On a line that bends around the street the chord comes closer to it
@@ -150,7 +146,7 @@ def _turn(to: float, origin: float) -> float:
 
 
 def _street_on_right(line: LineString, streets: BaseGeometry) -> LineString:
-    at = next(stations(line, [line.length * 0.37]))
+    at = station_at(line, line.length * 0.37)
     left = Point(at.x - math.sin(at.yaw) * 0.3, at.y + math.cos(at.yaw) * 0.3)
     right = Point(at.x + math.sin(at.yaw) * 0.3, at.y - math.cos(at.yaw) * 0.3)
     if streets.distance(left) < streets.distance(right):

@@ -16,6 +16,8 @@ from cns_drake.city.road_network import Arm, Junction
 _FROM_KERB = 0.7
 # Where a small road meets others, a stop sign takes the lights' place.
 _SMALL_ROAD_LANES = 2
+# Lights stand this far behind a junction, beside the stop line [m].
+_LIGHT_DISTANCE = 4.8
 # Signs stand this far behind a junction [m].
 _SIGN_DISTANCE = 9.0
 _SIGNS = ("sign_round", "sign_rectangular", "sign_triangular")
@@ -45,7 +47,15 @@ def _furnish_arm(
         else:
             half_turn = -math.pi / 2
             _place(
-                draft, "traffic_light", road, arm, 1.5, 1, half_turn, rng, tags
+                draft,
+                "traffic_light",
+                road,
+                arm,
+                _LIGHT_DISTANCE,
+                1,
+                half_turn,
+                rng,
+                tags,
             )
             _place(
                 draft,

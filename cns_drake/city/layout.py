@@ -14,6 +14,7 @@ from cns_drake.city.districts import share_out
 from cns_drake.city.draft import Draft
 from cns_drake.city.ground import GroundShape, ground_structures
 from cns_drake.city.junction_furniture import furnish_junctions
+from cns_drake.city.markings import marking_structure
 from cns_drake.city.mesh import Mesh
 from cns_drake.city.objects import OBJECTS
 from cns_drake.city.open_ground import furnish
@@ -99,6 +100,7 @@ def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
     plant_medians(draft, plan.medians or plan.street)
     ground = [
         *street_structures(network),
+        marking_structure(network),
         *ground_structures(districts, shape, plan.water_level),
     ]
     return City((*ground, *draft.structures))

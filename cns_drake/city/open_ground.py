@@ -13,7 +13,7 @@ from shapely.ops import unary_union
 
 from cns_drake.city.districts import District, corners_area
 from cns_drake.city.draft import Draft
-from cns_drake.city.frontage import Station, stations
+from cns_drake.city.frontage import Station, station_at
 from cns_drake.city.naming import name_stem
 from cns_drake.city.objects import OBJECTS
 from cns_drake.city.plan import (
@@ -98,7 +98,7 @@ def _place_line(
     line = LineString(points)
     s = 0.0
     while s <= line.length:
-        at = next(stations(line, [s]))
+        at = station_at(line, s)
         name = pick(plan.objects, rng)
         yaw = at.yaw + math.radians(plan.yaw_deg)
         _try_object(draft, district, name, plan.kind, at, yaw, rng)
@@ -176,7 +176,6 @@ def place_car(
         xy,
         yaw,
         tags,
-        clearance=_CLEARANCE,
     )
 
 
@@ -213,7 +212,7 @@ def _scatter(
         keep, yaw = rng.uniform() < plan.fill, rng.uniform(-math.pi, math.pi)
         name = pick(plan.objects, rng)
         if keep:
-            at = Station(float(dart[0]), float(dart[1]), 0.0, 0.0)
+            at = Station(float(dart[0]), float(dart[1]), 0.0)
             _try_object(draft, district, name, plan.kind, at, yaw, rng)
 
 

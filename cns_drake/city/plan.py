@@ -195,12 +195,12 @@ class StreetPlan(_Model):
     """
 
     trees: Weights = Field(default_factory=dict)
-    tree_spacing: Range = (8.0, 14.0)
+    tree_spacing: Range = (7.0, 11.0)
     tree_gaps: float = Field(default=0.15, ge=0, lt=1)
     lamp: str
     lamp_spacing: float = Field(default=26.0, gt=2)
     furniture: Weights = Field(default_factory=dict)
-    furniture_spacing: Range = (9.0, 22.0)
+    furniture_spacing: Range = (5.0, 13.0)
 
 
 class DistrictPlan(_Model):

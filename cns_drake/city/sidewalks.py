@@ -12,7 +12,7 @@ from shapely.ops import unary_union
 
 from cns_drake.city.districts import District
 from cns_drake.city.draft import Draft
-from cns_drake.city.frontage import Station, lines_along, stations
+from cns_drake.city.frontage import Station, lines_along, station_at
 from cns_drake.city.naming import name_stem
 from cns_drake.city.objects import OBJECTS
 from cns_drake.city.open_ground import place_car
@@ -23,13 +23,15 @@ from cns_drake.city.weighted import pick
 # [m].
 _FROM_KERB = {"lamp": 0.45, "tree": 0.9, "furniture": 0.6}
 # Around junctions nothing blocks the view but what belongs there [m].
-_JUNCTION_CLEARANCE = {"lamp": 1.0, "tree": 9.0, "furniture": 5.0}
+_JUNCTION_CLEARANCE = {"lamp": 1.0, "tree": 5.0, "furniture": 3.0}
 # Least distance between two things, and of things to lanes [m].
 _CLEARANCE = 0.4
 _CROWN_PART = 0.85
 # Length of a parking bay along the street, least and greatest [m].
 _BAY_LENGTH = (5.6, 7.0)
 _BAY_FILL = 0.72
+# Drivers park a little closer to the kerb than to the lane [m].
+_TO_KERB = 0.08
 
 
 def furnish_sidewalks(
@@ -60,7 +62,7 @@ def park_along_streets(draft: Draft, cars: Mapping[str, float]) -> None:
         road = draft.network.roads[name]
         rng = draft.rng("bays", name, side)
         sign = 1 if side == "left" else -1
-        offset = sign * (road.half_width + road.parking / 2)
+        offset = sign * (road.half_width + road.parking / 2 + _TO_KERB)
         s = road.first_station + float(rng.uniform(2.0, 5.0))
         while s < road.last_station:
             x, y, _, heading = road.evaluate([s], offset)[0]
@@ -79,7 +81,7 @@ def plant_medians(draft: Draft, plan: StreetPlan) -> None:
         line = _middle_line(median)
         s = float(rng.uniform(1.0, 3.0))
         while s < line.length - 1.0:
-            at = next(stations(line, [s]))
+            at = station_at(line, s)
             name = pick(plan.trees, rng)
             _place(draft, name, at, rng, ("median",))
             s += float(rng.uniform(*plan.tree_spacing))
@@ -109,7 +111,7 @@ def _walk(
     """Walks along one sidewalk and places the things of one task."""
     s = float(rng.uniform(1.0, 8.0))
     while s < line.length - 1.0:
-        at = next(stations(line, [s]))
+        at = station_at(line, s)
         here = shapely.Point(at.x, at.y)
         district = min(districts, key=lambda d: d.area.distance(here))
         street = district.plan.street or plan.street
