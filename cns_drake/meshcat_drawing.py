@@ -14,14 +14,16 @@ from cns_drake.semantics import CLASS_RGB
 from cns_drake.structure_table import StructureTable
 from cns_drake.surface_merging import merge_surfaces
 
-# Vertices are put on a grid of 2^-10 m: nobody sees a millimetre, and the
-# zeros at the end of each float compress well.
-_VERTEX_GRID = 2.0**-10
+# Vertices are put on a grid of 4 mm, which nobody sees: the zeros at the end
+# of each float compress well.
+_VERTEX_GRID = 2.0**-8
 
 _START_RGB = np.array([1.00, 0.10, 0.10])
 _END_RGB = np.array([0.10, 0.30, 1.00])
 _ROUTE_WIDTH = 1.2
-_ROUTE_HEIGHT = 0.25
+# The ribbon rises on its way [m], so that where a route passes a second time
+# its later part lies on top.
+_ROUTE_HEIGHTS = (0.2, 0.7)
 
 _MARKER_HEIGHT = 7.0
 _MARKER_RADIUS = 2.5
@@ -103,12 +105,13 @@ def draw_route(
     """
     p_WBset = np.array([X_WB.translation() for X_WB in X_WBs])
     left_W = np.array([X_WB.rotation().matrix()[:, 1] for X_WB in X_WBs])
-    p_WBset[:, 2] += _ROUTE_HEIGHT
-    half = _ROUTE_WIDTH / 2.0 * left_W
-    vertices = np.concatenate([p_WBset + half, p_WBset - half])
     step = np.linalg.norm(np.diff(p_WBset, axis=0), axis=1)
     travelled = np.concatenate([[0.0], np.cumsum(step)])
     fraction = (travelled / max(travelled[-1], 1e-9))[:, None]
+    first, last = _ROUTE_HEIGHTS
+    p_WBset[:, 2:] += (1.0 - fraction) * first + fraction * last
+    half = _ROUTE_WIDTH / 2.0 * left_W
+    vertices = np.concatenate([p_WBset + half, p_WBset - half])
     rgb = (1.0 - fraction) * _START_RGB + fraction * _END_RGB
     left = np.arange(len(X_WBs) - 1)
     right = left + len(X_WBs)

@@ -182,15 +182,15 @@ def test_city_is_one_mesh_for_each_class(early):
     assert drawn == {"/city/building", "/city/terrain"}
     ground = vertices(objects(early)["/city/terrain"])
     assert len(ground) == 8  # A box shares its corners.
-    np.testing.assert_allclose(ground.min(axis=0), [-40, -40, -0.2], atol=1e-3)
-    np.testing.assert_allclose(ground.max(axis=0), [40, 40, 0.0], atol=1e-3)
+    np.testing.assert_allclose(ground.min(axis=0), [-40, -40, -0.2], atol=3e-3)
+    np.testing.assert_allclose(ground.max(axis=0), [40, 40, 0.0], atol=3e-3)
 
 
 def test_city_stands_where_the_model_says(early):
     X_WG = RigidTransform(RollPitchYaw(0, 0, 0.3), [-15.0, 8.0, 3.0])
     p_GV = X_WG.inverse() @ vertices(objects(early)["/city/building"]).T
     np.testing.assert_allclose(
-        np.abs(p_GV), np.tile([[4.0], [2.0], [3.0]], 8), atol=2e-3
+        np.abs(p_GV), np.tile([[4.0], [2.0], [3.0]], 8), atol=4e-3
     )
 
 
@@ -201,8 +201,8 @@ def test_structures_that_the_stage_lacks_are_a_layer(early):
         "/stage_difference/absent/pole",
     }
     hall = vertices(objects(early)["/stage_difference/absent/building"])
-    np.testing.assert_allclose(hall.min(axis=0), [5, 6, 0], atol=1e-3)
-    np.testing.assert_allclose(hall.max(axis=0), [15, 10, 8], atol=1e-3)
+    np.testing.assert_allclose(hall.min(axis=0), [5, 6, 0], atol=3e-3)
+    np.testing.assert_allclose(hall.max(axis=0), [15, 10, 8], atol=3e-3)
 
 
 def test_structures_that_the_stage_has_in_addition_are_a_layer(
@@ -230,7 +230,7 @@ def test_without_another_stage_all_is_city(folder, tmp_path):
 def test_vehicle_moves_through_every_frame(early):
     drawn = objects(early)
     body = vertices(drawn["/vehicle/base_link/0"])
-    np.testing.assert_allclose(body.min(axis=0), [-1, -1, 0.5], atol=1e-3)
+    np.testing.assert_allclose(body.min(axis=0), [-1, -1, 0.5], atol=3e-3)
     keys = tracks(early)["/vehicle/base_link"]
     positions = keys[".position"]
     assert [key["time"] for key in positions] == list(range(NUM_FRAMES))
@@ -275,7 +275,7 @@ def test_scans_appear_where_they_were_taken(early):
             p_SR = np.stack([scan["x"], scan["y"], scan["z"]])
             expected.append((X_WB_at(time) @ X_BS @ p_SR).T)
         np.testing.assert_allclose(
-            vertices(objects(early)[path]), np.concatenate(expected), atol=2e-3
+            vertices(objects(early)[path]), np.concatenate(expected), atol=4e-3
         )
         if k > 0:
             assert tracks(early)[path][".visible"] == [
@@ -293,7 +293,7 @@ def test_route_goes_from_red_to_blue(early):
         np.testing.assert_allclose(
             middle[frame][:2],
             X_WB_at(frame * PERIOD).translation()[:2],
-            atol=2e-3,
+            atol=4e-3,
         )
     color = route["data"]["attributes"]["color"]["array"].reshape(2, -1, 3)
     red, _, blue = color[0].T
