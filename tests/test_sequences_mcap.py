@@ -52,7 +52,8 @@ def test_reads_what_was_written(tmp_path):
         )
         for i in (3, 0, 6, 5, 3):
             np.testing.assert_array_equal(sequence.scan(i), scans[i])
-    assert open_sequence(record_path.parent).name == "city_02"
+    for path in (record_path, record_path.parent):
+        assert open_sequence(path).name == "city_02"
     assert sequence.world_frame == "map"
 
 

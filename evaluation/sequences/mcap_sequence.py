@@ -267,7 +267,10 @@ def _mcap_path(path: Path) -> Path:
 
 def _sequence_name(path: Path) -> str:
     resolved = path.resolve()
-    return resolved.name if resolved.is_dir() else resolved.stem
+    # rosbag2 numbers the files of a recording: <name>_0.mcap.
+    return (
+        resolved.name if resolved.is_dir() else resolved.stem.removesuffix("_0")
+    )
 
 
 def _stamp_ns(header) -> int:
