@@ -24,7 +24,8 @@ from cns_drake.city.mesh import Mesh
 # and must have the same relief to close [m].
 END_MARGIN_M = 0.01
 
-_ARCH_SEGMENTS = 6
+# Chords of an arch, for narrow windows and for anything wider than 2 m.
+_NARROW_ARCH, _WIDE_ARCH, _WIDE_ARCH_M = 4, 6, 2.0
 
 
 class Patch(NamedTuple):
@@ -338,7 +339,8 @@ def _arch_outline(arch: Arch) -> tuple[list[float], list[float]]:
     """Returns x and z of the head's points, left to right."""
     middle, half = (arch.x0 + arch.x1) / 2, (arch.x1 - arch.x0) / 2
     rise = arch.z1 - arch.z_spring
-    angles = np.linspace(math.pi, 0.0, _ARCH_SEGMENTS + 1)
+    count = _WIDE_ARCH if 2 * half > _WIDE_ARCH_M else _NARROW_ARCH
+    angles = np.linspace(math.pi, 0.0, count + 1)
     x = [middle + half * math.cos(a) for a in angles]
     z = [arch.z_spring + rise * math.sin(a) for a in angles]
     # Exactly, so that jambs and spandrels meet.
@@ -350,7 +352,7 @@ def _arch_outline(arch: Arch) -> tuple[list[float], list[float]]:
 def _arch_reveals(arch: Arch):
     """Yields spandrels, soffit, jambs and the floor of an arch."""
     (x, z), d = _arch_outline(arch), arch.depth
-    for k in range(_ARCH_SEGMENTS):
+    for k in range(len(x) - 1):
         a, b = (x[k], z[k]), (x[k + 1], z[k + 1])
         yield [
             (*a, 0.0),
@@ -367,7 +369,8 @@ def _arch_reveals(arch: Arch):
 
 def _arch_back(arch: Arch):
     """Yields the back wall of an arch, slice upon slice."""
-    (x, z), d, n = _arch_outline(arch), arch.depth, _ARCH_SEGMENTS
+    (x, z), d = _arch_outline(arch), arch.depth
+    n = len(x) - 1
     yield [
         (x[0], arch.z0, d),
         (x[n], arch.z0, d),

@@ -6,6 +6,7 @@ the sides that can be seen and wound outwards.
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -231,6 +232,62 @@ def spire(points, tip, z0: float, z1: float) -> Mesh:
         [np.column_stack([points, np.full(n, z0)]), [[tip[0], tip[1], z1]]]
     )
     return Mesh(vertices, tuple((k, (k + 1) % n, n) for k in range(n)))
+
+
+def revolved(profile, count: int, center=(0.0, 0.0)) -> Mesh:
+    """Returns the surface that a profile sweeps around an upright axis.
+
+    Args:
+        profile: (radius, z) pairs from the bottom up [m]; a last radius of
+            zero gives a tip, else the top is closed by a lid.
+        count: sides of the polygon that stands for the circle.
+        center: where the axis stands [m].
+    """
+
+    def ring(radius: float) -> np.ndarray:
+        return regular_polygon(radius, count, center)
+
+    pieces = []
+    for (r0, z0), (r1, z1) in itertools.pairwise(profile):
+        if r1 > 0:
+            pieces.append(skirt(ring(r0), ring(r1), z0, z1))
+        else:
+            pieces.append(spire(ring(r0), center, z0, z1))
+    radius, z = profile[-1]
+    if radius > 0:
+        pieces.append(flat(ring(radius), z))
+    return merge_meshes(pieces)
+
+
+def extruded(profile, x0: float, x1: float) -> Mesh:
+    """Returns a shed: a roof line drawn along x, with its end walls.
+
+    Args:
+        profile: (y, z) points of the roof line, y rising [m]; the ends
+            reach down to the height of its first point.
+        x0, x1: ends of the shed [m].
+    """
+    profile = np.asarray(profile, dtype=float)
+    base = profile[0, 1]
+    vertices, faces = [], []
+
+    def add(*corners) -> None:
+        faces.append(tuple(range(len(vertices), len(vertices) + len(corners))))
+        vertices.extend(corners)
+
+    for (ya, za), (yb, zb) in itertools.pairwise(profile):
+        add((x0, ya, za), (x1, ya, za), (x1, yb, zb), (x0, yb, zb))
+        if yb - ya < 1e-6:
+            continue
+        right = [(x1, ya, base), (x1, yb, base), (x1, yb, zb), (x1, ya, za)]
+        corners = [c for k, c in enumerate(right) if c != right[k - 1]]
+        if len(corners) > 2:
+            add(*corners)
+            add(*((x0, y, z) for _, y, z in reversed(corners)))
+    if profile[-1, 1] > base:
+        ya, za = profile[-1]
+        add((x0, ya, za), (x1, ya, za), (x1, ya, base), (x0, ya, base))
+    return Mesh(np.array(vertices), tuple(faces))
 
 
 def roof_pan(points, z_floor: float, z_top: float, thickness: float) -> Mesh:

@@ -15,10 +15,19 @@ from shapely.geometry import Polygon
 
 from cns_drake.city.buildings.art_deco_tower import ART_DECO_TOWER
 from cns_drake.city.buildings.brick_block import BRICK_BLOCK
+from cns_drake.city.buildings.car_park import CAR_PARK
+from cns_drake.city.buildings.church import CHURCH
+from cns_drake.city.buildings.corner_building import CORNER_BUILDING
+from cns_drake.city.buildings.court_block import COURT_BLOCK
 from cns_drake.city.buildings.glass_skyscraper import GLASS_SKYSCRAPER
+from cns_drake.city.buildings.hotel import HOTEL
+from cns_drake.city.buildings.museum import MUSEUM
+from cns_drake.city.buildings.observation_tower import OBSERVATION_TOWER
 from cns_drake.city.buildings.office import OFFICE
+from cns_drake.city.buildings.podium_tower import PODIUM_TOWER
 from cns_drake.city.buildings.site import Archetype, Site
 from cns_drake.city.buildings.slab_tower import SLAB_TOWER
+from cns_drake.city.buildings.waterfront_hall import WATERFRONT_HALL
 from cns_drake.city.structures import Model
 
 ARCHETYPES: dict[str, Archetype] = {
@@ -26,9 +35,18 @@ ARCHETYPES: dict[str, Archetype] = {
     for archetype in (
         ART_DECO_TOWER,
         BRICK_BLOCK,
+        CAR_PARK,
+        CHURCH,
+        CORNER_BUILDING,
+        COURT_BLOCK,
         GLASS_SKYSCRAPER,
+        HOTEL,
+        MUSEUM,
+        OBSERVATION_TOWER,
         OFFICE,
+        PODIUM_TOWER,
         SLAB_TOWER,
+        WATERFRONT_HALL,
     )
 }
 

@@ -101,25 +101,22 @@ def arched(
 
 
 def shop_front(
-    height: float,
+    head: float,
     depth: float = 0.35,
     *,
     riser: float = 0.45,
-    fascia: float = 0.7,
     pier: float = 0.3,
     door: bool = True,
 ) -> Bay:
-    """A shop: glass over a low riser, a recessed door, a fascia above."""
+    """A shop: glass up to `head` over a low riser, and a recessed door."""
 
     def bay(x0: float, x1: float) -> list[Relief]:
         a, b = _centred(x0, x1, x1 - x0 - 2 * pier)
         if b - a < 1.6:
             return []
-        head = height - fascia
         relief: list[Relief] = [
             Patch(a, b, 0.0, riser, depth - 0.2),
             Patch(a, b, riser, head, depth),
-            Patch(a - 0.1, b + 0.1, head, height - 0.1, -0.15),
         ]
         if door:
             x = _cm(a + 0.62 * (b - a))
@@ -193,13 +190,16 @@ def loggia(
 def stretches(
     length: float, pitch: float, margin: float
 ) -> list[tuple[float, float]]:
-    """Divides a wall into equal bays of about `pitch`, clear of its ends."""
+    """Divides a wall into equal bays of about `pitch`, clear of its ends.
+
+    A wall too short for that gets one narrower bay, or none.
+    """
     room = length - 2 * margin
-    count = int(room / pitch + 0.35)
-    if count < 1:
-        return []
-    step = room / count
-    return [(margin + k * step, margin + (k + 1) * step) for k in range(count)]
+    count = max(int(room / pitch + 0.4), int(room > 0.6 * pitch))
+    return [
+        (margin + k * room / count, margin + (k + 1) * room / count)
+        for k in range(count)
+    ]
 
 
 def plain(edge: int, length: float) -> list[Relief]:

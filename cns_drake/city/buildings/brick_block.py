@@ -90,13 +90,13 @@ def build(p: BrickBlock, site: Site, rng: np.random.Generator) -> Model:
     )
     front = details.WallFrame(outline, 0)
     shops = bays.rhythm(
-        2 * p.pitch, [bays.shop_front(p.ground_height - 0.3)], margin=0.6
+        2 * p.pitch, [bays.shop_front(p.ground_height - 1.1)], margin=0.6
     )
     door = bays.entrance(1.8, 3.0)
     back = bays.rhythm(
         p.pitch, [bays.window(p.window_width, 1.4, 2.9, p.recess)], margin=0.8
     )
-    belt = Band(p.ground_height - 0.35, p.ground_height - 0.05, -0.18)
+    belt = Band(p.ground_height - 1.0, p.ground_height - 0.1, -0.15)
     ground = Facade(
         p.ground_height,
         (Band(0.0, 0.4, -0.08), belt),

@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from cns_drake.city import massing
+from cns_drake.city.buildings import bays
 from cns_drake.city.buildings.site import FOUNDATION_M
 from cns_drake.city.mesh import Mesh, box_mesh, merge_meshes
 
@@ -134,6 +135,40 @@ def piers(
         for x in places:
             pier = _pier(round(x, 2), width, depth, reach, z0, z1)
             pieces.append(wall.place(pier))
+    return merge_meshes(pieces)
+
+
+def pilasters(
+    outline,
+    pitch: float,
+    margin: float,
+    every: int,
+    width: float,
+    reach: float,
+    z0: float,
+    z1: float,
+    skip: Collection[int] = (),
+) -> Mesh:
+    """Pilasters between the bays that `bays.rhythm` gives these walls.
+
+    Args:
+        outline: of the walls.
+        pitch, margin: of the bays [m].
+        every: one pilaster each so many bays.
+        width, reach: of a pilaster [m].
+        z0, z1: bottom and top [m].
+        skip: edges without pilasters.
+    """
+    pieces = []
+    for edge in range(len(outline)):
+        wall = WallFrame(outline, edge)
+        cells = bays.stretches(wall.length, pitch, margin)
+        if edge in skip or len(cells) < 3:
+            continue
+        for k, (x, _) in enumerate(cells):
+            if k % every == 0 and k > 0:
+                pier = _pier(round(x, 2), width, 0.02, reach, z0, z1)
+                pieces.append(wall.place(pier))
     return merge_meshes(pieces)
 
 

@@ -116,7 +116,7 @@ def _add_ground(assembly, p: Office, site: Site, rng) -> float:
     front = details.WallFrame(outline, 0)
     pitch = 1.6 * p.pitch
     shops = bays.rhythm(
-        pitch, [bays.shop_front(h - 0.5, 0.5, door=False)], margin=0.7
+        pitch, [bays.shop_front(h - 1.1, 0.5, door=False)], margin=0.7
     )
     lobby = bays.entrance(3.2, 3.2, 1.8)
     sides = bays.rhythm(
@@ -124,7 +124,7 @@ def _add_ground(assembly, p: Office, site: Site, rng) -> float:
     )
     ground = Facade(
         h,
-        (Band(0.0, 0.35, -0.06), Band(h - 0.4, h, -0.15)),
+        (Band(0.0, 0.35, -0.06), Band(h - 0.9, h - 0.1, -0.15)),
         bays.by_edge(
             {0: bays.with_middle(shops, lobby, 5.0)},
             shops if len(outline) > 4 else sides,

@@ -9,8 +9,6 @@ import math
 
 import numpy as np
 
-from cns_drake.city import massing
-
 
 def chamfered(points, cut: float) -> np.ndarray:
     """Cuts every convex corner of an outline, `cut` metres along each edge."""
@@ -44,12 +42,20 @@ def _replaced(points, corner) -> np.ndarray:
 
 
 def stadium(x0, y0, x1, y1, step: float = 3.0) -> np.ndarray:
-    """A rectangle whose short ends are half circles; front first."""
-    if x1 - x0 < y1 - y0:
-        raise ValueError("the long sides lie along x")
-    radius = 0.499 * (y1 - y0)
-    corners = dict.fromkeys(range(4), radius)
-    return massing.rounded(massing.rectangle(x0, y0, x1, y1), corners, step)
+    """A rectangle whose short ends, left and right, are half circles.
+
+    Args:
+        x0, y0, x1, y1: its extent [m], longer along x.
+        step: longest chord of the half circles [m].
+    """
+    radius, middle = (y1 - y0) / 2, (y0 + y1) / 2
+    count = max(2, math.ceil(math.pi * radius / step))
+    angles = np.linspace(-math.pi / 2, math.pi / 2, count + 1)
+    arc = radius * np.column_stack([np.cos(angles), np.sin(angles)])
+    right = np.array([x1 - radius, middle]) + arc
+    left = np.array([x0 + radius, middle]) - arc
+    # The arc on the left ends where the front begins.
+    return np.roll(np.vstack([right, left]), 1, axis=0)
 
 
 def u_shape(x0, y0, x1, y1, wing: float, back: float) -> np.ndarray:

@@ -1,0 +1,255 @@
+"""The corner house: a curved front, arched windows, a dome or a lantern."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cns_drake.city import massing
+from cns_drake.city.buildings import bays, details, tiers
+from cns_drake.city.buildings.roof_equipment import equip_roof
+from cns_drake.city.buildings.site import Archetype, Assembly, Site
+from cns_drake.city.facades import Band, Facade
+from cns_drake.city.mesh import Mesh, merge_meshes
+from cns_drake.city.structures import Model
+
+_STUCCOS = ((0.84, 0.78, 0.66), (0.76, 0.66, 0.56), (0.82, 0.80, 0.76))
+
+
+@dataclass(frozen=True)
+class CornerBuilding:
+    """Parameters of a corner house; lengths in metres.
+
+    `corner` is the rounded corner of the rectangle (0: front left,
+    1: front right) and `radius` its radius.
+    """
+
+    height: float
+    corner: int
+    radius: float
+    ground_height: float
+    first_height: float
+    storey_height: float
+    pitch: float
+    window_width: float
+    recess: float
+    pilasters: bool
+    balcony: bool
+    dome: str
+    dome_height: float
+    cornice_reach: float
+    roof_items: tuple[str, ...]
+    rgb: tuple[float, float, float]
+    roof_rgb: tuple[float, float, float]
+
+
+def draw(site: Site, height: float, rng: np.random.Generator):
+    """Draws the parameters of one corner house."""
+    x0, y0, x1, y1 = site.bounds
+    side = min(x1 - x0, y1 - y0)
+    run = 2 * (x1 - x0 + y1 - y0)
+    return CornerBuilding(
+        height=height,
+        corner=int(rng.integers(2)),
+        radius=round(float(rng.uniform(0.3, 0.42)) * min(side, 24.0), 1),
+        ground_height=round(float(rng.uniform(4.6, 5.4)), 2),
+        first_height=round(float(rng.uniform(4.2, 4.8)), 2),
+        storey_height=float(rng.uniform(3.3, 3.8)),
+        pitch=max(float(rng.uniform(2.5, 3.2)), run / 44),
+        window_width=round(float(rng.uniform(1.1, 1.5)), 2),
+        recess=round(float(rng.uniform(0.22, 0.4)), 2),
+        pilasters=bool(rng.random() < 0.6),
+        balcony=bool(rng.random() < 0.7),
+        dome=("dome", "cone", "lantern")[int(rng.integers(3))],
+        dome_height=round(float(rng.uniform(0.17, 0.24)) * height, 1),
+        cornice_reach=round(float(rng.uniform(0.5, 0.9)), 2),
+        roof_items=("roof_stair_house", "roof_skylight", "roof_vents",
+                    "roof_ac_unit"),
+        rgb=_STUCCOS[int(rng.integers(len(_STUCCOS)))],
+        roof_rgb=((0.30, 0.42, 0.38), (0.32, 0.33, 0.36))[
+            int(rng.integers(2))
+        ],
+    )  # fmt: skip
+
+
+def build(p: CornerBuilding, site: Site, rng: np.random.Generator) -> Model:
+    """Builds the house on a rectangle."""
+    assembly = Assembly(site.name, p.rgb)
+    rectangle = site.outline
+    plan = massing.rounded(rectangle, {p.corner: p.radius}, 2.8)
+    blind = _blind_edges(rectangle, plan, site.blind_edges)
+    top = _add_shops(assembly, p, plan, blind, rng)
+    bottom = top
+    top = _add_first_floor(assembly, p, plan, blind, top)
+    crown = p.height - p.dome_height
+    groups, per_group, storey = tiers.divided(
+        crown - 2.2 - top, p.storey_height
+    )
+    window = bays.window(
+        p.window_width, 0.8, storey - 0.7, p.recess, hood=0.1, ledge=0.0
+    )
+    course = Band(0.6, 0.8, -0.1)
+    walls = Facade(
+        storey,
+        (course,),
+        bays.by_edge({}, bays.rhythm(p.pitch, [window], 0.3), blind),
+        glass=(p.recess,),
+    )
+    top = tiers.add_storeys(assembly, plan, walls, top, groups, per_group)
+    if p.pilasters:
+        strips = details.pilasters(
+            plan, p.pitch, 0.3, 2, 0.5, 0.16, bottom, top, blind
+        )
+        assembly.add("pilasters", strips)
+    eaves = Facade(2.2, tiers.cornice(1.4, p.cornice_reach))
+    roof = tiers.add_crown(assembly, plan, eaves, top, 0.8)
+    dome = _dome(p, plan, roof)
+    assembly.add("dome", dome, rgb=p.roof_rgb)
+    _equip(assembly, p, site, roof, rng)
+    return assembly.model(site)
+
+
+def _blind_edges(rectangle, plan, blind) -> frozenset[int]:
+    """Returns the edges of the plan that lie on blind edges of the site."""
+    found = set()
+    for k, (a, b) in enumerate(
+        zip(plan, np.roll(plan, -1, axis=0), strict=True)
+    ):
+        for edge in blind:
+            start = rectangle[edge]
+            along = rectangle[(edge + 1) % 4] - start
+            normal = np.array([-along[1], along[0]]) / np.hypot(*along)
+            if max(abs(normal @ (a - start)), abs(normal @ (b - start))) < 0.01:
+                found.add(k)
+    return frozenset(found)
+
+
+def _is_front(plan, edge: int) -> bool:
+    """Whether a wall looks to the front or belongs to the curve."""
+    along = plan[(edge + 1) % len(plan)] - plan[edge]
+    return edge == 0 or (along[0] > 0.1 and abs(along[1]) > 0.1)
+
+
+def _add_shops(assembly, p: CornerBuilding, plan, blind, rng) -> float:
+    h = p.ground_height
+    shops = bays.rhythm(
+        2 * p.pitch, [bays.shop_front(h - 1.2, 0.4, pier=0.25)], margin=0.35
+    )
+    glazed = bays.rhythm(
+        3.0, [bays.shop_front(h - 1.2, 0.4, door=False, pier=0.15)], 0.1
+    )
+    service = bays.rhythm(
+        2.5 * p.pitch, [bays.window(1.4, 1.5, h - 1.2, 0.4)], 1.0
+    )
+    service = bays.with_middle(service, bays.gate(2.6, 2.9, 0.4), 3.4)
+
+    def layout(edge: int, length: float):
+        if edge in blind:
+            return ()
+        if length < 3.0:
+            return glazed(edge, length)
+        along = plan[(edge + 1) % len(plan)] - plan[edge]
+        back = along[0] < -0.1
+        return (service if back else shops)(edge, length)
+
+    ground = Facade(
+        h,
+        (Band(0.0, 0.3, -0.06), Band(h - 1.0, h - 0.2, -0.15)),
+        layout,
+        glass=(0.4,),
+    )
+    front = details.WallFrame(plan, 0)
+    shades = [
+        front.place(details.awning(a + 0.3, b - 0.3, 1.3, 2.7, h - 1.2))
+        for a, b in bays.stretches(front.length, 2 * p.pitch, 0.35)
+        if rng.random() < 0.5
+    ]
+    return tiers.add_ground(assembly, plan, ground, shades)
+
+
+def _add_first_floor(assembly, p: CornerBuilding, plan, blind, z0) -> float:
+    """The tall main floor: arched windows, balconies in front of some."""
+    h = p.first_height
+    arched = bays.arched(p.window_width, 0.5, h - 1.6, p.recess)
+    plain = bays.window(p.window_width, 0.5, h - 0.9, p.recess)
+    fronts = {
+        edge: bays.rhythm(p.pitch, [arched], 0.3)
+        for edge in range(len(plan))
+        if _is_front(plan, edge)
+    }
+    floor = Facade(
+        h,
+        (Band(h - 0.4, h, -0.18),),
+        bays.by_edge(fronts, bays.rhythm(p.pitch, [plain], 0.3), blind),
+        glass=(p.recess,),
+    )
+    rails: list[Mesh] = []
+    for edge in fronts if p.balcony else ():
+        wall = details.WallFrame(plan, edge)
+        cells = bays.stretches(wall.length, p.pitch, 0.3)
+        for a, b in cells[len(cells) // 3 :: 3] if edge not in blind else ():
+            x = round((a + b) / 2, 2)
+            rail = details.balcony(x - 0.9, x + 0.9, 0.8, 0.25, 0.9)
+            rails.append(wall.place(rail))
+    return tiers.add_storeys(
+        assembly, plan, floor, z0, 1, 1, rails, part="main_floor"
+    )
+
+
+def _center(p: CornerBuilding, plan) -> np.ndarray:
+    """Returns the middle of the rounded corner's circle."""
+    low, high = plan.min(axis=0), plan.max(axis=0)
+    x = low[0] + p.radius if p.corner == 0 else high[0] - p.radius
+    return np.array([x, low[1] + p.radius])
+
+
+def _dome(p: CornerBuilding, plan, z0) -> Mesh:
+    """A drum over the corner under a dome, a cone or an open lantern."""
+    center, r = _center(p, plan), 0.62 * p.radius
+    top, height = p.height, p.height - z0
+    drum_top = round(z0 + 0.4 * height, 2)
+
+    def ring(radius: float) -> np.ndarray:
+        return massing.regular_polygon(radius, 12, center)
+
+    wall = drum_top - z0
+    bands = (Band(0.9, wall - 0.7, 0.25), Band(wall - 0.35, wall, -0.3))
+    posts = bays.rhythm(4.0, [bays.bar(0.4, 0.9, wall - 0.7, 0.0)], 0.1)
+    pieces = [tiers.block(ring(r), Facade(wall, bands, posts), z0)]
+    rise = top - drum_top
+    if p.dome == "cone":
+        pieces.append(massing.spire(ring(r), center, drum_top, top))
+        return merge_meshes(pieces)
+    share = 0.85 if p.dome == "dome" else 0.6
+    angles = np.linspace(0.0, 0.4 * np.pi, 5)
+    radii = r * np.cos(angles)
+    heights = drum_top + share * rise * np.sin(angles)
+    for k in range(len(angles) - 1):
+        lower, upper = ring(radii[k]), ring(radii[k + 1])
+        pieces.append(massing.skirt(lower, upper, heights[k], heights[k + 1]))
+    lid, tip = heights[-1], ring(radii[-1])
+    pieces.append(massing.flat(tip, lid))
+    if p.dome == "lantern":
+        core, middle = ring(0.6 * radii[-1]), lid + 0.55 * (top - lid)
+        pieces.append(massing.prism(core, lid, middle))
+        pieces.append(massing.flat(tip, middle, up=False))
+        lid = middle
+    pieces.append(massing.spire(tip, center, lid, top))
+    return merge_meshes(pieces)
+
+
+def _equip(assembly, p: CornerBuilding, site: Site, roof, rng) -> None:
+    x0, y0, x1, y1 = site.bounds
+    free = massing.rectangle(x0, y0 + 2 * p.radius, x1, y1)
+    if y1 - y0 - 2 * p.radius > 5.0:
+        equip_roof(assembly, free, roof, p.roof_items, rng)
+
+
+CORNER_BUILDING = Archetype(
+    name="corner_building",
+    draw=draw,
+    build=build,
+    heights=(16.0, 45.0),
+    widths=(14.0, 50.0),
+)
