@@ -75,7 +75,7 @@ def test_crown_lets_about_half_of_the_rays_in(name, variant):
     low, high = np.percentile(crown.vertices, [1, 99], axis=0)
     center, half = (low + high) / 2, (high - low) / 2
     rng = np.random.default_rng([variant, 3])
-    n = 400
+    n = 300
     # Through points that are uniform in the unit ball.
     p = rng.standard_normal((n, 3))
     p /= np.linalg.norm(p, axis=1, keepdims=True)

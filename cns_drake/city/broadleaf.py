@@ -152,7 +152,7 @@ def _wood(
         )
         limb_points += [middle, 0.4 * middle + 0.6 * target]
     joints = np.array(limb_points)
-    for center in centers[::2]:
+    for center in centers:
         near = joints[np.argmin(np.linalg.norm(joints - center, axis=1))]
         if np.linalg.norm(center - near) > 0.3:
             pieces.append(tube([near, center], [0.14 * r, 0.05 * r], 3))

@@ -52,10 +52,10 @@ _PLANE = BroadleafForm(
     profile=(0.55, 0.9, 1.0, 0.98, 0.85, 0.6, 0.25),
     trunk_radius=0.22,
     limbs=8,
-    clumps=42,
-    clump_radius=0.95,
-    leaf_length=0.6,
-    leaf_width=0.42,
+    clumps=47,
+    clump_radius=0.92,
+    leaf_length=0.57,
+    leaf_width=0.4,
 )
 _LIME = BroadleafForm(
     height=9.0,
