@@ -119,7 +119,8 @@ def ground_footprint(
             a, b = a[cut], b[cut]
             t = (HEADROOM - a[:, 2]) / (b[:, 2] - a[:, 2])
             corners.append(a[:, :2] + t[:, None] * (b - a)[:, :2])
-    hull = MultiPoint(np.concatenate(corners)).convex_hull
+    # Millimetres: the last bits of a sine differ from machine to machine.
+    hull = MultiPoint(np.round(np.concatenate(corners), 3)).convex_hull
     return hull.buffer(_FOOTPRINT_MARGIN, join_style="mitre")
 
 

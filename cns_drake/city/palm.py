@@ -10,7 +10,7 @@ from cns_drake.city.mesh import Mesh, merge_meshes
 
 _HEIGHT = 8.5
 _STEM = 7.0
-_FRONDS = 19
+_FRONDS = 22
 _LEAFLETS = 10
 
 
@@ -66,6 +66,6 @@ def _leaflets(rng: np.random.Generator, rib: np.ndarray, out: np.ndarray):
         droop = -0.35 - 0.3 * rng.uniform(size=(len(at), 1))
         direction = side * across + 0.75 * along + droop * (0.0, 0.0, 1.0)
         normal = np.tile((0.0, 0.0, 1.0), (len(at), 1)) + 0.5 * side * across
-        width = np.full(len(at), 0.21)
+        width = np.full(len(at), 0.22)
         columns.append((base, direction, normal, length, width))
     return [np.concatenate(column) for column in zip(*columns, strict=True)]
