@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+from html import escape
 import re
 import zlib
 
@@ -44,7 +45,7 @@ def make_static_page(meshcat: Meshcat, title: str) -> str:
 
     Args:
         meshcat: holds the scene.
-        title: the title of the page, plain text without markup.
+        title: the title of the page, plain text.
     """
     html = meshcat.StaticHtml()
     first = _COMMAND.search(html)
@@ -53,7 +54,7 @@ def make_static_page(meshcat: Meshcat, title: str) -> str:
             "this version of Drake writes Meshcat pages in another form"
         )
     head = html[: first.start()].replace(
-        "<title>Drake MeshCat</title>", f"<title>{title}</title>"
+        "<title>Drake MeshCat</title>", f"<title>{escape(title)}</title>"
     )
     return head + _QUEUE + _COMMAND.sub(_compressed, html[first.start() :])
 
