@@ -40,7 +40,7 @@ def make_static_page(meshcat: Meshcat, title: str) -> str:
     """Returns the scene as a self-contained page, without a server.
 
     It is the page that Drake makes, with the commands in it compressed: a
-    city takes a third of the space then. Any browser of 2023 or later
+    city takes about half of the space then. Any browser of 2023 or later
     inflates them itself.
 
     Args:
