@@ -314,6 +314,8 @@ def _filled_from_right(values: np.ndarray) -> np.ndarray:
 
     A row without any number becomes zeros.
     """
+    if values.shape[1] == 0:
+        return values
     known = ~np.isnan(values)
     first = known.argmax(axis=1)
     rows = np.arange(len(values))

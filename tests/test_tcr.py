@@ -48,9 +48,13 @@ def brute_force(source, target, tau):
     return 1.0 - counts[0] / counts[1]
 
 
-@pytest.mark.parametrize("tau", [2.0, 4.5])
+@pytest.mark.parametrize("tau", [4.5, 9.0])
 def test_agrees_with_the_definition(tau):
-    assert ratio(HALF, OTHER, tau=tau) == brute_force(HALF, OTHER, tau)
+    # Only some of the points: the oracle is slow.
+    a, b = HALF[::9], OTHER[::9]
+    expected = brute_force(a, b, tau)
+    assert 0.1 < expected < 0.9
+    assert ratio(a, b, tau=tau) == expected
 
 
 def test_by_hand():

@@ -16,9 +16,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 import math
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field, PositiveFloat, PositiveInt
 from scipy.spatial import cKDTree
 
 from evaluation.maps import thin
@@ -57,16 +58,16 @@ class ScanContextConfig(MethodConfig):
     """
 
     variant: Variant = "augmented-polar"
-    voxel_size: float = 0.5
-    rings: int = 20
-    sectors: int = 60
-    max_range: float = 80.0
-    min_points: int = 5
-    cart_cell: tuple[float, float] = (5.0, 2.0)
-    cart_range: tuple[float, float] = (100.0, 40.0)
-    lateral_shift: float = 2.0
-    candidates: int = 50
-    search_ratio: float = 0.1
+    voxel_size: PositiveFloat = 0.5
+    rings: PositiveInt = 20
+    sectors: PositiveInt = 60
+    max_range: PositiveFloat = 80.0
+    min_points: PositiveInt = 5
+    cart_cell: tuple[PositiveFloat, PositiveFloat] = (5.0, 2.0)
+    cart_range: tuple[PositiveFloat, PositiveFloat] = (100.0, 40.0)
+    lateral_shift: PositiveFloat = 2.0
+    candidates: PositiveInt = 50
+    search_ratio: Annotated[float, Field(ge=0.0, le=1.0)] = 0.1
 
 
 @dataclass(frozen=True)
