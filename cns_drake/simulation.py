@@ -140,7 +140,7 @@ def simulate(
         simulator.AdvanceTo(end)
     finished = time.perf_counter()
     if page is not None:
-        page.save(page_file)
+        page.save(page_file, title=scenario.name)
     return Run(
         name=scenario.name,
         folder=folder,
