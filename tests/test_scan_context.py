@@ -42,7 +42,7 @@ def make_scene(seed, number=150):
         height = rng.uniform(1.0, 15.0)
         size = rng.uniform(0.5, 6.0, 2)
         box = rng.uniform(size=(150, 3)) * [*size, height]
-        parts.append(box + [*foot, -1.6])
+        parts.append(box + np.array([*foot, -1.6]))
     return np.concatenate(parts)
 
 
@@ -100,7 +100,7 @@ class TestPolarContext:
         contexts = method(sensor_height=2.5, variant="polar").describe(scan)
         assert contexts.images[0, 7, 5] == pytest.approx(11.5)
         # Two points in one voxel count as one, at their mean.
-        doubled = np.vstack([scan, scan + [0.0, 0.0, 0.1]])
+        doubled = np.vstack([scan, scan + np.array([0.0, 0.0, 0.1])])
         contexts = method(sensor_height=2.5, variant="polar").describe(doubled)
         assert contexts.images[0, 7, 5] == pytest.approx(11.55)
 
@@ -334,7 +334,7 @@ def test_parameters():
     assert make_method(NAME, {"candidates": "7"}).config.candidates == 7
     with pytest.raises(InputError, match=r"no method 'x' \(known: scan-con"):
         make_method("x", {})
-    with pytest.raises(InputError, match="no parameter 'x'.*variant"):
+    with pytest.raises(InputError, match=r"no parameter 'x'.*variant"):
         make_method(NAME, {"x": 1})
     with pytest.raises(InputError, match=r"scan-context\+\+: variant: "):
         make_method(NAME, {"variant": "spherical"})

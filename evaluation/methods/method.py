@@ -23,7 +23,7 @@ class MethodConfig(BaseModel):
             of the CNS vehicle.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     sensor_height: float = 1.6
 

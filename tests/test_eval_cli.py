@@ -1,0 +1,326 @@
+import csv
+import json
+import subprocess
+import sys
+
+from drive_files import make_scan, write_recording, yaw_pose
+import numpy as np
+import pytest
+
+from evaluation import cli
+
+
+def make_block_scene(seed):
+    rng = np.random.default_rng([seed, 5])
+    parts = []
+    for _ in range(40):
+        foot = rng.uniform(-60.0, 60.0, 2)
+        size = [*rng.uniform(1.0, 8.0, 2), rng.uniform(2.0, 20.0)]
+        parts.append(
+            rng.uniform(size=(150, 3)) * size + np.array([*foot, -1.6])
+        )
+    return np.concatenate(parts)
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory):
+    """Two drives of eight frames, 10 m apart; folders of their scans."""
+    folder = tmp_path_factory.mktemp("data")
+    for name, side in (("town_01", 0.0), ("town_02", 1.0)):
+        scans = [make_block_scene(i) - [0.0, side, 0.0] for i in range(8)]
+        write_recording(
+            folder / name,
+            [make_scan(scan) for scan in scans],
+            [yaw_pose(10.0 * i, side, 0.0, 0.0) for i in range(8)],
+        )
+        singles = folder / f"{name}_scans"
+        singles.mkdir()
+        for i, scan in enumerate(scans[:4]):
+            four = np.c_[scan, np.ones(len(scan))].astype(np.float32)
+            four.tofile(singles / f"{i:06d}.bin")
+        np.save(folder / f"{name}.npy", np.concatenate(scans))
+    return folder
+
+
+def run(capsys, *arguments):
+    """Runs the program in this process; returns status, stdout, stderr."""
+    old = sys.argv
+    sys.argv = ["cns-eval", *map(str, arguments)]
+    try:
+        with pytest.raises(SystemExit) as info:
+            cli.main()
+    finally:
+        sys.argv = old
+    out, err = capsys.readouterr()
+    return info.value.code, out, err
+
+
+def assert_refused(capsys, arguments, *words):
+    status, out, err = run(capsys, *arguments)
+    assert status == 2
+    assert out == ""
+    assert err.startswith("cns-eval: error: ")
+    assert err.count("\n") == 1
+    for word in words:
+        assert str(word) in err
+
+
+def test_tcr_json(capsys, data):
+    status, out, err = run(
+        capsys, "tcr", data / "town_01", data / "town_02", "--json"
+    )
+    values = json.loads(out)
+    assert status == 0
+    assert err == ""
+    assert {
+        "tcr_sym",
+        "tcr_source_to_target",
+        "tcr_target_to_source",
+        "in_hull",
+        "unchanged",
+    } <= values.keys()
+    assert 0.0 <= values["tcr_sym"] < 0.05
+    assert values["in_hull"] > 100
+
+
+def test_tcr_of_itself_by_any_path(capsys, data):
+    for path in (
+        data / "town_01",
+        data / "town_01" / "town_01_0.mcap",
+        data / "town_01.npy",
+    ):
+        _, out, _ = run(capsys, "tcr", path, path, "--json")
+        assert json.loads(out)["tcr_sym"] == 0.0
+
+
+def test_tcr_table(capsys, data):
+    a, b = data / "town_01", data / "town_02"
+    status, out, _ = run(capsys, "tcr", a, b, "--control", a)
+    assert status == 0
+    for text in (
+        "town_01 <-> town_02",
+        "TCR_sym ",
+        "TCR town_02 -> town_01",
+        "where both drove",
+        "routes alone",
+    ):
+        assert text in out
+
+
+def test_tcr_undefined_is_null_with_a_reason(capsys, data, tmp_path):
+    np.save(tmp_path / "empty.npy", np.empty((0, 3)))
+    arguments = ("tcr", data / "town_01.npy", tmp_path / "empty.npy")
+    status, out, _ = run(capsys, *arguments, "--json")
+    assert status == 0
+    values = json.loads(out)
+    assert values["tcr_sym"] is None
+    assert values["reason"]
+    status, out, _ = run(capsys, *arguments)
+    assert status == 0
+    assert "undefined" in out
+
+
+def test_tcr_tells_of_points_that_are_not_finite(capsys, data, tmp_path):
+    points = np.load(data / "town_01.npy")
+    points[3] = np.nan
+    np.save(tmp_path / "a.npy", points)
+    status, _, err = run(capsys, "tcr", tmp_path / "a.npy", tmp_path / "a.npy")
+    assert status == 0
+    assert "a.npy: 1 points not finite" in err
+
+
+def test_pr_json(capsys, data):
+    status, out, err = run(
+        capsys,
+        "pr",
+        data / "town_01",
+        data / "town_02",
+        "--method",
+        "scan-context++",
+        "--json",
+    )
+    assert status == 0
+    assert err == ""
+    values = json.loads(out)
+    assert {
+        "method",
+        "mode",
+        "auc",
+        "recall_at_1",
+        "recall_at_n",
+        "f1_max",
+        "queries",
+        "queries_with_match",
+        "true_positives",
+    } <= values.keys()
+    assert values["method"] == "scan-context++"
+    assert values["mode"] == "all"
+    # Every scene is another; the side step of 1 m hides none of them.
+    assert values["recall_at_1"] == values["auc"] == 1.0
+    assert values["true_positives"] == values["queries"] == 8
+
+
+def test_pr_table_modes_and_parameters(capsys, data):
+    arguments = (
+        "pr",
+        data / "town_01",
+        data / "town_02",
+        "--method",
+        "scan-context++",
+        "--mode",
+        "filtered",
+        "--set",
+        "variant=polar",
+        "--set",
+        "candidates=3",
+        "--sensor-height",
+        "1.8",
+    )
+    status, out, _ = run(capsys, *arguments)
+    assert status == 0
+    for text in ("filtered", "R@1 ", "TP 8 of N 8", "AUC", "F1max", "R@1%"):
+        assert text in out
+    _, out, _ = run(capsys, *arguments, "--json")
+    parameters = json.loads(out)["parameters"]
+    assert parameters["variant"] == "polar"
+    assert parameters["candidates"] == 3
+    assert parameters["sensor_height"] == 1.8
+
+
+def test_scores_of_all_pairs(capsys, data, tmp_path):
+    output = tmp_path / "scores.csv"
+    status, out, err = run(
+        capsys,
+        "scores",
+        "--method",
+        "scan-context++",
+        "--database",
+        data / "town_01_scans",
+        "--query",
+        data / "town_02_scans",
+        "--output",
+        output,
+    )
+    assert (status, out) == (0, "")
+    assert str(output) in err
+    with output.open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    names = [f"{i:06d}" for i in range(4)]
+    assert [(r["query"], r["database"]) for r in rows] == [
+        (q, d) for q in names for d in names
+    ]
+    scores = np.array([float(r["score"]) for r in rows]).reshape(4, 4)
+    assert scores.argmax(axis=1).tolist() == [0, 1, 2, 3]
+    assert not list(tmp_path.glob("*.part"))
+
+
+def test_help_is_instant_and_modules_stay_apart():
+    # A time is no test; what is imported is.
+    code = (
+        "import sys; sys.argv = ['cns-eval', '--help']\n"
+        "from evaluation import cli\n"
+        "try: cli.main()\n"
+        "except SystemExit as e: assert not e.code, e.code\n"
+        "heavy = {'numpy', 'scipy', 'numba', 'matplotlib', 'mcap', 'rosbags',"
+        " 'pydrake', 'cns_drake', 'open3d'}\n"
+        "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    for command in ("tcr", "pr", "scores", "report"):
+        assert command in done.stdout
+
+
+def test_nothing_imports_the_simulator():
+    code = (
+        "import pkgutil, importlib, sys, evaluation\n"
+        "for m in pkgutil.walk_packages(evaluation.__path__, 'evaluation.'):\n"
+        "    if not m.name.endswith('__main__'):\n"
+        "        importlib.import_module(m.name)\n"
+        "assert not {'pydrake', 'cns_drake', 'open3d'} & set(sys.modules)\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_the_module_is_the_program(data):
+    done = subprocess.run(
+        [sys.executable, "-m", "evaluation", "tcr", "nowhere", "nowhere"],
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 2
+    assert done.stderr == ("cns-eval: error: nowhere: no such file or folder\n")
+
+
+def test_bad_usage(capsys, data):
+    town = data / "town_01"
+    assert_refused(capsys, ["evaluate"], "No such command 'evaluate'")
+    assert_refused(capsys, ["tcr", town], "Missing argument 'B'")
+    assert_refused(capsys, ["tcr", town, town, "--colour"], "--colour")
+    assert_refused(capsys, ["pr", town, town], "Missing option '--method'")
+    pr = ["pr", town, town, "--method"]
+    assert_refused(capsys, [*pr, "bow"], "'bow'", "known: scan-context++")
+    pr.append("scan-context++")
+    assert_refused(capsys, [*pr, "--mode", "some"], "some", "filtered")
+    assert_refused(capsys, [*pr, "--set", "candidates"], "is not NAME=VALUE")
+    assert_refused(capsys, [*pr, "--set", "x=1"], "no parameter 'x'")
+    assert_refused(capsys, [*pr, "--set", "rings=many"], "rings")
+    assert_refused(capsys, [*pr, "--sensor-height", "nan"], "sensor_height")
+
+
+def test_bad_input(capsys, data, tmp_path):
+    town = data / "town_01"
+    cut = tmp_path / "cut.mcap"
+    whole = (town / "town_01_0.mcap").read_bytes()
+    cut.write_bytes(whole[: len(whole) // 2])
+    assert_refused(capsys, ["tcr", town, cut], cut, "cut off")
+    assert_refused(capsys, ["tcr", tmp_path, town], tmp_path, "not a recorded")
+    short = tmp_path / "short.bin"
+    short.write_bytes(b"12345")
+    assert_refused(capsys, ["tcr", short, short], short, "5 bytes")
+    assert_refused(
+        capsys,
+        ["pr", town, data / "town_01.npy", "--method", "scan-context++"],
+        "town_01.npy",
+        "not a recorded sequence",
+    )
+
+
+def test_bad_folders_of_scans(capsys, data, tmp_path):
+    good = data / "town_01_scans"
+
+    def scores(database, query, output=tmp_path / "out.csv"):
+        return [
+            "scores",
+            "--method",
+            "scan-context++",
+            "--database",
+            database,
+            "--query",
+            query,
+            "--output",
+            output,
+        ]
+
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    assert_refused(capsys, scores(empty, good), empty, "no scan in it")
+    assert_refused(
+        capsys, scores(good, tmp_path / "none"), "none", "no such folder"
+    )
+    twice = tmp_path / "twice"
+    twice.mkdir()
+    for name in ("a.bin", "a.npy"):
+        (twice / name).write_bytes(b"")
+    assert_refused(capsys, scores(twice, good), "a.npy", "same name")
+    far = tmp_path / "far"
+    far.mkdir()
+    np.save(far / "a.npy", np.full((10, 3), 300.0))
+    assert_refused(capsys, scores(good, far), "a.npy", "no finite point")
+    assert not (tmp_path / "out.csv").exists()
+    assert not (tmp_path / "out.csv.part").exists()
+    blocked = tmp_path / "a file" / "out.csv"
+    blocked.parent.write_text("")
+    assert_refused(capsys, scores(good, good, blocked), blocked)
