@@ -16,7 +16,7 @@ from evaluation.files import completing
 from evaluation.hull import in_convex_hull
 from evaluation.maps import VoxelMap
 from evaluation.place_recognition import PlaceRecognition
-from evaluation.rendering import Picture, View, render, shade_by_height
+from evaluation.point_rendering import Picture, View, render, shade_by_height
 from evaluation.tcr import TAU
 
 _UNCHANGED = (214, 214, 214)

@@ -276,7 +276,9 @@ def test_bad_input(capsys, data, tmp_path):
     whole = (town / "town_01_0.mcap").read_bytes()
     cut.write_bytes(whole[: len(whole) // 2])
     assert_refused(capsys, ["tcr", town, cut], cut, "cut off")
-    assert_refused(capsys, ["tcr", tmp_path, town], tmp_path, "not a recorded")
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    assert_refused(capsys, ["tcr", empty, town], empty, "not a recorded")
     short = tmp_path / "short.bin"
     short.write_bytes(b"12345")
     assert_refused(capsys, ["tcr", short, short], short, "5 bytes")

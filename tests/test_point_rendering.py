@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from evaluation.rendering import View, render, shade_by_height
+from evaluation.point_rendering import View, render, shade_by_height
 
 RED, GREEN = (200, 0, 0), (0, 200, 0)
 
