@@ -123,7 +123,7 @@ def _place(path: Path) -> Recording:
     scenario = sequence.scenario
     if scenario is not None and {"map", "stage"} <= set(scenario):
         return Recording(
-            sequence, Path(scenario["map"]).name, str(scenario["stage"])
+            sequence, Path(str(scenario["map"])).name, str(scenario["stage"])
         )
     match = _NAME.fullmatch(sequence.name)
     if match is None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 import json
 import math
+import os
 import sys
 from typing import Any
 
@@ -12,8 +13,8 @@ import typer
 
 from evaluation.errors import InputError
 
-# Typer brings click along, under a private name since 0.26: its base class
-# of all usage errors is reached through the one that is public.
+# Typer brings click along, in new versions under a private name. The base
+# class of all its usage errors is reached through the one that is public.
 _USAGE_ERRORS = typer.BadParameter.__mro__[2]
 
 
@@ -30,6 +31,7 @@ def run(app: typer.Typer, program: str) -> int:
     """
     try:
         status = app(prog_name=program, standalone_mode=False)
+        sys.stdout.flush()
     except _USAGE_ERRORS as error:
         if not sys.argv[1:]:
             # Without arguments the help is shown; that says it all.
@@ -40,9 +42,12 @@ def run(app: typer.Typer, program: str) -> int:
     except (KeyboardInterrupt, typer.Abort):
         return _fail(program, "interrupted", status=130)
     except BrokenPipeError:
-        # Whoever read the results has seen enough of them.
-        sys.stdout = None
+        # Whoever read the results has seen enough of them. Python flushes
+        # once more at its end, which must not fail again.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except OSError as error:
+        return _fail(program, f"{error.filename}: {error.strerror}")
     return status if isinstance(status, int) else 0
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from evaluation import figures
 from evaluation.change import Surveyed, compare, survey_sequence
 from evaluation.collection import City, Recording, find_cities
+from evaluation.errors import InputError
 from evaluation.files import completing, make_folder
 from evaluation.maps import (
     PICTURE_DIVISIONS,
@@ -149,6 +150,8 @@ def _map(recording: Recording, track: Track) -> _Mapped:
     fine = map_sequence(
         recording.sequence, VOXEL_SIZE / PICTURE_DIVISIONS, track
     )
+    if len(fine) == 0:
+        raise InputError(f"{recording.name}: no scan holds a point")
     coarse = fine.coarsen(PICTURE_DIVISIONS)
     return _Mapped(survey_sequence(recording.sequence, coarse), fine)
 

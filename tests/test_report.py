@@ -143,6 +143,15 @@ def test_report_of_a_single_stage(tmp_path):
     assert "Temporal change ratio" not in text
 
 
+def test_scans_without_points_are_refused(tmp_path):
+    nothing = [make_scan(np.empty((0, 3)))] * 2
+    write_recording(
+        tmp_path / "town_01", nothing, [yaw_pose(x, 0, 0, 0) for x in (0, 1)]
+    )
+    with pytest.raises(InputError, match="town_01: no scan holds a point"):
+        write_report(tmp_path, tmp_path / "out")
+
+
 def test_output_that_cannot_be_written(recordings, tmp_path):
     (tmp_path / "out").write_text("a file")
     with pytest.raises(InputError, match=f"^{tmp_path / 'out'}"):

@@ -181,7 +181,8 @@ def faulty_files(folder):
     yield "cut.npy", (folder / "cut.npy").read_bytes()[:-8], "."
     pcds = {
         "cut.pcd": ({"DATA": "binary"}, bytes(5999), "cut off"),
-        "cut_ascii.pcd": ({"DATA": "ascii"}, b"1 2 3\n", "1 x 3 numbers"),
+        "cut_ascii.pcd": ({"DATA": "ascii"}, b"1 2 3\n" * 499, "499 x 3 num"),
+        "huge.pcd": ({"POINTS": 10**15, "DATA": "ascii"}, b"1 2 3", "cut off"),
         "words.pcd": ({"DATA": "ascii"}, b"a b c\n", "convert"),
         "odd.pcd": ({"DATA": "zip"}, b"", "unknown PCD encoding"),
         "fields.pcd": ({"SIZE": "4 4", "DATA": "binary"}, b"", "differ"),
@@ -212,6 +213,16 @@ def faulty_files(folder):
         "cut.ply",
         header % (b"binary_little_endian", b"float") + bytes(23),
         "cut off",
+    )
+    yield (
+        "huge.ply",
+        (header % (b"ascii", b"float")).replace(b"2", b"9" * 15),
+        "cut off",
+    )
+    yield (
+        "negative.ply",
+        (header % (b"ascii", b"float")).replace(b"2", b"-2"),
+        "negative number",
     )
     yield "cut_ascii.ply", header % (b"ascii", b"float") + b"1 2 3", "1 x 3"
     yield "odd.ply", header % (b"binary", b"float"), "unknown format"

@@ -134,6 +134,20 @@ def test_scenario_and_structures(tmp_path):
     assert bare.instances is None
 
 
+@pytest.mark.parametrize(
+    ("attachments", "attribute"),
+    [
+        ({"scenario.json": [1]}, "scenario"),
+        ({"structures.json": {"a": 1}}, "instances"),
+        ({"structures.json": [{"name": "a"}]}, "instances"),
+    ],
+)
+def test_attachments_of_another_kind(tmp_path, attachments, attribute):
+    path, _, _ = record(tmp_path / "s", attachments=attachments)
+    with pytest.raises(InputError, match=f"{path}: attachment .*json: no "):
+        getattr(open_sequence(path), attribute)
+
+
 def test_another_lidar_topic_if_it_is_the_only_one(tmp_path):
     path, scans, _ = record(tmp_path / "s", lidar_topic="/roof/points")
     np.testing.assert_array_equal(open_sequence(path).scan(2), scans[2])

@@ -81,14 +81,25 @@ class McapSequence(Sequence):
 
     @property
     def scenario(self) -> Mapping | None:
-        return self._json("scenario.json")
+        scenario = self._json("scenario.json")
+        if scenario is not None and not isinstance(scenario, dict):
+            raise InputError(
+                f"{self._path}: attachment scenario.json: no JSON object"
+            )
+        return scenario
 
     @property
     def instances(self) -> Mapping[int, Mapping] | None:
         table = self._json("structures.json")
         if table is None:
             return None
-        return {entry["instance"]: entry for entry in table}
+        try:
+            return {entry["instance"]: entry for entry in table}
+        except (TypeError, KeyError) as error:
+            raise InputError(
+                f"{self._path}: attachment structures.json: no list of"
+                " entries with an instance"
+            ) from error
 
     def scan(self, index: int) -> np.ndarray:
         if not 0 <= index < len(self):

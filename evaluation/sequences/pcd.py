@@ -91,9 +91,10 @@ def _describe(header: dict[str, list[str]]) -> tuple[np.dtype, int]:
 def _read_ascii(
     path: Path, offset: int, dtype: np.dtype, count: int
 ) -> np.ndarray:
-    points = np.empty(count, dtype=dtype)
     if count == 0:
-        return points
+        return np.empty(0, dtype=dtype)
+    # A point takes a byte at the very least: no buffer for more of them.
+    _check_size(path, offset + count)
     with open(path, "rb") as stream:
         stream.seek(offset)
         values = np.loadtxt(stream, dtype=np.float64, ndmin=2, max_rows=count)
@@ -103,6 +104,7 @@ def _read_ascii(
             f"PCD: {values.shape[0]} x {values.shape[1]} numbers instead of"
             f" {count} x {sum(widths)}"
         )
+    points = np.empty(count, dtype=dtype)
     columns = np.split(values, np.cumsum(widths)[:-1], axis=1)
     for name, column in zip(dtype.names, columns, strict=True):
         points[name] = column.reshape(points[name].shape)

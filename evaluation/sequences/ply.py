@@ -43,13 +43,14 @@ def read_ply(path: Path) -> np.ndarray:
     encoding, dtype, count, offset = _read_header(path)
     if count == 0:
         return np.empty(0, dtype=dtype)
-    if encoding == "ascii":
-        return _read_ascii(path, offset, dtype, count)
+    is_text = encoding == "ascii"
+    # As text, a vertex takes a byte at the very least.
+    needed = offset + count * (1 if is_text else dtype.itemsize)
     size = path.stat().st_size
-    if size < offset + count * dtype.itemsize:
-        raise ValueError(
-            f"PLY: cut off at {size} of {offset + count * dtype.itemsize} bytes"
-        )
+    if size < needed:
+        raise ValueError(f"PLY: cut off at {size} of {needed} bytes")
+    if is_text:
+        return _read_ascii(path, offset, dtype, count)
     return np.memmap(path, dtype, mode="r", offset=offset, shape=count)
 
 
@@ -94,6 +95,8 @@ def _describe_vertices(
         ]
     except (KeyError, IndexError, ValueError) as error:
         raise ValueError(f"PLY header: {error} is missing or wrong") from error
+    if count < 0:
+        raise ValueError("PLY header: a negative number of vertices")
     dtype = np.dtype(fields)
     for name in "xyz":
         if name not in dict(fields) or dtype.fields[name][0].kind != "f":

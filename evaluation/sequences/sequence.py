@@ -93,4 +93,4 @@ def _map_name(sequence: Sequence) -> str | None:
     """Returns the last part of the map's name, which may be a path."""
     if sequence.scenario is None or "map" not in sequence.scenario:
         return None
-    return Path(sequence.scenario["map"]).name
+    return Path(str(sequence.scenario["map"])).name

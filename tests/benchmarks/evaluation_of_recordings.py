@@ -1,0 +1,87 @@
+"""Where the time goes when recordings are mapped and places recognised.
+
+    python tests/benchmarks/evaluation_of_recordings.py DATABASE QUERY
+
+Aim: under 45 s for the map of 6000 scans of 25000 points on one core, and
+under 30 s for the place recognition of one pair.
+"""
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+import resource
+import time
+
+from evaluation.maps import map_sequence
+from evaluation.methods import make_method
+from evaluation.place_recognition import run
+from evaluation.retrieval import gather
+from evaluation.sequences import open_sequence
+
+
+def measure(label: str, work: Callable, number: int = 1):
+    start = time.perf_counter()
+    result = work()
+    seconds = time.perf_counter() - start
+    each = f", {1e3 * seconds / number:.2f} ms each" if number > 1 else ""
+    print(f"{label:<32} {seconds:7.2f} s{each}")
+    return result
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("database", type=Path)
+    parser.add_argument("query", type=Path)
+    arguments = parser.parse_args()
+    sequence = measure("open", lambda: open_sequence(arguments.query))
+    number = len(sequence)
+    measure("stamps and poses", lambda: sequence.X_WS, number)
+    sizes = measure(
+        "read scans",
+        lambda: [len(sequence.scan(i)) for i in range(number)],
+        number,
+    )
+    print(f"{number} scans of {sum(sizes) / number:.0f} points")
+    # Compiles, unless an earlier run has left the code on disk.
+    measure("map, first call", lambda: map_sequence(sequence), number)
+    voxels = measure("map", lambda: map_sequence(sequence), number)
+    print(f"{len(voxels)} voxels of {voxels.voxel_size} m")
+    method = make_method("scan-context++", {})
+    clouds = [gather(sequence, i, 1) for i in range(0, number, 20)]
+    places = measure(
+        "describe places",
+        lambda: [method.describe_place(cloud) for cloud in clouds],
+        len(clouds),
+    )
+    queries = measure(
+        "describe queries",
+        lambda: [method.describe(cloud) for cloud in clouds],
+        len(clouds),
+    )
+    database = measure("build database", lambda: method.build_database(places))
+    measure(
+        f"score {len(queries)} x {len(places)}, candidates",
+        lambda: [method.score(query, database) for query in queries],
+        len(queries),
+    )
+    measure(
+        f"score {len(queries)} x {len(places)}, all",
+        lambda: [
+            method.score(query, database, exhaustive=True) for query in queries
+        ],
+        len(queries),
+    )
+    measure(
+        "place recognition of the pair",
+        lambda: run(
+            open_sequence(arguments.database),
+            open_sequence(arguments.query),
+            method,
+        ),
+    )
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(f"peak memory {peak:.0f} MiB")
+
+
+if __name__ == "__main__":
+    main()
