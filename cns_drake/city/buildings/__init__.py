@@ -9,6 +9,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
 
 import numpy as np
 from shapely.geometry import Polygon
@@ -63,20 +64,23 @@ def sample(
 
     Args:
         archetype: key of `ARCHETYPES`.
-        footprint: the ground it gets, in the building's frame S [m]; edge 0
-            counter-clockwise is the street front, a rectangle's front is
+        footprint: the ground it gets, in the building's frame S [m]. Its
+            front is the edge between its first two corners, a rectangle's
             its edge of least y. Eaves, balconies and canopies reach out of
             it by at most the archetype's `overhang`.
         height: top of the walls, parapet or spire [m].
         rng: the only source of variation.
         name: the structure's name, which its own meshes carry.
-        blind_edges: edges against a neighbour, built as plain walls.
+        blind_edges: edges that nothing may cross, counter-clockwise from
+            the front: plain walls where the archetype has them, else it
+            stands back from there.
 
     Raises:
         ValueError: the archetype needs a rectangle and gets none, or the
             footprint or the height is outside what it can fill.
     """
     kind = ARCHETYPES[archetype]
+    height = round(height, 3)
     x0, y0, x1, y1 = footprint.bounds
     low, high = kind.widths
     if min(x1 - x0, y1 - y0) < low or max(x1 - x0, y1 - y0) > high:
@@ -85,7 +89,10 @@ def sample(
     if not low <= height <= high:
         raise ValueError(f"{name}: {archetype} is {low} to {high} m high")
     site = Site(footprint, name, frozenset(blind_edges))
-    return kind.build(kind.draw(site, height, rng), site, rng)
+    if not kind.party_walls:
+        site = site.detached(kind.overhang)
+    model = kind.build(kind.draw(site, height, rng), site, rng)
+    return replace(model, footprint=footprint)
 
 
 def metropolis_stock() -> tuple[str, ...]:

@@ -89,7 +89,7 @@ def build(p: ArtDecoTower, site: Site, rng: np.random.Generator) -> Model:
         _, across, along = p.steps[k]
         plan = massing.inset(base, (across, along, across, along))
         plan = outlines.notched(plan, p.notch) if p.notch else plan
-    _add_crown(assembly, p, plan, top, crown_height)
+    _add_crown(assembly, p, plan, top)
     return assembly.model(site)
 
 
@@ -118,9 +118,10 @@ def _add_terrace(assembly, plan, z, k) -> None:
     tiers.add_crown(assembly, plan, parapet, z, 1.1, part=f"terrace_{k}")
 
 
-def _add_crown(assembly, p: ArtDecoTower, plan, z0, height) -> None:
+def _add_crown(assembly, p: ArtDecoTower, plan, z0) -> None:
     pieces = []
-    step = (1.0 - p.spire) * height / p.crown_steps
+    height = p.height - z0
+    step = round((1.0 - p.spire) * height / p.crown_steps, 2)
     side = outlines.shortest_side(plan)
     for k in range(p.crown_steps):
         step_bands = (

@@ -6,7 +6,7 @@ along the walls of a storey. All heights are above the storey's floor [m].
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 
 from cns_drake.city.facades import Arch, Layout, Patch, Relief
 
@@ -238,16 +238,10 @@ def with_middle(layout: Layout, bay: Bay, width: float) -> Layout:
     return combined
 
 
-def by_edge(
-    layouts: dict[int, Layout],
-    otherwise: Layout,
-    blind: Collection[int] = (),
-) -> Layout:
-    """Gives single walls a layout of their own, and blind ones none."""
+def by_edge(layouts: dict[int, Layout], otherwise: Layout) -> Layout:
+    """Gives single walls a layout of their own."""
 
     def layout(edge: int, length: float) -> Sequence[Relief]:
-        if edge in blind:
-            return ()
         return layouts.get(edge, otherwise)(edge, length)
 
     return layout

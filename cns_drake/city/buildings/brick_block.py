@@ -103,9 +103,9 @@ def build(p: BrickBlock, site: Site, rng: np.random.Generator) -> Model:
         bays.by_edge(
             {0: bays.with_middle(shops, door, 3.4)},
             shops if len(outline) > 4 else back,
-            site.blind_edges,
         ),
         glass=(0.35, p.recess),
+        plain=site.blind_edges,
     )
     middle = front.length / 2
     canopies = [
@@ -130,19 +130,21 @@ def build(p: BrickBlock, site: Site, rng: np.random.Generator) -> Model:
         ledge=p.ledge,
         hood=p.hood,
     )
-    layout = bays.by_edge(
-        {}, bays.rhythm(p.pitch, [sash], margin=0.9), site.blind_edges
-    )
+    layout = bays.rhythm(p.pitch, [sash], margin=0.9)
     course = Band(p.sill - 0.2, p.sill, -p.sill_course)
-    walls = Facade(storey, (course,), layout, glass=(p.recess,))
+    walls = Facade(
+        storey, (course,), layout, (p.recess,), plain=site.blind_edges
+    )
     bottom = top
     top = tiers.add_storeys(assembly, outline, walls, top, groups, per_group)
 
+    crown_height = round(p.height - top, 3)
     corbel = bays.bar(0.35, 0.0, crown_height - p.parapet - 0.9, -0.3)
     frieze = Facade(
         crown_height,
-        (*tiers.cornice(crown_height - p.parapet, p.cornice_reach),),
+        tiers.cornice(crown_height - p.parapet, p.cornice_reach),
         bays.rhythm(p.pitch, [corbel if p.corbels else bays.blank], 0.9),
+        plain=site.blind_edges,
     )
     roof = tiers.add_crown(assembly, outline, frieze, top, p.parapet)
     equip_roof(assembly, outline, roof, p.roof_items, rng)
@@ -175,4 +177,5 @@ BRICK_BLOCK = Archetype(
     heights=(12.0, 40.0),
     widths=(10.0, 60.0),
     any_outline=True,
+    party_walls=True,
 )

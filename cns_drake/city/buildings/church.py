@@ -44,7 +44,7 @@ class Church:
 
 def draw(site: Site, height: float, rng: np.random.Generator) -> Church:
     """Draws the parameters of one church."""
-    x0, y0, x1, y1 = site.bounds
+    x0, _, x1, _ = site.bounds
     width = x1 - x0
     nave = round(float(rng.uniform(0.48, 0.56)) * min(width, 26.0), 1)
     wall = round(

@@ -51,7 +51,7 @@ def draw(site: Site, height: float, rng: np.random.Generator):
     run = 2 * (x1 - x0 + y1 - y0)
     return CornerBuilding(
         height=height,
-        corner=int(rng.integers(2)),
+        corner=int(rng.choice(_free_corners(site) or [0, 1])),
         radius=round(float(rng.uniform(0.3, 0.42)) * min(side, 24.0), 1),
         ground_height=round(float(rng.uniform(4.6, 5.4)), 2),
         first_height=round(float(rng.uniform(4.2, 4.8)), 2),
@@ -73,8 +73,16 @@ def draw(site: Site, height: float, rng: np.random.Generator):
     )  # fmt: skip
 
 
+def _free_corners(site: Site) -> list[int]:
+    """Returns the front corners, left and right, that no neighbour hides."""
+    flanks = {0: {3, 0}, 1: {0, 1}}
+    return [k for k, edges in flanks.items() if not edges & site.blind_edges]
+
+
 def build(p: CornerBuilding, site: Site, rng: np.random.Generator) -> Model:
     """Builds the house on a rectangle."""
+    if p.corner not in _free_corners(site):
+        site = site.detached(CORNER_BUILDING.overhang)
     assembly = Assembly(site.name, p.rgb)
     rectangle = site.outline
     plan = massing.rounded(rectangle, {p.corner: p.radius}, 2.8)
@@ -93,8 +101,9 @@ def build(p: CornerBuilding, site: Site, rng: np.random.Generator) -> Model:
     walls = Facade(
         storey,
         (course,),
-        bays.by_edge({}, bays.rhythm(p.pitch, [window], 0.3), blind),
+        bays.rhythm(p.pitch, [window], 0.3),
         glass=(p.recess,),
+        plain=blind,
     )
     top = tiers.add_storeys(assembly, plan, walls, top, groups, per_group)
     if p.pilasters:
@@ -102,7 +111,7 @@ def build(p: CornerBuilding, site: Site, rng: np.random.Generator) -> Model:
             plan, p.pitch, 0.3, 2, 0.5, 0.16, bottom, top, blind
         )
         assembly.add("pilasters", strips)
-    eaves = Facade(2.2, tiers.cornice(1.4, p.cornice_reach))
+    eaves = Facade(2.2, tiers.cornice(1.4, p.cornice_reach), plain=blind)
     roof = tiers.add_crown(assembly, plan, eaves, top, 0.8)
     dome = _dome(p, plan, roof)
     assembly.add("dome", dome, rgb=p.roof_rgb)
@@ -145,8 +154,6 @@ def _add_shops(assembly, p: CornerBuilding, plan, blind, rng) -> float:
     service = bays.with_middle(service, bays.gate(2.6, 2.9, 0.4), 3.4)
 
     def layout(edge: int, length: float):
-        if edge in blind:
-            return ()
         if length < 3.0:
             return glazed(edge, length)
         along = plan[(edge + 1) % len(plan)] - plan[edge]
@@ -158,6 +165,7 @@ def _add_shops(assembly, p: CornerBuilding, plan, blind, rng) -> float:
         (Band(0.0, 0.3, -0.06), Band(h - 1.0, h - 0.2, -0.15)),
         layout,
         glass=(0.4,),
+        plain=blind,
     )
     front = details.WallFrame(plan, 0)
     shades = [
@@ -181,8 +189,9 @@ def _add_first_floor(assembly, p: CornerBuilding, plan, blind, z0) -> float:
     floor = Facade(
         h,
         (Band(h - 0.4, h, -0.18),),
-        bays.by_edge(fronts, bays.rhythm(p.pitch, [plain], 0.3), blind),
+        bays.by_edge(fronts, bays.rhythm(p.pitch, [plain], 0.3)),
         glass=(p.recess,),
+        plain=blind,
     )
     rails: list[Mesh] = []
     for edge in fronts if p.balcony else ():
@@ -252,4 +261,5 @@ CORNER_BUILDING = Archetype(
     build=build,
     heights=(16.0, 45.0),
     widths=(14.0, 50.0),
+    party_walls=True,
 )

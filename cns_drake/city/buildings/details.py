@@ -173,7 +173,13 @@ def pilasters(
 
 
 def corner_piers(
-    outline, width: float, reach: float, depth: float, z0: float, z1: float
+    outline,
+    width: float,
+    reach: float,
+    depth: float,
+    z0: float,
+    z1: float,
+    skip: Collection[int] = (),
 ) -> Mesh:
     """Angled piers around the convex corners of an outline.
 
@@ -183,6 +189,7 @@ def corner_piers(
         reach: out of the walls [m].
         depth: into the walls, past recessed glass [m].
         z0, z1: bottom and top [m].
+        skip: edges whose corners get none.
     """
     outline = np.asarray(outline, dtype=float)
     outer = massing.inset(outline, -reach)
@@ -193,6 +200,8 @@ def corner_piers(
         after = WallFrame(outline, k)
         a, b = p - outline[k - 1], outline[(k + 1) % len(outline)] - p
         if a[0] * b[1] - a[1] * b[0] < 0.1:
+            continue
+        if k in skip or (k - 1) % len(outline) in skip:
             continue
         low, high = before.length - width, width
         plan = [

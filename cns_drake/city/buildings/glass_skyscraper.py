@@ -57,7 +57,8 @@ def draw(site: Site, height: float, rng: np.random.Generator):
         if count == 4:
             step = rng.uniform(0.06, 0.13, 4) * (rng.random(4) < 0.6) * side
         else:
-            step = np.full(count, rng.uniform(0.04, 0.08) * side)
+            reach = min(0.08 * side, 0.5 * massing.inset_limit(outline))
+            step = np.full(count, rng.uniform(0.5, 1.0) * reach)
         total = total + np.round(step, 1)
         setbacks.append(
             (fraction + float(rng.uniform(-0.06, 0.06)), tuple(total.tolist()))
@@ -157,7 +158,7 @@ def _add_lobby(assembly, p: GlassSkyscraper, plan) -> float:
 
 
 def _add_crown(assembly, p, plan, z0, rng) -> None:
-    height = p.crown_height
+    height = round(p.height - z0, 3)
     if p.crown == "wedge":
         assembly.add("crown", massing.sloped_prism(plan, z0, height, 0.35))
         return
@@ -165,15 +166,16 @@ def _add_crown(assembly, p, plan, z0, rng) -> None:
         low = round(0.45 * height, 2)
         ledge = Facade(low, (Band(low - 0.5, low, -0.3),))
         tiers.add_crown(assembly, plan, ledge, z0, 1.0, part="crown_low")
-        plan = massing.inset(plan, 0.12 * outlines.shortest_side(plan))
-        z0, height = z0 + low - 1.0, height - low + 1.0
+        reach = 0.12 * outlines.shortest_side(plan)
+        plan = massing.inset(plan, min(reach, massing.inset_limit(plan)))
+        z0, height = round(z0 + low - 1.0, 3), round(height - low + 1.0, 3)
     louvres = tuple(
         Band(z, z + 0.5, 0.2) for z in np.arange(0.8, height - 1.5, 1.0)
     )
     parapet = 0.7 * height if p.crown == "screen" else 1.0
     walls = Facade(height, louvres)
     roof = tiers.add_crown(assembly, plan, walls, z0, parapet)
-    equip_roof(assembly, massing.inset(plan, 0.3), roof, p.roof_items, rng)
+    equip_roof(assembly, plan, roof, p.roof_items, rng)
 
 
 GLASS_SKYSCRAPER = Archetype(

@@ -91,7 +91,7 @@ def build(p: Hotel, site: Site, rng: np.random.Generator) -> Model:
     edge = Facade(1.2, (Band(0.0, 0.3, -0.15), Band(0.9, 1.2, -0.2)))
     roof = tiers.add_crown(assembly, plan, edge, top, 1.1)
     bar = massing.inset(plan, p.bar_inset)
-    height = p.height - roof
+    height = round(p.height - roof, 3)
     walls = Facade(
         height,
         (Band(0.4, height - 1.2, 0.3), Band(height - 0.9, height - 0.5, -1.3)),

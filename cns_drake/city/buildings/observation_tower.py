@@ -59,7 +59,9 @@ def build(p: ObservationTower, site: Site, rng: np.random.Generator) -> Model:
     x0, y0, x1, y1 = site.bounds
     center = ((x0 + x1) / 2, (y0 + y1) / 2)
     _add_pavilion(assembly, p, center)
-    pod = round(p.pod_at * p.height, 1)
+    # Room for the bowl, the floors, the cone and some mast above it.
+    above = 4.5 + 4.0 * p.pod_floors + 5.5 + 0.1 * p.height
+    pod = round(min(p.pod_at * p.height, p.height - above), 1)
     middle = 0.5 * (p.foot_radius + p.neck_radius)
     shaft = massing.revolved(
         [

@@ -92,20 +92,31 @@ def build(p: Office, site: Site, rng: np.random.Generator) -> Model:
             0.8,
         )
         top = tiers.add_grooved(
-            assembly, outline, wall, top, goal, "storey", 0.2, most=8
+            assembly,
+            outline,
+            wall,
+            top,
+            goal,
+            "storey",
+            0.2,
+            8,
+            site.blind_edges,
         )
     else:
         top = _add_windows(assembly, p, site, top, goal)
+    rim = round(p.height - p.penthouse_height - top, 3)
     edge = Facade(
-        p.parapet + 0.5,
+        rim,
         (
             Band(0.1, 0.4, -0.2 if p.style == "ribbon" else 0.0),
-            Band(p.parapet + 0.2, p.parapet + 0.5, -0.35),
+            Band(rim - 0.3, rim, -0.35),
         ),
+        plain=site.blind_edges,
     )
     roof = tiers.add_crown(assembly, outline, edge, top, p.parapet)
     if p.penthouse_height > 0:
-        outline = massing.inset(outline, p.penthouse_inset)
+        inset = min(p.penthouse_inset, massing.inset_limit(outline))
+        outline = massing.inset(outline, inset)
         roof = _add_penthouse(assembly, p, outline, roof)
     equip_roof(assembly, outline, roof, p.roof_items, rng)
     return assembly.model(site)
@@ -128,9 +139,9 @@ def _add_ground(assembly, p: Office, site: Site, rng) -> float:
         bays.by_edge(
             {0: bays.with_middle(shops, lobby, 5.0)},
             shops if len(outline) > 4 else sides,
-            site.blind_edges,
         ),
         glass=(0.5,),
+        plain=site.blind_edges,
     )
     middle = front.length / 2
     extras = [
@@ -158,8 +169,9 @@ def _add_windows(assembly, p: Office, site: Site, z0, goal) -> float:
         )
         cells = bays.rhythm(p.pitch, [frame], margin=0.6)
         bands = ()
-    layout = bays.by_edge({}, cells, site.blind_edges)
-    walls = Facade(storey, bands, layout, glass=(p.recess,))
+    walls = Facade(
+        storey, bands, cells, glass=(p.recess,), plain=site.blind_edges
+    )
     return tiers.add_storeys(
         assembly, site.outline, walls, z0, groups, per_group
     )
@@ -167,7 +179,7 @@ def _add_windows(assembly, p: Office, site: Site, z0, goal) -> float:
 
 def _add_penthouse(assembly, p: Office, outline, roof) -> float:
     # It starts on the roof; its own parapet ends at the full height.
-    height = p.height - roof
+    height = round(p.height - roof, 3)
     eaves = height - 0.9
     walls = Facade(
         height,
@@ -189,4 +201,5 @@ OFFICE = Archetype(
     heights=(12.0, 45.0),
     widths=(14.0, 70.0),
     any_outline=True,
+    party_walls=True,
 )

@@ -129,7 +129,6 @@ def _add_shops(assembly, p: PodiumTower, site: Site, rng) -> float:
         bays.by_edge(
             {0: bays.with_middle(shops, main, 6.0), 2: service},
             shops,
-            site.blind_edges,
         ),
         glass=(0.45,),
     )
@@ -180,6 +179,7 @@ def _add_tower(assembly, p: PodiumTower, plan, z0, rng) -> None:
     top = tiers.add_storeys(
         assembly, plan, walls, z0, groups, per_group, extras, part="storey"
     )
+    crown = round(p.height - top, 3)
     louvres = tuple(Band(z, z + 0.35, 0.15) for z in (0.5, 1.2, 1.9))
     screen = Facade(crown, (*louvres, Band(2.6, crown, -0.15)))
     roof = tiers.add_crown(assembly, plan, screen, top, 2.2)

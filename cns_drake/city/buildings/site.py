@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 from shapely.geometry import Polygon
-from shapely.geometry.polygon import orient
 
+from cns_drake.city import massing
 from cns_drake.city.mesh import Mesh
 from cns_drake.city.structures import MeshShape, Model, Part, Shape
 
@@ -24,9 +24,9 @@ class Site:
     """The ground a building gets.
 
     Attributes:
-        footprint: simple polygon in the building's frame S [m]. Edge 0, from
-            its first to its second counter-clockwise corner, is the front;
-            a rectangle's front is its edge of least y.
+        footprint: simple polygon in the building's frame S [m]. Its front
+            is the edge between its first two corners, a rectangle's its
+            edge of least y; edges count counter-clockwise from there.
         name: the structure's name; its own meshes are called `<name>_...`.
         blind_edges: edges built against a neighbour: plain walls.
     """
@@ -38,13 +38,25 @@ class Site:
     @property
     def outline(self) -> np.ndarray:
         """The (N, 2) corners, counter-clockwise, the front edge first."""
-        ring = orient(self.footprint).exterior.coords[:-1]
-        points = np.array(ring, dtype=float)
+        exterior = self.footprint.exterior
+        points = np.array(exterior.coords[:-1], dtype=float)
+        if not exterior.is_ccw:
+            # Turned round, the edge that was first runs from 1 to 0.
+            points = np.roll(points[::-1], 2, axis=0)
         if self.is_rectangle:
             # The corner from which the edge of least y starts.
             start = int(np.lexsort((points[:, 0], points[:, 1]))[0])
             points = np.roll(points, -start, axis=0)
         return points
+
+    def detached(self, gap: float) -> Site:
+        """Returns the site with its blind edges moved in by `gap`.
+
+        What is built there stands free, overhangs included.
+        """
+        outline = self.outline
+        gaps = [gap * (k in self.blind_edges) for k in range(len(outline))]
+        return Site(Polygon(massing.inset(outline, gaps)), self.name)
 
     @property
     def is_rectangle(self) -> bool:
@@ -82,6 +94,8 @@ class Archetype:
             outside the footprint [m]; near the ground at most
             `GROUND_OVERHANG_M`.
         any_outline: whether it follows any polygon; else rectangles only.
+        party_walls: whether it can stand wall to wall with a neighbour;
+            else it keeps its overhang clear of blind edges.
     """
 
     name: str
@@ -91,6 +105,7 @@ class Archetype:
     widths: tuple[float, float]
     overhang: float = 1.5
     any_outline: bool = False
+    party_walls: bool = False
 
 
 # Plinths and pilasters may stand this far outside the footprint; above

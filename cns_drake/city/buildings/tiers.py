@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+import math
 
 from cns_drake.city import massing
 from cns_drake.city.buildings import details
@@ -22,17 +23,19 @@ def divided(
     """Divides a height into storeys, and these into equal groups.
 
     Args:
-        height: to be filled exactly [m].
+        height: to be filled, but for millimetres [m].
         storey: wanted height of a storey [m].
         most: greatest number of groups; a group becomes one visual.
 
     Returns:
-        Number of groups, storeys in a group, height of a storey [m].
+        Number of groups, storeys in a group, height of a storey in whole
+        millimetres, so that storeys placed on one another leave no gap [m].
     """
     count = max(1, round(height / storey))
     per_group = -(-count // most)
     groups = max(1, round(count / per_group))
-    return groups, per_group, height / (groups * per_group)
+    exact = height / (groups * per_group)
+    return groups, per_group, math.floor(1000.0 * exact) / 1000.0
 
 
 def add_ground(
@@ -72,16 +75,27 @@ def add_storeys(
         pieces += [e.moved((0.0, 0.0, k * facade.height)) for e in extras]
     step = per_group * facade.height
     assembly.stack(part, merge_meshes(pieces), z0, step, groups)
-    top = z0 + groups * step
+    top = round(z0 + groups * step, 3)
     if len(facade.glass) == 1:
-        pane = massing.inset(outline, facade.glass[0] - _PANE_OVERLAP)
-        glass = massing.skirt(pane, pane, z0, top)
+        glass = _pane(outline, facade, z0, top)
         assembly.add(f"{part}_glass", glass, rgb=assembly.glass_rgb)
     elif facade.glass:
         glass = glass_mesh(outline, facade.stacked(per_group))
         rgb = assembly.glass_rgb
         assembly.stack(f"{part}_glass", glass, z0, step, groups, rgb)
     return top
+
+
+def _pane(outline, facade: Facade, z0: float, z1: float) -> Mesh:
+    """Returns the pane behind all walls but plain ones."""
+    edges = range(len(outline))
+    depth = facade.glass[0] - _PANE_OVERLAP
+    plan = massing.inset(
+        outline, [0.0 if k in facade.plain else depth for k in edges]
+    )
+    pane = massing.skirt(plan, plan, z0, z1)
+    faces = tuple(pane.faces[k] for k in edges if k not in facade.plain)
+    return Mesh(pane.vertices, faces)
 
 
 @dataclass(frozen=True)
@@ -116,8 +130,11 @@ def add_grooved(
     part: str,
     rise: float = 0.0,
     most: int = 4,
+    plain: frozenset[int] = frozenset(),
 ) -> float:
-    """Adds storeys from z0 to `goal`; their piers rise above it.
+    """Adds storeys from z0 to about `goal`; their piers rise above them.
+
+    Returns their top [m], less than `goal` by millimetres.
 
     Bands that run around the building and piers as tall as the tier cost a
     fraction of single windows.
@@ -127,13 +144,21 @@ def add_grooved(
     bands = [Band(0.0, wall.spandrel, 0.0), Band(wall.spandrel, storey, depth)]
     if wall.ledge > 0:
         bands.append(Band(0.0, 0.2, -wall.ledge))
-    facade = Facade(storey, tuple(bands), glass=(depth,))
-    add_storeys(assembly, outline, facade, z0, groups, per_group, part=part)
+    facade = Facade(storey, tuple(bands), glass=(depth,), plain=plain)
+    top = add_storeys(
+        assembly, outline, facade, z0, groups, per_group, part=part
+    )
     pieces, into = [], depth + 0.05
     if wall.corner > 0:
         pieces.append(
             details.corner_piers(
-                outline, wall.corner, wall.reach, into, z0, goal + rise
+                outline,
+                wall.corner,
+                wall.reach,
+                into,
+                z0,
+                top + rise,
+                skip=plain,
             )
         )
     if wall.width > 0:
@@ -145,14 +170,15 @@ def add_grooved(
                 wall.width,
                 wall.reach,
                 z0,
-                goal + rise,
+                top + rise,
                 depth=into,
                 margin=margin,
+                skip=plain,
             )
         )
     if pieces:
         assembly.add(f"{part}_piers", merge_meshes(pieces))
-    return goal
+    return top
 
 
 def block(outline, facade: Facade, z0: float) -> Mesh:
@@ -181,7 +207,7 @@ def add_crown(
     The roof lies `parapet` below the top of the facade; `extras` are given
     in heights above z0.
     """
-    roof = facade.height - parapet
+    roof = round(facade.height - parapet, 3)
     mesh = merge_meshes(
         [
             facade_mesh(outline, facade),
@@ -191,7 +217,7 @@ def add_crown(
     )
     assembly.add(part, mesh, z0)
     _add_glass(assembly, outline, facade, z0, part)
-    return z0 + roof
+    return round(z0 + roof, 3)
 
 
 def _add_glass(assembly, outline, facade: Facade, z0: float, part: str):
