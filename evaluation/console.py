@@ -47,7 +47,8 @@ def run(app: typer.Typer, program: str) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:
-        return _fail(program, f"{error.filename}: {error.strerror}")
+        where = error.filename or "standard output"
+        return _fail(program, f"{where}: {error.strerror or error}")
     return status if isinstance(status, int) else 0
 
 

@@ -183,7 +183,7 @@ def faulty_files(folder):
         "cut.pcd": ({"DATA": "binary"}, bytes(5999), "cut off"),
         "cut_ascii.pcd": ({"DATA": "ascii"}, b"1 2 3\n" * 499, "499 x 3 num"),
         "huge.pcd": ({"POINTS": 10**15, "DATA": "ascii"}, b"1 2 3", "cut off"),
-        "words.pcd": ({"DATA": "ascii"}, b"a b c\n", "convert"),
+        "words.pcd": ({"DATA": "ascii"}, b"a b c\n" * 500, "convert"),
         "odd.pcd": ({"DATA": "zip"}, b"", "unknown PCD encoding"),
         "fields.pcd": ({"SIZE": "4 4", "DATA": "binary"}, b"", "differ"),
         "no_z.pcd": ({"FIELDS": "x y w", "DATA": "binary"}, b"", "field z"),
