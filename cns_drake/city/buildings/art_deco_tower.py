@@ -39,7 +39,6 @@ class ArtDecoTower:
 def draw(site: Site, height: float, rng: np.random.Generator) -> ArtDecoTower:
     """Draws the parameters of one tower."""
     x0, y0, x1, y1 = site.bounds
-    run = outlines.perimeter(site.outline)
     starts = ((0.5,), (0.3, 0.62))[int(rng.integers(2))]
     share = 0.24 if len(starts) == 2 else 0.4
     steps, across, along = [], 0.0, 0.0
@@ -56,7 +55,7 @@ def draw(site: Site, height: float, rng: np.random.Generator) -> ArtDecoTower:
             spandrel=round(float(rng.uniform(1.1, 1.6)), 2),
             ledge=0.0,
             glass_depth=round(float(rng.uniform(0.2, 0.4)), 2),
-            pitch=max(float(rng.uniform(2.6, 3.6)), run / 40),
+            pitch=max(float(rng.uniform(2.6, 3.6)), site.open_length / 34),
             width=round(float(rng.uniform(0.8, 1.4)), 2),
             reach=round(float(rng.uniform(0.2, 0.34)), 2),
             corner=round(float(rng.uniform(1.4, 2.4)), 2),

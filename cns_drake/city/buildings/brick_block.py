@@ -59,7 +59,7 @@ def draw(site: Site, height: float, rng: np.random.Generator) -> BrickBlock:
         height=height,
         ground_height=round(float(rng.uniform(4.0, 4.8)), 2),
         storey_height=storey,
-        pitch=float(rng.uniform(2.3, 3.4)),
+        pitch=max(float(rng.uniform(2.3, 3.4)), site.open_length / 46),
         window_width=round(float(rng.uniform(1.0, 1.6)), 2),
         sill=round(float(rng.uniform(0.75, 0.95)), 2),
         head=round(float(rng.uniform(2.4, 2.7)), 2),
@@ -108,17 +108,17 @@ def build(p: BrickBlock, site: Site, rng: np.random.Generator) -> Model:
         plain=site.blind_edges,
     )
     middle = front.length / 2
-    canopies = [
-        front.place(details.canopy(middle - 1.5, middle + 1.5, 1.3, 3.1))
-    ]
+    roof = details.canopy(middle - 1.5, middle + 1.5, 1.3, 3.1)
+    shades = []
     for x0, x1 in bays.stretches(front.length, 2 * p.pitch, 0.6):
         clear = x1 < middle - 1.7 or x0 > middle + 1.7
         if clear and rng.random() < 0.6:
             shade = details.awning(
                 x0 + 0.4, x1 - 0.4, 1.2, 2.6, p.ground_height - 0.9
             )
-            canopies.append(front.place(shade))
-    top = tiers.add_ground(assembly, outline, ground, canopies)
+            shades.append(front.place(shade))
+    tiers.add_awnings(assembly, shades, rng)
+    top = tiers.add_ground(assembly, outline, ground, [front.place(roof)])
 
     sash = bays.window(
         p.window_width,
@@ -138,6 +138,11 @@ def build(p: BrickBlock, site: Site, rng: np.random.Generator) -> Model:
     bottom = top
     top = tiers.add_storeys(assembly, outline, walls, top, groups, per_group)
 
+    if p.pilasters:
+        strips = details.pilasters(
+            outline, p.pitch, 0.9, 3, 0.5, 0.2, bottom, top, site.blind_edges
+        )
+        assembly.add("pilasters", strips)
     crown_height = round(p.height - top, 3)
     corbel = bays.bar(0.35, 0.0, crown_height - p.parapet - 0.9, -0.3)
     frieze = Facade(

@@ -125,6 +125,11 @@ def _add_nave(assembly, p: Church, nave) -> None:
         p.bay, [_lancet(1.3, low, max(low + 0.6, h - 2.4), d)], margin=1.6
     )
     plain = h - low > 3.4
+    # A stone gable in front of the roof's, with its coping.
+    (x0, y0), (x1, _) = nave[0], nave[1]
+    shield = massing.gable_roof(
+        y0 - 0.35, -x1 - 0.6, y0 + 0.3, -x0 + 0.6, h, p.roof_rise + 0.4
+    )
     walls = Facade(
         h,
         (Band(h - 0.5, h, -0.25),),
@@ -134,7 +139,8 @@ def _add_nave(assembly, p: Church, nave) -> None:
         ),
         glass=(d,),
     )
-    tiers.add_ground(assembly, nave, walls, part="nave")
+    gable = shield.moved(yaw=np.pi / 2)
+    tiers.add_ground(assembly, nave, walls, [gable], part="nave")
 
 
 def _add_aisles(assembly, p: Church, outer) -> None:

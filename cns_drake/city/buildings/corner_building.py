@@ -34,6 +34,7 @@ class CornerBuilding:
     pitch: float
     window_width: float
     recess: float
+    hood: float
     pilasters: bool
     balcony: bool
     dome: str
@@ -48,7 +49,6 @@ def draw(site: Site, height: float, rng: np.random.Generator):
     """Draws the parameters of one corner house."""
     x0, y0, x1, y1 = site.bounds
     side = min(x1 - x0, y1 - y0)
-    run = 2 * (x1 - x0 + y1 - y0)
     return CornerBuilding(
         height=height,
         corner=int(rng.choice(_free_corners(site) or [0, 1])),
@@ -56,9 +56,10 @@ def draw(site: Site, height: float, rng: np.random.Generator):
         ground_height=round(float(rng.uniform(4.6, 5.4)), 2),
         first_height=round(float(rng.uniform(4.2, 4.8)), 2),
         storey_height=float(rng.uniform(3.3, 3.8)),
-        pitch=max(float(rng.uniform(2.5, 3.2)), run / 44),
+        pitch=max(float(rng.uniform(2.5, 3.2)), site.open_length / 36),
         window_width=round(float(rng.uniform(1.1, 1.5)), 2),
         recess=round(float(rng.uniform(0.22, 0.4)), 2),
+        hood=0.1 * (rng.random() < 0.4),
         pilasters=bool(rng.random() < 0.6),
         balcony=bool(rng.random() < 0.7),
         dome=("dome", "cone", "lantern")[int(rng.integers(3))],
@@ -95,7 +96,7 @@ def build(p: CornerBuilding, site: Site, rng: np.random.Generator) -> Model:
         crown - 2.2 - top, p.storey_height
     )
     window = bays.window(
-        p.window_width, 0.8, storey - 0.7, p.recess, hood=0.1, ledge=0.0
+        p.window_width, 0.8, storey - 0.7, p.recess, hood=p.hood
     )
     course = Band(0.6, 0.8, -0.1)
     walls = Facade(
@@ -143,7 +144,12 @@ def _is_front(plan, edge: int) -> bool:
 def _add_shops(assembly, p: CornerBuilding, plan, blind, rng) -> float:
     h = p.ground_height
     shops = bays.rhythm(
-        2 * p.pitch, [bays.shop_front(h - 1.2, 0.4, pier=0.25)], margin=0.35
+        2 * p.pitch,
+        [
+            bays.shop_front(h - 1.2, 0.4, pier=0.25),
+            bays.shop_front(h - 1.2, 0.4, pier=0.25, door=False),
+        ],
+        margin=0.35,
     )
     glazed = bays.rhythm(
         3.0, [bays.shop_front(h - 1.2, 0.4, door=False, pier=0.15)], 0.1
@@ -173,7 +179,8 @@ def _add_shops(assembly, p: CornerBuilding, plan, blind, rng) -> float:
         for a, b in bays.stretches(front.length, 2 * p.pitch, 0.35)
         if rng.random() < 0.5
     ]
-    return tiers.add_ground(assembly, plan, ground, shades)
+    tiers.add_awnings(assembly, shades, rng)
+    return tiers.add_ground(assembly, plan, ground)
 
 
 def _add_first_floor(assembly, p: CornerBuilding, plan, blind, z0) -> float:

@@ -46,7 +46,8 @@ def draw(site: Site, height: float, rng: np.random.Generator) -> CourtBlock:
     """Draws the parameters of one block."""
     x0, y0, x1, y1 = site.bounds
     range_depth = float(rng.uniform(10.0, 12.5))
-    run = 2 * (x1 - x0 + y1 - y0) * 1.3
+    # The court has walls too.
+    run = 1.3 * site.open_length
     return CourtBlock(
         height=height,
         shape="U" if x1 - x0 > 30.0 and rng.random() < 0.7 else "L",
@@ -55,7 +56,7 @@ def draw(site: Site, height: float, rng: np.random.Generator) -> CourtBlock:
         back=round(min(range_depth + 0.8, 0.5 * (y1 - y0)), 1),
         ground_height=round(float(rng.uniform(3.8, 4.4)), 2),
         storey_height=float(rng.uniform(3.0, 3.4)),
-        pitch=max(float(rng.uniform(2.4, 3.2)), run / 56),
+        pitch=max(float(rng.uniform(2.4, 3.2)), run / 52),
         window_width=round(float(rng.uniform(0.95, 1.25)), 2),
         recess=round(float(rng.uniform(0.15, 0.28)), 2),
         oriel_every=int(rng.integers(2, 5)),

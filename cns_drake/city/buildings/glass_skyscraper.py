@@ -73,9 +73,7 @@ def draw(site: Site, height: float, rng: np.random.Generator):
             spandrel=round(float(rng.uniform(0.6, 1.2)), 2),
             ledge=round(float(rng.uniform(0.3, 0.6)), 2) * (style < 2),
             glass_depth=round(float(rng.uniform(0.2, 0.4)), 2),
-            pitch=max(
-                float(rng.uniform(2.2, 3.6)), outlines.perimeter(outline) / 45
-            ),
+            pitch=max(float(rng.uniform(2.2, 3.6)), site.open_length / 38),
             width=round(float(rng.uniform(0.12, 0.3)), 2) * (style > 0),
             reach=round(float(rng.uniform(0.2, 0.55)), 2),
             corner=0.0,

@@ -58,7 +58,7 @@ def draw(site: Site, height: float, rng: np.random.Generator) -> Museum:
         porch_share=share,
         columns=columns + columns % 2,
         column_radius=round(float(rng.uniform(0.45, 0.65)), 2),
-        wing_pitch=float(rng.uniform(3.6, 5.0)),
+        wing_pitch=max(float(rng.uniform(3.6, 5.0)), site.open_length / 36),
         niche_depth=round(float(rng.uniform(0.35, 0.5)), 2),
         statues=bool(rng.random() < 0.7),
         rgb=_STONES[int(rng.integers(len(_STONES)))],

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cns_drake.city import massing
-from cns_drake.city.buildings import bays, details, outlines, tiers
+from cns_drake.city.buildings import bays, details, tiers
 from cns_drake.city.buildings.roof_equipment import equip_roof
 from cns_drake.city.buildings.site import Archetype, Assembly, Site
 from cns_drake.city.facades import Band, Facade
@@ -47,7 +47,7 @@ class Office:
 
 def draw(site: Site, height: float, rng: np.random.Generator) -> Office:
     """Draws the parameters of one office."""
-    run = outlines.perimeter(site.outline)
+    run = site.open_length
     tall = height > 18.0
     return Office(
         height=height,
@@ -144,15 +144,15 @@ def _add_ground(assembly, p: Office, site: Site, rng) -> float:
         plain=site.blind_edges,
     )
     middle = front.length / 2
-    extras = [
-        front.place(details.canopy(middle - 2.6, middle + 2.6, 1.45, 3.4))
-    ]
+    roof = details.canopy(middle - 2.6, middle + 2.6, 1.45, 3.4)
+    shades = []
     for x0, x1 in bays.stretches(front.length, pitch, 0.7):
         free = x1 < middle - 2.6 or x0 > middle + 2.6
         if rng.random() < p.awnings and free:
             shade = details.awning(x0 + 0.3, x1 - 0.3, 1.3, 2.7, h - 1.1)
-            extras.append(front.place(shade))
-    return tiers.add_ground(assembly, outline, ground, extras)
+            shades.append(front.place(shade))
+    tiers.add_awnings(assembly, shades, rng)
+    return tiers.add_ground(assembly, outline, ground, [front.place(roof)])
 
 
 def _add_windows(assembly, p: Office, site: Site, z0, goal) -> float:

@@ -101,15 +101,3 @@ def shortest_side(points) -> float:
     """Returns the shorter side of an outline's bounding box [m]."""
     span = np.ptp(np.asarray(points, dtype=float), axis=0)
     return float(min(span))
-
-
-def area(points) -> float:
-    """Returns the area inside an outline [m^2]."""
-    x, y = np.asarray(points, dtype=float).T
-    return float(abs(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))) / 2)
-
-
-def perimeter(points) -> float:
-    """Returns the length of an outline [m]."""
-    points = np.asarray(points, dtype=float)
-    return float(sum(math.dist(p, points[k - 1]) for k, p in enumerate(points)))

@@ -65,10 +65,10 @@ def draw(site: Site, height: float, rng: np.random.Generator) -> PodiumTower:
         tower=(float(share[0]), float(share[1])),
         at=tuple(rng.choice([0.15, 0.5, 0.85], 2).tolist()),
         chamfer=round(float(rng.choice([0.0, 2.0, 3.5])), 1),
-        pitch=max(float(rng.uniform(3.0, 4.2)), run / 22),
+        pitch=max(float(rng.uniform(3.0, 4.2)), run / 19),
         recess=round(float(rng.uniform(0.35, 0.5)), 2),
         frame=round(float(rng.uniform(0.5, 0.9)), 2),
-        mullions=int(run < 80.0),
+        mullions=int(run < 70.0),
         balconies=bool(rng.random() < 0.5),
         awnings=float(rng.uniform(0.3, 0.9)),
         roof_items=(
@@ -134,15 +134,15 @@ def _add_shops(assembly, p: PodiumTower, site: Site, rng) -> float:
     )
     front = details.WallFrame(outline, 0)
     middle = front.length / 2
-    extras = [
-        front.place(details.canopy(middle - 3.2, middle + 3.2, 1.45, 4.0))
-    ]
+    roof = details.canopy(middle - 3.2, middle + 3.2, 1.45, 4.0)
+    shades = []
     for a, b in bays.stretches(front.length, p.shop_pitch, 0.8):
         free = b < middle - 3.2 or a > middle + 3.2
         if rng.random() < p.awnings and free:
             shade = details.awning(a + 0.4, b - 0.4, 1.35, 2.7, h - 1.3)
-            extras.append(front.place(shade))
-    return tiers.add_ground(assembly, outline, facade, extras)
+            shades.append(front.place(shade))
+    tiers.add_awnings(assembly, shades, rng)
+    return tiers.add_ground(assembly, outline, facade, [front.place(roof)])
 
 
 def _podium_storey(p: PodiumTower) -> Facade:

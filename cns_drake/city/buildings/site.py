@@ -47,7 +47,26 @@ class Site:
             # The corner from which the edge of least y starts.
             start = int(np.lexsort((points[:, 0], points[:, 1]))[0])
             points = np.roll(points, -start, axis=0)
+            # Whole centimetres, never outside, keep the meshes' text short.
+            low, high = points[0], points[2]
+            low = np.ceil(np.round(100.0 * low, 3)) / 100.0
+            high = np.floor(np.round(100.0 * high, 3)) / 100.0
+            points = massing.rectangle(*low, *high)
         return points
+
+    @property
+    def open_length(self) -> float:
+        """Length of all walls that get windows [m]."""
+        outline = self.outline
+        ends = np.roll(outline, -1, axis=0)
+        lengths = np.linalg.norm(ends - outline, axis=1)
+        return float(
+            sum(
+                length
+                for k, length in enumerate(lengths)
+                if k not in self.blind_edges
+            )
+        )
 
     def detached(self, gap: float) -> Site:
         """Returns the site with its blind edges moved in by `gap`.
@@ -76,7 +95,8 @@ class Site:
         """
         if not self.is_rectangle:
             raise ValueError(f"{self.name} needs a rectangular footprint")
-        return self.footprint.bounds
+        outline = self.outline
+        return (*outline[0].tolist(), *outline[2].tolist())
 
 
 @dataclass(frozen=True)

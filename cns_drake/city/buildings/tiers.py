@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
+import numpy as np
+
 from cns_drake.city import massing
 from cns_drake.city.buildings import details
 from cns_drake.city.buildings.site import FOUNDATION_M, Assembly
@@ -15,6 +17,24 @@ from cns_drake.city.mesh import Mesh, merge_meshes
 # A pane cuts this far into the reveals in front of it, lest rays slip
 # between the two [m].
 _PANE_OVERLAP = 0.004
+
+
+_AWNING_COLOURS = (
+    (0.55, 0.18, 0.16),
+    (0.20, 0.36, 0.28),
+    (0.85, 0.80, 0.68),
+    (0.22, 0.30, 0.45),
+    (0.72, 0.48, 0.18),
+)
+
+
+def add_awnings(
+    assembly: Assembly, pieces: Sequence[Mesh], rng: np.random.Generator
+) -> None:
+    """Adds the awnings of a building in a colour of their own."""
+    if pieces:
+        rgb = _AWNING_COLOURS[int(rng.integers(len(_AWNING_COLOURS)))]
+        assembly.add("awnings", merge_meshes(pieces), rgb=rgb)
 
 
 def divided(
@@ -173,6 +193,7 @@ def add_grooved(
                 top + rise,
                 depth=into,
                 margin=margin,
+                backs=rise > 0,
                 skip=plain,
             )
         )
