@@ -261,7 +261,7 @@ def test_bad_usage(capsys, data):
     assert_refused(capsys, ["tcr", town, town, "--colour"], "--colour")
     assert_refused(capsys, ["pr", town, town], "Missing option '--method'")
     pr = ["pr", town, town, "--method"]
-    assert_refused(capsys, [*pr, "bow"], "'bow'", "known: scan-context++")
+    assert_refused(capsys, [*pr, "bow"], "'bow'", "known: ", "scan-context++")
     pr.append("scan-context++")
     assert_refused(capsys, [*pr, "--mode", "some"], "some", "filtered")
     assert_refused(capsys, [*pr, "--set", "candidates"], "is not NAME=VALUE")

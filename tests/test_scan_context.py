@@ -330,9 +330,9 @@ def test_nothing_in_common_is_no_candidate():
 
 
 def test_parameters():
-    assert known_methods() == (NAME,)
+    assert NAME in known_methods()
     assert make_method(NAME, {"candidates": "7"}).config.candidates == 7
-    with pytest.raises(InputError, match=r"no method 'x' \(known: scan-con"):
+    with pytest.raises(InputError, match=r"no method 'x' \(known: .*scan-con"):
         make_method("x", {})
     with pytest.raises(InputError, match=r"no parameter 'x'.*variant"):
         make_method(NAME, {"x": 1})

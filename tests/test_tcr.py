@@ -51,7 +51,7 @@ def brute_force(source, target, tau):
 @pytest.mark.parametrize("tau", [4.5, 9.0])
 def test_agrees_with_the_definition(tau):
     # Only some of the points: the oracle is slow.
-    a, b = HALF[::9], OTHER[::9]
+    a, b = HALF[::15], OTHER[::15]
     expected = brute_force(a, b, tau)
     assert 0.1 < expected < 0.9
     assert ratio(a, b, tau=tau) == expected
@@ -127,7 +127,7 @@ def test_removing_shows_in_one_direction():
 
 
 def test_larger_tau_never_raises_it():
-    values = [ratio(HALF, OTHER, tau=t) for t in np.linspace(0.0, 12.0, 30)]
+    values = [ratio(HALF, OTHER, tau=t) for t in np.linspace(0.0, 12.0, 13)]
     assert np.all(np.diff(values) <= 0.0)
     assert values[0] > 0.9
     assert values[-1] < 0.1
