@@ -156,7 +156,7 @@ def _ears(points: np.ndarray) -> list[tuple[int, ...]]:
                 left.pop(k)
                 break
         else:
-            raise ValueError("the outline crosses itself")
+            raise ValueError("an outline crosses itself or runs clockwise")
     return [*faces, tuple(left)]
 
 

@@ -19,6 +19,9 @@ _BRICKS = (
     (0.69, 0.55, 0.43),
 )
 
+# Higher houses have their fire stairs inside.
+_MOST_FLIGHTS = 8
+
 
 @dataclass(frozen=True)
 class BrickBlock:
@@ -153,7 +156,7 @@ def build(p: BrickBlock, site: Site, rng: np.random.Generator) -> Model:
     )
     roof = tiers.add_crown(assembly, outline, frieze, top, p.parapet)
     equip_roof(assembly, outline, roof, p.roof_items, rng)
-    if p.stairs_edge is not None:
+    if p.stairs_edge is not None and groups * per_group <= _MOST_FLIGHTS:
         _add_fire_stairs(assembly, p, site, bottom, storey, top)
     return assembly.model(site)
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from shapely.geometry import box
 
 from cns_drake.city import massing
 from cns_drake.city.buildings import bays, details, tiers
@@ -44,8 +45,8 @@ class Church:
 
 def draw(site: Site, height: float, rng: np.random.Generator) -> Church:
     """Draws the parameters of one church."""
-    x0, _, x1, _ = site.bounds
-    width = x1 - x0
+    x0, y0, x1, y1 = site.bounds
+    width = min(x1 - x0, y1 - y0)
     nave = round(float(rng.uniform(0.48, 0.56)) * min(width, 26.0), 1)
     wall = round(
         min(float(rng.uniform(0.3, 0.36)) * height, 0.9 * nave + 3.0), 1
@@ -70,7 +71,32 @@ def draw(site: Site, height: float, rng: np.random.Generator) -> Church:
 
 
 def build(p: Church, site: Site, rng: np.random.Generator) -> Model:
-    """Builds the church along y on a rectangle, its portal at the front."""
+    """Builds the church along the longer side of a rectangle.
+
+    Its portal is at the front, or on the left where it lies along x.
+    """
+    x0, y0, x1, y1 = site.bounds
+    if x1 - x0 > y1 - y0:
+        # Built a quarter turn to the right of where it will stand.
+        along = Site(box(-y1, x0, -y0, x1), site.name)
+        return _turned(_built(p, along), site)
+    return _built(p, site)
+
+
+def _turned(model: Model, site: Site) -> Model:
+    """Returns the model turned by a quarter to the right (x, y -> y, -x)."""
+    parts = tuple(
+        replace(
+            part,
+            xyz=(part.xyz[1], -part.xyz[0], part.xyz[2]),
+            rpy=(0.0, 0.0, round(part.rpy[2] - np.pi / 2, 5)),
+        )
+        for part in model.parts
+    )
+    return Model(parts, model.meshes, site.footprint)
+
+
+def _built(p: Church, site: Site) -> Model:
     assembly = Assembly(site.name, p.rgb)
     x0, y0, x1, y1 = site.bounds
     middle, half = (x0 + x1) / 2, p.nave_width / 2
@@ -107,8 +133,8 @@ def _add_nave(assembly, p: Church, nave) -> None:
     h, d = p.nave_height, p.window_depth
 
     def front(edge: int, length: float):
-        x, w = round(length / 2, 2), round(0.13 * length, 2)
-        rise = min(0.5 * h, 4.0)
+        x, w = round(length / 2, 2), round(min(0.13 * length, 0.12 * h), 2)
+        rise = min(0.3 * h, 4.0)
         relief = [Arch(x - w, x + w, 0.0, rise, rise + w, 1.1)]
         rose = min(0.16 * length, 0.18 * h)
         z = 0.72 * h
@@ -158,7 +184,7 @@ def _add_aisles(assembly, p: Church, outer) -> None:
     for edge in (1, 3):
         wall = details.WallFrame(outer, edge)
         cells = bays.stretches(wall.length, p.bay, 1.6)
-        for x in [cells[0][0], *(b for _, b in cells)]:
+        for x in [wall.length - 1.6, *(a for a, _ in cells)]:
             for reach, top in ((1.1, 0.55 * h), (0.6, 0.9 * h)):
                 plan = massing.rectangle(x - 0.4, -0.02, x + 0.4, reach)
                 slope = massing.rectangle(x - 0.4, -0.02, x + 0.4, 0.1)
@@ -303,5 +329,5 @@ CHURCH = Archetype(
     draw=draw,
     build=build,
     heights=(30.0, 80.0),
-    widths=(20.0, 70.0),
+    widths=(24.0, 70.0),
 )

@@ -266,7 +266,7 @@ CORNER_BUILDING = Archetype(
     name="corner_building",
     draw=draw,
     build=build,
-    heights=(16.0, 45.0),
+    heights=(20.0, 45.0),
     widths=(14.0, 50.0),
     party_walls=True,
 )

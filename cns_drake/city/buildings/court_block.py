@@ -150,7 +150,8 @@ def _add_oriels(assembly, p: CourtBlock, plan, z0, count, storey) -> None:
 def _mansard(p: CourtBlock, plan, z0, rng) -> Mesh:
     eaves = massing.inset(plan, -0.5)
     knee = massing.inset(plan, p.mansard_inset - 0.6)
-    ridge = massing.inset(plan, p.mansard_inset + 1.6)
+    slope = min(1.6, p.wing / 2 - p.mansard_inset - 0.4)
+    ridge = massing.inset(plan, p.mansard_inset + slope)
     z1 = z0 + 0.3
     z2, z3 = p.height - 0.9, p.height
     pieces = [

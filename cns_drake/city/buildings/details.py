@@ -107,7 +107,6 @@ def piers(
     *,
     depth: float = 0.05,
     margin: float = 0.4,
-    backs: bool = False,
     skip: Collection[int] = (),
 ) -> Mesh:
     """Upright fins or pilasters along all walls of an outline.
@@ -120,7 +119,6 @@ def piers(
         z0, z1: bottom and top [m].
         depth: how far they go into the wall, past recessed glass [m].
         margin: between the ends of a wall and the middle of a pier [m].
-        backs: whether their backs are closed, for they outgrow the wall.
         skip: edges without piers.
     """
     pieces = []
@@ -135,7 +133,7 @@ def piers(
         else:
             places = [margin + k * room / count for k in range(count + 1)]
         for x in places:
-            pier = _pier(round(x, 2), width, depth, reach, z0, z1, backs)
+            pier = _pier(round(x, 2), width, depth, reach, z0, z1)
             pieces.append(wall.place(pier))
     return merge_meshes(pieces)
 
@@ -218,14 +216,17 @@ def corner_piers(
     return merge_meshes(pieces)
 
 
-def _pier(x, width, depth, reach, z0, z1, back: bool = False) -> Mesh:
-    """A box with or without its back, in wall coordinates."""
+def _pier(x, width, depth, reach, z0, z1) -> Mesh:
+    """A box in wall coordinates.
+
+    It has a back, too: piers outgrow walls, and near a corner their backs
+    come out of the recesses of the next wall.
+    """
     a, b = x - width / 2, x + width / 2
     plan = [(a, -depth), (b, -depth), (b, reach), (a, reach)]
     vertices = np.array([(x, y, z) for z in (z0, z1) for x, y in plan])
-    faces = ((1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7), (4, 5, 6, 7))
-    faces = (*faces, (0, 3, 2, 1))
-    return Mesh(vertices, (*faces, (0, 1, 5, 4)) if back else faces)
+    sides = ((0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
+    return Mesh(vertices, (*sides, (4, 5, 6, 7), (0, 3, 2, 1)))
 
 
 def steps(x0: float, x1: float, reach: float, rise: float, count: int) -> Mesh:

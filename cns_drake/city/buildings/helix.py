@@ -59,6 +59,8 @@ def ramp_turn(
         ]
     )
     faces: list[tuple[int, ...]] = []
+    # All diagonals run outwards and up, so that the deck is as thick
+    # everywhere.
     for s in range(_SEGMENTS):
         for k in range(n):
             m = (k + 1) % n
@@ -66,8 +68,10 @@ def ramp_turn(
             c, d = (s + 1) * n + m, (s + 1) * n + k
             if k in _UPRIGHT:
                 faces.append((b, a, d, c))
-            else:
+            elif section[k, 0] > section[m, 0]:
                 faces += [(b, a, d), (b, d, c)]
+            else:
+                faces += [(b, a, c), (a, d, c)]
     last = _SEGMENTS * n
     for quad in ((0, 1, 4, 5), (1, 2, 3, 4), (0, 5, 6, 7)):
         faces.append(quad)

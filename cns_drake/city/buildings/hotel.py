@@ -33,6 +33,7 @@ class Hotel:
     round_ends: bool
     corner: float
     pitch: float
+    side_pitch: float
     recess: float
     balcony_reach: float
     balcony_width: float
@@ -54,8 +55,9 @@ def draw(site: Site, height: float, rng: np.random.Generator) -> Hotel:
         ground_height=round(float(rng.uniform(5.0, 6.2)), 2),
         storey_height=float(rng.uniform(3.1, 3.4)),
         round_ends=bool(rng.random() < 0.5 and x1 - x0 > 1.5 * depth),
-        corner=round(float(rng.uniform(0.2, 0.35)) * depth, 1),
+        corner=round(float(rng.uniform(0.2, 0.35)) * min(depth, x1 - x0), 1),
         pitch=pitch,
+        side_pitch=max(2.7, (x1 - x0 + 2 * depth) / 34),
         recess=round(float(rng.uniform(0.2, 0.35)), 2),
         balcony_reach=round(float(rng.uniform(1.1, 1.45)), 2),
         balcony_width=round(float(rng.uniform(0.6, 0.95)) * pitch, 2),
@@ -134,12 +136,12 @@ def _add_lobby(assembly, p: Hotel, plan, y0) -> float:
 
 
 def _add_rooms(assembly, p: Hotel, plan, z0, goal) -> float:
-    groups, per_group, storey = tiers.divided(goal - z0, p.storey_height)
+    groups, per_group, storey = tiers.divided(goal - z0, p.storey_height, 15)
     head = round(storey - 0.45, 2)
     french = bays.window(p.pitch - 1.2, 0.0, head, p.recess, mullions=1)
     plain = bays.window(1.5, 0.8, head, p.recess)
     layout = {0: bays.rhythm(p.pitch, [french], margin=0.4)}
-    others = bays.rhythm(2.7, [plain], margin=0.35)
+    others = bays.rhythm(p.side_pitch, [plain], margin=0.35)
     walls = Facade(
         storey,
         (Band(storey - 0.12, storey, -0.08),),

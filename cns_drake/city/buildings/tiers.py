@@ -193,7 +193,6 @@ def add_grooved(
                 top + rise,
                 depth=into,
                 margin=margin,
-                backs=rise > 0,
                 skip=plain,
             )
         )
