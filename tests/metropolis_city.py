@@ -11,9 +11,6 @@ from cns_drake.city.layout import City, make_city
 from cns_drake.paths import worlds_folder
 
 WORLD = worlds_folder() / "metropolis"
-GROUND = frozenset(
-    ["road", "parking", "sidewalk", "terrain", "other-ground", "quay"]
-)
 
 
 @cache

@@ -1,5 +1,6 @@
 """The SDF text, read back by Drake."""
 
+from metropolis_city import parse_strictly
 import numpy as np
 from pydrake.geometry import Box, Cylinder, Mesh, Role, Sphere
 from pydrake.math import RigidTransform, RollPitchYaw
@@ -17,7 +18,6 @@ from cns_drake.city.structures import (
     SphereShape,
     Structure,
 )
-from metropolis_city import parse_strictly
 
 PARTS = (
     Part("a_box", BoxShape((1.0, 2.0, 3.0)), (1, 2, 3), (0.1, -0.2, 0.3)),

@@ -88,20 +88,7 @@ class Draft:
             xy: position in W [m].
             part: of the model's reach that must be free.
         """
-        reach = max(
-            (
-                float(
-                    np.hypot(
-                        *(
-                            model.meshes[p.shape.mesh].vertices * p.shape.scale
-                        ).T[:2]
-                    ).max()
-                )
-                for p in model.parts
-                if isinstance(p.shape, MeshShape)
-            ),
-            default=0.0,
-        )
+        reach = _reach(model)
         if reach == 0.0:
             return True
         return self._walls.is_free(Point(xy).buffer(part * reach))
@@ -154,3 +141,14 @@ class Draft:
         self._occupancy.add(footprint)
         self.structures.append(structure)
         return structure
+
+
+def _reach(model: Model) -> float:
+    """Returns how far a model's meshes reach from its middle [m]."""
+    reaches = [0.0]
+    for part in model.parts:
+        if isinstance(part.shape, MeshShape):
+            vertices = model.meshes[part.shape.mesh].vertices
+            xy = (vertices * part.shape.scale)[:, :2]
+            reaches.append(float(np.hypot(*xy.T).max()))
+    return max(reaches)

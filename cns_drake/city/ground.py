@@ -33,7 +33,7 @@ _WAVELENGTHS = (22.0, 60.0)
 
 @dataclass(frozen=True)
 class _Swell:
-    """The relief of one district.
+    """The relief of one district's lawns.
 
     Attributes:
         area: where it acts.
@@ -82,7 +82,7 @@ class GroundShape:
         self._swells = [
             _make_swell(district, buildings, rng_of(district.plan.name))
             for district in districts
-            if district.plan.relief > 0
+            if district.plan.relief > 0 and "lawn" in district.grounds
         ]
 
     def __call__(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -130,7 +130,7 @@ def ground_structures(
                     _quay(district, area, land, shape, water_level)
                 )
                 continue
-            has_relief = district.plan.relief > 0
+            has_relief = ground == "lawn" and district.plan.relief > 0
             structures.append(
                 ground_structure(
                     name,
@@ -153,22 +153,11 @@ def _make_swell(
         heading, phase = rng.uniform(0, 2 * math.pi, 2)
         k = 2 * math.pi / wavelength
         waves.append((k * math.cos(heading), k * math.sin(heading), phase))
-    level = unary_union(
-        [
-            district.area.boundary,
-            buildings.intersection(district.area),
-            *(
-                area
-                for ground, area in district.grounds.items()
-                if ground != plan.ground
-            ),
-        ]
-    )
+    lawn = district.grounds["lawn"]
+    level = unary_union([lawn.boundary, buildings.intersection(lawn)])
     shapely.prepare(level)
-    shapely.prepare(district.area)
-    return _Swell(
-        district.area, level, plan.relief, plan.relief_margin, np.array(waves)
-    )
+    shapely.prepare(lawn)
+    return _Swell(lawn, level, plan.relief, plan.relief_margin, np.array(waves))
 
 
 def _quay(

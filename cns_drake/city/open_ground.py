@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 import shapely
-from shapely.geometry import LineString, Point
+from shapely.geometry import LineString
 from shapely.ops import unary_union
 
 from cns_drake.city.districts import District, corners_area
@@ -105,7 +105,14 @@ def _place_line(
         s += float(rng.uniform(*plan.spacing))
 
 
-def _place_run(draft, district, plan: LinePlan, start, end, rng) -> None:
+def _place_run(
+    draft: Draft,
+    district: District,
+    plan: LinePlan,
+    start: np.ndarray,
+    end: np.ndarray,
+    rng: np.random.Generator,
+) -> None:
     """Places fences or hedges end to end between two points."""
     length = float(np.hypot(*(end - start)))
     count = max(1, math.ceil(length / _LONGEST_RUN))
@@ -233,8 +240,6 @@ def _try_object(
     model = builder.build(rng)
     if not draft.clears_buildings(model, (at.x, at.y), _CROWN_PART):
         return
-    if not district.area.contains(Point(at.x, at.y)):
-        return
     draft.place(
         kind or name_stem(name),
         builder.semantic_class,
@@ -243,4 +248,5 @@ def _try_object(
         yaw,
         (district.plan.name,),
         clearance=_CLEARANCE,
+        within=district.area,
     )

@@ -211,8 +211,8 @@ class DistrictPlan(_Model):
         block: a point in the block that the streets leave [m]; or
         area: corners [m]; without both, all that no other district takes.
         ground: kind of ground.
-        relief: height of the ground's swells [m].
-        relief_margin: width of the slope at streets and buildings [m].
+        relief: height of the swells of its lawns [m].
+        relief_margin: width of their slope at paths and buildings [m].
     """
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_]*$")

@@ -17,6 +17,8 @@ from cns_drake.city.polygons import (
 from cns_drake.city.road_network import RoadNetwork
 from cns_drake.city.structures import MeshShape, Model, Part, Structure
 
+# Marks the structures that are ground: no stage lacks them.
+GROUND_TAG = "ground"
 # The ground is cut into squares of this size, so that no part is so large
 # that its bounds say nothing about where it is [m].
 TILE = 64.0
@@ -107,7 +109,8 @@ def as_structure(
         Part(part, MeshShape(f"{name}_{part}"), rgb=rgb) for part in pieces
     )
     model = Model(parts, meshes, area)
-    return Structure(name, semantic_class, model, (0.0, 0.0, 0.0))
+    origin = (0.0, 0.0, 0.0)
+    return Structure(name, semantic_class, model, origin, tags=(GROUND_TAG,))
 
 
 def _kerb_structure(

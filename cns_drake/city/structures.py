@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import math
 
 from shapely.affinity import affine_transform
-from shapely.geometry import Polygon
+from shapely.geometry import MultiPolygon, Polygon
 
 from cns_drake.city.mesh import Mesh
 
@@ -75,7 +75,7 @@ class Model:
 
     parts: tuple[Part, ...]
     meshes: dict[str, Mesh]
-    footprint: Polygon
+    footprint: Polygon | MultiPolygon
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ class Structure:
     tags: tuple[str, ...] = field(default=())
 
     @property
-    def footprint_W(self) -> Polygon:
+    def footprint_W(self) -> Polygon | MultiPolygon:
         """The ground area of the model, in the world [m]."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         x, y, _ = self.xyz
