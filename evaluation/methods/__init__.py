@@ -1,6 +1,10 @@
 """Place-recognition methods, one a file, all behind one interface."""
 
-from evaluation.methods import scan_context  # noqa: F401  (registers itself)
+from evaluation.methods import (  # noqa: F401  (register themselves)
+    ringpp,
+    scan_context,
+    solid,
+)
 from evaluation.methods.method import (
     Method,
     MethodConfig,

@@ -1,0 +1,349 @@
+"""RING++ (Xu, Lu, Wu, Lu, Zhu, Liang, Xiong, Wang: T-RO 2023).
+
+A scan becomes a map from above with six channels that describe the shape of
+the cloud. Its Radon transform turns a rotation into a shift of its rows; the
+magnitude of each row's spectrum does not change if the scan is moved. Two
+scans are alike if these spectra correlate well for some shift, which is also
+their difference in heading. With the heading known, the maps from above tell
+the translation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field, PositiveFloat, model_validator
+import scipy.fft
+
+from evaluation.compiled import compiled
+from evaluation.methods.local_features import NUM_FEATURES, local_features
+from evaluation.methods.method import Method, MethodConfig, register
+from evaluation.methods.neighbours import nearest_neighbours
+from evaluation.methods.radon import radon
+from evaluation.poses import make_pose
+
+# Keeps the spectrum of a channel that hardly varies from being blown up when
+# it is normalised: the default of PyTorch's InstanceNorm2d, with which the
+# authors' program normalises. It takes a third of the power of the variance
+# of z, so that it is part of the method.
+_NORM_EPSILON = 1e-5
+# The authors' scale of the correlation, chosen to make distances of 0 to 1.
+_CORRELATION_SCALE = 0.15
+# Places that are compared with a query at once: what fits into a cache.
+_PLACES_AT_ONCE = 8
+
+
+class RingPlusPlusConfig(MethodConfig):
+    """Parameters of RING++.
+
+    Source of all: the authors' program, with what it has for KITTI.
+
+    Attributes:
+        half_width: of the square map from above [m]; 70. The protocol's
+            limit of 100 m is wider.
+        min_height: above the ground, at which what counts begins [m]; 0.73
+            (z > -1.0 m from a LiDAR at 1.73 m).
+        max_height: likewise where it ends [m]; 11.73 (z < 10 m).
+        height_unit: what a height is divided by when shape is described,
+            horizontal coordinates being divided by `half_width` [m]; 10.
+        neighbours: of a point, with itself, whose shape is described; 30.
+        cells: rows and columns of the map from above, and angles and rays of
+            its Radon transform; 120.
+    """
+
+    half_width: PositiveFloat = 70.0
+    min_height: float = 0.73
+    max_height: float = 11.73
+    height_unit: PositiveFloat = 10.0
+    neighbours: Annotated[int, Field(ge=2)] = 30
+    cells: Annotated[int, Field(ge=2)] = 120
+
+    @model_validator(mode="after")
+    def _limits_are_in_order(self) -> RingPlusPlusConfig:
+        if self.min_height >= self.max_height:
+            raise ValueError("min_height must be below max_height")
+        return self
+
+
+@dataclass(frozen=True)
+class Ring:
+    """Descriptor of one scan, with n = `cells` and F = n // 2 + 1.
+
+    Attributes:
+        filled: (M,) cells of the map that are not zero, row times n plus
+            column; rows along x, columns along y.
+        features: (M, 6) float32 values of these cells.
+        spectrum: (6 F, F) complex64. Rows: channels and frequencies along
+            the rays of the Radon transform, whose normalised magnitudes are
+            again transformed along the angles, the columns.
+    """
+
+    filled: np.ndarray
+    features: np.ndarray
+    spectrum: np.ndarray
+
+    def bev(self, num_cells: int) -> np.ndarray:
+        """Returns the map from above, (n, n, 6) float32."""
+        image = np.zeros((num_cells * num_cells, NUM_FEATURES), np.float32)
+        image[self.filled] = self.features
+        return image.reshape(num_cells, num_cells, NUM_FEATURES)
+
+
+@dataclass(frozen=True)
+class RingDatabase:
+    """Descriptors of D places.
+
+    Attributes:
+        places: the D descriptors.
+        conjugates: (D, 6 F, F) complex64 conjugates of their spectra.
+        is_empty: (D,) bool, which of them show nothing.
+    """
+
+    places: Sequence[Ring]
+    conjugates: np.ndarray
+    is_empty: np.ndarray
+
+
+@register("ring++")
+class RingPlusPlus(Method[Ring, RingDatabase]):
+    """RING++; the score of a pair is 1 - its distance.
+
+    Where it differs from the authors' program:
+
+    - Neighbours that lie in a plane have the omnivariance and entropy that
+      the formulas have in the limit. In the program, which computes in
+      single precision, rounding makes about one in ten of them NaN, and
+      these points are passed over.
+    - Fewer points than neighbours asked for are all neighbours.
+    - A scan that shows nothing is no candidate and finds none.
+    """
+
+    Config = RingPlusPlusConfig
+    config: RingPlusPlusConfig
+
+    def describe(self, points: np.ndarray) -> Ring:
+        num_cells = self.config.cells
+        image = self._bev(points)
+        # From 0 to a full turn, both included, as the program has it.
+        angles = np.linspace(0.0, 2.0 * math.pi, num_cells)
+        sinogram = radon(image, angles)
+        magnitudes = np.abs(np.fft.rfft(sinogram, axis=1, norm="ortho"))
+        normalised = _normalise(magnitudes.transpose(2, 1, 0), num_cells)
+        spectrum = np.fft.rfft(normalised, axis=2)
+        flat = image.reshape(-1, NUM_FEATURES)
+        filled = np.flatnonzero(flat.any(axis=1))
+        return Ring(
+            filled=filled,
+            features=flat[filled].astype(np.float32),
+            spectrum=spectrum.reshape(-1, spectrum.shape[2]).astype(
+                np.complex64
+            ),
+        )
+
+    def build_database(self, places: Sequence[Ring]) -> RingDatabase:
+        return RingDatabase(
+            places=places,
+            conjugates=np.stack([place.spectrum.conj() for place in places]),
+            is_empty=np.array([len(place.filled) == 0 for place in places]),
+        )
+
+    def score(
+        self, query: Ring, database: RingDatabase, *, exhaustive: bool = False
+    ) -> np.ndarray:
+        del exhaustive  # It always is.
+        num_places = len(database.places)
+        if len(query.filled) == 0:
+            return np.full(num_places, np.nan)
+        scores = np.empty(num_places)
+        for start in range(0, num_places, _PLACES_AT_ONCE):
+            some = slice(start, start + _PLACES_AT_ONCE)
+            correlations = self._correlate(query, database.conjugates[some])
+            scores[some] = correlations.max(axis=1)
+        scores[database.is_empty] = np.nan
+        return scores
+
+    def relative_pose(
+        self, query: Ring, database: RingDatabase, place: int
+    ) -> np.ndarray | None:
+        """Returns turn and horizontal translation of the query.
+
+        None if one of the two shows nothing.
+        """
+        if len(query.filled) == 0 or database.is_empty[place]:
+            return None
+        num_cells = self.config.cells
+        correlation = self._correlate(
+            query, database.conjugates[place : place + 1]
+        )
+        shift = -_signed(int(correlation.argmax()), num_cells)
+        query_bev = query.bev(num_cells)
+        place_bev = database.places[place].bev(num_cells)
+        # Rows lie 360 / (n - 1) deg apart, but since the last one repeats the
+        # first, a shift stands on average for 360 / n. Spectra of opposite
+        # rays are equal, which leaves two headings.
+        yaw = 2.0 * math.pi * shift / num_cells
+        best = None
+        for candidate in (yaw, yaw - math.pi):
+            peak, offset = _best_offset(
+                _rotate(query_bev, candidate), place_bev
+            )
+            if best is None or peak > best[0]:
+                best = peak, offset, candidate
+        _, offset, yaw = best
+        c, s = math.cos(yaw), math.sin(yaw)
+        R_PQ = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        cell = 2.0 * self.config.half_width / num_cells
+        return make_pose(R_PQ, np.array([-offset[0], -offset[1], 0.0]) * cell)
+
+    def _bev(self, points: np.ndarray) -> np.ndarray:
+        """Returns the map from above, (n, n, 6): rows along x, columns y.
+
+        A cell holds the greatest value of each feature over its points.
+        """
+        config = self.config
+        ground = -config.sensor_height
+        x, y, z = points.T
+        within = points[
+            (np.abs(x) < config.half_width)
+            & (np.abs(y) < config.half_width)
+            & (z > ground + config.min_height)
+            & (z < ground + config.max_height)
+            # What some drivers report for beams that did not return.
+            & points.any(axis=1)
+        ]
+        within = _without_duplicates(within)
+        image = np.zeros((config.cells, config.cells, NUM_FEATURES))
+        if len(within) < 2:
+            return image
+        scaled = within / [
+            config.half_width,
+            config.half_width,
+            config.height_unit,
+        ]
+        neighbours = nearest_neighbours(
+            scaled, min(config.neighbours, len(within))
+        )
+        features = local_features(scaled, neighbours)
+        cells = ((scaled[:, :2] + 1.0) * (0.5 * config.cells)).astype(np.int64)
+        # A limit is also reached by what rounding puts there.
+        _keep_greatest(image, np.minimum(cells, config.cells - 1), features)
+        return image
+
+    def _correlate(self, query: Ring, conjugates: np.ndarray) -> np.ndarray:
+        """Correlates a query with some places.
+
+        The circular correlation over the angles is taken for each channel
+        and frequency, and the magnitudes are summed, as in the program.
+
+        Args:
+            query: descriptor of the query.
+            conjugates: (B, 6 F, F) of the places.
+
+        Returns:
+            (B, n) for each shift of the place's rows by 0, ..., n - 1.
+        """
+        n = self.config.cells
+        # Of a sum over all frequencies, only half is stored. The scale is
+        # that of the program, where the transforms are unitary.
+        scale = _CORRELATION_SCALE * NUM_FEATURES * n * n * math.sqrt(n)
+        weights = np.tile(_frequency_weights(n) / scale, NUM_FEATURES)
+        weighted = query.spectrum * weights[:, None].astype(np.float32)
+        correlations = scipy.fft.irfft(
+            weighted * conjugates, n=n, axis=2, overwrite_x=True
+        )
+        np.abs(correlations, out=correlations)
+        return correlations.sum(axis=1)
+
+
+def _without_duplicates(points: np.ndarray) -> np.ndarray:
+    """Returns the different ones of points (N, 3), sorted."""
+    ordered = points[np.lexsort(points.T)]
+    differs = np.ones(len(ordered), dtype=bool)
+    differs[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    return ordered[differs]
+
+
+@compiled
+def _keep_greatest(image, cells, features):
+    """Raises the cells (N, 2) of an image to the features (N, C) in them."""
+    for index in range(len(cells)):
+        cell = image[cells[index, 0], cells[index, 1]]
+        for channel in range(len(cell)):
+            cell[channel] = max(cell[channel], features[index, channel])
+
+
+def _frequency_weights(n: int) -> np.ndarray:
+    """Returns how many of n frequencies each of the n // 2 + 1 stands for."""
+    weights = np.full(n // 2 + 1, 2.0)
+    weights[0] = 1.0
+    if n % 2 == 0:
+        weights[-1] = 1.0
+    return weights
+
+
+def _normalise(magnitudes: np.ndarray, n: int) -> np.ndarray:
+    """Returns channels of zero mean and (nearly) unit variance.
+
+    Args:
+        magnitudes: (C, F, A) half of the spectra, for A angles.
+        n: length of the whole spectra.
+    """
+    weights = _frequency_weights(n)[:, None] / (n * magnitudes.shape[2])
+    mean = (magnitudes * weights).sum(axis=(1, 2), keepdims=True)
+    centred = magnitudes - mean
+    variance = (centred**2 * weights).sum(axis=(1, 2), keepdims=True)
+    return centred / np.sqrt(variance + _NORM_EPSILON)
+
+
+def _rotate(image: np.ndarray, angle: float) -> np.ndarray:
+    """Returns an image (n, n, C), rotated from its rows' axis to its columns'.
+
+    Each pixel takes the value of the nearest one, or 0 from outside.
+    """
+    n = len(image)
+    centred = np.arange(n) - 0.5 * (n - 1)
+    x, y = np.meshgrid(centred, centred, indexing="ij")
+    c, s = math.cos(angle), math.sin(angle)
+    row = np.rint(c * x + s * y + 0.5 * (n - 1)).astype(np.int64)
+    column = np.rint(-s * x + c * y + 0.5 * (n - 1)).astype(np.int64)
+    inside = (row >= 0) & (row < n) & (column >= 0) & (column < n)
+    rotated = np.zeros_like(image)
+    rotated[inside] = image[row[inside], column[inside]]
+    return rotated
+
+
+def _best_offset(
+    image: np.ndarray, reference: np.ndarray
+) -> tuple[float, tuple[int, int]]:
+    """Returns how far an image is shifted against a reference.
+
+    Args:
+        image: (n, n, C).
+        reference: likewise.
+
+    Returns:
+        The correlation, summed over the magnitudes of its channels, and the
+        shift (rows, columns) at which it is greatest.
+    """
+    n = len(image)
+    spectra = [
+        scipy.fft.rfft2((one - one.mean()) / one.std(), axes=(0, 1))
+        for one in (image, reference)
+    ]
+    correlation = np.abs(
+        scipy.fft.irfft2(spectra[0] * spectra[1].conj(), s=(n, n), axes=(0, 1))
+    ).sum(axis=2)
+    row, column = np.unravel_index(correlation.argmax(), correlation.shape)
+    return (
+        float(correlation[row, column]),
+        (_signed(int(row), n), _signed(int(column), n)),
+    )
+
+
+def _signed(shift: int, n: int) -> int:
+    """Returns a shift by 0, ..., n - 1 as one of -n // 2, ..., n // 2 - 1."""
+    return (shift + n // 2) % n - n // 2

@@ -1,0 +1,206 @@
+"""SOLiD (Kim, Choi, Sim, Kim, Park: RA-L 2024), for narrow fields of view.
+
+Points are counted over range and elevation, and over azimuth and elevation.
+Elevations weigh the more the more points they have: the weighted counts over
+range tell places apart whichever way the sensor is turned, those over azimuth
+tell how it is turned.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field, PositiveFloat, PositiveInt, model_validator
+
+from evaluation.maps import Z_ORIGIN, thin
+from evaluation.methods.method import Method, MethodConfig, register
+from evaluation.poses import make_pose
+
+
+class SolidConfig(MethodConfig):
+    """Parameters of SOLiD.
+
+    Sources: [P] the Python program, [C] the C++ program, both by the
+    method's authors; [S] the data sheet of the `cns` LiDAR.
+
+    Attributes:
+        voxel_size: cell of the thinning before [m]; [P] 1.0. ([C] has 0.4,
+            but only [P] lists LiDARs of this field of view.)
+        min_range: what is not farther is left out [m]; [P] 3.
+        max_range: what is not nearer is left out [m]; [P] 80, for a LiDAR
+            of this field of view.
+        ranges: cells of equal length up to `max_range`; [P], [C] 40.
+        azimuths: cells of equal angle; [P], [C] 60.
+        elevations: cells of equal angle over the field of view; [P], [C]
+            the beams of the LiDAR, [S] 32.
+        lowest_deg: lower limit of the field of view [deg]; [S] -22.5.
+        highest_deg: upper limit [deg]; [S] 22.5.
+    """
+
+    voxel_size: PositiveFloat = 1.0
+    min_range: Annotated[float, Field(ge=0.0)] = 3.0
+    max_range: PositiveFloat = 80.0
+    ranges: PositiveInt = 40
+    azimuths: PositiveInt = 60
+    elevations: PositiveInt = 32
+    lowest_deg: Annotated[float, Field(ge=-90.0, le=90.0)] = -22.5
+    highest_deg: Annotated[float, Field(ge=-90.0, le=90.0)] = 22.5
+
+    @model_validator(mode="after")
+    def _limits_are_in_order(self) -> SolidConfig:
+        if self.min_range >= self.max_range:
+            raise ValueError("min_range must be below max_range")
+        if self.lowest_deg >= self.highest_deg:
+            raise ValueError("lowest_deg must be below highest_deg")
+        return self
+
+
+@dataclass(frozen=True)
+class Solid:
+    """Descriptor of one scan.
+
+    Attributes:
+        ranges: (ranges,) weighted counts over range (R-SOLiD).
+        azimuths: (azimuths,) weighted counts over azimuth (A-SOLiD).
+    """
+
+    ranges: np.ndarray
+    azimuths: np.ndarray
+
+
+@dataclass(frozen=True)
+class SolidDatabase:
+    """Descriptors of D places.
+
+    Attributes:
+        ranges: (D, ranges) of unit length; NaN for a place without points.
+        azimuths: (D, azimuths).
+    """
+
+    ranges: np.ndarray
+    azimuths: np.ndarray
+
+
+@register("solid")
+class SolidMethod(Method[Solid, SolidDatabase]):
+    """SOLiD; the score of a pair is the cosine of its range descriptors.
+
+    Where it differs from the authors' programs:
+
+    - An elevation outside the field of view counts in the outermost cell.
+      [P] lets those below wrap around to the top; [C] reads outside its
+      table if they are more than one cell too low.
+    - Coordinates that are exactly zero stay zero; the programs replace them
+      by 1 mm.
+    - If all elevations have equally many points, all weigh 1 (the programs
+      divide by zero).
+    - A scan without points within range is no candidate and finds none.
+    """
+
+    Config = SolidConfig
+    config: SolidConfig
+
+    def describe(self, points: np.ndarray) -> Solid:
+        config = self.config
+        x, y, z = self._prepare(points).T
+        r = np.hypot(x, y)
+        # A limit is also reached by what rounding puts there.
+        range_cell = np.minimum(
+            (r * (config.ranges / config.max_range)).astype(np.int64),
+            config.ranges - 1,
+        )
+        turns = np.arctan2(y, x) / (2.0 * math.pi) % 1.0
+        azimuth_cell = np.minimum(
+            (turns * config.azimuths).astype(np.int64), config.azimuths - 1
+        )
+        field_of_view = config.highest_deg - config.lowest_deg
+        height = np.rad2deg(np.arctan2(z, r)) - config.lowest_deg
+        elevation_cell = np.clip(
+            np.floor(height * (config.elevations / field_of_view)),
+            0,
+            config.elevations - 1,
+        ).astype(np.int64)
+        over_range = _count(
+            range_cell, config.ranges, elevation_cell, config.elevations
+        )
+        over_azimuth = _count(
+            azimuth_cell, config.azimuths, elevation_cell, config.elevations
+        )
+        weights = _elevation_weights(over_range.sum(axis=0))
+        return Solid(over_range @ weights, over_azimuth @ weights)
+
+    def build_database(self, places: Sequence[Solid]) -> SolidDatabase:
+        return SolidDatabase(
+            ranges=_unit(np.stack([place.ranges for place in places])),
+            azimuths=np.stack([place.azimuths for place in places]),
+        )
+
+    def score(
+        self, query: Solid, database: SolidDatabase, *, exhaustive: bool = False
+    ) -> np.ndarray:
+        del exhaustive  # It always is.
+        return (database.ranges * _unit(query.ranges)).sum(axis=1)
+
+    def relative_pose(
+        self, query: Solid, database: SolidDatabase, place: int
+    ) -> np.ndarray | None:
+        """Returns the turn of the query, in steps of one azimuth cell.
+
+        None if one of the two has no points within range.
+        """
+        azimuths = database.azimuths[place]
+        if not (query.azimuths.any() and azimuths.any()):
+            return None
+        num_cells = len(azimuths)
+        cell = np.arange(num_cells)
+        rolled = azimuths[(cell - cell[:, None]) % num_cells]
+        shift = int(np.abs(query.azimuths - rolled).sum(axis=1).argmin())
+        # What the place sees at azimuth a, the query sees at a + shift.
+        yaw = -2.0 * math.pi * shift / num_cells
+        c, s = math.cos(yaw), math.sin(yaw)
+        R_PQ = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        return make_pose(R_PQ, np.zeros(3))
+
+    def _prepare(self, points: np.ndarray) -> np.ndarray:
+        """Returns the thinned points within range.
+
+        The voxels of [P] begin half a voxel below the least coordinates.
+        """
+        config = self.config
+        distance = np.linalg.norm(points, axis=1)
+        within = points[
+            (config.min_range < distance) & (distance < config.max_range)
+        ]
+        if len(within) == 0:
+            return within
+        first = within.min(axis=0) - 0.5 * config.voxel_size
+        # `thin` has a grid through the origin, but for z.
+        offset = first - [0.0, 0.0, Z_ORIGIN]
+        return thin(within - offset, config.voxel_size) + offset
+
+
+def _count(
+    rows: np.ndarray, num_rows: int, columns: np.ndarray, num_columns: int
+) -> np.ndarray:
+    """Returns how many points fall into each cell, (num_rows, num_columns)."""
+    return np.bincount(
+        rows * num_columns + columns, minlength=num_rows * num_columns
+    ).reshape(num_rows, num_columns)
+
+
+def _elevation_weights(counts: np.ndarray) -> np.ndarray:
+    """Returns the counts, scaled so that the least is 0 and the most is 1."""
+    least, most = counts.min(), counts.max()
+    if least == most:
+        return np.ones(len(counts))
+    return (counts - least) / (most - least)
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    """Returns vectors (..., n) of unit length; NaN for those of length 0."""
+    norms = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return vectors / np.where(norms > 0.0, norms, np.nan)
