@@ -107,6 +107,7 @@ def piers(
     *,
     depth: float = 0.05,
     margin: float = 0.4,
+    entrance: float = 0.0,
     skip: Collection[int] = (),
 ) -> Mesh:
     """Upright fins or pilasters along all walls of an outline.
@@ -119,6 +120,7 @@ def piers(
         z0, z1: bottom and top [m].
         depth: how far they go into the wall, past recessed glass [m].
         margin: between the ends of a wall and the middle of a pier [m].
+        entrance: width in the middle of the front that stays free [m].
         skip: edges without piers.
     """
     pieces = []
@@ -132,6 +134,9 @@ def piers(
             places = [wall.length / 2]
         else:
             places = [margin + k * room / count for k in range(count + 1)]
+        if edge == 0 and entrance > 0:
+            half = (entrance + width) / 2
+            places = [x for x in places if abs(x - wall.length / 2) >= half]
         for x in places:
             pier = _pier(round(x, 2), width, depth, reach, z0, z1)
             pieces.append(wall.place(pier))

@@ -149,7 +149,15 @@ def _add_lobby(assembly, p: GlassSkyscraper, plan) -> float:
         glass=(0.7,),
     )
     columns = details.piers(
-        plan, 7.0, 0.9, 0.25, 0.0, height - 0.8, depth=0.75, margin=0.55
+        plan,
+        7.0,
+        0.9,
+        0.25,
+        0.0,
+        height - 0.8,
+        depth=0.75,
+        margin=0.55,
+        entrance=min(5.8, front.length / 2),
     )
     roof = details.canopy(middle - 4.0, middle + 4.0, 1.5, 4.2)
     return tiers.add_ground(assembly, plan, lobby, [columns, front.place(roof)])
