@@ -31,24 +31,26 @@ from cns_drake.city.buildings.slab_tower import SLAB_TOWER
 from cns_drake.city.buildings.waterfront_hall import WATERFRONT_HALL
 from cns_drake.city.structures import Model
 
+_METROPOLIS = (
+    ART_DECO_TOWER,
+    BRICK_BLOCK,
+    CAR_PARK,
+    CHURCH,
+    CORNER_BUILDING,
+    COURT_BLOCK,
+    GLASS_SKYSCRAPER,
+    HOTEL,
+    MUSEUM,
+    OBSERVATION_TOWER,
+    OFFICE,
+    PODIUM_TOWER,
+    SLAB_TOWER,
+    WATERFRONT_HALL,
+)
+
+# Stocks of further maps join here; maps may share archetypes.
 ARCHETYPES: dict[str, Archetype] = {
-    archetype.name: archetype
-    for archetype in (
-        ART_DECO_TOWER,
-        BRICK_BLOCK,
-        CAR_PARK,
-        CHURCH,
-        CORNER_BUILDING,
-        COURT_BLOCK,
-        GLASS_SKYSCRAPER,
-        HOTEL,
-        MUSEUM,
-        OBSERVATION_TOWER,
-        OFFICE,
-        PODIUM_TOWER,
-        SLAB_TOWER,
-        WATERFRONT_HALL,
-    )
+    archetype.name: archetype for archetype in _METROPOLIS
 }
 
 
@@ -97,4 +99,4 @@ def sample(
 
 def metropolis_stock() -> tuple[str, ...]:
     """Returns the archetypes that Metropolis is built of."""
-    return tuple(ARCHETYPES)
+    return tuple(archetype.name for archetype in _METROPOLIS)
