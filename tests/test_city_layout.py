@@ -5,48 +5,12 @@ from functools import cache
 import numpy as np
 import pytest
 import shapely
-import yaml
+from small_city import PLAN, ROADS
 
 from cns_drake.city.layout import City, lay_out, make_city
 from cns_drake.city.plan import load_plan
 from cns_drake.city.road_network import RoadNetwork, load_road_network
 from cns_drake.errors import InputError
-
-ROADS = """
-defaults: {lanes: [1, 1], lane_width: 3.5, sidewalk: 3.0, kerb_height: 0.12,
-           speed_limit: 10.0}
-junctions:
-  west: {position: [0, 0], kerb_radius: 6}
-  east: {position: [100, 10], kerb_radius: 6}
-roads:
-  north: {start: west, end: east, via: [[0, 70, 20], [100, 70, 20]]}
-  south: {start: east, end: west, via: [[100, -50, 20], [0, -50, 20]]}
-  middle: {start: west, end: east, parking: 2.2}
-"""
-PLAN = """
-seed: 3
-bounds: [-60, -110, 160, 130]
-cars: {saloon: 1}
-street: {lamp: lantern, trees: {lime_tree: 1}, furniture: {bench: 1}}
-districts:
-  - name: north_block
-    block: [50, 40]
-    ground: paved
-    rows:
-      - {archetypes: {brick_block: 1, office: 1}, width: [14, 18],
-         depth: [12, 14], height: [14, 20]}
-  - name: south_block
-    block: [50, -25]
-    relief: 1.5
-    patches: [{ground: gravel, line: [[6, -38], [94, -36]], width: 4}]
-    buildings:
-      - {archetype: office, at: [30, -21], size: [16, 14], height: 20,
-         yaw_deg: 40}
-    objects: [{object: statue, at: [70, -28]}]
-    scatter: [{objects: {lime_tree: 1}, spacing: 8}]
-  - name: outside
-    ground: lawn
-"""
 
 
 @cache
@@ -214,7 +178,3 @@ def test_a_missing_plan_is_named(tmp_path):
     (tmp_path / "roads.yaml").write_text(ROADS)
     with pytest.raises(InputError, match=r"city\.yaml: No such file"):
         make_city(tmp_path)
-
-
-def test_the_plan_is_plain_yaml():
-    assert yaml.safe_load(PLAN)["seed"] == 3

@@ -22,19 +22,21 @@ _MAX_STRUCTURES = 2**16 - 1
 
 
 def render_city(
-    world: Path, progress: Callable[[str], None] = lambda line: None
+    world: Path,
+    city: City,
+    progress: Callable[[str], None] = lambda line: None,
 ) -> dict[str, str]:
     """Returns the text of every generated file by its relative path.
 
     Args:
-        world: folder with `roads.yaml`, `city.yaml` and `stages.yaml`.
+        world: folder with `stages.yaml`; gives the world its name.
+        city: made from the folder's `roads.yaml` and `city.yaml`.
         progress: takes one line at a time.
 
     Raises:
-        InputError: if one of these files cannot be used.
+        InputError: if the stages cannot be used or the city has too many
+            structures.
     """
-    world = Path(world)
-    city = make_city(world)
     progress(f"{len(city.structures)} structures")
     if len(city.structures) > _MAX_STRUCTURES:
         raise InputError(
@@ -98,7 +100,7 @@ def generate_city(
         InputError: if an input cannot be used or a file not be written.
     """
     world = Path(world)
-    files = render_city(world, progress)
+    files = render_city(world, make_city(world), progress)
     try:
         (world / MESH_FOLDER).mkdir(exist_ok=True)
         for name, text in files.items():
@@ -117,12 +119,13 @@ def differing_files(
 ) -> list[Path]:
     """Returns the files that generating the city anew would change."""
     world = Path(world)
-    files = {world / k: v for k, v in render_city(world, progress).items()}
-    stale = _generated(world) - files.keys()
+    files = render_city(world, make_city(world), progress)
+    stale = _generated(world) - {world / name for name in files}
     changed = {
-        path
-        for path, text in files.items()
-        if not path.is_file() or path.read_bytes() != text.encode()
+        world / name
+        for name, text in files.items()
+        if not (world / name).is_file()
+        or (world / name).read_bytes() != text.encode()
     }
     return sorted(stale | changed)
 
