@@ -1,6 +1,7 @@
 """Place-recognition methods, one a file, all behind one interface."""
 
 from evaluation.methods import (  # noqa: F401  (register themselves)
+    btc,
     ringpp,
     scan_context,
     solid,

@@ -1,0 +1,254 @@
+"""BTC, the binary and triangle combined descriptor (Yuan et al., T-RO 2024).
+
+Places that stand out from the ground (walls, trunks, posts) are keypoints;
+what heights they have points at is a binary descriptor. Triangles of nearby
+keypoints do not change when the sensor moves: clouds that share enough
+triangles, by their sides and the descriptors of their vertices, are
+candidates. A candidate counts if its triangles agree on a motion; its score
+is how well the planes of both clouds then fit together.
+
+The clouds are several consecutive scans, in the frame of the first. (The
+method's authors describe them in a common world frame, which favours it:
+the grids on which planes and keypoints are found then coincide.)
+
+The steps are one module each: `btc_planes`, `btc_keypoints`,
+`btc_triangles` and `btc_verification`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
+from scipy.spatial import cKDTree
+
+from evaluation.methods.btc_keypoints import find_keypoints, suppress
+from evaluation.methods.btc_planes import Planes, base_plane, voxel_planes
+from evaluation.methods.btc_triangles import (
+    Triangles,
+    TriangleTable,
+    make_table,
+    make_triangles,
+    match,
+)
+from evaluation.methods.btc_verification import find_motion, plane_overlap
+from evaluation.methods.method import Method, MethodConfig, register
+
+# A bit of an int64 for each layer, and one for the sign.
+_MAX_LAYERS = 62
+
+
+class BtcConfig(MethodConfig):
+    """Parameters of BTC.
+
+    Sources: [O] the outdoor settings of the public program, [P] fixed in
+    its text. The height of the sensor is not used: the ground is found in
+    the cloud.
+
+    Attributes:
+        voxel_size: of the planes [m]; [O] 2.
+        max_sparse_points: a voxel with more may be a plane; [O] 10.
+        flatness: variance along the normal below which it is [m^2];
+            [O] 0.01.
+        merge_normal_limit: difference of two normals below which two planes
+            may be one; [O] 0.1.
+        merge_distance_limit: likewise, of the centers from the other plane
+            [m]; [O] 0.3.
+        resolution: length of a cell of the image [m]; [O] 0.5.
+        height_range: of the points in it, above the ground [m]; [O] -1, 4.
+        height_step: of the layers that bits stand for [m]; [O] 0.1.
+        num_layers: how many; [P] 49. The public program divides the range by
+            the step in single precision, which gives one less than meant,
+            and writes what is higher beyond the end of its array; here that
+            has no bit.
+        min_heights: that a keypoint needs; [O] 10.
+        suppression_radius: within which only the keypoint with most heights
+            stays [m]; [O] 2.
+        max_keypoints: [O] 500.
+        num_neighbours: keypoints that triangles are made with, the keypoint
+            itself included; [O] 10.
+        side_range: of the triangles [m]; [O] 2, 50.
+        side_resolution: of the table of triangles [m]; [O] 0.2.
+        side_tolerance: relative difference of the sides of triangles that
+            match; [O] 0.01.
+        min_similarity: of their descriptors; [O] 0.7.
+        min_votes: matches that a candidate needs; [P] 5.
+        candidates: places with most votes that are verified; [O] 50.
+        normal_limit: difference of the normals of planes that fit; [O] 0.2.
+        distance_limit: likewise, of the center from the plane [m]; [O] 0.5.
+    """
+
+    voxel_size: PositiveFloat = 2.0
+    max_sparse_points: PositiveInt = 10
+    flatness: PositiveFloat = 0.01
+    merge_normal_limit: PositiveFloat = 0.1
+    merge_distance_limit: PositiveFloat = 0.3
+    resolution: PositiveFloat = 0.5
+    height_range: tuple[float, float] = (-1.0, 4.0)
+    height_step: PositiveFloat = 0.1
+    num_layers: Annotated[int, Field(ge=1, le=_MAX_LAYERS)] = 49
+    min_heights: PositiveInt = 10
+    suppression_radius: NonNegativeFloat = 2.0
+    max_keypoints: PositiveInt = 500
+    num_neighbours: PositiveInt = 10
+    side_range: tuple[NonNegativeFloat, PositiveFloat] = (2.0, 50.0)
+    side_resolution: PositiveFloat = 0.2
+    side_tolerance: PositiveFloat = 0.01
+    min_similarity: Annotated[float, Field(ge=0.0, le=1.0)] = 0.7
+    min_votes: PositiveInt = 5
+    candidates: PositiveInt = 50
+    normal_limit: PositiveFloat = 0.2
+    distance_limit: PositiveFloat = 0.5
+
+
+@dataclass(frozen=True)
+class BtcDescription:
+    """What is kept of a cloud.
+
+    Attributes:
+        planes: patches, one a voxel.
+        triangles: of its keypoints.
+    """
+
+    planes: Planes
+    triangles: Triangles
+
+
+@dataclass(frozen=True)
+class BtcDatabase:
+    """D places.
+
+    Attributes:
+        planes: of each place.
+        trees: of the centers of the planes of each place.
+        table: the triangles of all.
+    """
+
+    planes: Sequence[Planes]
+    trees: Sequence[cKDTree]
+    table: TriangleTable
+
+
+@register("btc")
+class Btc(Method[BtcDescription, BtcDatabase]):
+    """BTC; the score of a pair is the part of planes that fit.
+
+    A place has no score if too few triangles match, or too few of these
+    agree on a motion, or no plane fits. The limit on the score above which
+    the public program reports a loop is left to who reads the scores.
+    """
+
+    Config = BtcConfig
+    config: BtcConfig
+    scans_per_place = 10
+
+    def describe(self, points: np.ndarray) -> BtcDescription:
+        config = self.config
+        planes = voxel_planes(
+            points, config.voxel_size, config.max_sparse_points, config.flatness
+        )
+        base = base_plane(
+            planes, config.merge_normal_limit, config.merge_distance_limit
+        )
+        if base is None:
+            # As in the public program: level, through the first point.
+            first = points[0] if len(points) > 0 else np.zeros(3)
+            base = first, np.array([0.0, 0.0, 1.0])
+        keypoints = find_keypoints(
+            points,
+            *base,
+            resolution=config.resolution,
+            height_range=config.height_range,
+            height_step=config.height_step,
+            num_layers=config.num_layers,
+            min_heights=config.min_heights,
+        )
+        keypoints = suppress(
+            keypoints, config.suppression_radius, config.max_keypoints
+        )
+        triangles = make_triangles(
+            keypoints, config.num_neighbours, config.side_range
+        )
+        return BtcDescription(planes, triangles)
+
+    def build_database(self, places: Sequence[BtcDescription]) -> BtcDatabase:
+        return BtcDatabase(
+            planes=[place.planes for place in places],
+            trees=[cKDTree(place.planes.centers) for place in places],
+            table=make_table(
+                [place.triangles for place in places],
+                self.config.side_resolution,
+            ),
+        )
+
+    def score(
+        self,
+        query: BtcDescription,
+        database: BtcDatabase,
+        *,
+        exhaustive: bool = False,
+    ) -> np.ndarray:
+        scores = np.full(len(database.planes), np.nan)
+        limit = None if exhaustive else self.config.candidates
+        for place, X_PQ in self._motions(query, database, limit):
+            if len(query.planes) == 0 or len(database.planes[place]) == 0:
+                continue
+            overlap = plane_overlap(
+                query.planes,
+                database.planes[place],
+                database.trees[place],
+                X_PQ,
+                self.config.normal_limit,
+                self.config.distance_limit,
+            )
+            if overlap > 0.0:
+                scores[place] = overlap
+        return scores
+
+    def relative_pose(
+        self, query: BtcDescription, database: BtcDatabase, place: int
+    ) -> np.ndarray | None:
+        """Returns the motion that the triangles agree on.
+
+        None if too few match or agree.
+        """
+        for candidate, X_PQ in self._motions(query, database, None):
+            if candidate == place:
+                return X_PQ
+        return None
+
+    def _motions(
+        self,
+        query: BtcDescription,
+        database: BtcDatabase,
+        max_candidates: int | None,
+    ) -> Iterator[tuple[int, np.ndarray]]:
+        """Yields candidates with the motion X_PQ that their triangles say.
+
+        Args:
+            max_candidates: only so many with most matches; all if None.
+        """
+        table = database.table
+        of_query, of_table = match(
+            query.triangles,
+            table,
+            self.config.side_tolerance,
+            self.config.min_similarity,
+        )
+        clouds = table.clouds[of_table]
+        # By place, those of each in the order in which they were found.
+        order = np.argsort(clouds, kind="stable")
+        votes = np.bincount(clouds, minlength=len(database.planes))
+        ends = np.cumsum(votes)
+        candidates = np.argsort(-votes, kind="stable")[:max_candidates]
+        for place in candidates[votes[candidates] >= self.config.min_votes]:
+            pairs = order[ends[place] - votes[place] : ends[place]]
+            X_PQ = find_motion(
+                query.triangles.positions[of_query[pairs]],
+                table.triangles.positions[of_table[pairs]],
+            )
+            if X_PQ is not None:
+                yield int(place), X_PQ

@@ -1,0 +1,284 @@
+"""Keypoints of a cloud: places that stand out from a plane, and how.
+
+Part of BTC (see `evaluation.methods.btc`). Seen along the normal of the
+plane, the cloud is an image; each of its cells tells by bits at which
+heights above the plane there are points. Cells with many heights (walls,
+trunks, posts) are the keypoints, if they are not part of a line of such.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from evaluation.compiled import compiled
+
+# Cells along the side of a square in which one keypoint may lie, the least
+# number of points of an image, and by how many heights a cell may have less
+# than its neighbour and still continue a line: fixed in the public program.
+_SEGMENT = 5
+_MIN_POINTS = 6
+_LINE_MARGIN = 3
+
+_NEIGHBOURS = ((0, 1), (1, 0), (1, 1), (1, -1))
+
+
+@dataclass(frozen=True)
+class Keypoints:
+    """Keypoints with their binary descriptors.
+
+    Attributes:
+        positions: (K, 3) on the plane [m].
+        heights: (K,) int64, bit k set if there are points in layer k.
+    """
+
+    positions: np.ndarray
+    heights: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.heights)
+
+
+@dataclass(frozen=True)
+class HeightImage:
+    """A cloud seen along the normal of a plane.
+
+    Attributes:
+        heights: (rows, columns) int64, bit k set if there are points in
+            layer k. At least one more cell than there are points for, up and
+            to the right; a multiple of the segment.
+        means: (rows, columns, 2) mean of the points of a cell, along rows
+            and along columns [m]; NaN where there are none.
+    """
+
+    heights: np.ndarray
+    means: np.ndarray
+
+
+def plane_axes(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the directions of an image's rows and columns on a plane.
+
+    Columns follow the x axis as far as the plane allows. (The public program
+    means to do the same, but a wrong term makes its axis leave the plane by
+    the y component of the normal.)
+
+    Args:
+        normal: (3,) unit.
+    """
+    if abs(normal[1]) < 1.0:
+        along = np.array([normal[2], 0.0, -normal[0]])
+        along /= np.linalg.norm(along)
+    else:
+        along = np.array([1.0, 0.0, 0.0])
+    return np.cross(normal, along), along
+
+
+def height_image(
+    points: np.ndarray,
+    center: np.ndarray,
+    axes: np.ndarray,
+    *,
+    resolution: float,
+    height_range: tuple[float, float],
+    height_step: float,
+    num_layers: int,
+) -> HeightImage | None:
+    """Draws points into the cells of a grid that starts at the first.
+
+    Args:
+        points: (N, 3) [m].
+        center: (3,) a point of the plane [m].
+        axes: (3, 3) orthonormal directions of rows, columns and heights.
+        resolution: length of a cell [m].
+        height_range: limits of the heights above the plane [m].
+        height_step: of the layers of height [m].
+        num_layers: how many layers; points above them only count for the
+            means.
+
+    Returns:
+        None if there are too few points within the limits.
+    """
+    near = _project(points, center, axes, *height_range)
+    if len(near) < _MIN_POINTS:
+        return None
+    # By column: NumPy is slow in reducing along the longer axis.
+    low = np.array([near[:, axis].min() for axis in range(2)])
+    high = np.array([near[:, axis].max() for axis in range(2)])
+    num_cells = ((high - low) / resolution).astype(np.int64) // _SEGMENT
+    heights, means = _draw(
+        near,
+        low,
+        resolution,
+        height_range[0],
+        height_step,
+        num_layers,
+        (num_cells + 2) * _SEGMENT,
+    )
+    return HeightImage(heights, means)
+
+
+def peaks(
+    num_heights: np.ndarray, min_heights: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Finds the cells that stand out, away from lines.
+
+    One a segment: the cell with most heights, the first of equal ones. It is
+    part of a line if in some direction one neighbour is nearly as high and
+    the opposite one at least half as high.
+
+    Args:
+        num_heights: (rows, columns) bits set in each cell; multiples of the
+            segment.
+        min_heights: that a peak needs.
+
+    Returns:
+        Rows (C,) and columns (C,), by segment along rows, then columns.
+    """
+    rows, columns = (length // _SEGMENT for length in num_heights.shape)
+    segments = (
+        num_heights.reshape(rows, _SEGMENT, columns, _SEGMENT)
+        .transpose(0, 2, 1, 3)
+        .reshape(rows * columns, _SEGMENT * _SEGMENT)
+    )
+    highest = segments.argmax(axis=1)
+    segment = np.flatnonzero(segments.max(axis=1) >= min_heights)
+    row = segment // columns * _SEGMENT + highest[segment] // _SEGMENT
+    column = segment % columns * _SEGMENT + highest[segment] % _SEGMENT
+    # At the other two sides, the image ends in empty cells.
+    inside = (row > 0) & (column > 0)
+    row, column = row[inside], column[inside]
+    peak = num_heights[row, column]
+    in_line = np.zeros(len(row), dtype=bool)
+    for down, right in _NEIGHBOURS:
+        one = num_heights[row + down, column + right]
+        other = num_heights[row - down, column - right]
+        low, high = np.minimum(one, other), np.maximum(one, other)
+        in_line |= (high >= peak - _LINE_MARGIN) & (
+            (low >= 0.5 * peak) | (low >= peak - _LINE_MARGIN)
+        )
+    return row[~in_line], column[~in_line]
+
+
+def find_keypoints(
+    points: np.ndarray,
+    center: np.ndarray,
+    normal: np.ndarray,
+    *,
+    resolution: float,
+    height_range: tuple[float, float],
+    height_step: float,
+    num_layers: int,
+    min_heights: int,
+) -> Keypoints:
+    """Returns the keypoints of a cloud seen along a normal.
+
+    Args:
+        points: (N, 3) [m].
+        center: (3,) a point of the plane [m].
+        normal: (3,) unit.
+        resolution: of the image [m].
+        height_range: limits of the heights above the plane [m].
+        height_step: of the layers of height [m].
+        num_layers: number of the layers.
+        min_heights: that a keypoint needs.
+    """
+    rows, columns = plane_axes(normal)
+    image = height_image(
+        points,
+        center,
+        np.stack([rows, columns, normal]),
+        resolution=resolution,
+        height_range=height_range,
+        height_step=height_step,
+        num_layers=num_layers,
+    )
+    if image is None:
+        return Keypoints(np.empty((0, 3)), np.empty(0, dtype=np.int64))
+    cells = peaks(count_bits(image.heights), min_heights)
+    return Keypoints(
+        positions=center + image.means[cells] @ np.stack([rows, columns]),
+        heights=image.heights[cells],
+    )
+
+
+def suppress(keypoints: Keypoints, radius: float, max_number: int) -> Keypoints:
+    """Returns keypoints with more heights than any other nearby.
+
+    Of equal ones, none stays.
+
+    Args:
+        keypoints: all.
+        radius: what is nearby [m].
+        max_number: of those, at most so many with most heights.
+    """
+    tree = cKDTree(keypoints.positions)
+    pairs = tree.query_pairs(radius, output_type="ndarray")
+    num_heights = count_bits(keypoints.heights)
+    one, other = num_heights[pairs[:, 0]], num_heights[pairs[:, 1]]
+    kept = np.ones(len(keypoints), dtype=bool)
+    kept[pairs[one <= other, 0]] = False
+    kept[pairs[other <= one, 1]] = False
+    chosen = np.flatnonzero(kept)
+    if len(chosen) > max_number:
+        order = np.argsort(-num_heights[chosen], kind="stable")
+        chosen = chosen[order[:max_number]]
+    return Keypoints(keypoints.positions[chosen], keypoints.heights[chosen])
+
+
+@compiled
+def count_bits(words):
+    """Returns how many bits are set in numbers from 0 to 2^62 - 1.
+
+    Args:
+        words: an int64 or an array of them.
+
+    Sums of neighbouring bits, pairs, nibbles, then of all bytes at once.
+    """
+    words = words - ((words >> 1) & 0x5555555555555555)
+    words = (words & 0x3333333333333333) + ((words >> 2) & 0x3333333333333333)
+    words = (words + (words >> 4)) & 0x0F0F0F0F0F0F0F0F
+    return (words * 0x0101010101010101) >> 56
+
+
+@compiled
+def _project(points, center, axes, low, high):
+    """Returns (M, 3) rows, columns and heights of points between limits."""
+    near = np.empty((len(points), 3))
+    num_near = 0
+    for i in range(len(points)):
+        x = points[i, 0] - center[0]
+        y = points[i, 1] - center[1]
+        z = points[i, 2] - center[2]
+        height = axes[2, 0] * x + axes[2, 1] * y + axes[2, 2] * z
+        if low <= height <= high:
+            near[num_near, 0] = axes[0, 0] * x + axes[0, 1] * y + axes[0, 2] * z
+            near[num_near, 1] = axes[1, 0] * x + axes[1, 1] * y + axes[1, 2] * z
+            near[num_near, 2] = height
+            num_near += 1
+    return near[:num_near]
+
+
+@compiled
+def _draw(near, low, resolution, lowest, height_step, num_layers, shape):
+    """Returns heights and means as of a `HeightImage`."""
+    heights = np.zeros((shape[0], shape[1]), dtype=np.int64)
+    counts = np.zeros((shape[0], shape[1]))
+    means = np.zeros((shape[0], shape[1], 2))
+    for i in range(len(near)):
+        row = int((near[i, 0] - low[0]) / resolution)
+        column = int((near[i, 1] - low[1]) / resolution)
+        layer = int((near[i, 2] - lowest) / height_step)
+        if layer < num_layers:
+            heights[row, column] |= 1 << layer
+        counts[row, column] += 1.0
+        means[row, column, 0] += near[i, 0]
+        means[row, column, 1] += near[i, 1]
+    for row in range(shape[0]):
+        for column in range(shape[1]):
+            if counts[row, column] > 0.0:
+                means[row, column] /= counts[row, column]
+            else:
+                means[row, column] = np.nan
+    return heights, means
