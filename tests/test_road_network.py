@@ -178,7 +178,7 @@ def test_lanes_that_do_not_meet_are_refused(load, cross):
         network.connection(
             LaneRef("w", "forward", 1), LaneRef("ne", "forward", 1)
         )
-    with pytest.raises(ValueError, match="U-turn on road w"):
+    with pytest.raises(ValueError, match="U-turn from road w to road w"):
         network.connection(
             LaneRef("w", "forward", 1), LaneRef("w", "backward", 1)
         )
@@ -289,6 +289,70 @@ def test_a_loop_road_and_a_joint_of_two_roads(load):
     assert [way.turn for way in into_loop] == ["left"]
 
 
+def test_a_dead_end_is_a_disc(load, cross):
+    cross["junctions"]["yard"] = {
+        "position": [0, 130],
+        "kerb_radius": 9.0,
+        "dead_end": True,
+    }
+    cross["roads"]["alley"] = {"start": "north", "end": "yard"}
+    network = load(cross)
+    assert len(network.junctions["yard"].arms) == 1
+    assert network.connections("yard") == []
+    area = network.junction_area("yard")
+    # The disc, and up to the road's end the corners beside the road.
+    assert area.area == pytest.approx(9**2 * np.pi, rel=0.04)
+    disc = Point(0, 130).buffer(8.9)
+    assert area.contains(disc.difference(Point(0, 121).buffer(4.0)))
+    road = network.roads["alley"]
+    assert road.full_length - road.last_station == 9.0
+
+
+def test_directions_that_part_do_not_lead_back(load, cross):
+    # East of the centre, e parts into an entry and an exit.
+    cross["junctions"]["fork"] = {"position": [30, 0], "kerb_radius": 6.0}
+    cross["roads"]["e"].update(end="fork")
+    for name, ends, y in (("out", ("fork", "east"), -6), ("in", None, 6)):
+        start, end = ends or ("east", "fork")
+        via = [[42, y, 8], [68, y, 8]]
+        cross["roads"][name] = {
+            "start": start,
+            "end": end,
+            "lanes": [2, 0],
+            "via": via if name == "out" else via[::-1],
+            "start_setback": 17.0,
+            "end_setback": 17.0,
+        }
+    network = load(cross)
+    ways = network.connections("fork")
+    pairs = {(way.incoming.road, way.outgoing.road) for way in ways}
+    assert pairs == {("e", "out"), ("in", "e")}
+    with pytest.raises(ValueError, match="U-turn from road in to road out"):
+        network.connection(
+            LaneRef("in", "forward", 1), LaneRef("out", "forward", 1)
+        )
+
+
+def test_lanes_of_one_way_roads_are_counted_from_the_kerb(load, cross):
+    for name, lanes in (("w", [2, 0]), ("e", [2, 0]), ("n", [1, 0])):
+        cross["roads"][name]["lanes"] = lanes
+    network = load(cross)
+    ways = {
+        (way.incoming, way.outgoing.road, way.outgoing.lane): way.turn
+        for way in network.connections("centre")
+        if way.incoming.road == "w"
+    }
+    first, second = (LaneRef("w", "forward", lane) for lane in (1, 2))
+    assert ways == {
+        (first, "e", 1): "straight",
+        (second, "e", 2): "straight",
+        # The only lane of n is its outermost.
+        (second, "n", 1): "left",
+        # South is a two-way road: right from the outermost lane.
+        (second, "s", 1): "right",
+    }
+
+
 FAULTS = {
     "unknown key": (
         lambda c: c["roads"]["e"].update(colour="red"),
@@ -321,6 +385,10 @@ FAULTS = {
     "dangling": (
         lambda c: [c["roads"].pop(name) for name in ("ne", "se")],
         r"junctions\.east: 1 road\(s\) end here",
+    ),
+    "dead end that is none": (
+        lambda c: c["junctions"]["east"].update(dead_end=True),
+        r"junctions\.east: 3 road\(s\) end here, exactly 1 at a dead end must",
     ),
     "unused junction": (
         lambda c: c["junctions"].update(far={"position": [900, 900]}),

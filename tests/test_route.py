@@ -111,7 +111,7 @@ FAULTS = {
     ),
     "U-turn": (
         [leg("ring_east"), leg("ring_east", "backward")],
-        r"route\.1 .*U-turn on road ring_east",
+        r"route\.1 .*U-turn from road ring_east to road ring_east",
     ),
     "left from the right lane": (
         [

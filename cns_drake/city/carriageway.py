@@ -16,6 +16,9 @@ _QUADRANT_SEGMENTS = 8
 _SIMPLIFY = 0.01
 # Areas that meet are joined over gaps up to twice this width [m].
 _SEAM = 0.005
+# Junctions are drawn so far into their roads, then cut off at the roads'
+# ends; what is left beside them is at most as thick, and dropped [m].
+_OVERLAP = 0.5
 # A parking bay keeps clear of the junction at each end of its road [m].
 _BAY_CLEARANCE = 3.0
 
@@ -68,15 +71,22 @@ def _band(road, right, left, clearance=0.0) -> Polygon:
 def junction_area(roads, junction) -> Polygon:
     """Returns the area between the ends of a junction's roads.
 
-    The straight continuations of the roads to the junction's position are
-    united, the corners between them filled up to a kerb of the junction's
-    radius, and the roads themselves cut away.
+    The continuations of the roads to the junction's position are united, the
+    corners between them filled up to a kerb of the junction's radius, and
+    the roads themselves cut away. At a dead end a disc takes the place of
+    the other roads.
     """
     stubs = [_stub(roads[arm.road], arm) for arm in junction.arms]
     parts = [
         line.buffer(arm.half_width, cap_style="flat")
         for line, arm in zip(stubs, junction.arms, strict=True)
     ]
+    if len(stubs) == 1:
+        parts.append(
+            Point(junction.position).buffer(
+                junction.kerb_radius, quad_segs=_QUADRANT_SEGMENTS
+            )
+        )
     # Bends of a through road leave a wedge at the outside; close it.
     for (a, line_a), (b, line_b) in itertools.combinations(
         zip(junction.arms, stubs, strict=True), 2
@@ -91,7 +101,10 @@ def junction_area(roads, junction) -> Polygon:
     )
     for arm in junction.arms:
         area = area.difference(_beyond(roads[arm.road], arm))
-    # Cutting can leave crumbs beside a road's end.
+    # Cutting can leave splinters and crumbs beside a road's end.
+    area = area.buffer(-_OVERLAP, join_style="mitre").buffer(
+        _OVERLAP, join_style="mitre"
+    )
     pieces = getattr(area, "geoms", [area])
     centre = Point(junction.position)
     return min(pieces, key=lambda piece: piece.distance(centre)).simplify(
@@ -100,8 +113,8 @@ def junction_area(roads, junction) -> Polygon:
 
 
 def _stub(road, arm) -> LineString:
-    """Returns an arm's centreline, from the junction to past its setback."""
-    reach = arm.setback + 2.0
+    """Returns an arm's centreline, from the junction past its setback."""
+    reach = arm.setback + _OVERLAP
     stations = np.linspace(0.0, reach, int(np.ceil(reach)) + 1)
     if arm.end == "end":
         stations = road.full_length - stations
@@ -116,8 +129,8 @@ def _beyond(road, arm) -> Polygon:
         x, y, _, heading = road.evaluate([road.last_station])[0]
         outward = heading + np.pi
     along = np.array([np.cos(outward), np.sin(outward)])
-    across = np.array([-along[1], along[0]]) * (arm.half_width + 1.0)
-    near, far = np.array([x, y]), np.array([x, y]) + along * 6.0
+    across = np.array([-along[1], along[0]]) * arm.half_width
+    near, far = np.array([x, y]), np.array([x, y]) + 2 * _OVERLAP * along
     return Polygon([near - across, far - across, far + across, near + across])
 
 

@@ -22,6 +22,8 @@ Turn = Literal["left", "straight", "right"]
 
 # Beyond this change of heading a way through a junction is a turn.
 _STRAIGHT_LIMIT_DEG = 35.0
+# Beyond this one it is a U-turn, which is no way at all.
+_U_TURN_LIMIT_DEG = 150.0
 # Roads may touch by this much before they count as crossing [m^2].
 _CROSSING_TOLERANCE = 1.0
 
@@ -111,15 +113,14 @@ class RoadNetwork:
                 f"{junction}, road {outgoing.road} {outgoing.direction} "
                 f"starts at {self.entry_junction(outgoing)}"
             )
-        if (
-            incoming.road == outgoing.road
-            and incoming.direction != outgoing.direction
-        ):
-            raise ValueError(f"U-turn on road {incoming.road}")
+        if self._is_u_turn(incoming, outgoing):
+            raise ValueError(
+                f"U-turn from road {incoming.road} to road {outgoing.road}"
+            )
         a = self.roads[incoming.road].lane_end(*incoming[1:], "exit")
         b = self.roads[outgoing.road].lane_end(*outgoing[1:], "entry")
         place = self.junctions[junction]
-        turn = _classify(b[3] - a[3], len(place.arms))
+        turn = _classify(_turn_deg(a, b), len(place.arms))
         # To the right, the outermost lane follows the kerb.
         width = self.roads[outgoing.road].lane_width
         radius = place.kerb_radius + width / 2 if turn == "right" else np.inf
@@ -128,6 +129,18 @@ class RoadNetwork:
         return Connection(
             junction, incoming, outgoing, turn, np.hstack([xy, z])
         )
+
+    def _is_u_turn(self, incoming: LaneRef, outgoing: LaneRef) -> bool:
+        """Tells whether two lanes that meet lead back where one came from.
+
+        That is so on one road, and where its directions part, for a
+        roundabout, say.
+        """
+        if incoming.road == outgoing.road:
+            return incoming.direction != outgoing.direction
+        a = self.roads[incoming.road].lane_end(*incoming[1:], "exit")
+        b = self.roads[outgoing.road].lane_end(*outgoing[1:], "entry")
+        return abs(_turn_deg(a, b)) > _U_TURN_LIMIT_DEG
 
     def lanes(self) -> Iterator[LaneRef]:
         """Yields every lane of every road."""
@@ -141,17 +154,25 @@ class RoadNetwork:
 
         A left turn leads from the innermost lane to the innermost lane, a
         right turn from the outermost to the outermost; straight on, the lane
-        keeps its number, counted from the middle of the road.
+        keeps its number, counted from the middle of the road. Between
+        one-way roads, those of a roundabout for example, the lane keeps its
+        number counted from the kerb on the right, whatever the turn.
         """
         incoming, outgoing = connection.incoming, connection.outgoing
+        if all(self._is_one_way(lane) for lane in (incoming, outgoing)):
+            return self._from_kerb(incoming) == self._from_kerb(outgoing)
         if connection.turn == "left":
             return incoming.lane == outgoing.lane == 1
         if connection.turn == "straight":
             return incoming.lane == outgoing.lane
-        return all(
-            lane.lane == self.roads[lane.road].lanes[lane.direction]
-            for lane in (incoming, outgoing)
-        )
+        return self._from_kerb(incoming) == self._from_kerb(outgoing) == 0
+
+    def _is_one_way(self, lane: LaneRef) -> bool:
+        return not all(self.roads[lane.road].lanes.values())
+
+    def _from_kerb(self, lane: LaneRef) -> int:
+        """Returns how many lanes lie between a lane and its kerb."""
+        return self.roads[lane.road].lanes[lane.direction] - lane.lane
 
     def connections(self, junction: str) -> list[Connection]:
         """Returns every legal way through a junction."""
@@ -161,7 +182,7 @@ class RoadNetwork:
         ways = [
             self.connection(a, b)
             for a, b in itertools.product(incoming, outgoing)
-            if a.road != b.road or a.direction == b.direction
+            if not self._is_u_turn(a, b)
         ]
         return [way for way in ways if self.is_legal(way)]
 
@@ -201,9 +222,13 @@ class RoadNetwork:
         return self._areas.lane_area
 
 
-def _classify(turn_angle: float, num_arms: int) -> Turn:
+def _turn_deg(a, b) -> float:
+    """Returns how far b's heading lies left of a's, both (x, y, z, heading)."""
+    return float(np.degrees((b[3] - a[3] + np.pi) % (2 * np.pi) - np.pi))
+
+
+def _classify(angle_deg: float, num_arms: int) -> Turn:
     """Returns the kind of turn; where two roads merely join it is none."""
-    angle_deg = np.degrees((turn_angle + np.pi) % (2 * np.pi) - np.pi)
     if num_arms == 2 or abs(angle_deg) <= _STRAIGHT_LIMIT_DEG:
         return "straight"
     return "left" if angle_deg > 0 else "right"
@@ -278,30 +303,38 @@ def _make_junction(path, file: RoadsFile, name, curves) -> Junction:
             ends.append((first[2], road_name, "start", width / 2))
         if road.end == name:
             ends.append((last[2] + np.pi, road_name, "end", width / 2))
-    if len(ends) < 2:
+    if (len(ends) == 1) != entry.dead_end or not ends:
+        wanted = "exactly 1 at a dead end" if entry.dead_end else "at least 2"
         raise InputError(
             f"{path}: junctions.{name}: {len(ends)} road(s) end here, "
-            "at least 2 must"
+            f"{wanted} must"
         )
     ends = sorted((h % (2 * np.pi), *rest) for h, *rest in ends)
     arms = []
     for k, (heading, road_name, end, half_width) in enumerate(ends):
-        given = getattr(file.roads[road_name], f"{end}_setback")
-        derived = max(
-            carriageway.corner_setback(
-                half_width, other[3], angle, entry.kerb_radius
-            )
-            for other, angle in (
-                (ends[k - 1], (heading - ends[k - 1][0]) % (2 * np.pi)),
-                (
-                    ends[(k + 1) % len(ends)],
-                    (ends[(k + 1) % len(ends)][0] - heading) % (2 * np.pi),
-                ),
-            )
-        )
-        arms.append(Arm(road_name, end, heading, half_width, given or derived))
+        setback = getattr(file.roads[road_name], f"{end}_setback")
+        if setback is None:
+            setback = _derived_setback(ends, k, entry.kerb_radius)
+        arms.append(Arm(road_name, end, heading, half_width, setback))
     return Junction(
         name, entry.position, entry.height, entry.kerb_radius, tuple(arms)
+    )
+
+
+def _derived_setback(ends, k: int, kerb_radius: float) -> float:
+    """Returns the setback that the neighbours of the k-th arm call for."""
+    if len(ends) == 1:
+        return kerb_radius
+    heading, _, _, half_width = ends[k]
+    before, after = ends[k - 1], ends[(k + 1) % len(ends)]
+    return max(
+        carriageway.corner_setback(
+            half_width, other[3], angle % (2 * np.pi), kerb_radius
+        )
+        for other, angle in (
+            (before, heading - before[0]),
+            (after, after[0] - heading),
+        )
     )
 
 

@@ -74,12 +74,15 @@ class JunctionEntry(_Model):
     Attributes:
         position: x, y of the point where the centrelines meet [m].
         height: the junction's area is level at this z [m].
-        kerb_radius: radius of the kerb round each corner [m].
+        kerb_radius: radius of the kerb round each corner [m]; of a dead end
+            radius of the disc in which its road ends.
+        dead_end: only one road comes here, and traffic cannot go on.
     """
 
     position: tuple[Finite, Finite] = Field(strict=False)
     height: Finite = 0.0
     kerb_radius: Positive = 8.0
+    dead_end: bool = False
 
 
 class RoadsFile(_Model):
