@@ -1,6 +1,7 @@
 """Placed triangles of building models, and rays on them."""
 
 from functools import cache
+from zlib import crc32
 
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
@@ -17,7 +18,7 @@ SEEDS = (1, 2)
 def typical_request(name: str, seed: int):
     """Returns a footprint off the origin and a height for an archetype."""
     kind = ARCHETYPES[name]
-    rng = np.random.default_rng([seed, sorted(ARCHETYPES).index(name)])
+    rng = np.random.default_rng([seed, crc32(name.encode())])
     low, high = kind.widths
     high = min(high, max(1.3 * low, 46.0))
     width, depth = np.round(np.sort(rng.uniform(low, high, 2))[::-1], 1)

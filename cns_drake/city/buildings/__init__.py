@@ -14,43 +14,20 @@ from dataclasses import replace
 import numpy as np
 from shapely.geometry import Polygon
 
-from cns_drake.city.buildings.art_deco_tower import ART_DECO_TOWER
-from cns_drake.city.buildings.brick_block import BRICK_BLOCK
-from cns_drake.city.buildings.car_park import CAR_PARK
-from cns_drake.city.buildings.church import CHURCH
-from cns_drake.city.buildings.corner_building import CORNER_BUILDING
-from cns_drake.city.buildings.court_block import COURT_BLOCK
-from cns_drake.city.buildings.glass_skyscraper import GLASS_SKYSCRAPER
-from cns_drake.city.buildings.hotel import HOTEL
-from cns_drake.city.buildings.museum import MUSEUM
-from cns_drake.city.buildings.observation_tower import OBSERVATION_TOWER
-from cns_drake.city.buildings.office import OFFICE
-from cns_drake.city.buildings.podium_tower import PODIUM_TOWER
+from cns_drake.city.buildings import stocks
 from cns_drake.city.buildings.site import Archetype, Site
-from cns_drake.city.buildings.slab_tower import SLAB_TOWER
-from cns_drake.city.buildings.waterfront_hall import WATERFRONT_HALL
 from cns_drake.city.structures import Model
 
-_METROPOLIS = (
-    ART_DECO_TOWER,
-    BRICK_BLOCK,
-    CAR_PARK,
-    CHURCH,
-    CORNER_BUILDING,
-    COURT_BLOCK,
-    GLASS_SKYSCRAPER,
-    HOTEL,
-    MUSEUM,
-    OBSERVATION_TOWER,
-    OFFICE,
-    PODIUM_TOWER,
-    SLAB_TOWER,
-    WATERFRONT_HALL,
-)
-
-# Stocks of further maps join here; maps may share archetypes.
+# By their names; maps share some of them.
 ARCHETYPES: dict[str, Archetype] = {
-    archetype.name: archetype for archetype in _METROPOLIS
+    archetype.name: archetype
+    for stock in (
+        stocks.METROPOLIS,
+        stocks.RIVERSIDE,
+        stocks.SUBURBIA,
+        stocks.DOWNTOWN,
+    )
+    for archetype in stock
 }
 
 
@@ -99,4 +76,23 @@ def sample(
 
 def metropolis_stock() -> tuple[str, ...]:
     """Returns the archetypes that Metropolis is built of."""
-    return tuple(archetype.name for archetype in _METROPOLIS)
+    return _names(stocks.METROPOLIS)
+
+
+def riverside_stock() -> tuple[str, ...]:
+    """Returns the archetypes that Riverside is built of."""
+    return _names(stocks.RIVERSIDE)
+
+
+def suburbia_stock() -> tuple[str, ...]:
+    """Returns the archetypes that Suburbia is built of."""
+    return _names(stocks.SUBURBIA)
+
+
+def downtown_stock() -> tuple[str, ...]:
+    """Returns the archetypes that Downtown is built of."""
+    return _names(stocks.DOWNTOWN)
+
+
+def _names(stock: tuple[Archetype, ...]) -> tuple[str, ...]:
+    return tuple(archetype.name for archetype in stock)
