@@ -18,8 +18,8 @@ def reproduce_maps(
 ) -> None:
     """Records the sequences of maps, evaluates them and reports.
 
-    `<output>/recordings` gets the recordings, `<output>/report` the tables
-    and figures. What is recorded already is not recorded again.
+    `<output>/<name>/` gets each recording, `<output>/report` the tables and
+    figures. What is recorded already is not recorded again.
 
     Args:
         maps: which maps; all shipped ones if empty.
@@ -38,15 +38,14 @@ def reproduce_maps(
         for name in maps or known
         for scenario in _scenarios_of_map(name)
     ]
-    recordings = output / "recordings"
-    record_all(scenarios, recordings, num_processes)
+    record_all(scenarios, output, num_processes)
     # A process of its own: the evaluation stands without the simulator.
-    command = [sys.executable, "-m", "evaluation", "report", str(recordings)]
+    command = [sys.executable, "-m", "evaluation", "report", str(output)]
     done = subprocess.run(
         [*command, "--output", str(output / "report")], check=False
     )
     if done.returncode != 0:
-        raise InputError(f"{recordings}: the evaluation failed (see above)")
+        raise InputError(f"{output}: the evaluation failed (see above)")
 
 
 def _scenarios_of_map(name: str) -> list[Scenario]:
