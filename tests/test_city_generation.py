@@ -1,0 +1,145 @@
+"""The committed files of Metropolis: what the generator makes, and fit."""
+
+import csv
+import xml.etree.ElementTree as ElementTree
+
+from metropolis_city import (
+    WORLD,
+    city,
+    parse_strictly,
+    stage_files,
+    structure_of,
+    visuals,
+)
+from pydrake.geometry import Role
+import pytest
+import yaml
+
+from cns_drake.city.generate import TABLE_NAME, render_city
+from cns_drake.city.stages import load_stages
+from cns_drake.city.streets import GROUND_TAG
+from cns_drake.semantics import CLASS_IDS
+
+MEGABYTE = 1_000_000
+
+
+def files(world) -> dict[str, bytes]:
+    """Returns all generated files of a world folder by relative path."""
+    found = [
+        *world.glob("stage_*.sdf"),
+        *world.glob("meshes/*"),
+        world / TABLE_NAME,
+    ]
+    return {str(p.relative_to(world)): p.read_bytes() for p in found}
+
+
+@pytest.fixture(scope="module")
+def stages():
+    return load_stages(
+        WORLD / "stages.yaml", [s.name for s in city().structures]
+    )
+
+
+def test_generating_anew_gives_the_committed_bytes():
+    new, old = render_city(WORLD, city()), files(WORLD)
+    assert sorted(new) == sorted(old)
+    changed = [name for name in new if new[name].encode() != old[name]]
+    assert changed == []
+
+
+def test_stages_differ_by_the_listed_names_only(stages):
+    whole = visuals(stage_files()[-1])
+    names = {s.name for s in city().structures}
+    assert {structure_of(v) for v in whole} == names
+    previous = set()
+    for path in stage_files():
+        stage = path.stem.removeprefix("stage_")
+        present = visuals(path)
+        absent = stages.absent(stage)
+        assert {structure_of(v) for v in present} == names - absent
+        expected = {
+            k: v for k, v in whole.items() if structure_of(k) not in absent
+        }
+        assert present == expected
+        assert previous <= {structure_of(v) for v in present}
+        previous = {structure_of(v) for v in present}
+
+
+def test_the_list_of_stages_is_complete(stages):
+    assert [p.stem for p in stage_files()] == [
+        f"stage_{stage}" for stage in stages.stages
+    ]
+    names = list(stages.stages)
+    assert (names[0], names[-1]) == ("01", "04")
+    assert len(stages.absent("01")) > 50
+    buildings = {
+        s.name for s in city().structures if s.semantic_class == "building"
+    }
+    assert buildings & stages.absent("01")
+    assert stages.candidates
+
+
+def test_the_ground_is_there_at_all_stages(stages):
+    ground = {s.name for s in city().structures if GROUND_TAG in s.tags}
+    assert len(ground) > 10
+    assert not ground & (stages.absent("01") | set(stages.candidates))
+
+
+def test_the_table_names_every_structure_once():
+    with (WORLD / TABLE_NAME).open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    structures = city().structures
+    assert [int(row["instance"]) for row in rows] == list(
+        range(1, len(structures) + 1)
+    )
+    assert [row["name"] for row in rows] == [s.name for s in structures]
+    for row, structure in zip(rows, structures, strict=True):
+        assert row["class"] == structure.semantic_class
+        assert int(row["label"]) == CLASS_IDS[row["class"]]
+        for axis, value in zip("xyz", structure.xyz, strict=True):
+            assert float(row[axis]) == pytest.approx(value, abs=5.1e-4)
+        assert float(row["yaw"]) == pytest.approx(structure.yaw, abs=5.1e-6)
+
+
+def test_meshes_are_neither_missing_nor_orphaned():
+    used = set()
+    for path in stage_files():
+        for uri in ElementTree.parse(path).iter("uri"):
+            assert (WORLD / uri.text).is_file(), uri.text
+            used.add(uri.text)
+    there = {f"meshes/{p.name}" for p in (WORLD / "meshes").iterdir()}
+    assert used == there
+
+
+def test_a_stage_is_one_static_link_without_collision():
+    for path in stage_files():
+        root = ElementTree.parse(path).getroot()
+        assert [m.findtext("static") for m in root.iter("model")] == ["true"]
+        assert len(list(root.iter("link"))) == 1
+        assert not list(root.iter("collision"))
+
+
+def test_budgets():
+    size = sum(map(len, files(WORLD).values()))
+    assert size <= 20 * MEGABYTE
+    triangles = {
+        p.name: _count_triangles(p) for p in (WORLD / "meshes").iterdir()
+    }
+    for path in stage_files():
+        inspector = parse_strictly(path).model_inspector()
+        count = len(inspector.GetAllGeometryIds(Role.kPerception))
+        assert 1000 < count < 6000
+        uris = ElementTree.parse(path).iter("uri")
+        names = [uri.text.removeprefix("meshes/") for uri in uris]
+        assert sum(triangles[name] for name in names) <= 1_500_000
+
+
+def _count_triangles(path) -> int:
+    lines = path.read_text().splitlines()
+    return sum(len(x.split()) - 3 for x in lines if x.startswith("f "))
+
+
+def test_stories_are_told(stages):
+    raw = yaml.safe_load((WORLD / "stages.yaml").read_text())
+    for stage in raw["stages"].values():
+        assert len(stage["story"].split()) > 10

@@ -1,0 +1,176 @@
+"""Metropolis as a city: nothing in anything else, ground everywhere."""
+
+from collections import Counter
+
+from metropolis_city import WORLD, city
+import numpy as np
+import pytest
+import shapely
+from shapely.affinity import affine_transform
+from shapely.strtree import STRtree
+
+from cns_drake.city.object_parts import HEADROOM, part_triangles
+from cns_drake.city.road_network import load_road_network
+from cns_drake.city.streets import GROUND_TAG
+from cns_drake.semantics import CLASS_IDS
+
+# Parts may reach this far outside a footprint: plinths, pilasters, steps.
+OVERHANG = 0.36
+
+
+def is_ground(structure) -> bool:
+    return GROUND_TAG in structure.tags
+
+
+@pytest.fixture(scope="module")
+def standing():
+    """Returns everything that stands on the ground."""
+    return [s for s in city().structures if not is_ground(s)]
+
+
+@pytest.fixture(scope="module")
+def network():
+    return load_road_network(WORLD / "roads.yaml")
+
+
+def test_the_city_is_as_rich_as_planned(standing):
+    counts = Counter(s.name.rsplit("_", 1)[0] for s in standing)
+    classes = Counter(s.semantic_class for s in standing)
+    assert 60 <= classes["building"] <= 110
+    assert 200 <= counts["tree"] <= 350
+    small = len(standing) - classes["building"] - counts["tree"]
+    assert 400 <= small <= 900
+    buildings = [s for s in standing if s.semantic_class == "building"]
+    assert len({s.tags[1] for s in buildings}) >= 8
+
+
+def test_names_and_classes(standing):
+    names = [s.name for s in city().structures]
+    assert len(set(names)) == len(names)
+    assert all("/" not in name and ":" not in name for name in names)
+    assert all(s.semantic_class in CLASS_IDS for s in city().structures)
+    for structure in city().structures:
+        parts = [part.name for part in structure.model.parts]
+        assert parts
+        assert len(set(parts)) == len(parts)
+
+
+def test_no_structure_stands_in_another(standing):
+    footprints = [s.footprint_W.buffer(-0.01) for s in standing]
+    for i, j in STRtree(footprints).query(footprints, "intersects").T:
+        if i < j:
+            pytest.fail(f"{standing[i].name} stands in {standing[j].name}")
+
+
+def test_no_structure_stands_in_a_lane(standing, network):
+    lanes = network.lane_area()
+    shapely.prepare(lanes)
+    for structure in standing:
+        footprint = structure.footprint_W.buffer(-0.01)
+        assert not lanes.intersects(footprint), structure.name
+
+
+def test_nothing_low_reaches_far_out_of_its_footprint(standing, network):
+    """The footprints tell the truth, so that the tests above mean something.
+
+    Every triangle that is partly below head height is clipped by eye height
+    planes through its vertices: only vertices are looked at, and edges that
+    cross head height are cut there.
+    """
+    lanes = network.lane_area()
+    shapely.prepare(lanes)
+    for structure in standing:
+        low = [
+            _low_points(part, structure.model.meshes)
+            for part in structure.model.parts
+        ]
+        points = np.concatenate(low)
+        allowed = structure.model.footprint.buffer(OVERHANG)
+        shapely.prepare(allowed)
+        inside = shapely.contains_xy(allowed, points[:, 0], points[:, 1])
+        assert inside.all(), f"{structure.name} {points[~inside][0]}"
+        c, s = np.cos(structure.yaw), np.sin(structure.yaw)
+        x, y, _ = structure.xyz
+        xy = points[:, :2] @ np.array([[c, s], [-s, c]]) + (x, y)
+        in_lane = shapely.contains_xy(lanes, xy[:, 0], xy[:, 1])
+        assert not in_lane.any(), f"{structure.name} {xy[in_lane][0]}"
+
+
+def _low_points(part, meshes) -> np.ndarray:
+    """Returns where a part's edges are below head height, in S."""
+    p, triangles = part_triangles(part, meshes)
+    points = [p[p[:, 2] <= HEADROOM]]
+    for i, j in ((0, 1), (1, 2), (2, 0)):
+        a, b = p[triangles[:, i]], p[triangles[:, j]]
+        cut = (a[:, 2] - HEADROOM) * (b[:, 2] - HEADROOM) < 0
+        a, b = a[cut], b[cut]
+        u = (HEADROOM - a[:, 2]) / (b[:, 2] - a[:, 2])
+        points.append(a + u[:, None] * (b - a))
+    return np.concatenate(points)
+
+
+def test_ground_lies_under_everything(standing):
+    """What a stage lacks leaves ground behind."""
+    ground = shapely.union_all(
+        [s.model.footprint for s in city().structures if is_ground(s)]
+    ).buffer(0.002)
+    shapely.prepare(ground)
+    for structure in standing:
+        assert ground.contains(structure.footprint_W), structure.name
+
+
+def test_ground_meshes_fill_the_bounds_without_gaps():
+    """Seen from above the ground has no holes, and overlaps nowhere."""
+    triangles = []
+    for structure in city().structures:
+        if not is_ground(structure) or structure.name == "markings":
+            continue  # Paint lies on the ground.
+        for mesh in structure.model.meshes.values():
+            triangles.append(mesh.vertices[mesh.triangles()][:, :, :2])
+    corners = np.concatenate(triangles)
+    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    areas = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2
+    low, high = corners.reshape(-1, 2).min(0), corners.reshape(-1, 2).max(0)
+    whole = np.prod(high - low)
+    assert min(high - low) >= 330
+    assert max(high - low) <= 420
+    assert areas.sum() == pytest.approx(whole, rel=2e-4)
+    union = shapely.union_all(shapely.polygons(corners[areas > 1e-6]))
+    assert union.area == pytest.approx(whole, rel=2e-4)
+
+
+def test_no_two_buildings_are_the_same():
+    """No repeated block: every building's geometry is its own."""
+    seen = {}
+    for structure in city().structures:
+        if structure.semantic_class != "building":
+            continue
+        model = structure.model
+        key = tuple(
+            (
+                part.xyz,
+                part.rpy,
+                part.shape.scale,
+                _rounded(model.meshes[part.shape.mesh]),
+            )
+            for part in model.parts
+            if hasattr(part.shape, "mesh")
+        )
+        assert seen.setdefault(key, structure.name) == structure.name
+
+
+def _rounded(mesh) -> bytes:
+    return np.round(mesh.vertices, 2).tobytes()
+
+
+def test_footprints_turn_with_their_structures(standing):
+    for structure in standing[::50]:
+        c, s = np.cos(structure.yaw), np.sin(structure.yaw)
+        x, y, _ = structure.xyz
+        expected = affine_transform(
+            structure.model.footprint, [c, -s, s, c, x, y]
+        )
+        assert structure.footprint_W.equals_exact(expected, 1e-9)
+        corner = structure.model.footprint.exterior.coords[0]
+        p_W = structure.p_WP((*corner[:2], 0.0))
+        assert expected.exterior.distance(shapely.Point(p_W[:2])) < 1e-9
