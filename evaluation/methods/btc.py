@@ -22,10 +22,21 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
+from pydantic import (
+    AfterValidator,
+    Field,
+    NonNegativeFloat,
+    PositiveFloat,
+    PositiveInt,
+)
 from scipy.spatial import cKDTree
 
-from evaluation.methods.btc_keypoints import find_keypoints, suppress
+from evaluation.methods.btc_keypoints import (
+    find_keypoints,
+    height_image,
+    image_axes,
+    suppress,
+)
 from evaluation.methods.btc_planes import Planes, base_plane, voxel_planes
 from evaluation.methods.btc_triangles import (
     Triangles,
@@ -39,6 +50,12 @@ from evaluation.methods.method import Method, MethodConfig, register
 
 # A bit of an int64 for each layer, and one for the sign.
 _MAX_LAYERS = 62
+
+
+def _increasing(limits: tuple[float, float]) -> tuple[float, float]:
+    if not limits[0] < limits[1]:
+        raise ValueError("the first limit must be below the second")
+    return limits
 
 
 class BtcConfig(MethodConfig):
@@ -87,14 +104,18 @@ class BtcConfig(MethodConfig):
     merge_normal_limit: PositiveFloat = 0.1
     merge_distance_limit: PositiveFloat = 0.3
     resolution: PositiveFloat = 0.5
-    height_range: tuple[float, float] = (-1.0, 4.0)
+    height_range: Annotated[
+        tuple[float, float], AfterValidator(_increasing)
+    ] = (-1.0, 4.0)
     height_step: PositiveFloat = 0.1
     num_layers: Annotated[int, Field(ge=1, le=_MAX_LAYERS)] = 49
     min_heights: PositiveInt = 10
     suppression_radius: NonNegativeFloat = 2.0
     max_keypoints: PositiveInt = 500
     num_neighbours: PositiveInt = 10
-    side_range: tuple[NonNegativeFloat, PositiveFloat] = (2.0, 50.0)
+    side_range: Annotated[
+        tuple[NonNegativeFloat, PositiveFloat], AfterValidator(_increasing)
+    ] = (2.0, 50.0)
     side_resolution: PositiveFloat = 0.2
     side_tolerance: PositiveFloat = 0.01
     min_similarity: Annotated[float, Field(ge=0.0, le=1.0)] = 0.7
@@ -122,12 +143,12 @@ class BtcDatabase:
     """D places.
 
     Attributes:
-        planes: of each place.
+        places: their descriptions.
         trees: of the centers of the planes of each place.
         table: the triangles of all.
     """
 
-    planes: Sequence[Planes]
+    places: Sequence[BtcDescription]
     trees: Sequence[cKDTree]
     table: TriangleTable
 
@@ -157,15 +178,18 @@ class Btc(Method[BtcDescription, BtcDatabase]):
             # As in the public program: level, through the first point.
             first = points[0] if len(points) > 0 else np.zeros(3)
             base = first, np.array([0.0, 0.0, 1.0])
-        keypoints = find_keypoints(
+        center, normal = base
+        axes = image_axes(normal)
+        image = height_image(
             points,
-            *base,
+            center,
+            axes,
             resolution=config.resolution,
             height_range=config.height_range,
             height_step=config.height_step,
             num_layers=config.num_layers,
-            min_heights=config.min_heights,
         )
+        keypoints = find_keypoints(image, center, axes, config.min_heights)
         keypoints = suppress(
             keypoints, config.suppression_radius, config.max_keypoints
         )
@@ -176,7 +200,7 @@ class Btc(Method[BtcDescription, BtcDatabase]):
 
     def build_database(self, places: Sequence[BtcDescription]) -> BtcDatabase:
         return BtcDatabase(
-            planes=[place.planes for place in places],
+            places=places,
             trees=[cKDTree(place.planes.centers) for place in places],
             table=make_table(
                 [place.triangles for place in places],
@@ -191,14 +215,15 @@ class Btc(Method[BtcDescription, BtcDatabase]):
         *,
         exhaustive: bool = False,
     ) -> np.ndarray:
-        scores = np.full(len(database.planes), np.nan)
+        scores = np.full(len(database.places), np.nan)
         limit = None if exhaustive else self.config.candidates
         for place, X_PQ in self._motions(query, database, limit):
-            if len(query.planes) == 0 or len(database.planes[place]) == 0:
+            planes = database.places[place].planes
+            if len(query.planes) == 0 or len(planes) == 0:
                 continue
             overlap = plane_overlap(
                 query.planes,
-                database.planes[place],
+                planes,
                 database.trees[place],
                 X_PQ,
                 self.config.normal_limit,
@@ -215,9 +240,9 @@ class Btc(Method[BtcDescription, BtcDatabase]):
 
         None if too few match or agree.
         """
-        for candidate, X_PQ in self._motions(query, database, None):
-            if candidate == place:
-                return X_PQ
+        alone = self.build_database([database.places[place]])
+        for _, X_PQ in self._motions(query, alone, None):
+            return X_PQ
         return None
 
     def _motions(
@@ -241,7 +266,7 @@ class Btc(Method[BtcDescription, BtcDatabase]):
         clouds = table.clouds[of_table]
         # By place, those of each in the order in which they were found.
         order = np.argsort(clouds, kind="stable")
-        votes = np.bincount(clouds, minlength=len(database.planes))
+        votes = np.bincount(clouds, minlength=len(database.places))
         ends = np.cumsum(votes)
         candidates = np.argsort(-votes, kind="stable")[:max_candidates]
         for place in candidates[votes[candidates] >= self.config.min_votes]:

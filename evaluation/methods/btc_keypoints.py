@@ -57,12 +57,13 @@ class HeightImage:
     means: np.ndarray
 
 
-def plane_axes(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the directions of an image's rows and columns on a plane.
+def image_axes(normal: np.ndarray) -> np.ndarray:
+    """Returns the directions of an image on a plane, (3, 3) orthonormal.
 
-    Columns follow the x axis as far as the plane allows. (The public program
-    means to do the same, but a wrong term makes its axis leave the plane by
-    the y component of the normal.)
+    They are, one a row: along the rows' numbers, along the columns' (which
+    follows the x axis as far as the plane allows), and the normal. (The
+    public program means the same, but by a wrong term its second direction
+    leaves the plane by the y component of the normal.)
 
     Args:
         normal: (3,) unit.
@@ -72,7 +73,7 @@ def plane_axes(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         along /= np.linalg.norm(along)
     else:
         along = np.array([1.0, 0.0, 0.0])
-    return np.cross(normal, along), along
+    return np.stack([np.cross(normal, along), along, normal])
 
 
 def height_image(
@@ -84,29 +85,29 @@ def height_image(
     height_range: tuple[float, float],
     height_step: float,
     num_layers: int,
-) -> HeightImage | None:
+) -> HeightImage:
     """Draws points into the cells of a grid that starts at the first.
+
+    Its memory grows with the area that the points cover.
 
     Args:
         points: (N, 3) [m].
         center: (3,) a point of the plane [m].
-        axes: (3, 3) orthonormal directions of rows, columns and heights.
+        axes: (3, 3) of the image.
         resolution: length of a cell [m].
         height_range: limits of the heights above the plane [m].
         height_step: of the layers of height [m].
         num_layers: how many layers; points above them only count for the
             means.
-
-    Returns:
-        None if there are too few points within the limits.
     """
     near = _project(points, center, axes, *height_range)
     if len(near) < _MIN_POINTS:
-        return None
+        empty = np.zeros((_SEGMENT, _SEGMENT), dtype=np.int64)
+        return HeightImage(empty, np.full((_SEGMENT, _SEGMENT, 2), np.nan))
     # By column: NumPy is slow in reducing along the longer axis.
     low = np.array([near[:, axis].min() for axis in range(2)])
     high = np.array([near[:, axis].max() for axis in range(2)])
-    num_cells = ((high - low) / resolution).astype(np.int64) // _SEGMENT
+    last = ((high - low) / resolution).astype(np.int64)
     heights, means = _draw(
         near,
         low,
@@ -114,7 +115,7 @@ def height_image(
         height_range[0],
         height_step,
         num_layers,
-        (num_cells + 2) * _SEGMENT,
+        (last // _SEGMENT + 2) * _SEGMENT,
     )
     return HeightImage(heights, means)
 
@@ -162,43 +163,19 @@ def peaks(
 
 
 def find_keypoints(
-    points: np.ndarray,
-    center: np.ndarray,
-    normal: np.ndarray,
-    *,
-    resolution: float,
-    height_range: tuple[float, float],
-    height_step: float,
-    num_layers: int,
-    min_heights: int,
+    image: HeightImage, center: np.ndarray, axes: np.ndarray, min_heights: int
 ) -> Keypoints:
-    """Returns the keypoints of a cloud seen along a normal.
+    """Returns the peaks of an image, as places on its plane.
 
     Args:
-        points: (N, 3) [m].
-        center: (3,) a point of the plane [m].
-        normal: (3,) unit.
-        resolution: of the image [m].
-        height_range: limits of the heights above the plane [m].
-        height_step: of the layers of height [m].
-        num_layers: number of the layers.
+        image: of a cloud.
+        center: (3,) with which the image was drawn [m].
+        axes: (3, 3) likewise.
         min_heights: that a keypoint needs.
     """
-    rows, columns = plane_axes(normal)
-    image = height_image(
-        points,
-        center,
-        np.stack([rows, columns, normal]),
-        resolution=resolution,
-        height_range=height_range,
-        height_step=height_step,
-        num_layers=num_layers,
-    )
-    if image is None:
-        return Keypoints(np.empty((0, 3)), np.empty(0, dtype=np.int64))
     cells = peaks(count_bits(image.heights), min_heights)
     return Keypoints(
-        positions=center + image.means[cells] @ np.stack([rows, columns]),
+        positions=center + image.means[cells] @ axes[:2],
         heights=image.heights[cells],
     )
 

@@ -22,6 +22,10 @@ _MIN_DETOUR = 0.2
 _SAME = 0.001
 _REACH = 1.5
 
+# A similarity of exactly the limit counts, whichever way it was rounded: the
+# public program holds the limit in single precision, where 0.7 is 1e-8 less.
+_ROUNDING = 1e-8
+
 # Three cell numbers of 20 bits make one key.
 _KEY_BITS = 20
 
@@ -240,7 +244,7 @@ def _match(
                                 * common
                                 / (bits[vertex] + count_bits(heights))
                             )
-                        if similarity / 3.0 > min_similarity:
+                        if similarity / 3.0 > min_similarity - _ROUNDING:
                             if num_found == len(found_query):
                                 found_query = np.append(
                                     found_query, np.empty_like(found_query)

@@ -1,0 +1,251 @@
+import math
+
+import numpy as np
+import pytest
+
+from evaluation.methods.btc_planes import (
+    Planes,
+    base_plane,
+    group_alike,
+    merge,
+    voxel_planes,
+)
+
+
+def voxels(points, **changes):
+    parameters = {"voxel_size": 2.0, "max_points": 10, "flatness": 0.01}
+    return voxel_planes(np.asarray(points, float), **parameters | changes)
+
+
+def patch(seed, number, center, normal, thickness=0.0):
+    """Returns points of a 1.2 m wide patch of a plane."""
+    rng = np.random.default_rng([seed, 31])
+    normal = np.asarray(normal, float) / np.linalg.norm(normal)
+    _, _, axes = np.linalg.svd(normal[None])
+    flat = rng.uniform(-0.4, 0.4, (number, 2)) @ axes[1:]
+    off = rng.normal(0.0, thickness, (number, 1)) * normal
+    return flat + off + np.asarray(center, float)
+
+
+def moments(points):
+    offsets = points - points.mean(axis=0)
+    return points.mean(axis=0), offsets.T @ offsets / len(points)
+
+
+def is_alike(planes, i, j, normal_limit, distance_limit):
+    """The definition, with differences of normals written out."""
+    n, m = planes.normals[i], planes.normals[j]
+    offset = planes.centers[j] - planes.centers[i]
+    return (
+        min(np.linalg.norm(n - m), np.linalg.norm(n + m)) < normal_limit
+        and abs(n @ offset) < distance_limit
+        and abs(m @ offset) < distance_limit
+    )
+
+
+class TestVoxelPlanes:
+    def test_plane_of_a_voxel(self):
+        normal = np.array([1.0, -2.0, 3.0]) / math.sqrt(14.0)
+        points = patch(0, 40, [11.0, -7.0, 3.0], normal)
+        planes = voxels(points)
+        assert planes.counts.tolist() == [40]
+        mean, covariance = moments(points)
+        np.testing.assert_allclose(planes.centers, mean[None], atol=1e-12)
+        np.testing.assert_allclose(planes.covariances[0], covariance, atol=1e-9)
+        assert abs(planes.normals[0] @ normal) == pytest.approx(1.0)
+
+    def test_large_coordinates_leave_the_covariance_alone(self):
+        far = np.array([350_001.0, -4_150_001.0, 1.0])
+        points = patch(1, 40, [0.0, 0.0, 0.0], [0.0, 0.3, 1.0]) + far
+        planes = voxels(points)
+        np.testing.assert_allclose(
+            planes.covariances[0], moments(points - far)[1], atol=1e-8
+        )
+
+    @pytest.mark.parametrize(("number", "found"), [(10, 0), (11, 1)])
+    def test_sparse_voxels_are_not_looked_at(self, number, found):
+        assert len(voxels(patch(2, number, [1, 1, 1], [0, 0, 1]))) == found
+
+    @pytest.mark.parametrize(("half", "found"), [(0.0999, 1), (0.1001, 0)])
+    def test_limit_of_flatness(self, half, found):
+        # Two layers, half of the points in each: the variance is half^2.
+        layer = patch(3, 30, [1.0, 1.0, 1.0], [0.0, 0.0, 1.0])
+        up = np.array([0.0, 0.0, half])
+        layers = [layer + up, layer - up]
+        assert len(voxels(np.concatenate(layers))) == found
+
+    def test_negative_multiples_belong_to_the_voxel_below(self):
+        edge = np.array([[-2.0, 0.1 * k, 0.03 * k * k] for k in range(8)])
+        beyond = np.array([[-2.5, 0.1 * k, 0.3] for k in range(8)])
+        before = np.array([[-1.5, 0.1 * k, 0.3] for k in range(8)])
+        assert voxels(np.concatenate([edge, beyond])).counts.tolist() == []
+        found = voxels(np.concatenate([edge, beyond]), flatness=1.0)
+        assert found.counts.tolist() == [16]
+        assert len(voxels(np.concatenate([edge, before]), flatness=1.0)) == 0
+
+    def test_zero_and_positive_multiples_belong_to_the_voxel_above(self):
+        edge = np.array([[2.0, 0.1 * k, 0.3] for k in range(11)])
+        zero = np.array([[0.0, 0.1 * k, 0.3] for k in range(11)])
+        inside = np.array([[1.9, 0.1 * k, 0.3] for k in range(11)])
+        found = voxels(np.concatenate([edge, zero, inside]))
+        assert found.counts.tolist() == [22, 11]
+
+    def test_sorted_by_index_whatever_the_order_of_points(self):
+        parts = [
+            patch(k, 20, center, [0.0, 0.0, 1.0])
+            for k, center in enumerate(
+                [[5.0, 1.0, 1.0], [-3.0, 9.0, 1.0], [-3.0, -9.0, 1.0]]
+            )
+        ]
+        points = np.concatenate(parts)
+        planes = voxels(points)
+        expected = [moments(parts[k])[0] for k in (2, 1, 0)]
+        np.testing.assert_allclose(planes.centers, expected, atol=1e-12)
+        shuffled = np.random.default_rng(4).permutation(points)
+        np.testing.assert_allclose(
+            voxels(shuffled).centers, planes.centers, atol=1e-12
+        )
+
+    @pytest.mark.parametrize("number", [0, 1])
+    def test_next_to_nothing(self, number):
+        assert len(voxels(np.zeros((number, 3)))) == 0
+
+
+class TestMerging:
+    @pytest.mark.parametrize("seed", range(4))
+    def test_groups_as_defined(self, seed):
+        rng = np.random.default_rng([seed, 32])
+        number = 60
+        normals = rng.normal(0.0, 0.05, (number, 3))
+        normals[:, 2] += 1.0
+        normals *= rng.choice([-1.0, 1.0], number)[:, None]
+        normals /= np.linalg.norm(normals, axis=1)[:, None]
+        centers = rng.uniform(-4.0, 4.0, (number, 3)) * [1.0, 1.0, 0.1]
+        planes = Planes(
+            centers, normals, np.zeros((number, 3, 3)), np.ones(number, int)
+        )
+        expected = [0] * number
+        next_group = 1
+        for i in reversed(range(1, number)):
+            for j in range(i):
+                if not is_alike(planes, i, j, 0.1, 0.3):
+                    continue
+                if expected[i] == expected[j] == 0:
+                    expected[i] = expected[j] = next_group
+                    next_group += 1
+                elif expected[i] == 0:
+                    expected[i] = expected[j]
+                elif expected[j] == 0:
+                    expected[j] = expected[i]
+        assert 3 < next_group < number // 2
+        labels = group_alike(centers, normals, 0.1, 0.3)
+        assert (labels + 1).tolist() == expected
+
+    @pytest.mark.parametrize(
+        ("angle", "height", "alike"),
+        [
+            (0.0, 0.29, True),
+            (0.0, 0.31, False),
+            (0.0999, 0.0, True),
+            (0.1002, 0.0, False),
+            (math.pi - 0.05, 0.0, True),
+        ],
+    )
+    def test_limits(self, angle, height, alike):
+        # Normals at an angle a differ by 2 sin(a / 2).
+        normals = np.array(
+            [[0.0, 0.0, 1.0], [math.sin(angle), 0.0, math.cos(angle)]]
+        )
+        centers = np.array([[0.0, 0.0, 0.0], [0.0, 1.0, height]])
+        labels = group_alike(centers, normals, 0.1, 0.3)
+        assert (labels[0] == labels[1] == 0) == alike
+
+    def test_merged_plane_has_the_moments_of_all_points(self):
+        parts = [
+            patch(k, 20 + k, [4.0 * k + 1.0, 1.0, 1.0], [0.0, 0.0, 1.0], 0.02)
+            for k in range(5)
+        ]
+        wall = patch(9, 400, [1.0, 31.0, 1.0], [1.0, 0.0, 0.0], 0.01)
+        planes = voxels(np.concatenate([*parts, wall]))
+        assert len(planes) == 6
+        merged = merge(planes, 0.1, 0.3, keep_single=False)
+        mean, covariance = moments(np.concatenate(parts))
+        assert merged.counts.tolist() == [sum(map(len, parts))]
+        np.testing.assert_allclose(merged.centers[0], mean, atol=1e-12)
+        np.testing.assert_allclose(merged.covariances[0], covariance, atol=1e-9)
+        assert abs(merged.normals[0, 2]) == pytest.approx(1.0, abs=1e-3)
+        both = merge(planes, 0.1, 0.3, keep_single=True)
+        assert sorted(both.counts) == [sum(map(len, parts)), 400]
+
+    def test_does_not_depend_on_the_order(self):
+        rng = np.random.default_rng(33)
+        parts = [
+            patch(
+                k,
+                20 + k,
+                [4.0 * (k % 6), 4.0 * (k // 6), rng.normal(0.0, 0.1)],
+                [*rng.normal(0.0, 0.04, 2), 1.0],
+                0.01,
+            )
+            for k in range(36)
+        ]
+        planes = voxels(np.concatenate(parts), voxel_size=4.0)
+        mixed = planes.take(rng.permutation(len(planes)))
+        np.testing.assert_array_equal(
+            np.sort(merge(planes, 0.1, 0.3, keep_single=True).counts),
+            np.sort(merge(mixed, 0.1, 0.3, keep_single=True).counts),
+        )
+
+
+class TestBasePlane:
+    def test_ground_rather_than_walls(self):
+        ground = [
+            patch(k, 30, [4.0 * k + 1.0, 1.0, -1.6], [0.0, 0.0, 1.0])
+            for k in range(6)
+        ]
+        walls = [
+            patch(k, 60, [1.0, 9.0, 4.0 * k + 1.0], [0.0, 1.0, 0.0])
+            for k in range(2)
+        ]
+        planes = voxels(np.concatenate([*walls, *ground]))
+        center, normal = base_plane(planes, 0.1, 0.3)
+        np.testing.assert_allclose(normal, [0.0, 0.0, 1.0], atol=1e-9)
+        assert center[2] == pytest.approx(-1.6)
+
+    def test_points_up(self):
+        tilted = np.array([0.6, -0.64, 0.48])
+        _, _, axes = np.linalg.svd(tilted[None])
+        parts = [patch(k, 30, 4.0 * k * axes[1], tilted, 0.0) for k in range(4)]
+        planes = voxels(np.concatenate(parts), voxel_size=4.0, max_points=3)
+        for sign in (1.0, -1.0):
+            turned = Planes(
+                planes.centers,
+                sign * planes.normals,
+                planes.covariances,
+                planes.counts,
+            )
+            _, normal = base_plane(turned, 0.1, 0.3)
+            np.testing.assert_allclose(normal, tilted, atol=1e-9)
+
+    def test_merged_twice(self):
+        # Two groups of flat patches, founded apart, are alike as a whole.
+        centers = np.array([[0, 0, 0], [3, 0, 0], [20, 0, 0], [23, 0, 0]])
+        angles = [0.06, 0.06, -0.06, -0.06]
+        normals = np.array([[0, math.sin(a), math.cos(a)] for a in angles])
+        planes = Planes(
+            centers.astype(float),
+            normals,
+            np.zeros((4, 3, 3)) + np.diag([0.3, 0.3, 0.0]),
+            np.array([20, 20, 20, 20]),
+        )
+        first = merge(planes, 0.1, 0.3, keep_single=False)
+        assert first.counts.tolist() == [40, 40]
+        center, normal = base_plane(planes, 0.1, 0.3)
+        np.testing.assert_allclose(center, [11.5, 0.0, 0.0], atol=1e-12)
+        np.testing.assert_allclose(normal, [0.0, 0.0, 1.0], atol=1e-12)
+
+    def test_none_without_a_pair(self):
+        alone = voxels(patch(0, 30, [1.0, 1.0, 1.0], [0.0, 0.0, 1.0]))
+        assert len(alone) == 1
+        assert base_plane(alone, 0.1, 0.3) is None
+        assert base_plane(voxels(np.empty((0, 3))), 0.1, 0.3) is None
