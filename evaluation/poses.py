@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 
 def make_pose(R: np.ndarray, p: np.ndarray) -> np.ndarray:
@@ -49,6 +50,26 @@ def inverse(X: np.ndarray) -> np.ndarray:
     R_transposed = np.swapaxes(X[..., :3, :3], -1, -2)
     p = -np.einsum("...ij,...j->...i", R_transposed, X[..., :3, 3])
     return make_pose(R_transposed, p)
+
+
+def interpolate(
+    X_0: np.ndarray, X_1: np.ndarray, fraction: np.ndarray
+) -> np.ndarray:
+    """Returns poses between pairs of poses: turns by SLERP, moves linearly.
+
+    Args:
+        X_0: (N, 4, 4).
+        X_1: (N, 4, 4).
+        fraction: (N,) of the way from the one to the other.
+
+    Returns:
+        (N, 4, 4); rotations are made orthonormal.
+    """
+    R_0 = Rotation.from_matrix(X_0[:, :3, :3])
+    turn = (R_0.inv() * Rotation.from_matrix(X_1[:, :3, :3])).as_rotvec()
+    R = R_0 * Rotation.from_rotvec(fraction[:, None] * turn)
+    p_0, p_1 = X_0[:, :3, 3], X_1[:, :3, 3]
+    return make_pose(R.as_matrix(), p_0 + fraction[:, None] * (p_1 - p_0))
 
 
 def transform(X: np.ndarray, p: np.ndarray) -> np.ndarray:

@@ -14,23 +14,43 @@ def open_sequence(path: Path) -> Sequence:
     """Opens the recorded drive at `path` with the reader it needs.
 
     Args:
-        path: a folder with one .mcap file (as cns-drake and rosbag2 write
-            it), or an .mcap file.
+        path: an .mcap file or a folder with one (as cns-drake and rosbag2
+            write it), or a folder of a drive as MulRan, HeLiPR, KITTI
+            odometry or CNS publish it. `LiDAR/<name>` in one of HeLiPR
+            chooses the LiDAR.
 
     Raises:
         InputError: if nothing there can be read as a sequence.
     """
     # Imported here: the readers' libraries are slow to load, and a map file
     # needs none of them.
-    from evaluation.sequences import mcap_sequence
+    from evaluation.sequences import (
+        cns_folder,
+        helipr,
+        kitti,
+        mcap_sequence,
+        mulran,
+    )
 
+    readers = (
+        (mcap_sequence.holds_mcap, mcap_sequence.McapSequence),
+        (mulran.holds_mulran, mulran.MulranSequence),
+        (helipr.holds_helipr, helipr.HeliprSequence),
+        (kitti.holds_kitti, kitti.KittiSequence),
+        (cns_folder.holds_cns, cns_folder.CnsFolderSequence),
+    )
     path = Path(path)
     if not path.exists():
         raise InputError(f"{path}: no such file or folder")
-    if mcap_sequence.holds_mcap(path):
-        return mcap_sequence.McapSequence(path)
+    fitting = [reader for holds, reader in readers if holds(path)]
+    if len(fitting) > 1:
+        names = ", ".join(reader.__name__ for reader in fitting)
+        raise InputError(f"{path}: files of several formats ({names})")
+    if fitting:
+        return fitting[0](path)
     if path.is_dir() and any(path.glob("*.mcap.part")):
         raise InputError(f"{path}: the recording was not finished")
     raise InputError(
-        f"{path}: not a recorded sequence (a folder with an .mcap file, or one)"
+        f"{path}: not a recorded sequence (a folder with an .mcap file, or"
+        " one, or a drive of MulRan, HeLiPR, KITTI odometry or CNS)"
     )

@@ -57,6 +57,20 @@ class Sequence(abc.ABC):
         """
 
     @property
+    def datum(self) -> str | None:
+        """Name of the survey grid that W follows, if it follows one.
+
+        Two sequences with one datum but different world frames differ by
+        what their positioning was wrong, at most some ten metres.
+        """
+        return None
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the user should know about how the recording was read."""
+        return ()
+
+    @property
     def scenario(self) -> Mapping | None:
         """How the drive was simulated, if the recording says so.
 

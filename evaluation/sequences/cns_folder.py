@@ -1,0 +1,188 @@
+"""Drives in the layout in which the CNS data set was published.
+
+    transformation_lidar.yaml        pose of the LiDAR on the vehicle
+    transformation_imu.yaml
+    <Map>/<Sequence>/gt.csv          time, x y z, qx qy qz qw of X_WB
+    <Map>/<Sequence>/imu.csv
+    <Map>/<Sequence>/pcd/<time>.pcd  x y z intensity
+
+B is the vehicle at the ground. Times are whole nanoseconds, or seconds with
+a decimal point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from evaluation import poses
+from evaluation.errors import InputError
+from evaluation.sequences.clouds import read_cloud
+from evaluation.sequences.scan_files import FileSequence, list_stamped
+from evaluation.sequences.trajectory import pose_matrices, read_quaternions
+
+_POSES = "gt.csv"
+# The paper's and the download's name of the folder.
+_FOLDERS = ("pcd", "LiDAR")
+_MOUNT = "transformation_lidar.yaml"
+# Above the vehicle, by the data set's figure of its sensors [m].
+_LIDAR_HEIGHT = 1.6
+
+# Everything is recorded at one time; only the notation may differ, as by a
+# double that holds nanoseconds since 1970.
+_TOLERANCE_NS = 1000
+
+
+class CnsFolderSequence(FileSequence):
+    """A drive in the published layout of CNS.
+
+    The mount of the LiDAR is read from `transformation_lidar.yaml`, beside
+    the drive or up to two folders above it. Without such a file it is that
+    of the data set: 1.6 m above the vehicle.
+    """
+
+    def __init__(self, path: Path):
+        """Opens a drive.
+
+        Args:
+            path: its folder.
+
+        Raises:
+            InputError: if there is none, or its poses cannot be used.
+        """
+        folders = [path / name for name in _FOLDERS if (path / name).is_dir()]
+        if not folders:
+            raise InputError(
+                f"{path}: CNS: neither {' nor '.join(_FOLDERS)} in it"
+            )
+        files, stamps_ns = list_stamped(folders[0], ".pcd")
+        trajectory = read_quaternions(path / _POSES, ",")
+        X_WB = trajectory.at(stamps_ns, _TOLERANCE_NS)
+        resolved = path.resolve()
+        self._place = None
+        mount = _find_mount(resolved)
+        if mount is not None and mount.parent == resolved.parent.parent:
+            self._place = {
+                "map": resolved.parent.name.lower(),
+                "stage": resolved.name,
+            }
+        super().__init__(
+            name=resolved.name
+            if self._place is None
+            else f"{resolved.parent.name}_{resolved.name}".lower(),
+            world_frame="map",
+            files=files,
+            stamps_ns=stamps_ns,
+            X_WS=X_WB @ _read_mount(mount),
+        )
+
+    @property
+    def scenario(self) -> Mapping | None:
+        """Map and stage, as far as the folders' names tell them."""
+        return self._place
+
+    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
+        return read_cloud(path)
+
+
+def holds_cns(path: Path) -> bool:
+    """Returns whether a folder looks like a drive in CNS' layout."""
+    return (path / _POSES).is_file() or (path / _FOLDERS[0]).is_dir()
+
+
+def _find_mount(path: Path) -> Path | None:
+    for folder in (path, path.parent, path.parent.parent):
+        if (folder / _MOUNT).is_file():
+            return folder / _MOUNT
+    return None
+
+
+def _read_mount(path: Path | None) -> np.ndarray:
+    """Returns X_BS (4, 4), the pose of the LiDAR on the vehicle."""
+    if path is None:
+        return poses.make_pose(np.eye(3), np.array([0.0, 0.0, _LIDAR_HEIGHT]))
+    try:
+        text = path.read_text(encoding="utf-8")
+        # OpenCV begins its files with a directive that YAML does not know.
+        lines = [x for x in text.splitlines() if not x.startswith("%")]
+        X_BS = _find_pose(yaml.load("\n".join(lines), _Loader), path)
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from error
+    except (yaml.YAMLError, UnicodeDecodeError, ValueError) as error:
+        # YAML's messages have several lines.
+        raise InputError(f"{path}: {' '.join(str(error).split())}") from error
+    if X_BS is None:
+        raise InputError(
+            f"{path}: no transformation (a matrix of 4 x 4 or 3 x 4 numbers,"
+            " or translation and rotation)"
+        )
+    if X_BS[2, 3] <= 0.0:
+        raise InputError(
+            f"{path}: translation: puts the LiDAR at z = {X_BS[2, 3]:g} m,"
+            " not above the vehicle (the inverse transformation?)"
+        )
+    return X_BS
+
+
+class _Loader(yaml.SafeLoader):
+    """Reads what has a tag of its own (OpenCV's matrices) as if it had none."""
+
+
+_Loader.add_multi_constructor(
+    "tag:yaml.org,2002:opencv",
+    lambda loader, suffix, node: loader.construct_mapping(node, deep=True),
+)
+
+
+def _find_pose(node: Any, path: Path) -> np.ndarray | None:
+    """Returns the first transformation in a YAML tree, as (4, 4)."""
+    numbers = _numbers(node)
+    if numbers is not None and len(numbers) in (12, 16):
+        if len(numbers) == 16 and not np.array_equal(
+            numbers[12:], [0.0, 0.0, 0.0, 1.0]
+        ):
+            raise ValueError("the last row of the matrix is not 0 0 0 1")
+        return pose_matrices(path, numbers[None, :12])[0]
+    if isinstance(node, dict):
+        lowered = {str(key).lower(): value for key, value in node.items()}
+        p = _numbers(lowered.get("translation"))
+        rotation = _numbers(lowered.get("rotation"))
+        if p is not None and rotation is not None and len(p) == 3:
+            return _compose(p, rotation, path)
+        children = list(node.values())
+    else:
+        children = node if isinstance(node, list) else []
+    for child in children:
+        X = _find_pose(child, path)
+        if X is not None:
+            return X
+    return None
+
+
+def _compose(p: np.ndarray, rotation: np.ndarray, path: Path) -> np.ndarray:
+    """Returns the pose of a position and a quat_xyzw or a 3 x 3 matrix."""
+    if len(rotation) == 4:
+        R = poses.rotation_from_quaternion(rotation)
+    elif len(rotation) == 9:
+        R = rotation.reshape(3, 3)
+    else:
+        raise ValueError(
+            f"rotation: {len(rotation)} numbers instead of 4 (x y z w) or 9"
+        )
+    return pose_matrices(path, np.c_[R, p].reshape(1, 12))[0]
+
+
+def _numbers(node: Any) -> np.ndarray | None:
+    """Returns the numbers of a list, nested or not, or of x y z (w) keys."""
+    if isinstance(node, dict):
+        keys = [key for key in "xyzw" if key in node]
+        node = [node[key] for key in keys] if len(keys) >= 3 else None
+    try:
+        numbers = np.array(node, dtype=np.float64).ravel()
+    except (TypeError, ValueError):
+        return None
+    return numbers if node is not None and len(numbers) > 1 else None

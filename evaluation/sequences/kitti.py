@@ -1,0 +1,141 @@
+"""Drives of the KITTI odometry benchmark, and of others in its layout.
+
+    sequences/NN/velodyne/%06d.bin   float32 x y z reflectance
+    sequences/NN/times.txt           seconds
+    sequences/NN/calib.txt           Tr: upper 3 x 4 of X_CS
+    poses/NN.txt                     upper 3 x 4 of X_C0C, a row a scan
+
+C is the left grey camera (x right, y down, z forward), C0 that at the first
+scan, S the LiDAR.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from evaluation import poses
+from evaluation.errors import InputError
+from evaluation.sequences.scan_files import FileSequence, read_packed
+from evaluation.sequences.text_tables import (
+    check_increasing,
+    parse_seconds,
+    read_numbers,
+)
+from evaluation.sequences.trajectory import pose_matrices
+
+_SCANS = "velodyne"
+_RECORD = np.dtype([(name, "<f4") for name in ("x", "y", "z", "intensity")])
+
+
+class KittiSequence(FileSequence):
+    """A drive of KITTI odometry.
+
+    W is the frame of the LiDAR at the first scan, not that of the camera,
+    so that z is up: X_WS = inverse(Tr) X_C0C Tr.
+    """
+
+    def __init__(self, path: Path):
+        """Opens a drive.
+
+        Args:
+            path: its folder; the poses lie in `../../poses/<name>.txt`, or
+                as `poses.txt` beside the scans.
+
+        Raises:
+            InputError: if there is none, its files do not fit together, or
+                it has no poses (as 11 to 21).
+        """
+        files = _numbered_files(path / _SCANS)
+        times_path = path / "times.txt"
+        times = read_numbers(times_path, [("time", "U40")])["time"]
+        try:
+            stamps_ns = parse_seconds(times)
+        except ValueError as error:
+            raise InputError(f"{times_path}: {error}") from error
+        check_increasing(times_path, stamps_ns, "row")
+        poses_path = _poses_path(path)
+        X_C0C = _read_poses(poses_path)
+        for table, rows in ((times_path, stamps_ns), (poses_path, X_C0C)):
+            if len(rows) != len(files):
+                raise InputError(
+                    f"{table}: {len(rows)} rows for {len(files)} scans"
+                )
+        X_CS = _read_calibration(path / "calib.txt")
+        name = path.resolve().name
+        super().__init__(
+            name=name,
+            world_frame=f"kitti/{name}",
+            files=files,
+            stamps_ns=stamps_ns,
+            X_WS=poses.inverse(X_CS) @ X_C0C @ X_CS,
+        )
+
+    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
+        return read_packed(path, _RECORD)
+
+
+def holds_kitti(path: Path) -> bool:
+    """Returns whether a folder looks like a drive in KITTI's layout."""
+    return (path / _SCANS).is_dir()
+
+
+def _numbered_files(folder: Path) -> list[Path]:
+    """Returns the scans 000000.bin, 000001.bin, ... without a gap."""
+    files = sorted(folder.glob("*.bin"))
+    if not files:
+        raise InputError(f"{folder}: no scan (*.bin) in it")
+    for number, file in enumerate(files):
+        if file.name != f"{number:06d}.bin":
+            raise InputError(
+                f"{folder / f'{number:06d}.bin'}: missing (there is"
+                f" {file.name})"
+            )
+    return files
+
+
+def _poses_path(path: Path) -> Path:
+    resolved = path.resolve()
+    for candidate in (
+        resolved.parent.parent / "poses" / f"{resolved.name}.txt",
+        path / "poses.txt",
+    ):
+        if candidate.is_file():
+            return candidate
+    raise InputError(
+        f"{path}: KITTI: no poses, neither ../../poses/{resolved.name}.txt nor"
+        " poses.txt"
+    )
+
+
+def _read_poses(path: Path) -> np.ndarray:
+    values = read_numbers(path, float)
+    if values.shape[1] != 12:
+        raise InputError(
+            f"{path}: rows of {values.shape[1]} numbers instead of 12"
+        )
+    return pose_matrices(path, values)
+
+
+def _read_calibration(path: Path) -> np.ndarray:
+    """Returns X_CS (4, 4), the pose of the LiDAR in the camera's frame."""
+    try:
+        lines = path.read_text(encoding="ascii").splitlines()
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: not a text file") from error
+    for line in lines:
+        key, colon, text = line.partition(":")
+        if colon and key.strip() == "Tr":
+            try:
+                values = np.array([[float(word) for word in text.split()]])
+            except ValueError as error:
+                raise InputError(f"{path}: Tr: {error}") from error
+            if values.shape[1] != 12:
+                raise InputError(
+                    f"{path}: Tr: {values.shape[1]} numbers instead of 12"
+                )
+            return pose_matrices(path, values)[0]
+    raise InputError(f"{path}: Tr: missing")

@@ -1,0 +1,188 @@
+"""Drives that are stored as one file a scan."""
+
+from __future__ import annotations
+
+import abc
+from pathlib import Path
+
+import numpy as np
+
+from evaluation.errors import InputError
+from evaluation.sequences.sequence import Sequence
+from evaluation.sequences.text_tables import check_increasing, parse_stamps_ns
+
+# No LiDAR sees that far [m]: numbers beyond are no coordinates.
+_FARTHEST = 10_000.0
+
+
+class FileSequence(Sequence):
+    """A drive of which each scan is a file; the poses are in memory."""
+
+    def __init__(
+        self,
+        name: str,
+        world_frame: str,
+        files: list[Path],
+        stamps_ns: np.ndarray,
+        X_WS: np.ndarray,
+        notes: tuple[str, ...] = (),
+        datum: str | None = None,
+    ):
+        """Describes a drive of N >= 1 scans.
+
+        Args:
+            name: of the sequence.
+            world_frame: name of W.
+            files: N scans.
+            stamps_ns: (N,) int64 [ns], strictly increasing.
+            X_WS: (N, 4, 4).
+            notes: see `Sequence.notes`.
+            datum: see `Sequence.datum`.
+        """
+        self.name = name
+        self.world_frame = world_frame
+        self._files = files
+        self._stamps_ns = stamps_ns
+        self._X_WS = X_WS
+        self._notes = notes
+        self._datum = datum
+
+    def __len__(self) -> int:
+        return len(self._files)
+
+    @property
+    def stamps_ns(self) -> np.ndarray:
+        return self._stamps_ns
+
+    @property
+    def X_WS(self) -> np.ndarray:
+        return self._X_WS
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return self._notes
+
+    @property
+    def datum(self) -> str | None:
+        return self._datum
+
+    def scan(self, index: int) -> np.ndarray:
+        if not 0 <= index < len(self):
+            raise IndexError(f"scan {index} of {len(self)}")
+        path = self._files[index]
+        try:
+            return _returns(self._read(path, int(self._stamps_ns[index])))
+        except OSError as error:
+            raise InputError(f"{path}: {error.strerror or error}") from error
+        except ValueError as error:
+            raise InputError(f"{path}: {error}") from error
+
+    @abc.abstractmethod
+    def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
+        """Reads the points of one scan, as they are in the file.
+
+        Raises:
+            ValueError: if the file is not of its format.
+            OSError: if it cannot be read.
+        """
+
+
+def list_stamped(folder: Path, suffix: str) -> tuple[list[Path], np.ndarray]:
+    """Finds files that are named by their time.
+
+    Args:
+        folder: where they lie.
+        suffix: how their names end, after the time.
+
+    Returns:
+        The files in order of time; (N,) int64 times [ns]; N >= 1.
+
+    Raises:
+        InputError: if there is none, or a name is no time.
+    """
+    files = [
+        path
+        for path in folder.glob(f"*{suffix}")
+        if not path.name.startswith(".")
+    ]
+    if not files:
+        raise InputError(f"{folder}: no scan (*{suffix}) in it")
+    stems = [path.name.removesuffix(suffix) for path in files]
+    try:
+        stamps_ns = parse_stamps_ns(np.array(stems))
+    except ValueError as error:
+        raise InputError(
+            f"{folder}: a file named *{suffix}: {error}"
+        ) from error
+    order = np.argsort(stamps_ns, kind="stable")
+    check_increasing(folder, stamps_ns[order], "scan")
+    return [files[i] for i in order], stamps_ns[order]
+
+
+def keep_spanned(
+    files: list[Path], spanned: np.ndarray, poses_path: Path
+) -> tuple[list[Path], tuple[str, ...]]:
+    """Leaves out the scans before the first and after the last pose.
+
+    Returns:
+        The other files; a note about it, if there is something to note.
+    """
+    if spanned.all():
+        return files, ()
+    kept = [file for file, inside in zip(files, spanned, strict=True) if inside]
+    missing = len(files) - len(kept)
+    return kept, (
+        f"{poses_path}: no pose for {missing} of {len(files)} scans at the"
+        " ends of the drive; they are left out",
+    )
+
+
+def read_packed(path: Path, dtype: np.dtype) -> np.ndarray:
+    """Reads a file that is nothing but records.
+
+    Raises:
+        ValueError: if it is no whole number of them.
+        OSError: if it cannot be read.
+    """
+    data = path.read_bytes()
+    if len(data) % dtype.itemsize:
+        raise ValueError(
+            f"{len(data)} bytes is no whole number of points of"
+            f" {dtype.itemsize} bytes (cut off, or of another sensor)"
+        )
+    return np.frombuffer(data, dtype=dtype)
+
+
+def check_below(points: np.ndarray, name: str, limit: int) -> None:
+    """Refuses points with a number that their sensor does not have.
+
+    It tells files of one sensor from those of another.
+
+    Raises:
+        ValueError: if `points[name]` reaches `limit`.
+    """
+    if len(points) and points[name].max() >= limit:
+        raise ValueError(
+            f"{name}: {points[name].max()} is not below {limit} (of another"
+            " sensor)"
+        )
+
+
+def _returns(points: np.ndarray) -> np.ndarray:
+    """Leaves out what came back from nowhere: points at the origin.
+
+    Raises:
+        ValueError: if a coordinate is not finite, or out of this world.
+    """
+    is_return = np.zeros(len(points), dtype=bool)
+    for name in "xyz":
+        # A comparison with NaN is false.
+        bad = ~(np.abs(points[name]) < _FARTHEST)
+        if bad.any():
+            first = int(np.flatnonzero(bad)[0])
+            raise ValueError(
+                f"{name}: point {first} of {len(points)} is at"
+                f" {points[name][first]:g} m"
+            )
+        is_return |= points[name] != 0.0
+    return points[is_return]
