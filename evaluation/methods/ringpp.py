@@ -118,6 +118,8 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
       the formulas have in the limit. In the program, which computes in
       single precision, rounding makes about one in ten of them NaN, and
       these points are passed over.
+    - Rays sample the map from above up to where it is zero. The program's
+      end at its edge, and rounding adds or drops a sample there.
     - Fewer points than neighbours asked for are all neighbours.
     - A scan that shows nothing is no candidate and finds none.
     """
