@@ -6,12 +6,14 @@ from dataclasses import dataclass
 import itertools
 
 import numpy as np
-from shapely import unary_union
+from shapely import set_precision, unary_union
 from shapely.geometry import LineString, MultiPolygon, Point, Polygon
 
 # Segments of a quarter circle in rounded outlines: a kerb of 13 m radius is
 # then true to 6 cm.
 _QUADRANT_SEGMENTS = 8
+# Outlines have their vertices on a grid of this width [m].
+_GRID = 0.001
 # Vertices closer to the outline than this are dropped [m].
 _SIMPLIFY = 0.01
 # Areas that meet are joined over gaps up to twice this width [m].
@@ -65,7 +67,7 @@ def _band(road, right, left, clearance=0.0) -> Polygon:
         road.evaluate(stations, left)[:, :2],
         road.evaluate(stations, right)[::-1, :2],
     ]
-    return Polygon(np.concatenate(outline)).simplify(_SIMPLIFY)
+    return _simplified(Polygon(np.concatenate(outline)))
 
 
 def junction_area(roads, junction) -> Polygon:
@@ -107,9 +109,7 @@ def junction_area(roads, junction) -> Polygon:
     )
     pieces = getattr(area, "geoms", [area])
     centre = Point(junction.position)
-    return min(pieces, key=lambda piece: piece.distance(centre)).simplify(
-        _SIMPLIFY
-    )
+    return _simplified(min(pieces, key=lambda piece: piece.distance(centre)))
 
 
 def _stub(road, arm) -> LineString:
@@ -170,7 +170,7 @@ def make_areas(roads, junction_areas) -> Areas:
         )
         walks.append(area.buffer(width, quad_segs=_QUADRANT_SEGMENTS))
     medians = unary_union(medians)
-    outline = _join(walks).simplify(_SIMPLIFY)
+    outline = _simplified(_join(walks))
     return Areas(
         carriageway=_multi(carriageway.difference(medians)),
         lane_area=_multi(without_bays.difference(medians)),
@@ -188,7 +188,17 @@ def _median(road) -> Polygon:
     )
     stations = road.stations(clearance=half)
     line = LineString(road.evaluate(stations, shift)[:, :2])
-    return line.buffer(half, quad_segs=_QUADRANT_SEGMENTS).simplify(_SIMPLIFY)
+    return _simplified(line.buffer(half, quad_segs=_QUADRANT_SEGMENTS))
+
+
+def _simplified(area):
+    """Returns an area without the vertices that its outline can do without.
+
+    On an evenly sampled arc many vertices are equally dispensable. Rounding
+    before, not after, makes the choice independent of the last bits, which
+    differ from one version of the numerical libraries to the next.
+    """
+    return set_precision(area, _GRID).simplify(_SIMPLIFY)
 
 
 def _join(parts):

@@ -1,4 +1,4 @@
-"""Ground polygons: triangulation, tiles and walls as meshes."""
+"""Ground polygons: tiles, surfaces and walls as meshes."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from shapely.geometry import MultiPolygon, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.mesh import Mesh
+from cns_drake.city.triangulation import triangulate
 
 # Height above W's origin [m] at arrays of x and y [m].
 HeightMap = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -63,28 +64,9 @@ def tiles(
             )
             if not geometry.intersects(square):
                 continue
-            piece = polygons_of(geometry.intersection(square))
+            piece = polygons_of(snap(geometry.intersection(square)))
             if piece:
                 yield column, row, MultiPolygon(piece)
-
-
-def triangulate(polygon: Polygon) -> np.ndarray:
-    """Returns the polygon as (M, 3, 2) counter-clockwise triangles.
-
-    The triangulation is the constrained Delaunay one: it uses the polygon's
-    own vertices and edges and adds none.
-    """
-    triangles = shapely.get_parts(
-        shapely.constrained_delaunay_triangles(polygon)
-    )
-    corners = np.array(
-        [triangle.exterior.coords[:3] for triangle in triangles]
-    ).reshape(-1, 3, 2)
-    first = corners[:, 1] - corners[:, 0]
-    second = corners[:, 2] - corners[:, 0]
-    area = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
-    corners[area < 0] = corners[area < 0][:, ::-1]
-    return corners[area != 0]
 
 
 def surface_mesh(
