@@ -301,6 +301,18 @@ def extruded(profile, x0: float, x1: float) -> Mesh:
     return Mesh(np.array(vertices), tuple(faces))
 
 
+def swapped(mesh: Mesh) -> Mesh:
+    """Returns the mesh with its x and y axes exchanged."""
+    faces = tuple(face[::-1] for face in mesh.faces)
+    return Mesh(mesh.vertices[:, [1, 0, 2]], faces)
+
+
+def shortest_side(points) -> float:
+    """Returns the shorter side of an outline's bounding box [m]."""
+    span = np.ptp(np.asarray(points, dtype=float), axis=0)
+    return float(min(span))
+
+
 def roof_pan(points, z_floor: float, z_top: float, thickness: float) -> Mesh:
     """Returns a flat roof inside a parapet: coping, inner walls, floor."""
     points = np.asarray(points, dtype=float)

@@ -121,7 +121,7 @@ def _add_crown(assembly, p: ArtDecoTower, plan, z0) -> None:
     pieces = []
     height = p.height - z0
     step = round((1.0 - p.spire) * height / p.crown_steps, 2)
-    side = outlines.shortest_side(plan)
+    side = massing.shortest_side(plan)
     for k in range(p.crown_steps):
         step_bands = (
             Band(0.6, 0.5 * step, 0.25),

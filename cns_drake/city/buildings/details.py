@@ -61,7 +61,7 @@ class WallFrame:
 def canopy(x0: float, x1: float, reach: float, z: float) -> Mesh:
     """A flat canopy with a fascia, hung on two slanted rods."""
     rods = [
-        _beam((x, 0.05, z + 1.2), (x, reach - 0.3, z + 0.3), 0.08)
+        beam((x, 0.05, z + 1.2), (x, reach - 0.3, z + 0.3), 0.08)
         for x in (x0 + 0.4, x1 - 0.4)
     ]
     slab = box_mesh((x1 - x0, reach, 0.3), ((x0 + x1) / 2, reach / 2, z + 0.15))
@@ -266,7 +266,7 @@ def fire_stairs_flight() -> Mesh:
         ),
     ]
     bars += [
-        _beam((-1.6, y, 0.0), (1.4, y, high), 0.12)
+        beam((-1.6, y, 0.0), (1.4, y, high), 0.12)
         for y in (-0.35 * reach, -0.85 * reach)
     ]
     return merge_meshes(bars)
@@ -287,7 +287,7 @@ def column(x: float, y: float, z0: float, z1: float, radius: float) -> Mesh:
     )
 
 
-def _beam(start, end, width: float) -> Mesh:
+def beam(start, end, width: float) -> Mesh:
     """A square bar between two points that lie on no common upright."""
     start, end = np.asarray(start, float), np.asarray(end, float)
     along = (end - start) / np.linalg.norm(end - start)

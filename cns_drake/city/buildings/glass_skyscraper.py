@@ -47,7 +47,7 @@ class GlassSkyscraper:
 def draw(site: Site, height: float, rng: np.random.Generator):
     """Draws the parameters of one skyscraper."""
     outline = site.outline
-    side = outlines.shortest_side(outline)
+    side = massing.shortest_side(outline)
     count = len(outline)
     heights = ((0.62,), (0.45, 0.78))[int(rng.integers(2))]
     style = int(rng.integers(4))  # Ribbons, a grid, or upright fins (twice).
@@ -172,7 +172,7 @@ def _add_crown(assembly, p, plan, z0, rng) -> None:
         low = round(0.45 * height, 2)
         ledge = Facade(low, (Band(low - 0.5, low, -0.3),))
         tiers.add_crown(assembly, plan, ledge, z0, 1.0, part="crown_low")
-        reach = 0.12 * outlines.shortest_side(plan)
+        reach = 0.12 * massing.shortest_side(plan)
         plan = massing.inset(plan, min(reach, massing.inset_limit(plan)))
         z0, height = round(z0 + low - 1.0, 3), round(height - low + 1.0, 3)
     louvres = tuple(

@@ -95,9 +95,3 @@ def mirrored(points) -> np.ndarray:
     flipped = np.column_stack([2 * middle - points[:, 0], points[:, 1]])
     # Mirroring turns it clockwise; the front edge stays first.
     return np.roll(flipped[::-1], 2 - len(points), axis=0)
-
-
-def shortest_side(points) -> float:
-    """Returns the shorter side of an outline's bounding box [m]."""
-    span = np.ptp(np.asarray(points, dtype=float), axis=0)
-    return float(min(span))

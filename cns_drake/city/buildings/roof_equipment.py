@@ -14,7 +14,7 @@ import numpy as np
 from shapely.geometry import Point, Polygon
 
 from cns_drake.city import massing
-from cns_drake.city.buildings.site import Assembly
+from cns_drake.city.buildings.site import Assembly, Rgb
 from cns_drake.city.mesh import Mesh, box_mesh, merge_meshes
 from cns_drake.city.structures import MeshShape
 
@@ -186,7 +186,42 @@ def _dish() -> Mesh:
     )
 
 
+def _chimney() -> Mesh:
+    """A brick stack with a corbelled head and two pots, 2.4 m."""
+    pots = [
+        massing.prism(massing.regular_polygon(0.13, 6, (x, 0.0)), 2.1, 2.4)
+        for x in (-0.2, 0.2)
+    ]
+    return merge_meshes(
+        [
+            massing.skirt(_CHIMNEY_PLAN, _CHIMNEY_PLAN, 0.0, 1.8),
+            massing.box(-0.52, 0.52, -0.34, 0.34, 1.8, 2.1),
+            *pots,
+        ]
+    )
+
+
+def _chimney_row() -> Mesh:
+    """A wide stack that two houses share, with five pots, 2.3 m."""
+    pots = [
+        massing.prism(massing.regular_polygon(0.12, 6, (x, 0.0)), 2.0, 2.3)
+        for x in np.linspace(-0.8, 0.8, 5).tolist()
+    ]
+    body = massing.rectangle(-1.0, -0.28, 1.0, 0.28)
+    return merge_meshes(
+        [
+            massing.skirt(body, body, 0.0, 1.7),
+            massing.box(-1.08, 1.08, -0.36, 0.36, 1.7, 2.0),
+            *pots,
+        ]
+    )
+
+
+_CHIMNEY_PLAN = massing.rectangle(-0.44, -0.26, 0.44, 0.26)
+
 _MAKERS = {
+    "roof_chimney": (_chimney, 0.6),
+    "roof_chimney_row": (_chimney_row, 1.1),
     "roof_ac_unit": (_ac_unit, 1.6),
     "roof_air_handler": (_air_handler, 3.8),
     "roof_cooling_tower": (_cooling_tower, 2.2),
@@ -205,6 +240,31 @@ _MAKERS = {
 def equipment_mesh(name: str) -> Mesh:
     """Returns a shared mesh by its name (`roof_...`)."""
     return _MAKERS[name][0]()
+
+
+def add_chimney(
+    assembly: Assembly,
+    part: str,
+    xyz: tuple[float, float, float],
+    rgb: Rgb,
+    *,
+    item: str = "roof_chimney",
+    yaw: float = 0.0,
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0),
+) -> None:
+    """Stands a shared chimney on a pitched roof.
+
+    Args:
+        assembly: the building.
+        part: name of the visual.
+        xyz: of its foot, below the roof's surface [m].
+        rgb: its colour.
+        item: `roof_chimney` or `roof_chimney_row`.
+        yaw: its heading [rad].
+        scale: along its axes.
+    """
+    assembly.share(item, equipment_mesh(item))
+    assembly.place(part, MeshShape(item, scale), xyz, yaw, rgb=rgb)
 
 
 def equip_roof(

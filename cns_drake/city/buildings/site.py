@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from shapely.geometry import Polygon
@@ -14,9 +14,15 @@ from cns_drake.city.mesh import Mesh
 from cns_drake.city.structures import MeshShape, Model, Part, Shape
 
 Rgb = tuple[float, float, float]
+T = TypeVar("T")
 
 # Buildings reach below their own ground level, for the ground has relief.
 FOUNDATION_M = 0.5
+
+
+def pick(rng: np.random.Generator, choices: Sequence[T]) -> T:
+    """Returns one of the choices, all equally likely."""
+    return choices[int(rng.integers(len(choices)))]
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from cns_drake.city.buildings.car_park import CAR_PARK
 from cns_drake.city.buildings.church import CHURCH
 from cns_drake.city.buildings.corner_building import CORNER_BUILDING
 from cns_drake.city.buildings.court_block import COURT_BLOCK
+from cns_drake.city.buildings.detached_house import DETACHED_HOUSE
 from cns_drake.city.buildings.glass_skyscraper import GLASS_SKYSCRAPER
 from cns_drake.city.buildings.hotel import HOTEL
 from cns_drake.city.buildings.museum import MUSEUM
@@ -28,7 +29,6 @@ CHAPEL = plain_house("chapel", (10.0, 30.0), (9.0, 40.0))
 BARN = plain_house("barn", (5.0, 14.0), (7.0, 40.0))
 SCHOOL = plain_house("school", (7.0, 18.0), (20.0, 90.0))
 KIOSK_ROW = plain_house("kiosk_row", (3.2, 8.0), (6.0, 60.0))
-DETACHED_HOUSE = plain_house("detached_house", (5.0, 12.0), (8.0, 26.0))
 BUNGALOW = plain_house("bungalow", (3.8, 8.0), (8.0, 30.0))
 SEMI_DETACHED = plain_house("semi_detached", (6.0, 12.0), (9.0, 26.0))
 TERRACE = plain_house("terrace", (6.0, 13.0), (8.0, 70.0), True)

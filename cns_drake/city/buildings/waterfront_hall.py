@@ -145,7 +145,8 @@ def _roof(p: WaterfrontHall, plan) -> Mesh:
     (x0, y0), (x1, y1) = plan[0], plan[2]
     rise = p.height - p.eaves
     if p.roof == "sawtooth":
-        teeth = _extruded_along_y(_sawtooth(x0, x1, rise), y0, y1)
+        teeth = massing.extruded(_sawtooth(x0, x1, rise), y0, y1)
+        teeth = massing.swapped(teeth)
         return teeth.moved((0.0, 0.0, p.eaves))
     pieces = []
     edges = np.linspace(y0, y1, p.spans + 1)
@@ -154,13 +155,6 @@ def _roof(p: WaterfrontHall, plan) -> Mesh:
         pieces.append(shed.moved((0.0, 0.0, p.eaves)))
         pieces += _ridge(p, x0, x1, (a + b) / 2)
     return merge_meshes(pieces)
-
-
-def _extruded_along_y(profile, y0: float, y1: float) -> Mesh:
-    """Like `massing.extruded`, along the other axis."""
-    shed = massing.extruded(profile, y0, y1)
-    faces = tuple(face[::-1] for face in shed.faces)
-    return Mesh(shed.vertices[:, [1, 0, 2]], faces)
 
 
 def _sawtooth(x0: float, x1: float, rise: float) -> list:

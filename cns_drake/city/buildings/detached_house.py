@@ -1,0 +1,365 @@
+"""The detached house: wings under gables or hips, a porch, a garage."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cns_drake.city.buildings import (
+    bays,
+    dormers,
+    house_walls,
+    porches,
+    wings,
+)
+from cns_drake.city.buildings.materials import Materials
+from cns_drake.city.buildings.roof_equipment import add_chimney
+from cns_drake.city.buildings.site import Archetype, Assembly, Site, pick
+from cns_drake.city.buildings.wings import Openings, Roof, Wing
+from cns_drake.city.facades import Band
+from cns_drake.city.structures import Model
+
+_WALLS = (
+    (0.86, 0.84, 0.78),
+    (0.72, 0.74, 0.72),
+    (0.80, 0.74, 0.60),
+    (0.56, 0.62, 0.66),
+    (0.62, 0.42, 0.34),
+    (0.66, 0.68, 0.56),
+    (0.78, 0.66, 0.56),
+)
+_ROOFS = (
+    (0.34, 0.33, 0.34),
+    (0.46, 0.28, 0.22),
+    (0.40, 0.35, 0.30),
+    (0.28, 0.31, 0.34),
+)
+_ACCENTS = (
+    (0.45, 0.16, 0.14),
+    (0.20, 0.32, 0.26),
+    (0.22, 0.28, 0.40),
+    (0.42, 0.30, 0.20),
+)
+_TRIM = (0.90, 0.89, 0.86)
+_BASE = (0.58, 0.56, 0.53)
+_BRICK = (0.52, 0.32, 0.26)
+
+# Kept free around the walls, for eaves and chimneys [m].
+_MARGIN = 0.5
+_STOREY = 2.65
+_ROOF = 0.2
+
+
+@dataclass(frozen=True)
+class DetachedHouse:
+    """Parameters of a detached house; lengths in metres.
+
+    `plan` is `box`, `ell` (a wing to the front), `tee` (a wing to the
+    back) or `cross` (both). The garage stands on the right, the front wing
+    on the left, unless `mirrored`.
+    """
+
+    height: float
+    plan: str
+    mirrored: bool
+    roof: str
+    pitch_deg: float
+    wing_width: float
+    low_wing: bool
+    deck: float
+    window_pitch: float
+    window_width: float
+    casing: str
+    porch: str
+    porch_reach: float
+    garage: str
+    garage_width: float
+    chimney: str
+    chimney_at: float
+    dormers: int
+    dormer: str
+    bay_window: bool
+    rgb: tuple[float, float, float]
+    roof_rgb: tuple[float, float, float]
+    accent_rgb: tuple[float, float, float]
+
+
+def draw(site: Site, height: float, rng: np.random.Generator):
+    """Draws the parameters of one house."""
+    return DetachedHouse(
+        height=height,
+        plan=pick(rng, ("box", "ell", "tee", "cross", "ell")),
+        mirrored=bool(rng.random() < 0.5),
+        roof=pick(rng, ("gable", "gable", "hip")),
+        pitch_deg=float(rng.uniform(28.0, 45.0)),
+        wing_width=float(rng.uniform(0.36, 0.46)),
+        low_wing=bool(rng.random() < 0.35),
+        deck=round(float(rng.uniform(0.2, 0.6)), 2),
+        window_pitch=float(rng.uniform(2.6, 3.4)),
+        window_width=round(float(rng.uniform(0.95, 1.3)), 2),
+        casing=pick(rng, ("frame", "sill", "sill", "shutters")),
+        porch=pick(rng, ("shed", "gable", "full", "flat")),
+        porch_reach=round(float(rng.uniform(1.5, 2.2)), 2),
+        garage=pick(rng, ("flat", "gable", "shed", "none")),
+        garage_width=round(float(rng.uniform(3.2, 5.8)), 1),
+        chimney=pick(rng, ("ridge", "breast", "ridge", "none")),
+        chimney_at=float(rng.uniform(0.2, 0.8)),
+        dormers=int(rng.integers(0, 3)),
+        dormer=pick(rng, ("gable", "shed")),
+        bay_window=bool(rng.random() < 0.4),
+        rgb=pick(rng, _WALLS),
+        roof_rgb=pick(rng, _ROOFS),
+        accent_rgb=pick(rng, _ACCENTS),
+    )
+
+
+_WING_ENDS = {
+    "box": (),
+    "ell": ("front",),
+    "tee": ("back",),
+    "cross": ("front", "back"),
+}
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """Where the parts of a house stand.
+
+    Attributes:
+        main, wings, garage: its boxes.
+        storeys: of the main box.
+        free: part of the main front that no wing hides, in x [m].
+        ahead: room in front of the main front [m].
+    """
+
+    main: Wing
+    wings: tuple[Wing, ...]
+    garage: Wing | None
+    storeys: int
+    free: tuple[float, float]
+    ahead: float
+
+    @property
+    def boxes(self) -> tuple[Wing, ...]:
+        garage = () if self.garage is None else (self.garage,)
+        return (self.main, *self.wings, *garage)
+
+    def mirrored(self, width: float) -> _Plan:
+        """Returns the plan with x replaced by `width` - x."""
+        parts = tuple(wing.mirrored(width) for wing in self.wings)
+        garage = self.garage and self.garage.mirrored(width)
+        a, b = self.free
+        return replace(
+            self,
+            main=self.main.mirrored(width),
+            wings=parts,
+            garage=garage,
+            free=(width - b, width - a),
+        )
+
+
+def _storeys(height: float, deck: float, span: float, pitch_deg: float) -> int:
+    """Returns the storeys that bring the roof closest to its pitch."""
+    wanted = wings.ridge_rise(span, pitch_deg)
+    room = height - _ROOF - deck - 0.15
+    return min(
+        (n for n in (1, 2, 3) if n == 1 or room - n * _STOREY > 0.1 * span),
+        key=lambda n: abs(room - n * _STOREY - wanted),
+    )
+
+
+def _planned(p: DetachedHouse, site: Site) -> _Plan:
+    """Lays the house out."""
+    x0, y0, x1, y1 = site.bounds
+    left, right, back = x0 + _MARGIN, x1 - _MARGIN, y1 - _MARGIN
+    ahead = min(p.porch_reach + 0.3 + 1.8 * p.deck, 0.3 * (back - y0))
+    front = y0 + ahead
+    main_back = front + min(back - front, 10.0)
+    deep = main_back - front
+    garage_width = min(p.garage_width, 0.36 * (right - left))
+    has_garage = p.garage != "none" and garage_width > 2.9
+    split = right - garage_width * has_garage
+    n = _storeys(p.height, p.deck, deep, p.pitch_deg)
+    wall_top = min(p.deck + n * _STOREY + 0.15, p.height - _ROOF - 0.08 * deep)
+    slope = 2 * (p.height - wall_top - _ROOF) / deep
+    roof = Roof(p.roof, eaves=0.4, verge=0.3, thickness=_ROOF)
+    main = Wing.at(left, front, split, main_back, wall_top, p.height, roof)
+    wide = max(3.2, p.wing_width * (split - left))
+    drop = _STOREY * (n > 1 and p.low_wing)
+    top = min(wall_top + _ROOF + slope * wide / 2, p.height - 0.25) - drop
+    shape = Roof(p.roof, True, 0.35, 0.3, _ROOF)
+    middle = (front + main_back) / 2
+    parts = []
+    for end in _WING_ENDS[p.plan]:
+        if end == "front":
+            span = (left - 0.02, front - max(0.6, ahead - 0.6))
+            area = (*span, left + wide, middle)
+        else:
+            a = left + 0.4 * (split - left - wide)
+            area = (a, middle, a + wide, min(back, main_back + 3.0))
+        if end == "front" or back - main_back > 1.0:
+            parts.append(Wing.at(*area, wall_top - drop, top, shape))
+    garage = None
+    if has_garage:
+        garage = _garage(p, split - 0.06, right, front + 0.6, main_back)
+    taken = left + wide if "front" in _WING_ENDS[p.plan] else left
+    plan = _Plan(main, tuple(parts), garage, n, (taken, split), ahead)
+    return plan.mirrored(x0 + x1) if p.mirrored else plan
+
+
+def _garage(p: DetachedHouse, x0, x1, y0, y1) -> Wing:
+    wall_top, span = 2.65, x1 - x0
+    top = {
+        "flat": wall_top + 0.5,
+        "gable": wall_top + _ROOF + 0.3 * span,
+        "shed": wall_top + _ROOF + 0.2 * span,
+    }[p.garage]
+    shape = Roof(p.garage, True, 0.3, 0.25, _ROOF)
+    back = min(y1 - 0.4, y0 + 6.5)
+    return Wing.at(x0, y0, x1, back, wall_top, min(top, p.height), shape)
+
+
+def build(p: DetachedHouse, site: Site, rng: np.random.Generator) -> Model:
+    """Builds the house on a rectangle, its porch in front."""
+    assembly = Assembly(site.name, p.rgb)
+    materials = Materials(
+        {
+            "walls": p.rgb,
+            "glass": assembly.glass_rgb,
+            "roof": p.roof_rgb,
+            "trim": _TRIM,
+            "accent": p.accent_rgb,
+            "base": _BASE,
+        }
+    )
+    plan = _planned(p, site)
+    _add_main(assembly, materials, p, plan)
+    for wing in plan.wings:
+        _add_wing(materials, p, plan, wing)
+    if plan.garage is not None:
+        _add_garage(materials, plan)
+    _add_chimney(assembly, materials, p, plan)
+    materials.finish(assembly)
+    return assembly.model(site)
+
+
+def _add_main(assembly, materials, p: DetachedHouse, plan: _Plan) -> None:
+    main = plan.main
+    openings = _windows(p, plan, main, plan.storeys)
+    wall = main.wall(0)
+    a, b = (x - main.x0 for x in plan.free)
+    door = a + 0.5 * (b - a)
+    house_walls.add_door(materials, main, openings, 0, door, p.deck, lights=0.3)
+    _add_porch(assembly, materials, p, plan, (a, b))
+    _close(materials, p, main, openings)
+    base, high = main.wall_top + _ROOF, main.top - main.wall_top - _ROOF
+    if p.roof == "gable" and high > 2.0:
+        slope = 2 * high / (main.y1 - main.y0)
+        for u, v in bays.stretches(b - a, 3.0, 0.4)[: p.dormers]:
+            dormers.add_dormer(
+                materials, wall, a + (u + v) / 2, 1.5, base=base, slope=slope,
+                ridge=main.top, setback=0.2 * high / slope, height=1.3,
+                roof=p.dormer,
+            )  # fmt: skip
+
+
+def _windows(p: DetachedHouse, plan: _Plan, wing: Wing, count: int) -> Openings:
+    openings = Openings(wing, plan.boxes)
+    for edges, pitch in (((0, 2), p.window_pitch), ((1, 3), 3.8)):
+        house_walls.add_rows(
+            openings, edges, p.deck, _STOREY, count, pitch, p.window_width
+        )
+    return openings
+
+
+def _close(materials, p: DetachedHouse, wing: Wing, openings) -> None:
+    """Adds walls and roof around the openings of a wing."""
+    house_walls.add_casings(materials, wing, openings, (0,), p.casing)
+    bands = (Band(0.0, p.deck, -0.04),)
+    wings.add_walls(materials, wing, openings, (house_walls.GLASS_M,), bands)
+    low = wing.wall_top + 0.4
+    attic = wings.attic_window(0.9, low, low + 1.0, house_walls.GLASS_M)
+    wings.add_roof(materials, wing, attic)
+
+
+def _add_porch(assembly, materials, p: DetachedHouse, plan, free) -> None:
+    """Roofs the door; a `full` porch runs along the free front."""
+    wall = plan.main.wall(0)
+    a, b = free
+    door = (a + b) / 2
+    reach = min(p.porch_reach, plan.ahead - 0.3)
+    eaves = p.deck + 2.3
+    top = eaves + (0.9 if p.porch == "gable" else 0.45)
+    if plan.storeys == 1:
+        top = min(top, plan.main.wall_top + 0.1)
+    full = p.porch == "full" and b - a > 3.5
+    x0, x1 = (a + 0.3, b - 0.3) if full else (door - 1.2, door + 1.2)
+    porches.add_porch(
+        materials, wall, x0, x1, reach, p.deck, eaves, top,
+        roof="shed" if p.porch == "full" else p.porch,
+        posts=max(3, round((x1 - x0) / 2.2)) if full else 2,
+    )  # fmt: skip
+    room = plan.ahead - reach - 0.02
+    porches.add_steps(
+        materials, wall, door - 0.7, door + 0.7, reach, p.deck, room
+    )
+    if full and p.deck > 0.3:
+        y = reach - 0.15
+        runs = (
+            ((x0 + 0.15, y), (door - 0.8, y)),
+            ((door + 0.8, y), (x1 - 0.15, y)),
+        )
+        for k, (start, end) in enumerate(runs):
+            porches.add_railing(
+                assembly, f"railing_{k}", wall, start, end, p.deck, _TRIM
+            )
+
+
+def _add_wing(materials, p: DetachedHouse, plan: _Plan, wing: Wing) -> None:
+    count = max(1, round((wing.wall_top - p.deck) / _STOREY))
+    openings = _windows(p, plan, wing, count)
+    _close(materials, p, wing, openings)
+    is_front = wing.y0 < plan.main.y0
+    if p.bay_window and is_front and wing.x1 - wing.x0 > 3.0:
+        x = (wing.x1 - wing.x0) / 2
+        porches.add_bay_window(
+            materials, wing.wall(0), x, 2.2, 0.4, 0.0, p.deck + 2.3
+        )
+
+
+def _add_garage(materials, plan: _Plan) -> None:
+    garage = plan.garage
+    openings = Openings(garage, plan.boxes)
+    length = garage.x1 - garage.x0
+    house_walls.add_garage_door(
+        materials, garage, openings, 0, length / 2, min(length - 0.7, 4.9)
+    )
+    openings.row((1, 3), 1.0, 3.4, [house_walls.sash(0.9, 0.0, 1.1, 2.0)])
+    wings.add_walls(materials, garage, openings, (house_walls.GLASS_M,))
+    wings.add_roof(materials, garage)
+
+
+def _add_chimney(assembly, materials, p: DetachedHouse, plan: _Plan) -> None:
+    main = plan.main
+    y = (main.y0 + main.y1) / 2
+    if p.chimney == "breast":
+        wall = main.wall(1 if p.mirrored else 3)
+        x = wall.length / 2
+        breast = porches.chimney_breast(wall, x, 1.6, 0.42, main.top - 0.1)
+        materials.add("base", breast)
+        spot = (*wall.point(x, 0.18).tolist(), main.top - 0.9)
+        add_chimney(assembly, "chimney", spot, _BASE, yaw=np.pi / 2)
+    elif p.chimney == "ridge":
+        x = main.x0 + p.chimney_at * (main.x1 - main.x0)
+        add_chimney(assembly, "chimney", (x, y, main.top - 1.2), _BRICK)
+
+
+DETACHED_HOUSE = Archetype(
+    name="detached_house",
+    draw=draw,
+    build=build,
+    heights=(5.0, 12.0),
+    widths=(8.0, 26.0),
+    overhang=0.35,
+)

@@ -1,0 +1,375 @@
+"""Houses of several wings: boxes with windows, each under its own roof.
+
+Wings may overlap: where one stands against another, the walls get no
+windows. A wing's edges count like those of a rectangle: 0 front, 1 right,
+2 back, 3 left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+import itertools
+import math
+
+import numpy as np
+
+from cns_drake.city import massing
+from cns_drake.city.buildings import bays, details, pitched_roofs
+from cns_drake.city.buildings.materials import Materials
+from cns_drake.city.buildings.pitched_roofs import Hole
+from cns_drake.city.buildings.site import FOUNDATION_M
+from cns_drake.city.facades import (
+    Band,
+    Facade,
+    Relief,
+    facade_mesh,
+    glass_mesh,
+)
+
+# Overlap of a roof's underside with the top of the walls [m].
+_SEAT = 0.02
+
+
+@dataclass(frozen=True)
+class Roof:
+    """The shape of a roof.
+
+    Attributes:
+        kind: `gable`, `gambrel`, `barrel`, `shed`, `hip`, `mansard`, `flat`.
+        along_y: whether the ridge runs from the front to the back; a shed
+            roof rises across the ridge's direction.
+        eaves: overhang below the slopes [m].
+        verge: overhang beyond the gables [m].
+        thickness: of the roof, measured upright [m].
+        ridge: place of a gable roof's ridge as a part of the span.
+        parapet: of a flat roof [m].
+    """
+
+    kind: str = "gable"
+    along_y: bool = False
+    eaves: float = 0.4
+    verge: float = 0.3
+    thickness: float = 0.22
+    ridge: float = 0.5
+    parapet: float = 0.4
+
+
+@dataclass(frozen=True)
+class Wing:
+    """A box of a house.
+
+    Attributes:
+        x0, y0, x1, y1: its walls [m].
+        wall_top: top of its walls [m].
+        top: of its roof [m]; of a flat roof, the parapet.
+        roof: shape of its roof.
+        blind: edges built against a neighbour: flush and plain.
+    """
+
+    x0: float
+    y0: float
+    x1: float
+    y1: float
+    wall_top: float
+    top: float
+    roof: Roof = field(default_factory=Roof)
+    blind: frozenset[int] = frozenset()
+
+    @staticmethod
+    def at(
+        x0: float,
+        y0: float,
+        x1: float,
+        y1: float,
+        wall_top: float,
+        top: float,
+        roof: Roof,
+        blind: Collection[int] = (),
+    ) -> Wing:
+        """Returns a wing with its walls on whole centimetres.
+
+        They keep the meshes' text short.
+        """
+        walls = (round(float(v), 2) for v in (x0, y0, x1, y1, wall_top))
+        return Wing(*walls, round(float(top), 3), roof, frozenset(blind))
+
+    def mirrored(self, width: float) -> Wing:
+        """Returns the wing with x replaced by `width` - x."""
+        blind = frozenset((0, 3, 2, 1)[k] for k in self.blind)
+        x0, x1 = round(width - self.x1, 2), round(width - self.x0, 2)
+        return replace(self, x0=x0, x1=x1, blind=blind)
+
+    @property
+    def outline(self) -> np.ndarray:
+        return massing.rectangle(self.x0, self.y0, self.x1, self.y1)
+
+    def wall(self, edge: int) -> details.WallFrame:
+        """Returns the frame of one of the walls."""
+        return details.WallFrame(self.outline, edge)
+
+    @property
+    def line(self) -> list[tuple[float, float]]:
+        """The upper surface of the roof between the walls, without eaves."""
+        roof = self.roof
+        a, b = (self.x0, self.x1) if roof.along_y else (self.y0, self.y1)
+        z = self.wall_top + roof.thickness - _SEAT
+        if roof.kind == "gable":
+            return pitched_roofs.gable_line(a, b, z, self.top, roof.ridge)
+        if roof.kind == "gambrel":
+            return pitched_roofs.gambrel_line(a, b, z, self.top)
+        if roof.kind == "barrel":
+            return pitched_roofs.barrel_line(a, b, z, self.top)
+        if roof.kind == "shed":
+            return [(a, z), (b, self.top)]
+        return [(a, self.top), (b, self.top)]
+
+    @property
+    def gables(self) -> tuple[int, int]:
+        """The edges below the ends of the ridge, at its start and end."""
+        return (0, 2) if self.roof.along_y else (3, 1)
+
+    def covers(self, x: float, y: float) -> bool:
+        """Whether a point lies within the walls."""
+        return self.x0 < x < self.x1 and self.y0 < y < self.y1
+
+
+def free_stretches(
+    wing: Wing, edge: int, others: Iterable[Wing], z: float
+) -> list[tuple[float, float]]:
+    """Returns the parts of a wall that no other wing hides at a height."""
+    wall = wing.wall(edge)
+    cuts = {0.0, wall.length}
+    hiding = [w for w in others if w is not wing and w.top > z]
+    for other in hiding:
+        for corner in other.outline:
+            along = wall.point(0.0, 0.0), wall.point(1.0, 0.0)
+            x = float((corner - along[0]) @ (along[1] - along[0]))
+            if 0.0 < x < wall.length:
+                cuts.add(x)
+    free: list[tuple[float, float]] = []
+    bounds = sorted(cuts)
+    for a, b in itertools.pairwise(bounds):
+        x, y = wall.point((a + b) / 2, 0.05)
+        if edge in wing.blind or any(w.covers(x, y) for w in hiding):
+            continue
+        if free and abs(free[-1][1] - a) < 1e-9:
+            free[-1] = (free[-1][0], b)
+        else:
+            free.append((a, b))
+    return free
+
+
+class Openings:
+    """The windows and doors of a wing, by edge."""
+
+    def __init__(self, wing: Wing, others: Sequence[Wing] = ()):
+        self._wing = wing
+        self._others = others
+        self._reliefs: dict[int, list[Relief]] = {k: [] for k in range(4)}
+
+    def row(
+        self,
+        edges: Iterable[int],
+        z: float,
+        pitch: float,
+        choices: Sequence[bays.Bay],
+        margin: float = 0.5,
+    ) -> None:
+        """Repeats bays along the free parts of walls.
+
+        Args:
+            edges: the walls.
+            z: height above which other wings hide them [m].
+            pitch: about the width of a bay [m].
+            choices: bays in turn, from both ends towards the middle.
+            margin: kept from the ends of each free part [m].
+        """
+        for edge in edges:
+            for a, b in free_stretches(self._wing, edge, self._others, z):
+                layout = bays.rhythm(pitch, choices, margin)
+                self._reliefs[edge] += [
+                    r._replace(x0=r.x0 + a, x1=r.x1 + a)
+                    for r in layout(edge, b - a)
+                ]
+
+    def put(self, edge: int, x: float, width: float, bay: bays.Bay) -> None:
+        """Puts a bay around x, in place of what it meets there."""
+        x0, x1 = x - width / 2, x + width / 2
+        new = bay(x0, x1)
+        low = min(r.z0 for r in new)
+        high = max(r.z1 for r in new)
+        self._reliefs[edge] = [
+            r
+            for r in self._reliefs[edge]
+            if r.x1 < x0 + 0.01 or r.x0 > x1 - 0.01 or r.z1 < low or r.z0 > high
+        ] + new
+
+    def clear(self, edge: int, x0: float, x1: float, z0: float, z1: float):
+        """Removes whatever meets a part of a wall."""
+        self._reliefs[edge] = [
+            r
+            for r in self._reliefs[edge]
+            if r.x1 < x0 or r.x0 > x1 or r.z1 < z0 or r.z0 > z1
+        ]
+
+    def layout(self, edge: int, length: float) -> list[Relief]:
+        """Returns all of them, for a facade."""
+        return self._reliefs[edge]
+
+
+def add_walls(
+    materials: Materials,
+    wing: Wing,
+    openings: Openings,
+    glass: Sequence[float],
+    bands: Sequence[Band] = (),
+    material: str = "walls",
+) -> None:
+    """Adds a wing's walls on their foundation, and their glass."""
+    facade = Facade(
+        wing.wall_top,
+        tuple(bands),
+        openings.layout,
+        tuple(glass),
+        plain=wing.blind,
+    )
+    outline = wing.outline
+    materials.add(
+        material,
+        massing.skirt(outline, outline, -FOUNDATION_M, 0.0),
+        facade_mesh(outline, facade),
+    )
+    materials.add("glass", glass_mesh(outline, facade))
+
+
+def add_roof(
+    materials: Materials,
+    wing: Wing,
+    attic: bays.Bay | None = None,
+    material: str = "walls",
+) -> None:
+    """Adds a wing's roof and gables.
+
+    Args:
+        materials: where to, the roof as `roof`.
+        wing: the wing.
+        attic: (x0, x1) -> holes for the windows of a gable, or None.
+        material: of the gables.
+    """
+    roof, outline = wing.roof, wing.outline
+    blind = np.array([k in wing.blind for k in range(4)])
+    reach = np.where(blind, 0.0, roof.eaves)
+    if roof.kind == "flat":
+        floor = round(wing.top - roof.parapet, 3)
+        materials.add(
+            material,
+            massing.skirt(outline, outline, wing.wall_top, wing.top),
+            massing.roof_pan(outline, floor, wing.top, 0.25),
+        )
+        return
+    z = wing.wall_top - _SEAT
+    if roof.kind == "hip":
+        solid = pitched_roofs.hip(outline, z, wing.top, reach, roof.thickness)
+        materials.add("roof", solid)
+        return
+    if roof.kind == "mansard":
+        knee = z + 0.72 * (wing.top - z)
+        solid = pitched_roofs.mansard(
+            outline, z, knee, wing.top, 0.35 * (knee - z), roof.eaves
+        )
+        materials.add("roof", solid)
+        return
+    _add_shell(materials, wing, attic, material)
+
+
+def _add_shell(materials, wing: Wing, attic, material: str) -> None:
+    roof, line = wing.roof, wing.line
+    blind = [k in wing.blind for k in range(4)]
+    low_edge, high_edge = (3, 1) if roof.along_y else (0, 2)
+    start_edge, end_edge = wing.gables
+    if roof.along_y:
+        start, end = wing.y0, wing.y1
+    else:
+        start, end = wing.x0, wing.x1
+    start -= roof.verge * (not blind[start_edge])
+    end += roof.verge * (not blind[end_edge])
+    covering = pitched_roofs.with_eaves(
+        line,
+        roof.eaves * (not blind[low_edge]),
+        roof.eaves * (not blind[high_edge]),
+    )
+    materials.add(
+        "roof",
+        pitched_roofs.shell(
+            covering, start, end, roof.thickness, along_y=roof.along_y
+        ),
+    )
+    for edge in wing.gables:
+        wall = wing.wall(edge)
+        under = _seen_from(wing, edge, line)
+        holes: list[Hole] = []
+        if attic is not None and edge not in wing.blind:
+            holes = [
+                hole for hole in attic(0.0, wall.length) if _fits(hole, under)
+            ]
+        gable = pitched_roofs.gable_wall(
+            under, 0.0, wall.length, wing.wall_top, holes
+        )
+        materials.add(material, wall.place(gable))
+        if holes:
+            glass = pitched_roofs.gable_glass(holes)
+            materials.add("glass", wall.place(glass))
+    if roof.kind == "shed":
+        # The tall side, from the walls up to the roof.
+        wall = wing.wall(high_edge)
+        top = line[-1][1] - roof.thickness
+        shield = pitched_roofs.gable_wall(
+            [(0.0, top), (wall.length, top)], 0.0, wall.length, wing.wall_top
+        )
+        materials.add(material, wall.place(shield))
+
+
+def _seen_from(wing: Wing, edge: int, line) -> list[tuple[float, float]]:
+    """Returns the underside of the roof in a gable's wall coordinates."""
+    thickness = wing.roof.thickness
+    start, end = line[0][0], line[-1][0]
+    # Walls run counter-clockwise: seen from the front and from the right
+    # side the line keeps its sense.
+    if edge in (0, 1):
+        return [(u - start, z - thickness) for u, z in line]
+    return [(end - u, z - thickness) for u, z in reversed(line)]
+
+
+def _fits(hole: Hole, under) -> bool:
+    return all(
+        hole.z1 < pitched_roofs.line_height(under, x) - 0.15
+        for x in (hole.x0, hole.x1)
+    )
+
+
+def attic_window(
+    width: float, z0: float, z1: float, depth: float, count: int = 1
+):
+    """Returns windows side by side in the middle of a gable."""
+
+    def holes(a: float, b: float) -> list[Hole]:
+        step = 1.5 * width
+        first = (a + b) / 2 - step * (count - 1) / 2
+        return [
+            Hole(
+                round(first + k * step - width / 2, 2),
+                round(first + k * step + width / 2, 2),
+                z0,
+                z1,
+                depth,
+            )
+            for k in range(count)
+        ]
+
+    return holes
+
+
+def ridge_rise(span: float, pitch_deg: float) -> float:
+    """Returns how high a ridge rises over a span at a pitch [m]."""
+    return span / 2 * math.tan(math.radians(pitch_deg))
