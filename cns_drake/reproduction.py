@@ -18,7 +18,8 @@ def reproduce_maps(
 ) -> None:
     """Records the sequences of maps, evaluates them and reports.
 
-    `<output>/<name>/` gets each recording, `<output>/report` the tables and
+    `<output>/<name>/` gets each recording, `<output>/pictures` a street of
+    each map in its first and last stage, `<output>/report` the tables and
     figures. What is recorded already is not recorded again.
 
     Args:
@@ -39,6 +40,8 @@ def reproduce_maps(
         for scenario in _scenarios_of_map(name)
     ]
     record_all(scenarios, output, num_processes)
+    for name in maps or known:
+        _draw_stages(known[name], output / "pictures" / f"{name}_stages.png")
     # A process of its own: the evaluation stands without the simulator.
     command = [sys.executable, "-m", "evaluation", "report", str(output)]
     done = subprocess.run(
@@ -74,3 +77,15 @@ def _scenarios_of_map(name: str) -> list[Scenario]:
         if sequence is not last
     ]
     return sequences + controls
+
+
+def _draw_stages(folder: Path, path: Path) -> None:
+    # matplotlib is not needed by those who only record.
+    from cns_drake.stage_pictures import draw_stages, load_views
+
+    print(f"drawing {path}", file=sys.stderr)
+    files = sorted(folder.glob("stage_*.sdf"))
+    stages = {
+        file.stem.replace("_", " "): file for file in (files[0], files[-1])
+    }
+    draw_stages(stages, load_views(folder / "views.yaml")["street"], path)
