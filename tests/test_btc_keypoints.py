@@ -306,13 +306,15 @@ class TestKeypoints:
         kept = suppress(self.make(positions, numbers), 2.0, 500)
         np.testing.assert_array_equal(kept.positions, positions[expected])
 
-    def test_at_most(self):
-        positions = [[10.0 * k, 0.0, 0.0] for k in range(6)]
+    @pytest.mark.parametrize(
+        ("number", "left"),
+        [(4, [4, 1, 3, 2]), (5, [4, 1, 3, 2, 5]), (6, [0, 1, 2, 3, 4, 5])],
+    )
+    def test_at_most(self, number, left):
+        positions = np.array([[10.0 * k, 0.0, 0.0] for k in range(6)])
         keypoints = self.make(positions, (11, 15, 12, 15, 20, 12))
-        kept = suppress(keypoints, 2.0, 4)
-        assert kept.positions[:, 0].tolist() == [40.0, 10.0, 30.0, 20.0]
-        everything = suppress(keypoints, 2.0, 6)
-        np.testing.assert_array_equal(everything.positions, positions)
+        kept = suppress(keypoints, 2.0, number)
+        np.testing.assert_array_equal(kept.positions, positions[left])
 
     def test_none(self):
         nothing = self.make(np.empty((0, 3)), [])

@@ -177,6 +177,22 @@ class TestMerging:
         both = merge(planes, 0.1, 0.3, keep_single=True)
         assert sorted(both.counts) == [sum(map(len, parts)), 400]
 
+    def test_small_patches_found_groups_before_large_ones(self):
+        # A chain in which only neighbours are alike, by size D, A, B, C:
+        # the smallest two choose their neighbours, A and B stay apart.
+        heights = {"D": -0.25, "A": 0.0, "B": 0.25, "C": 0.5}
+        counts = {"D": 15, "A": 40, "B": 30, "C": 20}
+        centers = np.array([[0.0, 0.0, heights[name]] for name in "ABCD"])
+        planes = Planes(
+            centers,
+            np.tile([0.0, 0.0, 1.0], (4, 1)),
+            np.tile(np.diag([0.3, 0.3, 0.0]), (4, 1, 1)),
+            np.array([counts[name] for name in "ABCD"]),
+        )
+        for order in ([0, 1, 2, 3], [3, 2, 1, 0], [2, 0, 3, 1]):
+            merged = merge(planes.take(order), 0.1, 0.3, keep_single=False)
+            assert sorted(merged.counts) == [50, 55]
+
     def test_does_not_depend_on_the_order(self):
         rng = np.random.default_rng(33)
         parts = [

@@ -168,6 +168,8 @@ class Btc(Method[BtcDescription, BtcDatabase]):
 
     def describe(self, points: np.ndarray) -> BtcDescription:
         config = self.config
+        # Compiled code is made anew for arrays in another order.
+        points = np.ascontiguousarray(points)
         planes = voxel_planes(
             points, config.voxel_size, config.max_sparse_points, config.flatness
         )
