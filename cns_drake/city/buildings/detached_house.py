@@ -9,46 +9,18 @@ import numpy as np
 from cns_drake.city.buildings import (
     bays,
     dormers,
+    family_house,
     house_walls,
     porches,
-    wings,
 )
-from cns_drake.city.buildings.materials import Materials
+from cns_drake.city.buildings.family_house import ROOF_M, STOREY_M
 from cns_drake.city.buildings.roof_equipment import add_chimney
 from cns_drake.city.buildings.site import Archetype, Assembly, Site, pick
-from cns_drake.city.buildings.wings import Openings, Roof, Wing
-from cns_drake.city.facades import Band
+from cns_drake.city.buildings.wings import Roof, Wing
 from cns_drake.city.structures import Model
-
-_WALLS = (
-    (0.86, 0.84, 0.78),
-    (0.72, 0.74, 0.72),
-    (0.80, 0.74, 0.60),
-    (0.56, 0.62, 0.66),
-    (0.62, 0.42, 0.34),
-    (0.66, 0.68, 0.56),
-    (0.78, 0.66, 0.56),
-)
-_ROOFS = (
-    (0.34, 0.33, 0.34),
-    (0.46, 0.28, 0.22),
-    (0.40, 0.35, 0.30),
-    (0.28, 0.31, 0.34),
-)
-_ACCENTS = (
-    (0.45, 0.16, 0.14),
-    (0.20, 0.32, 0.26),
-    (0.22, 0.28, 0.40),
-    (0.42, 0.30, 0.20),
-)
-_TRIM = (0.90, 0.89, 0.86)
-_BASE = (0.58, 0.56, 0.53)
-_BRICK = (0.52, 0.32, 0.26)
 
 # Kept free around the walls, for eaves and chimneys [m].
 _MARGIN = 0.5
-_STOREY = 2.65
-_ROOF = 0.2
 
 
 @dataclass(frozen=True)
@@ -108,9 +80,9 @@ def draw(site: Site, height: float, rng: np.random.Generator):
         dormers=int(rng.integers(0, 3)),
         dormer=pick(rng, ("gable", "shed")),
         bay_window=bool(rng.random() < 0.4),
-        rgb=pick(rng, _WALLS),
-        roof_rgb=pick(rng, _ROOFS),
-        accent_rgb=pick(rng, _ACCENTS),
+        rgb=pick(rng, family_house.WALLS),
+        roof_rgb=pick(rng, family_house.ROOFS),
+        accent_rgb=pick(rng, family_house.ACCENTS),
     )
 
 
@@ -159,16 +131,6 @@ class _Plan:
         )
 
 
-def _storeys(height: float, deck: float, span: float, pitch_deg: float) -> int:
-    """Returns the storeys that bring the roof closest to its pitch."""
-    wanted = wings.ridge_rise(span, pitch_deg)
-    room = height - _ROOF - deck - 0.15
-    return min(
-        (n for n in (1, 2, 3) if n == 1 or room - n * _STOREY > 0.1 * span),
-        key=lambda n: abs(room - n * _STOREY - wanted),
-    )
-
-
 def _planned(p: DetachedHouse, site: Site) -> _Plan:
     """Lays the house out."""
     x0, y0, x1, y1 = site.bounds
@@ -180,15 +142,15 @@ def _planned(p: DetachedHouse, site: Site) -> _Plan:
     garage_width = min(p.garage_width, 0.36 * (right - left))
     has_garage = p.garage != "none" and garage_width > 2.9
     split = right - garage_width * has_garage
-    n = _storeys(p.height, p.deck, deep, p.pitch_deg)
-    wall_top = min(p.deck + n * _STOREY + 0.15, p.height - _ROOF - 0.08 * deep)
-    slope = 2 * (p.height - wall_top - _ROOF) / deep
-    roof = Roof(p.roof, eaves=0.4, verge=0.3, thickness=_ROOF)
+    n = family_house.storeys_for(p.height, p.deck, deep, p.pitch_deg)
+    wall_top = family_house.wall_top_for(p.height, p.deck, deep, n)
+    slope = 2 * (p.height - wall_top - ROOF_M) / deep
+    roof = Roof(p.roof, eaves=0.4, verge=0.3, thickness=ROOF_M)
     main = Wing.at(left, front, split, main_back, wall_top, p.height, roof)
     wide = max(3.2, p.wing_width * (split - left))
-    drop = _STOREY * (n > 1 and p.low_wing)
-    top = min(wall_top + _ROOF + slope * wide / 2, p.height - 0.25) - drop
-    shape = Roof(p.roof, True, 0.35, 0.3, _ROOF)
+    drop = STOREY_M * (n > 1 and p.low_wing)
+    top = min(wall_top + ROOF_M + slope * wide / 2, p.height - 0.25) - drop
+    shape = Roof(p.roof, True, 0.35, 0.3, ROOF_M)
     middle = (front + main_back) / 2
     parts = []
     for end in _WING_ENDS[p.plan]:
@@ -202,43 +164,27 @@ def _planned(p: DetachedHouse, site: Site) -> _Plan:
             parts.append(Wing.at(*area, wall_top - drop, top, shape))
     garage = None
     if has_garage:
-        garage = _garage(p, split - 0.06, right, front + 0.6, main_back)
+        garage = family_house.garage_wing(
+            p.garage, split - 0.06, right, front + 0.6, main_back - 0.4,
+            p.height,
+        )  # fmt: skip
     taken = left + wide if "front" in _WING_ENDS[p.plan] else left
     plan = _Plan(main, tuple(parts), garage, n, (taken, split), ahead)
     return plan.mirrored(x0 + x1) if p.mirrored else plan
 
 
-def _garage(p: DetachedHouse, x0, x1, y0, y1) -> Wing:
-    wall_top, span = 2.65, x1 - x0
-    top = {
-        "flat": wall_top + 0.5,
-        "gable": wall_top + _ROOF + 0.3 * span,
-        "shed": wall_top + _ROOF + 0.2 * span,
-    }[p.garage]
-    shape = Roof(p.garage, True, 0.3, 0.25, _ROOF)
-    back = min(y1 - 0.4, y0 + 6.5)
-    return Wing.at(x0, y0, x1, back, wall_top, min(top, p.height), shape)
-
-
 def build(p: DetachedHouse, site: Site, rng: np.random.Generator) -> Model:
     """Builds the house on a rectangle, its porch in front."""
     assembly = Assembly(site.name, p.rgb)
-    materials = Materials(
-        {
-            "walls": p.rgb,
-            "glass": assembly.glass_rgb,
-            "roof": p.roof_rgb,
-            "trim": _TRIM,
-            "accent": p.accent_rgb,
-            "base": _BASE,
-        }
+    materials = family_house.house_materials(
+        assembly, p.rgb, p.roof_rgb, p.accent_rgb
     )
     plan = _planned(p, site)
     _add_main(assembly, materials, p, plan)
     for wing in plan.wings:
         _add_wing(materials, p, plan, wing)
     if plan.garage is not None:
-        _add_garage(materials, plan)
+        family_house.add_garage(materials, plan.garage, plan.boxes)
     _add_chimney(assembly, materials, p, plan)
     materials.finish(assembly)
     return assembly.model(site)
@@ -246,14 +192,16 @@ def build(p: DetachedHouse, site: Site, rng: np.random.Generator) -> Model:
 
 def _add_main(assembly, materials, p: DetachedHouse, plan: _Plan) -> None:
     main = plan.main
-    openings = _windows(p, plan, main, plan.storeys)
+    openings = family_house.window_rows(
+        main, plan.boxes, p.deck, plan.storeys, p.window_pitch, p.window_width
+    )
     wall = main.wall(0)
     a, b = (x - main.x0 for x in plan.free)
     door = a + 0.5 * (b - a)
     house_walls.add_door(materials, main, openings, 0, door, p.deck, lights=0.3)
     _add_porch(assembly, materials, p, plan, (a, b))
-    _close(materials, p, main, openings)
-    base, high = main.wall_top + _ROOF, main.top - main.wall_top - _ROOF
+    family_house.close_box(materials, main, openings, p.deck, p.casing)
+    base, high = main.wall_top + ROOF_M, main.top - main.wall_top - ROOF_M
     if p.roof == "gable" and high > 2.0:
         slope = 2 * high / (main.y1 - main.y0)
         for u, v in bays.stretches(b - a, 3.0, 0.4)[: p.dormers]:
@@ -262,25 +210,6 @@ def _add_main(assembly, materials, p: DetachedHouse, plan: _Plan) -> None:
                 ridge=main.top, setback=0.2 * high / slope, height=1.3,
                 roof=p.dormer,
             )  # fmt: skip
-
-
-def _windows(p: DetachedHouse, plan: _Plan, wing: Wing, count: int) -> Openings:
-    openings = Openings(wing, plan.boxes)
-    for edges, pitch in (((0, 2), p.window_pitch), ((1, 3), 3.8)):
-        house_walls.add_rows(
-            openings, edges, p.deck, _STOREY, count, pitch, p.window_width
-        )
-    return openings
-
-
-def _close(materials, p: DetachedHouse, wing: Wing, openings) -> None:
-    """Adds walls and roof around the openings of a wing."""
-    house_walls.add_casings(materials, wing, openings, (0,), p.casing)
-    bands = (Band(0.0, p.deck, -0.04),)
-    wings.add_walls(materials, wing, openings, (house_walls.GLASS_M,), bands)
-    low = wing.wall_top + 0.4
-    attic = wings.attic_window(0.9, low, low + 1.0, house_walls.GLASS_M)
-    wings.add_roof(materials, wing, attic)
 
 
 def _add_porch(assembly, materials, p: DetachedHouse, plan, free) -> None:
@@ -312,32 +241,28 @@ def _add_porch(assembly, materials, p: DetachedHouse, plan, free) -> None:
         )
         for k, (start, end) in enumerate(runs):
             porches.add_railing(
-                assembly, f"railing_{k}", wall, start, end, p.deck, _TRIM
+                assembly,
+                f"railing_{k}",
+                wall,
+                start,
+                end,
+                p.deck,
+                family_house.TRIM,
             )
 
 
 def _add_wing(materials, p: DetachedHouse, plan: _Plan, wing: Wing) -> None:
-    count = max(1, round((wing.wall_top - p.deck) / _STOREY))
-    openings = _windows(p, plan, wing, count)
-    _close(materials, p, wing, openings)
+    count = max(1, round((wing.wall_top - p.deck) / STOREY_M))
+    openings = family_house.window_rows(
+        wing, plan.boxes, p.deck, count, p.window_pitch, p.window_width
+    )
+    family_house.close_box(materials, wing, openings, p.deck, p.casing)
     is_front = wing.y0 < plan.main.y0
     if p.bay_window and is_front and wing.x1 - wing.x0 > 3.0:
         x = (wing.x1 - wing.x0) / 2
         porches.add_bay_window(
             materials, wing.wall(0), x, 2.2, 0.4, 0.0, p.deck + 2.3
         )
-
-
-def _add_garage(materials, plan: _Plan) -> None:
-    garage = plan.garage
-    openings = Openings(garage, plan.boxes)
-    length = garage.x1 - garage.x0
-    house_walls.add_garage_door(
-        materials, garage, openings, 0, length / 2, min(length - 0.7, 4.9)
-    )
-    openings.row((1, 3), 1.0, 3.4, [house_walls.sash(0.9, 0.0, 1.1, 2.0)])
-    wings.add_walls(materials, garage, openings, (house_walls.GLASS_M,))
-    wings.add_roof(materials, garage)
 
 
 def _add_chimney(assembly, materials, p: DetachedHouse, plan: _Plan) -> None:
@@ -349,10 +274,12 @@ def _add_chimney(assembly, materials, p: DetachedHouse, plan: _Plan) -> None:
         breast = porches.chimney_breast(wall, x, 1.6, 0.42, main.top - 0.1)
         materials.add("base", breast)
         spot = (*wall.point(x, 0.18).tolist(), main.top - 0.9)
-        add_chimney(assembly, "chimney", spot, _BASE, yaw=np.pi / 2)
+        add_chimney(assembly, "chimney", spot, family_house.BASE, yaw=np.pi / 2)
     elif p.chimney == "ridge":
         x = main.x0 + p.chimney_at * (main.x1 - main.x0)
-        add_chimney(assembly, "chimney", (x, y, main.top - 1.2), _BRICK)
+        add_chimney(
+            assembly, "chimney", (x, y, main.top - 1.2), family_house.BRICKS[0]
+        )
 
 
 DETACHED_HOUSE = Archetype(

@@ -37,6 +37,7 @@ def add_rows(
     pitch: float,
     width: float,
     margin: float = 0.6,
+    head: float = 2.15,
 ) -> None:
     """Adds a row of windows to each storey of a wing.
 
@@ -50,11 +51,12 @@ def add_rows(
         count: of storeys.
         pitch, width: of the windows [m].
         margin: kept from corners [m].
+        head: of the windows above the floor [m].
     """
     for k in range(count):
         z = floor + k * storey
         wide = round(width * (1.25 if k == 0 else 1.0), 2)
-        choices = [sash(wide, z, 0.85, 2.15), sash(width, z, 0.85, 2.15)]
+        choices = [sash(wide, z, 0.85, head), sash(width, z, 0.85, head)]
         openings.row(edges, z + 0.7, pitch, choices, margin)
 
 
@@ -69,6 +71,7 @@ def add_door(
     width: float = 1.0,
     height: float = 2.1,
     lights: float = 0.0,
+    material: str = "accent",
 ) -> None:
     """Adds a door with its leaf, and windows of `lights` width beside it."""
     half, top = width / 2, round(floor + height, 2)
@@ -85,7 +88,7 @@ def add_door(
 
     openings.put(edge, x, width + 2 * lights + 0.5, bay)
     leaf = _leaf(x - half, x + half, floor, top)
-    materials.add("accent", *(wing.wall(edge).place(part) for part in leaf))
+    materials.add(material, *(wing.wall(edge).place(part) for part in leaf))
 
 
 def _leaf(x0: float, x1: float, z0: float, z1: float) -> list:

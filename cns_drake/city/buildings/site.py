@@ -151,7 +151,13 @@ class Assembly:
     meshes: dict[str, Mesh] = field(default_factory=dict)
 
     def add(self, part: str, mesh: Mesh, z: float = 0.0, rgb=None) -> None:
-        """Adds a mesh of this building's own and places it once."""
+        """Adds a mesh of this building's own and places it once.
+
+        A mesh without faces (pilasters on walls too short for any) is left
+        out.
+        """
+        if not mesh.faces:
+            return
         key = self.define(part, mesh)
         self.place(part, MeshShape(key), (0.0, 0.0, z), rgb=rgb)
 

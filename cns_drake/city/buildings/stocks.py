@@ -16,13 +16,14 @@ from cns_drake.city.buildings.observation_tower import OBSERVATION_TOWER
 from cns_drake.city.buildings.office import OFFICE
 from cns_drake.city.buildings.podium_tower import PODIUM_TOWER
 from cns_drake.city.buildings.provisional import plain_house
+from cns_drake.city.buildings.row_house import ROW_HOUSE
+from cns_drake.city.buildings.shop_house import SHOP_HOUSE
 from cns_drake.city.buildings.slab_tower import SLAB_TOWER
+from cns_drake.city.buildings.terrace import TERRACE
 from cns_drake.city.buildings.waterfront_hall import WATERFRONT_HALL
 
-ROW_HOUSE = plain_house("row_house", (6.5, 16.0), (4.5, 16.0), True)
 WALK_UP = plain_house("walk_up", (8.0, 20.0), (9.0, 45.0), True)
 BALCONY_FLATS = plain_house("balcony_flats", (9.0, 33.0), (11.0, 70.0))
-SHOP_HOUSE = plain_house("shop_house", (6.0, 18.0), (5.5, 30.0), True)
 MILL = plain_house("mill", (12.0, 28.0), (14.0, 70.0))
 TOWN_HALL = plain_house("town_hall", (18.0, 45.0), (18.0, 60.0))
 CHAPEL = plain_house("chapel", (10.0, 30.0), (9.0, 40.0))
@@ -31,7 +32,6 @@ SCHOOL = plain_house("school", (7.0, 18.0), (20.0, 90.0))
 KIOSK_ROW = plain_house("kiosk_row", (3.2, 8.0), (6.0, 60.0))
 BUNGALOW = plain_house("bungalow", (3.8, 8.0), (8.0, 30.0))
 SEMI_DETACHED = plain_house("semi_detached", (6.0, 12.0), (9.0, 26.0))
-TERRACE = plain_house("terrace", (6.0, 13.0), (8.0, 70.0), True)
 SHOP_STRIP = plain_house("shop_strip", (4.0, 12.0), (7.0, 60.0), True)
 CORNER_STORE = plain_house("corner_store", (5.0, 16.0), (8.0, 30.0), True)
 GARDEN_FLATS = plain_house("garden_flats", (8.0, 20.0), (12.0, 60.0))
