@@ -18,11 +18,11 @@ from cns_drake.city.plan import BuildingPlan, RowPlan
 from cns_drake.city.structures import Structure
 from cns_drake.errors import InputError
 
-# Neighbours closer than this are built wall to wall, without windows and
-# balconies on the sides that face each other [m].
-_PARTY_WALL = 2.0
+# Neighbours closer than this get blank walls on the sides that face each
+# other; it is room for the eaves and balconies of both [m].
+_PARTY_WALL = 3.1
 # Buildings that are not neighbours in a row keep this distance [m].
-_YARD = 3.0
+_YARD = 3.1
 # Where a lot does not fit, the next trial starts this much further on [m].
 _STEP = 1.0
 # Parts of the drawn width and depth that are tried in turn; never less than
@@ -131,8 +131,10 @@ def _single_house(
     area = affine_transform(footprint, [c, -s, s, c, *plan.at])
     if not district.area.contains(area):
         raise InputError(f"{fault_at}.at: reaches out of the district")
-    if not draft.is_free(area):
-        raise InputError(f"{fault_at}.at: stands in another building")
+    if not draft.is_free(area, _YARD):
+        raise InputError(
+            f"{fault_at}.at: stands closer than {_YARD} m to another building"
+        )
     draft.take(area)
     return _House(plan.archetype, footprint, plan.at, yaw, plan.height, area)
 

@@ -44,7 +44,8 @@ class Draft:
         self._counts: Counter[str] = Counter()
         self._walls = Occupancy()
         self._occupancy = Occupancy()
-        self._occupancy.add(network.lane_area())
+        self._lanes = Occupancy()
+        self._lanes.add(network.lane_area())
 
     def rng(self, *words: str | int) -> np.random.Generator:
         """Returns the generator of one task, told apart by words.
@@ -66,8 +67,16 @@ class Draft:
         clearance: float = 0.0,
         ignore: BaseGeometry | None = None,
     ) -> bool:
-        """Tells whether an area in W keeps clear of lanes and structures."""
-        return self._occupancy.is_free(area, clearance, ignore)
+        """Tells whether an area in W is neither a lane's nor taken.
+
+        Args:
+            area: in W [m].
+            clearance: least distance to what is taken, not to lanes [m].
+            ignore: taken area that may be closer, but not overlapped.
+        """
+        return self._lanes.is_free(area) and self._occupancy.is_free(
+            area, clearance, ignore
+        )
 
     def take(self, area: BaseGeometry) -> None:
         """Keeps an area in W free of what is placed later."""

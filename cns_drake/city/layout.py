@@ -45,11 +45,14 @@ class City:
         """Returns all meshes by name.
 
         Raises:
-            ValueError: if two different meshes have the same name.
+            ValueError: if two different meshes have the same name, or one
+                has no faces.
         """
         meshes: dict[str, Mesh] = {}
         for structure in self.structures:
             for name, mesh in structure.model.meshes.items():
+                if not mesh.faces:
+                    raise ValueError(f"mesh {name} has no faces")
                 known = meshes.setdefault(name, mesh)
                 if known is not mesh and known.to_obj() != mesh.to_obj():
                     raise ValueError(f"two different meshes are called {name}")
