@@ -147,6 +147,22 @@ def entrance(
     return bay
 
 
+def house_door(width: float, z0: float, z1: float, depth: float) -> Bay:
+    """A doorway above steps: two leaves, a fanlight, a flat surround."""
+
+    def bay(x0: float, x1: float) -> list[Relief]:
+        a, b = _centred(x0, x1, min(width, x1 - x0 - 0.6))
+        middle, light = _cm((a + b) / 2), _cm(z1 - 0.4)
+        return [
+            Patch(a - 0.25, b + 0.25, z0, _cm(z1 + 0.25), -0.1),
+            Patch(a, b, z0, z1, depth),
+            Patch(a, b, light, _cm(light + 0.08), depth - 0.12),
+            Patch(middle - 0.05, middle + 0.05, z0, light, depth - 0.06),
+        ]
+
+    return bay
+
+
 def bar(width: float, z0: float, z1: float, depth: float) -> Bay:
     """An upright bar in the middle of the bay, at its own depth."""
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cns_drake.city import massing
-from cns_drake.city.buildings import bays, details, tiers
+from cns_drake.city.buildings import bays, details, outlines, tiers
 from cns_drake.city.buildings.roof_equipment import equip_roof
 from cns_drake.city.buildings.site import Archetype, Assembly, Site
 from cns_drake.city.facades import Band, Facade
@@ -51,7 +51,7 @@ def draw(site: Site, height: float, rng: np.random.Generator):
     side = min(x1 - x0, y1 - y0)
     return CornerBuilding(
         height=height,
-        corner=int(rng.choice(_free_corners(site) or [0, 1])),
+        corner=int(rng.choice(site.free_corners or [0, 1])),
         radius=round(float(rng.uniform(0.3, 0.42)) * min(side, 24.0), 1),
         ground_height=round(float(rng.uniform(4.6, 5.4)), 2),
         first_height=round(float(rng.uniform(4.2, 4.8)), 2),
@@ -74,20 +74,14 @@ def draw(site: Site, height: float, rng: np.random.Generator):
     )  # fmt: skip
 
 
-def _free_corners(site: Site) -> list[int]:
-    """Returns the front corners, left and right, that no neighbour hides."""
-    flanks = {0: {3, 0}, 1: {0, 1}}
-    return [k for k, edges in flanks.items() if not edges & site.blind_edges]
-
-
 def build(p: CornerBuilding, site: Site, rng: np.random.Generator) -> Model:
     """Builds the house on a rectangle."""
-    if p.corner not in _free_corners(site):
+    if p.corner not in site.free_corners:
         site = site.detached(CORNER_BUILDING.overhang)
     assembly = Assembly(site.name, p.rgb)
     rectangle = site.outline
     plan = massing.rounded(rectangle, {p.corner: p.radius}, 2.8)
-    blind = _blind_edges(rectangle, plan, site.blind_edges)
+    blind = outlines.edges_on(plan, rectangle, site.blind_edges)
     top = _add_shops(assembly, p, plan, blind, rng)
     bottom = top
     top = _add_first_floor(assembly, p, plan, blind, top)
@@ -118,21 +112,6 @@ def build(p: CornerBuilding, site: Site, rng: np.random.Generator) -> Model:
     assembly.add("dome", dome, rgb=p.roof_rgb)
     _equip(assembly, p, site, roof, rng)
     return assembly.model(site)
-
-
-def _blind_edges(rectangle, plan, blind) -> frozenset[int]:
-    """Returns the edges of the plan that lie on blind edges of the site."""
-    found = set()
-    for k, (a, b) in enumerate(
-        zip(plan, np.roll(plan, -1, axis=0), strict=True)
-    ):
-        for edge in blind:
-            start = rectangle[edge]
-            along = rectangle[(edge + 1) % 4] - start
-            normal = np.array([-along[1], along[0]]) / np.hypot(*along)
-            if max(abs(normal @ (a - start)), abs(normal @ (b - start))) < 0.01:
-                found.add(k)
-    return frozenset(found)
 
 
 def _is_front(plan, edge: int) -> bool:

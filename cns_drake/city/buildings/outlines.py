@@ -95,3 +95,17 @@ def mirrored(points) -> np.ndarray:
     flipped = np.column_stack([2 * middle - points[:, 0], points[:, 1]])
     # Mirroring turns it clockwise; the front edge stays first.
     return np.roll(flipped[::-1], 2 - len(points), axis=0)
+
+
+def edges_on(plan, outline, edges) -> frozenset[int]:
+    """Returns the edges of a plan that lie on some edges of an outline."""
+    found = set()
+    ends = np.roll(plan, -1, axis=0)
+    for k, (a, b) in enumerate(zip(plan, ends, strict=True)):
+        for edge in edges:
+            start = outline[edge]
+            along = outline[(edge + 1) % len(outline)] - start
+            normal = np.array([-along[1], along[0]]) / np.hypot(*along)
+            if max(abs(normal @ (a - start)), abs(normal @ (b - start))) < 0.01:
+                found.add(k)
+    return frozenset(found)

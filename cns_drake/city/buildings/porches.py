@@ -279,7 +279,7 @@ def casings(
             low = r.z0 - 0.1
             pieces.append(board(r.x0 - 0.1, r.x1 + 0.1, low, r.z0, 2 * reach))
         else:
-            side = (r.x1 - r.x0) / 2
+            side = min((r.x1 - r.x0) / 2, 0.45)
             for a, b in ((r.x0 - side, r.x0), (r.x1, r.x1 + side)):
                 pieces.append(board(a, b, r.z0, r.z1, reach))
     return pieces

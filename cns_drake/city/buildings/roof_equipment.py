@@ -274,6 +274,7 @@ def equip_roof(
     items: Sequence[str],
     rng: np.random.Generator,
     clear: float = 1.0,
+    prefix: str = "",
 ) -> None:
     """Stands equipment on a flat roof without overlaps, as far as it fits.
 
@@ -284,6 +285,7 @@ def equip_roof(
         items: names of shared meshes, the most important first.
         rng: draws places, headings and sizes.
         clear: distance kept from the edge [m].
+        prefix: of the names of the visuals.
     """
     room = Polygon(roof)
     x0, y0, x1, y1 = room.bounds
@@ -305,5 +307,6 @@ def equip_roof(
                 taken.append((x, y, radius))
                 assembly.share(item, equipment_mesh(item))
                 shape = MeshShape(item, (stretch, scale, scale))
-                assembly.place(f"roof_{number:02d}", shape, (x, y, z), turn)
+                part = f"{prefix}roof_{number:02d}"
+                assembly.place(part, shape, (x, y, z), turn)
                 break

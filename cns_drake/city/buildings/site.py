@@ -74,6 +74,12 @@ class Site:
             )
         )
 
+    @property
+    def free_corners(self) -> list[int]:
+        """The front corners, 0 left and 1 right, that no neighbour hides."""
+        flanks = {0: {3, 0}, 1: {0, 1}}
+        return [k for k, e in flanks.items() if not e & self.blind_edges]
+
     def detached(self, gap: float) -> Site:
         """Returns the site with its blind edges moved in by `gap`.
 
