@@ -105,7 +105,7 @@ def build(p: GalleryFlats, site: Site, rng: np.random.Generator) -> Model:
     slab = massing.rectangle(a, round(front, 2), b, round(back, 2))
     open_edge = 0 if p.gallery_front else 2
     goal = p.height - 2.2 - p.ground
-    groups, per_group, storey = tiers.divided(goal, p.storey, 7)
+    groups, per_group, storey = tiers.divided(goal, p.storey, 6)
     top = _add_ground(assembly, p, slab)
     walls = _storey(p, storey, open_edge)
     top = tiers.add_storeys(assembly, slab, walls, top, groups, per_group)

@@ -24,6 +24,14 @@ class Materials:
             raise ValueError(f"unknown material {material}")
         self._pieces.setdefault(material, []).extend(meshes)
 
+    def moved(self, translation, yaw: float = 0.0) -> Materials:
+        """Returns the same, rotated about z by `yaw`, then translated."""
+        result = Materials(self._colours)
+        for material, pieces in self._pieces.items():
+            mesh = merge_meshes(pieces)
+            result.add(material, mesh.moved(translation, yaw))
+        return result
+
     def finish(self, assembly: Assembly) -> None:
         """Adds one part for each material in use, named like it."""
         for material, rgb in self._colours.items():

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from cns_drake.city.buildings.art_deco_tower import ART_DECO_TOWER
 from cns_drake.city.buildings.balcony_flats import BALCONY_FLATS
+from cns_drake.city.buildings.barn import BARN
 from cns_drake.city.buildings.brick_block import BRICK_BLOCK
 from cns_drake.city.buildings.bungalow import BUNGALOW
 from cns_drake.city.buildings.car_park import CAR_PARK
+from cns_drake.city.buildings.chapel import CHAPEL
 from cns_drake.city.buildings.church import CHURCH
 from cns_drake.city.buildings.corner_building import CORNER_BUILDING
 from cns_drake.city.buildings.corner_store import CORNER_STORE
@@ -32,8 +34,6 @@ from cns_drake.city.buildings.waterfront_hall import WATERFRONT_HALL
 
 MILL = plain_house("mill", (12.0, 28.0), (14.0, 70.0))
 TOWN_HALL = plain_house("town_hall", (18.0, 45.0), (18.0, 60.0))
-CHAPEL = plain_house("chapel", (10.0, 30.0), (9.0, 40.0))
-BARN = plain_house("barn", (5.0, 14.0), (7.0, 40.0))
 SCHOOL = plain_house("school", (7.0, 18.0), (20.0, 90.0))
 KIOSK_ROW = plain_house("kiosk_row", (3.2, 8.0), (6.0, 60.0))
 GAS_STATION = plain_house("gas_station", (5.0, 8.0), (18.0, 50.0))

@@ -20,8 +20,10 @@ from cns_drake.city.buildings.materials import Materials
 from cns_drake.city.buildings.pitched_roofs import Hole
 from cns_drake.city.buildings.site import FOUNDATION_M
 from cns_drake.city.facades import (
+    Arch,
     Band,
     Facade,
+    Patch,
     Relief,
     facade_mesh,
     glass_mesh,
@@ -44,6 +46,8 @@ class Roof:
         thickness: of the roof, measured upright [m].
         ridge: place of a gable roof's ridge as a part of the span.
         parapet: of a flat roof [m].
+        falling: whether a shed roof falls along its line instead of rising:
+            to the back, or to the right if `along_y`.
     """
 
     kind: str = "gable"
@@ -53,6 +57,7 @@ class Roof:
     thickness: float = 0.22
     ridge: float = 0.5
     parapet: float = 0.4
+    falling: bool = False
 
 
 @dataclass(frozen=True)
@@ -121,7 +126,8 @@ class Wing:
         if roof.kind == "barrel":
             return pitched_roofs.barrel_line(a, b, z, self.top)
         if roof.kind == "shed":
-            return [(a, z), (b, self.top)]
+            heights = (self.top, z) if roof.falling else (z, self.top)
+            return [(a, heights[0]), (b, heights[1])]
         return [(a, self.top), (b, self.top)]
 
     @property
@@ -197,6 +203,8 @@ class Openings:
         """Puts a bay around x, in place of what it meets there."""
         x0, x1 = x - width / 2, x + width / 2
         new = bay(x0, x1)
+        if not new:
+            return
         low = min(r.z0 for r in new)
         high = max(r.z1 for r in new)
         self._reliefs[edge] = [
@@ -214,8 +222,16 @@ class Openings:
         ]
 
     def layout(self, edge: int, length: float) -> list[Relief]:
-        """Returns all of them, for a facade."""
-        return self._reliefs[edge]
+        """Returns all of them, for a facade.
+
+        Bands end at arches, which need flat wall around them.
+        """
+        found: list[Relief] = []
+        for relief in self._reliefs[edge]:
+            if isinstance(relief, Arch):
+                found.append(Patch(*relief[:3], relief.z1, 0.0))
+            found.append(relief)
+        return found
 
 
 def add_walls(
@@ -322,8 +338,8 @@ def _add_shell(materials, wing: Wing, attic, material: str) -> None:
             materials.add("glass", wall.place(glass))
     if roof.kind == "shed":
         # The tall side, from the walls up to the roof.
-        wall = wing.wall(high_edge)
-        top = line[-1][1] - roof.thickness
+        wall = wing.wall(low_edge if roof.falling else high_edge)
+        top = wing.top - roof.thickness
         shield = pitched_roofs.gable_wall(
             [(0.0, top), (wall.length, top)], 0.0, wall.length, wing.wall_top
         )
