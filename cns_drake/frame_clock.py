@@ -1,7 +1,17 @@
 """When frames are."""
 
+import math
+
 # Time between frames [s]: the paper's 20 Hz.
 FRAME_PERIOD = 0.05
 # Stamp of frame 0 [ns]. Not zero, which tf2 takes for "latest", and not the
 # clock's time, so that the same scenario gives the same bytes.
 START_NS = 1_700_000_000_000_000_000
+
+
+def frames_within(duration: float) -> int:
+    """Returns how many frames a drive of a duration [s] has.
+
+    The first frame is taken at its start.
+    """
+    return math.floor(duration / FRAME_PERIOD) + 1

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
@@ -11,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, RootModel, Strict
 from cns_drake.city.road import LaneRef
 from cns_drake.city.road_network import RoadNetwork
 from cns_drake.errors import InputError
+from cns_drake.lane_path import LanePath, sample_lane_path
 
 # Distance between the points from which the path is interpolated [m].
 _DENSE_SPACING = 0.25
@@ -18,8 +18,6 @@ _DENSE_SPACING = 0.25
 # less than the second length there is none.
 _LANE_CHANGE_LENGTH = 50.0
 _MIN_LANE_CHANGE_LENGTH = 20.0
-# A route must be longer than this for a trajectory to be made of it [m].
-_MIN_ROUTE_LENGTH = 20.0
 
 LaneNumber = Annotated[int, Field(ge=1)]
 LaneChange = Annotated[tuple[LaneNumber, LaneNumber], Strict(False)]
@@ -65,27 +63,6 @@ class Route(RootModel[list[RouteLeg]]):
     root: list[RouteLeg] = Field(min_length=1)
 
 
-@dataclass(frozen=True)
-class LanePath:
-    """The middle of the lanes of a route, evenly sampled.
-
-    Attributes:
-        points: (N, 3) positions in the world, first and last included [m].
-        spacing: distance between neighbours along the path [m].
-        speed_limits: (N,) the roads' limits there; within a junction the
-            lower one of the two roads [m/s].
-    """
-
-    points: np.ndarray
-    spacing: float
-    speed_limits: np.ndarray
-
-    @property
-    def length(self) -> float:
-        """Length along the lanes [m]."""
-        return self.spacing * (len(self.points) - 1)
-
-
 def make_lane_path(
     network: RoadNetwork, route: Route, spacing: float, source="route"
 ) -> LanePath:
@@ -94,7 +71,8 @@ def make_lane_path(
     Consecutive legs must meet in a junction, and the way through it must be
     legal: a left turn from the innermost lane to the innermost, a right turn
     from the outermost lane to the outermost, straight on without a change of
-    lane (`RoadNetwork.is_legal`). Lanes change only along a leg.
+    lane (`RoadNetwork.is_legal`). Lanes change only along a leg. Within a
+    junction the lower one of the two roads' speed limits holds.
 
     Args:
         network: the roads.
@@ -124,13 +102,12 @@ def make_lane_path(
             ) from error
         pieces.append(points)
         limits.append(np.full(len(points), limit))
-    path = _resample(np.concatenate(pieces), np.concatenate(limits), spacing)
-    if path.length < _MIN_ROUTE_LENGTH:
-        raise InputError(
-            f"{source}: route: {path.length:.1f} m long, at least "
-            f"{_MIN_ROUTE_LENGTH:.0f} m are needed"
-        )
-    return path
+    return sample_lane_path(
+        np.concatenate(pieces),
+        np.concatenate(limits),
+        spacing,
+        f"{source}: route",
+    )
 
 
 def _check_ends(leg: RouteLeg, is_first: bool, is_last: bool):
@@ -211,19 +188,3 @@ def _way(network: RoadNetwork, previous: RouteLeg, leg: RouteLeg) -> np.ndarray:
             f"{way.outgoing.lane}: {rule}"
         )
     return way.points[1:-1]
-
-
-def _resample(points, limits, spacing) -> LanePath:
-    """Returns evenly spaced points along a polyline."""
-    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    travelled = np.concatenate([[0.0], np.cumsum(steps)])
-    count = max(1, round(travelled[-1] / spacing))
-    wanted = np.linspace(0.0, travelled[-1], count + 1)
-    xyz = [np.interp(wanted, travelled, axis) for axis in points.T]
-    # A limit holds from its first point on; of two neighbours take the lower.
-    after = np.searchsorted(travelled, wanted).clip(1, len(points) - 1)
-    return LanePath(
-        points=np.stack(xyz, axis=1),
-        spacing=float(wanted[1] - wanted[0]),
-        speed_limits=np.minimum(limits[after - 1], limits[after]),
-    )

@@ -12,6 +12,7 @@ from pydantic import (
     Field,
     StringConstraints,
     ValidationError,
+    ValidationInfo,
     field_validator,
 )
 from pydrake.math import RigidTransform, RollPitchYaw
@@ -97,13 +98,19 @@ class ImuConfig(Mount):
 class Scenario(_Model):
     """A vehicle with sensors that follows a route through a stage.
 
+    Where it drives is either a map and its stage or any SDF world; how, it
+    is either told by lanes of the map's roads or by waypoints.
+
     Attributes:
         name: of the sequence; file and folder names derive from it.
         map: name of a shipped map, or the path of a folder laid out like
             one (`roads.yaml`, `stage_<stage>.sdf`, `structures.csv`).
         stage: which stage of the map.
+        world: an SDF file instead, with visuals for the LiDAR.
         title: what the sequence shows, in words.
         route: the lanes to follow.
+        waypoints: a CSV file of places to pass instead; see
+            `cns_drake.waypoints.load_waypoint_path`.
         speeds: how fast.
         lidars: the LiDARs by name; the name gives frame and topic.
         imu: the IMU.
@@ -112,10 +119,12 @@ class Scenario(_Model):
     """
 
     name: Name
-    map: str
-    stage: Name
+    map: str | None = None
+    stage: Name | None = Field(None, validate_default=True)
+    world: str | None = Field(None, validate_default=True)
     title: str = ""
-    route: Route
+    route: Route | None = Field(None, validate_default=True)
+    waypoints: str | None = Field(None, validate_default=True)
     speeds: Speeds
     lidars: dict[Name, LidarConfig] = Field(
         default={"lidar": LidarConfig()}, min_length=1
@@ -123,6 +132,39 @@ class Scenario(_Model):
     imu: ImuConfig = ImuConfig()
     frames: int | None = Field(None, ge=1)
     seed: int = Field(0, ge=0)
+
+    # A field that did not validate is missing in `info.data`: then its own
+    # fault is enough.
+
+    @field_validator("stage")
+    @classmethod
+    def _of_a_map(cls, stage: str | None, info: ValidationInfo):
+        if "map" in info.data and (stage is None) != (info.data["map"] is None):
+            raise ValueError("a map and its stage belong together")
+        return stage
+
+    @field_validator("world")
+    @classmethod
+    def _or_a_map(cls, world: str | None, info: ValidationInfo):
+        if "map" in info.data and (world is None) == (info.data["map"] is None):
+            raise ValueError("give either a map and its stage, or a world")
+        return world
+
+    @field_validator("route")
+    @classmethod
+    def _on_roads(cls, route: Route | None, info: ValidationInfo):
+        if route is not None and info.data.get("world") is not None:
+            raise ValueError("a world has no roads, give waypoints instead")
+        return route
+
+    @field_validator("waypoints")
+    @classmethod
+    def _or_a_route(cls, waypoints: str | None, info: ValidationInfo):
+        if "route" in info.data and (waypoints is None) == (
+            info.data["route"] is None
+        ):
+            raise ValueError("give either a route or waypoints")
+        return waypoints
 
     @field_validator("lidars")
     @classmethod
@@ -134,12 +176,16 @@ class Scenario(_Model):
 
     @property
     def map_folder(self) -> Path:
-        """The folder of the map."""
+        """The folder of the map; of a world, where its file is."""
+        if self.map is None:
+            return Path(self.world).parent
         return shipped_maps().get(self.map, Path(self.map))
 
     @property
     def world_file(self) -> Path:
-        """The SDF file of the stage."""
+        """The SDF file of the stage, or the world itself."""
+        if self.map is None:
+            return Path(self.world)
         return self.map_folder / f"stage_{self.stage}.sdf"
 
     @property
@@ -163,7 +209,7 @@ class Scenario(_Model):
         return self.model_copy(update={"lidars": lidars})
 
     def check_files(self, source="scenario") -> None:
-        """Checks that the map and its stage exist.
+        """Checks that the map and its stage, or the other files, exist.
 
         Args:
             source: the file or name that errors begin with.
@@ -171,6 +217,12 @@ class Scenario(_Model):
         Raises:
             InputError: they do not.
         """
+        for field in ("world", "waypoints"):
+            file = getattr(self, field)
+            if file is not None and not Path(file).is_file():
+                raise InputError(f"{source}: {field}: {file}: no such file")
+        if self.map is None:
+            return
         folder = self.map_folder
         if not folder.is_dir():
             known = ", ".join(shipped_maps())
@@ -244,10 +296,11 @@ def load_scenario(name_or_file: str | Path) -> Scenario:
     if not isinstance(values, dict):
         raise InputError(f"{path}: not a mapping of scenario fields")
     values.setdefault("name", sequence_name(path))
-    map_name = values.get("map")
-    if isinstance(map_name, str) and map_name not in shipped_maps():
-        # Relative to the file, and independent of where it is read from.
-        values["map"] = str((path.parent / map_name).resolve())
+    for field in ("map", "world", "waypoints"):
+        place = values.get(field)
+        if isinstance(place, str) and place not in shipped_maps():
+            # Relative to the file, independent of where it is read from.
+            values[field] = str((path.parent / place).resolve())
     scenario = make_scenario(values, path)
     scenario.check_files(path)
     return scenario

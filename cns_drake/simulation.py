@@ -14,11 +14,12 @@ from cns_drake import __version__
 from cns_drake.bag_writer import BagWriter, check_folder
 from cns_drake.errors import InputError
 from cns_drake.files import check_writable, complete_part, write_part
-from cns_drake.frame_clock import FRAME_PERIOD, START_NS
+from cns_drake.frame_clock import FRAME_PERIOD, START_NS, frames_within
 from cns_drake.mcap_recorder import make_calibration, recording_topics
 from cns_drake.meshcat_recording import MeshcatRecorder
+from cns_drake.planning import plan_drive
 from cns_drake.scenario import Scenario
-from cns_drake.station import load_stage, make_station, plan_drive
+from cns_drake.station import load_stage, make_station
 from cns_drake.world import World
 
 # Reports that so many frames of so many are done.
@@ -83,7 +84,7 @@ def simulate(
     check_folder(folder, overwrite)
     scenario.check_files(scenario.name)
     trajectory = plan_drive(scenario)
-    available = math.floor(trajectory.duration / FRAME_PERIOD) + 1
+    available = frames_within(trajectory.duration)
     num_frames = scenario.frames or available
     if num_frames > available:
         raise InputError(
@@ -91,6 +92,7 @@ def simulate(
             f"takes only {available}"
         )
     scenario = scenario.model_copy(update={"frames": num_frames})
+    described = scenario.model_dump(mode="json", exclude_none=True)
     world = load_stage(scenario)
     X_BSs = {name: lidar.pose() for name, lidar in scenario.lidars.items()}
     bag = BagWriter(
@@ -98,16 +100,18 @@ def simulate(
         recording_topics(scenario.lidars),
         start_ns=START_NS,
         attachments={
-            "scenario.json": scenario.model_dump(mode="json"),
+            "scenario.json": described,
             "structures.json": _structure_list(world),
             "calibration.json": make_calibration(X_BSs, scenario.imu.pose()),
         },
-        scenario=scenario.model_dump(mode="json"),
+        scenario=described,
         custom_data={
             "cns_drake_version": __version__,
-            "map": scenario.map,
-            "stage": scenario.stage,
-            "seed": str(scenario.seed),
+            **{
+                key: str(described[key])
+                for key in ("map", "stage", "world", "seed")
+                if key in described
+            },
         },
         overwrite=overwrite,
     )
@@ -165,6 +169,8 @@ def _structure_list(world: World) -> list[dict]:
 
 def _other_stage(scenario: Scenario) -> World | None:
     """Returns the stage to compare with: the last, or else the first."""
+    if scenario.stage is None:
+        return None
     stages = sorted(scenario.map_folder.glob("stage_*.sdf"))
     last = stages[-1] if stages[-1] != scenario.world_file else stages[0]
     if last == scenario.world_file:

@@ -6,7 +6,6 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
 from cns_drake.bag_writer import BagWriter
-from cns_drake.city.road_network import load_road_network
 from cns_drake.frame_clock import FRAME_PERIOD, START_NS
 from cns_drake.imu import add_imu
 from cns_drake.lidar import Lidar
@@ -14,8 +13,9 @@ from cns_drake.mcap_recorder import McapRecorder
 from cns_drake.meshcat_recording import MeshcatRecorder
 from cns_drake.odometry import add_odometry
 from cns_drake.paths import vehicle_file
+from cns_drake.planning import plan_drive
 from cns_drake.scenario import Scenario
-from cns_drake.trajectory import Trajectory, make_trajectory
+from cns_drake.trajectory import Trajectory
 from cns_drake.vehicle_motion import VehicleMotion
 from cns_drake.world import World, load_world
 
@@ -116,14 +116,6 @@ def make_station(
 def load_stage(scenario: Scenario) -> World:
     """Loads the stage of a scenario with the vehicle in it."""
     return load_world(scenario.world_file, vehicle=vehicle_file())
-
-
-def plan_drive(scenario: Scenario) -> Trajectory:
-    """Plans the drive of a scenario along its route."""
-    network = load_road_network(scenario.roads_file)
-    return make_trajectory(
-        network, scenario.route, scenario.speeds, scenario.name
-    )
 
 
 def _connect(builder, name, recorder, measured) -> None:

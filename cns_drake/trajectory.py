@@ -8,16 +8,15 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.math import SpatialAcceleration, SpatialVelocity
 
-from cns_drake.city.road_network import RoadNetwork
+from cns_drake.lane_path import LanePath
 from cns_drake.path_geometry import PathIntegral, PathJet, SmoothPath
-from cns_drake.route import LanePath, Route, make_lane_path
 from cns_drake.speed_profile import Speeds, make_time_scaling
 from cns_drake.uniform_spline import SplineDerivatives
 
 # Distance of the path's control points [m]: the curvature then builds up
 # over about 10 m, as a driver turns the wheel, and in the tightest bends of a
 # town the path leaves the middle of the lane by less than 10 cm.
-_POINT_SPACING = 2.0
+POINT_SPACING = 2.0
 
 
 @dataclass(frozen=True)
@@ -112,25 +111,6 @@ _UP = np.array([0.0, 0.0, 1.0])
 
 def _left(jet: PathJet) -> np.ndarray:
     return np.array([-np.sin(jet.yaw[0]), np.cos(jet.yaw[0]), 0.0])
-
-
-def make_trajectory(
-    network: RoadNetwork, route: Route, speeds: Speeds, source="route"
-) -> Trajectory:
-    """Returns the trajectory of a route.
-
-    Args:
-        network: the roads.
-        route: the legs.
-        speeds: the bounds on speed and acceleration.
-        source: the file that errors name.
-
-    Raises:
-        InputError: the route does not suit the network; see
-            `cns_drake.route.make_lane_path`.
-    """
-    lane_path = make_lane_path(network, route, _POINT_SPACING, source)
-    return Trajectory(lane_path, speeds)
 
 
 class WheelMotion:

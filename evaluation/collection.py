@@ -35,7 +35,9 @@ class Recording:
     def route(self) -> object | None:
         """What the scenario says about the route; None if it is unknown."""
         scenario = self.sequence.scenario
-        return None if scenario is None else scenario.get("route")
+        if scenario is None:
+            return None
+        return scenario.get("route") or scenario.get("waypoints")
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,9 @@ import numpy as np
 import yaml
 
 from cns_drake.city.road_network import load_road_network
+from cns_drake.lane_path import LanePath
 from cns_drake.paths import shipped_sequences
-from cns_drake.route import LanePath, make_lane_path
+from cns_drake.route import make_lane_path
 from cns_drake.scenario import Scenario
 from cns_drake.speed_profile import Speeds
 from cns_drake.trajectory import Trajectory

@@ -5,28 +5,17 @@ from drives import (
     SPACING,
     helix_points,
     lane_path,
-    shipped_drive,
     smoothed_radius,
     wavy_points,
 )
 import numpy as np
-from pydrake.math import RotationMatrix
 import pytest
-from shapely.geometry import LineString, Point, Polygon
 
-from cns_drake.city.road_network import load_road_network
+from cns_drake.lane_path import LanePath
 from cns_drake.path_geometry import PathIntegral, SmoothPath
-from cns_drake.route import LanePath, Route
 from cns_drake.speed_profile import Speeds
-from cns_drake.trajectory import Trajectory, WheelMotion, make_trajectory
+from cns_drake.trajectory import Trajectory, WheelMotion
 from cns_drake.uniform_spline import make_uniform_spline
-
-SHIPPED = ("metropolis_01", "metropolis_04")
-
-
-@pytest.fixture(scope="module")
-def drives():
-    return {name: shipped_drive(name) for name in SHIPPED}
 
 
 def motion(trajectory, t):
@@ -158,41 +147,6 @@ def test_the_path_turns_without_jumps_and_without_roll():
     assert R_WB[2, 1] == pytest.approx(0.0, abs=1e-12)
 
 
-def test_it_starts_and_ends_at_rest(drives):
-    for _, path, trajectory in drives.values():
-        for t, point in ((0.0, 0), (trajectory.duration, -1)):
-            np.testing.assert_allclose(
-                trajectory.pose(t).translation(), path.points[point], atol=1e-9
-            )
-            for twist in (
-                trajectory.spatial_velocity(t),
-                trajectory.spatial_acceleration(t),
-            ):
-                np.testing.assert_allclose(
-                    twist.get_coeffs(), np.zeros(6), atol=1e-9
-                )
-
-
-@pytest.mark.parametrize("name", SHIPPED)
-def test_bounds_hold_at_every_instant(drives, name):
-    scenario, path, trajectory = drives[name]
-    t = np.arange(0.0, trajectory.duration, 0.002)
-    speed, along, across = motion(trajectory, t)
-    speeds = scenario.speeds
-    assert speed.max() <= speeds.cruise + 1e-9
-    assert np.abs(along).max() <= speeds.longitudinal_acceleration
-    assert across.max() <= speeds.lateral_acceleration
-    # And they are made use of.
-    assert speed.max() > 0.99 * speeds.cruise
-    assert np.abs(along).max() > 0.9 * speeds.longitudinal_acceleration
-    assert across.max() > 0.99 * speeds.lateral_acceleration
-    u = trajectory.path_parameter(t)[0]
-    limits = np.interp(
-        u, path.spacing * np.arange(len(path.points)), path.speed_limits
-    )
-    assert np.all(speed <= limits)
-
-
 def test_bounds_hold_on_hills_and_where_limits_drop():
     for seed in range(4):
         points = wavy_points(seed)
@@ -208,76 +162,6 @@ def test_bounds_hold_on_hills_and_where_limits_drop():
         assert np.all(speed <= np.minimum(limit, CAREFUL.cruise) + 1e-9)
         assert np.abs(along).max() <= CAREFUL.longitudinal_acceleration
         assert across.max() <= CAREFUL.lateral_acceleration
-
-
-@pytest.mark.parametrize("name", SHIPPED)
-def test_acceleration_is_continuous(drives, name):
-    _, _, trajectory = drives[name]
-    # Across every knot of the time scaling, and of the path, where a step
-    # would be: the jerk of at most 50 m/s^3 moves it by 1e-5.
-    step = 1e-7
-    time_knots = np.arange(0.3, trajectory.duration, 0.3)
-    t = np.linspace(0, trajectory.duration, 20001)
-    u = trajectory.path_parameter(t)[0]
-    rising = np.concatenate([[True], np.diff(u) > 1e-9])
-    path_knots = np.arange(1, round(trajectory.path.end / SPACING))
-    path_times = np.interp(
-        path_knots * trajectory.path.spacing, u[rising], t[rising]
-    )
-    for knots in (time_knots, path_times):
-        before, after = (
-            _components(trajectory, knots + k) for k in (-step, step)
-        )
-        assert np.abs(after - before).max() < 1e-5
-
-
-def _components(trajectory, t):
-    return np.array(
-        [
-            trajectory.spatial_acceleration(time).get_coeffs()
-            for time in np.atleast_1d(t)
-        ]
-    )
-
-
-@pytest.mark.parametrize("name", SHIPPED)
-def test_the_vehicle_stays_in_its_lane(drives, name):
-    scenario, path, trajectory = drives[name]
-    t = np.arange(0.0, trajectory.duration, 0.1)
-    lane = LineString(path.points[:, :2])
-    positions = trajectory.positions(t)
-    deviation = max(lane.distance(Point(p)) for p in positions[:, :2])
-    assert deviation < 0.1
-    # The whole body, 4.7 m by 1.9 m, keeps off the kerbs.
-    body = np.array([(3.7, 0.95), (3.7, -0.95), (-1, -0.95), (-1, 0.95)])
-    network = load_road_network(scenario.roads_file)
-    area = network.lane_area()
-    for time in t[::5]:
-        X_WB = trajectory.pose(time)
-        corners = [X_WB.multiply([x, y, 0.0])[:2] for x, y in body]
-        assert area.contains(Polygon(corners)), time
-
-
-def test_the_shipped_drives_have_the_length_and_overlap_of_the_paper(drives):
-    samples = {}
-    for name, (_, _, trajectory) in drives.items():
-        assert 1500 <= trajectory.length <= 2700
-        assert 8.0 < trajectory.length / trajectory.duration < 11.0
-        t = np.arange(0.0, trajectory.duration, 0.01)
-        travelled = trajectory.travelled(t)
-        for spacing in (5, 10):
-            wanted = np.arange(0.0, trajectory.length, spacing)
-            times = np.interp(wanted, travelled, t)
-            samples[name, spacing] = trajectory.positions(times)
-    queries = samples["metropolis_04", 10]
-    database = samples["metropolis_01", 5]
-    assert 150 <= len(queries) <= 260
-    assert 150 <= len(samples["metropolis_01", 10]) <= 260
-    distance = np.linalg.norm(queries[:, None] - database[None], axis=2)
-    matched = np.count_nonzero(distance.min(axis=1) <= 7.5)
-    # Table II: 147 queries of Metropolis 04 have a match in 01.
-    assert matched == pytest.approx(147, rel=0.2)
-    assert matched < len(queries)
 
 
 def test_path_integrals():
@@ -327,26 +211,3 @@ def test_wheel_rates_are_derivatives_of_the_angles():
         np.testing.assert_allclose(now.rate, rate, atol=1e-5)
         acceleration = (after.rate - before.rate) / (2 * step)
         np.testing.assert_allclose(now.acceleration, acceleration, atol=1e-5)
-
-
-def test_make_trajectory_strings_everything_together():
-    network = load_road_network(shipped_drive("metropolis_01")[0].roads_file)
-    route = Route.model_validate(
-        [
-            {"road": "ring_east", "direction": "forward", "lane": 1},
-            {
-                "road": "ring_south_east",
-                "direction": "forward",
-                "lane": 1,
-                "end": 30,
-            },
-        ]
-    )
-    trajectory = make_trajectory(network, route, CAREFUL)
-    x, y, _, heading = network.roads["ring_east"].lane_end(
-        "forward", 1, "entry"
-    )
-    X_WB = trajectory.pose(0.0)
-    np.testing.assert_allclose(X_WB.translation(), [x, y, 0], atol=1e-9)
-    expected = RotationMatrix.MakeZRotation(heading).matrix()
-    np.testing.assert_allclose(X_WB.rotation().matrix(), expected, atol=1e-3)

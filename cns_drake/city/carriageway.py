@@ -16,8 +16,9 @@ _QUADRANT_SEGMENTS = 8
 _GRID = 0.001
 # Vertices closer to the outline than this are dropped [m].
 _SIMPLIFY = 0.01
-# Areas that meet are joined over gaps up to twice this width [m].
-_SEAM = 0.005
+# Areas that meet are joined over slits up to twice this width, as they stay
+# open where roads end beside one another at a slant [m].
+_SEAM = 0.25
 # Junctions are drawn so far into their roads, then cut off at the roads'
 # ends; what is left beside them is at most as thick, and dropped [m].
 _OVERLAP = 0.5
@@ -102,7 +103,7 @@ def junction_area(roads, junction) -> Polygon:
         -radius, quad_segs=_QUADRANT_SEGMENTS
     )
     for arm in junction.arms:
-        area = area.difference(_beyond(roads[arm.road], arm))
+        area = area.difference(road_strip(roads[arm.road]))
     # Cutting can leave splinters and crumbs beside a road's end.
     area = area.buffer(-_OVERLAP, join_style="mitre").buffer(
         _OVERLAP, join_style="mitre"
@@ -119,19 +120,6 @@ def _stub(road, arm) -> LineString:
     if arm.end == "end":
         stations = road.full_length - stations
     return LineString(road.evaluate(stations)[:, :2])
-
-
-def _beyond(road, arm) -> Polygon:
-    """Returns a box over the part of an arm's stub that belongs to the road."""
-    if arm.end == "start":
-        x, y, _, outward = road.evaluate([road.first_station])[0]
-    else:
-        x, y, _, heading = road.evaluate([road.last_station])[0]
-        outward = heading + np.pi
-    along = np.array([np.cos(outward), np.sin(outward)])
-    across = np.array([-along[1], along[0]]) * arm.half_width
-    near, far = np.array([x, y]), np.array([x, y]) + 2 * _OVERLAP * along
-    return Polygon([near - across, far - across, far + across, near + across])
 
 
 def make_areas(roads, junction_areas) -> Areas:
@@ -202,7 +190,7 @@ def _simplified(area):
 
 
 def _join(parts):
-    """Returns the union, with hairline gaps between neighbours closed."""
+    """Returns the union, with the slits between neighbours closed."""
     grown = unary_union(
         [part.buffer(_SEAM, join_style="mitre") for part in parts]
     )

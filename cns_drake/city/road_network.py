@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from shapely import STRtree
 from shapely.geometry import MultiPolygon, Polygon
 
 from cns_drake.city import carriageway
@@ -297,6 +298,8 @@ def _make_junction(path, file: RoadsFile, name, curves) -> Junction:
     entry = file.junctions[name]
     ends = []
     for road_name, road in file.roads.items():
+        if name not in (road.start, road.end):
+            continue
         width = road.lane_width * sum(road.lanes) + road.median
         first, last = curves[road_name].evaluate([0, curves[road_name].length])
         if road.start == name:
@@ -339,12 +342,14 @@ def _derived_setback(ends, k: int, kerb_radius: float) -> float:
 
 
 def _check_crossings(path, network: RoadNetwork):
-    strips = {
-        name: carriageway.road_strip(road)
-        for name, road in network.roads.items()
-    }
-    for a, b in itertools.combinations(strips, 2):
-        if strips[a].intersection(strips[b]).area > _CROSSING_TOLERANCE:
+    names = list(network.roads)
+    strips = [carriageway.road_strip(network.roads[name]) for name in names]
+    pairs = STRtree(strips).query(strips, predicate="intersects")
+    for a, b in sorted(pairs.T.tolist()):
+        if a < b and strips[a].intersection(strips[b]).area > (
+            _CROSSING_TOLERANCE
+        ):
             raise InputError(
-                f"{path}: roads.{a}: meets road {b} outside a junction"
+                f"{path}: roads.{names[a]}: meets road {names[b]} outside a "
+                "junction"
             )

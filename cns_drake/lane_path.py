@@ -1,0 +1,67 @@
+"""The line that a vehicle is to follow, and how fast it may go there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cns_drake.errors import InputError
+
+# A path must be longer than this for a trajectory to be made of it [m].
+_MIN_LENGTH = 20.0
+
+
+@dataclass(frozen=True)
+class LanePath:
+    """The middle of the lanes of a drive, evenly sampled.
+
+    Attributes:
+        points: (N, 3) positions in the world, first and last included [m].
+        spacing: distance between neighbours along the path [m].
+        speed_limits: (N,) the limits there, infinite where there is none
+            [m/s].
+    """
+
+    points: np.ndarray
+    spacing: float
+    speed_limits: np.ndarray
+
+    @property
+    def length(self) -> float:
+        """Length along the lanes [m]."""
+        return self.spacing * (len(self.points) - 1)
+
+
+def sample_lane_path(points, speed_limits, spacing: float, source) -> LanePath:
+    """Returns evenly spaced points along a polyline.
+
+    Args:
+        points: (N, 3) its corners [m].
+        speed_limits: (N,) limit at each corner; on a segment the lower one
+            of its two holds [m/s].
+        spacing: the distance of the points, rounded so that it divides the
+            length of the polyline [m].
+        source: what an error begins with.
+
+    Raises:
+        InputError: the polyline is too short for a drive.
+    """
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    travelled = np.concatenate([[0.0], np.cumsum(steps)])
+    length = float(travelled[-1])
+    if length < _MIN_LENGTH:
+        raise InputError(
+            f"{source}: {length:.1f} m long, at least {_MIN_LENGTH:.0f} m "
+            "are needed"
+        )
+    count = max(1, round(length / spacing))
+    wanted = np.linspace(0.0, length, count + 1)
+    xyz = [np.interp(wanted, travelled, axis) for axis in points.T]
+    # A limit holds from its first point on; of two neighbours take the lower.
+    after = np.searchsorted(travelled, wanted).clip(1, len(points) - 1)
+    return LanePath(
+        points=np.stack(xyz, axis=1),
+        spacing=float(wanted[1] - wanted[0]),
+        speed_limits=np.minimum(speed_limits[after - 1], speed_limits[after]),
+    )

@@ -1,0 +1,26 @@
+"""From a scenario to the drive that it describes."""
+
+from __future__ import annotations
+
+from cns_drake.city.road_network import load_road_network
+from cns_drake.route import make_lane_path
+from cns_drake.scenario import Scenario
+from cns_drake.trajectory import POINT_SPACING, Trajectory
+from cns_drake.waypoints import load_waypoint_path
+
+
+def plan_drive(scenario: Scenario) -> Trajectory:
+    """Plans the drive of a scenario, along its route or its waypoints.
+
+    Raises:
+        InputError: the roads or the waypoints cannot be used, or the route
+            does not suit the roads.
+    """
+    if scenario.waypoints is not None:
+        path = load_waypoint_path(scenario.waypoints, POINT_SPACING)
+    else:
+        network = load_road_network(scenario.roads_file)
+        path = make_lane_path(
+            network, scenario.route, POINT_SPACING, scenario.name
+        )
+    return Trajectory(path, scenario.speeds)
