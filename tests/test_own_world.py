@@ -56,6 +56,18 @@ def test_a_world_and_waypoints_give_a_recording(yard, tmp_path):
     np.testing.assert_allclose(position, [-10, 5, 0], atol=1e-9)
 
 
+def test_waypoints_lead_through_a_map_as_well(yard, small_map):
+    path = yard / "yard_01.yaml"
+    values = yaml.safe_load(path.read_text())
+    del values["world"]
+    values |= {"map": str(small_map), "stage": "01"}
+    path.write_text(yaml.safe_dump(values))
+    scenario = load_scenario(path)
+    assert scenario.world_file == small_map / "stage_01.sdf"
+    start = plan_drive(scenario).pose(0.0).translation()
+    np.testing.assert_allclose(start, [-10, 5, 0], atol=1e-9)
+
+
 def test_the_drive_keeps_to_waypoints_and_speeds(yard):
     trajectory = plan_drive(load_scenario(yard / "yard_01.yaml"))
     # 50 m and 55 m, less the corner's 2 * 8 m replaced by a quarter circle.
