@@ -18,6 +18,7 @@ from cns_drake.city.buildings.gallery_flats import GALLERY_FLATS
 from cns_drake.city.buildings.garden_flats import GARDEN_FLATS
 from cns_drake.city.buildings.glass_skyscraper import GLASS_SKYSCRAPER
 from cns_drake.city.buildings.hotel import HOTEL
+from cns_drake.city.buildings.mill import MILL
 from cns_drake.city.buildings.museum import MUSEUM
 from cns_drake.city.buildings.observation_tower import OBSERVATION_TOWER
 from cns_drake.city.buildings.office import OFFICE
@@ -29,11 +30,10 @@ from cns_drake.city.buildings.shop_house import SHOP_HOUSE
 from cns_drake.city.buildings.shop_strip import SHOP_STRIP
 from cns_drake.city.buildings.slab_tower import SLAB_TOWER
 from cns_drake.city.buildings.terrace import TERRACE
+from cns_drake.city.buildings.town_hall import TOWN_HALL
 from cns_drake.city.buildings.walk_up import WALK_UP
 from cns_drake.city.buildings.waterfront_hall import WATERFRONT_HALL
 
-MILL = plain_house("mill", (12.0, 28.0), (14.0, 70.0))
-TOWN_HALL = plain_house("town_hall", (18.0, 45.0), (18.0, 60.0))
 SCHOOL = plain_house("school", (7.0, 18.0), (20.0, 90.0))
 KIOSK_ROW = plain_house("kiosk_row", (3.2, 8.0), (6.0, 60.0))
 GAS_STATION = plain_house("gas_station", (5.0, 8.0), (18.0, 50.0))
