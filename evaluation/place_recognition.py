@@ -90,18 +90,40 @@ def run(
             world, or no query has a match.
     """
     retrieval = retrieve(database, query, method, track)
+    return judge_retrieval(method, database.name, query.name, retrieval, mode)
+
+
+def judge_retrieval(
+    method: Method,
+    database: str,
+    query: str,
+    retrieval: Retrieval,
+    mode: Mode = "all",
+) -> PlaceRecognition:
+    """Returns the numbers of what a method retrieved.
+
+    Args:
+        method: that made the scores.
+        database: name of the drive whose places are known.
+        query: name of the drive that asks.
+        retrieval: scores and truth.
+        mode: which queries count.
+
+    Raises:
+        InputError: if no query has a match.
+    """
     if not retrieval.matches.any():
         nearest = retrieval.distances.min()
         raise InputError(
-            f"{query.name}: no query lies within {MATCH_RADIUS} m of a place"
-            f" of {database.name} (the nearest at {nearest:.1f} m)"
+            f"{query}: no query lies within {MATCH_RADIUS} m of a place"
+            f" of {database} (the nearest at {nearest:.1f} m)"
         )
     outcomes = judge(retrieval.scores, retrieval.matches)
     return PlaceRecognition(
         method=method.name,
         parameters=method.config.model_dump(mode="json"),
-        database=database.name,
-        query=query.name,
+        database=database,
+        query=query,
         retrieval=retrieval,
         outcomes=outcomes,
         metrics=evaluate(outcomes, mode),

@@ -13,7 +13,9 @@ fixed as follows.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Set
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -27,6 +29,9 @@ QUERY_SPACING = 10.0
 DATABASE_SPACING = 5.0
 MATCH_RADIUS = 7.5
 CROP = 100.0
+
+# What a drive is described for.
+Role = Literal["places", "queries"]
 
 
 @dataclass(frozen=True)
@@ -50,6 +55,29 @@ class Retrieval:
     def matches(self) -> np.ndarray:
         """(Q, D) bool, which place is a true match of which query."""
         return self.distances <= MATCH_RADIUS
+
+
+@dataclass(frozen=True)
+class DescribedDrive:
+    """What a method keeps of a drive.
+
+    Attributes:
+        name: of the drive.
+        place_frames: (D,) frames at which it has places.
+        p_WPs: (D, 3) the positions of the sensor there [m].
+        places: D descriptors; empty if it is no database.
+        query_frames: (Q,) frames at which it asks.
+        p_WQs: (Q, 3) likewise [m].
+        queries: Q descriptors; empty if it does not ask.
+    """
+
+    name: str
+    place_frames: np.ndarray
+    p_WPs: np.ndarray
+    places: list
+    query_frames: np.ndarray
+    p_WQs: np.ndarray
+    queries: list
 
 
 def sample_frames(positions: np.ndarray, spacing: float) -> np.ndarray:
@@ -117,37 +145,104 @@ def retrieve(
             same world.
     """
     check_same_world(database, query)
-    p_WDs = database.X_WS[:, :3, 3]
-    p_WQs = query.X_WS[:, :3, 3]
-    database_frames = sample_frames(p_WDs, DATABASE_SPACING)
-    query_frames = sample_frames(p_WQs, QUERY_SPACING)
-    places = method.build_database(
-        [
-            method.describe_place(
-                gather(database, frame, method.scans_per_place)
-            )
-            for frame in track(
-                database_frames,
-                f"describing {database.name}",
-                len(database_frames),
-            )
-        ]
-    )
-    scores = np.empty((len(query_frames), len(database_frames)))
-    numbered = track(
-        list(enumerate(query_frames)),
-        f"querying {query.name}",
-        len(query_frames),
-    )
-    for row, frame in numbered:
-        descriptor = method.describe(
-            gather(query, frame, method.scans_per_place)
+    (places,) = describe_drive(database, [method], {"places"}, track)
+    (queries,) = describe_drive(query, [method], {"queries"}, track)
+    return compare(method, places, queries, track)
+
+
+def describe_drive(
+    sequence: Sequence,
+    methods: Iterable[Method],
+    roles: Set[Role],
+    track: Track = silent,
+    visit: Callable[[int, np.ndarray], None] | None = None,
+) -> list[DescribedDrive]:
+    """Describes the places and queries of a drive, each cloud once.
+
+    Queries are taken at every other place, so that a method which describes
+    both alike does so once. Clouds are shared between methods.
+
+    Args:
+        sequence: the drive.
+        methods: that describe it.
+        roles: what it serves as.
+        track: reports progress.
+        visit: is also shown each described frame and its single scan (N, 3),
+            cropped, in the frame of the sensor.
+
+    Returns:
+        What each method made of it.
+
+    Raises:
+        InputError: if the sequence cannot be read.
+    """
+    methods = list(methods)
+    positions = sequence.X_WS[:, :3, 3]
+    frames = {
+        "places": sample_frames(positions, DATABASE_SPACING),
+        "queries": sample_frames(positions, QUERY_SPACING),
+    }
+    members = {role: set(frames[role].tolist()) for role in roles}
+    described = [
+        DescribedDrive(
+            sequence.name,
+            frames["places"],
+            positions[frames["places"]],
+            [],
+            frames["queries"],
+            positions[frames["queries"]],
+            [],
         )
+        for _ in methods
+    ]
+    sizes = {method.scans_per_place for method in methods}
+    if visit is not None:
+        sizes.add(1)
+    wanted = sorted(set().union(*members.values()))
+    for frame in track(wanted, f"describing {sequence.name}", len(wanted)):
+        clouds = {size: gather(sequence, frame, size) for size in sizes}
+        if visit is not None:
+            visit(frame, clouds[1])
+        for method, result in zip(methods, described, strict=True):
+            cloud = clouds[method.scans_per_place]
+            place = None
+            if frame in members.get("places", ()):
+                place = method.describe_place(cloud)
+                result.places.append(place)
+            if frame in members.get("queries", ()):
+                if place is None or not method.describes_alike:
+                    place = method.describe(cloud)
+                result.queries.append(place)
+    return described
+
+
+def compare(
+    method: Method,
+    database: DescribedDrive,
+    query: DescribedDrive,
+    track: Track = silent,
+) -> Retrieval:
+    """Scores the queries of one drive against the places of another.
+
+    Args:
+        method: that described both.
+        database: with its places described.
+        query: with its queries described; in the same world frame.
+        track: reports progress.
+    """
+    places = method.build_database(database.places)
+    scores = np.empty((len(query.queries), len(database.places)))
+    numbered = track(
+        list(enumerate(query.queries)),
+        f"querying {query.name}",
+        len(query.queries),
+    )
+    for row, descriptor in numbered:
         scores[row] = method.score(descriptor, places)
-    offsets = p_WQs[query_frames, None, :] - p_WDs[None, database_frames, :]
+    offsets = query.p_WQs[:, None, :] - database.p_WPs[None, :, :]
     return Retrieval(
-        query_frames=query_frames,
-        database_frames=database_frames,
+        query_frames=query.query_frames,
+        database_frames=database.place_frames,
         scores=scores,
         distances=np.linalg.norm(offsets, axis=2),
     )

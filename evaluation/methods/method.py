@@ -59,6 +59,11 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         """Describes a scan of the database, where that differs."""
         return self.describe(points)
 
+    @property
+    def describes_alike(self) -> bool:
+        """Whether places and queries are described in the same way."""
+        return type(self).describe_place is Method.describe_place
+
     @abc.abstractmethod
     def build_database(self, places: Sequence[Descriptor]) -> Database:
         """Returns what a query is compared with: all places, indexed."""
