@@ -54,10 +54,10 @@ def list_sequences() -> None:
     from rich.table import Table
     import yaml
 
-    from cns_drake.paths import shipped_sequences
+    from cns_drake.paths import recordable_sequences
 
     table = Table("sequence", "map", "stage", "title")
-    for name, path in shipped_sequences().items():
+    for name, path in recordable_sequences().items():
         fields = yaml.load(path.read_text(encoding="utf-8"), yaml.CSafeLoader)
         table.add_row(name, fields["map"], fields["stage"], fields["title"])
     Console().print(table)

@@ -37,6 +37,20 @@ def shipped_sequences() -> dict[str, Path]:
     }
 
 
+def recordable_sequences() -> dict[str, Path]:
+    """Returns the shipped sequences whose stage is shipped as well.
+
+    A map's roads and drives may be there before its city is.
+    """
+    return {
+        name: path
+        for name, path in shipped_sequences().items()
+        if path.with_name(path.name.replace("sequence_", "stage_"))
+        .with_suffix(".sdf")
+        .is_file()
+    }
+
+
 def sequence_name(path: Path) -> str:
     """Returns the name of the sequence that a scenario file describes.
 

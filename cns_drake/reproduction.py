@@ -9,7 +9,7 @@ import sys
 
 from cns_drake.errors import InputError
 from cns_drake.jobs import record_all
-from cns_drake.paths import shipped_maps, shipped_sequences
+from cns_drake.paths import recordable_sequences, shipped_maps
 from cns_drake.scenario import Scenario, load_scenario
 
 
@@ -30,7 +30,12 @@ def reproduce_maps(
     Raises:
         InputError: a map is not known, or a step failed.
     """
-    known = shipped_maps()
+    folders = {path.parent for path in recordable_sequences().values()}
+    known = {
+        name: folder
+        for name, folder in shipped_maps().items()
+        if folder in folders
+    }
     for name in maps or ():
         if name not in known:
             raise InputError(f"unknown map '{name}'; known: {', '.join(known)}")
@@ -60,7 +65,7 @@ def _scenarios_of_map(name: str) -> list[Scenario]:
     """
     sequences = [
         load_scenario(sequence)
-        for sequence, path in shipped_sequences().items()
+        for sequence, path in recordable_sequences().items()
         if path.parent == shipped_maps()[name]
     ]
     last = max(sequences, key=lambda sequence: sequence.stage)

@@ -7,13 +7,14 @@ from small_map import scenario_values
 import yaml
 
 from cns_drake.errors import InputError
-from cns_drake.paths import shipped_sequences
+from cns_drake.paths import recordable_sequences
 from cns_drake.scenario import Mount, load_scenario, make_scenario
 
 
 def test_shipped_sequences_load():
-    assert {"metropolis_01", "metropolis_04"} <= shipped_sequences().keys()
-    for name in shipped_sequences():
+    names = recordable_sequences().keys()
+    assert {"metropolis_01", "metropolis_04"} <= names
+    for name in names:
         scenario = load_scenario(name)
         assert scenario.name == name
         assert scenario.world_file.is_file()
