@@ -73,6 +73,7 @@ class Lidar(LeafSystem):
         self._pattern = pattern
         structures = structures or StructureTable(())
         self._d_Sset = pattern.d_Sset.astype(np.float32)
+        self._d_Sset_cast = pattern.d_Sset[pattern.packet_order]
 
         self._geometry_query = self.DeclareAbstractInputPort(
             "geometry_query", Value(QueryObject())
@@ -114,17 +115,21 @@ class Lidar(LeafSystem):
         seen = self._scene.Eval(context)
         seen.update(query_object)
         X_WS = query_object.GetPoseInWorld(self._parent_frame_id) @ self._X_PS
-        d_Wset = self._pattern.d_Sset @ X_WS.rotation().matrix().T
+        order = self._pattern.packet_order
+        d_Wset = self._d_Sset_cast @ X_WS.rotation().matrix().T
         # Beyond the maximum by a hair, so that the limit itself is decided
         # below and not by the rounding inside the ray caster.
         reach = self._pattern.max_range * (1.0 + 1e-5)
         hits = seen.scene.cast_rays(X_WS.translation(), d_Wset, reach)
+        ranges = np.empty_like(hits.ranges)
+        ranges[order] = hits.ranges
+        geometry = np.empty_like(hits.geometry)
+        geometry[order] = hits.geometry
         returned = np.flatnonzero(
-            (hits.ranges >= self._pattern.min_range)
-            & (hits.ranges <= self._pattern.max_range)
+            (ranges >= self._pattern.min_range)
+            & (ranges <= self._pattern.max_range)
         )
-        ranges = hits.ranges[returned]
-        geometry = hits.geometry[returned]
+        ranges, geometry = ranges[returned], geometry[returned]
         p_SRset = self._d_Sset[returned] * ranges[:, None]
         # Zeros, so that the padding between fields is defined, too.
         scan = np.zeros(len(returned), POINT_DTYPE)
