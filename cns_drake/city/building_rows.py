@@ -68,6 +68,7 @@ def place_buildings(draft: Draft, district: District, source: str) -> None:
         InputError: if a single building has no room or cannot be built.
     """
     name = district.plan.name
+    draft.open_range()
     for index, plan in enumerate(district.plan.buildings):
         rng = draft.rng(name, "building", index)
         fault_at = f"{source}: districts.{name}.buildings.{index}"
@@ -77,6 +78,7 @@ def place_buildings(draft: Draft, district: District, source: str) -> None:
         except ValueError as error:
             raise InputError(f"{fault_at}: {error}") from error
     for index, row in enumerate(district.plan.rows):
+        draft.open_range()
         houses = _row_houses(
             draft, district, row, draft.rng(name, "row", index)
         )

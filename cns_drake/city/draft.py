@@ -17,6 +17,9 @@ from cns_drake.city.road_network import RoadNetwork
 from cns_drake.city.streets import kerb_height
 from cns_drake.city.structures import MeshShape, Model, Structure
 
+# Numbers in names start anew at multiples of this.
+_RANGE = 50
+
 
 class Draft:
     """Collects structures, gives them names and keeps them apart.
@@ -56,6 +59,16 @@ class Draft:
         key = "/".join(map(str, words)).encode()
         return np.random.default_rng([self._seed, zlib.crc32(key)])
 
+    def open_range(self) -> None:
+        """Starts a new range of numbers in names, for the next task.
+
+        Like house numbers, which start anew with each street: one thing
+        more or less in one task does not rename those of all later tasks,
+        which the lists of the stages refer to.
+        """
+        for kind, count in self._counts.items():
+            self._counts[kind] = -(-count // _RANGE) * _RANGE
+
     def next_name(self, kind: str) -> str:
         """Returns a new name, e.g. `tower_017` for the kind `tower`."""
         self._counts[kind] += 1
@@ -87,21 +100,6 @@ class Draft:
         self.structures.append(structure)
         self._walls.add(structure.footprint_W)
 
-    def clears_buildings(
-        self, model: Model, xy: tuple[float, float], part: float
-    ) -> bool:
-        """Tells whether a wide crown keeps off all buildings.
-
-        Args:
-            model: of a tree; what has no meshes always keeps off.
-            xy: position in W [m].
-            part: of the model's reach that must be free.
-        """
-        reach = _reach(model)
-        if reach == 0.0:
-            return True
-        return self._walls.is_free(Point(xy).buffer(part * reach))
-
     def place(
         self,
         kind: str,
@@ -112,9 +110,13 @@ class Draft:
         tags: Iterable[str],
         *,
         clearance: float = 0.0,
+        crown_part: float = 0.0,
         within: BaseGeometry | None = None,
     ) -> Structure | None:
         """Places a model on the finished ground if there is room for it.
+
+        A model without room uses up a name as well, so that the names of
+        others do not depend on whether it fits.
 
         Args:
             kind: stem of the name.
@@ -124,6 +126,8 @@ class Draft:
             yaw: heading in W [rad].
             tags: free words.
             clearance: to everything that stands already [m].
+            crown_part: how much of the reach of a tree's crown must be
+                clear of buildings, from 0 to 1.
             within: where given, the footprint must lie in this area.
 
         Returns:
@@ -131,22 +135,22 @@ class Draft:
         """
         x, y = (round(float(value), 3) for value in xy)
         z = float(self.ground_height(np.array([x]), np.array([y]))[0])
-        trial = Structure(
-            kind, semantic_class, model, (x, y, round(z, 3)), float(yaw)
-        )
-        footprint = trial.footprint_W
-        if within is not None and not within.contains(footprint):
-            return None
-        if not self.is_free(footprint, clearance):
-            return None
         structure = Structure(
             self.next_name(kind),
             semantic_class,
             model,
-            trial.xyz,
-            trial.yaw,
+            (x, y, round(z, 3)),
+            float(yaw),
             tuple(tags),
         )
+        footprint = structure.footprint_W
+        if within is not None and not within.contains(footprint):
+            return None
+        if not self.is_free(footprint, clearance):
+            return None
+        crown = Point(x, y).buffer(crown_part * _reach(model))
+        if not crown.is_empty and not self._walls.is_free(crown):
+            return None
         self._occupancy.add(footprint)
         self.structures.append(structure)
         return structure

@@ -26,6 +26,7 @@ _SIGNS = ("sign_round", "sign_rectangular", "sign_triangular")
 def furnish_junctions(draft: Draft) -> None:
     """Places lights, stop signs and name signs at all arms, then signs."""
     for junction in draft.network.junctions.values():
+        draft.open_range()
         rng = draft.rng("junction", junction.name)
         for arm in junction.arms:
             _furnish_arm(draft, junction, arm, rng)

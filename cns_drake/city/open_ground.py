@@ -50,16 +50,20 @@ def furnish(
         InputError: if a single object has no room.
     """
     name = district.plan.name
+    draft.open_range()
     for index, plan in enumerate(district.plan.objects):
         rng = draft.rng(name, "object", index)
         field = f"{source}: districts.{name}.objects.{index}"
         _place_object(draft, district, plan, rng, field)
     for index, plan in enumerate(district.plan.lines):
+        draft.open_range()
         _place_line(draft, district, plan, draft.rng(name, "line", index))
     for index, plan in enumerate(district.plan.parking):
+        draft.open_range()
         rng = draft.rng(name, "parking", index)
         _place_cars(draft, district, plan, cars, rng)
     for index, plan in enumerate(district.plan.scatter):
+        draft.open_range()
         _scatter(draft, district, plan, draft.rng(name, "scatter", index))
 
 
@@ -238,8 +242,6 @@ def _try_object(
 ) -> None:
     builder = OBJECTS[name]
     model = builder.build(rng)
-    if not draft.clears_buildings(model, (at.x, at.y), _CROWN_PART):
-        return
     draft.place(
         kind or name_stem(name),
         builder.semantic_class,
@@ -248,5 +250,6 @@ def _try_object(
         yaw,
         (district.plan.name,),
         clearance=_CLEARANCE,
+        crown_part=_CROWN_PART,
         within=district.area,
     )

@@ -47,6 +47,7 @@ def furnish_sidewalks(
             draft.network.carriageway(), draft.network.sidewalks(), distance
         )
         for index, line in enumerate(lines):
+            draft.open_range()
             rng = draft.rng("sidewalk", task, index)
             _walk(draft, plan, districts, task, line, keep_off, rng)
 
@@ -59,6 +60,7 @@ def park_along_streets(draft: Draft, cars: Mapping[str, float]) -> None:
         cars: object -> weight.
     """
     for (name, side), bay in draft.network.parking_bays().items():
+        draft.open_range()
         road = draft.network.roads[name]
         rng = draft.rng("bays", name, side)
         sign = 1 if side == "left" else -1
@@ -77,6 +79,7 @@ def park_along_streets(draft: Draft, cars: Mapping[str, float]) -> None:
 def plant_medians(draft: Draft, plan: StreetPlan) -> None:
     """Plants the strips between the directions, and lights them."""
     for index, median in enumerate(draft.network.medians().geoms):
+        draft.open_range()
         rng = draft.rng("median", index)
         line = _middle_line(median)
         s = float(rng.uniform(1.0, 3.0))
@@ -170,8 +173,6 @@ def _place(
             at.y + front * math.cos(at.yaw),
         )
         yaw = at.yaw - math.pi / 2
-    if not draft.clears_buildings(model, xy, _CROWN_PART):
-        return
     draft.place(
         name_stem(name),
         builder.semantic_class,
@@ -180,4 +181,5 @@ def _place(
         yaw,
         tags,
         clearance=_CLEARANCE,
+        crown_part=_CROWN_PART,
     )
