@@ -18,6 +18,7 @@ from cns_drake.city.buildings.gallery_flats import GALLERY_FLATS
 from cns_drake.city.buildings.garden_flats import GARDEN_FLATS
 from cns_drake.city.buildings.glass_skyscraper import GLASS_SKYSCRAPER
 from cns_drake.city.buildings.hotel import HOTEL
+from cns_drake.city.buildings.kiosk_row import KIOSK_ROW
 from cns_drake.city.buildings.mill import MILL
 from cns_drake.city.buildings.museum import MUSEUM
 from cns_drake.city.buildings.observation_tower import OBSERVATION_TOWER
@@ -25,6 +26,7 @@ from cns_drake.city.buildings.office import OFFICE
 from cns_drake.city.buildings.podium_tower import PODIUM_TOWER
 from cns_drake.city.buildings.provisional import plain_house
 from cns_drake.city.buildings.row_house import ROW_HOUSE
+from cns_drake.city.buildings.school import SCHOOL
 from cns_drake.city.buildings.semi_detached import SEMI_DETACHED
 from cns_drake.city.buildings.shop_house import SHOP_HOUSE
 from cns_drake.city.buildings.shop_strip import SHOP_STRIP
@@ -34,8 +36,6 @@ from cns_drake.city.buildings.town_hall import TOWN_HALL
 from cns_drake.city.buildings.walk_up import WALK_UP
 from cns_drake.city.buildings.waterfront_hall import WATERFRONT_HALL
 
-SCHOOL = plain_house("school", (7.0, 18.0), (20.0, 90.0))
-KIOSK_ROW = plain_house("kiosk_row", (3.2, 8.0), (6.0, 60.0))
 GAS_STATION = plain_house("gas_station", (5.0, 8.0), (18.0, 50.0))
 SUPERMARKET = plain_house("supermarket", (6.0, 14.0), (20.0, 90.0))
 SPORTS_HALL = plain_house("sports_hall", (7.0, 18.0), (18.0, 80.0))

@@ -213,6 +213,10 @@ class Openings:
             if r.x1 < x0 + 0.01 or r.x0 > x1 - 0.01 or r.z1 < low or r.z0 > high
         ] + new
 
+    def add(self, edge: int, reliefs: Iterable[Relief]) -> None:
+        """Adds reliefs given in the wall's coordinates."""
+        self._reliefs[edge] += reliefs
+
     def clear(self, edge: int, x0: float, x1: float, z0: float, z1: float):
         """Removes whatever meets a part of a wall."""
         self._reliefs[edge] = [
@@ -310,11 +314,11 @@ def _add_shell(materials, wing: Wing, attic, material: str) -> None:
         start, end = wing.x0, wing.x1
     start -= roof.verge * (not blind[start_edge])
     end += roof.verge * (not blind[end_edge])
-    covering = pitched_roofs.with_eaves(
-        line,
-        roof.eaves * (not blind[low_edge]),
-        roof.eaves * (not blind[high_edge]),
-    )
+    # A shed roof has no eaves at its upper end: its top is the wing's.
+    ends = [not blind[low_edge], not blind[high_edge]]
+    if roof.kind == "shed":
+        ends[0 if roof.falling else 1] = False
+    covering = pitched_roofs.with_eaves(line, *(roof.eaves * e for e in ends))
     materials.add(
         "roof",
         pitched_roofs.shell(
