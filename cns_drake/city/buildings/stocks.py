@@ -16,6 +16,7 @@ from cns_drake.city.buildings.court_block import COURT_BLOCK
 from cns_drake.city.buildings.detached_house import DETACHED_HOUSE
 from cns_drake.city.buildings.gallery_flats import GALLERY_FLATS
 from cns_drake.city.buildings.garden_flats import GARDEN_FLATS
+from cns_drake.city.buildings.gas_station import GAS_STATION
 from cns_drake.city.buildings.glass_skyscraper import GLASS_SKYSCRAPER
 from cns_drake.city.buildings.hotel import HOTEL
 from cns_drake.city.buildings.kiosk_row import KIOSK_ROW
@@ -23,6 +24,7 @@ from cns_drake.city.buildings.mill import MILL
 from cns_drake.city.buildings.museum import MUSEUM
 from cns_drake.city.buildings.observation_tower import OBSERVATION_TOWER
 from cns_drake.city.buildings.office import OFFICE
+from cns_drake.city.buildings.park_pavilion import PARK_PAVILION
 from cns_drake.city.buildings.podium_tower import PODIUM_TOWER
 from cns_drake.city.buildings.provisional import plain_house
 from cns_drake.city.buildings.row_house import ROW_HOUSE
@@ -31,15 +33,13 @@ from cns_drake.city.buildings.semi_detached import SEMI_DETACHED
 from cns_drake.city.buildings.shop_house import SHOP_HOUSE
 from cns_drake.city.buildings.shop_strip import SHOP_STRIP
 from cns_drake.city.buildings.slab_tower import SLAB_TOWER
+from cns_drake.city.buildings.sports_hall import SPORTS_HALL
+from cns_drake.city.buildings.supermarket import SUPERMARKET
 from cns_drake.city.buildings.terrace import TERRACE
 from cns_drake.city.buildings.town_hall import TOWN_HALL
 from cns_drake.city.buildings.walk_up import WALK_UP
 from cns_drake.city.buildings.waterfront_hall import WATERFRONT_HALL
 
-GAS_STATION = plain_house("gas_station", (5.0, 8.0), (18.0, 50.0))
-SUPERMARKET = plain_house("supermarket", (6.0, 14.0), (20.0, 90.0))
-SPORTS_HALL = plain_house("sports_hall", (7.0, 18.0), (18.0, 80.0))
-PARK_PAVILION = plain_house("park_pavilion", (4.0, 10.0), (5.0, 24.0))
 GRID_TOWER = plain_house("grid_tower", (30.0, 120.0), (16.0, 60.0))
 BANDED_TOWER = plain_house("banded_tower", (25.0, 100.0), (16.0, 60.0))
 PARKING_DECK = plain_house("parking_deck", (8.0, 30.0), (24.0, 100.0))
