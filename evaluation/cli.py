@@ -141,11 +141,20 @@ def scores(
 def report(
     recordings: Annotated[Path, typer.Argument(metavar="DIR")],
     output: Annotated[Path, typer.Option(help="Folder to write.")],
+    jobs: Annotated[
+        int | None,
+        typer.Option(
+            help="Processes that work at the same time; as many as there are"
+            " cores if left out."
+        ),
+    ] = None,
 ) -> None:
-    """Tables and figures from all recordings in a folder."""
+    """Tables, figures and report.html from all recordings in a folder."""
     from evaluation import report as reporting
+    from evaluation.workers import num_cores
 
-    path = reporting.write_report(recordings, output, console.track)
+    num_jobs = num_cores() if jobs is None else jobs
+    path = reporting.write_report(recordings, output, console.track, num_jobs)
     print(path)
 
 

@@ -18,11 +18,13 @@ class Recording:
     """A sequence with its place in a collection.
 
     Attributes:
+        path: where it lies.
         sequence: the drive.
         map_name: of the city.
         stage: of the city's life; stages sort by name.
     """
 
+    path: Path
     sequence: Sequence
     map_name: str
     stage: str
@@ -125,7 +127,10 @@ def _place(path: Path) -> Recording:
     scenario = sequence.scenario
     if scenario is not None and {"map", "stage"} <= set(scenario):
         return Recording(
-            sequence, Path(str(scenario["map"])).name, str(scenario["stage"])
+            path,
+            sequence,
+            Path(str(scenario["map"])).name,
+            str(scenario["stage"]),
         )
     match = _NAME.fullmatch(sequence.name)
     if match is None:
@@ -133,7 +138,7 @@ def _place(path: Path) -> Recording:
             f"{path}: neither a scenario nor a name <map>_<stage> tells map"
             " and stage"
         )
-    return Recording(sequence, match["map"], match["stage"])
+    return Recording(path, sequence, match["map"], match["stage"])
 
 
 def _make_city(folder: Path, name: str, recordings: list[Recording]) -> City:

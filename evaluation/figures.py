@@ -1,44 +1,59 @@
-"""Figures: what changed, where the routes lead, precision over recall."""
+"""Pictures of the maps: where the routes lead, and what changed."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 import numpy as np
 from scipy.spatial import cKDTree
 
-from evaluation.files import completing
+from evaluation.drawing import save, unit
 from evaluation.hull import in_convex_hull
 from evaluation.maps import VoxelMap
-from evaluation.place_recognition import PlaceRecognition
 from evaluation.point_rendering import Picture, View, render, shade_by_height
-from evaluation.tcr import TAU
+from evaluation.tcr import TAU, TemporalChange
 
 _UNCHANGED = (214, 214, 214)
 _CHANGED = (196, 18, 24)
 _ABSENT_OUTSIDE = (240, 170, 160)
+# Of sets O and H: blue and vermilion are told apart by all.
+_IN_O = (120, 170, 215)
+_ONLY_IN_H = (213, 94, 0)
+_OUTSIDE_H = (228, 228, 228)
 
-_OBLIQUE = View(azimuth_deg=-55.0, elevation_deg=38.0, pixels_per_metre=4.0)
-_FROM_ABOVE = View(azimuth_deg=-90.0, elevation_deg=90.0, pixels_per_metre=4.0)
+_OBLIQUE = View(azimuth_deg=-55.0, elevation_deg=38.0, pixels_per_metre=3.0)
+_SMALL_OBLIQUE = View(
+    azimuth_deg=-55.0, elevation_deg=38.0, pixels_per_metre=1.8
+)
+_FROM_ABOVE = View(azimuth_deg=-90.0, elevation_deg=90.0, pixels_per_metre=2.5)
 # Red at the start and blue at the end, as in the paper.
 _ROUTE_COLOURS = "turbo_r"
-# Okabe and Ito's colours, told apart by all kinds of colour vision; line
-# styles for prints without colour.
-_CURVE_STYLES = (
-    ("#0072B2", "-"),
-    ("#D55E00", "--"),
-    ("#009E73", "-."),
-    ("#CC79A7", ":"),
-    ("#E69F00", "-"),
-    ("#56B4E9", "--"),
-)
+# What a view from above shows beyond the route [m].
+_MARGIN = 60.0
 _SCALE_BAR = 50.0
-_DPI = 200
+_PANEL_INCHES = 4.2
+
+
+@dataclass(frozen=True)
+class Stage:
+    """What is drawn of one drive.
+
+    Attributes:
+        name: of the stage, e.g. `04`.
+        fine: map for pictures.
+        coarse: map on the grid of the TCR.
+        positions: (N, 3) of the sensor [m].
+    """
+
+    name: str
+    fine: VoxelMap
+    coarse: VoxelMap
+    positions: np.ndarray
 
 
 def judge_points(
@@ -61,128 +76,157 @@ def judge_points(
     return distances > tau, in_convex_hull(points, other)
 
 
-def draw_change(
-    points: VoxelMap,
-    other: VoxelMap,
-    names: tuple[str, str],
-    path: Path,
-) -> None:
-    """Draws a map with what another one lacks in red.
-
-    Nothing but the metric decides on the colour. Red is a point without a
-    counterpart in the other map. It is pale where the point lies outside the
-    other map's hull: there the other drive may just not have looked, and the
-    TCR does not count it.
-
-    Args:
-        points: fine map to draw.
-        other: the other map, on the grid of the TCR.
-        names: of the two.
-        path: PNG file to write.
-    """
-    absent, in_hull = judge_points(points.centroids_W, other.centroids_W)
-    rgb = np.empty((len(points), 3), dtype=np.uint8)
-    rgb[:] = _UNCHANGED
-    rgb[absent] = _ABSENT_OUTSIDE
-    rgb[absent & in_hull] = _CHANGED
-    picture = render(
-        points.centroids_W,
-        shade_by_height(rgb, points.centroids_W[:, 2], darkest=0.85),
-        _OBLIQUE,
-    )
-    figure, axes = _picture_axes(picture)
-    axes.legend(
-        handles=[
-            Patch(color=_unit(_CHANGED), label=f"absent from {names[1]}"),
-            Patch(
-                color=_unit(_ABSENT_OUTSIDE),
-                label="absent, outside its hull: not counted",
-            ),
-            Patch(color=_unit(_UNCHANGED), label=f"{names[0]}, unchanged"),
-        ],
-        loc="lower left",
-        frameon=False,
-        fontsize=8,
-    )
-    _save(figure, path)
-
-
-def draw_route(
-    points: VoxelMap, positions: np.ndarray, name: str, path: Path
-) -> None:
-    """Draws a route over its map from above, red at its start, blue at end.
+def top_view(points: VoxelMap, positions: np.ndarray) -> Picture:
+    """Returns the surroundings of a route from above, x to the right.
 
     Args:
         points: fine map.
-        positions: (N, 3) of the sensor along the drive [m].
-        name: of the drive.
-        path: PNG file to write.
+        positions: (N, 3) of the sensor along the route [m].
     """
-    rgb = np.empty((len(points), 3), dtype=np.uint8)
-    rgb[:] = _UNCHANGED
-    picture = render(
-        points.centroids_W,
-        shade_by_height(rgb, points.centroids_W[:, 2], darkest=0.6),
-        _FROM_ABOVE,
+    low, high = positions[:, :2].min(axis=0), positions[:, :2].max(axis=0)
+    centroids = points.centroids_W
+    near = (
+        (centroids[:, :2] >= low - _MARGIN)
+        & (centroids[:, :2] <= high + _MARGIN)
+    ).all(axis=1)
+    if not near.any():
+        near[:] = True
+    shown = centroids[near]
+    rgb = np.full((len(shown), 3), _UNCHANGED, dtype=np.uint8)
+    return render(
+        shown, shade_by_height(rgb, shown[:, 2], darkest=0.6), _FROM_ABOVE
     )
-    figure, axes = _picture_axes(picture)
-    line = picture.project(positions)
-    segments = LineCollection(
-        np.stack([line[:-1], line[1:]], axis=1),
-        cmap=_ROUTE_COLOURS,
-        array=np.linspace(0.0, 1.0, max(len(line) - 1, 1)),
-        linewidths=2.0,
-        capstyle="round",
-    )
-    axes.add_collection(segments)
-    axes.set_title(f"{name}: from red to blue", fontsize=9)
-    _save(figure, path)
 
 
-def draw_pr_curves(
-    title: str, results: Sequence[tuple[str, PlaceRecognition]], path: Path
-) -> None:
-    """Draws the precision-recall curves of some pairs or methods.
+def draw_routes(map_name: str, stages: Sequence[Stage], stem: Path) -> None:
+    """Draws the routes of a city over their maps, red to blue, from above.
 
     Args:
-        title: of the figure.
-        results: label of each curve, and what it shows.
-        path: file to write; its ending tells the format (PDF, PNG).
+        map_name: of the city.
+        stages: its drives.
+        stem: path to write, without ending.
     """
-    figure = Figure(figsize=(4.5, 3.6), layout="constrained")
-    axes = figure.add_subplot()
-    for index, (label, result) in enumerate(results):
-        curve = result.metrics.curve
-        colour, style = _CURVE_STYLES[index % len(_CURVE_STYLES)]
-        # From recall 0 on with the precision of the first point: the area
-        # that is drawn is the AUC.
-        recall = np.concatenate([[0.0], curve.recall])
-        precision = np.concatenate([curve.precision[:1], curve.precision])
-        axes.plot(
-            recall[: len(precision)],
-            precision,
-            color=colour,
-            linestyle=style,
-            linewidth=1.6,
-            label=f"{label} (AUC {result.metrics.auc:.3f})",
-        )
-    axes.set(
-        xlabel="recall",
-        ylabel="precision",
-        xlim=(0.0, 1.0),
-        ylim=(0.0, 1.02),
+    pictures = [top_view(one.fine, one.positions) for one in stages]
+    figure, grid = _picture_grid(pictures)
+    for axes, picture, stage in zip(grid, pictures, stages, strict=True):
+        _show(axes, picture)
+        _draw_route(axes, picture.project(stage.positions))
+        axes.set_title(f"{map_name} {stage.name}", fontsize=9)
+    save(figure, stem, "webp")
+
+
+def draw_change(
+    map_name: str,
+    earlier: Stage,
+    later: Stage,
+    change: TemporalChange,
+    stems: tuple[Path, Path],
+) -> None:
+    """Draws what changed between two stages, and the sets behind the TCR.
+
+    Nothing but the metric decides on a colour. In the first figure, red is a
+    point without a counterpart in the other map. It is pale where the point
+    lies outside the other map's hull: there the other drive may just not
+    have looked, and the TCR does not count it. The second shows the sets H
+    and O in both orders and united.
+
+    Args:
+        map_name: of the city.
+        earlier: stage A.
+        later: stage B.
+        change: between them, A the source.
+        stems: paths to write, without endings.
+    """
+    stages = (earlier, later)
+    judged = [
+        judge_points(one.fine.centroids_W, other.coarse.centroids_W)
+        for one, other in zip(stages, stages[::-1], strict=True)
+    ]
+    _draw_absent(map_name, stages, judged, stems[0])
+    _draw_sets(map_name, stages, judged, change, stems[1])
+
+
+def _draw_absent(map_name, stages, judged, stem: Path) -> None:
+    pictures = []
+    for stage, (absent, in_hull) in zip(stages, judged, strict=True):
+        rgb = np.full((len(absent), 3), _UNCHANGED, dtype=np.uint8)
+        rgb[absent] = _ABSENT_OUTSIDE
+        rgb[absent & in_hull] = _CHANGED
+        pictures.append(_render_shaded(stage.fine.centroids_W, rgb, _OBLIQUE))
+    figure, grid = _picture_grid(pictures)
+    names = [stage.name for stage in stages]
+    titles = (
+        f"{map_name} {names[0]}: gone by {names[1]}",
+        f"{map_name} {names[1]}: new since {names[0]}",
     )
-    axes.set_title(title, fontsize=9)
-    axes.grid(alpha=0.3)
-    axes.legend(fontsize=7)
-    _save(figure, path)
+    for axes, picture, text in zip(grid, pictures, titles, strict=True):
+        _show(axes, picture)
+        axes.set_title(text, fontsize=9)
+    _legend(
+        figure,
+        (_CHANGED, "absent from the other"),
+        (_ABSENT_OUTSIDE, "absent, outside the other's hull: not counted"),
+        (_UNCHANGED, "unchanged"),
+    )
+    save(figure, stem, "webp")
 
 
-def _picture_axes(picture: Picture):
-    """Returns a figure of the picture's size, axes in metres, a scale bar."""
-    height, width = picture.image.shape[:2]
-    figure = Figure(figsize=(width / _DPI, height / _DPI + 0.3))
-    axes = figure.add_axes((0.0, 0.0, 1.0, height / (height + 0.3 * _DPI)))
+def _draw_sets(map_name, stages, judged, change, stem: Path) -> None:
+    clouds, colours = [], []
+    for stage, (absent, in_hull) in zip(stages, judged, strict=True):
+        rgb = np.full((len(absent), 3), _OUTSIDE_H, dtype=np.uint8)
+        rgb[in_hull] = _IN_O
+        rgb[in_hull & absent] = _ONLY_IN_H
+        clouds.append(stage.fine.centroids_W)
+        colours.append(rgb)
+    clouds.append(np.concatenate(clouds))
+    colours.append(np.concatenate(colours))
+    pictures = [
+        _render_shaded(cloud, rgb, _SMALL_OBLIQUE)
+        for cloud, rgb in zip(clouds, colours, strict=True)
+    ]
+    figure, grid = _picture_grid(pictures)
+    first, last = (stage.name for stage in stages)
+    titles = (
+        f"H({first}, {last}): TCR {change.source_to_target.ratio:.4f}",
+        f"H({last}, {first}): TCR {change.target_to_source.ratio:.4f}",
+        f"union: TCR_sym {change.symmetric:.4f}",
+    )
+    for axes, picture, text in zip(grid, pictures, titles, strict=True):
+        _show(axes, picture)
+        axes.set_title(f"{map_name} {text}", fontsize=9)
+    _legend(
+        figure,
+        (_IN_O, "O: in H and unchanged"),
+        (_ONLY_IN_H, "in H, changed"),
+        (_OUTSIDE_H, "outside H"),
+    )
+    save(figure, stem, "webp")
+
+
+def _render_shaded(points: np.ndarray, rgb: np.ndarray, view: View) -> Picture:
+    return render(
+        points, shade_by_height(rgb, points[:, 2], darkest=0.85), view
+    )
+
+
+def _picture_grid(pictures: Sequence[Picture]):
+    """Returns a figure with a column of equal height for each picture."""
+    shapes = [(e[1] - e[0], e[3] - e[2]) for e in (p.extent for p in pictures)]
+    tallest = max(height / width for width, height in shapes)
+    figure = Figure(
+        figsize=(
+            _PANEL_INCHES * len(pictures),
+            _PANEL_INCHES * min(tallest, 1.6) + 0.7,
+        ),
+        layout="constrained",
+    )
+    grid = figure.subplots(1, len(pictures), squeeze=False)[0]
+    return figure, grid
+
+
+def _show(axes, picture: Picture) -> None:
+    """Shows a picture, axes in metres, with a scale bar."""
     axes.imshow(
         picture.image, extent=picture.extent, interpolation="antialiased"
     )
@@ -200,17 +244,33 @@ def _picture_axes(picture: Picture):
         fontsize=8,
     )
     axes.set(xlim=(left, right), ylim=(bottom, top))
-    return figure, axes
 
 
-def _save(figure: Figure, path: Path) -> None:
-    FigureCanvasAgg(figure)
-    kind = path.suffix.removeprefix(".")
-    # No time of creation: equal input gives equal bytes.
-    metadata = {"CreationDate": None} if kind == "pdf" else None
-    with completing(path) as part:
-        figure.savefig(part, format=kind, dpi=_DPI, metadata=metadata)
+def _draw_route(axes, line: np.ndarray) -> None:
+    """Draws a route (N, 2) with a triangle at its start, a square at end."""
+    segments = LineCollection(
+        np.stack([line[:-1], line[1:]], axis=1),
+        cmap=_ROUTE_COLOURS,
+        array=np.linspace(0.0, 1.0, max(len(line) - 1, 1)),
+        linewidths=2.0,
+        capstyle="round",
+    )
+    axes.add_collection(segments)
+    for point, marker, label in (
+        (line[0], "^", "start"),
+        (line[-1], "s", "end"),
+    ):
+        axes.plot(*point, marker, color="black", markersize=6, label=label)
+    axes.legend(fontsize=7, loc="upper right", framealpha=0.8)
 
 
-def _unit(rgb: tuple[int, int, int]) -> tuple[float, ...]:
-    return tuple(value / 255.0 for value in rgb)
+def _legend(figure: Figure, *entries: tuple[tuple[int, int, int], str]) -> None:
+    figure.legend(
+        handles=[
+            Patch(color=unit(colour), label=label) for colour, label in entries
+        ],
+        loc="outside lower center",
+        ncols=len(entries),
+        frameon=False,
+        fontsize=8,
+    )

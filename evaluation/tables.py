@@ -1,19 +1,42 @@
-"""Tables of results, with the paper's values beside ours."""
+"""Tables of numbers, written as Markdown, LaTeX, HTML and CSV."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 import csv
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+import html
 import io
 import math
 
-from evaluation import paper
-from evaluation.change import ChangeReport
-from evaluation.metrics import Mode
-from evaluation.place_recognition import PlaceRecognition
+MISSING = "–"
 
-_MISSING = "–"
+_LATEX = {
+    "&": r"\&",
+    "%": r"\%",
+    "#": r"\#",
+    "_": r"\_",
+    "±": r"$\pm$",
+    "→": r"$\rightarrow$",
+    "↔": r"$\leftrightarrow$",
+    "–": "--",
+    "·": r"$\cdot$",
+}
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A number that competes with others, with the paper's beside it.
+
+    Attributes:
+        value: ours; None or NaN where there is none.
+        printed: the paper's; None where it has none.
+        rank: 1 for the best of its row, 2 for the second, None for others.
+    """
+
+    value: float | None
+    printed: float | None = None
+    rank: int | None = None
 
 
 @dataclass(frozen=True)
@@ -22,141 +45,184 @@ class Table:
 
     Attributes:
         header: name of each column.
-        rows: one value a column: text, a number, or None where there is
-            none.
+        rows: one value a column: text, a number, a `Cell`, or None where
+            there is nothing.
+        groups: names over some columns, each with how many it spans; empty
+            names are left out. All columns, or no group at all.
+        caption: what the table shows.
     """
 
     header: tuple[str, ...]
     rows: tuple[tuple[object, ...], ...]
+    groups: tuple[tuple[str, int], ...] = ()
+    caption: str = ""
 
     def to_csv(self) -> str:
-        """Returns the table with all digits; a missing value is empty."""
+        """Returns the table with all digits; a missing value is empty.
+
+        Cells become two columns, of which the second is the paper's.
+        """
         stream = io.StringIO()
         writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(self.header)
-        for row in self.rows:
+        columns = list(zip(*self.rows, strict=True)) or [()] * len(self.header)
+        expanded = []
+        for name, group, column in zip(
+            self.header, self._group_of_each(), columns, strict=True
+        ):
+            full = f"{group} {name}".strip()
+            if any(isinstance(value, Cell) for value in column):
+                expanded.append([full, *(value.value for value in column)])
+                expanded.append(
+                    [f"paper's {full}", *(value.printed for value in column)]
+                )
+            else:
+                expanded.append([full, *column])
+        for row in zip(*expanded, strict=True):
             writer.writerow(["" if _is_missing(v) else v for v in row])
         return stream.getvalue()
 
     def to_markdown(self) -> str:
-        """Returns the table with four decimals, as the paper prints them."""
-        lines = [self.header, ["---"] * len(self.header)]
-        lines += [[_to_text(value) for value in row] for row in self.rows]
+        """Returns the table with four decimals, as the paper prints them.
+
+        The paper's values follow in brackets.
+        """
+        header = [
+            f"{group} {name}".strip()
+            for group, name in zip(
+                self._group_of_each(), self.header, strict=True
+            )
+        ]
+        lines = [header, ["---"] * len(self.header)]
+        lines += [[_to_markdown(value) for value in row] for row in self.rows]
         return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
-
-@dataclass(frozen=True)
-class ChangeResult:
-    """The change between two stages of a map."""
-
-    map_name: str
-    stages: tuple[str, str]
-    report: ChangeReport
-
-
-@dataclass(frozen=True)
-class RecognitionResult:
-    """A method on a pair of stages of a map: database, query."""
-
-    map_name: str
-    stages: tuple[str, str]
-    outcome: PlaceRecognition
-
-    def counting(self, mode: Mode) -> RecognitionResult:
-        """Returns the same outcome with its numbers in a mode."""
-        return replace(self, outcome=self.outcome.counting(mode))
-
-
-def change_table(results: Iterable[ChangeResult]) -> Table:
-    """Returns Table I: the change of each pair, and what it is made of."""
-    header = (
-        "map",
-        "stages",
-        "TCR_sym",
-        "paper",
-        "earlier -> later",
-        "later -> earlier",
-        "same stage, both routes",
-        "where both drove",
-        "voxels in hulls",
-        "unchanged",
-    )
-    rows = []
-    for result in results:
-        report = result.report
-        change = report.change
-        rows.append(
-            (
-                result.map_name,
-                " <-> ".join(result.stages),
-                change.symmetric,
-                paper.tcr_values().get((result.map_name, *result.stages)),
-                change.source_to_target.ratio,
-                change.target_to_source.ratio,
-                report.control.symmetric if report.control else None,
-                report.masked.symmetric if report.masked else None,
-                change.num_in_hull,
-                change.num_unchanged,
+    def to_html(self) -> str:
+        """Returns a `table` element."""
+        parts = ["<table>"]
+        if self.caption:
+            parts.append(f"<caption>{html.escape(self.caption)}</caption>")
+        parts.append("<thead>")
+        if self.groups:
+            cells = "".join(
+                f'<th colspan="{span}" class="group">{html.escape(name)}</th>'
+                for name, span in self.groups
             )
-        )
-    return Table(header, tuple(rows))
+            parts.append(f"<tr>{cells}</tr>")
+        names = "".join(f"<th>{html.escape(name)}</th>" for name in self.header)
+        parts.append(f"<tr>{names}</tr></thead><tbody>")
+        for row in self.rows:
+            cells = "".join(f"<td>{_to_html(value)}</td>" for value in row)
+            parts.append(f"<tr>{cells}</tr>")
+        parts.append("</tbody></table>")
+        return "".join(parts)
+
+    def to_latex(self) -> str:
+        r"""Returns a `table*` for a document with the package booktabs."""
+        lines = [
+            "% Needs \\usepackage{booktabs}; \\resizebox is of graphicx.",
+            r"\begin{table*}",
+            r"\centering",
+        ]
+        if self.caption:
+            lines.append(rf"\caption{{{_escape(self.caption)}}}")
+        lines += [
+            r"\resizebox{\textwidth}{!}{%",
+            rf"\begin{{tabular}}{{@{{}}{'c' * len(self.header)}@{{}}}}",
+            r"\toprule",
+        ]
+        if self.groups:
+            lines += self._latex_groups()
+        lines.append(_latex_row(_escape(name) for name in self.header))
+        lines.append(r"\midrule")
+        lines += [_latex_row(map(_to_latex, row)) for row in self.rows]
+        lines += [r"\bottomrule", r"\end{tabular}}", r"\end{table*}"]
+        return "\n".join(lines) + "\n"
+
+    def _latex_groups(self) -> list[str]:
+        names, rules, column = [], [], 1
+        for name, span in self.groups:
+            names.append(rf"\multicolumn{{{span}}}{{c}}{{{_escape(name)}}}")
+            if name:
+                rules.append(rf"\cmidrule(lr){{{column}-{column + span - 1}}}")
+            column += span
+        return [_latex_row(names), "".join(rules)]
+
+    def _group_of_each(self) -> list[str]:
+        """Returns the name over each column."""
+        if not self.groups:
+            return [""] * len(self.header)
+        return [name for name, span in self.groups for _ in range(span)]
 
 
-def recognition_table(results: Sequence[RecognitionResult]) -> Table:
-    """Returns Table II: a row for each pair, method and mode."""
-    header = (
-        "map",
-        "database -> query",
-        "method",
-        "mode",
-        "AUC",
-        "paper's AUC",
-        "R@1",
-        "paper's R@1",
-        "F1max",
-        "paper's F1",
-        "queries",
-        "N (with a match)",
-        "TP of R@1",
-        "TP of F1max",
-        "T of F1max",
-    )
-    rows = []
-    for result in results:
-        outcome = result.outcome
-        metrics = outcome.metrics
-        printed = paper.recognition_values().get(
-            (result.map_name, *result.stages, outcome.method, metrics.mode)
-        )
-        index = metrics.f1_max_index
-        curve = metrics.curve
-        rows.append(
-            (
-                result.map_name,
-                " -> ".join(result.stages),
-                outcome.method,
-                metrics.mode,
-                metrics.auc,
-                printed.auc if printed else None,
-                metrics.recall_at_1,
-                printed.recall_at_1 if printed else None,
-                metrics.f1_max,
-                printed.f1_max if printed else None,
-                metrics.num_queries,
-                metrics.num_with_match,
-                metrics.num_right,
-                None if index is None else int(curve.true_positives[index]),
-                None if index is None else int(curve.counted[index]),
-            )
-        )
-    return Table(header, tuple(rows))
+def ranked(
+    values: Sequence[float | None], printed: Sequence[float | None]
+) -> list[Cell]:
+    """Returns cells of a row, of which the greatest two are marked.
+
+    Equal values share a rank, as they are printed with four decimals.
+    """
+    shown = [None if _is_missing(v) else round(v, 4) for v in values]
+    order = sorted({v for v in shown if v is not None}, reverse=True)
+    # With a single competitor nothing is best.
+    places = {value: rank for rank, value in enumerate(order[:2], start=1)}
+    if sum(v is not None for v in shown) < 2:
+        places = {}
+    return [
+        Cell(value, other, places.get(rounded))
+        for value, other, rounded in zip(values, printed, shown, strict=True)
+    ]
+
+
+def to_text(value: object) -> str:
+    """Returns a value as tables show it."""
+    if _is_missing(value):
+        return MISSING
+    return f"{value:.4f}" if isinstance(value, float) else str(value)
+
+
+def _to_markdown(value: object) -> str:
+    if not isinstance(value, Cell):
+        return to_text(value)
+    text = to_text(value.value)
+    if value.rank == 1:
+        text = f"**{text}**"
+    elif value.rank == 2:
+        text = f"<u>{text}</u>"
+    return text if value.printed is None else f"{text} ({value.printed:.4f})"
+
+
+def _to_html(value: object) -> str:
+    if not isinstance(value, Cell):
+        return html.escape(to_text(value))
+    text = to_text(value.value)
+    tag = {1: "b", 2: "u"}.get(value.rank)
+    if tag:
+        text = f"<{tag}>{text}</{tag}>"
+    if value.printed is None:
+        return text
+    return f"{text}<small>{value.printed:.4f}</small>"
+
+
+def _to_latex(value: object) -> str:
+    if not isinstance(value, Cell):
+        return _escape(to_text(value))
+    text = _escape(to_text(value.value))
+    if value.rank == 1:
+        text = rf"\textbf{{{text}}}"
+    elif value.rank == 2:
+        text = rf"\underline{{{text}}}"
+    if value.printed is None:
+        return text
+    return rf"{text} {{\scriptsize ({value.printed:.4f})}}"
+
+
+def _latex_row(cells) -> str:
+    return " & ".join(cells) + r" \\"
+
+
+def _escape(text: str) -> str:
+    return "".join(_LATEX.get(letter, letter) for letter in text)
 
 
 def _is_missing(value: object) -> bool:
     return value is None or (isinstance(value, float) and math.isnan(value))
-
-
-def _to_text(value: object) -> str:
-    if _is_missing(value):
-        return _MISSING
-    return f"{value:.4f}" if isinstance(value, float) else str(value)

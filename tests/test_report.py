@@ -7,9 +7,7 @@ import pytest
 from evaluation import paper
 from evaluation.collection import find_cities
 from evaluation.errors import InputError
-from evaluation.figures import judge_points
 from evaluation.report import write_report
-from evaluation.tables import Table
 
 ROUTES = {"a": {"lanes": [1]}, "b": {"lanes": [2]}}
 
@@ -96,55 +94,87 @@ def test_no_recordings_or_too_many(tmp_path):
         find_cities(tmp_path)
 
 
-def test_report(recordings, tmp_path):
-    path = write_report(recordings, tmp_path / "out")
-    text = path.read_text()
-    with (tmp_path / "out" / "tcr.csv").open(newline="") as stream:
-        (change,) = csv.DictReader(stream)
+@pytest.fixture(scope="module")
+def report(recordings, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("report")
+    write_report(recordings, folder)
+    return folder
+
+
+def read_csv(path):
+    with path.open(newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def test_change_beside_the_paper(report):
+    change, real = read_csv(report / "tcr.csv")
     assert change["map"] == "metropolis"
-    assert change["stages"] == "01 <-> 04"
+    assert change["stages"] == "01 ↔ 04"
     assert float(change["paper"]) == 0.2920
     assert 0.03 < float(change["TCR_sym"]) < 0.5
     assert float(change["same stage, both routes"]) < 0.02
-    assert f"{float(change['TCR_sym']):.4f}" in text
-    with (tmp_path / "out" / "place_recognition.csv").open(
-        newline=""
-    ) as stream:
-        every, filtered = (
-            row
-            for row in csv.DictReader(stream)
-            if row["method"] == "scan-context++"
-        )
+    assert float(real["paper"]) == 0.1819
+    assert real["TCR_sym"] == ""
+    shown = f"{float(change['TCR_sym']):.4f}"
+    for name in ("report.md", "tcr.md", "tcr.tex", "report.html"):
+        assert shown in (report / name).read_text(), name
+
+
+def test_recognition_beside_the_paper(report):
+    every, filtered = (
+        row
+        for row in read_csv(report / "place_recognition.csv")
+        if row["method"] == "scan-context++"
+    )
     assert [every["mode"], filtered["mode"]] == ["all", "filtered"]
     # The paper's Scan Context++ counts all queries.
     assert float(every["paper's R@1"]) == 0.2993
     assert filtered["paper's R@1"] == ""
     assert every["N (with a match)"] == "9"
-    figures = {p.name for p in (tmp_path / "out" / "figures").iterdir()}
-    assert figures == {
-        "change_metropolis_01_04.png",
-        "route_metropolis_01.png",
-        "route_metropolis_04.png",
-        "pr_metropolis.pdf",
-        "pr_metropolis.png",
+    assert float(every["AUC low"]) <= float(every["AUC"])
+    assert float(every["AUC"]) <= float(every["AUC high"])
+    shown = f"{float(every['AUC']):.4f}"
+    for name in ("place_recognition.md", "place_recognition.tex"):
+        text = (report / name).read_text()
+        assert shown in text
+        assert "(0.2993)" in text
+
+
+def test_figures_for_print_and_page(report):
+    stems = {
+        "auc_over_tcr": "svg",
+        "change_metropolis_01_04": "webp",
+        "pr_metropolis": "svg",
+        "routes_metropolis": "webp",
+        "sets_metropolis_01_04": "webp",
     }
-    for name in figures - {"pr_metropolis.pdf"}:
-        assert f"](figures/{name})" in text
+    names = {path.name for path in (report / "figures").iterdir()}
+    assert names == {
+        f"{stem}.{kind}"
+        for stem, page_kind in stems.items()
+        for kind in ("pdf", "png", page_kind)
+    }
+    text = (report / "report.md").read_text()
+    for stem in stems:
+        assert f"](figures/{stem}.png)" in text
 
 
-def test_report_is_the_same_every_time(recordings, tmp_path):
-    for name in ("first", "second"):
-        write_report(recordings, tmp_path / name)
-    for path in sorted((tmp_path / "first").rglob("*.*")):
-        other = tmp_path / "second" / path.relative_to(tmp_path / "first")
+def test_report_is_the_same_whoever_works(recordings, report, tmp_path):
+    write_report(recordings, tmp_path, num_jobs=2)
+    paths = sorted(path for path in report.rglob("*.*") if path.is_file())
+    assert len(paths) == 8 + 15
+    for path in paths:
+        other = tmp_path / path.relative_to(report)
         assert path.read_bytes() == other.read_bytes(), path.name
 
 
 def test_report_of_a_single_stage(tmp_path):
     drive(tmp_path / "in" / "metropolis_01", "01", "a")
     text = write_report(tmp_path / "in", tmp_path / "out").read_text()
-    assert "route_metropolis_01.png" in text
+    assert "routes_metropolis.png" in text
     assert "Temporal change ratio" not in text
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "Queries, one by one" not in page
 
 
 def test_scans_without_points_are_refused(tmp_path):
@@ -160,36 +190,6 @@ def test_output_that_cannot_be_written(recordings, tmp_path):
     (tmp_path / "out").write_text("a file")
     with pytest.raises(InputError, match=f"^{tmp_path / 'out'}"):
         write_report(recordings, tmp_path / "out")
-
-
-def test_change_picture_asks_the_metric():
-    other = np.array(
-        [[x, y, z] for x in (0, 20) for y in (0, 20) for z in (0, 20)], float
-    )
-    points = np.array(
-        [
-            [0.0, 0.0, 4.4],
-            [0.0, 0.0, 4.6],
-            [10.0, 10.0, 10.0],
-            [40.0, 0.0, 0.0],
-            [24.0, 0.0, 0.0],
-        ]
-    )
-    absent, in_hull = judge_points(points, other)
-    assert absent.tolist() == [False, True, True, True, False]
-    assert in_hull.tolist() == [True, True, True, False, False]
-
-
-def test_table():
-    table = Table(
-        ("name", "value", "count"),
-        (("a", 0.123456, 3), ("b", None, 4), ("c", float("nan"), 5)),
-    )
-    assert table.to_csv() == "name,value,count\na,0.123456,3\nb,,4\nc,,5\n"
-    assert table.to_markdown() == (
-        "| name | value | count |\n| --- | --- | --- |\n"
-        "| a | 0.1235 | 3 |\n| b | – | 4 |\n| c | – | 5 |\n"
-    )
 
 
 def test_paper_values():

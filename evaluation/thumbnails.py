@@ -1,0 +1,49 @@
+"""Scans reduced to what a small picture from above shows of them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+# Side of a cell [m]; 256 of them across, so that a byte counts them.
+CELL = 0.5
+_HALF_CELLS = 128
+# Height above the ground from which on points are kept [m]; below is road.
+_LOWEST = 0.4
+# Step of the stored heights above the ground [m].
+HEIGHT_STEP = 0.1
+# Points that are kept of a scan.
+MAX_POINTS = 2000
+
+
+def thumbnail(
+    points: np.ndarray, sensor_height: float, seed: int
+) -> np.ndarray:
+    """Returns the highest point in each cell around the sensor.
+
+    Args:
+        points: (N, 3) in the frame of the sensor [m].
+        sensor_height: above the ground [m].
+        seed: of the order, and so of the choice if there are too many.
+
+    Returns:
+        (M, 3) uint8, M <= 2000: cells along x and along y, of which 128 is
+        the first one forward or left of the sensor, and height above the
+        ground in steps of 0.1 m, at most 25.5 m. In random order, so that a
+        part from the front shows the whole scan thinner.
+    """
+    cells = np.floor(points[:, :2] / CELL).astype(np.int64) + _HALF_CELLS
+    heights = points[:, 2] + sensor_height
+    kept = ((cells >= 0) & (cells < 2 * _HALF_CELLS)).all(axis=1)
+    kept &= heights >= _LOWEST
+    cells, heights = cells[kept], heights[kept]
+    highest = np.zeros((2 * _HALF_CELLS) ** 2)
+    flat = cells[:, 0] * 2 * _HALF_CELLS + cells[:, 1]
+    np.maximum.at(highest, flat, heights)
+    filled = np.flatnonzero(highest)
+    rng = np.random.default_rng([seed, len(filled)])
+    chosen = rng.permutation(filled)[:MAX_POINTS]
+    steps = np.minimum(highest[chosen] / HEIGHT_STEP, 255.0)
+    return np.stack(
+        [chosen // (2 * _HALF_CELLS), chosen % (2 * _HALF_CELLS), steps],
+        axis=1,
+    ).astype(np.uint8)

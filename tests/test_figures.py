@@ -1,0 +1,38 @@
+import numpy as np
+
+from evaluation.figures import judge_points, top_view
+from evaluation.maps import voxelise
+from evaluation.points import from_xyz
+
+
+def test_change_picture_asks_the_metric():
+    other = np.array(
+        [[x, y, z] for x in (0, 20) for y in (0, 20) for z in (0, 20)], float
+    )
+    points = np.array(
+        [
+            [0.0, 0.0, 4.4],
+            [0.0, 0.0, 4.6],
+            [10.0, 10.0, 10.0],
+            [40.0, 0.0, 0.0],
+            [24.0, 0.0, 0.0],
+        ]
+    )
+    absent, in_hull = judge_points(points, other)
+    assert absent.tolist() == [False, True, True, True, False]
+    assert in_hull.tolist() == [True, True, True, False, False]
+
+
+def test_view_from_above_shows_the_route_and_60_m_around():
+    x = np.arange(0.25, 1000.0, 0.5)
+    line = np.stack([x, np.full_like(x, 3.0), np.zeros_like(x)], axis=1)
+    points, _ = voxelise(from_xyz(line), 0.5)
+    positions = np.array([[400.0, 3.0, 1.6], [500.0, 3.0, 1.6]])
+    picture = top_view(points, positions)
+    left, right, bottom, top = picture.extent
+    np.testing.assert_allclose([left, right], [340.0, 560.0], atol=2.0)
+    assert bottom <= 3.0 <= top
+    assert picture.project(positions)[:, 0].tolist() == [400.0, 500.0]
+    # Without a point in sight the whole map is shown.
+    far = top_view(points, positions + np.array([0.0, 500.0, 0.0]))
+    assert far.extent[1] > 990.0
