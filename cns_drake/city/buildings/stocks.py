@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from cns_drake.city.buildings.art_deco_tower import ART_DECO_TOWER
 from cns_drake.city.buildings.balcony_flats import BALCONY_FLATS
+from cns_drake.city.buildings.banded_tower import BANDED_TOWER
 from cns_drake.city.buildings.barn import BARN
 from cns_drake.city.buildings.brick_block import BRICK_BLOCK
 from cns_drake.city.buildings.bungalow import BUNGALOW
@@ -18,6 +19,7 @@ from cns_drake.city.buildings.gallery_flats import GALLERY_FLATS
 from cns_drake.city.buildings.garden_flats import GARDEN_FLATS
 from cns_drake.city.buildings.gas_station import GAS_STATION
 from cns_drake.city.buildings.glass_skyscraper import GLASS_SKYSCRAPER
+from cns_drake.city.buildings.grid_tower import GRID_TOWER
 from cns_drake.city.buildings.hotel import HOTEL
 from cns_drake.city.buildings.kiosk_row import KIOSK_ROW
 from cns_drake.city.buildings.mill import MILL
@@ -25,6 +27,7 @@ from cns_drake.city.buildings.museum import MUSEUM
 from cns_drake.city.buildings.observation_tower import OBSERVATION_TOWER
 from cns_drake.city.buildings.office import OFFICE
 from cns_drake.city.buildings.park_pavilion import PARK_PAVILION
+from cns_drake.city.buildings.parking_deck import PARKING_DECK
 from cns_drake.city.buildings.podium_tower import PODIUM_TOWER
 from cns_drake.city.buildings.provisional import plain_house
 from cns_drake.city.buildings.row_house import ROW_HOUSE
@@ -37,13 +40,10 @@ from cns_drake.city.buildings.sports_hall import SPORTS_HALL
 from cns_drake.city.buildings.supermarket import SUPERMARKET
 from cns_drake.city.buildings.terrace import TERRACE
 from cns_drake.city.buildings.town_hall import TOWN_HALL
+from cns_drake.city.buildings.unfinished_tower import UNFINISHED_TOWER
 from cns_drake.city.buildings.walk_up import WALK_UP
 from cns_drake.city.buildings.waterfront_hall import WATERFRONT_HALL
 
-GRID_TOWER = plain_house("grid_tower", (30.0, 120.0), (16.0, 60.0))
-BANDED_TOWER = plain_house("banded_tower", (25.0, 100.0), (16.0, 60.0))
-PARKING_DECK = plain_house("parking_deck", (8.0, 30.0), (24.0, 100.0))
-UNFINISHED_TOWER = plain_house("unfinished_tower", (15.0, 90.0), (16.0, 60.0))
 SHOPPING_HALL = plain_house("shopping_hall", (9.0, 26.0), (28.0, 120.0))
 ELEVATED_STATION = plain_house("elevated_station", (9.0, 16.0), (14.0, 120.0))
 
