@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -26,6 +27,9 @@ from evaluation.tcr import (
     covered,
     temporal_change,
 )
+
+if TYPE_CHECKING:
+    from evaluation.alignment import AlignmentReport, When
 
 # Two drives on one route are this close to each other [m]; lanes are 3.5 m.
 _SAME_ROUTE = 1.0
@@ -63,6 +67,8 @@ class ChangeReport:
         control: between two drives on the two routes in one stage; None if
             none was given.
         control_names: the two that `control` compares.
+        alignment: how the two were put into one world; None if they came
+            in one.
     """
 
     source: str
@@ -71,6 +77,7 @@ class ChangeReport:
     masked: TemporalChange | None
     control: TemporalChange | None
     control_names: tuple[str, str] | None
+    alignment: AlignmentReport | None = None
 
     def to_json(self) -> dict:
         """Returns all numbers; NaN becomes None, with a reason beside."""
@@ -99,6 +106,7 @@ class ChangeReport:
             "tau": TAU,
             "coverage_masked": None,
             "control": None,
+            "alignment": None,
         }
         if change.undefined_because:
             values["reason"] = change.undefined_because
@@ -110,6 +118,8 @@ class ChangeReport:
             values["control"] = _summary(self.control) | {
                 "between": list(self.control_names)
             }
+        if self.alignment is not None:
+            values["alignment"] = self.alignment.to_json()
         return values
 
 
@@ -119,12 +129,48 @@ def survey(path: Path, track: Track = silent) -> Surveyed:
     Raises:
         InputError: if it cannot be read as either.
     """
-    path = Path(path)
-    if path.is_file() and is_cloud(path):
-        voxels, num_ignored = voxelise(read_cloud(path))
-        return Surveyed(path.name, voxels, num_ignored=num_ignored)
-    sequence = open_sequence(path)
-    return survey_sequence(sequence, map_sequence(sequence, VOXEL_SIZE, track))
+    return _survey(_open(path), track)
+
+
+def survey_in_one_world(
+    paths: list[Path], when: When, track: Track = silent
+) -> tuple[list[Surveyed], list[AlignmentReport]]:
+    """Maps what lies at some paths, all in one world.
+
+    Args:
+        paths: of sequences or map files; what is not a sequence is in that
+            world already.
+        when: whether later sequences are aligned with the first.
+        track: reports progress.
+
+    Returns:
+        The maps, in the order of the paths; what was aligned, and how.
+
+    Raises:
+        InputError: if something cannot be read, or not be aligned.
+    """
+    opened = [_open(path) for path in paths]
+    drives = [i for i, one in enumerate(opened) if isinstance(one, Sequence)]
+    if when == "always" and len(drives) < len(opened):
+        raise InputError("--align always: a map file cannot be aligned")
+    reports = []
+    if len(drives) > 1:
+        # Imported here: slow to load, and maps as files do without it.
+        from evaluation.alignment import in_one_world
+
+        first, *others = drives
+        for number, other in enumerate(others):
+            alignment = in_one_world(
+                opened[first],
+                opened[other],
+                when,
+                track,
+                hold_first=number > 0,
+            )
+            if alignment is not None:
+                opened[first], opened[other] = alignment.first, alignment.second
+                reports.append(alignment.report)
+    return [_survey(one, track) for one in opened], reports
 
 
 def survey_sequence(sequence: Sequence, voxels: VoxelMap) -> Surveyed:
@@ -133,7 +179,10 @@ def survey_sequence(sequence: Sequence, voxels: VoxelMap) -> Surveyed:
 
 
 def compare(
-    source: Surveyed, target: Surveyed, control: Surveyed | None = None
+    source: Surveyed,
+    target: Surveyed,
+    control: Surveyed | None = None,
+    alignment: AlignmentReport | None = None,
 ) -> ChangeReport:
     """Measures the change between two maps.
 
@@ -144,6 +193,7 @@ def compare(
             stage. Which of them it is shows in its route. It is compared
             with the one whose stage it shares, so that the same two routes
             are compared as in A and B, but one stage.
+        alignment: how the two were put into one world, for the report.
 
     Raises:
         InputError: if the three are not of one world, or the control is on
@@ -175,7 +225,24 @@ def compare(
         masked,
         control_change,
         control_names,
+        alignment,
     )
+
+
+def _open(path: Path) -> Sequence | Path:
+    """Returns the sequence at a path, or the path if it is a map file."""
+    path = Path(path)
+    if path.is_file() and is_cloud(path):
+        return path
+    return open_sequence(path)
+
+
+def _survey(source: Sequence | Path, track: Track) -> Surveyed:
+    if isinstance(source, Sequence):
+        voxels = map_sequence(source, VOXEL_SIZE, track)
+        return survey_sequence(source, voxels)
+    voxels, num_ignored = voxelise(read_cloud(source))
+    return Surveyed(source.name, voxels, num_ignored=num_ignored)
 
 
 def _same_stage_partner(

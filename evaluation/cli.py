@@ -29,6 +29,20 @@ class ModeName(str, Enum):
     FILTERED = "filtered"
 
 
+class AlignName(str, Enum):
+    """When sequences are put into one world."""
+
+    AUTO = "auto"
+    ALWAYS = "always"
+    NEVER = "never"
+
+
+_Align = Annotated[
+    AlignName,
+    typer.Option(
+        help="Align sequences: those whose world frames differ, all, or none."
+    ),
+]
 _Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 _MethodName = Annotated[
     str, typer.Option("--method", help="Place-recognition method.")
@@ -58,24 +72,32 @@ def tcr(
             " A's stage: what TCR_sym the routes alone cause.",
         ),
     ] = None,
+    align: _Align = AlignName.AUTO,
     json: _Json = False,
 ) -> None:
     """Temporal change ratio of two sequences or map files.
 
-    A and B are recorded sequences or maps (.pcd .ply .npy .bin) in one world
-    frame. A is the source and B the target of the directed ratios.
+    A and B are recorded sequences (MCAP, MulRan, HeLiPR, KITTI odometry,
+    CNS) or maps (.pcd .ply .npy .bin). A is the source and B the target of
+    the directed ratios. Sequences of different world frames are aligned.
     """
     from evaluation import change
 
-    surveys = [
-        change.survey(path, console.track)
-        for path in (source, target, control)
-        if path is not None
-    ]
+    paths = [path for path in (source, target, control) if path is not None]
+    surveys, alignments = change.survey_in_one_world(
+        paths, align.value, console.track
+    )
     for one in surveys:
+        _tell_notes(one.sequence)
         if one.num_ignored:
             console.note(f"{one.name}: {one.num_ignored} points not finite")
-    report = change.compare(*surveys)
+    for alignment in alignments:
+        console.note(alignment.to_text())
+    report = change.compare(
+        *surveys[:2],
+        control=None if control is None else surveys[2],
+        alignment=alignments[0] if alignments else None,
+    )
     if json:
         console.print_json(report.to_json())
     else:
@@ -93,23 +115,27 @@ def pr(
     ] = ModeName.ALL,
     parameter: _Parameters = None,
     sensor_height: _SensorHeight = 1.6,
+    align: _Align = AlignName.AUTO,
     json: _Json = False,
 ) -> None:
     """Place recognition: how well queries find their place in a database.
 
-    Both are recorded sequences in one world frame.
+    Both are recorded sequences (MCAP, MulRan, HeLiPR, KITTI odometry, CNS).
+    Those of different world frames are aligned.
     """
     from evaluation import place_recognition
+    from evaluation.alignment import in_one_world
     from evaluation.sequences import open_sequence
 
     chosen = _make_method(method, parameter, sensor_height)
-    result = place_recognition.run(
-        open_sequence(database),
-        open_sequence(query),
-        chosen,
-        mode.value,
-        console.track,
-    )
+    drives = [open_sequence(path) for path in (database, query)]
+    for drive in drives:
+        _tell_notes(drive)
+    alignment = in_one_world(*drives, align.value, console.track)
+    if alignment is not None:
+        drives = [alignment.first, alignment.second]
+        console.note(alignment.report.to_text())
+    result = place_recognition.run(*drives, chosen, mode.value, console.track)
     if json:
         console.print_json(result.to_json())
     else:
@@ -161,6 +187,11 @@ def report(
 def main() -> None:
     """Runs the command line and exits with its status."""
     raise SystemExit(console.run(app, "cns-eval"))
+
+
+def _tell_notes(sequence) -> None:
+    for note in () if sequence is None else sequence.notes:
+        console.note(note)
 
 
 def _make_method(name: str, assignments: list[str] | None, height: float):

@@ -95,6 +95,15 @@ def check_same_world(first: Sequence, second: Sequence) -> None:
             f"{second.name}: poses in frame {second.world_frame!r}, those of"
             f" {first.name} in {first.world_frame!r}"
         )
+    check_same_map(first, second)
+
+
+def check_same_map(first: Sequence, second: Sequence) -> None:
+    """Refuses two sequences that are known to be of different places.
+
+    Raises:
+        InputError: if their maps differ by name.
+    """
     maps = [_map_name(sequence) for sequence in (first, second)]
     if None not in maps and maps[0] != maps[1]:
         raise InputError(

@@ -1,0 +1,11 @@
+"""Alignment of drives whose poses are given in different worlds."""
+
+from evaluation.alignment.align import (
+    Alignment,
+    AlignmentReport,
+    When,
+    align,
+    in_one_world,
+)
+
+__all__ = ["Alignment", "AlignmentReport", "When", "align", "in_one_world"]

@@ -1,0 +1,216 @@
+"""Guesses of how the worlds of two drives lie to each other.
+
+Without common coordinates, places that look alike tell it: Scan Context
+proposes pairs of keyframes with the turn between them, and a consensus of
+two pairs (RANSAC) fixes the four numbers that two upright worlds can differ
+by: a turn about the vertical and a move.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from evaluation.alignment.submaps import Submaps
+from evaluation.methods.scan_context import ScanContext
+from evaluation.progress import Track
+from evaluation.retrieval import gather
+
+# Candidates a query. LT-mapper takes 3, if they score 0.7 at least; here they
+# need not score, since in a changed city right ones score 0.3 to 0.5, and
+# wrong ones are outvoted.
+_CANDIDATES = 5
+# Off by how much a pair may be under a guess: half a lane and the spacing of
+# keyframes, drift; sectors of six degrees [m, rad].
+_NEAR = 8.0
+_TURN = np.radians(12.0)
+# Two pairs tell a turn if they are this far apart [m].
+_BASELINE = 20.0
+_MOST_TRIALS = 3000
+_NUM_GUESSES = 5
+_SEED = 11
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """M pairs of keyframes that look alike.
+
+    Attributes:
+        source: (M,) keyframes of the source.
+        target: (M,) keyframes of the target.
+        p_S: (M, 3) position of the former in the source's world [m].
+        p_T: (M, 3) position of the latter in the target's world [m].
+        turn: (M,) about the vertical, from the source's world to the
+            target's, that makes them look alike [rad].
+    """
+
+    source: np.ndarray
+    target: np.ndarray
+    p_S: np.ndarray
+    p_T: np.ndarray
+    turn: np.ndarray
+
+
+@dataclass(frozen=True)
+class Guess:
+    """A pose of the source's world in the target's.
+
+    Attributes:
+        X_TS: (4, 4), upright.
+        pairs: indices of the candidates that agree.
+    """
+
+    X_TS: np.ndarray
+    pairs: np.ndarray
+
+
+def find_candidates(
+    source: Submaps, target: Submaps, track: Track
+) -> Candidates:
+    """Finds keyframes of two drives that look alike."""
+    method = ScanContext()
+    places = [
+        method.describe_place(gather(target.sequence, frame, 1))
+        for frame in track(
+            target.frames, f"describing {target.sequence.name}", len(target)
+        )
+    ]
+    database = method.build_database(places)
+    found = []
+    for k in track(
+        range(len(source)), f"recognising {source.sequence.name}", len(source)
+    ):
+        query = method.describe(gather(source.sequence, source.frames[k], 1))
+        scores = np.nan_to_num(method.score(query, database), nan=-np.inf)
+        for place in np.argsort(-scores, kind="stable")[:_CANDIDATES]:
+            if not np.isfinite(scores[place]):
+                break
+            X_PQ = method.relative_pose(query, database, int(place))
+            turn = (
+                _heading(target.X_WK[place])
+                + _heading(X_PQ)
+                - _heading(source.X_WK[k])
+            )
+            found.append((k, int(place), turn))
+    rows = np.array(found).reshape(-1, 3)
+    k, place = rows[:, 0].astype(np.int64), rows[:, 1].astype(np.int64)
+    return Candidates(
+        source=k,
+        target=place,
+        p_S=source.X_WK[k, :3, 3],
+        p_T=target.X_WK[place, :3, 3],
+        turn=rows[:, 2],
+    )
+
+
+def find_guesses(candidates: Candidates) -> list[Guess]:
+    """Returns the guesses that most candidates agree with, best first.
+
+    Each is the consensus of two pairs, refined with all that agree; what
+    agreed with a better guess does not vote for the next one.
+    """
+    trials = _trials(candidates)
+    is_left = np.ones(len(candidates.turn), dtype=bool)
+    guesses = []
+    while len(guesses) < _NUM_GUESSES and len(trials):
+        agreement = np.stack(
+            [_agrees(candidates, turn, move) for turn, move in trials]
+        )
+        # A place that is proposed three times votes once.
+        votes = np.array(
+            [
+                len(np.unique(candidates.source[row & is_left]))
+                for row in agreement
+            ]
+        )
+        best = int(votes.argmax())
+        if votes[best] < 2:
+            break
+        pairs = agreement[best] & is_left
+        for _ in range(3):
+            turn, move = _fit(candidates, pairs)
+            pairs = _agrees(candidates, turn, move)
+        guesses.append(Guess(upright(turn, move), np.flatnonzero(pairs)))
+        is_left &= ~pairs & ~agreement[best]
+        trials = [
+            trial
+            for trial, row in zip(trials, agreement, strict=True)
+            if (row & is_left).sum() >= 2
+        ]
+    return guesses
+
+
+def upright(turn: float, move: np.ndarray) -> np.ndarray:
+    """Returns a pose (4, 4) turned about the vertical [rad] and moved [m]."""
+    X = np.eye(4)
+    X[:2, :2] = [[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]
+    X[:3, 3] = move
+    return X
+
+
+def _trials(candidates: Candidates) -> list[tuple[float, np.ndarray]]:
+    """Returns turns and moves that two pairs of candidates agree on."""
+    p_S, p_T = candidates.p_S[:, :2], candidates.p_T[:, :2]
+    one, two = np.triu_indices(len(p_S), k=1)
+    from_S, from_T = p_S[two] - p_S[one], p_T[two] - p_T[one]
+    apart = np.linalg.norm(from_S, axis=1)
+    turns = np.arctan2(from_T[:, 1], from_T[:, 0]) - np.arctan2(
+        from_S[:, 1], from_S[:, 0]
+    )
+    fits = (
+        (apart > _BASELINE)
+        & (np.abs(apart - np.linalg.norm(from_T, axis=1)) < _NEAR)
+        & (np.abs(_wrap(turns - candidates.turn[one])) < _TURN)
+        & (np.abs(_wrap(turns - candidates.turn[two])) < _TURN)
+    )
+    chosen = np.flatnonzero(fits)
+    if len(chosen) > _MOST_TRIALS:
+        rng = np.random.default_rng(_SEED)
+        chosen = np.sort(rng.choice(chosen, _MOST_TRIALS, replace=False))
+    trials = []
+    for pair in chosen:
+        ends = [one[pair], two[pair]]
+        trials.append(
+            (turns[pair], _move(candidates, np.array(ends), turns[pair]))
+        )
+    return trials
+
+
+def _agrees(
+    candidates: Candidates, turn: float, move: np.ndarray
+) -> np.ndarray:
+    """Returns (M,) bool, which pairs a guess brings together."""
+    p_T = _turned(candidates.p_S, turn) + move
+    off = np.linalg.norm((p_T - candidates.p_T)[:, :2], axis=1)
+    return (off < _NEAR) & (np.abs(_wrap(candidates.turn - turn)) < _TURN)
+
+
+def _fit(candidates: Candidates, pairs: np.ndarray) -> tuple[float, np.ndarray]:
+    """Returns the turn and move of least squares (Umeyama 1991, in 2-D)."""
+    p_S, p_T = candidates.p_S[pairs, :2], candidates.p_T[pairs, :2]
+    a, b = p_S - p_S.mean(axis=0), p_T - p_T.mean(axis=0)
+    turn = float(
+        np.arctan2((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum(), (a * b).sum())
+    )
+    return turn, _move(candidates, pairs, turn)
+
+
+def _move(candidates: Candidates, pairs: np.ndarray, turn: float) -> np.ndarray:
+    offsets = candidates.p_T[pairs] - _turned(candidates.p_S[pairs], turn)
+    move = offsets.mean(axis=0)
+    # Wrong pairs may be at any height.
+    move[2] = np.median(offsets[:, 2])
+    return move
+
+
+def _turned(p: np.ndarray, turn: float) -> np.ndarray:
+    return p @ upright(turn, np.zeros(3))[:3, :3].T
+
+
+def _heading(X: np.ndarray) -> float:
+    return float(np.arctan2(X[1, 0], X[0, 0]))
+
+
+def _wrap(angle: np.ndarray) -> np.ndarray:
+    return (angle + np.pi) % (2.0 * np.pi) - np.pi

@@ -1,0 +1,151 @@
+"""Finds the loops between two drives, or of a drive with itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from evaluation import poses
+from evaluation.alignment.loops import Loop, close
+from evaluation.alignment.submaps import Submaps
+from evaluation.progress import Track
+
+# Keyframes that see the same are this close, seen from above [m].
+SAME_PLACE = 10.0
+# A drive passes a place again if there is so much path between [m].
+_DETOUR = 50.0
+# A guess this far from the last one may lead elsewhere [m].
+_ANOTHER_GUESS = 1.0
+
+
+@dataclass
+class LoopSearch:
+    """Loops between two drives, as they are found.
+
+    Attributes:
+        source: whose keyframes K are registered.
+        target: to whose keyframes L.
+        loops: by keyframe of the source, one each.
+        tried: guess X_TK from which each keyframe was registered last.
+        num_attempts: registrations tried.
+    """
+
+    source: Submaps
+    target: Submaps
+    loops: dict[int, Loop] = field(default_factory=dict)
+    tried: dict[int, np.ndarray] = field(default_factory=dict)
+    num_attempts: int = 0
+
+    def near(self, X_TK: np.ndarray) -> np.ndarray:
+        """Returns the keyframes (M,) that guesses (K, 4, 4) put near some."""
+        return np.flatnonzero([self._place(X) is not None for X in X_TK])
+
+    def attempt(self, k: int, X_TK: np.ndarray) -> bool:
+        """Registers keyframe k, guessed to be at X_TK (4, 4).
+
+        Returns:
+            Whether that made a loop.
+        """
+        place = self._place(X_TK)
+        if place is None:
+            return False
+        self.num_attempts += 1
+        self.tried[k] = X_TK
+        X_LK = poses.inverse(self.target.X_WK[place]) @ X_TK
+        loop = close(self.source, self.target, k, place, X_LK)
+        if loop is None:
+            return False
+        self.loops[k] = loop
+        return True
+
+    def grow(self, track: Track) -> None:
+        """Tries all keyframes, outwards along the path from known loops.
+
+        Each is guessed to be moved like the nearest one that has a loop.
+        """
+        path = self.source.path
+        away = np.full(len(path), np.inf)
+        teacher = np.zeros(len(path), dtype=np.int64)
+        is_open = np.ones(len(path), dtype=bool)
+
+        def learn(k: int) -> None:
+            distance = np.abs(path - path[k])
+            closer = distance < away
+            away[closer], teacher[closer] = distance[closer], k
+            is_open[k] = False
+
+        for k in self.loops:
+            learn(k)
+        remaining = int(is_open.sum())
+        description = f"aligning {self.source.sequence.name}"
+        for _ in track(range(remaining), description, remaining):
+            k = int(np.where(is_open, away, np.inf).argmin())
+            is_open[k] = False
+            if self.attempt(k, self._moved_like(teacher[k], k)):
+                learn(k)
+
+    def retry(self, keyframes: np.ndarray, X_TK: np.ndarray) -> int:
+        """Tries keyframes again, if there is something new to try.
+
+        Args:
+            keyframes: which.
+            X_TK: (K, 4, 4) guesses for all.
+
+        Returns:
+            How many loops that made.
+        """
+        made = 0
+        for k in keyframes:
+            before = self.tried.get(k)
+            if before is not None:
+                moved = np.linalg.norm(X_TK[k, :3, 3] - before[:3, 3])
+                if moved < _ANOTHER_GUESS:
+                    continue
+            made += self.attempt(k, X_TK[k])
+        return made
+
+    def _moved_like(self, teacher: int, k: int) -> np.ndarray:
+        """Returns X_TK of a keyframe that is moved as one with a loop is."""
+        loop = self.loops[teacher]
+        X_TJ = self.target.X_WK[loop.target] @ loop.X_LK
+        X_WK = self.source.X_WK
+        return X_TJ @ poses.inverse(X_WK[teacher]) @ X_WK[k]
+
+    def _place(self, X_TK: np.ndarray) -> int | None:
+        """Returns the nearest keyframe of the target; None if none is near."""
+        offsets = self.target.X_WK[:, :2, 3] - X_TK[:2, 3]
+        away = np.linalg.norm(offsets, axis=1)
+        nearest = int(away.argmin())
+        return nearest if away[nearest] <= SAME_PLACE else None
+
+
+def find_self_loops(drive: Submaps, most: int) -> list[Loop]:
+    """Registers keyframes of a drive to earlier ones at the same place.
+
+    Args:
+        drive: a drive.
+        most: how many are tried, evenly along the drive.
+    """
+    pairs = []
+    for k in range(len(drive)):
+        offsets = drive.X_WK[:, :2, 3] - drive.X_WK[k, :2, 3]
+        away = np.linalg.norm(offsets, axis=1)
+        away[drive.path > drive.path[k] - _DETOUR] = np.inf
+        if away.min() <= SAME_PLACE:
+            pairs.append((k, int(away.argmin())))
+    chosen = evenly(len(pairs), most)
+    loops = []
+    for k, place in (pairs[index] for index in chosen):
+        X_LK = poses.inverse(drive.X_WK[place]) @ drive.X_WK[k]
+        loop = close(drive, drive, k, place, X_LK)
+        if loop is not None:
+            loops.append(loop)
+    return loops
+
+
+def evenly(number: int, most: int) -> np.ndarray:
+    """Returns at most so many of `number` indices, evenly spread."""
+    if number <= most:
+        return np.arange(number)
+    return np.linspace(0, number - 1, most).astype(np.int64)

@@ -1,0 +1,196 @@
+"""Registration of one cloud to another, from a rough guess on.
+
+Point-to-plane ICP (Chen and Medioni 1991): each point is paired with the
+nearest one of the other cloud and drawn to its plane, under a distance limit
+that shrinks from stage to stage, so that far guesses are drawn in and near
+ones not disturbed by what changed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+from evaluation import poses
+from evaluation.methods.neighbours import nearest_neighbours
+
+# Neighbours, the point among them, that a normal is fitted to.
+NUM_NEIGHBOURS = 10
+# A normal this close to the horizontal belongs to something that stands up.
+_UPRIGHT = 0.5
+# Farthest pairs of each stage [m].
+_LIMITS = (10.0, 5.0, 2.0, 1.0)
+_MAX_ITERATIONS = 15
+# A stage is over when a step moves or turns less than this [m, rad].
+_STILL = (0.005, 2e-4)
+# Distances beyond this part of the limit lose their weight.
+_SCALE = 0.25
+# Normals of a pair that differ by more than this cosine are of two surfaces.
+_PARALLEL = 0.7
+_FEWEST_PAIRS = 20
+# Points that a step is computed from; more add time, not accuracy.
+_NUM_SAMPLES = 4000
+_SEED = 7
+# How well a point is known to lie on its plane [m]; of so many neighbouring
+# points, which share their errors, only one counts.
+_SIGMA = 0.1
+_CORRELATED = 50.0
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Points on surfaces.
+
+    Attributes:
+        points: (N, 3) [m].
+        normals: (N, 3) of unit length, with either sign.
+        tree: of the points.
+    """
+
+    points: np.ndarray
+    normals: np.ndarray
+    tree: cKDTree
+
+    def sample(self) -> Surface:
+        """Returns some of the points, with the tree of all."""
+        if len(self.points) <= _NUM_SAMPLES:
+            return self
+        rng = np.random.default_rng(_SEED)
+        chosen = rng.choice(len(self.points), _NUM_SAMPLES, replace=False)
+        return Surface(self.points[chosen], self.normals[chosen], self.tree)
+
+    @property
+    def is_upright(self) -> np.ndarray:
+        """(N,) bool, which points are on walls rather than the ground."""
+        return np.abs(self.normals[:, 2]) < _UPRIGHT
+
+
+@dataclass(frozen=True)
+class Registration:
+    """Where a cloud S lies on a cloud T, and how well it fits there.
+
+    Attributes:
+        X_TS: (4, 4).
+        fitness: part of the points that have a counterpart, of S or of T,
+            whichever is more: one of them may show much that the other one
+            lacks, because it was built or torn down in between.
+        structure: the same of the upright points alone, since flat ground
+            fits nearly everywhere.
+        covariance: (6, 6) of a small motion of S in T: turn [rad], move [m].
+    """
+
+    X_TS: np.ndarray
+    fitness: float
+    structure: float
+    covariance: np.ndarray
+
+
+def make_surface(points: np.ndarray) -> Surface:
+    """Returns a cloud with normals, fitted to the nearest neighbours.
+
+    Args:
+        points: (N, 3) [m], N >= NUM_NEIGHBOURS.
+    """
+    neighbours = points[nearest_neighbours(points, NUM_NEIGHBOURS)]
+    centred = neighbours - neighbours.mean(axis=1, keepdims=True)
+    _, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", centred, centred))
+    return Surface(points, axes[:, :, 0], cKDTree(points))
+
+
+def register(
+    source: Surface, target: Surface, guess: np.ndarray
+) -> Registration:
+    """Moves a cloud onto another.
+
+    Args:
+        source: S.
+        target: T.
+        guess: (4, 4) X_TS, right within some metres and degrees.
+    """
+    sample = source.sample()
+    X = np.array(guess, dtype=np.float64)
+    for limit in _LIMITS:
+        for _ in range(_MAX_ITERATIONS):
+            step = _step(sample, target, X, limit)
+            X = step @ X
+            move = np.linalg.norm(
+                step[:3, :3] @ X[:3, 3] + step[:3, 3] - X[:3, 3]
+            )
+            turn = Rotation.from_matrix(step[:3, :3]).magnitude()
+            if move < _STILL[0] and turn < _STILL[1]:
+                break
+    return _judge(source, target, X)
+
+
+def _step(
+    sample: Surface, target: Surface, X_TS: np.ndarray, limit: float
+) -> np.ndarray:
+    """Returns the motion (4, 4) in T that draws the pairs together."""
+    is_paired, p_T, nearest = _pair(sample, target, X_TS, limit)
+    if np.count_nonzero(is_paired) < _FEWEST_PAIRS:
+        return np.eye(4)
+    r, J = _linearise(p_T[is_paired], target, nearest[is_paired])
+    weights = (1.0 + (r / (_SCALE * limit)) ** 2) ** -2
+    H = J.T @ (weights[:, None] * J)
+    # Directions that no surface holds stay as they are.
+    damping = 1e-6 * np.trace(H) * np.eye(6)
+    xi = -np.linalg.solve(H + damping, J.T @ (weights * r))
+    return poses.make_pose(Rotation.from_rotvec(xi[:3]).as_matrix(), xi[3:])
+
+
+def _pair(
+    sample: Surface, target: Surface, X_TS: np.ndarray, limit: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pairs points with the nearest ones of the target.
+
+    Returns:
+        (N,) bool, which points have a partner; (N, 3) where they are in T;
+        (N,) index of the partner.
+    """
+    p_T = poses.transform(X_TS, sample.points)
+    distances, nearest = target.tree.query(p_T, distance_upper_bound=limit)
+    is_paired = np.isfinite(distances)
+    # Without a partner the tree answers with an index that there is not.
+    nearest = np.where(is_paired, nearest, 0)
+    cosines = np.einsum(
+        "ni,ni->n", sample.normals @ X_TS[:3, :3].T, target.normals[nearest]
+    )
+    return is_paired & (np.abs(cosines) > _PARALLEL), p_T, nearest
+
+
+def _linearise(
+    p_T: np.ndarray, target: Surface, partner: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns distances to planes (M,), and their Jacobian (M, 6)."""
+    n_T = target.normals[partner]
+    distances = np.einsum("ni,ni->n", p_T - target.points[partner], n_T)
+    return distances, np.concatenate([np.cross(p_T, n_T), n_T], axis=1)
+
+
+def _judge(source: Surface, target: Surface, X_TS: np.ndarray) -> Registration:
+    sample = source.sample()
+    limit = _LIMITS[-1]
+    is_paired, p_T, nearest = _pair(sample, target, X_TS, limit)
+    _, J = _linearise(p_T[is_paired], target, nearest[is_paired])
+    counting = len(source.points) / len(sample.points) / _CORRELATED
+    H = J.T @ J * (counting / _SIGMA**2)
+    reverse = target.sample()
+    is_found, _, _ = _pair(reverse, source, poses.inverse(X_TS), limit)
+    return Registration(
+        X_TS=X_TS,
+        fitness=float(max(is_paired.mean(), is_found.mean())),
+        structure=max(
+            _part(is_paired, sample.is_upright),
+            _part(is_found, reverse.is_upright),
+        ),
+        # Where nothing holds, a metre and a few degrees are left open.
+        covariance=np.linalg.inv(H + np.eye(6)),
+    )
+
+
+def _part(is_counted: np.ndarray, of: np.ndarray) -> float:
+    total = np.count_nonzero(of)
+    return np.count_nonzero(is_counted & of) / total if total else 0.0

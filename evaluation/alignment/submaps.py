@@ -1,0 +1,132 @@
+"""A drive cut into overlapping small maps, for alignment."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from evaluation import poses
+from evaluation.alignment.registration import Surface, make_surface
+from evaluation.maps import VoxelAccumulator
+from evaluation.retrieval import sample_frames
+from evaluation.sequences.sequence import Sequence
+
+# Between keyframes, along the path [m]; on very long drives more, on very
+# short ones less.
+_SPACING = 10.0
+_FEWEST_KEYFRAMES = 20
+_MOST_KEYFRAMES = 400
+# A submap holds the scans of this part of the path on either side of its
+# keyframe, at this spacing, out to this range [m].
+_HALF_LENGTH = 10.0
+_SCAN_SPACING = 2.5
+_RANGE = 60.0
+_VOXEL_SIZE = 0.7
+_FEWEST_POINTS = 500
+# The ground is looked for within this distance of so many keyframes [m], where
+# normals are so close to the vertical.
+_GROUND_RANGE = 8.0
+_GROUND_KEYFRAMES = 20
+_LEVEL = 0.95
+# Surfaces kept in memory; neighbours are asked for one after the other.
+_NUM_KEPT = 48
+
+
+class Submaps:
+    """Keyframes K of a drive, and what surrounds them.
+
+    Attributes:
+        sequence: the drive.
+        X_WS: (N, 4, 4) poses of its frames.
+        travelled: (N,) length of the path so far [m].
+        frames: (K,) keyframes.
+        X_WK: (K, 4, 4) their poses.
+    """
+
+    def __init__(self, sequence: Sequence):
+        self.sequence = sequence
+        self.X_WS = sequence.X_WS
+        p_WS = self.X_WS[:, :3, 3]
+        steps = np.linalg.norm(np.diff(p_WS, axis=0), axis=1)
+        self.travelled = np.concatenate([[0.0], np.cumsum(steps)])
+        length = self.travelled[-1]
+        spacing = max(
+            min(_SPACING, length / _FEWEST_KEYFRAMES), length / _MOST_KEYFRAMES
+        )
+        self.frames = (
+            sample_frames(p_WS, spacing) if length > 0.0 else np.array([0])
+        )
+        self._scans = sample_frames(p_WS, _SCAN_SPACING)
+        self.X_WK = self.X_WS[self.frames]
+        self.surface = lru_cache(_NUM_KEPT)(self._make_surface)
+
+    def __len__(self) -> int:
+        return len(self.frames)
+
+    @property
+    def length(self) -> float:
+        """Length of the path [m]."""
+        return float(self.travelled[-1])
+
+    @property
+    def path(self) -> np.ndarray:
+        """(K,) where along the path the keyframes are [m]."""
+        return self.travelled[self.frames]
+
+    def bend(self, X_VK: np.ndarray) -> np.ndarray:
+        """Returns poses of all frames for new ones of the keyframes.
+
+        Args:
+            X_VK: (K, 4, 4).
+
+        Returns:
+            (N, 4, 4); between keyframes, what the two would do to a frame is
+            blended along the path.
+        """
+        moves = X_VK @ poses.inverse(self.X_WK)
+        frames = np.arange(len(self.X_WS))
+        before = np.searchsorted(self.frames, frames, side="right") - 1
+        after = np.minimum(before + 1, len(self) - 1)
+        gap = np.maximum(self.path[after] - self.path[before], 1e-9)
+        fraction = np.clip((self.travelled - self.path[before]) / gap, 0.0, 1.0)
+        return poses.interpolate(
+            moves[before] @ self.X_WS, moves[after] @ self.X_WS, fraction
+        )
+
+    def ground_height(self) -> float:
+        """Returns the usual height of the ground under the drive in W [m]."""
+        heights = []
+        number = min(_GROUND_KEYFRAMES, len(self))
+        for index in np.linspace(0, len(self) - 1, number).astype(np.int64):
+            surface = self.surface(int(index))
+            if surface is None:
+                continue
+            near = np.hypot(*surface.points[:, :2].T) < _GROUND_RANGE
+            below = surface.points[:, 2] < 0.0
+            level = np.abs(surface.normals[:, 2]) > _LEVEL
+            points = surface.points[near & below & level]
+            if len(points):
+                heights.append(
+                    np.median(poses.transform(self.X_WK[index], points)[:, 2])
+                )
+        return float(np.median(heights)) if heights else 0.0
+
+    def _make_surface(self, index: int) -> Surface | None:
+        """Returns the submap around a keyframe, in the frame of its LiDAR.
+
+        None if there is next to nothing to see.
+        """
+        frame = self.frames[index]
+        off = np.abs(self.travelled[self._scans] - self.travelled[frame])
+        chosen = {int(frame), *self._scans[off <= _HALF_LENGTH].tolist()}
+        X_KW = poses.inverse(self.X_WS[frame])
+        accumulator = VoxelAccumulator(_VOXEL_SIZE)
+        for other in sorted(chosen):
+            points = self.sequence.scan(other)
+            near = np.hypot(points["x"], points["y"]) < _RANGE
+            accumulator.add(points[near], X_KW @ self.X_WS[other])
+        centroids = accumulator.to_map().centroids_W
+        if len(centroids) < _FEWEST_POINTS:
+            return None
+        return make_surface(centroids)

@@ -1,0 +1,56 @@
+"""A drive whose poses have been corrected."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from evaluation.sequences.sequence import Sequence
+
+
+class MovedSequence(Sequence):
+    """Another sequence's scans, at other poses."""
+
+    def __init__(self, sequence: Sequence, world_frame: str, X_WS: np.ndarray):
+        """Puts a drive elsewhere.
+
+        Args:
+            sequence: of N scans.
+            world_frame: name of W.
+            X_WS: (N, 4, 4).
+        """
+        self.name = sequence.name
+        self.world_frame = world_frame
+        self._sequence = sequence
+        self._X_WS = X_WS
+
+    def __len__(self) -> int:
+        return len(self._sequence)
+
+    @property
+    def stamps_ns(self) -> np.ndarray:
+        return self._sequence.stamps_ns
+
+    @property
+    def X_WS(self) -> np.ndarray:
+        return self._X_WS
+
+    def scan(self, index: int) -> np.ndarray:
+        return self._sequence.scan(index)
+
+    @property
+    def datum(self) -> str | None:
+        return self._sequence.datum
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return self._sequence.notes
+
+    @property
+    def scenario(self) -> Mapping | None:
+        return self._sequence.scenario
+
+    @property
+    def instances(self) -> Mapping[int, Mapping] | None:
+        return self._sequence.instances
