@@ -128,7 +128,7 @@ def draw_change(
     point without a counterpart in the other map. It is pale where the point
     lies outside the other map's hull: there the other drive may just not
     have looked, and the TCR does not count it. The second shows the sets H
-    and O in both orders and united.
+    and O in both orders and united; a point has the colour of its voxel.
 
     Args:
         map_name: of the city.
@@ -138,17 +138,36 @@ def draw_change(
         stems: paths to write, without endings.
     """
     stages = (earlier, later)
-    judged = [
-        judge_points(one.fine.centroids_W, other.coarse.centroids_W)
-        for one, other in zip(stages, stages[::-1], strict=True)
-    ]
-    _draw_absent(map_name, stages, judged, stems[0])
-    _draw_sets(map_name, stages, judged, change, stems[1])
+    _draw_absent(map_name, stages, stems[0])
+    _draw_sets(map_name, stages, change, stems[1])
 
 
-def _draw_absent(map_name, stages, judged, stem: Path) -> None:
+def voxel_of_each(fine: VoxelMap, coarse: VoxelMap) -> np.ndarray:
+    """Returns in which coarse voxel each fine one lies.
+
+    Args:
+        fine: a map.
+        coarse: the same map after `coarsen`.
+
+    Returns:
+        (N,) index into the coarse map.
+    """
+    factor = round(coarse.voxel_size / fine.voxel_size)
+    owners = np.floor_divide(fine.indices, factor)
+    # Both as numbers that sort like the rows of indices do.
+    low = coarse.indices.min(axis=0)
+    spans = np.ptp(coarse.indices, axis=0).astype(np.int64) + 1
+    weights = np.array([spans[1] * spans[2], spans[2], 1])
+    keys = (coarse.indices - low) @ weights
+    return np.searchsorted(keys, (owners - low) @ weights)
+
+
+def _draw_absent(map_name, stages, stem: Path) -> None:
     pictures = []
-    for stage, (absent, in_hull) in zip(stages, judged, strict=True):
+    for stage, other in zip(stages, stages[::-1], strict=True):
+        absent, in_hull = judge_points(
+            stage.fine.centroids_W, other.coarse.centroids_W
+        )
         rgb = np.full((len(absent), 3), _UNCHANGED, dtype=np.uint8)
         rgb[absent] = _ABSENT_OUTSIDE
         rgb[absent & in_hull] = _CHANGED
@@ -156,8 +175,8 @@ def _draw_absent(map_name, stages, judged, stem: Path) -> None:
     figure, grid = _picture_grid(pictures)
     names = [stage.name for stage in stages]
     titles = (
-        f"{map_name} {names[0]}: gone by {names[1]}",
-        f"{map_name} {names[1]}: new since {names[0]}",
+        f"{map_name} {names[0]}: what {names[1]} lacks",
+        f"{map_name} {names[1]}: what {names[0]} lacks",
     )
     for axes, picture, text in zip(grid, pictures, titles, strict=True):
         _show(axes, picture)
@@ -171,12 +190,14 @@ def _draw_absent(map_name, stages, judged, stem: Path) -> None:
     save(figure, stem, "webp")
 
 
-def _draw_sets(map_name, stages, judged, change, stem: Path) -> None:
+def _draw_sets(map_name, stages, change: TemporalChange, stem: Path) -> None:
     clouds, colours = [], []
-    for stage, (absent, in_hull) in zip(stages, judged, strict=True):
-        rgb = np.full((len(absent), 3), _OUTSIDE_H, dtype=np.uint8)
-        rgb[in_hull] = _IN_O
-        rgb[in_hull & absent] = _ONLY_IN_H
+    sides = (change.source_to_target, change.target_to_source)
+    for stage, side in zip(stages, sides, strict=True):
+        rgb = np.full((len(stage.coarse), 3), _OUTSIDE_H, dtype=np.uint8)
+        rgb[side.in_hull] = _ONLY_IN_H
+        rgb[side.unchanged] = _IN_O
+        rgb = rgb[voxel_of_each(stage.fine, stage.coarse)]
         clouds.append(stage.fine.centroids_W)
         colours.append(rgb)
     clouds.append(np.concatenate(clouds))

@@ -84,13 +84,13 @@ def _summary(content: PageContent) -> str:
     pairs = {result.pair for result in content.recognitions}
     methods = {result.method for result in content.recognitions}
     facts = [
-        (len(maps), "maps compared"),
-        (len(content.changes), "pairs of stages"),
-        (len(pairs), "database → query"),
-        (len(methods), "methods"),
+        ("maps", len(maps)),
+        ("pairs of stages", len(content.changes)),
+        ("database → query", len(pairs)),
+        ("methods", len(methods)),
     ]
     parts = ['<ul class="facts">']
-    parts += [f"<li><b>{n}</b> {what}</li>" for n, what in facts]
+    parts += [f"<li>{what} <b>{n}</b></li>" for what, n in facts]
     parts.append("</ul>")
     if content.findings:
         parts.append('<dl class="findings">')
