@@ -17,9 +17,11 @@ from shapely.geometry import MultiPoint, Polygon, box
 
 from cns_drake.city.buildings import (
     ARCHETYPES,
+    downtown_stock,
     metropolis_stock,
-    provisional,
+    riverside_stock,
     sample,
+    suburbia_stock,
 )
 from cns_drake.city.buildings.site import (
     FOUNDATION_M,
@@ -29,17 +31,27 @@ from cns_drake.city.buildings.site import (
 )
 from cns_drake.city.structures import MeshShape
 
-NAMES = sorted(
-    name for name in ARCHETYPES if ARCHETYPES[name].draw is not provisional.draw
-)
+NAMES = sorted(ARCHETYPES)
 ANY_OUTLINE = [name for name in NAMES if ARCHETYPES[name].any_outline]
 PARTY_WALLS = [name for name in NAMES if ARCHETYPES[name].party_walls]
 # Rays along an edge may hit the face behind it, in single precision.
 EDGE_HITS = 2e-4
 # Meshes that many buildings use.
 SHARED = ("roof_", "fire_stairs", "railing_panel")
-HOUSES = ("detached_house",)
-TOWERS = ("art_deco_tower", "glass_skyscraper", "podium_tower")
+HOUSES = (
+    "bungalow",
+    "detached_house",
+    "park_pavilion",
+    "row_house",
+    "semi_detached",
+)
+TOWERS = (
+    "art_deco_tower",
+    "banded_tower",
+    "glass_skyscraper",
+    "podium_tower",
+    "unfinished_tower",
+)
 
 every_building = pytest.mark.parametrize(
     ("name", "seed"), [(name, seed) for name in NAMES for seed in SEEDS]
@@ -75,9 +87,17 @@ def outside(points, region) -> float:
     return float(shapely.distance(region, shapely.points(points)).max())
 
 
-def test_metropolis_has_its_stock():
-    assert len(metropolis_stock()) >= 10
-    assert set(metropolis_stock()) <= set(ARCHETYPES)
+def test_every_map_has_its_stock():
+    stocks = [
+        metropolis_stock(),
+        riverside_stock(),
+        suburbia_stock(),
+        downtown_stock(),
+    ]
+    for k, stock in enumerate(stocks):
+        assert len(stock) == len(set(stock)) >= 8
+        assert set(stock) <= set(ARCHETYPES)
+        assert k == 0 or len(set(stock) - set(stocks[0])) >= 5
     assert all(ARCHETYPES[name].name == name for name in NAMES)
 
 
@@ -156,7 +176,7 @@ def test_rays_from_the_street_never_see_the_inside(name, seed):
     footprint, height = typical_request(name, seed)
     triangles = placed_triangles(typical_model(name, seed))
     origins, directions = rays_from_the_street(
-        footprint, min(height, 60.0), 20_000, seed
+        footprint, min(height, 60.0), 12_000, seed
     )
     check_closed(triangles, origins, directions)
 
@@ -167,7 +187,7 @@ def test_rays_from_above_never_see_the_inside(name, seed):
     triangles = placed_triangles(typical_model(name, seed))
     rng = np.random.default_rng(seed)
     x0, y0, x1, y1 = footprint.bounds
-    count = 20_000
+    count = 12_000
     origins = np.column_stack(
         [
             rng.uniform(x0, x1, count),
@@ -213,7 +233,7 @@ def test_any_outline_gets_closed_walls(name):
     # Convex within the overhang: nothing is left of the block uncovered.
     hull = MultiPoint(corners[corners[:, 2] < 1.0][:, :2]).convex_hull
     assert block.difference(hull.buffer(0.05)).area < 0.01 * block.area
-    origins, directions = rays_from_the_street(block, 40.0, 20_000, 1)
+    origins, directions = rays_from_the_street(block, 40.0, 12_000, 1)
     check_closed(triangles, origins, directions)
 
 
@@ -231,7 +251,7 @@ def test_nothing_crosses_blind_edges(name, blind):
         assert corners[:, 0].max() <= x1 + 2e-3
     if 3 in blind:
         assert corners[:, 0].min() >= x0 - 2e-3
-    origins, directions = rays_from_the_street(footprint, height, 20_000, 1)
+    origins, directions = rays_from_the_street(footprint, height, 12_000, 1)
     check_closed(triangles, origins, directions)
 
 
@@ -248,7 +268,9 @@ def test_party_walls_stand_flush_on_the_boundary(name):
     directions = np.tile([-1.0, 0.0, 0.0], (ys.size, 1))
     _, distance = cast(placed_triangles(model), origins, directions)
     # There may be room for steps in front and for a yard behind.
-    assert np.isclose(distance, 90.0 - x1, atol=1e-3).mean() > 0.6
+    near = distance < 90.0 - x1 + 2.0
+    assert near.mean() > 0.35
+    assert np.isclose(distance[near], 90.0 - x1, atol=1e-3).mean() > 0.85
 
 
 @pytest.mark.parametrize("name", NAMES)

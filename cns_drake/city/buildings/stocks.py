@@ -15,6 +15,7 @@ from cns_drake.city.buildings.corner_building import CORNER_BUILDING
 from cns_drake.city.buildings.corner_store import CORNER_STORE
 from cns_drake.city.buildings.court_block import COURT_BLOCK
 from cns_drake.city.buildings.detached_house import DETACHED_HOUSE
+from cns_drake.city.buildings.elevated_station import ELEVATED_STATION
 from cns_drake.city.buildings.gallery_flats import GALLERY_FLATS
 from cns_drake.city.buildings.garden_flats import GARDEN_FLATS
 from cns_drake.city.buildings.gas_station import GAS_STATION
@@ -29,12 +30,12 @@ from cns_drake.city.buildings.office import OFFICE
 from cns_drake.city.buildings.park_pavilion import PARK_PAVILION
 from cns_drake.city.buildings.parking_deck import PARKING_DECK
 from cns_drake.city.buildings.podium_tower import PODIUM_TOWER
-from cns_drake.city.buildings.provisional import plain_house
 from cns_drake.city.buildings.row_house import ROW_HOUSE
 from cns_drake.city.buildings.school import SCHOOL
 from cns_drake.city.buildings.semi_detached import SEMI_DETACHED
 from cns_drake.city.buildings.shop_house import SHOP_HOUSE
 from cns_drake.city.buildings.shop_strip import SHOP_STRIP
+from cns_drake.city.buildings.shopping_hall import SHOPPING_HALL
 from cns_drake.city.buildings.slab_tower import SLAB_TOWER
 from cns_drake.city.buildings.sports_hall import SPORTS_HALL
 from cns_drake.city.buildings.supermarket import SUPERMARKET
@@ -43,9 +44,6 @@ from cns_drake.city.buildings.town_hall import TOWN_HALL
 from cns_drake.city.buildings.unfinished_tower import UNFINISHED_TOWER
 from cns_drake.city.buildings.walk_up import WALK_UP
 from cns_drake.city.buildings.waterfront_hall import WATERFRONT_HALL
-
-SHOPPING_HALL = plain_house("shopping_hall", (9.0, 26.0), (28.0, 120.0))
-ELEVATED_STATION = plain_house("elevated_station", (9.0, 16.0), (14.0, 120.0))
 
 METROPOLIS = (
     ART_DECO_TOWER,

@@ -84,7 +84,7 @@ def draw(site: Site, height: float, rng: np.random.Generator):
         group=group,
         clad=group * int(rng.integers(0, max(1, storeys // group // 2))),
         scaffolds=pick(rng, ((0,), (0, 1), (0, 3), (0, 1, 3))),
-        scaffold_top=int(rng.integers(storeys // 2, storeys)),
+        scaffold_top=min(int(rng.integers(storeys // 2, storeys)), 8),
         nets=float(rng.uniform(0.2, 0.7)),
         props=bool(rng.random() < 0.7),
         hoist=bool(rng.random() < 0.6),
@@ -126,7 +126,7 @@ def _columns(p: UnfinishedTower, plan) -> list[tuple[float, float]]:
     (x0, y0), (x1, y1) = plan[0], plan[2]
     places = []
     for a, b in ((x0, x1), (y0, y1)):
-        count = min(7, max(2, round((b - a) / p.pitch) + 1))
+        count = min(6, max(2, round((b - a) / p.pitch) + 1))
         places.append(np.round(np.linspace(a + 0.5, b - 0.5, count), 2))
     xs, ys = (place.tolist() for place in places)
     return [(x, y) for x in xs for y in ys]
@@ -205,7 +205,7 @@ def _add_cladding(assembly, p: UnfinishedTower, plan) -> None:
     outer = massing.inset(plan, -_CLADDING_M)
     head = round(p.storey - 0.5, 2)
     length = max(np.ptp(plan, axis=0))
-    pitch = max(p.pitch / 2, length / 10)
+    pitch = max(p.pitch / 2, length / 8)
     facade = Facade(
         p.storey,
         (Band(0.0, 0.2, -0.08),),

@@ -87,7 +87,7 @@ def draw(site: Site, height: float, rng: np.random.Generator) -> WalkUp:
         storey=float(rng.uniform(2.8, 3.1)),
         section=float(rng.uniform(11.0, 15.0)),
         bay_reach=round(float(rng.choice([0.0, 0.4, 0.6])), 2),
-        pitch=max(float(rng.uniform(2.1, 2.8)), (x1 - x0 + depth) / 22),
+        pitch=max(float(rng.uniform(2.1, 2.8)), (x1 - x0 + depth) / 17),
         window_width=round(float(rng.uniform(1.0, 1.5)), 2),
         recess=round(float(rng.uniform(0.14, 0.26)), 2),
         arched=bool(rng.random() < 0.3),
