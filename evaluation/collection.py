@@ -22,24 +22,18 @@ class Recording:
         sequence: the drive.
         map_name: of the city.
         stage: of the city's life; stages sort by name.
+        route: what the scenario says about it; None if it is unknown.
     """
 
     path: Path
     sequence: Sequence
     map_name: str
     stage: str
+    route: object | None
 
     @property
     def name(self) -> str:
         return self.sequence.name
-
-    @property
-    def route(self) -> object | None:
-        """What the scenario says about the route; None if it is unknown."""
-        scenario = self.sequence.scenario
-        if scenario is None:
-            return None
-        return scenario.get("route") or scenario.get("waypoints")
 
 
 @dataclass(frozen=True)
@@ -124,21 +118,19 @@ def find_cities(folder: Path) -> list[City]:
 
 def _place(path: Path) -> Recording:
     sequence = open_sequence(path)
-    scenario = sequence.scenario
-    if scenario is not None and {"map", "stage"} <= set(scenario):
-        return Recording(
-            path,
-            sequence,
-            Path(str(scenario["map"])).name,
-            str(scenario["stage"]),
-        )
+    scenario = sequence.scenario or {}
+    # A city has lanes to follow, any other world has waypoints.
+    route = scenario.get("route") or scenario.get("waypoints")
+    if {"map", "stage"} <= set(scenario):
+        name = Path(str(scenario["map"])).name
+        return Recording(path, sequence, name, str(scenario["stage"]), route)
     match = _NAME.fullmatch(sequence.name)
     if match is None:
         raise InputError(
             f"{path}: neither a scenario nor a name <map>_<stage> tells map"
             " and stage"
         )
-    return Recording(path, sequence, match["map"], match["stage"])
+    return Recording(path, sequence, match["map"], match["stage"], route)
 
 
 def _make_city(folder: Path, name: str, recordings: list[Recording]) -> City:

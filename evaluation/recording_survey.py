@@ -9,12 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from evaluation.errors import InputError
-from evaluation.maps import (
-    PICTURE_DIVISIONS,
-    VOXEL_SIZE,
-    VoxelMap,
-    map_sequence,
-)
+from evaluation.mapped_sequence import MappedSequence
+from evaluation.maps import PICTURE_DIVISIONS, VOXEL_SIZE, VoxelMap
 from evaluation.methods import known_methods, make_method
 from evaluation.page_data import PageDrive, make_drive
 from evaluation.retrieval import DescribedDrive, Role, describe_drive
@@ -54,12 +50,13 @@ def survey_recording(path: Path, roles: Set[Role]) -> RecordingSurvey:
     Raises:
         InputError: if it cannot be read, or holds no point.
     """
-    sequence = open_sequence(path)
-    fine = map_sequence(sequence, VOXEL_SIZE / PICTURE_DIVISIONS)
-    if len(fine) == 0:
-        raise InputError(f"{sequence.name}: no scan holds a point")
     frames, thumbnails = [], []
     methods = [make_method(name, {}) for name in known_methods()]
+    sequence = MappedSequence(
+        open_sequence(path),
+        VOXEL_SIZE / PICTURE_DIVISIONS,
+        kept=max(method.scans_per_place for method in methods),
+    )
 
     def keep_thumbnail(frame: int, cloud: np.ndarray) -> None:
         frames.append(frame)
@@ -73,6 +70,9 @@ def survey_recording(path: Path, roles: Set[Role]) -> RecordingSurvey:
             method.name: drive
             for method, drive in zip(methods, drives, strict=True)
         }
+    fine = sequence.finish()
+    if len(fine) == 0:
+        raise InputError(f"{sequence.name}: no scan holds a point")
     return RecordingSurvey(
         name=sequence.name,
         fine=fine,

@@ -1,6 +1,6 @@
 import numpy as np
 
-from evaluation.figures import judge_points, top_view
+from evaluation.figures import judge_points, top_view, voxel_of_each
 from evaluation.maps import voxelise
 from evaluation.points import from_xyz
 
@@ -36,3 +36,14 @@ def test_view_from_above_shows_the_route_and_60_m_around():
     # Without a point in sight the whole map is shown.
     far = top_view(points, positions + np.array([0.0, 500.0, 0.0]))
     assert far.extent[1] > 990.0
+
+
+def test_fine_voxels_know_their_coarse_ones():
+    rng = np.random.default_rng(8)
+    fine, _ = voxelise(from_xyz(rng.uniform(-40, 40, (3000, 3))), 0.5)
+    coarse = fine.coarsen(10)
+    owners = voxel_of_each(fine, coarse)
+    np.testing.assert_array_equal(
+        coarse.indices[owners], np.floor_divide(fine.indices, 10)
+    )
+    assert set(owners) == set(range(len(coarse)))
