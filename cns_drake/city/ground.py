@@ -106,12 +106,13 @@ def ground_structures(
         water_level: height of water [m].
     """
     structures = []
+    # Land within water is a bridge, and water passes below it.
     land = unary_union(
         [
             area
             for district in districts
             for ground, area in district.grounds.items()
-            if ground != "water"
+            if ground != "water" and district.plan.ground != "water"
         ]
     )
     for district in districts:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from shapely.ops import unary_union
 
+from cns_drake.city.bridges import bridge_structures
 from cns_drake.city.building_rows import place_buildings
 from cns_drake.city.buildings import ARCHETYPES
 from cns_drake.city.districts import share_out
@@ -105,6 +106,7 @@ def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
         *street_structures(network),
         marking_structure(network),
         *ground_structures(districts, shape, plan.water_level),
+        *bridge_structures(districts, draft.streets, shape, plan.water_level),
     ]
     return City((*ground, *draft.structures))
 

@@ -126,7 +126,9 @@ def _place_run(
     for k in range(count):
         middle = start + (end - start) * (k + 0.5) / count
         # A finger's breadth between runs, so that they do not overlap.
-        model = builder.build(rng, length=length / count - 0.06)
+        model = builder.build(
+            rng, length=length / count - 0.06, **plan.parameters
+        )
         draft.place(
             plan.kind or name_stem(name),
             builder.semantic_class,
