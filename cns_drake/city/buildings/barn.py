@@ -9,6 +9,7 @@ import numpy as np
 from cns_drake.city import massing
 from cns_drake.city.buildings import bays, details, porches, wings
 from cns_drake.city.buildings.materials import Materials
+from cns_drake.city.buildings.openings import Openings, free_stretches
 from cns_drake.city.buildings.site import (
     FOUNDATION_M,
     Archetype,
@@ -16,7 +17,7 @@ from cns_drake.city.buildings.site import (
     Site,
     pick,
 )
-from cns_drake.city.buildings.wings import Openings, Roof, Wing
+from cns_drake.city.buildings.wings import Roof, Wing
 from cns_drake.city.facades import Band, Patch
 from cns_drake.city.mesh import Mesh
 from cns_drake.city.structures import Model
@@ -131,9 +132,7 @@ def build(p: Barn, site: Site, rng: np.random.Generator) -> Model:
             _add_doors(materials, p, main, openings, gable)
             if not along_y:
                 _add_doors(materials, p, main, openings, 0)
-        wings.add_walls(
-            materials, wing, openings, (_RECESS,), (Band(0.0, 0.3, -0.06),)
-        )
+        openings.add_walls(materials, (_RECESS,), (Band(0.0, 0.3, -0.06),))
         low_z = wing.wall_top + 0.5
         attic = wings.attic_window(1.0, low_z, low_z + 1.3, _RECESS)
         wings.add_roof(materials, wing, attic)
@@ -217,7 +216,7 @@ def _add_battens(materials, p: Barn, wing, boxes, openings, edge) -> None:
     """Adds upright battens on the free parts of a wall between openings."""
     wall = wing.wall(edge)
     reliefs = openings.layout(edge, wall.length)
-    for a, b in wings.free_stretches(wing, edge, boxes, 0.5):
+    for a, b in free_stretches(wing, edge, boxes, 0.5):
         for x, _ in bays.stretches(b - a, p.batten, 0.12):
             u = a + x
             if any(r.x0 - 0.15 < u < r.x1 + 0.15 for r in reliefs):

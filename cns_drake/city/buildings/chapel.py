@@ -9,6 +9,7 @@ import numpy as np
 from cns_drake.city import massing
 from cns_drake.city.buildings import bays, wings
 from cns_drake.city.buildings.materials import Materials
+from cns_drake.city.buildings.openings import Openings, free_stretches
 from cns_drake.city.buildings.site import (
     FOUNDATION_M,
     Archetype,
@@ -16,7 +17,7 @@ from cns_drake.city.buildings.site import (
     Site,
     pick,
 )
-from cns_drake.city.buildings.wings import Openings, Roof, Wing
+from cns_drake.city.buildings.wings import Roof, Wing
 from cns_drake.city.facades import Band
 from cns_drake.city.mesh import Mesh, merge_meshes
 from cns_drake.city.structures import Model
@@ -216,7 +217,7 @@ def _add_nave(materials, p: Chapel, nave: Wing, boxes) -> None:
         elif not any(w.y0 < nave.y0 for w in boxes[1:]):
             openings.put(0, middle, 2.2, bays.entrance(1.4, 2.1, 0.4))
     bands = (Band(0.0, 0.45, -0.08), Band(high - 0.25, high, -0.08))
-    wings.add_walls(materials, nave, openings, (_RECESS,), bands[:1])
+    openings.add_walls(materials, (_RECESS,), bands[:1])
     low = high + 0.2 * (nave.top - high)
     rose = wings.attic_window(1.3, low, low + 1.6, _RECESS)
     wings.add_roof(materials, nave, rose)
@@ -226,7 +227,7 @@ def _add_buttresses(materials, p: Chapel, nave: Wing, boxes) -> None:
     high = 0.75 * nave.wall_top
     for edge in (1, 3):
         wall = nave.wall(edge)
-        for a, b in wings.free_stretches(nave, edge, boxes, 0.5):
+        for a, b in free_stretches(nave, edge, boxes, 0.5):
             for x, _ in bays.stretches(b - a, p.bay, 1.0)[1:]:
                 u = a + x
                 plan = massing.rectangle(u - 0.22, -0.05, u + 0.22, 0.42)
@@ -259,7 +260,7 @@ def _add_tower(materials, p: Chapel, tower: Wing, boxes) -> None:
         )
     bands = (Band(0.0, 0.45, -0.1), Band(top - 3.1, top - 2.9, -0.08),
              Band(top - 0.3, top, -0.18))  # fmt: skip
-    wings.add_walls(materials, tower, openings, (_RECESS,), bands)
+    openings.add_walls(materials, (_RECESS,), bands)
     materials.add("roof", *_spire(p, tower))
     x, y = (tower.x0 + tower.x1) / 2, (tower.y0 + tower.y1) / 2
     materials.add("trim", _cross(x, y, p.height - 1.3, p.height))
@@ -350,7 +351,7 @@ def _add_small(materials, wing: Wing, boxes, *, is_porch: bool) -> None:
     else:
         head = round(min(2.0, wing.wall_top - 0.3), 2)
         openings.row(range(4), 1.2, 2.2, [bays.window(0.8, 1.0, head, _RECESS)])
-    wings.add_walls(materials, wing, openings, (_RECESS,))
+    openings.add_walls(materials, (_RECESS,))
     wings.add_roof(materials, wing)
 
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cns_drake.city.buildings import (
-    bays,
     dormers,
     family_house,
     house_walls,
@@ -63,7 +62,7 @@ def draw(site: Site, height: float, rng: np.random.Generator):
         height=height,
         plan=pick(rng, ("box", "ell", "tee", "cross", "ell")),
         mirrored=bool(rng.random() < 0.5),
-        roof=pick(rng, ("gable", "gable", "hip")),
+        roof=pick(rng, ("gable", "gable", "hip", "gambrel")),
         pitch_deg=float(rng.uniform(28.0, 45.0)),
         wing_width=float(rng.uniform(0.36, 0.46)),
         low_wing=bool(rng.random() < 0.35),
@@ -142,7 +141,8 @@ def _planned(p: DetachedHouse, site: Site) -> _Plan:
     garage_width = min(p.garage_width, 0.36 * (right - left))
     has_garage = p.garage != "none" and garage_width > 2.9
     split = right - garage_width * has_garage
-    n = family_house.storeys_for(p.height, p.deck, deep, p.pitch_deg)
+    pitch_deg = 48.0 if p.roof == "gambrel" else p.pitch_deg
+    n = family_house.storeys_for(p.height, p.deck, deep, pitch_deg)
     wall_top = family_house.wall_top_for(p.height, p.deck, deep, n)
     slope = 2 * (p.height - wall_top - ROOF_M) / deep
     roof = Roof(p.roof, eaves=0.4, verge=0.3, thickness=ROOF_M)
@@ -150,7 +150,8 @@ def _planned(p: DetachedHouse, site: Site) -> _Plan:
     wide = max(3.2, p.wing_width * (split - left))
     drop = STOREY_M * (n > 1 and p.low_wing)
     top = min(wall_top + ROOF_M + slope * wide / 2, p.height - 0.25) - drop
-    shape = Roof(p.roof, True, 0.35, 0.3, ROOF_M)
+    kind = "hip" if p.roof == "hip" else "gable"
+    shape = Roof(kind, True, 0.35, 0.3, ROOF_M)
     middle = (front + main_back) / 2
     parts = []
     for end in _WING_ENDS[p.plan]:
@@ -195,21 +196,13 @@ def _add_main(assembly, materials, p: DetachedHouse, plan: _Plan) -> None:
     openings = family_house.window_rows(
         main, plan.boxes, p.deck, plan.storeys, p.window_pitch, p.window_width
     )
-    wall = main.wall(0)
     a, b = (x - main.x0 for x in plan.free)
     door = a + 0.5 * (b - a)
     house_walls.add_door(materials, main, openings, 0, door, p.deck, lights=0.3)
     _add_porch(assembly, materials, p, plan, (a, b))
     family_house.close_box(materials, main, openings, p.deck, p.casing)
-    base, high = main.wall_top + ROOF_M, main.top - main.wall_top - ROOF_M
-    if p.roof == "gable" and high > 2.0:
-        slope = 2 * high / (main.y1 - main.y0)
-        for u, v in bays.stretches(b - a, 3.0, 0.4)[: p.dormers]:
-            dormers.add_dormer(
-                materials, wall, a + (u + v) / 2, 1.5, base=base, slope=slope,
-                ridge=main.top, setback=0.2 * high / slope, height=1.3,
-                roof=p.dormer,
-            )  # fmt: skip
+    if p.roof in ("gable", "gambrel"):
+        dormers.add_dormers(materials, main, a, b, p.dormers, p.dormer, 3.0)
 
 
 def _add_porch(assembly, materials, p: DetachedHouse, plan, free) -> None:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.city.buildings import details, pitched_roofs
+from cns_drake.city.buildings import bays, details, pitched_roofs
 from cns_drake.city.buildings.materials import Materials
 from cns_drake.city.buildings.pitched_roofs import Hole
+from cns_drake.city.buildings.wings import Wing
 from cns_drake.city.mesh import Mesh, merge_meshes
 
 _THICKNESS = 0.14
@@ -81,6 +82,46 @@ def add_dormer(
     materials.add(material, wall.place(front.moved(shift)), wall.place(cheeks))
     materials.add("glass", wall.place(pane.moved(shift)))
     materials.add("roof", wall.place(lid))
+
+
+def add_dormers(
+    materials: Materials,
+    wing: Wing,
+    start: float,
+    end: float,
+    count: int,
+    roof: str,
+    pitch: float = 9.0,
+) -> None:
+    """Adds dormers side by side on the front slope of a wing.
+
+    On a gambrel roof they stand on the steep part, without a pitched roof.
+
+    Args:
+        materials: where to.
+        wing: with a `gable` or `gambrel` roof along the front.
+        start, end: the stretch of the front wall below them [m].
+        count: of dormers, at most.
+        roof: their shape.
+        pitch: greatest distance between two [m].
+    """
+    (u0, z0), (u1, z1) = wing.line[:2]
+    slope, room = (z1 - z0) / (u1 - u0), z1 - z0
+    if count == 0 or slope < 0.35:
+        return
+    if wing.roof.kind == "gambrel":
+        roof, setback, height = "flat", 0.12 / slope, min(room - 0.35, 1.8)
+    else:
+        setback, height = 0.2 * room / slope, min(1.4, 0.55 * room)
+    step = min((end - start) / count, pitch)
+    for a, b in bays.stretches(end - start, step, 0.4)[:count]:
+        width = min(1.5, b - a - 0.5)
+        if width > 0.9:
+            add_dormer(
+                materials, wing.wall(0), start + (a + b) / 2, width, base=z0,
+                slope=slope, ridge=wing.top, setback=setback, height=height,
+                roof=roof,
+            )  # fmt: skip
 
 
 def _cheeks(a, b, back, front, low, high, rise) -> Mesh:

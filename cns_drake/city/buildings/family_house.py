@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 from cns_drake.city.buildings import house_walls, wings
 from cns_drake.city.buildings.materials import Materials
+from cns_drake.city.buildings.openings import Openings
 from cns_drake.city.buildings.site import Assembly, Rgb
-from cns_drake.city.buildings.wings import Openings, Roof, Wing
+from cns_drake.city.buildings.wings import Roof, Wing
 from cns_drake.city.facades import Band
 
 WALLS = (
@@ -113,7 +114,7 @@ def close_box(
     """
     house_walls.add_casings(materials, wing, openings, edges, casing)
     bands = (Band(0.0, plinth, -0.04),) if plinth > 0 else ()
-    wings.add_walls(materials, wing, openings, (house_walls.GLASS_M,), bands)
+    openings.add_walls(materials, (house_walls.GLASS_M,), bands)
     low = wing.wall_top + 0.4
     attic = wings.attic_window(0.9, low, low + 1.0, house_walls.GLASS_M)
     wings.add_roof(materials, wing, attic)
@@ -144,5 +145,5 @@ def add_garage(
         materials, garage, openings, 0, length / 2, min(length - 0.7, 4.9)
     )
     openings.row((1, 3), 1.0, 3.4, [house_walls.sash(0.9, 0.0, 1.1, 2.0)])
-    wings.add_walls(materials, garage, openings, (house_walls.GLASS_M,))
+    openings.add_walls(materials, (house_walls.GLASS_M,))
     wings.add_roof(materials, garage)

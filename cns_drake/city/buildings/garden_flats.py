@@ -15,6 +15,7 @@ from cns_drake.city.buildings import (
     wings,
 )
 from cns_drake.city.buildings.family_house import ROOF_M
+from cns_drake.city.buildings.openings import Openings
 from cns_drake.city.buildings.roof_equipment import add_chimney
 from cns_drake.city.buildings.site import (
     FOUNDATION_M,
@@ -23,7 +24,7 @@ from cns_drake.city.buildings.site import (
     Site,
     pick,
 )
-from cns_drake.city.buildings.wings import Openings, Roof, Wing
+from cns_drake.city.buildings.wings import Roof, Wing
 from cns_drake.city.facades import Band
 from cns_drake.city.mesh import merge_meshes
 from cns_drake.city.structures import MeshShape, Model
@@ -146,7 +147,7 @@ def _add_house(assembly, materials, p, wing, boxes, storeys, number) -> None:
     house_walls.add_casings(materials, wing, openings, (0,), p.casing)
     z = round(_FLOOR + storey, 2)
     bands = (Band(0.0, _FLOOR, -0.05), Band(z - 0.2, z, -0.05))
-    wings.add_walls(materials, wing, openings, (house_walls.GLASS_M,), bands)
+    openings.add_walls(materials, (house_walls.GLASS_M,), bands)
     low = wing.wall_top + 0.4
     attic = wings.attic_window(0.9, low, low + 1.0, house_walls.GLASS_M, 2)
     wings.add_roof(materials, wing, attic)

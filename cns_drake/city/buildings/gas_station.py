@@ -9,6 +9,7 @@ import numpy as np
 from cns_drake.city import massing
 from cns_drake.city.buildings import bays, wings
 from cns_drake.city.buildings.materials import Materials
+from cns_drake.city.buildings.openings import Openings
 from cns_drake.city.buildings.roof_equipment import equip_roof
 from cns_drake.city.buildings.site import (
     FOUNDATION_M,
@@ -17,7 +18,7 @@ from cns_drake.city.buildings.site import (
     Site,
     pick,
 )
-from cns_drake.city.buildings.wings import Openings, Roof, Wing
+from cns_drake.city.buildings.wings import Roof, Wing
 from cns_drake.city.facades import Band
 from cns_drake.city.mesh import Mesh, merge_meshes
 from cns_drake.city.structures import Model
@@ -214,9 +215,7 @@ def _add_shop(assembly, materials, p: GasStation, xs, ys, rng) -> None:
         0, 0.55 * wide, 2.6, bays.window(2.0, 0.0, 2.5, _RECESS, mullions=1)
     )
     openings.row((1, 2, 3), 1.0, 4.5, [bays.window(1.0, 1.6, 2.3, _RECESS)])
-    wings.add_walls(
-        materials, shop, openings, (_RECESS,), (Band(0.0, 0.25, -0.05),)
-    )
+    openings.add_walls(materials, (_RECESS,), (Band(0.0, 0.25, -0.05),))
     wings.add_roof(materials, shop)
     wall = shop.wall(0)
     sign = massing.box(0.3, wide - 0.3, -0.02, 0.3, 2.85, p.shop_height + 0.02)
@@ -238,7 +237,7 @@ def _add_wash(materials, p: GasStation, xs, ys) -> None:
     for edge in (0, 2):
         openings.put(edge, (xs[1] - xs[0]) / 2, 4.4, bays.gate(3.4, 2.9, 0.5))
     openings.row((1, 3), 1.0, 3.0, [bays.window(2.2, 1.0, 2.4, _RECESS)])
-    wings.add_walls(materials, box, openings, (_RECESS,))
+    openings.add_walls(materials, (_RECESS,))
     wings.add_roof(materials, box)
 
 

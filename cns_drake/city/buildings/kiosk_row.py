@@ -15,6 +15,7 @@ from cns_drake.city.buildings import (
     wings,
 )
 from cns_drake.city.buildings.materials import Materials
+from cns_drake.city.buildings.openings import Openings
 from cns_drake.city.buildings.site import (
     FOUNDATION_M,
     Archetype,
@@ -22,7 +23,7 @@ from cns_drake.city.buildings.site import (
     Site,
     pick,
 )
-from cns_drake.city.buildings.wings import Openings, Roof, Wing
+from cns_drake.city.buildings.wings import Roof, Wing
 from cns_drake.city.facades import Band, Patch
 from cns_drake.city.structures import Model
 
@@ -167,7 +168,7 @@ def _add_stall(materials, p: KioskRow, wing: Wing, boxes, k: int, rng) -> None:
     sign = porches.board(a, b, head + 0.02, wing.wall_top - 0.02, 0.1)
     materials.add("awning", wall.place(sign))
     bands = (Band(0.0, 0.25, -0.05),)
-    wings.add_walls(materials, wing, openings, (0.12,), bands, material)
+    openings.add_walls(materials, (0.12,), bands, material)
     wings.add_roof(materials, wing, material=material)
 
 

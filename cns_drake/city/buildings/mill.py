@@ -10,6 +10,7 @@ import numpy as np
 from cns_drake.city import massing
 from cns_drake.city.buildings import bays, details, tiers, wings
 from cns_drake.city.buildings.materials import Materials
+from cns_drake.city.buildings.openings import Openings
 from cns_drake.city.buildings.site import (
     FOUNDATION_M,
     Archetype,
@@ -17,7 +18,7 @@ from cns_drake.city.buildings.site import (
     Site,
     pick,
 )
-from cns_drake.city.buildings.wings import Openings, Roof, Wing
+from cns_drake.city.buildings.wings import Roof, Wing
 from cns_drake.city.facades import Band, Facade
 from cns_drake.city.mesh import Mesh
 from cns_drake.city.structures import Model
@@ -240,7 +241,7 @@ def _add_boiler(materials, p: Mill, main: Wing, xs) -> None:
     openings = Openings(house, (main,))
     window = bays.arched(1.5, 1.0, top - 3.0, _RECESS, rise=0.4)
     openings.row(range(4), 1.0, 2.8, [window], 0.6)
-    wings.add_walls(materials, house, openings, (_RECESS,), material="annex")
+    openings.add_walls(materials, (_RECESS,), material="annex")
     wings.add_roof(materials, house, material="annex")
 
 

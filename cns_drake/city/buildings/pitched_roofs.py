@@ -186,8 +186,7 @@ def hip(outline, z: float, top: float, eaves: float, fascia: float) -> Mesh:
         fascia: height of the upright edge [m].
     """
     outer = massing.inset(outline, -np.asarray(eaves))
-    # Half the shortest side leaves a ridge, of no length on a square.
-    ridge = massing.inset(outer, massing.shortest_side(outer) / 2)
+    ridge = _ridge(outer)
     return merge_meshes(
         [
             massing.flat(outer, z, up=False),
@@ -211,7 +210,7 @@ def mansard(
     """
     outer, fascia = massing.inset(outline, -eaves), 0.3
     bend = massing.inset(outline, run)
-    ridge = massing.inset(bend, massing.shortest_side(bend) / 2)
+    ridge = _ridge(bend)
     return merge_meshes(
         [
             massing.flat(outer, z, up=False),
@@ -220,3 +219,14 @@ def mansard(
             massing.skirt(bend, ridge, knee, top),
         ]
     )
+
+
+def _ridge(rectangle) -> np.ndarray:
+    """Returns the ridge of a hip as corners that meet in pairs.
+
+    Moving all sides in by half the shorter one leaves a line, on a square
+    a point.
+    """
+    ends = np.roll(rectangle, -1, axis=0)
+    sides = np.linalg.norm(ends - rectangle, axis=1)
+    return massing.inset(rectangle, float(sides.min()) / 2)

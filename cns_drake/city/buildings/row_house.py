@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from cns_drake.city.buildings import family_house, house_walls, row_unit, wings
+from cns_drake.city.buildings.openings import Openings
 from cns_drake.city.buildings.row_unit import RowUnit
 from cns_drake.city.buildings.site import Archetype, Assembly, Site, pick
-from cns_drake.city.buildings.wings import Openings, Roof, Wing
+from cns_drake.city.buildings.wings import Roof, Wing
 from cns_drake.city.structures import Model
 
 _WALLS = (
@@ -98,7 +99,7 @@ def _add_annex(materials, p: RowHouse, main: Wing, back: float) -> None:
     )
     openings = Openings(annex, (main,))
     openings.row((1, 2, 3), 0.9, 2.6, [house_walls.sash(1.1, 0.1, 0.9, 2.1)])
-    wings.add_walls(materials, annex, openings, (house_walls.GLASS_M,))
+    openings.add_walls(materials, (house_walls.GLASS_M,))
     wings.add_roof(materials, annex)
 
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from cns_drake.city import massing
 from cns_drake.city.buildings import (
-    bays,
     dormers,
     house_walls,
     pitched_roofs,
@@ -17,9 +16,10 @@ from cns_drake.city.buildings import (
     wings,
 )
 from cns_drake.city.buildings.materials import Materials
+from cns_drake.city.buildings.openings import Openings
 from cns_drake.city.buildings.roof_equipment import add_chimney
 from cns_drake.city.buildings.site import Assembly, Rgb
-from cns_drake.city.buildings.wings import Openings, Roof, Wing
+from cns_drake.city.buildings.wings import Roof, Wing
 from cns_drake.city.facades import Band, Patch
 from cns_drake.city.mesh import Mesh
 
@@ -111,7 +111,7 @@ def add_unit(
     if p.roof == "flat":
         z = round(wing.wall_top - 0.45, 2)
         bands.append(Band(z, wing.wall_top, -0.22))
-    wings.add_walls(materials, wing, openings, (house_walls.GLASS_M,), bands)
+    openings.add_walls(materials, (house_walls.GLASS_M,), bands)
     add_roof(materials, p, wing)
     if p.chimney:
         add_stack(assembly, p, wing, f"{part}chimney")
@@ -217,7 +217,8 @@ def add_roof(materials: Materials, p: RowUnit, wing: Wing) -> None:
         _add_gable_windows(materials, wing)
     elif p.roof in ("gable", "gambrel"):
         _add_firewalls(materials, wing)
-        _add_dormers(materials, p, wing)
+        length = wing.x1 - wing.x0
+        dormers.add_dormers(materials, wing, 0.0, length, p.dormers, p.dormer)
 
 
 def _stepped_gable(wing: Wing) -> list[Mesh]:
@@ -257,33 +258,6 @@ def _add_firewalls(materials: Materials, wing: Wing) -> None:
     for x in (wing.x0, wing.x1 - 0.3):
         wall = pitched_roofs.shell(line, x, x + 0.3, _FIREWALL_M + 0.1)
         materials.add("walls", wall)
-
-
-def _add_dormers(materials: Materials, p: RowUnit, wing: Wing) -> None:
-    (u0, z0), (u1, z1) = wing.line[:2]
-    slope = (z1 - z0) / (u1 - u0)
-    ridge = z1 if p.roof == "gambrel" else wing.top
-    wall = wing.wall(0)
-    if p.dormers == 0 or slope < 0.35:
-        return
-    cells = bays.stretches(wall.length, wall.length / p.dormers, 0.5)
-    for a, b in cells:
-        width = min(1.5, b - a - 0.5)
-        if width < 0.9:
-            continue
-        if p.roof == "gambrel":
-            room, setback = ridge - z0, 0.12 / slope
-            height = min(room - 0.35, 1.8)
-            ridge_top = wing.top
-        else:
-            room = ridge - z0
-            setback, height = 0.2 * room / slope, min(1.4, 0.55 * room)
-            ridge_top = ridge
-        dormers.add_dormer(
-            materials, wall, (a + b) / 2, width, base=z0, slope=slope,
-            ridge=ridge_top, setback=setback, height=height,
-            roof="flat" if p.roof == "gambrel" else p.dormer,
-        )  # fmt: skip
 
 
 def add_stack(assembly: Assembly, p: RowUnit, wing: Wing, name: str) -> None:

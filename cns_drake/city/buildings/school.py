@@ -9,6 +9,7 @@ import numpy as np
 from cns_drake.city import massing
 from cns_drake.city.buildings import bays, details, pitched_roofs, tiers, wings
 from cns_drake.city.buildings.materials import Materials
+from cns_drake.city.buildings.openings import Openings
 from cns_drake.city.buildings.roof_equipment import equip_roof
 from cns_drake.city.buildings.site import (
     FOUNDATION_M,
@@ -17,7 +18,7 @@ from cns_drake.city.buildings.site import (
     Site,
     pick,
 )
-from cns_drake.city.buildings.wings import Openings, Roof, Wing
+from cns_drake.city.buildings.wings import Roof, Wing
 from cns_drake.city.facades import Band, Facade
 from cns_drake.city.structures import Model
 
@@ -180,7 +181,7 @@ def _add_entrance(materials, p: School, bar, top: float) -> None:
     openings.put(0, half, 2 * half - 0.4, glazing)
     doors = bays.window(2 * half - 1.4, 0.05, 2.5, _RECESS, mullions=3)
     openings.add(0, doors(0.2, 2 * half - 0.2))
-    wings.add_walls(materials, hall, openings, (_RECESS,), material="accent")
+    openings.add_walls(materials, (_RECESS,), material="accent")
     wings.add_roof(materials, hall, material="accent")
     front = hall.wall(0)
     a, b = -0.8, 2 * half + 0.8
@@ -207,7 +208,7 @@ def _add_back_wing(materials, p: School, bar, back: float, top: float) -> None:
         z = 3.4 * k
         pane = bays.window(2.4, z + 0.9, z + 2.6, _RECESS, mullions=1)
         openings.row((1, 2, 3), z + 0.5, 3.6, [pane], 0.8)
-    wings.add_walls(materials, wing, openings, (_RECESS,), material="gym")
+    openings.add_walls(materials, (_RECESS,), material="gym")
     wings.add_roof(materials, wing, material="gym")
 
 
@@ -246,11 +247,11 @@ def _add_gym(materials, p: School, xs, ys, bar) -> None:
         for u in np.linspace(0.6, y1 - y0 - 0.6, 5).tolist()
     ]
     materials.add("accent", *piers)
-    wings.add_walls(materials, gym, openings, (_RECESS,), material="gym")
+    openings.add_walls(materials, (_RECESS,), material="gym")
     wings.add_roof(materials, gym, material="gym")
     passage = Openings(link, boxes)
     passage.row((0, 2), 0.3, 2.0, [bays.window(1.4, 0.4, 2.6, _RECESS)], 0.3)
-    wings.add_walls(materials, link, passage, (_RECESS,), material="trim")
+    passage.add_walls(materials, (_RECESS,), material="trim")
     wings.add_roof(materials, link, material="trim")
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from cns_drake.city import massing
 from cns_drake.city.buildings import bays, details
 from cns_drake.city.buildings.materials import Materials
-from cns_drake.city.buildings.wings import Openings
+from cns_drake.city.buildings.openings import Openings
 
 # Depths of shop windows and of the doors between them [m].
 SHOP_GLASS_M = (0.35, 0.95)

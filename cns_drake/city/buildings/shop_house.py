@@ -13,13 +13,12 @@ from cns_drake.city.buildings import (
     porches,
     row_unit,
     shop_fronts,
-    wings,
 )
 from cns_drake.city.buildings.materials import Materials
+from cns_drake.city.buildings.openings import Openings
 from cns_drake.city.buildings.roof_equipment import equip_roof
 from cns_drake.city.buildings.row_unit import RowUnit
 from cns_drake.city.buildings.site import Archetype, Assembly, Site, pick
-from cns_drake.city.buildings.wings import Openings
 from cns_drake.city.facades import Band
 from cns_drake.city.structures import Model
 
@@ -145,7 +144,7 @@ def build(p: ShopHouse, site: Site, rng: np.random.Generator) -> Model:
         z = round(wing.wall_top - 0.45, 2)
         bands.append(Band(z, wing.wall_top, -0.25))
     glass = (house_walls.GLASS_M, *shop_fronts.SHOP_GLASS_M)
-    wings.add_walls(materials, wing, openings, glass, bands)
+    openings.add_walls(materials, glass, bands)
     row_unit.add_roof(materials, p.unit, wing)
     if p.unit.roof == "flat":
         z = wing.top - wing.roof.parapet

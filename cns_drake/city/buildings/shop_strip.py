@@ -15,9 +15,10 @@ from cns_drake.city.buildings import (
     wings,
 )
 from cns_drake.city.buildings.materials import Materials
+from cns_drake.city.buildings.openings import Openings
 from cns_drake.city.buildings.roof_equipment import equip_roof
 from cns_drake.city.buildings.site import Archetype, Assembly, Site, pick
-from cns_drake.city.buildings.wings import Openings, Roof, Wing
+from cns_drake.city.buildings.wings import Roof, Wing
 from cns_drake.city.facades import Band
 from cns_drake.city.structures import Model
 
@@ -161,7 +162,7 @@ def _add_unit(materials, p: ShopStrip, wing: Wing, tall: bool, rng) -> None:
     openings.row((2,), 0.5, 3.6, back, 0.7)
     bands = (Band(0.0, 0.3, -0.05),)
     glass = (house_walls.GLASS_M, *shop_fronts.SHOP_GLASS_M)
-    wings.add_walls(materials, wing, openings, glass, bands, cladding)
+    openings.add_walls(materials, glass, bands, cladding)
     wings.add_roof(materials, wing, material=cladding)
     if p.canopy:
         z = p.ground - 0.95

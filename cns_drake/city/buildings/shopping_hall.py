@@ -9,6 +9,7 @@ import numpy as np
 from cns_drake.city import massing
 from cns_drake.city.buildings import bays, details, pitched_roofs, wings
 from cns_drake.city.buildings.materials import Materials
+from cns_drake.city.buildings.openings import Openings
 from cns_drake.city.buildings.roof_equipment import equip_roof
 from cns_drake.city.buildings.site import (
     FOUNDATION_M,
@@ -17,7 +18,7 @@ from cns_drake.city.buildings.site import (
     Site,
     pick,
 )
-from cns_drake.city.buildings.wings import Openings, Roof, Wing
+from cns_drake.city.buildings.wings import Roof, Wing
 from cns_drake.city.facades import Band
 from cns_drake.city.mesh import Mesh
 from cns_drake.city.structures import Model
@@ -179,7 +180,7 @@ def _add_hall(materials, p: ShoppingHall, hall: Wing, boxes) -> None:
         Band(p.hall - 1.5, p.hall - 1.35, 0.08),
         Band(p.hall - 0.5, p.hall - 0.2, -0.15),
     )
-    wings.add_walls(materials, hall, openings, (_RECESS,), bands)
+    openings.add_walls(materials, (_RECESS,), bands)
     wings.add_roof(materials, hall)
 
 
@@ -189,7 +190,7 @@ def _add_anchor(materials, p: ShoppingHall, anchor: Wing, boxes) -> None:
     openings.row(range(4), p.hall + 0.2, 5.0, [high], 1.0)
     bands = (Band(0.0, 0.4, -0.06), Band(anchor.top - 0.6, anchor.top - 0.2,
                                          -0.12))  # fmt: skip
-    wings.add_walls(materials, anchor, openings, (_RECESS,), bands, "anchor")
+    openings.add_walls(materials, (_RECESS,), bands, "anchor")
     wings.add_roof(materials, anchor, material="anchor")
     wall = anchor.wall(3 if p.anchor_left else 1)
     z = anchor.top - 3.4
@@ -253,7 +254,7 @@ def _add_portal(materials, p: ShoppingHall, hall: Wing) -> None:
                         transom=round((3.1 + top - 2.0) / 2, 2))  # fmt: skip
     openings.put(0, half, width + 0.8, doors)
     openings.add(0, upper(half - width / 2 - 0.4, half + width / 2 + 0.4))
-    wings.add_walls(materials, portal, openings, (_RECESS,), material="accent")
+    openings.add_walls(materials, (_RECESS,), material="accent")
     wings.add_roof(materials, portal, material="accent")
     wall = portal.wall(0)
     pieces: list[Mesh] = [

@@ -10,6 +10,7 @@ import numpy as np
 from cns_drake.city import massing
 from cns_drake.city.buildings import bays, pitched_roofs, wings
 from cns_drake.city.buildings.materials import Materials
+from cns_drake.city.buildings.openings import Openings, free_stretches
 from cns_drake.city.buildings.roof_equipment import equip_roof
 from cns_drake.city.buildings.site import (
     FOUNDATION_M,
@@ -18,7 +19,7 @@ from cns_drake.city.buildings.site import (
     Site,
     pick,
 )
-from cns_drake.city.buildings.wings import Openings, Roof, Wing
+from cns_drake.city.buildings.wings import Roof, Wing
 from cns_drake.city.facades import Band
 from cns_drake.city.structures import Model
 
@@ -150,9 +151,7 @@ def _add_hall(materials, p: SportsHall, hall: Wing, halls) -> None:
     openings.row(sides, high - 1.0, p.bay, [band], 0.5)
     openings.row(ends, high - 1.0, p.bay, [tall if p.glazed else band], 0.9)
     openings.put(2, 2.6, 2.6, bays.gate(1.9, 2.3, 0.2))
-    wings.add_walls(
-        materials, hall, openings, (_RECESS,), (Band(0.0, 0.5, -0.08),)
-    )
+    openings.add_walls(materials, (_RECESS,), (Band(0.0, 0.5, -0.08),))
     wings.add_roof(materials, hall)
     _add_frames(materials, p, hall, halls)
 
@@ -163,7 +162,7 @@ def _add_frames(materials, p: SportsHall, hall: Wing, halls) -> None:
     along_y = hall.roof.along_y
     for edge in (k for k in range(4) if k not in hall.gables):
         wall = hall.wall(edge)
-        for a, b in wings.free_stretches(hall, edge, halls, 0.5):
+        for a, b in free_stretches(hall, edge, halls, 0.5):
             cells = bays.stretches(b - a, p.bay, 0.5)
             for u, _ in cells[1:]:
                 x = a + u
@@ -211,9 +210,7 @@ def _add_annex(assembly, materials, p: SportsHall, halls, y0, rng) -> None:
         hall_width - 0.6, 0.05, p.annex_height - 0.8, _RECESS, mullions=3
     )
     openings.put(0, wide / 2, hall_width, glazing)
-    wings.add_walls(
-        materials, annex, openings, (_RECESS,), (Band(0.0, 0.3, -0.05),)
-    )
+    openings.add_walls(materials, (_RECESS,), (Band(0.0, 0.3, -0.05),))
     wings.add_roof(materials, annex)
     z = p.annex_height - 0.65
     lid = massing.box(

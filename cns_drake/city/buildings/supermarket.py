@@ -9,6 +9,7 @@ import numpy as np
 from cns_drake.city import massing
 from cns_drake.city.buildings import bays, details, wings
 from cns_drake.city.buildings.materials import Materials
+from cns_drake.city.buildings.openings import Openings
 from cns_drake.city.buildings.roof_equipment import equip_roof
 from cns_drake.city.buildings.site import (
     FOUNDATION_M,
@@ -17,7 +18,7 @@ from cns_drake.city.buildings.site import (
     Site,
     pick,
 )
-from cns_drake.city.buildings.wings import Openings, Roof, Wing
+from cns_drake.city.buildings.wings import Roof, Wing
 from cns_drake.city.facades import Band
 from cns_drake.city.structures import Model
 
@@ -119,7 +120,7 @@ def build(p: Supermarket, site: Site, rng: np.random.Generator) -> Model:
     service = [bays.gate(2.6, 2.8, 0.25), bays.window(1.1, 0.0, 2.2, _RECESS)]
     openings.row((2,), 0.5, 8.0, service, 1.5)
     bands = (Band(0.0, 0.4, -0.06), Band(p.eaves - 0.7, p.eaves - 0.2, -0.08))
-    wings.add_walls(materials, hall, openings, (_RECESS,), bands)
+    openings.add_walls(materials, (_RECESS,), bands)
     wings.add_roof(materials, hall)
     piers = details.pilasters(
         hall.outline, p.pitch, 0.6, 1, 0.5, 0.2, 0.0, p.eaves - 0.5
@@ -172,7 +173,7 @@ def _add_entrance(materials, p: Supermarket, hall: Wing) -> None:
     if wall_top > 5.0:
         light = bays.window(w - 2.4, 2.95, wall_top - 1.5, _RECESS, mullions=3)
         openings.add(0, light(0.8, w - 0.8))
-    wings.add_walls(materials, porch, openings, (_RECESS,), material="brand")
+    openings.add_walls(materials, (_RECESS,), material="brand")
     wings.add_roof(materials, porch, material="brand")
     sign = massing.box(
         0.2 * w, 0.8 * w, -0.02, 0.22, wall_top - 1.2, wall_top - 0.15

@@ -50,6 +50,8 @@ def draw(site: Site, height: float, rng: np.random.Generator) -> Terrace:
     )
     if unit.bay == "none":
         unit = replace(unit, bay="canted", bay_storeys=1)
+    if unit.casing == "frame":
+        unit = replace(unit, casing="sill")
     return Terrace(
         height=height,
         unit=replace(
@@ -121,7 +123,7 @@ TERRACE = Archetype(
     draw=draw,
     build=build,
     heights=(6.0, 13.0),
-    widths=(8.0, 60.0),
+    widths=(8.0, 50.0),
     overhang=0.35,
     party_walls=True,
 )

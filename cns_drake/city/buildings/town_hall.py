@@ -37,6 +37,7 @@ class TownHall:
         floor: height of the main floor above the ground.
         porch_columns: along the front of the porch.
         pavilion: width of the pavilions at both ends; 0 for none.
+        mansard: whether their roofs are steep, with a knee.
         tower: side of the tower.
         crown: `dome`, `spire` or `cupola` (a lantern on a dome).
         rise: of the roofs.
@@ -49,6 +50,7 @@ class TownHall:
     floor: float
     porch_columns: int
     pavilion: float
+    mansard: bool
     tower: float
     crown: str
     rise: float
@@ -74,6 +76,7 @@ def draw(site: Site, height: float, rng: np.random.Generator) -> TownHall:
         pavilion=round(float(rng.uniform(0.18, 0.22)) * width, 2)
         if width > 26.0 and rng.random() < 0.75
         else 0.0,
+        mansard=bool(rng.random() < 0.5),
         tower=round(min(0.14 * width + 2.4, 0.35 * depth, 8.0), 2),
         crown=pick(rng, ("dome", "spire", "cupola")),
         rise=round(float(rng.uniform(0.28, 0.4)) * min(depth, 16.0), 2),
@@ -99,7 +102,7 @@ def build(p: TownHall, site: Site, rng: np.random.Generator) -> Model:
     ridge = min(top + 0.15 + p.rise, 0.62 * p.height)
     roofs = [pitched_roofs.hip(body, top - 0.02, ridge, 0.5, 0.35)]
     for end in _pavilions(p, body):
-        roofs.append(pitched_roofs.hip(end, top - 0.02, ridge + 0.3, 0.5, 0.35))
+        roofs.append(_pavilion_roof(p, end, top - 0.02, ridge))
     assembly.add("roof", merge_meshes(roofs), rgb=p.roof_rgb)
     _add_porch(assembly, p, body, ahead, top)
     _add_tower(assembly, p, body, top)
@@ -118,6 +121,15 @@ def _pavilions(p: TownHall, body) -> list[np.ndarray]:
             (round(x1 - p.pavilion, 2), x1),
         )
     ]
+
+
+def _pavilion_roof(p: TownHall, plan, z: float, ridge: float) -> Mesh:
+    """Returns a hip, or a mansard that is as high as the main ridge."""
+    if p.mansard:
+        knee = z + 0.75 * (ridge - z)
+        lean = 0.3 * (knee - z)
+        return pitched_roofs.mansard(plan, z, knee, ridge + 0.4, lean, 0.5)
+    return pitched_roofs.hip(plan, z, ridge + 0.3, 0.5, 0.35)
 
 
 def _with_pavilions(p: TownHall, body) -> np.ndarray:

@@ -1,15 +1,13 @@
-"""Houses of several wings: boxes with windows, each under its own roof.
+"""Houses of several wings: boxes that may overlap, each under its own roof.
 
-Wings may overlap: where one stands against another, the walls get no
-windows. A wing's edges count like those of a rectangle: 0 front, 1 right,
-2 back, 3 left.
+A wing's edges count like those of a rectangle: 0 front, 1 right, 2 back,
+3 left.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
-import itertools
 import math
 
 import numpy as np
@@ -18,16 +16,6 @@ from cns_drake.city import massing
 from cns_drake.city.buildings import bays, details, pitched_roofs
 from cns_drake.city.buildings.materials import Materials
 from cns_drake.city.buildings.pitched_roofs import Hole
-from cns_drake.city.buildings.site import FOUNDATION_M
-from cns_drake.city.facades import (
-    Arch,
-    Band,
-    Facade,
-    Patch,
-    Relief,
-    facade_mesh,
-    glass_mesh,
-)
 
 # Overlap of a roof's underside with the top of the walls [m].
 _SEAT = 0.02
@@ -38,7 +26,7 @@ class Roof:
     """The shape of a roof.
 
     Attributes:
-        kind: `gable`, `gambrel`, `barrel`, `shed`, `hip`, `mansard`, `flat`.
+        kind: `gable`, `gambrel`, `barrel`, `shed`, `hip` or `flat`.
         along_y: whether the ridge runs from the front to the back; a shed
             roof rises across the ridge's direction.
         eaves: overhang below the slopes [m].
@@ -140,129 +128,6 @@ class Wing:
         return self.x0 < x < self.x1 and self.y0 < y < self.y1
 
 
-def free_stretches(
-    wing: Wing, edge: int, others: Iterable[Wing], z: float
-) -> list[tuple[float, float]]:
-    """Returns the parts of a wall that no other wing hides at a height."""
-    wall = wing.wall(edge)
-    cuts = {0.0, wall.length}
-    hiding = [w for w in others if w is not wing and w.top > z]
-    for other in hiding:
-        for corner in other.outline:
-            along = wall.point(0.0, 0.0), wall.point(1.0, 0.0)
-            x = float((corner - along[0]) @ (along[1] - along[0]))
-            if 0.0 < x < wall.length:
-                cuts.add(x)
-    free: list[tuple[float, float]] = []
-    bounds = sorted(cuts)
-    for a, b in itertools.pairwise(bounds):
-        x, y = wall.point((a + b) / 2, 0.05)
-        if edge in wing.blind or any(w.covers(x, y) for w in hiding):
-            continue
-        if free and abs(free[-1][1] - a) < 1e-9:
-            free[-1] = (free[-1][0], b)
-        else:
-            free.append((a, b))
-    return free
-
-
-class Openings:
-    """The windows and doors of a wing, by edge."""
-
-    def __init__(self, wing: Wing, others: Sequence[Wing] = ()):
-        self._wing = wing
-        self._others = others
-        self._reliefs: dict[int, list[Relief]] = {k: [] for k in range(4)}
-
-    def row(
-        self,
-        edges: Iterable[int],
-        z: float,
-        pitch: float,
-        choices: Sequence[bays.Bay],
-        margin: float = 0.5,
-    ) -> None:
-        """Repeats bays along the free parts of walls.
-
-        Args:
-            edges: the walls.
-            z: height above which other wings hide them [m].
-            pitch: about the width of a bay [m].
-            choices: bays in turn, from both ends towards the middle.
-            margin: kept from the ends of each free part [m].
-        """
-        for edge in edges:
-            for a, b in free_stretches(self._wing, edge, self._others, z):
-                layout = bays.rhythm(pitch, choices, margin)
-                self._reliefs[edge] += [
-                    r._replace(x0=r.x0 + a, x1=r.x1 + a)
-                    for r in layout(edge, b - a)
-                ]
-
-    def put(self, edge: int, x: float, width: float, bay: bays.Bay) -> None:
-        """Puts a bay around x, in place of what it meets there."""
-        x0, x1 = x - width / 2, x + width / 2
-        new = bay(x0, x1)
-        if not new:
-            return
-        low = min(r.z0 for r in new)
-        high = max(r.z1 for r in new)
-        self._reliefs[edge] = [
-            r
-            for r in self._reliefs[edge]
-            if r.x1 < x0 + 0.01 or r.x0 > x1 - 0.01 or r.z1 < low or r.z0 > high
-        ] + new
-
-    def add(self, edge: int, reliefs: Iterable[Relief]) -> None:
-        """Adds reliefs given in the wall's coordinates."""
-        self._reliefs[edge] += reliefs
-
-    def clear(self, edge: int, x0: float, x1: float, z0: float, z1: float):
-        """Removes whatever meets a part of a wall."""
-        self._reliefs[edge] = [
-            r
-            for r in self._reliefs[edge]
-            if r.x1 < x0 or r.x0 > x1 or r.z1 < z0 or r.z0 > z1
-        ]
-
-    def layout(self, edge: int, length: float) -> list[Relief]:
-        """Returns all of them, for a facade.
-
-        Bands end at arches, which need flat wall around them.
-        """
-        found: list[Relief] = []
-        for relief in self._reliefs[edge]:
-            if isinstance(relief, Arch):
-                found.append(Patch(*relief[:3], relief.z1, 0.0))
-            found.append(relief)
-        return found
-
-
-def add_walls(
-    materials: Materials,
-    wing: Wing,
-    openings: Openings,
-    glass: Sequence[float],
-    bands: Sequence[Band] = (),
-    material: str = "walls",
-) -> None:
-    """Adds a wing's walls on their foundation, and their glass."""
-    facade = Facade(
-        wing.wall_top,
-        tuple(bands),
-        openings.layout,
-        tuple(glass),
-        plain=wing.blind,
-    )
-    outline = wing.outline
-    materials.add(
-        material,
-        massing.skirt(outline, outline, -FOUNDATION_M, 0.0),
-        facade_mesh(outline, facade),
-    )
-    materials.add("glass", glass_mesh(outline, facade))
-
-
 def add_roof(
     materials: Materials,
     wing: Wing,
@@ -291,13 +156,6 @@ def add_roof(
     z = wing.wall_top - _SEAT
     if roof.kind == "hip":
         solid = pitched_roofs.hip(outline, z, wing.top, reach, roof.thickness)
-        materials.add("roof", solid)
-        return
-    if roof.kind == "mansard":
-        knee = z + 0.72 * (wing.top - z)
-        solid = pitched_roofs.mansard(
-            outline, z, knee, wing.top, 0.35 * (knee - z), roof.eaves
-        )
         materials.add("roof", solid)
         return
     _add_shell(materials, wing, attic, material)
