@@ -58,6 +58,9 @@ def save(figure: Figure, stem: Path, page_kind: str) -> None:
         InputError: if a file cannot be written.
     """
     FigureCanvasAgg(figure)
+    # Arranged once, not for each format again.
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
     for kind in (*PRINTED, page_kind):
         path = stem.with_name(f"{stem.name}.{kind}")
         options: dict = {"dpi": _DPI}
