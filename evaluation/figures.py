@@ -238,7 +238,7 @@ def _picture_grid(pictures: Sequence[Picture]):
     figure = Figure(
         figsize=(
             _PANEL_INCHES * len(pictures),
-            _PANEL_INCHES * min(tallest, 1.6) + 0.7,
+            _PANEL_INCHES * min(tallest, 1.6) + 0.4,
         ),
         layout="constrained",
     )

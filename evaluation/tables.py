@@ -213,7 +213,7 @@ def _to_latex(value: object) -> str:
         text = rf"\underline{{{text}}}"
     if value.printed is None:
         return text
-    return rf"{text} {{\scriptsize ({value.printed:.4f})}}"
+    return rf"\shortstack{{{text}\\{{\scriptsize {value.printed:.4f}}}}}"
 
 
 def _latex_row(cells) -> str:

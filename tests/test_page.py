@@ -190,6 +190,9 @@ _READER = """<script>
   byId("next").click();
   byId("next").click();
   await shown("0/1/4/0");
+  notes.push("too wide by " + (
+    document.documentElement.scrollWidth - document.documentElement.clientWidth
+  ));
   document.body.dataset.notes = JSON.stringify(notes);
 })();
 </script></body>"""
@@ -237,9 +240,11 @@ def test_reader_goes_through_queries(page, tmp_path, size):
         "0/0/2/0 | Query 3 of 5, Scan Context++: no candidate | Query:"
         " metropolis_04, frame 2 | No candidate",
         "0/1/2/0 | Query 3 of 5, RING++: right – best match 2.0 m",
-        "0/1/4/0 | Query 5 of 5, RING++: no true place in the database",
+        "0/1/4/0 | Query 5 of 5, RING++: no true place",
     ):
         assert expected in text
+    # Wide things scroll by themselves.
+    assert "too wide by 0" in text
     # The match and the wall are drawn.
     assert int(re.search(r"orange (\d+)", text)[1]) > 20
     assert int(re.search(r"wall (\d+)", text)[1]) > 20

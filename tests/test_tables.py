@@ -62,10 +62,13 @@ def test_latex_is_escaped_booktabs():
     assert r"\cmidrule(lr){2-2}\cmidrule(lr){3-3}" in lines
     assert r"pair\_of & AUC & AUC \\" in lines
     assert (
-        r"01 $\rightarrow$ 04 & \textbf{0.7500} {\scriptsize (0.5000)} &"
+        r"01 $\rightarrow$ 04 &"
+        r" \shortstack{\textbf{0.7500}\\{\scriptsize 0.5000}} &"
         r" \underline{0.2500} \\" in lines
     )
-    assert r"x \& y & -- {\scriptsize (0.1250)} & 0.5000 \\" in lines
+    assert (
+        r"x \& y & \shortstack{--\\{\scriptsize 0.1250}} & 0.5000 \\" in lines
+    )
     text = "\n".join(lines)
     assert text.count("{") == text.count("}")
     assert text.isascii()

@@ -11,7 +11,7 @@ const COLOURS = {
 const WORDS = {
   right: "right",
   wrong: "wrong",
-  none: "no true place in the database",
+  none: "no true place",
   silent: "no candidate",
 };
 // Half of the length that a scan's picture shows [m], and of a bar [m].
