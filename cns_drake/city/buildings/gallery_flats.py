@@ -87,8 +87,8 @@ def draw(site: Site, height: float, rng: np.random.Generator) -> GalleryFlats:
         stair_width=round(float(rng.uniform(3.2, 4.2)), 2),
         panels=float(rng.uniform(0.15, 0.5)),
         ground=round(float(rng.uniform(3.0, 3.6)), 2),
-        roof_items=("roof_vents", "roof_tank", "roof_mast", "roof_skylight",
-                    "roof_dish", "roof_vents")[: int(rng.integers(2, 7))],
+        roof_items=("roof_vents", "roof_tank", "roof_mast",
+                    "roof_dish")[: int(rng.integers(2, 5))],
         rgb=pick(rng, _CONCRETES),
         panel_rgb=pick(rng, _PANELS),
     )  # fmt: skip

@@ -68,7 +68,7 @@ def draw(site: Site, height: float, rng: np.random.Generator) -> ParkingDeck:
     """Draws the parameters of one parking deck."""
     x0, y0, x1, y1 = site.bounds
     rise = height - 3.4
-    storeys = max(1, round(rise / float(rng.uniform(2.8, 3.3))))
+    storeys = max(2, round(rise / float(rng.uniform(2.8, 3.3))))
     return ParkingDeck(
         height=height,
         storeys=storeys,
@@ -303,7 +303,7 @@ PARKING_DECK = Archetype(
     name="parking_deck",
     draw=draw,
     build=build,
-    heights=(8.0, 30.0),
+    heights=(9.5, 30.0),
     widths=(24.0, 100.0),
     overhang=0.35,
 )

@@ -1,7 +1,7 @@
 """What stands on roofs: shared meshes, and where they go.
 
 These meshes have fixed names and shapes, shared by all buildings of a city;
-parts vary them by scale and heading. Each stands on z = 0.
+parts vary them by scale and heading. Each stands on z = 0, chimneys in it.
 """
 
 from __future__ import annotations
@@ -187,14 +187,14 @@ def _dish() -> Mesh:
 
 
 def _chimney() -> Mesh:
-    """A brick stack with a corbelled head and two pots, 2.4 m."""
+    """A brick stack with a corbelled head and two pots, up to 2.4 m."""
     pots = [
         massing.prism(massing.regular_polygon(0.13, 6, (x, 0.0)), 2.1, 2.4)
         for x in (-0.2, 0.2)
     ]
     return merge_meshes(
         [
-            massing.skirt(_CHIMNEY_PLAN, _CHIMNEY_PLAN, 0.0, 1.8),
+            massing.skirt(_CHIMNEY_PLAN, _CHIMNEY_PLAN, -_ROOT_M, 1.8),
             massing.box(-0.52, 0.52, -0.34, 0.34, 1.8, 2.1),
             *pots,
         ]
@@ -202,7 +202,7 @@ def _chimney() -> Mesh:
 
 
 def _chimney_row() -> Mesh:
-    """A wide stack that two houses share, with five pots, 2.3 m."""
+    """A wide stack that two houses share, with five pots, up to 2.3 m."""
     pots = [
         massing.prism(massing.regular_polygon(0.12, 6, (x, 0.0)), 2.0, 2.3)
         for x in np.linspace(-0.8, 0.8, 5).tolist()
@@ -210,13 +210,16 @@ def _chimney_row() -> Mesh:
     body = massing.rectangle(-1.0, -0.28, 1.0, 0.28)
     return merge_meshes(
         [
-            massing.skirt(body, body, 0.0, 1.7),
+            massing.skirt(body, body, -_ROOT_M, 1.7),
             massing.box(-1.08, 1.08, -0.36, 0.36, 1.7, 2.0),
             *pots,
         ]
     )
 
 
+# Chimneys reach this far below their foot, into the slope that they stand on
+# [m].
+_ROOT_M = 1.5
 _CHIMNEY_PLAN = massing.rectangle(-0.44, -0.26, 0.44, 0.26)
 
 _MAKERS = {

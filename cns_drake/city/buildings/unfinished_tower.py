@@ -83,7 +83,7 @@ def draw(site: Site, height: float, rng: np.random.Generator):
         core=(float(rng.uniform(0.28, 0.4)), float(rng.uniform(0.28, 0.4))),
         group=group,
         clad=group * int(rng.integers(0, max(1, storeys // group // 2))),
-        scaffolds=pick(rng, ((0,), (0, 1), (0, 3), (0, 1, 3))),
+        scaffolds=pick(rng, ((0,), (0, 1), (0, 3), (1, 3))),
         scaffold_top=min(int(rng.integers(storeys // 2, storeys)), 8),
         nets=float(rng.uniform(0.2, 0.7)),
         props=bool(rng.random() < 0.7),
@@ -160,9 +160,8 @@ def _add_frame(assembly, p: UnfinishedTower, plan) -> None:
             massing.box(x - 0.25, x + 0.25, y - 0.25, y + 0.25, top - 0.05,
                         top + 0.5)
         )  # fmt: skip
-        for u, v in ((x - 0.16, y - 0.16), (x + 0.16, y + 0.16)):
-            bar = massing.regular_polygon(0.03, 3, (u, v))
-            stubs.append(massing.prism(bar, top + 0.45, top + 1.5))
+        bar = massing.regular_polygon(0.05, 3, (x + 0.12, y))
+        stubs.append(massing.prism(bar, top + 0.45, top + 1.5))
     for edge in range(4):
         wall = details.WallFrame(plan, edge)
         for u in np.linspace(0.1, wall.length - 0.1, 6).tolist():
@@ -314,7 +313,7 @@ UNFINISHED_TOWER = Archetype(
     name="unfinished_tower",
     draw=draw,
     build=build,
-    heights=(15.0, 90.0),
+    heights=(15.0, 60.0),
     widths=(16.0, 50.0),
     overhang=0.35,
 )
