@@ -33,7 +33,10 @@ _MEDIAN_RGB = (0.47, 0.55, 0.34)
 
 
 def street_structures(network: RoadNetwork) -> list[Structure]:
-    """Returns the ground of all streets, the carriageway at z = 0."""
+    """Returns the ground of all streets, the carriageway at z = 0.
+
+    Kinds of ground that these streets do not have are left out.
+    """
     height = kerb_height(network)
     medians = snap(network.medians())
     paved = snap(network.carriageway()).difference(medians)
@@ -46,7 +49,7 @@ def street_structures(network: RoadNetwork) -> list[Structure]:
         )
     )
     sidewalks = snap(network.sidewalks()).difference(kerbs)
-    return [
+    structures = [
         ground_structure(
             "carriageway", "road", paved.difference(bays), 0.0, _ROAD_RGB
         ),
@@ -63,6 +66,7 @@ def street_structures(network: RoadNetwork) -> list[Structure]:
             _MEDIAN_RGB,
         ),
     ]
+    return [structure for structure in structures if structure.model.parts]
 
 
 def kerb_height(network: RoadNetwork) -> float:
