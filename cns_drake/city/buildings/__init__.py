@@ -47,7 +47,8 @@ def sample(
             front is the edge between its first two corners, a rectangle's
             its edge of least y. Eaves, balconies and canopies reach out of
             it by at most the archetype's `overhang`.
-        height: top of the walls, parapet or spire [m].
+        height: top of the building: parapet, ridge or spire; only roof
+            equipment and chimneys may rise above it [m].
         rng: the only source of variation.
         name: the structure's name, which its own meshes carry.
         blind_edges: edges that nothing may cross, counter-clockwise from

@@ -213,13 +213,14 @@ def _add_screens(assembly, p: ParkingDeck, plan, rng) -> None:
     open_edges = (0, 1, 3) if p.ramp_back else (1, 2, 3)
     top = p.storeys * p.storey + p.parapet - 0.05
     low = p.storey - _SLAB_M - 0.1
-    pieces = []
+    pieces, shafts = [], _shafts(p, plan)
     for edge in open_edges:
         wall = details.WallFrame(plan, edge)
         if p.screen == "panels":
             for a, b in bays.stretches(wall.length, 3 * p.screen_pitch, 0.5):
                 for k in range(1, p.storeys + 1):
-                    if rng.random() < 0.55:
+                    wanted = rng.random() < 0.55
+                    if wanted and not _is_hidden(wall, a, b, shafts):
                         z = k * p.storey - 0.25
                         spot = (round(a + 0.1, 2), round(b - 0.1, 2), 0.0, 0.12)
                         pieces.append(wall.place(
@@ -230,6 +231,8 @@ def _add_screens(assembly, p: ParkingDeck, plan, rng) -> None:
         reach = 0.24 if p.screen == "fins" else 0.1
         width = 0.05 if p.screen == "fins" else 0.03
         for u, _ in bays.stretches(wall.length, step, 0.6):
+            if _is_hidden(wall, u, u, shafts):
+                continue
             spot = (round(u - width, 2), round(u + width, 2), -0.02, reach)
             pieces.append(wall.place(massing.box(*spot, low, top)))
         if p.screen == "cables":
@@ -242,18 +245,32 @@ def _add_screens(assembly, p: ParkingDeck, plan, rng) -> None:
         assembly.add("screens", merge_meshes(pieces), rgb=p.screen_rgb)
 
 
-def _add_stairs(assembly, p: ParkingDeck, plan) -> None:
-    """Adds glazed stair shafts at two corners of the decks."""
+def _shafts(p: ParkingDeck, plan) -> list[np.ndarray]:
+    """Returns the outlines of the stairs, a little in front of the decks."""
     (x0, y0), (x1, y1) = plan[0], plan[2]
     s = min(_STAIR_M, 0.3 * (y1 - y0))
-    places = {
-        0: (x0 + 1.0, y0 - 0.05), 1: (x1 - s - 1.0, y0 - 0.05),
-        2: (x1 - s - 1.0, y1 - s + 0.05), 3: (x0 + 1.0, y1 - s + 0.05),
-    }  # fmt: skip
+    left, right = x0 + 1.0, x1 - s - 1.0
+    front, back = y0 - 0.3, y1 - s + 0.3
+    places = ((left, front), (right, front), (right, back), (left, back))
+    return [
+        massing.rectangle(x, y, x + s, y + s)
+        for x, y in (places[corner] for corner in p.stairs)
+    ]
+
+
+def _is_hidden(wall, u0: float, u1: float, shafts) -> bool:
+    """Whether a stair stands in front of a part of a wall."""
+    ends = np.array([wall.point(u0, 0.0), wall.point(u1, 0.0)])
+    low, high = ends.min(axis=0) - 0.05, ends.max(axis=0) + 0.05
+    return any(
+        (shaft[2] > low).all() and (shaft[0] < high).all() for shaft in shafts
+    )
+
+
+def _add_stairs(assembly, p: ParkingDeck, plan) -> None:
+    """Adds glazed stair shafts at two corners of the decks."""
     pieces, panes = [], []
-    for corner in p.stairs:
-        x, y = places[corner]
-        shaft = massing.rectangle(x, y, x + s, y + s)
+    for shaft in _shafts(p, plan):
         slit = bays.with_middle(
             bays.plain, bays.window(2.2, 2.8, p.height - 0.9, 0.2), 3.0
         )

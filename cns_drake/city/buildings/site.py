@@ -118,7 +118,8 @@ class Archetype:
     Attributes:
         name: key in the registry.
         draw: (site, height, rng) -> parameters; height is that of the
-            walls, parapet or spire; only roof equipment may rise above.
+            parapet, ridge or spire; only roof equipment and chimneys may
+            rise above.
         build: (parameters, site, rng) -> model.
         heights: least and greatest sensible height [m].
         widths: least and greatest sensible side of the footprint [m].
