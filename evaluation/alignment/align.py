@@ -57,7 +57,7 @@ _LEAST_YIELD = 0.25
 _NUM_SELF_LOOPS = 30
 _ROUNDS = 3
 # A drive has drifted if a quarter of its loops are off by more [m].
-_DRIFT = 0.5
+_DRIFT = 0.3
 # The ground of a world that is off zero by less is left there [m].
 _GROUND_TOLERANCE = 0.25
 

@@ -15,14 +15,17 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from evaluation import poses
+from evaluation.compiled import compiled
 from evaluation.methods.neighbours import nearest_neighbours
 
 # Neighbours, the point among them, that a normal is fitted to.
 NUM_NEIGHBOURS = 10
 # A normal this close to the horizontal belongs to something that stands up.
 _UPRIGHT = 0.5
-# Farthest pairs of each stage [m].
-_LIMITS = (10.0, 5.0, 2.0, 1.0)
+# Farthest pairs of each stage [m], and the points that it uses: more add
+# time, not accuracy.
+_STAGES = ((10.0, 1500), (5.0, 1500), (2.0, 4000), (1.0, 4000))
+_LIMIT, _NUM_SAMPLES = _STAGES[-1]
 _MAX_ITERATIONS = 15
 # A stage is over when a step moves or turns less than this [m, rad].
 _STILL = (0.005, 2e-4)
@@ -31,8 +34,8 @@ _SCALE = 0.25
 # Normals of a pair that differ by more than this cosine are of two surfaces.
 _PARALLEL = 0.7
 _FEWEST_PAIRS = 20
-# Points that a step is computed from; more add time, not accuracy.
-_NUM_SAMPLES = 4000
+# Powers of up to 2^6 tell spreads apart that differ by a tenth.
+_SQUARINGS = 6
 _SEED = 7
 # How well a point is known to lie on its plane [m]; of so many neighbouring
 # points, which share their errors, only one counts.
@@ -54,12 +57,12 @@ class Surface:
     normals: np.ndarray
     tree: cKDTree
 
-    def sample(self) -> Surface:
-        """Returns some of the points, with the tree of all."""
-        if len(self.points) <= _NUM_SAMPLES:
+    def sample(self, number: int = _NUM_SAMPLES) -> Surface:
+        """Returns so many of the points, with the tree of all."""
+        if len(self.points) <= number:
             return self
         rng = np.random.default_rng(_SEED)
-        chosen = rng.choice(len(self.points), _NUM_SAMPLES, replace=False)
+        chosen = rng.choice(len(self.points), number, replace=False)
         return Surface(self.points[chosen], self.normals[chosen], self.tree)
 
     @property
@@ -91,13 +94,15 @@ class Registration:
 def make_surface(points: np.ndarray) -> Surface:
     """Returns a cloud with normals, fitted to the nearest neighbours.
 
+    Points whose neighbours are all on one line are left out.
+
     Args:
         points: (N, 3) [m], N >= NUM_NEIGHBOURS.
     """
-    neighbours = points[nearest_neighbours(points, NUM_NEIGHBOURS)]
-    centred = neighbours - neighbours.mean(axis=1, keepdims=True)
-    _, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", centred, centred))
-    return Surface(points, axes[:, :, 0], cKDTree(points))
+    normals = _normals(points, nearest_neighbours(points, NUM_NEIGHBOURS))
+    has_normal = normals.any(axis=1)
+    points = points[has_normal]
+    return Surface(points, normals[has_normal], cKDTree(points))
 
 
 def register(
@@ -110,9 +115,9 @@ def register(
         target: T.
         guess: (4, 4) X_TS, right within some metres and degrees.
     """
-    sample = source.sample()
     X = np.array(guess, dtype=np.float64)
-    for limit in _LIMITS:
+    for limit, number in _STAGES:
+        sample = source.sample(number)
         for _ in range(_MAX_ITERATIONS):
             step = _step(sample, target, X, limit)
             X = step @ X
@@ -172,13 +177,12 @@ def _linearise(
 
 def _judge(source: Surface, target: Surface, X_TS: np.ndarray) -> Registration:
     sample = source.sample()
-    limit = _LIMITS[-1]
-    is_paired, p_T, nearest = _pair(sample, target, X_TS, limit)
+    is_paired, p_T, nearest = _pair(sample, target, X_TS, _LIMIT)
     _, J = _linearise(p_T[is_paired], target, nearest[is_paired])
     counting = len(source.points) / len(sample.points) / _CORRELATED
     H = J.T @ J * (counting / _SIGMA**2)
     reverse = target.sample()
-    is_found, _, _ = _pair(reverse, source, poses.inverse(X_TS), limit)
+    is_found, _, _ = _pair(reverse, source, poses.inverse(X_TS), _LIMIT)
     return Registration(
         X_TS=X_TS,
         fitness=float(max(is_paired.mean(), is_found.mean())),
@@ -194,3 +198,68 @@ def _judge(source: Surface, target: Surface, X_TS: np.ndarray) -> Registration:
 def _part(is_counted: np.ndarray, of: np.ndarray) -> float:
     total = np.count_nonzero(of)
     return np.count_nonzero(is_counted & of) / total if total else 0.0
+
+
+@compiled
+def _normals(points, neighbours):
+    """Returns the directions (N, 3) in which neighbours (N, K) spread least.
+
+    They are of unit length, or zero where the neighbours are on one line.
+
+    That is the eigenvector of the least eigenvalue of their covariance C. It
+    has the greatest eigenvalue in the adjugate of C, so that the powers of
+    the adjugate tend to its projector; they are taken by squaring.
+    """
+    normals = np.empty((len(points), 3))
+    number = neighbours.shape[1]
+    for point in range(len(points)):
+        # Relative to the point itself, so that squares of large coordinates
+        # are not subtracted from each other.
+        x, y, z = 0.0, 0.0, 0.0
+        xx, yy, zz, xy, xz, yz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for other in neighbours[point]:
+            dx = points[other, 0] - points[point, 0]
+            dy = points[other, 1] - points[point, 1]
+            dz = points[other, 2] - points[point, 2]
+            x, y, z = x + dx, y + dy, z + dz
+            xx, yy, zz = xx + dx * dx, yy + dy * dy, zz + dz * dz
+            xy, xz, yz = xy + dx * dy, xz + dx * dz, yz + dy * dz
+        xx, yy, zz = (
+            xx - x * x / number,
+            yy - y * y / number,
+            zz - z * z / number,
+        )
+        xy, xz, yz = (
+            xy - x * y / number,
+            xz - x * z / number,
+            yz - y * z / number,
+        )
+        # The adjugate, symmetric as well: a d e / d b f / e f c.
+        a, b, c = yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy
+        d, e, f = xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - xx * yz
+        if a + b + c <= 0.0:
+            normals[point] = 0.0
+            continue
+        for _ in range(_SQUARINGS):
+            trace = a + b + c
+            a, b, c = a / trace, b / trace, c / trace
+            d, e, f = d / trace, e / trace, f / trace
+            a, b, c, d, e, f = (
+                a * a + d * d + e * e,
+                d * d + b * b + f * f,
+                e * e + f * f + c * c,
+                a * d + d * b + e * f,
+                a * e + d * f + e * c,
+                d * e + b * f + f * c,
+            )
+        if a >= b and a >= c:
+            nx, ny, nz = a, d, e
+        elif b >= c:
+            nx, ny, nz = d, b, f
+        else:
+            nx, ny, nz = e, f, c
+        length = np.sqrt(nx * nx + ny * ny + nz * nz)
+        normals[point, 0] = nx / length
+        normals[point, 1] = ny / length
+        normals[point, 2] = nz / length
+    return normals

@@ -129,4 +129,5 @@ class Submaps:
         centroids = accumulator.to_map().centroids_W
         if len(centroids) < _FEWEST_POINTS:
             return None
-        return make_surface(centroids)
+        surface = make_surface(centroids)
+        return surface if len(surface.points) >= _FEWEST_POINTS else None
