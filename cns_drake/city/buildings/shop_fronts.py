@@ -60,7 +60,8 @@ def add_shops(
             materials.add("awning", wall.place(shade))
         if rng.random() < 0.4:
             x = x0 + 0.25 if rng.random() < 0.5 else x1 - 0.25
-            z = head + 0.1
+            # Blades hang above heads, like awnings.
+            z = max(2.4, head + 0.1)
             blade = massing.box(x - 0.06, x + 0.06, 0.1, 0.9, z, z + 0.8)
             materials.add("trim", wall.place(blade))
 
