@@ -1,18 +1,19 @@
-"""The committed files of Metropolis: what the generator makes, and fit."""
+"""The committed files of the cities: what the generator makes, and fit."""
 
 import csv
 import xml.etree.ElementTree as ElementTree
 
-from metropolis_city import (
-    WORLD,
+from pydrake.geometry import Role
+import pytest
+from shipped_cities import (
+    PLANS,
     city,
     parse_strictly,
     stage_files,
     structure_of,
     visuals,
+    world_of,
 )
-from pydrake.geometry import Role
-import pytest
 import yaml
 
 from cns_drake.city.generate import TABLE_NAME, render_city
@@ -33,26 +34,32 @@ def files(world) -> dict[str, bytes]:
     return {str(p.relative_to(world)): p.read_bytes() for p in found}
 
 
+@pytest.fixture(scope="module", params=PLANS)
+def name(request):
+    return request.param
+
+
 @pytest.fixture(scope="module")
-def stages():
+def stages(name):
     return load_stages(
-        WORLD / "stages.yaml", [s.name for s in city().structures]
+        world_of(name) / "stages.yaml",
+        [s.name for s in city(name).structures],
     )
 
 
-def test_generating_anew_gives_the_committed_bytes():
-    new, old = render_city(WORLD, city()), files(WORLD)
+def test_generating_anew_gives_the_committed_bytes(name):
+    new, old = render_city(world_of(name), city(name)), files(world_of(name))
     assert sorted(new) == sorted(old)
     changed = [name for name in new if new[name].encode() != old[name]]
     assert changed == []
 
 
-def test_stages_differ_by_the_listed_names_only(stages):
-    whole = visuals(stage_files()[-1])
-    names = {s.name for s in city().structures}
+def test_stages_differ_by_the_listed_names_only(name, stages):
+    whole = visuals(stage_files(name)[-1])
+    names = {s.name for s in city(name).structures}
     assert {structure_of(v) for v in whole} == names
     previous = set()
-    for path in stage_files():
+    for path in stage_files(name):
         stage = path.stem.removeprefix("stage_")
         present = visuals(path)
         absent = stages.absent(stage)
@@ -65,30 +72,30 @@ def test_stages_differ_by_the_listed_names_only(stages):
         previous = {structure_of(v) for v in present}
 
 
-def test_the_list_of_stages_is_complete(stages):
-    assert [p.stem for p in stage_files()] == [
+def test_the_list_of_stages_is_complete(name, stages):
+    assert [p.stem for p in stage_files(name)] == [
         f"stage_{stage}" for stage in stages.stages
     ]
     names = list(stages.stages)
-    assert (names[0], names[-1]) == ("01", "04")
+    assert (names[0], names[-1]) == ("01", PLANS[name].last_stage)
     assert len(stages.absent("01")) > 50
     buildings = {
-        s.name for s in city().structures if s.semantic_class == "building"
+        s.name for s in city(name).structures if s.semantic_class == "building"
     }
     assert buildings & stages.absent("01")
     assert stages.candidates
 
 
-def test_the_ground_is_there_at_all_stages(stages):
-    ground = {s.name for s in city().structures if GROUND_TAG in s.tags}
+def test_the_ground_is_there_at_all_stages(name, stages):
+    ground = {s.name for s in city(name).structures if GROUND_TAG in s.tags}
     assert len(ground) > 10
     assert not ground & (stages.absent("01") | set(stages.candidates))
 
 
-def test_the_table_names_every_structure_once():
-    with (WORLD / TABLE_NAME).open(newline="") as file:
+def test_the_table_names_every_structure_once(name):
+    with (world_of(name) / TABLE_NAME).open(newline="") as file:
         rows = list(csv.DictReader(file))
-    structures = city().structures
+    structures = city(name).structures
     assert [int(row["instance"]) for row in rows] == list(
         range(1, len(structures) + 1)
     )
@@ -101,31 +108,33 @@ def test_the_table_names_every_structure_once():
         assert float(row["yaw"]) == pytest.approx(structure.yaw, abs=5.1e-6)
 
 
-def test_meshes_are_neither_missing_nor_orphaned():
+def test_meshes_are_neither_missing_nor_orphaned(name):
+    world = world_of(name)
     used = set()
-    for path in stage_files():
+    for path in stage_files(name):
         for uri in ElementTree.parse(path).iter("uri"):
-            assert (WORLD / uri.text).is_file(), uri.text
+            assert (world / uri.text).is_file(), uri.text
             used.add(uri.text)
-    there = {f"meshes/{p.name}" for p in (WORLD / "meshes").iterdir()}
+    there = {f"meshes/{p.name}" for p in (world / "meshes").iterdir()}
     assert used == there
 
 
-def test_a_stage_is_one_static_link_without_collision():
-    for path in stage_files():
+def test_a_stage_is_one_static_link_without_collision(name):
+    for path in stage_files(name):
         root = ElementTree.parse(path).getroot()
         assert [m.findtext("static") for m in root.iter("model")] == ["true"]
         assert len(list(root.iter("link"))) == 1
         assert not list(root.iter("collision"))
 
 
-def test_budgets():
-    size = sum(map(len, files(WORLD).values()))
+def test_budgets(name):
+    world = world_of(name)
+    size = sum(map(len, files(world).values()))
     assert size <= 20 * MEGABYTE
     triangles = {
-        p.name: _count_triangles(p) for p in (WORLD / "meshes").iterdir()
+        p.name: _count_triangles(p) for p in (world / "meshes").iterdir()
     }
-    for path in stage_files():
+    for path in stage_files(name):
         inspector = parse_strictly(path).model_inspector()
         count = len(inspector.GetAllGeometryIds(Role.kPerception))
         assert 1000 < count < 6000
@@ -139,7 +148,8 @@ def _count_triangles(path) -> int:
     return sum(len(x.split()) - 3 for x in lines if x.startswith("f "))
 
 
-def test_stories_are_told(stages):
-    raw = yaml.safe_load((WORLD / "stages.yaml").read_text())
+def test_stories_are_told(name):
+    path = world_of(name) / "stages.yaml"
+    raw = yaml.safe_load(path.read_text())
     for stage in raw["stages"].values():
         assert len(stage["story"].split()) > 10

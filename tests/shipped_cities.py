@@ -1,5 +1,6 @@
-"""Metropolis as the generator makes it and as its files hold it."""
+"""The cities as the generator makes them and as their files hold them."""
 
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -10,18 +11,44 @@ from pydrake.multibody.plant import MultibodyPlant
 from cns_drake.city.layout import City, make_city
 from cns_drake.paths import worlds_folder
 
-WORLD = worlds_folder() / "metropolis"
+
+@dataclass(frozen=True)
+class Plan:
+    """What a city should have; ranges hold least and greatest count.
+
+    Attributes:
+        last_stage: the whole city.
+        buildings, trees, small: numbers of structures that stand.
+        sides: least and greatest length of the world's sides [m].
+    """
+
+    last_stage: str
+    buildings: tuple[int, int]
+    trees: tuple[int, int]
+    small: tuple[int, int]
+    sides: tuple[float, float]
+
+
+PLANS = {
+    "metropolis": Plan("04", (60, 110), (200, 350), (400, 900), (330, 420)),
+    "suburbia": Plan("02", (70, 110), (300, 500), (500, 900), (330, 420)),
+}
+
+
+def world_of(name: str) -> Path:
+    """Returns the folder of a map."""
+    return worlds_folder() / name
 
 
 @cache
-def city() -> City:
+def city(name: str) -> City:
     """Returns the generated city."""
-    return make_city(WORLD)
+    return make_city(world_of(name))
 
 
-def stage_files() -> list[Path]:
+def stage_files(name: str) -> list[Path]:
     """Returns the committed stages, earliest first."""
-    return sorted(WORLD.glob("stage_*.sdf"))
+    return sorted(world_of(name).glob("stage_*.sdf"))
 
 
 @cache
