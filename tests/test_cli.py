@@ -1,5 +1,6 @@
 """The command line: results, exit status, and one line for every fault."""
 
+from pathlib import Path
 import re
 import subprocess
 import sys
@@ -9,6 +10,9 @@ import pytest
 from small_map import box_visual, scenario_values, world_text
 import yaml
 
+from cns_drake.paths import recordable_sequences
+
+DIAGRAMS = Path(__file__).parent.parent / "diagrams"
 POSE = ["--pose", "0", "0", "1.6", "0", "0", "-0.5"]
 
 
@@ -101,7 +105,7 @@ def test_scan(files, tmp_path):
 
 
 def test_diagram_script(tmp_path):
-    script = "diagrams/metropolis_04.py"
+    script = DIAGRAMS / "metropolis_04.py"
     result = run("--output", tmp_path, "--frames", 2, script=script)
     assert result.returncode == 0, result.stderr
     assert (tmp_path / "metropolis_04" / "metropolis_04_0.mcap").is_file()
@@ -169,3 +173,10 @@ def assert_one_line(result, fault):
     # Nothing but progress may come before.
     errors = [line for line in result.stderr.splitlines() if "error" in line]
     assert errors == [last]
+
+
+def test_every_sequence_has_a_script_that_names_it():
+    scripts = {path.stem: path.read_text() for path in DIAGRAMS.glob("*.py")}
+    assert scripts.keys() == recordable_sequences().keys()
+    for name, text in scripts.items():
+        assert f'main("{name}", __doc__)' in text

@@ -1,0 +1,14 @@
+"""Suburbia, stage 02: the finished suburb.
+
+Houses with gardens, terraces, flats, a shopping street, a park and a sports
+ground, along a ring and the streets across it. `diagrams/suburbia_01.py`
+drives through the village that it grew from.
+
+What is driven is data, `worlds/suburbia/sequence_02.yaml`; how it is wired is
+`cns_drake.station.make_station`.
+"""
+
+from cns_drake.sequence_script import main
+
+if __name__ == "__main__":
+    main("suburbia_02", __doc__)
