@@ -15,7 +15,7 @@ As LT-SLAM does it (Kim and Kim, "LT-mapper", ICRA 2022), made robust:
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -26,19 +26,11 @@ from evaluation.alignment.anchor_search import (
     find_guesses,
     upright,
 )
-from evaluation.alignment.anchoring import (
-    agreeing,
-    fit_anchor,
-    fit_bent,
-    straighten,
-)
-from evaluation.alignment.loop_search import (
-    SAME_PLACE,
-    LoopSearch,
-    evenly,
-    find_self_loops,
-)
+from evaluation.alignment.anchoring import agreeing, fit_anchor, fit_bent
+from evaluation.alignment.loop_search import SAME_PLACE, LoopSearch, evenly
 from evaluation.alignment.loops import loop_errors
+from evaluation.alignment.report import AlignmentReport
+from evaluation.alignment.straightening import Straightened, make_consistent
 from evaluation.alignment.submaps import Submaps
 from evaluation.errors import InputError
 from evaluation.progress import Track, silent
@@ -53,73 +45,13 @@ _NUM_PROBES = 8
 # a wrong guess in a city of equal blocks 15 % fitted somehow.
 _FEWEST_LOOPS = 4
 _LEAST_YIELD = 0.25
-# Pairs of a drive with itself that are tried, and how often if it drifted.
-_NUM_SELF_LOOPS = 30
+# How often keyframes without a loop are tried again.
 _ROUNDS = 3
-# A drive has drifted if a quarter of its loops are off by more [m].
+# The source has drifted if a quarter of its loops are off by more under the
+# best rigid pose [m].
 _DRIFT = 0.3
 # The ground of a world that is off zero by less is left there [m].
 _GROUND_TOLERANCE = 0.25
-
-
-@dataclass(frozen=True)
-class AlignmentReport:
-    """How two drives were put into one world.
-
-    Attributes:
-        held: name of the drive that gives the world.
-        moved: name of the other.
-        frames: names of the worlds that the two came in.
-        guess: where the first guess came from.
-        candidates: pairs of places that look alike; None if not asked for.
-        attempts: registrations tried.
-        loops: registrations that fit.
-        inliers: loops that agree with the result.
-        distance_median: between inliers and result [m].
-        distance_95: 95 % of the inliers are nearer [m].
-        angle_median_deg: between inliers and result.
-        model: "anchor" for one rigid pose, "pose graph" for a bent drive.
-        move: of the source's middle frame, along x, y, z [m].
-        turn_deg: of that frame about the vertical.
-        bend: how far another frame was moved unlike the middle one, at most
-            [m].
-        straightened: the drives that disagreed with themselves, and by how
-            much: upper quartile over their loops [m].
-        ground: height that was subtracted from both [m].
-    """
-
-    held: str
-    moved: str
-    frames: tuple[str, str]
-    guess: str
-    candidates: int | None
-    attempts: int
-    loops: int
-    inliers: int
-    distance_median: float
-    distance_95: float
-    angle_median_deg: float
-    model: str
-    move: tuple[float, float, float]
-    turn_deg: float
-    bend: float
-    straightened: dict[str, float]
-    ground: float
-
-    def to_json(self) -> dict:
-        """Returns all numbers."""
-        return asdict(self)
-
-    def to_text(self) -> str:
-        """Returns one line for the user."""
-        return (
-            f"{self.moved} (poses in {self.frames[1]!r}) aligned to"
-            f" {self.held} (in {self.frames[0]!r}): {self.inliers} of"
-            f" {self.loops} loops agree ({self.attempts} tried), median"
-            f" {self.distance_median:.2f} m and"
-            f" {self.angle_median_deg:.2f} deg off; {self.model}, first guess"
-            f" from {self.guess}"
-        )
 
 
 @dataclass(frozen=True)
@@ -188,14 +120,16 @@ def align(
         InputError: if the two have too little in common, or a scan cannot
             be read.
     """
-    straightened: dict[str, float] = {}
-    held = Submaps(first) if hold_first else _straightened(first, straightened)
-    moving = _straightened(second, straightened)
-    off = [straightened.get(one.name, 0.0) for one in (first, second)]
-    swapped = off[0] > off[1]
+    if hold_first:
+        held = Straightened(Submaps(first), 0.0)
+    else:
+        held = make_consistent(first, track)
+    moving = make_consistent(second, track)
+    swapped = held.off > moving.off and not hold_first
     if swapped:
         held, moving = moving, held
-    search, guess, num_candidates = _start(moving, held, track)
+    target, source = held.drive, moving.drive
+    search, guess, num_candidates = _start(source, target, track)
     search.grow(track)
     X_TK, model = _fit(search)
     for _ in range(_ROUNDS):
@@ -203,35 +137,37 @@ def align(
             break
         X_TK, model = _fit(search)
     loops = list(search.loops.values())
-    is_inlier = agreeing(loops, held.X_WK, X_TK)
-    names = (second.name, first.name) if swapped else (first.name, second.name)
+    is_inlier = agreeing(loops, target.X_WK, X_TK)
     needed = max(
         _FEWEST_LOOPS, 0.5 * len(loops), _LEAST_YIELD * len(search.tried)
     )
     if is_inlier.sum() < needed:
         raise InputError(
-            f"{names[1]}: cannot be aligned to {names[0]}:"
+            f"{source.name}: cannot be aligned to {target.name}:"
             f" {len(search.tried)} places tried, {len(loops)} fit, and only"
             f" {is_inlier.sum()} of these agree"
         )
-    distances, angles = loop_errors(loops, held.X_WK, X_TK)
-    ground = 0.0 if hold_first else held.ground_height()
+    distances, angles = loop_errors(loops, target.X_WK, X_TK)
+    ground = 0.0 if hold_first else target.ground_height()
     if abs(ground) < _GROUND_TOLERANCE:
         ground = 0.0
-    X_TS = moving.bend(X_TK)
-    world_frame = held.sequence.world_frame
+    X_TS = source.bend(X_TK)
+    frame = target.sequence.world_frame
+    if ground != 0.0 or held.off > 0.0:
+        # No longer the world of others that name it.
+        frame = f"{frame}, corrected by {target.name}"
     placed = [
-        _lowered(held.sequence, world_frame, held.X_WS, ground),
-        _lowered(moving.sequence, world_frame, X_TS, ground),
+        _lowered(target.sequence, target.X_WS, ground, frame, target),
+        _lowered(source.sequence, X_TS, ground, frame, target),
     ]
     if swapped:
         placed.reverse()
     return Alignment(
         *placed,
         AlignmentReport(
-            held=names[0],
-            moved=names[1],
-            frames=(held.sequence.world_frame, moving.sequence.world_frame),
+            held=target.name,
+            moved=source.name,
+            frames=(target.sequence.world_frame, source.sequence.world_frame),
             guess=guess,
             candidates=num_candidates,
             attempts=search.num_attempts,
@@ -241,34 +177,11 @@ def align(
             distance_95=float(np.quantile(distances[is_inlier], 0.95)),
             angle_median_deg=float(np.degrees(np.median(angles[is_inlier]))),
             model=model,
-            straightened=straightened,
+            straightened=(held.off, moving.off),
             ground=ground,
             **_motion((first if swapped else second).X_WS, X_TS),
         ),
     )
-
-
-def _straightened(sequence: Sequence, straightened: dict) -> Submaps:
-    """Returns a drive, made to agree with itself where it can be checked.
-
-    Args:
-        sequence: the drive.
-        straightened: gets an entry if it did not agree.
-    """
-    drive = Submaps(sequence)
-    # Near places first: what they tell brings others within reach.
-    for _ in range(_ROUNDS):
-        loops = find_self_loops(drive, _NUM_SELF_LOOPS)
-        if not loops:
-            break
-        distances, _ = loop_errors(loops, drive.X_WK, drive.X_WK)
-        off = float(np.quantile(distances, 0.75))
-        if off < _DRIFT:
-            break
-        straightened.setdefault(sequence.name, off)
-        X_WS = drive.bend(straighten(loops, drive))
-        drive = Submaps(MovedSequence(sequence, sequence.world_frame, X_WS))
-    return drive
 
 
 def _start(
@@ -306,8 +219,8 @@ def _start(
             break
     if len(best.loops) < 2:
         raise InputError(
-            f"{a.name}: cannot be aligned to {b.name}: no place of the one"
-            " was found in the other"
+            f"{source.name}: cannot be aligned to {target.name}: no place of"
+            " the one was found in the other"
         )
     return best, "places that look alike", len(candidates.turn)
 
@@ -367,11 +280,16 @@ def _doubtful(search: LoopSearch, X_TK: np.ndarray) -> np.ndarray:
 
 
 def _lowered(
-    sequence: Sequence, world_frame: str, X_WS: np.ndarray, ground: float
+    sequence: Sequence,
+    X_WS: np.ndarray,
+    ground: float,
+    world_frame: str,
+    target: Submaps,
 ) -> Sequence:
+    """Returns a drive at poses whose heights start at the ground."""
     X = X_WS.copy()
     X[:, 2, 3] -= ground
-    return MovedSequence(sequence, world_frame, X)
+    return MovedSequence(sequence, X, world_frame, target.sequence.datum)
 
 
 def _motion(X_WS: np.ndarray, X_TS: np.ndarray) -> dict:

@@ -73,13 +73,13 @@ def find_candidates(
     places = [
         method.describe_place(gather(target.sequence, frame, 1))
         for frame in track(
-            target.frames, f"describing {target.sequence.name}", len(target)
+            target.frames, f"describing {target.name}", len(target)
         )
     ]
     database = method.build_database(places)
     found = []
     for k in track(
-        range(len(source)), f"recognising {source.sequence.name}", len(source)
+        range(len(source)), f"recognising {source.name}", len(source)
     ):
         query = method.describe(gather(source.sequence, source.frames[k], 1))
         scores = np.nan_to_num(method.score(query, database), nan=-np.inf)

@@ -78,7 +78,7 @@ class LoopSearch:
         for k in self.loops:
             learn(k)
         remaining = int(is_open.sum())
-        description = f"aligning {self.source.sequence.name}"
+        description = f"aligning {self.source.name}"
         for _ in track(range(remaining), description, remaining):
             k = int(np.where(is_open, away, np.inf).argmin())
             is_open[k] = False
@@ -120,12 +120,13 @@ class LoopSearch:
         return nearest if away[nearest] <= SAME_PLACE else None
 
 
-def find_self_loops(drive: Submaps, most: int) -> list[Loop]:
+def find_self_loops(drive: Submaps, most: int, track: Track) -> list[Loop]:
     """Registers keyframes of a drive to earlier ones at the same place.
 
     Args:
         drive: a drive.
         most: how many are tried, evenly along the drive.
+        track: reports progress.
     """
     pairs = []
     for k in range(len(drive)):
@@ -134,9 +135,9 @@ def find_self_loops(drive: Submaps, most: int) -> list[Loop]:
         away[drive.path > drive.path[k] - _DETOUR] = np.inf
         if away.min() <= SAME_PLACE:
             pairs.append((k, int(away.argmin())))
-    chosen = evenly(len(pairs), most)
+    chosen = [pairs[index] for index in evenly(len(pairs), most)]
     loops = []
-    for k, place in (pairs[index] for index in chosen):
+    for k, place in track(chosen, f"checking {drive.name}", len(chosen)):
         X_LK = poses.inverse(drive.X_WK[place]) @ drive.X_WK[k]
         loop = close(drive, drive, k, place, X_LK)
         if loop is not None:

@@ -65,6 +65,11 @@ class Submaps:
         return len(self.frames)
 
     @property
+    def name(self) -> str:
+        """Name of the drive."""
+        return self.sequence.name
+
+    @property
     def length(self) -> float:
         """Length of the path [m]."""
         return float(self.travelled[-1])

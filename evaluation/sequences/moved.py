@@ -12,18 +12,26 @@ from evaluation.sequences.sequence import Sequence
 class MovedSequence(Sequence):
     """Another sequence's scans, at other poses."""
 
-    def __init__(self, sequence: Sequence, world_frame: str, X_WS: np.ndarray):
+    def __init__(
+        self,
+        sequence: Sequence,
+        X_WS: np.ndarray,
+        world_frame: str,
+        datum: str | None,
+    ):
         """Puts a drive elsewhere.
 
         Args:
             sequence: of N scans.
-            world_frame: name of W.
             X_WS: (N, 4, 4).
+            world_frame: name of W.
+            datum: see `Sequence.datum`.
         """
         self.name = sequence.name
         self.world_frame = world_frame
         self._sequence = sequence
         self._X_WS = X_WS
+        self._datum = datum
 
     def __len__(self) -> int:
         return len(self._sequence)
@@ -41,7 +49,7 @@ class MovedSequence(Sequence):
 
     @property
     def datum(self) -> str | None:
-        return self._sequence.datum
+        return self._datum
 
     @property
     def notes(self) -> tuple[str, ...]:
