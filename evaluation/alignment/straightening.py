@@ -18,8 +18,10 @@ from evaluation.progress import Track
 from evaluation.sequences.moved import MovedSequence
 from evaluation.sequences.sequence import Sequence
 
-# Pairs that are tried, and how often if the drive has drifted.
+# Pairs that are tried; how many must fit, so that no chance one bends a drive;
+# and how often, if the drive has drifted.
 _NUM_LOOPS = 30
+_FEWEST_LOOPS = 3
 _ROUNDS = 3
 # It has if a quarter of the loops are off by more [m].
 _DRIFT = 0.3
@@ -51,7 +53,7 @@ def make_consistent(sequence: Sequence, track: Track) -> Straightened:
     # Near places first: what they tell brings others within reach.
     for _ in range(_ROUNDS):
         loops = find_self_loops(drive, _NUM_LOOPS, track)
-        if not loops:
+        if len(loops) < _FEWEST_LOOPS:
             break
         distances, _ = loop_errors(loops, drive.X_WK, drive.X_WK)
         off = float(np.quantile(distances, 0.75))
