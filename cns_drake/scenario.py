@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 import re
 from typing import Annotated
@@ -50,7 +51,7 @@ class Mount(_Model):
 
     def pose(self) -> RigidTransform:
         """Returns the sensor's pose in base_link."""
-        roll, pitch, yaw = (angle * _RAD_PER_DEG for angle in self.rpy_deg)
+        roll, pitch, yaw = map(math.radians, self.rpy_deg)
         return RigidTransform(RollPitchYaw(roll, pitch, yaw), self.xyz)
 
 
@@ -239,9 +240,6 @@ class Scenario(_Model):
                 f"{source}: stage: map '{self.map}' has no stage "
                 f"'{self.stage}'; it has: {', '.join(stages) or 'none'}"
             )
-
-
-_RAD_PER_DEG = 0.017453292519943295
 
 
 def make_lidar_config(preset: str) -> LidarConfig:
