@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cns_drake.city.road_network import load_road_network
+from cns_drake.city.roads.network import load_road_network
 from cns_drake.route import make_lane_path
 from cns_drake.scenario import Scenario
 from cns_drake.trajectory import POINT_SPACING, Trajectory

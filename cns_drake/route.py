@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, RootModel, Strict
 
-from cns_drake.city.road import LaneRef
-from cns_drake.city.road_network import RoadNetwork
+from cns_drake.city.roads.network import RoadNetwork
+from cns_drake.city.roads.road import LaneRef
 from cns_drake.errors import InputError
 from cns_drake.lane_path import LanePath, sample_lane_path
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from cns_drake.city.centreline import Centreline
+from cns_drake.city.roads.centreline import Centreline
 from cns_drake.errors import InputError
 from cns_drake.lane_path import LanePath, sample_lane_path
 

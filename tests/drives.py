@@ -3,7 +3,7 @@
 import numpy as np
 import yaml
 
-from cns_drake.city.road_network import load_road_network
+from cns_drake.city.roads.network import load_road_network
 from cns_drake.lane_path import LanePath
 from cns_drake.paths import shipped_sequences
 from cns_drake.route import make_lane_path

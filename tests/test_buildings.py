@@ -29,7 +29,7 @@ from cns_drake.city.buildings.site import (
     HEAD_ROOM_M,
     Site,
 )
-from cns_drake.city.structures import MeshShape
+from cns_drake.city.geometry.structures import MeshShape
 
 NAMES = sorted(ARCHETYPES)
 ANY_OUTLINE = [name for name in NAMES if ARCHETYPES[name].any_outline]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cns_drake.city.centreline import Centreline, blend, sample_stations
+from cns_drake.city.roads.centreline import Centreline, blend, sample_stations
 
 
 def test_rounded_corner_is_line_arc_line():

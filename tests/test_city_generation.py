@@ -17,8 +17,8 @@ from shipped_cities import (
 import yaml
 
 from cns_drake.city.generate import TABLE_NAME, render_city
+from cns_drake.city.ground.streets import GROUND_TAG
 from cns_drake.city.stages import load_stages
-from cns_drake.city.streets import GROUND_TAG
 from cns_drake.semantics import CLASS_IDS
 
 MEGABYTE = 1_000_000

@@ -9,7 +9,7 @@ from small_city import PLAN, ROADS
 
 from cns_drake.city.layout import City, lay_out, make_city
 from cns_drake.city.plan import load_plan
-from cns_drake.city.road_network import RoadNetwork, load_road_network
+from cns_drake.city.roads.network import RoadNetwork, load_road_network
 from cns_drake.errors import InputError
 
 

@@ -7,7 +7,7 @@ from shapely.affinity import rotate
 from shapely.geometry import Point, box
 from shapely.ops import unary_union
 
-from cns_drake.city.polygons import (
+from cns_drake.city.geometry.polygons import (
     polygons_of,
     snap,
     surface_mesh,

@@ -8,9 +8,9 @@ import shapely
 from shapely.geometry import LineString, Point, box
 from shipped_cities import city, world_of
 
-from cns_drake.city.object_parts import part_triangles
-from cns_drake.city.road_network import load_road_network
-from cns_drake.city.streets import GROUND_TAG
+from cns_drake.city.geometry.object_parts import part_triangles
+from cns_drake.city.ground.streets import GROUND_TAG
+from cns_drake.city.roads.network import load_road_network
 
 WATER = -2.8
 # From bank to bank; the quays are at y = -131 and -197.

@@ -7,9 +7,8 @@ import pytest
 from shapely.geometry import box
 from shipped_cities import parse_strictly
 
-from cns_drake.city.mesh import box_mesh
-from cns_drake.city.sdf import stage_sdf
-from cns_drake.city.structures import (
+from cns_drake.city.geometry.mesh import box_mesh
+from cns_drake.city.geometry.structures import (
     BoxShape,
     CylinderShape,
     MeshShape,
@@ -18,6 +17,7 @@ from cns_drake.city.structures import (
     SphereShape,
     Structure,
 )
+from cns_drake.city.sdf import stage_sdf
 
 PARTS = (
     Part("a_box", BoxShape((1.0, 2.0, 3.0)), (1, 2, 3), (0.1, -0.2, 0.3)),

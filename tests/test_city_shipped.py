@@ -9,9 +9,9 @@ from shapely.affinity import affine_transform
 from shapely.strtree import STRtree
 from shipped_cities import PLANS, city, world_of
 
-from cns_drake.city.object_parts import HEADROOM, part_triangles
-from cns_drake.city.road_network import load_road_network
-from cns_drake.city.streets import GROUND_TAG
+from cns_drake.city.geometry.object_parts import HEADROOM, part_triangles
+from cns_drake.city.ground.streets import GROUND_TAG
+from cns_drake.city.roads.network import load_road_network
 from cns_drake.semantics import CLASS_IDS
 
 # Parts may reach this far outside a footprint: plinths, pilasters, steps.

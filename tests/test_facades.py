@@ -7,8 +7,8 @@ import pytest
 from shapely.geometry import Polygon
 from winding import winding_numbers
 
-from cns_drake.city import massing
-from cns_drake.city.facades import (
+from cns_drake.city.buildings import massing
+from cns_drake.city.buildings.facades import (
     Arch,
     Band,
     Facade,
@@ -16,7 +16,7 @@ from cns_drake.city.facades import (
     facade_mesh,
     glass_mesh,
 )
-from cns_drake.city.mesh import merge_meshes
+from cns_drake.city.geometry.mesh import merge_meshes
 
 # A rectangle turned by 30 degrees and moved off the origin.
 _C, _S = math.cos(math.pi / 6), math.sin(math.pi / 6)

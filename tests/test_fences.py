@@ -2,9 +2,9 @@ from mesh_checks import first_hit, is_closed, solids, surface_points
 import numpy as np
 import pytest
 
-from cns_drake.city.fences import RUN_KINDS
+from cns_drake.city.furniture.fences import RUN_KINDS
+from cns_drake.city.geometry.structures import MeshShape
 from cns_drake.city.objects import OBJECTS
-from cns_drake.city.structures import MeshShape
 
 LENGTHS = (1.3, 5.0, 12.4, 37.0)
 

@@ -2,14 +2,19 @@ import numpy as np
 import pytest
 from shapely.geometry import box
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays, dormers, family_house, outlines
+from cns_drake.city.buildings import (
+    bays,
+    dormers,
+    family_house,
+    massing,
+    outlines,
+)
+from cns_drake.city.buildings.facades import Arch, Patch
 from cns_drake.city.buildings.materials import Materials
 from cns_drake.city.buildings.openings import Openings, free_stretches
 from cns_drake.city.buildings.site import Assembly, Site
 from cns_drake.city.buildings.wings import Roof, Wing, add_roof
-from cns_drake.city.facades import Arch, Patch
-from cns_drake.city.mesh import box_mesh
+from cns_drake.city.geometry.mesh import box_mesh
 
 HALL = Wing.at(0, 0, 20, 8, 6.0, 9.0, Roof())
 # Stands against the middle of the hall's front, lower than its walls.

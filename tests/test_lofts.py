@@ -2,7 +2,7 @@ from mesh_checks import is_closed, out_of_plane, volume
 import numpy as np
 import pytest
 
-from cns_drake.city.lofts import (
+from cns_drake.city.geometry.lofts import (
     along_x,
     along_y,
     beam,

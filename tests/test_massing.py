@@ -6,10 +6,9 @@ import pytest
 from shapely.geometry import Point, Polygon, box
 from winding import winding_numbers
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import details, outlines
+from cns_drake.city.buildings import details, massing, outlines
 from cns_drake.city.buildings.helix import ramp_turn
-from cns_drake.city.mesh import merge_meshes
+from cns_drake.city.geometry.mesh import merge_meshes
 
 _C, _S = math.cos(0.7), math.sin(0.7)
 # A rectangle of 14 m by 9 m, turned by 0.7 rad.

@@ -3,8 +3,8 @@ import numpy as np
 import pytest
 from shapely.geometry import MultiPoint, Point
 
-from cns_drake.city.mesh import box_mesh
-from cns_drake.city.object_parts import (
+from cns_drake.city.geometry.mesh import box_mesh
+from cns_drake.city.geometry.object_parts import (
     HEADROOM,
     ROOT_DEPTH,
     assemble,
@@ -13,7 +13,7 @@ from cns_drake.city.object_parts import (
     post,
     rotation,
 )
-from cns_drake.city.structures import (
+from cns_drake.city.geometry.structures import (
     CylinderShape,
     MeshShape,
     Part,

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from shapely.geometry import MultiPoint
 
-from cns_drake.city.fences import RUN_KINDS
+from cns_drake.city.furniture.fences import RUN_KINDS
+from cns_drake.city.geometry.structures import MeshShape
 from cns_drake.city.objects import OBJECTS
-from cns_drake.city.structures import MeshShape
-from cns_drake.city.tree_species import SPECIES
-from cns_drake.city.vegetation import tree_meshes
+from cns_drake.city.plants.tree_species import SPECIES
+from cns_drake.city.plants.vegetation import tree_meshes
 from cns_drake.semantics import CLASS_IDS
 
 SEEDS = range(6)

@@ -2,9 +2,9 @@ from mesh_checks import first_hit, is_closed, solids
 import numpy as np
 import pytest
 
+from cns_drake.city.furniture.parked_cars import FORMS, vehicle_meshes
+from cns_drake.city.geometry.structures import MeshShape
 from cns_drake.city.objects import OBJECTS
-from cns_drake.city.parked_cars import FORMS, vehicle_meshes
-from cns_drake.city.structures import MeshShape
 
 # Length, width without mirrors, height of real vehicles of the kind [m].
 SIZES = {

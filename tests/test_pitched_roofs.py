@@ -5,8 +5,7 @@ from mesh_checks import is_closed, out_of_plane, volume
 import numpy as np
 import pytest
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import pitched_roofs
+from cns_drake.city.buildings import massing, pitched_roofs
 from cns_drake.city.buildings.pitched_roofs import Hole
 
 LINES = {

@@ -7,8 +7,8 @@ import pytest
 from shapely.geometry import LineString, Point
 import yaml
 
-from cns_drake.city.road import LaneRef
-from cns_drake.city.road_network import load_road_network
+from cns_drake.city.roads.network import load_road_network
+from cns_drake.city.roads.road import LaneRef
 from cns_drake.errors import InputError
 from cns_drake.paths import worlds_folder
 

@@ -4,7 +4,7 @@ import numpy as np
 from pydantic import ValidationError
 import pytest
 
-from cns_drake.city.road_network import load_road_network
+from cns_drake.city.roads.network import load_road_network
 from cns_drake.errors import InputError
 from cns_drake.paths import worlds_folder
 from cns_drake.route import Route, make_lane_path

@@ -6,8 +6,8 @@ import pytest
 from scipy.spatial import cKDTree
 from shapely import contains, distance, linestrings, points, polygons, prepare
 
-from cns_drake.city.road_network import load_road_network
-from cns_drake.city.road_surface import RoadSurface
+from cns_drake.city.roads.network import load_road_network
+from cns_drake.city.roads.surface import RoadSurface
 from cns_drake.frame_clock import FRAME_PERIOD, frames_within
 from cns_drake.paths import shipped_sequences
 from cns_drake.planning import plan_drive

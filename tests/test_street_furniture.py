@@ -2,9 +2,9 @@ from mesh_checks import is_closed, solids, surface_points
 import numpy as np
 import pytest
 
+from cns_drake.city.furniture.street_furniture import STREET_FURNITURE
+from cns_drake.city.geometry.structures import MeshShape
 from cns_drake.city.objects import OBJECTS
-from cns_drake.city.street_furniture import STREET_FURNITURE
-from cns_drake.city.structures import MeshShape
 
 SOLID = [
     *STREET_FURNITURE,

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from shapely.geometry import LineString, Point, Polygon
 
-from cns_drake.city.road_network import load_road_network
-from cns_drake.city.road_surface import RoadSurface
+from cns_drake.city.roads.network import load_road_network
+from cns_drake.city.roads.surface import RoadSurface
 from cns_drake.paths import shipped_maps
 
 # Figures of CARLA's towns: extents of the centrelines in x and y [m], length

@@ -4,10 +4,10 @@ from mesh_checks import first_hit, out_of_plane, surface_points
 import numpy as np
 import pytest
 
+from cns_drake.city.geometry.structures import MeshShape
 from cns_drake.city.objects import OBJECTS
-from cns_drake.city.structures import MeshShape
-from cns_drake.city.tree_species import SPECIES
-from cns_drake.city.vegetation import STREET_TREES, tree_meshes
+from cns_drake.city.plants.tree_species import SPECIES
+from cns_drake.city.plants.vegetation import STREET_TREES, tree_meshes
 
 VARIANTS = [
     (name, variant)

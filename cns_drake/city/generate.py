@@ -9,10 +9,10 @@ import os
 from pathlib import Path
 import tempfile
 
+from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.layout import City, make_city
 from cns_drake.city.sdf import MESH_FOLDER, stage_sdf
 from cns_drake.city.stages import load_stages
-from cns_drake.city.structures import Structure
 from cns_drake.errors import InputError
 from cns_drake.semantics import CLASS_IDS
 

@@ -8,26 +8,26 @@ from pathlib import Path
 
 from shapely.ops import unary_union
 
-from cns_drake.city.bridges import bridge_structures
-from cns_drake.city.building_rows import place_buildings
 from cns_drake.city.buildings import ARCHETYPES
-from cns_drake.city.districts import share_out
-from cns_drake.city.draft import Draft
-from cns_drake.city.ground import GroundShape, ground_structures
-from cns_drake.city.junction_furniture import furnish_junctions
-from cns_drake.city.markings import marking_structure
-from cns_drake.city.mesh import Mesh
+from cns_drake.city.geometry.mesh import Mesh
+from cns_drake.city.geometry.structures import Structure
+from cns_drake.city.ground.bridges import bridge_structures
+from cns_drake.city.ground.markings import marking_structure
+from cns_drake.city.ground.streets import street_structures
+from cns_drake.city.ground.terrain import GroundShape, ground_structures
 from cns_drake.city.objects import OBJECTS
-from cns_drake.city.open_ground import furnish
-from cns_drake.city.plan import CityPlan, DistrictPlan, load_plan
-from cns_drake.city.road_network import RoadNetwork, load_road_network
-from cns_drake.city.sidewalks import (
+from cns_drake.city.placement.building_rows import place_buildings
+from cns_drake.city.placement.districts import share_out
+from cns_drake.city.placement.draft import Draft
+from cns_drake.city.placement.junction_furniture import furnish_junctions
+from cns_drake.city.placement.open_ground import furnish
+from cns_drake.city.placement.sidewalks import (
     furnish_sidewalks,
     park_along_streets,
     plant_medians,
 )
-from cns_drake.city.streets import street_structures
-from cns_drake.city.structures import Structure
+from cns_drake.city.plan import CityPlan, DistrictPlan, load_plan
+from cns_drake.city.roads.network import RoadNetwork, load_road_network
 from cns_drake.errors import InputError
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from xml.sax.saxutils import quoteattr
 
-from cns_drake.city.structures import (
+from cns_drake.city.geometry.structures import (
     BoxShape,
     CylinderShape,
     MeshShape,

@@ -16,7 +16,7 @@ from shapely.geometry import Polygon
 
 from cns_drake.city.buildings import stocks
 from cns_drake.city.buildings.site import Archetype, Site
-from cns_drake.city.structures import Model
+from cns_drake.city.geometry.structures import Model
 
 # By their names; maps share some of them.
 ARCHETYPES: dict[str, Archetype] = {

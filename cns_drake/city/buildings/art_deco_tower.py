@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays, details, outlines, tiers
+from cns_drake.city.buildings import bays, details, massing, outlines, tiers
+from cns_drake.city.buildings.facades import Band, Facade
 from cns_drake.city.buildings.site import Archetype, Assembly, Site
-from cns_drake.city.facades import Band, Facade
-from cns_drake.city.mesh import merge_meshes
-from cns_drake.city.structures import Model
+from cns_drake.city.geometry.mesh import merge_meshes
+from cns_drake.city.geometry.structures import Model
 
 _STONES = ((0.76, 0.70, 0.60), (0.68, 0.64, 0.58), (0.70, 0.58, 0.48))
 

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays, details, tiers
+from cns_drake.city.buildings import bays, details, massing, tiers
+from cns_drake.city.buildings.facades import Band, Facade, facade_mesh
 from cns_drake.city.buildings.roof_equipment import equip_roof
 from cns_drake.city.buildings.site import Archetype, Assembly, Site, pick
-from cns_drake.city.facades import Band, Facade, facade_mesh
-from cns_drake.city.mesh import merge_meshes
-from cns_drake.city.structures import MeshShape, Model
+from cns_drake.city.geometry.mesh import merge_meshes
+from cns_drake.city.geometry.structures import MeshShape, Model
 
 _BANDS = (
     (0.84, 0.84, 0.82),

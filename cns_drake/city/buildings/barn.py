@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays, details, porches, wings
+from cns_drake.city.buildings import bays, details, massing, porches, wings
+from cns_drake.city.buildings.facades import Band, Patch
 from cns_drake.city.buildings.materials import Materials
 from cns_drake.city.buildings.openings import Openings, free_stretches
 from cns_drake.city.buildings.site import (
@@ -18,9 +18,8 @@ from cns_drake.city.buildings.site import (
     pick,
 )
 from cns_drake.city.buildings.wings import Roof, Wing
-from cns_drake.city.facades import Band, Patch
-from cns_drake.city.mesh import Mesh
-from cns_drake.city.structures import Model
+from cns_drake.city.geometry.mesh import Mesh
+from cns_drake.city.geometry.structures import Model
 
 _BOARDS = (
     (0.50, 0.22, 0.18),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from cns_drake.city.facades import Arch, Layout, Patch, Relief
+from cns_drake.city.buildings.facades import Arch, Layout, Patch, Relief
 
 Bay = Callable[[float, float], list[Relief]]
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from cns_drake.city.buildings import bays, details, tiers
+from cns_drake.city.buildings.facades import Band, Facade
 from cns_drake.city.buildings.roof_equipment import equip_roof
 from cns_drake.city.buildings.site import Archetype, Assembly, Site
-from cns_drake.city.facades import Band, Facade
-from cns_drake.city.structures import MeshShape, Model
+from cns_drake.city.geometry.structures import MeshShape, Model
 
 _BRICKS = (
     (0.56, 0.33, 0.27),

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.city import massing
 from cns_drake.city.buildings import (
     family_house,
     house_walls,
+    massing,
     porches,
 )
 from cns_drake.city.buildings.family_house import ROOF_M
@@ -22,7 +22,7 @@ from cns_drake.city.buildings.site import (
     pick,
 )
 from cns_drake.city.buildings.wings import Roof, Wing
-from cns_drake.city.structures import Model
+from cns_drake.city.geometry.structures import Model
 
 # Kept free around the walls, for wide eaves [m].
 _MARGIN = 0.75

@@ -7,8 +7,8 @@ import math
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays, details, tiers
+from cns_drake.city.buildings import bays, details, massing, tiers
+from cns_drake.city.buildings.facades import Band, Facade
 from cns_drake.city.buildings.helix import ramp_turn
 from cns_drake.city.buildings.site import (
     FOUNDATION_M,
@@ -16,9 +16,8 @@ from cns_drake.city.buildings.site import (
     Assembly,
     Site,
 )
-from cns_drake.city.facades import Band, Facade
-from cns_drake.city.mesh import Mesh, merge_meshes
-from cns_drake.city.structures import MeshShape, Model
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+from cns_drake.city.geometry.structures import MeshShape, Model
 
 _SLAB_M = 0.32
 _STAIR_RISE_M = 3.0

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays, wings
+from cns_drake.city.buildings import bays, massing, wings
+from cns_drake.city.buildings.facades import Band
 from cns_drake.city.buildings.materials import Materials
 from cns_drake.city.buildings.openings import Openings, free_stretches
 from cns_drake.city.buildings.site import (
@@ -18,9 +18,8 @@ from cns_drake.city.buildings.site import (
     pick,
 )
 from cns_drake.city.buildings.wings import Roof, Wing
-from cns_drake.city.facades import Band
-from cns_drake.city.mesh import Mesh, merge_meshes
-from cns_drake.city.structures import Model
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+from cns_drake.city.geometry.structures import Model
 
 _WALLS = (
     (0.90, 0.89, 0.86),

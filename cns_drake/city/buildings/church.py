@@ -7,17 +7,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 from shapely.geometry import box
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays, details, tiers
+from cns_drake.city.buildings import bays, details, massing, tiers
+from cns_drake.city.buildings.facades import (
+    Arch,
+    Band,
+    Facade,
+    facade_mesh,
+    glass_mesh,
+)
 from cns_drake.city.buildings.site import (
     FOUNDATION_M,
     Archetype,
     Assembly,
     Site,
 )
-from cns_drake.city.facades import Arch, Band, Facade, facade_mesh, glass_mesh
-from cns_drake.city.mesh import Mesh, merge_meshes
-from cns_drake.city.structures import Model
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+from cns_drake.city.geometry.structures import Model
 
 _STONES = ((0.66, 0.61, 0.53), (0.56, 0.36, 0.30), (0.62, 0.62, 0.60))
 

@@ -6,13 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays, details, outlines, tiers
+from cns_drake.city.buildings import bays, details, massing, outlines, tiers
+from cns_drake.city.buildings.facades import Band, Facade
 from cns_drake.city.buildings.roof_equipment import equip_roof
 from cns_drake.city.buildings.site import Archetype, Assembly, Site
-from cns_drake.city.facades import Band, Facade
-from cns_drake.city.mesh import Mesh, merge_meshes
-from cns_drake.city.structures import Model
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+from cns_drake.city.geometry.structures import Model
 
 _STUCCOS = ((0.84, 0.78, 0.66), (0.76, 0.66, 0.56), (0.82, 0.80, 0.76))
 

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays, details, outlines, tiers
+from cns_drake.city.buildings import bays, details, massing, outlines, tiers
+from cns_drake.city.buildings.facades import Band, Facade
 from cns_drake.city.buildings.site import Archetype, Assembly, Site
-from cns_drake.city.facades import Band, Facade
-from cns_drake.city.mesh import Mesh, merge_meshes
-from cns_drake.city.structures import MeshShape, Model
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+from cns_drake.city.geometry.structures import MeshShape, Model
 
 _RENDERS = ((0.80, 0.70, 0.55), (0.70, 0.45, 0.38), (0.78, 0.76, 0.70))
 _SLATES = ((0.33, 0.35, 0.40), (0.45, 0.30, 0.26))

@@ -16,7 +16,7 @@ from cns_drake.city.buildings.family_house import ROOF_M, STOREY_M
 from cns_drake.city.buildings.roof_equipment import add_chimney
 from cns_drake.city.buildings.site import Archetype, Assembly, Site, pick
 from cns_drake.city.buildings.wings import Roof, Wing
-from cns_drake.city.structures import Model
+from cns_drake.city.geometry.structures import Model
 
 # Kept free around the walls, for eaves and chimneys [m].
 _MARGIN = 0.5

@@ -12,10 +12,9 @@ import math
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays
+from cns_drake.city.buildings import bays, massing
 from cns_drake.city.buildings.site import FOUNDATION_M
-from cns_drake.city.mesh import Mesh, box_mesh, merge_meshes
+from cns_drake.city.geometry.mesh import Mesh, box_mesh, merge_meshes
 
 # Height that the shared flight of fire stairs climbs; parts scale it [m].
 FIRE_STAIRS_STOREY_M = 3.4

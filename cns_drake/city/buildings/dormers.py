@@ -8,7 +8,7 @@ from cns_drake.city.buildings import bays, details, pitched_roofs
 from cns_drake.city.buildings.materials import Materials
 from cns_drake.city.buildings.pitched_roofs import Hole
 from cns_drake.city.buildings.wings import Wing
-from cns_drake.city.mesh import Mesh, merge_meshes
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 _THICKNESS = 0.14
 # What the dormer's walls and roof reach into the slope behind them [m].

@@ -6,8 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays, details, pitched_roofs
+from cns_drake.city.buildings import bays, details, massing, pitched_roofs
+from cns_drake.city.buildings.facades import (
+    Band,
+    Facade,
+    facade_mesh,
+    glass_mesh,
+)
 from cns_drake.city.buildings.materials import Materials
 from cns_drake.city.buildings.porches import add_railing
 from cns_drake.city.buildings.site import (
@@ -17,9 +22,8 @@ from cns_drake.city.buildings.site import (
     Site,
     pick,
 )
-from cns_drake.city.facades import Band, Facade, facade_mesh, glass_mesh
-from cns_drake.city.mesh import Mesh
-from cns_drake.city.structures import Model
+from cns_drake.city.geometry.mesh import Mesh
+from cns_drake.city.geometry.structures import Model
 
 _CONCRETES = ((0.70, 0.69, 0.67), (0.62, 0.62, 0.60), (0.74, 0.71, 0.64))
 _STEELS = ((0.30, 0.42, 0.38), (0.46, 0.28, 0.24), (0.40, 0.44, 0.50))

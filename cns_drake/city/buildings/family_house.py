@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from cns_drake.city.buildings import house_walls, wings
+from cns_drake.city.buildings.facades import Band
 from cns_drake.city.buildings.materials import Materials
 from cns_drake.city.buildings.openings import Openings
 from cns_drake.city.buildings.site import Assembly, Rgb
 from cns_drake.city.buildings.wings import Roof, Wing
-from cns_drake.city.facades import Band
 
 WALLS = (
     (0.86, 0.84, 0.78),

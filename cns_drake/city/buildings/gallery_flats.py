@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays, details, tiers
+from cns_drake.city.buildings import bays, details, massing, tiers
+from cns_drake.city.buildings.facades import Band, Facade
 from cns_drake.city.buildings.roof_equipment import equip_roof
 from cns_drake.city.buildings.site import (
     FOUNDATION_M,
@@ -16,9 +16,8 @@ from cns_drake.city.buildings.site import (
     Site,
     pick,
 )
-from cns_drake.city.facades import Band, Facade
-from cns_drake.city.mesh import Mesh, merge_meshes
-from cns_drake.city.structures import Model
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+from cns_drake.city.geometry.structures import Model
 
 _CONCRETES = ((0.74, 0.73, 0.70), (0.80, 0.77, 0.70), (0.66, 0.67, 0.68))
 _PANELS = (

@@ -6,14 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.city import massing
 from cns_drake.city.buildings import (
     bays,
     details,
     family_house,
     house_walls,
+    massing,
     wings,
 )
+from cns_drake.city.buildings.facades import Band
 from cns_drake.city.buildings.family_house import ROOF_M
 from cns_drake.city.buildings.openings import Openings
 from cns_drake.city.buildings.roof_equipment import add_chimney
@@ -25,9 +26,8 @@ from cns_drake.city.buildings.site import (
     pick,
 )
 from cns_drake.city.buildings.wings import Roof, Wing
-from cns_drake.city.facades import Band
-from cns_drake.city.mesh import merge_meshes
-from cns_drake.city.structures import MeshShape, Model
+from cns_drake.city.geometry.mesh import merge_meshes
+from cns_drake.city.geometry.structures import MeshShape, Model
 
 _MARGIN = 0.5
 _FLOOR = 0.3

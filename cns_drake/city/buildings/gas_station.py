@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays, wings
+from cns_drake.city.buildings import bays, massing, wings
+from cns_drake.city.buildings.facades import Band
 from cns_drake.city.buildings.materials import Materials
 from cns_drake.city.buildings.openings import Openings
 from cns_drake.city.buildings.roof_equipment import equip_roof
@@ -19,9 +19,8 @@ from cns_drake.city.buildings.site import (
     pick,
 )
 from cns_drake.city.buildings.wings import Roof, Wing
-from cns_drake.city.facades import Band
-from cns_drake.city.mesh import Mesh, merge_meshes
-from cns_drake.city.structures import Model
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+from cns_drake.city.geometry.structures import Model
 
 _BRANDS = (
     (0.74, 0.20, 0.16),

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays, details, outlines, tiers
+from cns_drake.city.buildings import bays, details, massing, outlines, tiers
+from cns_drake.city.buildings.facades import Band, Facade
 from cns_drake.city.buildings.roof_equipment import equip_roof
 from cns_drake.city.buildings.site import Archetype, Assembly, Site, pick
-from cns_drake.city.facades import Band, Facade
-from cns_drake.city.structures import Model
+from cns_drake.city.geometry.structures import Model
 
 _CLADDINGS = (
     (0.80, 0.78, 0.74),

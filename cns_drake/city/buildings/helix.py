@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from cns_drake.city.mesh import Mesh
+from cns_drake.city.geometry.mesh import Mesh
 
 _SEGMENTS = 24
 _PARAPET_THICKNESS_M = 0.2

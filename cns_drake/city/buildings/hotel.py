@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays, details, outlines, tiers
+from cns_drake.city.buildings import bays, details, massing, outlines, tiers
+from cns_drake.city.buildings.facades import Band, Facade
 from cns_drake.city.buildings.roof_equipment import equip_roof
 from cns_drake.city.buildings.site import (
     FOUNDATION_M,
@@ -15,9 +15,8 @@ from cns_drake.city.buildings.site import (
     Assembly,
     Site,
 )
-from cns_drake.city.facades import Band, Facade
-from cns_drake.city.mesh import merge_meshes
-from cns_drake.city.structures import Model
+from cns_drake.city.geometry.mesh import merge_meshes
+from cns_drake.city.geometry.structures import Model
 
 _PAINTS = ((0.86, 0.83, 0.77), (0.80, 0.72, 0.62), (0.72, 0.75, 0.76))
 _FORECOURT_M = 7.0

@@ -6,12 +6,11 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays, porches
+from cns_drake.city.buildings import bays, massing, porches
+from cns_drake.city.buildings.facades import Patch, Relief
 from cns_drake.city.buildings.materials import Materials
 from cns_drake.city.buildings.openings import Openings
 from cns_drake.city.buildings.wings import Wing
-from cns_drake.city.facades import Patch, Relief
 
 # Depths of windows and of the leaves of doors behind the wall [m].
 GLASS_M, DOOR_M = 0.12, 0.2

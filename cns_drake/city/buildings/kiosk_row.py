@@ -6,14 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.city import massing
 from cns_drake.city.buildings import (
     bays,
     details,
+    massing,
     pitched_roofs,
     porches,
     wings,
 )
+from cns_drake.city.buildings.facades import Band, Patch
 from cns_drake.city.buildings.materials import Materials
 from cns_drake.city.buildings.openings import Openings
 from cns_drake.city.buildings.site import (
@@ -24,8 +25,7 @@ from cns_drake.city.buildings.site import (
     pick,
 )
 from cns_drake.city.buildings.wings import Roof, Wing
-from cns_drake.city.facades import Band, Patch
-from cns_drake.city.structures import Model
+from cns_drake.city.geometry.structures import Model
 
 _STALLS = (
     (0.30, 0.42, 0.36),

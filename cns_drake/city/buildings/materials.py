@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from cns_drake.city.buildings.site import Assembly, Rgb
-from cns_drake.city.mesh import Mesh, merge_meshes
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 
 class Materials:

@@ -7,8 +7,8 @@ import math
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays, details, tiers, wings
+from cns_drake.city.buildings import bays, details, massing, tiers, wings
+from cns_drake.city.buildings.facades import Band, Facade
 from cns_drake.city.buildings.materials import Materials
 from cns_drake.city.buildings.openings import Openings
 from cns_drake.city.buildings.site import (
@@ -19,9 +19,8 @@ from cns_drake.city.buildings.site import (
     pick,
 )
 from cns_drake.city.buildings.wings import Roof, Wing
-from cns_drake.city.facades import Band, Facade
-from cns_drake.city.mesh import Mesh
-from cns_drake.city.structures import Model
+from cns_drake.city.geometry.mesh import Mesh
+from cns_drake.city.geometry.structures import Model
 
 _BRICKS = ((0.54, 0.33, 0.27), (0.48, 0.30, 0.25), (0.62, 0.45, 0.35))
 _ROOFS = ((0.36, 0.36, 0.38), (0.44, 0.30, 0.25), (0.42, 0.44, 0.44))

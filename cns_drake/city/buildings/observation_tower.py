@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays, details, tiers
+from cns_drake.city.buildings import bays, details, massing, tiers
+from cns_drake.city.buildings.facades import Band, Facade
 from cns_drake.city.buildings.site import Archetype, Assembly, Site
-from cns_drake.city.facades import Band, Facade
-from cns_drake.city.mesh import merge_meshes
-from cns_drake.city.structures import Model
+from cns_drake.city.geometry.mesh import merge_meshes
+from cns_drake.city.geometry.structures import Model
 
 _SIDES = 16
 

@@ -5,12 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 import itertools
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays
-from cns_drake.city.buildings.materials import Materials
-from cns_drake.city.buildings.site import FOUNDATION_M
-from cns_drake.city.buildings.wings import Wing
-from cns_drake.city.facades import (
+from cns_drake.city.buildings import bays, massing
+from cns_drake.city.buildings.facades import (
     Arch,
     Band,
     Facade,
@@ -19,6 +15,9 @@ from cns_drake.city.facades import (
     facade_mesh,
     glass_mesh,
 )
+from cns_drake.city.buildings.materials import Materials
+from cns_drake.city.buildings.site import FOUNDATION_M
+from cns_drake.city.buildings.wings import Wing
 
 
 def free_stretches(

@@ -8,8 +8,14 @@ import math
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays, details, pitched_roofs, tiers
+from cns_drake.city.buildings import (
+    bays,
+    details,
+    massing,
+    pitched_roofs,
+    tiers,
+)
+from cns_drake.city.buildings.facades import Band, Facade, glass_mesh
 from cns_drake.city.buildings.materials import Materials
 from cns_drake.city.buildings.porches import add_railing
 from cns_drake.city.buildings.site import (
@@ -19,9 +25,8 @@ from cns_drake.city.buildings.site import (
     Site,
     pick,
 )
-from cns_drake.city.facades import Band, Facade, glass_mesh
-from cns_drake.city.mesh import merge_meshes
-from cns_drake.city.structures import Model
+from cns_drake.city.geometry.mesh import merge_meshes
+from cns_drake.city.geometry.structures import Model
 
 _TIMBERS = ((0.88, 0.87, 0.83), (0.44, 0.34, 0.26), (0.34, 0.42, 0.38))
 _ROOFS = ((0.34, 0.46, 0.42), (0.44, 0.28, 0.23), (0.36, 0.37, 0.40))

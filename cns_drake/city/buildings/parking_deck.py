@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays, details, tiers
+from cns_drake.city.buildings import bays, details, massing, tiers
+from cns_drake.city.buildings.facades import Band, Facade
 from cns_drake.city.buildings.site import (
     FOUNDATION_M,
     Archetype,
@@ -15,9 +15,8 @@ from cns_drake.city.buildings.site import (
     Site,
     pick,
 )
-from cns_drake.city.facades import Band, Facade
-from cns_drake.city.mesh import Mesh, merge_meshes
-from cns_drake.city.structures import MeshShape, Model
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+from cns_drake.city.geometry.structures import MeshShape, Model
 
 _CONCRETES = ((0.72, 0.71, 0.69), (0.64, 0.63, 0.61), (0.78, 0.76, 0.70))
 _SCREENS = (

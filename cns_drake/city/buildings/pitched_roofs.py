@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.mesh import Mesh, merge_meshes
+from cns_drake.city.buildings import massing
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 Line = Sequence[tuple[float, float]]
 

@@ -12,19 +12,18 @@ import math
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays, details, pitched_roofs
-from cns_drake.city.buildings.materials import Materials
-from cns_drake.city.buildings.site import FOUNDATION_M, Assembly, Rgb
-from cns_drake.city.facades import (
+from cns_drake.city.buildings import bays, details, massing, pitched_roofs
+from cns_drake.city.buildings.facades import (
     Band,
     Facade,
     Relief,
     facade_mesh,
     glass_mesh,
 )
-from cns_drake.city.mesh import Mesh, merge_meshes
-from cns_drake.city.structures import MeshShape
+from cns_drake.city.buildings.materials import Materials
+from cns_drake.city.buildings.site import FOUNDATION_M, Assembly, Rgb
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+from cns_drake.city.geometry.structures import MeshShape
 
 _POST_M = 0.16
 # Length of the shared panel of railing [m].

@@ -13,10 +13,10 @@ import math
 import numpy as np
 from shapely.geometry import Point, Polygon
 
-from cns_drake.city import massing
+from cns_drake.city.buildings import massing
 from cns_drake.city.buildings.site import Assembly, Rgb
-from cns_drake.city.mesh import Mesh, box_mesh, merge_meshes
-from cns_drake.city.structures import MeshShape
+from cns_drake.city.geometry.mesh import Mesh, box_mesh, merge_meshes
+from cns_drake.city.geometry.structures import MeshShape
 
 
 def _ac_unit() -> Mesh:

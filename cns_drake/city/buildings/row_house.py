@@ -11,7 +11,7 @@ from cns_drake.city.buildings.openings import Openings
 from cns_drake.city.buildings.row_unit import RowUnit
 from cns_drake.city.buildings.site import Archetype, Assembly, Site, pick
 from cns_drake.city.buildings.wings import Roof, Wing
-from cns_drake.city.structures import Model
+from cns_drake.city.geometry.structures import Model
 
 _WALLS = (
     *family_house.BRICKS,

@@ -7,21 +7,21 @@ import math
 
 import numpy as np
 
-from cns_drake.city import massing
 from cns_drake.city.buildings import (
     dormers,
     house_walls,
+    massing,
     pitched_roofs,
     porches,
     wings,
 )
+from cns_drake.city.buildings.facades import Band, Patch
 from cns_drake.city.buildings.materials import Materials
 from cns_drake.city.buildings.openings import Openings
 from cns_drake.city.buildings.roof_equipment import add_chimney
 from cns_drake.city.buildings.site import Assembly, Rgb
 from cns_drake.city.buildings.wings import Roof, Wing
-from cns_drake.city.facades import Band, Patch
-from cns_drake.city.mesh import Mesh
+from cns_drake.city.geometry.mesh import Mesh
 
 _ROOF_M = 0.2
 # Party walls rise this far above a roof whose ridge follows the street [m].

@@ -6,8 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays, details, pitched_roofs, tiers, wings
+from cns_drake.city.buildings import (
+    bays,
+    details,
+    massing,
+    pitched_roofs,
+    tiers,
+    wings,
+)
+from cns_drake.city.buildings.facades import Band, Facade
 from cns_drake.city.buildings.materials import Materials
 from cns_drake.city.buildings.openings import Openings
 from cns_drake.city.buildings.roof_equipment import equip_roof
@@ -19,8 +26,7 @@ from cns_drake.city.buildings.site import (
     pick,
 )
 from cns_drake.city.buildings.wings import Roof, Wing
-from cns_drake.city.facades import Band, Facade
-from cns_drake.city.structures import Model
+from cns_drake.city.geometry.structures import Model
 
 _WALLS = ((0.62, 0.42, 0.34), (0.82, 0.76, 0.64), (0.74, 0.72, 0.68))
 _ROOFS = ((0.44, 0.28, 0.23), (0.36, 0.37, 0.40))

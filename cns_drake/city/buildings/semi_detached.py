@@ -6,14 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import family_house, house_walls, porches
+from cns_drake.city.buildings import family_house, house_walls, massing, porches
 from cns_drake.city.buildings.family_house import ROOF_M, STOREY_M
 from cns_drake.city.buildings.openings import Openings
 from cns_drake.city.buildings.roof_equipment import add_chimney
 from cns_drake.city.buildings.site import Archetype, Assembly, Site, pick
 from cns_drake.city.buildings.wings import Roof, Wing
-from cns_drake.city.structures import Model
+from cns_drake.city.geometry.structures import Model
 
 # Kept free around the walls, for eaves [m].
 _MARGIN = 0.5

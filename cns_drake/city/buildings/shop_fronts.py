@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays, details
+from cns_drake.city.buildings import bays, details, massing
 from cns_drake.city.buildings.materials import Materials
 from cns_drake.city.buildings.openings import Openings
 

@@ -14,13 +14,13 @@ from cns_drake.city.buildings import (
     row_unit,
     shop_fronts,
 )
+from cns_drake.city.buildings.facades import Band
 from cns_drake.city.buildings.materials import Materials
 from cns_drake.city.buildings.openings import Openings
 from cns_drake.city.buildings.roof_equipment import equip_roof
 from cns_drake.city.buildings.row_unit import RowUnit
 from cns_drake.city.buildings.site import Archetype, Assembly, Site, pick
-from cns_drake.city.facades import Band
-from cns_drake.city.structures import Model
+from cns_drake.city.geometry.structures import Model
 
 _WALLS = (
     *family_house.BRICKS,

@@ -6,21 +6,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.city import massing
 from cns_drake.city.buildings import (
     bays,
     family_house,
     house_walls,
+    massing,
     shop_fronts,
     wings,
 )
+from cns_drake.city.buildings.facades import Band
 from cns_drake.city.buildings.materials import Materials
 from cns_drake.city.buildings.openings import Openings
 from cns_drake.city.buildings.roof_equipment import equip_roof
 from cns_drake.city.buildings.site import Archetype, Assembly, Site, pick
 from cns_drake.city.buildings.wings import Roof, Wing
-from cns_drake.city.facades import Band
-from cns_drake.city.structures import Model
+from cns_drake.city.geometry.structures import Model
 
 _WALLS = (
     (0.78, 0.74, 0.66),

@@ -6,8 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays, details, pitched_roofs, wings
+from cns_drake.city.buildings import (
+    bays,
+    details,
+    massing,
+    pitched_roofs,
+    wings,
+)
+from cns_drake.city.buildings.facades import Band
 from cns_drake.city.buildings.materials import Materials
 from cns_drake.city.buildings.openings import Openings
 from cns_drake.city.buildings.roof_equipment import equip_roof
@@ -19,9 +25,8 @@ from cns_drake.city.buildings.site import (
     pick,
 )
 from cns_drake.city.buildings.wings import Roof, Wing
-from cns_drake.city.facades import Band
-from cns_drake.city.mesh import Mesh
-from cns_drake.city.structures import Model
+from cns_drake.city.geometry.mesh import Mesh
+from cns_drake.city.geometry.structures import Model
 
 _WALLS = (
     (0.80, 0.76, 0.68),

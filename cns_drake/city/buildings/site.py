@@ -9,9 +9,9 @@ from typing import Any, TypeVar
 import numpy as np
 from shapely.geometry import Polygon
 
-from cns_drake.city import massing
-from cns_drake.city.mesh import Mesh
-from cns_drake.city.structures import MeshShape, Model, Part, Shape
+from cns_drake.city.buildings import massing
+from cns_drake.city.geometry.mesh import Mesh
+from cns_drake.city.geometry.structures import MeshShape, Model, Part, Shape
 
 Rgb = tuple[float, float, float]
 T = TypeVar("T")

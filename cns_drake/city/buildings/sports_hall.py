@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays, pitched_roofs, wings
+from cns_drake.city.buildings import bays, massing, pitched_roofs, wings
+from cns_drake.city.buildings.facades import Band
 from cns_drake.city.buildings.materials import Materials
 from cns_drake.city.buildings.openings import Openings, free_stretches
 from cns_drake.city.buildings.roof_equipment import equip_roof
@@ -20,8 +20,7 @@ from cns_drake.city.buildings.site import (
     pick,
 )
 from cns_drake.city.buildings.wings import Roof, Wing
-from cns_drake.city.facades import Band
-from cns_drake.city.structures import Model
+from cns_drake.city.geometry.structures import Model
 
 _WALLS = ((0.80, 0.78, 0.74), (0.62, 0.44, 0.36), (0.66, 0.70, 0.72))
 _ROOFS = ((0.42, 0.46, 0.50), (0.52, 0.30, 0.24), (0.36, 0.44, 0.40))

@@ -9,7 +9,7 @@ import numpy as np
 from cns_drake.city.buildings import family_house, row_unit
 from cns_drake.city.buildings.row_unit import RowUnit
 from cns_drake.city.buildings.site import Archetype, Assembly, Site, pick
-from cns_drake.city.structures import Model
+from cns_drake.city.geometry.structures import Model
 
 _DOORS = ("accent", "trim", "roof")
 

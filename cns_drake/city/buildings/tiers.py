@@ -8,11 +8,15 @@ import math
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import details
+from cns_drake.city.buildings import details, massing
+from cns_drake.city.buildings.facades import (
+    Band,
+    Facade,
+    facade_mesh,
+    glass_mesh,
+)
 from cns_drake.city.buildings.site import FOUNDATION_M, Assembly
-from cns_drake.city.facades import Band, Facade, facade_mesh, glass_mesh
-from cns_drake.city.mesh import Mesh, merge_meshes
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 # A pane cuts this far into the reveals in front of it, lest rays slip
 # between the two [m].

@@ -7,8 +7,14 @@ import math
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays, details, pitched_roofs, tiers
+from cns_drake.city.buildings import (
+    bays,
+    details,
+    massing,
+    pitched_roofs,
+    tiers,
+)
+from cns_drake.city.buildings.facades import Band, Facade
 from cns_drake.city.buildings.site import (
     FOUNDATION_M,
     Archetype,
@@ -16,9 +22,8 @@ from cns_drake.city.buildings.site import (
     Site,
     pick,
 )
-from cns_drake.city.facades import Band, Facade
-from cns_drake.city.mesh import Mesh, merge_meshes
-from cns_drake.city.structures import Model
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+from cns_drake.city.geometry.structures import Model
 
 _WALLS = ((0.82, 0.77, 0.66), (0.60, 0.40, 0.32), (0.76, 0.72, 0.66))
 _STONE = (0.84, 0.81, 0.74)

@@ -8,8 +8,13 @@ import itertools
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays, details
+from cns_drake.city.buildings import bays, details, massing
+from cns_drake.city.buildings.facades import (
+    Band,
+    Facade,
+    facade_mesh,
+    glass_mesh,
+)
 from cns_drake.city.buildings.site import (
     FOUNDATION_M,
     Archetype,
@@ -17,9 +22,8 @@ from cns_drake.city.buildings.site import (
     Site,
     pick,
 )
-from cns_drake.city.facades import Band, Facade, facade_mesh, glass_mesh
-from cns_drake.city.mesh import Mesh, merge_meshes
-from cns_drake.city.structures import Model
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+from cns_drake.city.geometry.structures import Model
 
 _CONCRETE = (0.66, 0.65, 0.63)
 _STEEL = (0.52, 0.53, 0.55)

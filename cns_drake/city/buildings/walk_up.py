@@ -7,15 +7,16 @@ import itertools
 
 import numpy as np
 
-from cns_drake.city import massing
 from cns_drake.city.buildings import (
     bays,
     details,
     family_house,
+    massing,
     outlines,
     pitched_roofs,
     tiers,
 )
+from cns_drake.city.buildings.facades import Band, Facade
 from cns_drake.city.buildings.roof_equipment import add_chimney, equip_roof
 from cns_drake.city.buildings.site import (
     FOUNDATION_M,
@@ -24,9 +25,8 @@ from cns_drake.city.buildings.site import (
     Site,
     pick,
 )
-from cns_drake.city.facades import Band, Facade
-from cns_drake.city.mesh import Mesh, merge_meshes
-from cns_drake.city.structures import Model
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+from cns_drake.city.geometry.structures import Model
 
 _WALLS = (*family_house.BRICKS, (0.66, 0.50, 0.38), (0.72, 0.62, 0.50))
 

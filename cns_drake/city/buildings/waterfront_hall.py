@@ -7,17 +7,21 @@ import itertools
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays, details
+from cns_drake.city.buildings import bays, details, massing
+from cns_drake.city.buildings.facades import (
+    Band,
+    Facade,
+    facade_mesh,
+    glass_mesh,
+)
 from cns_drake.city.buildings.site import (
     FOUNDATION_M,
     Archetype,
     Assembly,
     Site,
 )
-from cns_drake.city.facades import Band, Facade, facade_mesh, glass_mesh
-from cns_drake.city.mesh import Mesh, merge_meshes
-from cns_drake.city.structures import Model
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+from cns_drake.city.geometry.structures import Model
 
 _WALLS = ((0.60, 0.36, 0.29), (0.62, 0.62, 0.60), (0.70, 0.64, 0.52))
 _ROOFS = ((0.42, 0.44, 0.46), (0.50, 0.33, 0.27), (0.36, 0.42, 0.40))

@@ -12,8 +12,7 @@ import math
 
 import numpy as np
 
-from cns_drake.city import massing
-from cns_drake.city.buildings import bays, details, pitched_roofs
+from cns_drake.city.buildings import bays, details, massing, pitched_roofs
 from cns_drake.city.buildings.materials import Materials
 from cns_drake.city.buildings.pitched_roofs import Hole
 

@@ -1,0 +1,1 @@
+"""What stands on streets, squares and sites, besides plants."""

@@ -1,0 +1,222 @@
+"""Traffic lights and road signs."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from cns_drake.city.geometry.lofts import along_x, along_y, lathe, prism
+from cns_drake.city.geometry.mesh import Mesh, box_mesh, merge_meshes
+from cns_drake.city.geometry.object_parts import (
+    Builder,
+    assemble,
+    bar,
+    block,
+    post,
+)
+from cns_drake.city.geometry.structures import (
+    CylinderShape,
+    MeshShape,
+    Model,
+    Part,
+)
+
+_STEEL = (0.45, 0.47, 0.49)
+_BLACK = (0.12, 0.13, 0.13)
+_RED = (0.75, 0.15, 0.15)
+_BLUE = (0.15, 0.32, 0.65)
+_WHITE = (0.88, 0.88, 0.86)
+_TO_X = (0.0, np.pi / 2, 0.0)
+
+
+def mast_arm_light(
+    rng: np.random.Generator, *, arm: float | None = None
+) -> Model:
+    """Returns a traffic light with a mast arm over the lanes.
+
+    The arm reaches along +x, the signals face +y: traffic that drives
+    towards -y has the mast on its right-hand side.
+
+    Args:
+        rng: draws the arm if it is not given.
+        arm: length of the arm [m].
+    """
+    drawn = float(rng.uniform(5.0, 6.5))
+    arm = drawn if arm is None else arm
+    height = 6.0
+    head = MeshShape("signal_head_3")
+    parts = (
+        post("mast", 0.11, height + 0.3, rgb=_STEEL),
+        bar("arm", (0, 0, height), (arm, 0, height + 0.15), 0.06, _STEEL),
+        Part("signal_0", head, xyz=(arm - 0.3, 0.1, height - 0.35), rgb=_BLACK),
+        Part("signal_1", head, xyz=(0.45 * arm, 0.1, height - 0.4), rgb=_BLACK),
+        Part("signal_2", head, xyz=(0.0, 0.15, 3.0), rgb=_BLACK),
+    )
+    return assemble(parts, {"signal_head_3": _signal_head(3)})
+
+
+def post_light(rng: np.random.Generator) -> Model:
+    """Returns a traffic light on a post; the signals face +y."""
+    height = float(rng.uniform(3.3, 3.6))
+    parts = (
+        post("mast", 0.06, height, rgb=_STEEL),
+        Part(
+            "signal",
+            MeshShape("signal_head_3"),
+            xyz=(0.0, 0.1, height - 0.5),
+            rgb=_BLACK,
+        ),
+    )
+    return assemble(parts, {"signal_head_3": _signal_head(3)})
+
+
+def pedestrian_light(rng: np.random.Generator) -> Model:
+    """Returns a pedestrian light: two lamps and a push button, face +y."""
+    height = float(rng.uniform(2.7, 3.0))
+    parts = (
+        post("mast", 0.05, height, rgb=_STEEL),
+        Part(
+            "signal",
+            MeshShape("signal_head_2"),
+            xyz=(0.0, 0.1, height - 0.4),
+            rgb=_BLACK,
+        ),
+        block("button", (0.12, 0.1, 0.2), (0, 0.08, 1.1), rgb=(0.8, 0.7, 0.2)),
+    )
+    return assemble(parts, {"signal_head_2": _signal_head(2)})
+
+
+def round_sign(rng: np.random.Generator) -> Model:
+    """Returns a round sign that faces +x."""
+    height = float(rng.uniform(2.5, 2.9))
+    rgb = (_RED, _BLUE)[int(rng.integers(2))]
+    plate = Part(
+        "plate",
+        CylinderShape(0.32, 0.03),
+        xyz=(0.05, 0.0, height - 0.32),
+        rpy=_TO_X,
+        rgb=rgb,
+    )
+    return assemble((post("mast", 0.035, height, rgb=_STEEL), plate))
+
+
+def triangular_sign(rng: np.random.Generator) -> Model:
+    """Returns a triangular sign that faces +x."""
+    height = float(rng.uniform(2.6, 3.0))
+    plate = Part(
+        "plate",
+        MeshShape("sign_triangle"),
+        xyz=(0.05, 0.0, height - 0.45),
+        rgb=_RED,
+    )
+    return assemble(
+        (post("mast", 0.035, height, rgb=_STEEL), plate),
+        {"sign_triangle": _plate(3, 0.52)},
+    )
+
+
+def stop_sign(rng: np.random.Generator) -> Model:
+    """Returns an eight-cornered stop sign that faces +x."""
+    height = float(rng.uniform(2.5, 2.9))
+    plate = Part(
+        "plate",
+        MeshShape("sign_octagon"),
+        xyz=(0.05, 0.0, height - 0.4),
+        rgb=_RED,
+    )
+    return assemble(
+        (post("mast", 0.035, height, rgb=_STEEL), plate),
+        {"sign_octagon": _plate(8, 0.4)},
+    )
+
+
+def rectangular_sign(rng: np.random.Generator) -> Model:
+    """Returns a rectangular sign that faces +x."""
+    height = float(rng.uniform(2.6, 3.0))
+    width = float(rng.uniform(0.45, 0.65))
+    tall = float(rng.uniform(0.6, 0.9))
+    return assemble(
+        (
+            post("mast", 0.035, height, rgb=_STEEL),
+            block(
+                "plate",
+                (0.03, width, tall),
+                (0.05, 0, height - 0.5 * tall),
+                rgb=(_BLUE, _WHITE)[int(rng.integers(2))],
+            ),
+        )
+    )
+
+
+def street_name_sign(rng: np.random.Generator) -> Model:
+    """Returns two crossed street name blades on a post."""
+    height = float(rng.uniform(3.0, 3.3))
+    return assemble(
+        (
+            post("mast", 0.03, height, rgb=_STEEL),
+            block(
+                "blade_x", (1.1, 0.03, 0.22), (0.4, 0, height - 0.12), rgb=_BLUE
+            ),
+            block(
+                "blade_y",
+                (0.03, 1.0, 0.22),
+                (0, 0.35, height - 0.36),
+                rgb=_BLUE,
+            ),
+        )
+    )
+
+
+def direction_board(rng: np.random.Generator) -> Model:
+    """Returns a large direction board on two posts; it faces +x."""
+    width = float(rng.uniform(2.4, 3.4))
+    height = 4.6
+    side = 0.35 * width
+    return assemble(
+        (
+            post("mast_0", 0.06, height, (0.0, side), _STEEL),
+            post("mast_1", 0.06, height, (0.0, -side), _STEEL),
+            block("plate", (0.05, width, 1.7), (0.09, 0, 3.75), rgb=_BLUE),
+        )
+    )
+
+
+@cache
+def _signal_head(lamps: int) -> Mesh:
+    """Returns a signal box with its lamps; centred, facing +y."""
+    pitch = 0.3
+    tall = pitch * lamps + 0.08
+    pieces = [
+        box_mesh((0.3, 0.2, tall)),
+        box_mesh((0.52, 0.03, tall + 0.2), (0.0, -0.05, 0.0)),
+    ]
+    for k in range(lamps):
+        hood = lathe([(0.13, 0.0), (0.13, 0.18)], 8)
+        z = (k - (lamps - 1) / 2) * pitch
+        pieces.append(along_y(hood).moved((0.0, 0.09, z)))
+    return merge_meshes(pieces)
+
+
+@cache
+def _plate(corners: int, radius: float) -> Mesh:
+    """Returns a thin regular polygon that faces +x, point or edge up."""
+    start = np.pi / 2 if corners == 3 else np.pi / corners
+    angle = start + 2 * np.pi * np.arange(corners) / corners
+    flat = prism(
+        radius * np.column_stack([np.cos(angle), np.sin(angle)]), -0.015, 0.015
+    )
+    return along_x(flat)
+
+
+TRAFFIC_SIGNALS = {
+    "traffic_light": Builder("pole", mast_arm_light),
+    "traffic_light_post": Builder("pole", post_light),
+    "pedestrian_light": Builder("pole", pedestrian_light),
+    "sign_round": Builder("traffic-sign", round_sign),
+    "sign_triangular": Builder("traffic-sign", triangular_sign),
+    "sign_stop": Builder("traffic-sign", stop_sign),
+    "sign_rectangular": Builder("traffic-sign", rectangular_sign),
+    "sign_street_name": Builder("traffic-sign", street_name_sign),
+    "sign_direction": Builder("traffic-sign", direction_board),
+}

@@ -1,0 +1,1 @@
+"""Meshes, polygons and the structures that are made of them."""

@@ -1,0 +1,172 @@
+"""Parts and footprints of the small objects that stand in a city."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from shapely.geometry import MultiPoint, Polygon
+
+from cns_drake.city.geometry.mesh import Mesh, box_mesh
+from cns_drake.city.geometry.structures import (
+    BoxShape,
+    CylinderShape,
+    MeshShape,
+    Model,
+    Part,
+)
+
+# Posts and trunks reach this far into the ground, so that no gap shows where
+# the ground falls away a little [m].
+ROOT_DEPTH = 0.3
+
+# What hangs above this height (crowns, signs, mast arms) does not claim the
+# ground below it [m].
+HEADROOM = 2.4
+
+_FOOTPRINT_MARGIN = 0.02
+_ROUND_SIDES = 12
+
+
+@dataclass(frozen=True)
+class Builder:
+    """How to make objects of one kind.
+
+    Attributes:
+        semantic_class: a key of `cns_drake.semantics.CLASS_IDS`.
+        build: `build(rng, **parameters) -> Model`; every parameter has a
+            default, most are then drawn from `rng`. The same generator
+            state gives the same model.
+    """
+
+    semantic_class: str
+    build: Callable[..., Model]
+
+
+def post(
+    name: str, radius: float, height: float, xy=(0.0, 0.0), rgb=None
+) -> Part:
+    """Returns an upright cylinder from below the ground to `height` [m]."""
+    return Part(
+        name,
+        CylinderShape(radius, height + ROOT_DEPTH),
+        xyz=(xy[0], xy[1], (height - ROOT_DEPTH) / 2),
+        rgb=rgb,
+    )
+
+
+def bar(name: str, start, end, radius: float, rgb=None) -> Part:
+    """Returns a cylinder between two points [m]."""
+    start, end = np.asarray(start, float), np.asarray(end, float)
+    along = end - start
+    length = float(np.linalg.norm(along))
+    pitch = float(np.arccos(np.clip(along[2] / length, -1, 1)))
+    yaw = float(np.arctan2(along[1], along[0]))
+    return Part(
+        name,
+        CylinderShape(radius, length),
+        xyz=tuple(float(x) for x in (start + end) / 2),
+        rpy=(0.0, pitch, yaw),
+        rgb=rgb,
+    )
+
+
+def block(name: str, size, center, yaw: float = 0.0, rgb=None) -> Part:
+    """Returns a box of the given size about `center` [m]."""
+    return Part(
+        name,
+        BoxShape(tuple(map(float, size))),
+        xyz=tuple(map(float, center)),
+        rpy=(0.0, 0.0, float(yaw)),
+        rgb=rgb,
+    )
+
+
+def single(
+    mesh_name: str,
+    mesh: Mesh,
+    rgb,
+    scale=(1.0, 1.0, 1.0),
+) -> Model:
+    """Returns a model of one mesh."""
+    part = Part("body", MeshShape(mesh_name, tuple(scale)), rgb=rgb)
+    return assemble((part,), {mesh_name: mesh})
+
+
+def assemble(
+    parts: Sequence[Part], meshes: Mapping[str, Mesh] | None = None
+) -> Model:
+    """Returns the model of some parts; its footprint comes from them.
+
+    The footprint is the convex hull of all geometry below `HEADROOM`.
+    """
+    meshes = dict(meshes or {})
+    return Model(tuple(parts), meshes, ground_footprint(parts, meshes))
+
+
+def ground_footprint(
+    parts: Sequence[Part], meshes: Mapping[str, Mesh]
+) -> Polygon:
+    """Returns the convex hull, in S, of what lies below `HEADROOM`."""
+    corners = [np.zeros((0, 2))]
+    for part in parts:
+        p, triangles = part_triangles(part, meshes)
+        corners.append(p[p[:, 2] <= HEADROOM, :2])
+        for i, j in ((0, 1), (1, 2), (2, 0)):
+            a, b = p[triangles[:, i]], p[triangles[:, j]]
+            cut = (a[:, 2] - HEADROOM) * (b[:, 2] - HEADROOM) < 0
+            a, b = a[cut], b[cut]
+            t = (HEADROOM - a[:, 2]) / (b[:, 2] - a[:, 2])
+            corners.append(a[:, :2] + t[:, None] * (b - a)[:, :2])
+    # Millimetres: the last bits of a sine differ from machine to machine.
+    hull = MultiPoint(np.round(np.concatenate(corners), 3)).convex_hull
+    return hull.buffer(_FOOTPRINT_MARGIN, join_style="mitre")
+
+
+def part_triangles(
+    part: Part, meshes: Mapping[str, Mesh]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns a part's (N, 3) vertices in S and (M, 3) triangles.
+
+    Round shapes become the prisms and the octahedra-like hulls that just
+    contain them, so that a footprint made from them is never too small.
+    """
+    shape = part.shape
+    if isinstance(shape, MeshShape):
+        mesh = meshes[shape.mesh]
+        local = mesh.vertices * np.asarray(shape.scale)
+    elif isinstance(shape, BoxShape):
+        mesh = box_mesh(shape.size)
+        local = mesh.vertices
+    elif isinstance(shape, CylinderShape):
+        mesh = _round_mesh(shape.radius, shape.length)
+        local = mesh.vertices
+    else:
+        mesh = _round_mesh(shape.radius, 2 * shape.radius)
+        local = mesh.vertices
+    return local @ rotation(part.rpy).T + part.xyz, mesh.triangles()
+
+
+def rotation(rpy) -> np.ndarray:
+    """Returns R = Rz(yaw) Ry(pitch) Rx(roll), as in SDF."""
+    (cr, sr), (cp, sp), (cy, sy) = ((np.cos(a), np.sin(a)) for a in rpy)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def _round_mesh(radius: float, length: float) -> Mesh:
+    """Returns the prism that just contains an upright cylinder."""
+    angle = 2 * np.pi * np.arange(_ROUND_SIDES) / _ROUND_SIDES
+    ring = radius / np.cos(np.pi / _ROUND_SIDES)
+    x, y = ring * np.cos(angle), ring * np.sin(angle)
+    low = np.column_stack([x, y, np.full(_ROUND_SIDES, -length / 2)])
+    n = _ROUND_SIDES
+    sides = [(k, (k + 1) % n, n + (k + 1) % n, n + k) for k in range(n)]
+    high = low + np.array([0.0, 0.0, length])
+    return Mesh(np.concatenate([low, high]), tuple(sides))

@@ -1,0 +1,1 @@
+"""What a city stands on: streets, markings, terrain, bridges."""

@@ -1,0 +1,184 @@
+"""The ground of districts: lawns with relief, paving, water behind quays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+import math
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+from shapely.ops import unary_union
+
+from cns_drake.city.geometry.polygons import tiles, wall_mesh
+from cns_drake.city.geometry.structures import Structure
+from cns_drake.city.ground.streets import TILE, as_structure, ground_structure
+from cns_drake.city.placement.districts import District
+
+# Kind of ground -> semantic class and colour.
+_LOOK = {
+    "paved": ("other-ground", (0.70, 0.67, 0.62)),
+    "lawn": ("terrain", (0.45, 0.56, 0.32)),
+    "gravel": ("other-ground", (0.63, 0.58, 0.50)),
+    "parking": ("parking", (0.38, 0.37, 0.38)),
+    "water": ("other-ground", (0.25, 0.38, 0.45)),
+}
+_QUAY_RGB = (0.55, 0.53, 0.50)
+# Meshes of ground with relief have vertices this far apart [m].
+_SPACING = 4.0
+# Wavelengths of the swells [m].
+_WAVELENGTHS = (22.0, 60.0)
+
+
+@dataclass(frozen=True)
+class _Swell:
+    """The relief of one district's lawns.
+
+    Attributes:
+        area: where it acts.
+        level: lines and areas at which it has died away.
+        amplitude: greatest height [m].
+        margin: distance over which it rises from `level` [m].
+        waves: rows of wave vector [rad/m] and phase [rad].
+    """
+
+    area: BaseGeometry
+    level: BaseGeometry
+    amplitude: float
+    margin: float
+    waves: np.ndarray
+
+    def height(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Returns the height above level ground at points in W [m]."""
+        distance = shapely.distance(shapely.points(x, y), self.level)
+        u = np.clip(distance / self.margin, 0.0, 1.0)
+        rise = u * u * (3 - 2 * u)
+        phase = np.outer(x, self.waves[:, 0]) + np.outer(y, self.waves[:, 1])
+        wave = np.sin(phase + self.waves[:, 2]).mean(axis=1)
+        # Everywhere above level, so that no hollow would collect water.
+        return self.amplitude * rise * (0.65 + 0.35 * wave)
+
+
+class GroundShape:
+    """Height of the finished ground inside and outside the streets."""
+
+    def __init__(
+        self,
+        level: float,
+        districts: Iterable[District],
+        buildings: BaseGeometry,
+        rng_of,
+    ):
+        """Shapes the ground around what is built.
+
+        Args:
+            level: height of the sidewalks [m].
+            districts: with their ground.
+            buildings: footprints of all buildings in W.
+            rng_of: district name -> generator.
+        """
+        self._level = level
+        self._swells = [
+            _make_swell(district, buildings, rng_of(district.plan.name))
+            for district in districts
+            if district.plan.relief > 0 and "lawn" in district.grounds
+        ]
+
+    def __call__(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Returns the height of the ground at points in W [m]."""
+        x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+        z = np.full(x.shape, self._level)
+        for swell in self._swells:
+            inside = shapely.intersects_xy(swell.area, x, y)
+            z[inside] += swell.height(x[inside], y[inside])
+        return z
+
+
+def ground_structures(
+    districts: Sequence[District], shape: GroundShape, water_level: float
+) -> list[Structure]:
+    """Returns the ground of all districts.
+
+    Args:
+        districts: with their ground.
+        shape: height of everything but water.
+        water_level: height of water [m].
+    """
+    structures = []
+    # Land within water is a bridge, and water passes below it.
+    land = unary_union(
+        [
+            area
+            for district in districts
+            for ground, area in district.grounds.items()
+            if ground != "water" and district.plan.ground != "water"
+        ]
+    )
+    for district in districts:
+        for ground, area in district.grounds.items():
+            if area.is_empty:
+                continue
+            name = f"ground_{district.plan.name}_{ground}"
+            semantic_class, rgb = _LOOK[ground]
+            if ground == "water":
+                structures.append(
+                    ground_structure(
+                        name, semantic_class, area, water_level, rgb
+                    )
+                )
+                structures.append(
+                    _quay(district, area, land, shape, water_level)
+                )
+                continue
+            has_relief = ground == "lawn" and district.plan.relief > 0
+            structures.append(
+                ground_structure(
+                    name,
+                    semantic_class,
+                    area,
+                    shape,
+                    rgb,
+                    _SPACING if has_relief else 0.0,
+                )
+            )
+    return structures
+
+
+def _make_swell(
+    district: District, buildings: BaseGeometry, rng: np.random.Generator
+) -> _Swell:
+    plan = district.plan
+    waves = []
+    for wavelength in rng.uniform(*_WAVELENGTHS, 5):
+        heading, phase = rng.uniform(0, 2 * math.pi, 2)
+        k = 2 * math.pi / wavelength
+        waves.append((k * math.cos(heading), k * math.sin(heading), phase))
+    lawn = district.grounds["lawn"]
+    level = unary_union([lawn.boundary, buildings.intersection(lawn)])
+    shapely.prepare(level)
+    shapely.prepare(lawn)
+    return _Swell(lawn, level, plan.relief, plan.relief_margin, np.array(waves))
+
+
+def _quay(
+    district: District,
+    water: BaseGeometry,
+    land: BaseGeometry,
+    shape: GroundShape,
+    water_level: float,
+) -> Structure:
+    """Returns the walls where water borders on land, one part a tile."""
+    rim = water.boundary.buffer(0.3).intersection(land.buffer(0.6))
+    pieces = {}
+    for k, (_, _, piece) in enumerate(tiles(rim, TILE)):
+        wall = wall_mesh(water, water_level, shape, along=piece)
+        if wall.faces:
+            pieces[f"tile_{k:02d}"] = wall
+    return as_structure(
+        f"quay_{district.plan.name}",
+        "other-structure",
+        pieces,
+        rim,
+        _QUAY_RGB,
+    )

@@ -1,0 +1,224 @@
+"""Buildings at given places and in rows along the streets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+import math
+
+import numpy as np
+from shapely.affinity import affine_transform
+from shapely.geometry import LineString, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from cns_drake.city.buildings import ARCHETYPES, sample
+from cns_drake.city.geometry.structures import Structure
+from cns_drake.city.placement.districts import District, corners_area
+from cns_drake.city.placement.draft import Draft
+from cns_drake.city.placement.frontage import Lot, lines_along, lot_at
+from cns_drake.city.plan import BuildingPlan, RowPlan
+from cns_drake.errors import InputError
+
+# Neighbours closer than this get blank walls on the sides that face each
+# other; it is room for the eaves and balconies of both [m].
+_PARTY_WALL = 3.1
+# Buildings that are not neighbours in a row keep this distance [m].
+_YARD = 3.1
+# Where a lot does not fit, the next trial starts this much further on [m].
+_STEP = 1.0
+# Parts of the drawn width and depth that are tried in turn; never less than
+# the row's least.
+_SIZES = ((1.0, 1.0), (1.0, 0.7), (0.75, 1.0), (0.5, 1.0), (0.5, 0.5))
+# Walls that stand against each other may overlap by rounding [m].
+_TOUCH = 0.005
+# Edges of a rectangle, counter-clockwise from the front.
+_RIGHT_EDGE, _LEFT_EDGE = 1, 3
+
+
+@dataclass
+class _House:
+    """A building that is to be built.
+
+    Attributes:
+        archetype: key of the registry of buildings.
+        footprint: in its own frame S [m].
+        xy, yaw: where S lies in W [m, rad].
+        height: of the walls [m].
+        taken: the ground in W that was taken for it.
+        blind_edges: edges of the footprint with a neighbour wall to wall.
+    """
+
+    archetype: str
+    footprint: Polygon
+    xy: tuple[float, float]
+    yaw: float
+    height: float
+    taken: BaseGeometry
+    blind_edges: set[int] = field(default_factory=set)
+
+
+def place_buildings(draft: Draft, district: District, source: str) -> None:
+    """Places a district's single buildings, then its rows.
+
+    Args:
+        draft: the city so far.
+        district: with its ground.
+        source: the plan's file name, for messages.
+
+    Raises:
+        InputError: if a single building has no room or cannot be built.
+    """
+    name = district.plan.name
+    draft.open_range()
+    for index, plan in enumerate(district.plan.buildings):
+        rng = draft.rng(name, "building", index)
+        fault_at = f"{source}: districts.{name}.buildings.{index}"
+        house = _single_house(draft, district, plan, fault_at)
+        try:
+            _build(draft, district, plan.kind, house, rng)
+        except ValueError as error:
+            raise InputError(f"{fault_at}: {error}") from error
+    for index, row in enumerate(district.plan.rows):
+        draft.open_range()
+        houses = _row_houses(
+            draft, district, row, draft.rng(name, "row", index)
+        )
+        for k, house in enumerate(houses):
+            rng = draft.rng(name, "row", index, k)
+            _build(draft, district, row.kind, house, rng)
+
+
+def _build(
+    draft: Draft,
+    district: District,
+    kind: str | None,
+    house: _House,
+    rng: np.random.Generator,
+) -> None:
+    name = draft.next_name(kind or house.archetype)
+    model = sample(
+        house.archetype,
+        house.footprint,
+        house.height,
+        rng,
+        name,
+        house.blind_edges,
+    )
+    x, y = (round(float(value), 3) for value in house.xy)
+    draft.add_building(
+        Structure(
+            name,
+            "building",
+            model,
+            (x, y, draft.level),
+            round(house.yaw, 5),
+            (district.plan.name, house.archetype),
+        )
+    )
+
+
+def _single_house(
+    draft: Draft, district: District, plan: BuildingPlan, fault_at: str
+) -> _House:
+    if plan.archetype not in ARCHETYPES:
+        raise InputError(
+            f"{fault_at}.archetype: unknown archetype {plan.archetype}"
+        )
+    footprint = (
+        Polygon(plan.outline)
+        if plan.outline is not None
+        else Lot(0.0, 0.0, 0.0, *plan.size).footprint
+    )
+    yaw = math.radians(plan.yaw_deg)
+    c, s = math.cos(yaw), math.sin(yaw)
+    area = affine_transform(footprint, [c, -s, s, c, *plan.at])
+    if not district.area.contains(area):
+        raise InputError(f"{fault_at}.at: reaches out of the district")
+    if not draft.is_free(area, _YARD):
+        raise InputError(
+            f"{fault_at}.at: stands closer than {_YARD} m to another building"
+        )
+    draft.take(area)
+    return _House(plan.archetype, footprint, plan.at, yaw, plan.height, area)
+
+
+def _row_houses(
+    draft: Draft, district: District, row: RowPlan, rng: np.random.Generator
+) -> list[_House]:
+    """Walks along the streets and takes a lot wherever one fits.
+
+    Rows keep to the district's own ground: a patch is there to stay open.
+    """
+    area = district.grounds[district.plan.ground]
+    if row.within is not None:
+        area = area.intersection(corners_area(row.within))
+    # Lots that touch the rim of the area must not fail by rounding.
+    limit = area.buffer(0.05)
+    houses: list[_House] = []
+    for line in lines_along(draft.streets, area, row.setback):
+        start, previous = 0.0, None
+        while start < line.length - row.width[0]:
+            house = _fitting_house(
+                draft, limit, row, line, start, previous, rng
+            )
+            if house is None:
+                start, previous = start + _STEP, None
+                continue
+            x0, _, x1, _ = house.footprint.bounds
+            if rng.uniform() > row.fill:
+                start, previous = start + (x1 - x0), None
+                continue
+            draft.take(house.taken)
+            houses.append(house)
+            gap = float(rng.uniform(*row.gap))
+            if gap < _PARTY_WALL:
+                house.blind_edges.add(_RIGHT_EDGE)
+            start, previous = start + (x1 - x0) + gap, house
+    return houses
+
+
+def _fitting_house(
+    draft: Draft,
+    limit: BaseGeometry,
+    row: RowPlan,
+    line: LineString,
+    start: float,
+    previous: _House | None,
+    rng: np.random.Generator,
+) -> _House | None:
+    """Draws a house for the lot at `start`; None if it does not fit."""
+    names = list(row.archetypes)
+    if previous is not None and len(names) > 1:
+        # No two neighbours of the same kind.
+        names = [name for name in names if name != previous.archetype]
+    weights = np.array([row.archetypes[name] for name in names])
+    archetype = names[rng.choice(len(names), p=weights / weights.sum())]
+    kind = ARCHETYPES[archetype]
+    height = np.clip(rng.uniform(*row.height), *kind.heights)
+    width = rng.uniform(*row.width)
+    depth = rng.uniform(*row.depth)
+    low, high = kind.widths
+    for width_part, depth_part in _SIZES:
+        size = np.maximum(
+            (width * width_part, depth * depth_part),
+            (row.width[0], row.depth[0]),
+        )
+        lot = lot_at(line, start, *np.clip(size, low, high).round(1).tolist())
+        # On a curve a lot's front is its chord, a little less than asked for.
+        if lot is None or lot.width < low:
+            continue
+        area = lot.footprint_W
+        ignore = previous.taken if previous else None
+        inner = area.buffer(-_TOUCH, join_style="mitre")
+        if limit.contains(area) and draft.is_free(inner, _YARD, ignore):
+            house = _House(
+                archetype,
+                lot.footprint,
+                (lot.x, lot.y),
+                lot.yaw,
+                round(float(height), 1),
+                area,
+            )
+            if previous and _RIGHT_EDGE in previous.blind_edges:
+                house.blind_edges.add(_LEFT_EDGE)
+            return house
+    return None

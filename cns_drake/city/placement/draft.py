@@ -1,0 +1,167 @@
+"""A city in the making: what stands where so far."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+import zlib
+
+import numpy as np
+from shapely.geometry import Point
+from shapely.geometry.base import BaseGeometry
+from shapely.ops import unary_union
+
+from cns_drake.city.geometry.occupancy import Occupancy
+from cns_drake.city.geometry.polygons import HeightMap, snap
+from cns_drake.city.geometry.structures import MeshShape, Model, Structure
+from cns_drake.city.ground.streets import kerb_height
+from cns_drake.city.roads.network import RoadNetwork
+
+# Numbers in names start anew at multiples of this.
+_RANGE = 50
+
+
+class Draft:
+    """Collects structures, gives them names and keeps them apart.
+
+    Attributes:
+        network: the roads.
+        streets: all ground that belongs to them, sidewalks included, in W.
+        level: height of sidewalks and of level ground in W [m].
+        structures: what has been placed, in the order of placement.
+        ground_height: height of the finished ground in W; set once the
+            buildings stand and the ground has been shaped around them.
+    """
+
+    def __init__(self, network: RoadNetwork, seed: int):
+        self.network = network
+        self.streets: BaseGeometry = snap(
+            unary_union(
+                [network.carriageway(), network.sidewalks(), network.medians()]
+            )
+        )
+        self.level = kerb_height(network)
+        self.structures: list[Structure] = []
+        self.ground_height: HeightMap | None = None
+        self._seed = seed
+        self._counts: Counter[str] = Counter()
+        self._walls = Occupancy()
+        self._occupancy = Occupancy()
+        self._lanes = Occupancy()
+        self._lanes.add(network.lane_area())
+
+    def rng(self, *words: str | int) -> np.random.Generator:
+        """Returns the generator of one task, told apart by words.
+
+        Every task has its own, so that a change in one district leaves the
+        draws of all others alone.
+        """
+        key = "/".join(map(str, words)).encode()
+        return np.random.default_rng([self._seed, zlib.crc32(key)])
+
+    def open_range(self) -> None:
+        """Starts a new range of numbers in names, for the next task.
+
+        Like house numbers, which start anew with each street: one thing
+        more or less in one task does not rename those of all later tasks,
+        which the lists of the stages refer to.
+        """
+        for kind, count in self._counts.items():
+            self._counts[kind] = -(-count // _RANGE) * _RANGE
+
+    def next_name(self, kind: str) -> str:
+        """Returns a new name, e.g. `tower_017` for the kind `tower`."""
+        self._counts[kind] += 1
+        return f"{kind}_{self._counts[kind]:03d}"
+
+    def is_free(
+        self,
+        area: BaseGeometry,
+        clearance: float = 0.0,
+        ignore: BaseGeometry | None = None,
+    ) -> bool:
+        """Tells whether an area in W is neither a lane's nor taken.
+
+        Args:
+            area: in W [m].
+            clearance: least distance to what is taken, not to lanes [m].
+            ignore: taken area that may be closer, but not overlapped.
+        """
+        return self._lanes.is_free(area) and self._occupancy.is_free(
+            area, clearance, ignore
+        )
+
+    def take(self, area: BaseGeometry) -> None:
+        """Keeps an area in W free of what is placed later."""
+        self._occupancy.add(area)
+
+    def add_building(self, structure: Structure) -> None:
+        """Adds a building whose ground has been taken before."""
+        self.structures.append(structure)
+        self._walls.add(structure.footprint_W)
+
+    def place(
+        self,
+        kind: str,
+        semantic_class: str,
+        model: Model,
+        xy: tuple[float, float],
+        yaw: float,
+        tags: Iterable[str],
+        *,
+        clearance: float = 0.0,
+        crown_part: float = 0.0,
+        within: BaseGeometry | None = None,
+    ) -> Structure | None:
+        """Places a model on the finished ground if there is room for it.
+
+        A model without room uses up a name as well, so that the names of
+        others do not depend on whether it fits.
+
+        Args:
+            kind: stem of the name.
+            semantic_class: of the structure.
+            model: its geometry.
+            xy: position in W [m].
+            yaw: heading in W [rad].
+            tags: free words.
+            clearance: to everything that stands already [m].
+            crown_part: how much of the reach of a tree's crown must be
+                clear of buildings, from 0 to 1.
+            within: where given, the footprint must lie in this area.
+
+        Returns:
+            The structure, or None where there is no room.
+        """
+        x, y = (round(float(value), 3) for value in xy)
+        z = float(self.ground_height(np.array([x]), np.array([y]))[0])
+        structure = Structure(
+            self.next_name(kind),
+            semantic_class,
+            model,
+            (x, y, round(z, 3)),
+            float(yaw),
+            tuple(tags),
+        )
+        footprint = structure.footprint_W
+        if within is not None and not within.contains(footprint):
+            return None
+        if not self.is_free(footprint, clearance):
+            return None
+        crown = Point(x, y).buffer(crown_part * _reach(model))
+        if not crown.is_empty and not self._walls.is_free(crown):
+            return None
+        self._occupancy.add(footprint)
+        self.structures.append(structure)
+        return structure
+
+
+def _reach(model: Model) -> float:
+    """Returns how far a model's meshes reach from its middle [m]."""
+    reaches = [0.0]
+    for part in model.parts:
+        if isinstance(part.shape, MeshShape):
+            vertices = model.meshes[part.shape.mesh].vertices
+            xy = (vertices * part.shape.scale)[:, :2]
+            reaches.append(float(np.hypot(*xy.T).max()))
+    return max(reaches)

@@ -1,0 +1,257 @@
+"""What stands on a district's own ground: trees, hedges, cars, benches."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import itertools
+import math
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString
+from shapely.ops import unary_union
+
+from cns_drake.city.objects import OBJECTS
+from cns_drake.city.placement.districts import District, corners_area
+from cns_drake.city.placement.draft import Draft
+from cns_drake.city.placement.frontage import Station, station_at
+from cns_drake.city.placement.naming import name_stem
+from cns_drake.city.placement.weighted import pick
+from cns_drake.city.plan import (
+    LinePlan,
+    ObjectPlan,
+    ParkingPlan,
+    ScatterPlan,
+)
+from cns_drake.errors import InputError
+
+# Least distance between two objects [m].
+_CLEARANCE = 0.15
+# Trees keep their crowns off walls: distance of the trunk from any building
+# as a part of the crown's reach.
+_CROWN_PART = 0.8
+# Runs (fences, hedges) are at most this long, so that one can be missing
+# at a stage without all of them being so [m].
+_LONGEST_RUN = 24.0
+
+
+def furnish(
+    draft: Draft, district: District, cars: Mapping[str, float], source: str
+) -> None:
+    """Places a district's objects, lines, parked cars and scattered plants.
+
+    Args:
+        draft: the city so far.
+        district: with its ground.
+        cars: object -> weight of the parked cars.
+        source: the plan's file name, for messages.
+
+    Raises:
+        InputError: if a single object has no room.
+    """
+    name = district.plan.name
+    draft.open_range()
+    for index, plan in enumerate(district.plan.objects):
+        rng = draft.rng(name, "object", index)
+        field = f"{source}: districts.{name}.objects.{index}"
+        _place_object(draft, district, plan, rng, field)
+    for index, plan in enumerate(district.plan.lines):
+        draft.open_range()
+        _place_line(draft, district, plan, draft.rng(name, "line", index))
+    for index, plan in enumerate(district.plan.parking):
+        draft.open_range()
+        rng = draft.rng(name, "parking", index)
+        _place_cars(draft, district, plan, cars, rng)
+    for index, plan in enumerate(district.plan.scatter):
+        draft.open_range()
+        _scatter(draft, district, plan, draft.rng(name, "scatter", index))
+
+
+def _place_object(
+    draft: Draft,
+    district: District,
+    plan: ObjectPlan,
+    rng: np.random.Generator,
+    field: str,
+) -> None:
+    builder = OBJECTS[plan.object]
+    try:
+        model = builder.build(rng, **plan.parameters)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{field}.parameters: {error}") from error
+    placed = draft.place(
+        plan.kind or name_stem(plan.object),
+        builder.semantic_class,
+        model,
+        plan.at,
+        math.radians(plan.yaw_deg),
+        (district.plan.name,),
+    )
+    if placed is None:
+        raise InputError(f"{field}.at: stands in something else")
+
+
+def _place_line(
+    draft: Draft, district: District, plan: LinePlan, rng: np.random.Generator
+) -> None:
+    points = np.array(plan.points)
+    if plan.spacing is None:
+        for start, end in itertools.pairwise(points):
+            _place_run(draft, district, plan, start, end, rng)
+        return
+    line = LineString(points)
+    s = 0.0
+    while s <= line.length:
+        at = station_at(line, s)
+        name = pick(plan.objects, rng)
+        yaw = at.yaw + math.radians(plan.yaw_deg)
+        _try_object(draft, district, name, plan.kind, at, yaw, rng)
+        s += float(rng.uniform(*plan.spacing))
+
+
+def _place_run(
+    draft: Draft,
+    district: District,
+    plan: LinePlan,
+    start: np.ndarray,
+    end: np.ndarray,
+    rng: np.random.Generator,
+) -> None:
+    """Places fences or hedges end to end between two points."""
+    length = float(np.hypot(*(end - start)))
+    count = max(1, math.ceil(length / _LONGEST_RUN))
+    yaw = math.atan2(*(end - start)[::-1])
+    name = pick(plan.objects, rng)
+    builder = OBJECTS[name]
+    for k in range(count):
+        middle = start + (end - start) * (k + 0.5) / count
+        # A finger's breadth between runs, so that they do not overlap.
+        model = builder.build(
+            rng, length=length / count - 0.06, **plan.parameters
+        )
+        draft.place(
+            plan.kind or name_stem(name),
+            builder.semantic_class,
+            model,
+            tuple(middle),
+            yaw + math.radians(plan.yaw_deg),
+            (district.plan.name,),
+        )
+
+
+def _place_cars(
+    draft: Draft,
+    district: District,
+    plan: ParkingPlan,
+    cars: Mapping[str, float],
+    rng: np.random.Generator,
+) -> None:
+    start, end = np.array(plan.start), np.array(plan.end)
+    length = float(np.hypot(*(end - start)))
+    along = (end - start) / length
+    inwards = np.array([-along[1], along[0]])
+    width, depth = plan.bay
+    for k in range(int(length / width)):
+        if rng.uniform() > plan.fill:
+            continue
+        at = start + along * (k + 0.5) * width + inwards * depth / 2
+        at = at + rng.uniform(-0.15, 0.15, 2)
+        # Most drivers park nose in.
+        nose = inwards if rng.uniform() < 0.7 else -inwards
+        yaw = math.atan2(nose[1], nose[0]) + float(rng.uniform(-0.04, 0.04))
+        place_car(draft, cars, tuple(at), yaw, rng, (district.plan.name,))
+
+
+def place_car(
+    draft: Draft,
+    cars: Mapping[str, float],
+    xy: tuple[float, float],
+    yaw: float,
+    rng: np.random.Generator,
+    tags: tuple[str, ...],
+) -> None:
+    """Places a parked car if there is room for it.
+
+    Args:
+        draft: the city so far.
+        cars: object -> weight.
+        xy: position in W [m].
+        yaw: heading in W [rad].
+        rng: draws the car.
+        tags: of the structure.
+    """
+    name = pick(cars, rng)
+    builder = OBJECTS[name]
+    draft.place(
+        name_stem(name),
+        builder.semantic_class,
+        builder.build(rng),
+        xy,
+        yaw,
+        tags,
+    )
+
+
+def _scatter(
+    draft: Draft,
+    district: District,
+    plan: ScatterPlan,
+    rng: np.random.Generator,
+) -> None:
+    """Spreads objects at least `spacing` apart, by throwing darts."""
+    area = unary_union(
+        [
+            shape
+            for ground, shape in district.grounds.items()
+            if ground in plan.ground
+        ]
+    )
+    if plan.within is not None:
+        area = area.intersection(corners_area(plan.within))
+    area = area.buffer(-plan.clearance)
+    if area.is_empty:
+        return
+    shapely.prepare(area)
+    x0, y0, x1, y1 = area.bounds
+    chosen: list[np.ndarray] = []
+    darts = int(4 * (x1 - x0) * (y1 - y0) / plan.spacing**2) + 1
+    for dart in rng.uniform((x0, y0), (x1, y1), (darts, 2)):
+        if not shapely.contains_xy(area, *dart):
+            continue
+        if chosen and _nearest(chosen, dart) < plan.spacing:
+            continue
+        chosen.append(dart)
+        # Drawn for every dart, so that the fill does not move the others.
+        keep, yaw = rng.uniform() < plan.fill, rng.uniform(-math.pi, math.pi)
+        name = pick(plan.objects, rng)
+        if keep:
+            at = Station(float(dart[0]), float(dart[1]), 0.0)
+            _try_object(draft, district, name, plan.kind, at, yaw, rng)
+
+
+def _nearest(points: list[np.ndarray], point: np.ndarray) -> float:
+    return float(np.hypot(*(np.array(points) - point).T).min())
+
+
+def _try_object(
+    draft: Draft,
+    district: District,
+    name: str,
+    kind: str | None,
+    at: Station,
+    yaw: float,
+    rng: np.random.Generator,
+) -> None:
+    builder = OBJECTS[name]
+    model = builder.build(rng)
+    draft.place(
+        kind or name_stem(name),
+        builder.semantic_class,
+        model,
+        (at.x, at.y),
+        yaw,
+        (district.plan.name,),
+        clearance=_CLEARANCE,
+        crown_part=_CROWN_PART,
+        within=district.area,
+    )

@@ -1,0 +1,185 @@
+"""What stands along the streets: lamps, trees, furniture, parked cars."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+import math
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString
+from shapely.ops import unary_union
+
+from cns_drake.city.objects import OBJECTS
+from cns_drake.city.placement.districts import District
+from cns_drake.city.placement.draft import Draft
+from cns_drake.city.placement.frontage import Station, lines_along, station_at
+from cns_drake.city.placement.naming import name_stem
+from cns_drake.city.placement.open_ground import place_car
+from cns_drake.city.placement.weighted import pick
+from cns_drake.city.plan import CityPlan, StreetPlan
+
+# How far from the kerb things stand: their nearest point, not their middle
+# [m].
+_FROM_KERB = {"lamp": 0.45, "tree": 0.9, "furniture": 0.6}
+# Around junctions nothing blocks the view but what belongs there [m].
+_JUNCTION_CLEARANCE = {"lamp": 1.0, "tree": 5.0, "furniture": 3.0}
+# Least distance between two things, and of things to lanes [m].
+_CLEARANCE = 0.4
+_CROWN_PART = 0.85
+# Length of a parking bay along the street, least and greatest [m].
+_BAY_LENGTH = (5.6, 7.0)
+_BAY_FILL = 0.72
+# Drivers park a little closer to the kerb than to the lane [m].
+_TO_KERB = 0.08
+
+
+def furnish_sidewalks(
+    draft: Draft, plan: CityPlan, districts: Sequence[District]
+) -> None:
+    """Places street lamps, then trees, then furniture on all sidewalks."""
+    junctions = unary_union(
+        [draft.network.junction_area(name) for name in draft.network.junctions]
+    )
+    for task, distance in _FROM_KERB.items():
+        keep_off = junctions.buffer(_JUNCTION_CLEARANCE[task])
+        lines = lines_along(
+            draft.network.carriageway(), draft.network.sidewalks(), distance
+        )
+        for index, line in enumerate(lines):
+            draft.open_range()
+            rng = draft.rng("sidewalk", task, index)
+            _walk(draft, plan, districts, task, line, keep_off, rng)
+
+
+def park_along_streets(draft: Draft, cars: Mapping[str, float]) -> None:
+    """Parks cars in the bays at the sides of the roads.
+
+    Args:
+        draft: the city so far.
+        cars: object -> weight.
+    """
+    for (name, side), bay in draft.network.parking_bays().items():
+        draft.open_range()
+        road = draft.network.roads[name]
+        rng = draft.rng("bays", name, side)
+        sign = 1 if side == "left" else -1
+        offset = sign * (road.half_width + road.parking / 2 + _TO_KERB)
+        s = road.first_station + float(rng.uniform(2.0, 5.0))
+        while s < road.last_station:
+            x, y, _, heading = road.evaluate([s], offset)[0]
+            if shapely.contains_xy(bay, x, y) and rng.uniform() < _BAY_FILL:
+                # On the left of `forward` traffic runs the other way.
+                yaw = heading + (math.pi if side == "left" else 0.0)
+                yaw += float(rng.uniform(-0.03, 0.03))
+                place_car(draft, cars, (x, y), yaw, rng, ("bay", name))
+            s += float(rng.uniform(*_BAY_LENGTH))
+
+
+def plant_medians(draft: Draft, plan: StreetPlan) -> None:
+    """Plants the strips between the directions, and lights them."""
+    for index, median in enumerate(draft.network.medians().geoms):
+        draft.open_range()
+        rng = draft.rng("median", index)
+        line = _middle_line(median)
+        s = float(rng.uniform(1.0, 3.0))
+        while s < line.length - 1.0:
+            at = station_at(line, s)
+            name = pick(plan.trees, rng)
+            _place(draft, name, at, rng, ("median",))
+            s += float(rng.uniform(*plan.tree_spacing))
+
+
+def _middle_line(median) -> LineString:
+    """Returns the long axis of a strip, without its round noses."""
+    corners = np.array(median.minimum_rotated_rectangle.exterior.coords)[:4]
+    sides = np.roll(corners, -1, axis=0) - corners
+    lengths = np.hypot(*sides.T)
+    short = int(np.argmin(lengths[:2]))
+    a = (corners[short] + corners[short + 1]) / 2
+    b = (corners[(short + 2) % 4] + corners[(short + 3) % 4]) / 2
+    inset = lengths.min() / np.hypot(*(b - a))
+    return LineString([a + (b - a) * inset, b - (b - a) * inset])
+
+
+def _walk(
+    draft: Draft,
+    plan: CityPlan,
+    districts: Sequence[District],
+    task: str,
+    line: LineString,
+    keep_off,
+    rng: np.random.Generator,
+) -> None:
+    """Walks along one sidewalk and places the things of one task."""
+    s = float(rng.uniform(1.0, 8.0))
+    while s < line.length - 1.0:
+        at = station_at(line, s)
+        here = shapely.Point(at.x, at.y)
+        district = min(districts, key=lambda d: d.area.distance(here))
+        street = district.plan.street or plan.street
+        step, name = _draw(street, task, rng)
+        if name is not None and not keep_off.intersects(here):
+            tags = ("sidewalk", district.plan.name)
+            _place(draft, name, at, rng, tags, facing_street=True)
+        s += step
+
+
+def _draw(
+    street: StreetPlan, task: str, rng: np.random.Generator
+) -> tuple[float, str | None]:
+    """Returns the distance to the next place, and what stands here."""
+    if task == "lamp":
+        return street.lamp_spacing, street.lamp
+    if task == "tree":
+        step = float(rng.uniform(*street.tree_spacing))
+        if not street.trees:
+            return step, None
+        name = pick(street.trees, rng)
+        return step, None if rng.uniform() < street.tree_gaps else name
+    step = float(rng.uniform(*street.furniture_spacing))
+    if not street.furniture:
+        return step, None
+    return step, pick(street.furniture, rng)
+
+
+def _place(
+    draft: Draft,
+    name: str,
+    at: Station,
+    rng: np.random.Generator,
+    tags: tuple[str, ...],
+    *,
+    facing_street: bool = False,
+) -> None:
+    """Places an object on a line, or behind it with its front (+x) to it.
+
+    Args:
+        draft: the city so far.
+        name: of the object.
+        at: place on the line; the street is on the line's right.
+        rng: draws the object.
+        tags: of the structure.
+        facing_street: turn the object to the right and set it back, so that
+            its front touches the line; else it stands on the line, along it.
+    """
+    builder = OBJECTS[name]
+    model = builder.build(rng)
+    xy, yaw = (at.x, at.y), at.yaw
+    if facing_street:
+        front = model.footprint.bounds[2]
+        xy = (
+            at.x - front * math.sin(at.yaw),
+            at.y + front * math.cos(at.yaw),
+        )
+        yaw = at.yaw - math.pi / 2
+    draft.place(
+        name_stem(name),
+        builder.semantic_class,
+        model,
+        xy,
+        yaw,
+        tags,
+        clearance=_CLEARANCE,
+        crown_part=_CROWN_PART,
+    )

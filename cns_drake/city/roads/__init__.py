@@ -1,0 +1,1 @@
+"""Road networks: centrelines, lanes, junctions, surfaces."""
