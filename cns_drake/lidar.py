@@ -20,6 +20,8 @@ from cns_drake.structure_table import StructureTable
 # Intensity falls with distance as in CARLA's ray-cast LiDAR with its default
 # atmosphere: exp(-a d), a = 0.004 / m (docs/ref_sensors of CARLA).
 _ATTENUATION_PER_M = 0.004
+# Step of the intensities of a LiDAR with finite resolution: 12 bits.
+_INTENSITY_STEP = 2.0**-12
 
 
 class Lidar(LeafSystem):
@@ -53,6 +55,7 @@ class Lidar(LeafSystem):
         X_PS: RigidTransform,
         pattern: BeamPattern,
         *,
+        resolution: float = 0.0,
         structures: StructureTable | None = None,
         anchored_frames: Collection[FrameId] = (),
     ):
@@ -63,6 +66,9 @@ class Lidar(LeafSystem):
                 the model that P belongs to is invisible.
             X_PS: pose of the sensor in P.
             pattern: the beams.
+            resolution: coordinates are rounded to multiples of this [m], and
+                intensities to 12 bits; 0: neither is rounded. Steps that are
+                powers of two stay exact in float32 and compress well.
             structures: gives labels and instance ids to returns.
             anchored_frames: frames that never move, besides the world's;
                 their geometry is cheaper to cast on.
@@ -71,6 +77,7 @@ class Lidar(LeafSystem):
         self._parent_frame_id = parent_frame_id
         self._X_PS = X_PS
         self._pattern = pattern
+        self._resolution = resolution
         structures = structures or StructureTable(())
         self._d_Sset = pattern.d_Sset.astype(np.float32)
         self._d_Sset_cast = pattern.d_Sset[pattern.packet_order]
@@ -131,10 +138,14 @@ class Lidar(LeafSystem):
         )
         ranges, geometry = ranges[returned], geometry[returned]
         p_SRset = self._d_Sset[returned] * ranges[:, None]
+        intensity = np.exp(-_ATTENUATION_PER_M * ranges)
+        if self._resolution > 0:
+            p_SRset = _rounded(p_SRset, self._resolution)
+            intensity = _rounded(intensity, _INTENSITY_STEP)
         # Zeros, so that the padding between fields is defined, too.
         scan = np.zeros(len(returned), POINT_DTYPE)
         scan["x"], scan["y"], scan["z"] = p_SRset.T
-        scan["intensity"] = np.exp(-_ATTENUATION_PER_M * ranges)
+        scan["intensity"] = intensity
         scan["ring"] = self._pattern.ring[returned]
         scan["t"] = self._pattern.t_ns[returned]
         scan["label"] = seen.label[geometry]
@@ -147,6 +158,10 @@ class Lidar(LeafSystem):
         point_cloud.resize(len(scan))
         for axis, name in enumerate("xyz"):
             point_cloud.mutable_xyzs()[axis] = scan[name]
+
+
+def _rounded(values: np.ndarray, step: float) -> np.ndarray:
+    return np.rint(values / np.float32(step)) * np.float32(step)
 
 
 class _SeenGeometry:

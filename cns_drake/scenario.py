@@ -63,6 +63,7 @@ class LidarConfig(Mount):
         columns: columns in a turn, in place of the preset's.
         min_range: nearest range, in place of the preset's [m].
         max_range: farthest range, in place of the preset's [m].
+        resolution: step of the coordinates [m]; 0 records what was cast.
     """
 
     xyz: Triple = (0.0, 0.0, 1.6)
@@ -70,6 +71,8 @@ class LidarConfig(Mount):
     columns: int | None = Field(None, ge=4, le=8192)
     min_range: float | None = Field(None, ge=0.0)
     max_range: float | None = Field(None, gt=0.0, le=1000.0)
+    # About what real units resolve; a third less to store than exact values.
+    resolution: float = Field(2.0**-10, ge=0.0, le=1.0)
 
     @field_validator("preset")
     @classmethod

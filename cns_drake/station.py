@@ -80,6 +80,7 @@ def make_station(
                 plant.GetBodyFrameIdOrThrow(base.index()),
                 X_BSs[name],
                 config.pattern(),
+                resolution=config.resolution,
                 structures=world.structures,
                 anchored_frames=world.anchored_frames(),
             ),

@@ -337,3 +337,22 @@ def test_point_layout_is_that_of_a_c_struct():
     offsets = [POINT_DTYPE.fields[n][1] for n in POINT_DTYPE.names]
     assert offsets == [0, 4, 8, 12, 16, 20, 24, 26]
     assert POINT_DTYPE.itemsize == 28
+
+
+def test_resolution_rounds_coordinates_and_intensity():
+    rng = np.random.default_rng(7)
+    exact, rounded = (Stage() for _ in range(2))
+    for stage in (exact, rounded):
+        stage.add("room::ball", Sphere(6.0), RigidTransform([9.0, 1.0, 2.0]))
+        stage.add("room::floor", Box(200, 200, 0.2))
+    step = 2.0 ** -int(rng.integers(8, 11))
+    exact = exact.finish().eval()
+    rounded = rounded.finish(resolution=step).eval()
+    steps = positions(rounded) / step
+    np.testing.assert_array_equal(steps, np.rint(steps))
+    error = np.abs(positions(rounded) - positions(exact))
+    assert 0.4 * step < error.max() <= 0.5 * step + 1e-5
+    error = np.abs(rounded["intensity"] - exact["intensity"])
+    assert 0 < error.max() <= 2.0**-13 + 1e-7
+    for name in ("ring", "t", "label", "instance"):
+        np.testing.assert_array_equal(rounded[name], exact[name])

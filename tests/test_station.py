@@ -69,7 +69,8 @@ def test_vehicle_is_invisible_and_on_the_ground(small_map):
     scan = diagram.GetOutputPort("lidar_scan").Eval(context)
     lowest = scan[scan["ring"] == 31]
     assert len(lowest) == 1024
-    np.testing.assert_allclose(lowest["z"], -1.6, atol=1e-5)
+    # Coordinates are multiples of 1 / 1024 m.
+    np.testing.assert_array_equal(lowest["z"], -1638 / 1024)
     assert set(lowest["instance"]) == {1}
 
 
