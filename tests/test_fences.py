@@ -25,6 +25,16 @@ def test_length_is_as_asked(name, length):
     assert x.max() == pytest.approx(length / 2, abs=0.07)
 
 
+@pytest.mark.parametrize("length", LENGTHS)
+@pytest.mark.parametrize("name", RUN_KINDS)
+def test_leaves_the_next_run_its_room(name, length):
+    # Runs in a row stand 6 cm apart; outlines are drawn 2 cm too large.
+    model = OBJECTS[name].build(np.random.default_rng(0), length=length)
+    x0, _, x1, _ = model.footprint.bounds
+    assert x0 > -length / 2 - 0.03
+    assert x1 < length / 2 + 0.03
+
+
 @pytest.mark.parametrize("name", RUN_KINDS)
 def test_height_is_as_asked(name):
     kind = RUN_KINDS[name]

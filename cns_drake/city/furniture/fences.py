@@ -162,9 +162,11 @@ def _garden_wall(count: int) -> Mesh:
     ]
     for k in range(count):
         x = 3.0 * k
+        # The coping, too, keeps within the length, or the next wall in a
+        # row would have no room.
         pieces += [
-            _box(x, x + 0.4, -0.2, 0.2, _ROOT, 1.62),
-            _box(x - 0.04, x + 0.44, -0.24, 0.24, 1.62, 1.7),
+            _box(x + 0.04, x + 0.44, -0.2, 0.2, _ROOT, 1.62),
+            _box(x, x + 0.48, -0.24, 0.24, 1.62, 1.7),
         ]
     return merge_meshes(pieces)
 
