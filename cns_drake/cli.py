@@ -48,18 +48,43 @@ Overwrite = Annotated[
 
 
 @app.command("list")
-def list_sequences() -> None:
-    """List the shipped sequences."""
+def list_sequences(
+    folders: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar="[FOLDER]...",
+            help="Folders of maps of your own; the shipped ones if none.",
+        ),
+    ] = None,
+) -> None:
+    """List sequences: length, duration, frames; the size of their stage."""
     from rich.console import Console
     from rich.table import Table
-    import yaml
 
-    from cns_drake.paths import recordable_sequences
+    from cns_drake.paths import shipped_maps
+    from cns_drake.sequence_table import sequence_rows
 
-    table = Table("sequence", "map", "stage", "title")
-    for name, path in recordable_sequences().items():
-        fields = yaml.load(path.read_text(encoding="utf-8"), yaml.CSafeLoader)
-        table.add_row(name, fields["map"], fields["stage"], fields["title"])
+    # Without a frame the table fits into 80 columns.
+    table = Table("sequence", "map", "stage", box=None, padding=(0, 1, 0, 0))
+    for heading in ("length", "duration", "frames", "structures", "triangles"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for folder in folders or shipped_maps().values():
+        rows = sequence_rows(folder, lambda line: print(line, file=sys.stderr))
+        if folders and not rows:
+            raise InputError(
+                f"{folder}: no sequence_NN.yaml whose stage_NN.sdf is there"
+            )
+        for row in rows:
+            table.add_row(
+                row.sequence,
+                row.map,
+                row.stage,
+                f"{row.length:.0f} m",
+                f"{row.duration:.1f} s",
+                str(row.frames),
+                str(row.structures),
+                str(row.triangles),
+            )
     Console().print(table)
 
 

@@ -8,6 +8,7 @@ import sys
 
 from cns_drake.city.generate import differing_files, generate_city
 from cns_drake.errors import InputError
+from cns_drake.sequence_table import write_table
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -18,7 +19,10 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "world",
         type=Path,
-        help="folder with roads.yaml, city.yaml and stages.yaml",
+        help=(
+            "folder with roads.yaml, city.yaml and stages.yaml, and the "
+            "sequences of the city, whose figures are brought up to date"
+        ),
     )
     parser.add_argument(
         "--check",
@@ -37,6 +41,7 @@ def main(arguments: list[str] | None = None) -> int:
                 print(path)
             return 1 if changed else 0
         files = generate_city(options.world, progress)
+        write_table(options.world, progress)
     except InputError as error:
         print(error, file=sys.stderr)
         return 2

@@ -1,0 +1,173 @@
+"""The figures of a folder's sequences, kept beside them in a table.
+
+Planning a drive and reading a stage take seconds; a listing should not. Each
+row of `sequences.csv` therefore carries a checksum of the files that it was
+measured from, and is measured anew when they have changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import csv
+from dataclasses import astuple, dataclass, fields
+import io
+from pathlib import Path
+import zlib
+
+import yaml
+
+from cns_drake.errors import InputError
+from cns_drake.files import complete_part, user_errors, write_part
+from cns_drake.paths import sequence_name
+
+TABLE_NAME = "sequences.csv"
+
+
+@dataclass(frozen=True)
+class SequenceRow:
+    """A sequence and its figures.
+
+    Attributes:
+        sequence: its name.
+        map: the map's name.
+        stage: the city's stage.
+        title: what it shows, in a few words.
+        checksum: of the files that the figures were measured from.
+        length: of the path [m].
+        duration: of the drive [s].
+        frames: how many are recorded.
+        structures: in the stage.
+        triangles: in the stage.
+    """
+
+    sequence: str
+    map: str
+    stage: str
+    title: str
+    checksum: str
+    length: float
+    duration: float
+    frames: int
+    structures: int
+    triangles: int
+
+
+def sequence_rows(
+    folder: Path, progress: Callable[[str], None] = lambda line: None
+) -> list[SequenceRow]:
+    """Returns the rows of a map's sequences whose stage is there.
+
+    Args:
+        folder: of the map, with `sequence_NN.yaml` and `stage_NN.sdf`.
+        progress: takes a line for each row that has to be measured.
+
+    Raises:
+        InputError: if a sequence cannot be read or planned, or its stage not
+            be parsed.
+    """
+    known = {row.checksum: row for row in _read(folder / TABLE_NAME)}
+    rows = []
+    for path in sorted(folder.glob("sequence_*.yaml")):
+        entries = _entries(path)
+        stage = folder / f"stage_{entries.get('stage')}.sdf"
+        if not stage.is_file():
+            continue
+        checksum = _checksum(path, folder / "roads.yaml", stage)
+        row = known.get(checksum)
+        if row is None:
+            progress(f"measuring {sequence_name(path)}")
+            row = _measure(path, checksum)
+        rows.append(row)
+    return rows
+
+
+def write_table(
+    folder: Path, progress: Callable[[str], None] = lambda line: None
+) -> None:
+    """Brings the table of a folder up to date.
+
+    A folder without sequences gets none.
+
+    Raises:
+        InputError: as `sequence_rows`, or if the table cannot be written.
+    """
+    rows = sequence_rows(folder, progress)
+    if not rows:
+        return
+    out = io.StringIO()
+    table = csv.writer(out, lineterminator="\n")
+    table.writerow(field.name for field in fields(SequenceRow))
+    table.writerows(astuple(row) for row in rows)
+    write_part(folder / TABLE_NAME, out.getvalue())
+    complete_part(folder / TABLE_NAME)
+
+
+def _entries(path: Path) -> dict:
+    with user_errors(path):
+        text = path.read_bytes()
+    try:
+        entries = yaml.load(text, yaml.CSafeLoader)
+    except yaml.YAMLError as error:
+        fault = " ".join(str(error).split())
+        raise InputError(f"{path}: not readable as YAML: {fault}") from None
+    if not isinstance(entries, dict):
+        raise InputError(f"{path}: not a mapping of scenario fields")
+    return entries
+
+
+def _checksum(*paths: Path) -> str:
+    total = 0
+    for path in paths:
+        with user_errors(path):
+            total = zlib.crc32(path.read_bytes(), total)
+    return f"{total:08x}"
+
+
+def _read(path: Path) -> list[SequenceRow]:
+    """Returns the rows of a table; of one that cannot be used, none.
+
+    Nothing is lost: its rows are measured anew.
+    """
+    types = {"length": float, "duration": float}
+    types |= dict.fromkeys(("frames", "structures", "triangles"), int)
+    names = [field.name for field in fields(SequenceRow)]
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            return [
+                SequenceRow(*(types.get(n, str)(row[n]) for n in names))
+                for row in csv.DictReader(file)
+            ]
+    except (OSError, KeyError, ValueError, TypeError):
+        return []
+
+
+def _measure(path: Path, checksum: str) -> SequenceRow:
+    # Slow to import, and rarely needed.
+    from cns_drake.perception_geometry import (
+        TriangleSurface,
+        read_perception_geometry,
+    )
+    from cns_drake.scenario import load_scenario
+    from cns_drake.sequence_facts import sequence_facts
+    from cns_drake.world import load_world
+
+    scenario = load_scenario(path)
+    facts = sequence_facts(scenario)
+    world = load_world(scenario.world_file)
+    geometries = read_perception_geometry(world.scene_graph.model_inspector())
+    return SequenceRow(
+        sequence=scenario.name,
+        map=path.resolve().parent.name,
+        stage=scenario.stage,
+        title=scenario.title,
+        checksum=checksum,
+        length=round(facts.length, 1),
+        duration=round(facts.duration, 2),
+        frames=facts.frames,
+        structures=len({geometry.structure for geometry in geometries}),
+        triangles=sum(
+            len(geometry.surface.triangles)
+            for geometry in geometries
+            if isinstance(geometry.surface, TriangleSurface)
+        ),
+    )
