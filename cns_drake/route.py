@@ -17,7 +17,7 @@ _DENSE_SPACING = 0.25
 # A lane change takes this much of its road where there is as much [m]; on
 # less than the second length there is none.
 _LANE_CHANGE_LENGTH = 50.0
-_MIN_LANE_CHANGE_LENGTH = 20.0
+MIN_LANE_CHANGE_LENGTH = 20.0
 
 LaneNumber = Annotated[int, Field(ge=1)]
 LaneChange = Annotated[tuple[LaneNumber, LaneNumber], Strict(False)]
@@ -158,10 +158,10 @@ def _lane_change(travelled: np.ndarray, wanted: bool) -> np.ndarray:
     if not wanted:
         return np.zeros_like(travelled)
     available = travelled[-1] - travelled[0]
-    if available < _MIN_LANE_CHANGE_LENGTH:
+    if available < MIN_LANE_CHANGE_LENGTH:
         raise ValueError(
             f"{available:.1f} m are too short for a lane change, it needs "
-            f"{_MIN_LANE_CHANGE_LENGTH:.0f} m"
+            f"{MIN_LANE_CHANGE_LENGTH:.0f} m"
         )
     length = min(available, _LANE_CHANGE_LENGTH)
     middle = (travelled[0] + travelled[-1]) / 2
