@@ -96,10 +96,16 @@ class BeamPattern:
         return np.repeat(np.arange(self.num_columns), self.num_rings)
 
     @cached_property
+    def column_t_ns(self) -> np.ndarray:
+        """(num_columns,) uint32 firing time since the start of the turn."""
+        column_ns = self.period * 1e9 / self.num_columns
+        columns = np.arange(self.num_columns)
+        return np.round(columns * column_ns).astype(np.uint32)
+
+    @cached_property
     def t_ns(self) -> np.ndarray:
         """(num_beams,) uint32 firing time since the start of the turn."""
-        column_ns = self.period * 1e9 / self.num_columns
-        return np.round(self.column * column_ns).astype(np.uint32)
+        return self.column_t_ns[self.column]
 
 
 def _uniform_deg(top: float, bottom: float, num_rings: int):

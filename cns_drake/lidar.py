@@ -13,15 +13,10 @@ from pydrake.systems.framework import Context, LeafSystem, ValueProducer
 
 from cns_drake.beam_pattern import POINT_DTYPE, BeamPattern
 from cns_drake.errors import InputError
+from cns_drake.measurement import IDEAL, MeasurementModel
 from cns_drake.perception_geometry import read_perception_geometry
 from cns_drake.ray_casting import RayCastingScene
 from cns_drake.structure_table import StructureTable
-
-# Intensity falls with distance as in CARLA's ray-cast LiDAR with its default
-# atmosphere: exp(-a d), a = 0.004 / m (docs/ref_sensors of CARLA).
-_ATTENUATION_PER_M = 0.004
-# Step of the intensities of a LiDAR with finite resolution: 12 bits.
-_INTENSITY_STEP = 2.0**-12
 
 
 class Lidar(LeafSystem):
@@ -32,17 +27,24 @@ class Lidar(LeafSystem):
         name: Lidar
         input_ports:
         - geometry_query
+        - sweep (with motion distortion only)
         output_ports:
         - scan
         - point_cloud_S
 
     Frames: W is the world, P the parent frame, S the sensor frame (x
-    forward, y left, z up). All beams of a turn are cast from the pose of S
-    at the time of the output (a deskewed scan). `scan` is a structured array
-    of `POINT_DTYPE`, one record per return in firing order; beams whose
-    nearest surface is closer than the minimum range or farther than the
-    maximum range return nothing. `point_cloud_S` holds the same positions as
-    a Drake point cloud.
+    forward, y left, z up). `scan` is a structured array of `POINT_DTYPE`,
+    one record per return in firing order; beams whose nearest surface is
+    closer than the minimum range or farther than the maximum range return
+    nothing. `point_cloud_S` holds the same positions as a Drake point cloud.
+
+    The turn starts at the time of the output. Without motion distortion all
+    its beams are cast from the pose of S at that time (a deskewed scan).
+    With it, each column is cast from the pose of S at its own firing time,
+    which `sweep` tells (a `Sweep` of P with a pose for each column), and
+    its points are expressed in S at that time, as a real unit reports them:
+    X_WS(time + t) takes them to where they lie in the world. Other geometry
+    that moves stays for the turn where it is at its start.
 
     Drake cannot cast rays, so the system reads shapes and poses from the
     QueryObject and casts on a hierarchy of its own, built anew only when
@@ -55,7 +57,8 @@ class Lidar(LeafSystem):
         X_PS: RigidTransform,
         pattern: BeamPattern,
         *,
-        resolution: float = 0.0,
+        measurement: MeasurementModel = IDEAL,
+        motion_distortion: bool = False,
         structures: StructureTable | None = None,
         anchored_frames: Collection[FrameId] = (),
     ):
@@ -66,9 +69,8 @@ class Lidar(LeafSystem):
                 the model that P belongs to is invisible.
             X_PS: pose of the sensor in P.
             pattern: the beams.
-            resolution: coordinates are rounded to multiples of this [m], and
-                intensities to 12 bits; 0: neither is rounded. Steps that are
-                powers of two stay exact in float32 and compress well.
+            measurement: what it makes of true ranges.
+            motion_distortion: whether it moves while it turns.
             structures: gives labels and instance ids to returns.
             anchored_frames: frames that never move, besides the world's;
                 their geometry is cheaper to cast on.
@@ -77,7 +79,7 @@ class Lidar(LeafSystem):
         self._parent_frame_id = parent_frame_id
         self._X_PS = X_PS
         self._pattern = pattern
-        self._resolution = resolution
+        self._measurement = measurement
         structures = structures or StructureTable(())
         self._d_Sset = pattern.d_Sset.astype(np.float32)
         self._d_Sset_cast = pattern.d_Sset[pattern.packet_order]
@@ -85,6 +87,11 @@ class Lidar(LeafSystem):
         self._geometry_query = self.DeclareAbstractInputPort(
             "geometry_query", Value(QueryObject())
         )
+        self._sweep = None
+        if motion_distortion:
+            self._sweep = self.DeclareAbstractInputPort(
+                "sweep", Value(object())
+            )
         # Nothing in a Context invalidates the scene: whether geometry came or
         # went is checked when a scan is made, and poses are set then.
         self._scene = self.DeclareCacheEntry(
@@ -101,7 +108,7 @@ class Lidar(LeafSystem):
             "scan",
             alloc=lambda: Value(np.empty(0, POINT_DTYPE)),
             calc=self._calc_scan,
-            prerequisites_of_calc={self._geometry_query.ticket()},
+            prerequisites_of_calc=self._scan_prerequisites(),
         )
         self._scan = scan
         self.DeclareAbstractOutputPort(
@@ -121,36 +128,60 @@ class Lidar(LeafSystem):
         query_object = self._geometry_query.Eval(context)
         seen = self._scene.Eval(context)
         seen.update(query_object)
-        X_WS = query_object.GetPoseInWorld(self._parent_frame_id) @ self._X_PS
+        hits = seen.scene.cast_rays(
+            *self._calc_beams(context, query_object),
+            self._measurement.reach(self._pattern.max_range),
+        )
         order = self._pattern.packet_order
-        d_Wset = self._d_Sset_cast @ X_WS.rotation().matrix().T
-        # Beyond the maximum by a hair, so that the limit itself is decided
-        # below and not by the rounding inside the ray caster.
-        reach = self._pattern.max_range * (1.0 + 1e-5)
-        hits = seen.scene.cast_rays(X_WS.translation(), d_Wset, reach)
-        ranges = np.empty_like(hits.ranges)
-        ranges[order] = hits.ranges
+        true_ranges = np.empty_like(hits.ranges)
+        true_ranges[order] = hits.ranges
         geometry = np.empty_like(hits.geometry)
         geometry[order] = hits.geometry
-        returned = np.flatnonzero(
-            (ranges >= self._pattern.min_range)
-            & (ranges <= self._pattern.max_range)
+        beams, ranges, intensity = self._measurement.measure(
+            true_ranges,
+            self._pattern.min_range,
+            self._pattern.max_range,
+            round(context.get_time() / self._pattern.period),
         )
-        ranges, geometry = ranges[returned], geometry[returned]
-        p_SRset = self._d_Sset[returned] * ranges[:, None]
-        intensity = np.exp(-_ATTENUATION_PER_M * ranges)
-        if self._resolution > 0:
-            p_SRset = _rounded(p_SRset, self._resolution)
-            intensity = _rounded(intensity, _INTENSITY_STEP)
+        geometry = geometry[beams]
+        p_SRset = self._measurement.round_positions(
+            self._d_Sset[beams] * ranges[:, None]
+        )
         # Zeros, so that the padding between fields is defined, too.
-        scan = np.zeros(len(returned), POINT_DTYPE)
+        scan = np.zeros(len(beams), POINT_DTYPE)
         scan["x"], scan["y"], scan["z"] = p_SRset.T
         scan["intensity"] = intensity
-        scan["ring"] = self._pattern.ring[returned]
-        scan["t"] = self._pattern.t_ns[returned]
+        scan["ring"] = self._pattern.ring[beams]
+        scan["t"] = self._pattern.t_ns[beams]
         scan["label"] = seen.label[geometry]
         scan["instance"] = seen.instance[geometry]
         output.set_value(scan)
+
+    def _scan_prerequisites(self) -> set:
+        prerequisites = {self._geometry_query.ticket()}
+        if self._sweep is not None:
+            prerequisites.add(self._sweep.ticket())
+        if self._measurement.is_random:
+            prerequisites.add(self.time_ticket())
+        return prerequisites
+
+    def _calc_beams(self, context, query_object):
+        """Returns origins, (3,) or (num_beams, 3), and directions in W.
+
+        In packet order, which takes one column after the other for each
+        ring.
+        """
+        if self._sweep is None:
+            X_WP = query_object.GetPoseInWorld(self._parent_frame_id)
+            X_WS = X_WP @ self._X_PS
+            d_Wset = self._d_Sset_cast @ X_WS.rotation().matrix().T
+            return X_WS.translation(), d_Wset
+        sweep = self._sweep.Eval(context).of_frame(self._X_PS)
+        num_rings = self._pattern.num_rings
+        d_Sset = self._d_Sset_cast.reshape(num_rings, -1, 3)
+        d_Wset = np.einsum("cij,rcj->rci", sweep.R_WPset, d_Sset)
+        p_WSset = np.tile(sweep.p_WPset, (num_rings, 1))
+        return p_WSset, d_Wset.reshape(-1, 3)
 
     def _calc_point_cloud(self, context: Context, output) -> None:
         scan = self._scan.Eval(context)
@@ -158,10 +189,6 @@ class Lidar(LeafSystem):
         point_cloud.resize(len(scan))
         for axis, name in enumerate("xyz"):
             point_cloud.mutable_xyzs()[axis] = scan[name]
-
-
-def _rounded(values: np.ndarray, step: float) -> np.ndarray:
-    return np.rint(values / np.float32(step)) * np.float32(step)
 
 
 class _SeenGeometry:

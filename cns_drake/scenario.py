@@ -15,6 +15,7 @@ from pydantic import (
     ValidationError,
     ValidationInfo,
     field_validator,
+    model_validator,
 )
 from pydrake.math import RigidTransform, RollPitchYaw
 import yaml
@@ -26,6 +27,7 @@ from cns_drake.beam_pattern import (
 )
 from cns_drake.errors import InputError, describe_validation_error
 from cns_drake.frame_clock import FRAME_PERIOD
+from cns_drake.measurement import MeasurementModel
 from cns_drake.paths import sequence_name, shipped_maps, shipped_sequences
 from cns_drake.route import Route
 from cns_drake.speed_profile import Speeds
@@ -35,7 +37,7 @@ Triple = tuple[float, float, float]
 
 
 class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class Mount(_Model):
@@ -64,6 +66,12 @@ class LidarConfig(Mount):
         min_range: nearest range, in place of the preset's [m].
         max_range: farthest range, in place of the preset's [m].
         resolution: step of the coordinates [m]; 0 records what was cast.
+        range_noise: standard deviation of the ranges [m].
+        dropout: probability that a return is lost.
+        faint_dropout: probability that a return of no intensity is lost,
+            falling linearly with intensity to none for full intensity.
+        motion_distortion: whether each column is cast from the sensor's pose
+            at its own firing time, instead of all from that at the stamp.
     """
 
     xyz: Triple = (0.0, 0.0, 1.6)
@@ -73,6 +81,20 @@ class LidarConfig(Mount):
     max_range: float | None = Field(None, gt=0.0, le=1000.0)
     # About what real units resolve; a third less to store than exact values.
     resolution: float = Field(2.0**-10, ge=0.0, le=1.0)
+    range_noise: float = Field(0.0, ge=0.0, le=10.0)
+    dropout: float = Field(0.0, ge=0.0, le=1.0)
+    faint_dropout: float = Field(0.0, ge=0.0, le=1.0)
+    motion_distortion: bool = False
+
+    @model_validator(mode="after")
+    def _returns_something(self):
+        pattern = self.pattern()
+        if pattern.min_range >= pattern.max_range:
+            raise ValueError(
+                f"min_range {pattern.min_range:g} is not below max_range "
+                f"{pattern.max_range:g}"
+            )
+        return self
 
     @field_validator("preset")
     @classmethod
@@ -90,6 +112,34 @@ class LidarConfig(Mount):
             num_columns=self.columns,
             min_range=self.min_range,
             max_range=self.max_range,
+        )
+
+    def measurement(self, name: str, seed: int) -> MeasurementModel:
+        """Returns what the LiDAR of a name makes of true ranges.
+
+        Args:
+            name: of the LiDAR.
+            seed: of the scenario.
+        """
+        return MeasurementModel(
+            resolution=self.resolution,
+            range_noise=self.range_noise,
+            dropout=self.dropout,
+            faint_dropout=self.faint_dropout,
+            seed=seed,
+            sensor_name=name,
+        )
+
+    def with_preset(self, preset: str) -> LidarConfig:
+        """Returns another unit in the same place that measures alike.
+
+        Raises:
+            InputError: the preset is not known.
+        """
+        unit = make_lidar_config(preset)
+        unit_fields = ("preset", "columns", "min_range", "max_range")
+        return self.model_copy(
+            update={field: getattr(unit, field) for field in unit_fields}
         )
 
 
@@ -119,7 +169,7 @@ class Scenario(_Model):
         lidars: the LiDARs by name; the name gives frame and topic.
         imu: the IMU.
         frames: how many frames to record; all of the route by default.
-        seed: of everything random; the shipped sensors have no noise.
+        seed: of everything random: the noise of LiDARs that have any.
     """
 
     name: Name
@@ -198,16 +248,15 @@ class Scenario(_Model):
         return self.map_folder / "roads.yaml"
 
     def with_lidar_preset(self, preset: str) -> Scenario:
-        """Returns the scenario with every LiDAR replaced by a preset.
+        """Returns the scenario with the unit of every LiDAR replaced.
+
+        Their places, and how they measure, stay as they are.
 
         Raises:
             InputError: the preset is not known.
         """
-        replacement = make_lidar_config(preset)
         lidars = {
-            name: replacement.model_copy(
-                update={"xyz": config.xyz, "rpy_deg": config.rpy_deg}
-            )
+            name: config.with_preset(preset)
             for name, config in self.lidars.items()
         }
         return self.model_copy(update={"lidars": lidars})

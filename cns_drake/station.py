@@ -15,6 +15,7 @@ from cns_drake.odometry import add_odometry
 from cns_drake.paths import vehicle_file
 from cns_drake.planning import plan_drive
 from cns_drake.scenario import Scenario
+from cns_drake.sweep import VehicleSweep
 from cns_drake.trajectory import Trajectory
 from cns_drake.vehicle_motion import VehicleMotion
 from cns_drake.world import World, load_world
@@ -32,9 +33,10 @@ def make_station(
 
     Systems: `scene_graph` holds the stage and the vehicle, `vehicle_motion`
     prescribes where the vehicle is, `geometry_pose` passes that on to the
-    SceneGraph; a `Lidar` for each entry of `scenario.lidars` under its name,
-    an accelerometer and a gyroscope, and `odometry` measure; `mcap_recorder`
-    and `meshcat_recorder` take down what they measure.
+    SceneGraph; a `Lidar` for each entry of `scenario.lidars` under its name
+    (with a `<lidar>_sweep` if it moves while it turns), an accelerometer and
+    a gyroscope, and `odometry` measure; `mcap_recorder` and
+    `meshcat_recorder` take down what they measure.
 
     Exported output ports: `<lidar>_scan`, `specific_force`,
     `angular_velocity`, `odometry`, `geometry_query`.
@@ -80,7 +82,8 @@ def make_station(
                 plant.GetBodyFrameIdOrThrow(base.index()),
                 X_BSs[name],
                 config.pattern(),
-                resolution=config.resolution,
+                measurement=config.measurement(name, scenario.seed),
+                motion_distortion=config.motion_distortion,
                 structures=world.structures,
                 anchored_frames=world.anchored_frames(),
             ),
@@ -88,6 +91,14 @@ def make_station(
         builder.Connect(
             measured["geometry_query"], lidar.GetInputPort("geometry_query")
         )
+        if config.motion_distortion:
+            sweep = builder.AddNamedSystem(
+                f"{name}_sweep",
+                VehicleSweep(trajectory, config.pattern().column_t_ns * 1e-9),
+            )
+            builder.Connect(
+                sweep.GetOutputPort("sweep"), lidar.GetInputPort("sweep")
+            )
         measured[f"{name}_scan"] = lidar.GetOutputPort("scan")
     accelerometer, gyroscope = add_imu(builder, plant, motion, base, X_BI)
     measured["specific_force"] = accelerometer.get_measurement_output_port()

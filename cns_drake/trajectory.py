@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.math import SpatialAcceleration, SpatialVelocity
+from scipy.spatial.transform import Rotation
 
 from cns_drake.lane_path import LanePath
 from cns_drake.path_geometry import PathIntegral, PathJet, SmoothPath
@@ -79,6 +80,13 @@ class Trajectory:
         return RigidTransform(
             RollPitchYaw(0.0, -jet.climb[0], jet.yaw[0]), jet.p[0]
         )
+
+    def poses(self, t) -> tuple[np.ndarray, np.ndarray]:
+        """Returns R_WB (N, 3, 3) and p_WB (N, 3) [m] at (N,) times."""
+        jet = self._path.evaluate(self.path_parameter(t)[0])
+        yaw_pitch = np.stack([jet.yaw, -jet.climb], axis=1)
+        # Capitals: about the axes of the vehicle, one after the other.
+        return Rotation.from_euler("ZY", yaw_pitch).as_matrix(), jet.p
 
     def spatial_velocity(self, t: float) -> SpatialVelocity:
         """Returns V_WB, expressed in the world [rad/s, m/s]."""

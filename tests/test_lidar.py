@@ -28,6 +28,7 @@ from cns_drake.beam_pattern import (
 )
 from cns_drake.errors import InputError
 from cns_drake.lidar import Lidar
+from cns_drake.measurement import MeasurementModel
 from cns_drake.structure_table import StructureEntry, StructureTable
 
 X_WS = RigidTransform(RollPitchYaw(0.11, -0.07, 2.3), [1.5, -0.8, 0.4])
@@ -347,7 +348,9 @@ def test_resolution_rounds_coordinates_and_intensity():
         stage.add("room::floor", Box(200, 200, 0.2))
     step = 2.0 ** -int(rng.integers(8, 11))
     exact = exact.finish().eval()
-    rounded = rounded.finish(resolution=step).eval()
+    rounded = rounded.finish(
+        measurement=MeasurementModel(resolution=step)
+    ).eval()
     steps = positions(rounded) / step
     np.testing.assert_array_equal(steps, np.rint(steps))
     error = np.abs(positions(rounded) - positions(exact))

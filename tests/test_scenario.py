@@ -8,7 +8,7 @@ import yaml
 
 from cns_drake.errors import InputError
 from cns_drake.paths import recordable_sequences
-from cns_drake.scenario import Mount, load_scenario, make_scenario
+from cns_drake.scenario import LidarConfig, Mount, load_scenario, make_scenario
 
 
 def test_shipped_sequences_load():
@@ -67,6 +67,10 @@ def test_preset_replaces_the_lidar_where_it_is():
     config = scenario.lidars["lidar"]
     assert config.pattern().num_rings == 128
     assert config.xyz == (0.0, 0.0, 1.6)
+    own = {"lidars": {"a": {"columns": 64, "range_noise": 0.02}}}
+    values = scenario.model_dump() | own
+    config = make_scenario(values, "test").with_lidar_preset("vlp-16")
+    assert config.lidars["a"] == LidarConfig(preset="vlp-16", range_noise=0.02)
     with pytest.raises(InputError, match=r"--lidar: preset: .*os2-128.*vlp-16"):
         scenario.with_lidar_preset("os2-128")
 
@@ -84,6 +88,19 @@ def test_preset_replaces_the_lidar_where_it_is():
         ({"lidars": {"imu": {}}}, r"lidars: 'imu' is the name of another"),
         ({"lidars": {"a": {"preset": "x"}}}, r"lidars.a.preset: unknown"),
         ({"lidars": {"a b": {}}}, r"scenario.yaml: lidars.a b"),
+        ({"lidars": {"a": {"range_noise": -0.1}}}, r"a.range_noise: .*greater"),
+        ({"lidars": {"a": {"range_noise": float("nan")}}}, r"a.range_noise: "),
+        ({"lidars": {"a": {"dropout": 1.1}}}, r"a.dropout: .*less"),
+        ({"lidars": {"a": {"faint_dropout": -1}}}, r"a.faint_dropout: "),
+        ({"lidars": {"a": {"motion_distortion": "x"}}}, r"motion_distortion"),
+        (
+            {"lidars": {"a": {"max_range": 0.5}}},
+            r"lidars.a: min_range 0.8 is not below max_range 0.5",
+        ),
+        (
+            {"lidars": {"a": {"xyz": [0, float("inf"), 0]}}},
+            r"a.xyz.1: .*finite",
+        ),
         ({"imu": {"xyz": [0, 0]}}, r"scenario.yaml: imu.xyz"),
         ({"route": []}, r"scenario.yaml: route: "),
         ({"route": [{"road": "x"}]}, r"scenario.yaml: route.0.direction"),
