@@ -8,6 +8,7 @@ import sys
 
 from cns_drake.city.generate import differing_files, generate_city
 from cns_drake.errors import InputError
+from cns_drake.scenario import load_scenario
 from cns_drake.sequence_table import write_table
 
 
@@ -29,12 +30,32 @@ def main(arguments: list[str] | None = None) -> int:
         action="store_true",
         help="write nothing; exit with 1 if a file would change",
     )
+    parser.add_argument(
+        "--calibrate",
+        nargs=2,
+        metavar=("EARLIER", "LATER"),
+        help="generate nothing; estimate TCR_sym between the sequences of two "
+        "stages of the generated city, such as 01 04, and what each group of "
+        "stages.yaml contributes to it",
+    )
+    parser.add_argument(
+        "--target",
+        type=float,
+        metavar="TCR_SYM",
+        help="with --calibrate: propose what to change in the earlier stage "
+        "to reach this TCR_sym",
+    )
     options = parser.parse_args(arguments)
+    if options.target is not None and not options.calibrate:
+        parser.error("--target: only with --calibrate")
 
     def progress(line: str) -> None:
         print(line, file=sys.stderr)
 
     try:
+        if options.calibrate:
+            _calibrate(options.world, options.calibrate, options.target)
+            return 0
         if options.check:
             changed = differing_files(options.world, progress)
             for path in changed:
@@ -47,6 +68,20 @@ def main(arguments: list[str] | None = None) -> int:
         return 2
     progress(f"{len(files)} files")
     return 0
+
+
+def _calibrate(world: Path, stages: list[str], target: float | None) -> None:
+    # Only who calibrates needs the evaluation.
+    from cns_drake.city.calibration import Calibration, report_lines
+
+    earlier, later = (
+        load_scenario(world / f"sequence_{stage}.yaml") for stage in stages
+    )
+    calibration = Calibration(
+        earlier, later, progress=lambda line: print(line, file=sys.stderr)
+    )
+    for line in report_lines(calibration, target):
+        print(line)
 
 
 if __name__ == "__main__":
