@@ -3,16 +3,22 @@
 The recording grows in `<folder>/<name>_0.mcap.part`. Only when it is whole
 does it get its final name, and `metadata.yaml` comes last: where that file
 is, the folder is complete and consistent.
+
+What an interrupted run leaves is a part file, whose messages a later run of
+the same recording takes over by writing them again; see PartFile.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 import contextlib
+import io
 import json
 import os
 from pathlib import Path
+from typing import NamedTuple
 
+from mcap.records import Channel, Message
 from mcap.writer import CompressionType, Writer
 
 from cns_drake import __version__, messages
@@ -23,10 +29,14 @@ from cns_drake.files import (
     user_errors,
     write_part,
 )
+from cns_drake.mcap_recovery import Fault, read_records
+from cns_drake.part_file import PartFile
+from cns_drake.recording_folder import RecordingFolder
 from cns_drake.rosbag2_metadata import (
     Topic,
     make_bag_information,
     make_qos_yaml,
+    make_topic_metadata,
     to_yaml,
 )
 
@@ -36,12 +46,29 @@ _CHUNK_BYTES = 1024 * 1024
 _FLUSH_PERIOD_NS = 1_000_000_000
 
 
+class RecordedMessage(NamedTuple):
+    """A message as `BagWriter.write` takes it.
+
+    Attributes:
+        topic: its name.
+        stamp_ns: the message's time [ns].
+        data: the serialised message.
+        sequence: the message's number on its topic.
+    """
+
+    topic: str
+    stamp_ns: int
+    data: bytes
+    sequence: int
+
+
 class BagWriter:
     """A context manager that writes one recording.
 
     Leaving the context normally completes the recording. Leaving it by an
     exception closes what was recorded as a shorter but valid MCAP file that
-    keeps its `.part` name. The same calls give the same bytes.
+    keeps its `.part` name. The same calls give the same bytes, whatever an
+    interrupted run had left.
     """
 
     def __init__(
@@ -63,45 +90,50 @@ class BagWriter:
             start_ns: time of the first message, also the nominal time of
                 the attachments [ns].
             attachments: file name -> JSON value, put before all messages.
+                They tell whether an interrupted recording is of the same
+                kind, so that its messages can be taken over.
             scenario: what `scenario.yaml` beside the MCAP shall hold.
             custom_data: key -> text for `ros2 bag info`.
-            overwrite: whether an existing recording may be replaced. It is
-                kept until the new one is complete.
+            overwrite: whether an existing recording may be replaced. A
+                finished one is kept until the new one is complete.
 
         Raises:
-            InputError: if the folder exists and `overwrite` is not set.
+            InputError: if the folder must not be used, see
+                `RecordingFolder.check`.
         """
-        self._folder = Path(os.path.abspath(folder))
+        self._files = RecordingFolder(folder)
         self._overwrite = overwrite
-        check_folder(self._folder, overwrite)
+        self._files.check(overwrite)
         self._topics = tuple(topics)
         self._start_ns = start_ns
         self._attachments = dict(attachments)
         self._scenario = scenario
         self._custom_data = dict(custom_data or {})
-        self._mcap = self._folder / f"{self._folder.name}_0.mcap"
-        self._part = part_path(self._mcap)
+        self._part = part_path(self._files.mcap)
         self._counts = {topic.name: 0 for topic in self._topics}
         self._first_ns: int | None = None
         self._last_ns: int | None = None
         self._flushed_ns = start_ns
         # False while a record is being written: if that is interrupted, the
         # writer's index no longer describes the file and must not be used.
-        self._intact = True
+        self._intact = False
 
     def __enter__(self) -> BagWriter:
         """Creates the folder, the MCAP and what precedes the messages.
 
         Raises:
-            InputError: if the folder or the file cannot be written.
+            InputError: if the folder or the file cannot be written, another
+                process is writing it, or what an interrupted run left is no
+                part of this recording.
         """
-        with user_errors(self._folder):
-            self._folder.mkdir(parents=True, exist_ok=self._overwrite)
+        with user_errors(self._files.path):
+            self._files.path.mkdir(parents=True, exist_ok=True)
+        self._files.check(self._overwrite)
         with user_errors(self._part):
-            self._stream = open(self._part, "wb")
+            self._stream = self._open_part()
         try:
             with self._writing():
-                self._begin()
+                self._writer, self._channel_ids = self._begin(self._stream)
         except BaseException:
             self._close_part()
             raise
@@ -120,10 +152,37 @@ class BagWriter:
         try:
             with self._writing():
                 self._end()
-                os.fsync(self._stream.fileno())
+                self._stream.finish()
+            self._publish()
         finally:
             self._close_stream()
-        self._publish()
+
+    def interrupted(self) -> Iterator[RecordedMessage]:
+        """Yields the messages that an interrupted run recorded.
+
+        They must be written before any other message, in this order and
+        while this iterator goes on, to be taken over; it ends where the file
+        is damaged.
+
+        Raises:
+            InputError: if the file cannot be read.
+        """
+        topics: dict[int, str] = {}
+        with user_errors(self._part), open(self._part, "rb") as stream:
+            for record in read_records(stream):
+                if isinstance(record, Fault):
+                    return
+                if isinstance(record, Channel):
+                    topics[record.id] = record.topic
+                elif isinstance(record, Message):
+                    if record.channel_id not in topics:
+                        return
+                    yield RecordedMessage(
+                        topics[record.channel_id],
+                        record.log_time,
+                        record.data,
+                        record.sequence,
+                    )
 
     def write(
         self, topic: str, stamp_ns: int, data: bytes, sequence: int
@@ -152,15 +211,54 @@ class BagWriter:
             self._first_ns = stamp_ns
         self._last_ns = stamp_ns
 
-    def _begin(self) -> None:
-        self._writer = Writer(
-            self._stream,
+    def _open_part(self) -> PartFile:
+        """Opens the part file, empty or with what can be taken over."""
+        preamble = io.BytesIO()
+        self._begin(preamble)
+        if (
+            self._files.mcap.is_file()
+            and not self._files.is_finished()
+            and not self._part.exists()
+        ):
+            # Interrupted between the final names of the files.
+            stream = PartFile(self._files.mcap)
+            if stream.starts_like(preamble.getvalue()):
+                os.replace(self._files.mcap, self._part)
+                return stream
+            stream.close()
+            self._refuse_other_recording()
+        stream = PartFile(self._part)
+        if not stream.starts_like(preamble.getvalue()):
+            try:
+                self._refuse_other_recording()
+                stream.clear()
+            except BaseException:
+                stream.close()
+                raise
+        return stream
+
+    def _refuse_other_recording(self) -> None:
+        if not self._overwrite:
+            raise InputError(
+                f"{self._files.path}: the folder already exists and holds an "
+                "interrupted recording of another scenario, world or version "
+                "(--overwrite discards it)"
+            )
+
+    def _begin(self, stream) -> tuple[Writer, dict[str, int]]:
+        """Writes what precedes the messages.
+
+        Returns:
+            The writer, and topic -> channel id.
+        """
+        writer = Writer(
+            stream,
             chunk_size=_CHUNK_BYTES,
             compression=CompressionType.ZSTD,
         )
-        self._writer.start(profile="ros2", library=f"cns-drake {__version__}")
+        writer.start(profile="ros2", library=f"cns-drake {__version__}")
         for name, value in self._attachments.items():
-            self._writer.add_attachment(
+            writer.add_attachment(
                 self._start_ns,
                 self._start_ns,
                 name,
@@ -168,7 +266,7 @@ class BagWriter:
                 _to_json(value),
             )
         schema_ids = {
-            message_type: self._writer.register_schema(
+            message_type: writer.register_schema(
                 message_type,
                 "ros2msg",
                 messages.message_definition(message_type).encode(),
@@ -177,8 +275,8 @@ class BagWriter:
                 topic.message_type for topic in self._topics
             )
         }
-        self._channel_ids = {
-            topic.name: self._writer.register_channel(
+        channel_ids = {
+            topic.name: writer.register_channel(
                 topic.name,
                 "cdr",
                 schema_ids[topic.message_type],
@@ -191,7 +289,8 @@ class BagWriter:
             )
             for topic in self._topics
         }
-        self._writer.flush()
+        writer.flush()
+        return writer, channel_ids
 
     def _end(self) -> None:
         self._writer.add_metadata(
@@ -207,22 +306,22 @@ class BagWriter:
         renamed. An old `metadata.yaml` goes first: it must never describe
         the new MCAP.
         """
-        metadata_file = self._folder / "metadata.yaml"
-        scenario_file = self._folder / "scenario.yaml"
+        files = self._files
         metadata = {"rosbag2_bagfile_information": self._information()}
-        write_part(scenario_file, to_yaml(self._scenario))
-        write_part(metadata_file, to_yaml(metadata))
-        with user_errors(metadata_file):
-            metadata_file.unlink(missing_ok=True)
-        for path in (self._mcap, scenario_file, metadata_file):
+        write_part(files.scenario, to_yaml(self._scenario))
+        write_part(files.metadata, to_yaml(metadata))
+        with user_errors(files.metadata):
+            files.metadata.unlink(missing_ok=True)
+        for path in (files.mcap, files.scenario, files.metadata):
             complete_part(path)
 
     def _close_part(self) -> None:
         """Ends an incomplete file as well as its state allows."""
         # The exception on its way is the fault to report, not a second one
-        # that comes of it.
+        # that comes of it. As long as nothing new was written, the file is
+        # better than what could be written.
         with contextlib.suppress(InputError):
-            if self._intact:
+            if self._intact and not self._stream.replaying:
                 with self._writing():
                     self._end()
         self._close_stream()
@@ -245,29 +344,15 @@ class BagWriter:
         first_ns = self._start_ns if self._first_ns is None else self._first_ns
         last_ns = first_ns if self._last_ns is None else self._last_ns
         return make_bag_information(
-            self._mcap.name,
-            {topic: self._counts[topic.name] for topic in self._topics},
+            self._files.mcap.name,
+            {
+                make_topic_metadata(topic): self._counts[topic.name]
+                for topic in self._topics
+            },
             start_ns=first_ns,
             end_ns=last_ns,
             custom_data=self._custom_data,
         )
-
-
-def check_folder(folder: Path, overwrite: bool) -> None:
-    """Refuses a folder that a recording must not go into.
-
-    Raises:
-        InputError: if `folder` is a file, or exists without `overwrite`.
-    """
-    with user_errors(folder):
-        if folder.is_dir():
-            if not overwrite:
-                raise InputError(
-                    f"{folder}: the folder already exists (--overwrite"
-                    " replaces it)"
-                )
-        elif folder.exists():
-            raise InputError(f"{folder}: there is a file of this name")
 
 
 def _to_json(value) -> bytes:

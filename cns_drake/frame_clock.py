@@ -9,6 +9,13 @@ FRAME_PERIOD = 0.05
 START_NS = 1_700_000_000_000_000_000
 
 
+def frame_stamp_ns(
+    frame: int, *, start_ns: int = START_NS, period: float = FRAME_PERIOD
+) -> int:
+    """Returns the stamp of a frame [ns]."""
+    return start_ns + round(frame * period * 1e9)
+
+
 def frames_within(duration: float) -> int:
     """Returns how many frames a drive of a duration [s] has.
 

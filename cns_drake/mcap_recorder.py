@@ -11,6 +11,7 @@ from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
 from cns_drake import messages
 from cns_drake.bag_writer import BagWriter
+from cns_drake.frame_clock import frame_stamp_ns
 from cns_drake.rosbag2_metadata import Topic
 
 _TF_STATIC = Topic("/tf_static", messages.TF, latched=True)
@@ -93,7 +94,9 @@ class McapRecorder(LeafSystem):
 
     def _publish(self, context: Context) -> EventStatus:
         frame = self._frame_index(context.get_time())
-        stamp_ns = self._start_ns + round(frame * self._period * 1e9)
+        stamp_ns = frame_stamp_ns(
+            frame, start_ns=self._start_ns, period=self._period
+        )
         odometry = self._odometry.Eval(context)
         if frame == 0:
             # Latched, hence once; in the first frame rather than before it,

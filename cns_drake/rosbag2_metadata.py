@@ -32,9 +32,39 @@ class Topic:
     latched: bool = False
 
 
+@dataclass(frozen=True)
+class TopicMetadata:
+    """What rosbag2 wants to know of a topic.
+
+    Attributes:
+        name: e.g. `/lidar/points`.
+        message_type: e.g. `sensor_msgs/msg/PointCloud2`.
+        serialization_format: e.g. `cdr`.
+        qos_yaml: the publishers' quality of service.
+        message_hash: the message type's REP-2011 hash.
+    """
+
+    name: str
+    message_type: str
+    serialization_format: str
+    qos_yaml: str
+    message_hash: str
+
+
+def make_topic_metadata(topic: Topic) -> TopicMetadata:
+    """Returns the metadata of a topic of ours."""
+    return TopicMetadata(
+        name=topic.name,
+        message_type=topic.message_type,
+        serialization_format="cdr",
+        qos_yaml=make_qos_yaml(topic),
+        message_hash=messages.message_hash(topic.message_type),
+    )
+
+
 def make_bag_information(
     file_name: str,
-    message_counts: Mapping[Topic, int],
+    message_counts: Mapping[TopicMetadata, int],
     *,
     start_ns: int,
     end_ns: int,
@@ -61,11 +91,9 @@ def make_bag_information(
                 "topic_metadata": {
                     "name": topic.name,
                     "type": topic.message_type,
-                    "serialization_format": "cdr",
-                    "offered_qos_profiles": make_qos_yaml(topic),
-                    "type_description_hash": messages.message_hash(
-                        topic.message_type
-                    ),
+                    "serialization_format": topic.serialization_format,
+                    "offered_qos_profiles": topic.qos_yaml,
+                    "type_description_hash": topic.message_hash,
                 },
                 "message_count": topic_count,
             }

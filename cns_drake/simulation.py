@@ -2,28 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import math
 from pathlib import Path
 import time
 
+from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 
 from cns_drake import __version__
-from cns_drake.bag_writer import BagWriter, check_folder
+from cns_drake.bag_writer import BagWriter
 from cns_drake.errors import InputError
 from cns_drake.files import check_writable, complete_part, write_part
 from cns_drake.frame_clock import FRAME_PERIOD, START_NS, frames_within
 from cns_drake.mcap_recorder import make_calibration, recording_topics
 from cns_drake.meshcat_recording import MeshcatRecorder
 from cns_drake.planning import plan_drive
+from cns_drake.provenance import (
+    INPUTS_KEY,
+    combined_digest,
+    dependency_versions,
+    digest_inputs,
+)
+from cns_drake.recording_folder import RecordingFolder
+from cns_drake.resuming import take_over_frames
+from cns_drake.rosbag2_metadata import Topic
 from cns_drake.scenario import Scenario
 from cns_drake.station import load_stage, make_station
 from cns_drake.world import World
 
 # Reports that so many frames of so many are done.
 ProgressCallback = Callable[[int, int], None]
+# Takes what a user should know, in words.
+NoteCallback = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -33,8 +45,10 @@ class Run:
     Attributes:
         name: of the sequence.
         folder: the recording.
-        num_frames: frames recorded.
-        simulated_s: simulated time from the first frame to the last [s].
+        num_frames: frames in the recording.
+        resumed_frames: how many of them an interrupted run had recorded.
+        simulated_s: simulated time from the first frame simulated to the
+            last [s].
         wall_s: time that took, without loading [s].
         loading_s: time to load the stage and plan the drive [s].
     """
@@ -42,6 +56,7 @@ class Run:
     name: str
     folder: Path
     num_frames: int
+    resumed_frames: int
     simulated_s: float
     wall_s: float
     loading_s: float
@@ -60,8 +75,13 @@ def simulate(
     graphviz_file: Path | None = None,
     overwrite: bool = False,
     on_frame: ProgressCallback = lambda done, total: None,
+    on_note: NoteCallback = lambda text: None,
 ) -> Run:
     """Simulates a scenario and records it as `<output>/<name>/`.
+
+    If an interrupted run of the same scenario, world and version has left
+    frames there, they are kept and the simulation starts with the next one;
+    the result is the same. For a page of the drive all frames are simulated.
 
     Args:
         scenario: what to run.
@@ -71,17 +91,18 @@ def simulate(
             anywhere.
         overwrite: replace an existing recording of that name.
         on_frame: is told about progress.
+        on_note: is told what was found of an interrupted run.
 
     Raises:
         InputError: the scenario cannot be run or its output not be written.
     """
-    folder = output / scenario.name
+    files = RecordingFolder(output / scenario.name)
     start = time.perf_counter()
     for file in (page_file, graphviz_file):
         if file is not None:
             check_writable(file)
     # What can be found wrong at once is found before anything slow.
-    check_folder(folder, overwrite)
+    files.check(overwrite)
     scenario.check_files(scenario.name)
     trajectory = plan_drive(scenario)
     available = frames_within(trajectory.duration)
@@ -92,38 +113,30 @@ def simulate(
             f"takes only {available}"
         )
     scenario = scenario.model_copy(update={"frames": num_frames})
-    described = scenario.model_dump(mode="json", exclude_none=True)
     world = load_stage(scenario)
-    X_BSs = {name: lidar.pose() for name, lidar in scenario.lidars.items()}
-    bag = BagWriter(
-        folder,
-        recording_topics(scenario.lidars),
-        start_ns=START_NS,
-        attachments={
-            "scenario.json": described,
-            "structures.json": _structure_list(world),
-            "calibration.json": make_calibration(X_BSs, scenario.imu.pose()),
-        },
-        scenario=described,
-        custom_data={
-            "cns_drake_version": __version__,
-            **{
-                key: str(described[key])
-                for key in ("map", "stage", "world", "seed")
-                if key in described
-            },
-        },
-        overwrite=overwrite,
-    )
+    topics = recording_topics(scenario.lidars)
+    bag = _make_bag(files.path, topics, scenario, world, overwrite)
     page = None
     if page_file is not None:
         page = MeshcatRecorder(
             world,
-            X_BSs=X_BSs,
+            X_BSs=_lidar_poses(scenario),
             period=FRAME_PERIOD,
             other_stage=_other_stage(scenario),
         )
+    # Frame k is recorded at k periods; ending with the last one's time, no
+    # rounding can add or drop a frame.
+    end = (num_frames - 1) * FRAME_PERIOD
+    resumed_frames = 0
     with bag:
+        if page is None:
+            resumed_frames = take_over_frames(bag, topics)
+        if resumed_frames > 0:
+            on_note(
+                f"{scenario.name}: found {resumed_frames} of {num_frames} "
+                "frames of an interrupted run, going on from there"
+            )
+        begin = min(resumed_frames * FRAME_PERIOD, end)
         diagram = make_station(
             scenario, world=world, trajectory=trajectory, bag=bag, page=page
         )
@@ -138,21 +151,65 @@ def simulate(
             on_frame(min(done, num_frames), num_frames)
 
         simulator.set_monitor(monitor)
-        # Frame k is recorded at k periods; ending with the last one's time,
-        # no rounding can add or drop a frame.
-        end = (num_frames - 1) * FRAME_PERIOD
-        simulator.AdvanceTo(end)
+        if resumed_frames < num_frames:
+            simulator.get_mutable_context().SetTime(begin)
+            simulator.AdvanceTo(end)
     finished = time.perf_counter()
     if page is not None:
         page.save(page_file, title=scenario.name)
     return Run(
         name=scenario.name,
-        folder=folder,
+        folder=files.path,
         num_frames=num_frames,
-        simulated_s=end,
+        resumed_frames=resumed_frames,
+        simulated_s=end - begin,
         wall_s=finished - loaded,
         loading_s=loaded - start,
     )
+
+
+def _make_bag(
+    folder: Path,
+    topics: Sequence[Topic],
+    scenario: Scenario,
+    world: World,
+    overwrite: bool,
+) -> BagWriter:
+    """Makes the recording of a scenario, which has a number of frames."""
+    described = scenario.model_dump(mode="json", exclude_none=True)
+    inputs = digest_inputs(scenario)
+    return BagWriter(
+        folder,
+        topics,
+        start_ns=START_NS,
+        attachments={
+            "scenario.json": described,
+            "structures.json": _structure_list(world),
+            "calibration.json": make_calibration(
+                _lidar_poses(scenario), scenario.imu.pose()
+            ),
+            "provenance.json": {
+                "versions": dependency_versions(),
+                "inputs_sha256": inputs,
+            },
+        },
+        scenario=described,
+        custom_data={
+            "cns_drake_version": __version__,
+            INPUTS_KEY: combined_digest(inputs),
+            **{
+                key: str(described[key])
+                for key in ("map", "stage", "world", "seed")
+                if key in described
+            },
+        },
+        overwrite=overwrite,
+    )
+
+
+def _lidar_poses(scenario: Scenario) -> dict[str, RigidTransform]:
+    """Returns LiDAR name -> pose X_BS in the vehicle frame."""
+    return {name: lidar.pose() for name, lidar in scenario.lidars.items()}
 
 
 def _structure_list(world: World) -> list[dict]:

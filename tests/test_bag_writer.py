@@ -1,7 +1,6 @@
 import contextlib
 import json
 import os
-from pathlib import Path
 import resource
 
 from mcap.exceptions import McapError
@@ -15,7 +14,7 @@ from rosbags.interfaces import QosDurability, QosReliability
 import yaml
 
 from cns_drake import messages
-from cns_drake.bag_writer import BagWriter, check_folder
+from cns_drake.bag_writer import BagWriter
 from cns_drake.errors import InputError
 from cns_drake.rosbag2_metadata import Topic
 
@@ -257,13 +256,13 @@ def test_existing_folder_is_refused_and_untouched(tmp_path):
     assert {n: (folder / n).read_bytes() for n in names(folder)} == before
 
 
-def test_folder_that_appears_after_the_check_is_refused(tmp_path):
+def test_recording_that_appears_after_the_check_is_refused(tmp_path):
     folder = tmp_path / "town_01"
     bag = open_bag(folder)
-    folder.mkdir()
-    with pytest.raises(InputError, match="town_01: File exists"), bag:
+    record(folder, 5)
+    with pytest.raises(InputError, match=r"town_01: .*exists"), bag:
         pytest.fail("the context must not open")
-    assert names(folder) == []
+    assert len(stamps_read_indexed(folder / "town_01_0.mcap")) == 6
 
 
 def test_overwrite_keeps_the_old_recording_until_the_new_is_whole(tmp_path):
@@ -304,26 +303,35 @@ def test_folder_below_a_file_is_named(tmp_path):
 def test_file_in_place_of_the_folder_is_refused(tmp_path, overwrite):
     (tmp_path / "town_01").write_text("precious")
     with pytest.raises(InputError, match="town_01: there is a file"):
-        check_folder(tmp_path / "town_01", overwrite)
-    with pytest.raises(InputError, match="town_01: there is a file"):
         open_bag(tmp_path / "town_01", overwrite=overwrite)
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
+@contextlib.contextmanager
+def largest_file(size):
+    """Makes real writes fail, without a mount."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
 def test_full_disk_at_the_start(tmp_path):
     folder = tmp_path / "town_01"
-    folder.mkdir()
-    (folder / "town_01_0.mcap.part").symlink_to("/dev/full")
-    with pytest.raises(InputError, match=r"\.part: No space left") as error:
-        record(folder, overwrite=True)
+    with (
+        largest_file(10),
+        pytest.raises(InputError, match=r"\.part: File too large") as error,
+    ):
+        record(folder)
     assert "\n" not in str(error.value)
     assert names(folder) == ["town_01_0.mcap.part"]
+    record(folder)
+    assert "metadata.yaml" in names(folder)
 
 
 def test_disk_that_fills_up_in_mid_run(tmp_path):
-    # A limit on the size of files makes real writes fail without a mount.
     folder = tmp_path / "town_01"
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     noise = np.random.default_rng(0)
 
     def record_much():
@@ -331,12 +339,11 @@ def test_disk_that_fills_up_in_mid_run(tmp_path):
             for i in range(100):
                 write_frames(bag, [i], noise.bytes(100_000))
 
-    resource.setrlimit(resource.RLIMIT_FSIZE, (3_000_000, hard))
-    try:
-        with pytest.raises(InputError, match=r"\.part: File too large"):
-            record_much()
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    with (
+        largest_file(3_000_000),
+        pytest.raises(InputError, match=r"\.part: File too large"),
+    ):
+        record_much()
     assert names(folder) == ["town_01_0.mcap.part"]
     stamps = stamps_read_linearly(folder / "town_01_0.mcap.part")
     assert stamps == [START_NS + i * 50_000_000 for i in range(len(stamps))]

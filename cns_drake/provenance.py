@@ -1,0 +1,107 @@
+"""What a recording was made from and with, besides its scenario."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import json
+import os
+from pathlib import Path
+import platform
+import re
+
+from cns_drake import __version__
+from cns_drake.files import user_errors
+from cns_drake.paths import vehicle_file
+from cns_drake.scenario import Scenario
+
+# Whatever can have a say in a message's bytes.
+_PACKAGES = (
+    "drake",
+    "embreex",
+    "numpy",
+    "scipy",
+    "mcap",
+    "rosbags",
+    "zstandard",
+)
+# Where a recording's metadata keep the combined digest of its inputs.
+INPUTS_KEY = "inputs_sha256"
+
+_URI = re.compile(r"<uri>\s*([^<>\0]+?)\s*</uri>")
+
+
+def dependency_versions() -> dict[str, str]:
+    """Returns package -> version, of cns-drake and what it computes with."""
+    return {
+        "cns-drake": __version__,
+        "python": platform.python_version(),
+        **{name: importlib.metadata.version(name) for name in _PACKAGES},
+    }
+
+
+def digest_inputs(scenario: Scenario) -> dict[str, str]:
+    """Returns SHA-256 digests of the files that a scenario reads.
+
+    A world counts with the meshes and models that it names by relative
+    paths; what it finds by a `package://` or `model://` URI does not count.
+
+    Returns:
+        `world`, `vehicle`, and `structures`, `roads` or `waypoints` where
+        there are such -> hexadecimal digest. It depends on contents and on
+        the relative names alone, not on where the files lie.
+
+    Raises:
+        InputError: a file cannot be read.
+    """
+    inputs = {"world": scenario.world_file, "vehicle": vehicle_file()}
+    structures = scenario.world_file.parent / "structures.csv"
+    if structures.is_file():
+        inputs["structures"] = structures
+    if scenario.waypoints is not None:
+        inputs["waypoints"] = Path(scenario.waypoints)
+    else:
+        inputs["roads"] = scenario.roads_file
+    return {name: _digest(path) for name, path in inputs.items()}
+
+
+def combined_digest(inputs: dict[str, str]) -> str:
+    """Returns one digest for all that `digest_inputs` returns."""
+    return hashlib.sha256(json.dumps(inputs).encode()).hexdigest()
+
+
+def _digest(path: Path) -> str:
+    digest = hashlib.sha256()
+    for name in sorted(_referenced_files(path)):
+        content = _read(path.parent / name)
+        digest.update(f"{name} {len(content)}\n".encode())
+        digest.update(content)
+    # The file itself comes last, without its name.
+    digest.update(_read(path))
+    return digest.hexdigest()
+
+
+def _referenced_files(model: Path) -> set[str]:
+    """Returns the files that an SDF file and the models in it name.
+
+    Returns:
+        Paths relative to the model's folder.
+    """
+    found: set[str] = set()
+    waiting = [model]
+    while waiting:
+        file = waiting.pop()
+        for uri in _URI.findall(_read(file).decode(errors="replace")):
+            place = file.parent / uri
+            name = os.path.relpath(place, model.parent)
+            # Only what is really a file: no folder, no device.
+            if name not in found and place.is_file():
+                found.add(name)
+                if place.suffix == ".sdf":
+                    waiting.append(place)
+    return found
+
+
+def _read(path: Path) -> bytes:
+    with user_errors(path):
+        return path.read_bytes()
