@@ -7,10 +7,10 @@ from pathlib import Path
 from evaluation.errors import InputError
 from evaluation.sequences.sequence import Sequence, check_same_world
 
-__all__ = ["Sequence", "check_same_world", "open_sequence"]
+__all__ = ["Sequence", "check_same_world", "open", "open_sequence"]
 
 
-def open_sequence(path: Path) -> Sequence:
+def open_sequence(path: Path, lidar: str | None = None) -> Sequence:
     """Opens the recorded drive at `path` with the reader it needs.
 
     Args:
@@ -18,9 +18,11 @@ def open_sequence(path: Path) -> Sequence:
             write it), or a folder of a drive as MulRan, HeLiPR, KITTI
             odometry or CNS publish it. `LiDAR/<name>` in one of HeLiPR
             chooses the LiDAR.
+        lidar: which LiDAR's scans to read, of a recording with several.
 
     Raises:
-        InputError: if nothing there can be read as a sequence.
+        InputError: if nothing there can be read as a sequence, or it has no
+            such LiDAR.
     """
     # Imported here: the readers' libraries are slow to load, and a map file
     # needs none of them.
@@ -46,11 +48,22 @@ def open_sequence(path: Path) -> Sequence:
     if len(fitting) > 1:
         names = ", ".join(reader.__name__ for reader in fitting)
         raise InputError(f"{path}: files of several formats ({names})")
-    if fitting:
+    if fitting and lidar is None:
         return fitting[0](path)
+    if fitting:
+        if fitting[0] not in (
+            mcap_sequence.McapSequence,
+            helipr.HeliprSequence,
+        ):
+            raise InputError(f"{path}: has one LiDAR, not a '{lidar}'")
+        return fitting[0](path, lidar)
     if path.is_dir() and any(path.glob("*.mcap.part")):
         raise InputError(f"{path}: the recording was not finished")
     raise InputError(
         f"{path}: not a recorded sequence (a folder with an .mcap file, or"
         " one, or a drive of MulRan, HeLiPR, KITTI odometry or CNS)"
     )
+
+
+# For `from evaluation import sequences; sequences.open(path)`.
+open = open_sequence

@@ -7,12 +7,14 @@
     <Map>/<Sequence>/pcd/<time>.pcd  x y z intensity
 
 B is the vehicle at the ground. Times are whole nanoseconds, or seconds with
-a decimal point.
+a decimal point. A row of `imu.csv` is time, quat_xyzw of R_WI, angular
+velocity, specific force. A drive that cns-drake exported also has a
+`scenario.yaml`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -22,10 +24,17 @@ import yaml
 from evaluation import poses
 from evaluation.errors import InputError
 from evaluation.sequences.clouds import read_cloud
-from evaluation.sequences.scan_files import FileSequence, list_stamped
+from evaluation.sequences.motion import IMU_DTYPE
+from evaluation.sequences.scan_files import (
+    FileSequence,
+    list_stamped,
+    read_scenario,
+)
+from evaluation.sequences.text_tables import read_stamped_rows
 from evaluation.sequences.trajectory import pose_matrices, read_quaternions
 
 _POSES = "gt.csv"
+_IMU = "imu.csv"
 # The paper's and the download's name of the folder.
 _FOLDERS = ("pcd", "LiDAR")
 _MOUNT = "transformation_lidar.yaml"
@@ -63,27 +72,35 @@ class CnsFolderSequence(FileSequence):
         trajectory = read_quaternions(path / _POSES, ",")
         X_WB = trajectory.at(stamps_ns, _TOLERANCE_NS)
         resolved = path.resolve()
-        self._place = None
+        self._imu_path = path / _IMU
         mount = _find_mount(resolved)
+        name, scenario = resolved.name, read_scenario(path)
         if mount is not None and mount.parent == resolved.parent.parent:
-            self._place = {
+            name = f"{resolved.parent.name}_{resolved.name}".lower()
+            scenario = scenario or {
                 "map": resolved.parent.name.lower(),
                 "stage": resolved.name,
             }
         super().__init__(
-            name=resolved.name
-            if self._place is None
-            else f"{resolved.parent.name}_{resolved.name}".lower(),
+            name=str((scenario or {}).get("name", name)),
             world_frame="map",
             files=files,
             stamps_ns=stamps_ns,
             X_WS=X_WB @ _read_mount(mount),
+            scenario=scenario,
         )
 
-    @property
-    def scenario(self) -> Mapping | None:
-        """Map and stage, as far as the folders' names tell them."""
-        return self._place
+    @cached_property
+    def imu(self) -> np.ndarray | None:
+        if not self._imu_path.is_file():
+            return None
+        stamps_ns, values = read_stamped_rows(self._imu_path, 10, ",")
+        imu = np.empty(len(values), dtype=IMU_DTYPE)
+        imu["stamp_ns"] = stamps_ns
+        imu["quat_xyzw"] = values[:, :4]
+        imu["angular_velocity"] = values[:, 4:7]
+        imu["specific_force"] = values[:, 7:]
+        return imu
 
     def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
         return read_cloud(path)

@@ -6,18 +6,33 @@
     poses/NN.txt                     upper 3 x 4 of X_C0C, a row a scan
 
 C is the left grey camera (x right, y down, z forward), C0 that at the first
-scan, S the LiDAR.
+scan, S the LiDAR. Beside these there may be, in SemanticKITTI's form,
+
+    sequences/NN/labels/%06d.label   uint32 label | instance << 16, a point
+
+and, as cns-drake exports a drive,
+
+    sequences/NN/first_pose.txt      upper 3 x 4 of X_WS at the first scan
+    sequences/NN/scenario.yaml
+    sequences/NN/structures.json     what the instances are
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+import json
 from pathlib import Path
 
 import numpy as np
 
 from evaluation import poses
 from evaluation.errors import InputError
-from evaluation.sequences.scan_files import FileSequence, read_packed
+from evaluation.sequences.scan_files import (
+    FileSequence,
+    read_packed,
+    read_scenario,
+)
+from evaluation.sequences.sequence import index_instances
 from evaluation.sequences.text_tables import (
     check_increasing,
     parse_seconds,
@@ -26,14 +41,20 @@ from evaluation.sequences.text_tables import (
 from evaluation.sequences.trajectory import pose_matrices
 
 _SCANS = "velodyne"
+_LABELS = "labels"
+_FIRST_POSE = "first_pose.txt"
+_STRUCTURES = "structures.json"
 _RECORD = np.dtype([(name, "<f4") for name in ("x", "y", "z", "intensity")])
+_LABEL = np.dtype([("label", "<u2"), ("instance", "<u2")])
 
 
 class KittiSequence(FileSequence):
     """A drive of KITTI odometry.
 
-    W is the frame of the LiDAR at the first scan, not that of the camera,
-    so that z is up: X_WS = inverse(Tr) X_C0C Tr.
+    Poses of the LiDAR are X_S0S = inverse(Tr) X_C0C Tr. W is S0, the frame
+    of the LiDAR at the first scan and not that of the camera, so that z is
+    up; with a `first_pose.txt` it is the world of the recording. With
+    `labels` points have the fields `label` and `instance`.
     """
 
     def __init__(self, path: Path):
@@ -63,17 +84,54 @@ class KittiSequence(FileSequence):
                     f"{table}: {len(rows)} rows for {len(files)} scans"
                 )
         X_CS = _read_calibration(path / "calib.txt")
+        X_WS = poses.inverse(X_CS) @ X_C0C @ X_CS
         name = path.resolve().name
+        world_frame = f"kitti/{name}"
+        first_pose = path / _FIRST_POSE
+        if first_pose.is_file():
+            X_WS = _read_poses(first_pose)[0] @ X_WS
+            world_frame = "map"
+        scenario = read_scenario(path)
+        self._structures = path / _STRUCTURES
+        labels = path / _LABELS
+        self._labels = labels if labels.is_dir() else None
         super().__init__(
-            name=name,
-            world_frame=f"kitti/{name}",
+            name=str((scenario or {}).get("name", name)),
+            world_frame=world_frame,
             files=files,
             stamps_ns=stamps_ns,
-            X_WS=poses.inverse(X_CS) @ X_C0C @ X_CS,
+            X_WS=X_WS,
+            scenario=scenario,
         )
 
+    @property
+    def instances(self) -> Mapping[int, Mapping] | None:
+        path = self._structures
+        if not path.is_file():
+            return None
+        try:
+            table = json.loads(path.read_text(encoding="utf-8"))
+        except OSError as error:
+            raise InputError(f"{path}: {error.strerror or error}") from error
+        except (ValueError, RecursionError) as error:
+            raise InputError(f"{path}: {error}") from error
+        return index_instances(table, str(path))
+
     def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
-        return read_packed(path, _RECORD)
+        stored = read_packed(path, _RECORD)
+        if self._labels is None:
+            return stored
+        labels_path = self._labels / f"{path.stem}.label"
+        labels = read_packed(labels_path, _LABEL)
+        if len(labels) != len(stored):
+            raise ValueError(
+                f"{len(stored)} points, but {len(labels)} in {labels_path}"
+            )
+        points = np.empty(len(stored), dtype=[*_RECORD.descr, *_LABEL.descr])
+        for part in (stored, labels):
+            for name in part.dtype.names:
+                points[name] = part[name]
+        return points
 
 
 def holds_kitti(path: Path) -> bool:

@@ -14,15 +14,18 @@ from rosbags.typesys import Stores, get_typestore
 from evaluation import poses
 from evaluation.errors import InputError
 from evaluation.sequences.mcap_file import Location, McapFile
+from evaluation.sequences.motion import IMU_DTYPE, ODOMETRY_DTYPE
 from evaluation.sequences.point_cloud2 import to_points
-from evaluation.sequences.sequence import Sequence
+from evaluation.sequences.sequence import Sequence, index_instances
 
 _LIDAR_TOPIC = "/lidar/points"
 _ODOMETRY_TOPIC = "/odometry"
+_IMU_TOPIC = "/imu/data"
 _TF_STATIC_TOPIC = "/tf_static"
 
 _POINT_CLOUD = "sensor_msgs/msg/PointCloud2"
 _ODOMETRY = "nav_msgs/msg/Odometry"
+_IMU = "sensor_msgs/msg/Imu"
 _TF = "tf2_msgs/msg/TFMessage"
 
 _TYPESTORE = get_typestore(Stores.ROS2_HUMBLE)
@@ -31,7 +34,8 @@ _TYPESTORE = get_typestore(Stores.ROS2_HUMBLE)
 class McapSequence(Sequence):
     """A recording on the topics /lidar/points, /odometry and /tf_static.
 
-    Without `/lidar/points` the only topic of point clouds takes its place.
+    Without `/lidar/points` the only topic of point clouds takes its place;
+    of several LiDARs, `lidar` chooses one. The topic /imu/data is optional.
     Scan i is the i-th message of that topic by log time. Its pose is
     that of the `/odometry` message with exactly the same stamp, composed
     with the sensor's place on the vehicle from `/tf_static`; nothing is
@@ -41,24 +45,28 @@ class McapSequence(Sequence):
     file when they are first asked for; a scan takes one chunk.
     """
 
-    def __init__(self, path: Path):
+    def __init__(self, path: Path, lidar: str | None = None):
         """Opens a recording.
 
         Args:
             path: the .mcap file, or the folder that holds it.
+            lidar: whose scans to read: those of the topic /<lidar>/points.
 
         Raises:
-            InputError: if there is no complete recording at `path`.
+            InputError: if there is no complete recording at `path`, or no
+                such LiDAR in it.
         """
         self._file = McapFile(_mcap_path(Path(path)))
         self._path = self._file.path
         self.name = _sequence_name(Path(path))
-        self._lidar_topic = self._find_lidar_topic()
+        self._lidar_topic = self._find_lidar_topic(lidar)
         self._message_types = {
             self._lidar_topic: _POINT_CLOUD,
             _ODOMETRY_TOPIC: _ODOMETRY,
             _TF_STATIC_TOPIC: _TF,
         }
+        if _IMU_TOPIC in self._file.topics:
+            self._message_types[_IMU_TOPIC] = _IMU
         for topic, message_type in self._message_types.items():
             self._check_topic(topic, message_type)
         self._scans = self._file.locate(self._lidar_topic)
@@ -93,13 +101,9 @@ class McapSequence(Sequence):
         table = self._json("structures.json")
         if table is None:
             return None
-        try:
-            return {entry["instance"]: entry for entry in table}
-        except (TypeError, KeyError) as error:
-            raise InputError(
-                f"{self._path}: attachment structures.json: no list of"
-                " entries with an instance"
-            ) from error
+        return index_instances(
+            table, f"{self._path}: attachment structures.json"
+        )
 
     def scan(self, index: int) -> np.ndarray:
         if not 0 <= index < len(self):
@@ -112,20 +116,35 @@ class McapSequence(Sequence):
                 f"{self._path}: {self._lidar_topic}: scan {index}: {error}"
             ) from error
 
+    @property
+    def odometry(self) -> np.ndarray:
+        return self._stamps_and_odometry[1]
+
+    @cached_property
+    def imu(self) -> np.ndarray | None:
+        if _IMU_TOPIC not in self._message_types:
+            return None
+        messages = self._file.parse_each(
+            self._file.locate(_IMU_TOPIC), lambda _, data: bytes(data)
+        )
+        return np.array(
+            [_imu_row(self._decode(_IMU_TOPIC, data)) for data in messages],
+            dtype=IMU_DTYPE,
+        )
+
     @cached_property
     def _track(self) -> tuple[np.ndarray, np.ndarray]:
         """Stamps (N,) [ns] and poses (N, 4, 4) of the scans."""
-        stamps_ns, odometry = self._read_stamps_and_odometry()
+        stamps_ns, odometry = self._stamps_and_odometry
         disorder = np.flatnonzero(np.diff(stamps_ns) <= 0)
         if len(disorder):
             raise InputError(
                 f"{self._path}: {self._lidar_topic}: the stamp of scan"
                 f" {disorder[0] + 1} is not later than the one before"
             )
+        rows = {stamp: i for i, stamp in enumerate(odometry["stamp_ns"])}
         missing = [
-            index
-            for index, stamp in enumerate(stamps_ns.tolist())
-            if stamp not in odometry
+            index for index, stamp in enumerate(stamps_ns) if stamp not in rows
         ]
         if missing:
             raise InputError(
@@ -133,41 +152,50 @@ class McapSequence(Sequence):
                 f" {stamps_ns[missing[0]]} of scan {missing[0]}"
                 f" ({len(missing)} of {len(self)} scans have none)"
             )
-        X_WB = self._to_poses([odometry[stamp] for stamp in stamps_ns.tolist()])
-        return stamps_ns, X_WB @ self._X_BS
-
-    def _read_stamps_and_odometry(
-        self,
-    ) -> tuple[np.ndarray, dict[int, np.ndarray]]:
-        """Returns the stamps of the scans, and stamp -> pose of the vehicle.
-
-        The latter is a row of p_WB (3) and the quat_xyzw of R_WB (4).
-        """
-        stamps_ns = np.zeros(len(self), dtype=np.int64)
-        odometry = {}
-        visits = [(place, index) for index, place in enumerate(self._scans)]
-        visits += [
-            (place, None) for place in self._file.locate(_ODOMETRY_TOPIC)
-        ]
-        # In the order of the file, so that each chunk is unpacked once.
-        visits.sort(key=lambda visit: (visit[0].chunk, visit[0].offset))
-        for place, scan_index in visits:
-            if scan_index is not None:
-                stamps_ns[scan_index] = self._scan_stamp_ns(place)
-                continue
-            message = self._message(_ODOMETRY_TOPIC, place)
-            odometry[_stamp_ns(message.header)] = _position_quaternion(
-                message.pose.pose.position, message.pose.pose.orientation
-            )
-        return stamps_ns, odometry
+        matching = odometry[[rows[stamp] for stamp in stamps_ns]]
+        X_WB = self._to_poses(matching["position"], matching["quat_xyzw"])
+        return stamps_ns, X_WB @ self.X_BS
 
     @cached_property
-    def _X_BS(self) -> np.ndarray:
-        """Pose of the LiDAR on the vehicle, (4, 4), from /tf_static."""
+    def _stamps_and_odometry(self) -> tuple[np.ndarray, np.ndarray]:
+        """Stamps (N,) of the scans, and the odometry, in one pass."""
+        num_scans = len(self)
+
+        def parse(position: int, data: memoryview) -> int | bytes:
+            if position < num_scans:
+                return self._scan_stamp_ns(data)
+            return bytes(data)
+
+        parsed = self._file.parse_each(
+            self._scans + self._file.locate(_ODOMETRY_TOPIC), parse
+        )
+        rows = [
+            _odometry_row(self._decode(_ODOMETRY_TOPIC, data))
+            for data in parsed[num_scans:]
+        ]
+        return (
+            np.array(parsed[:num_scans], dtype=np.int64),
+            np.array(rows, dtype=ODOMETRY_DTYPE),
+        )
+
+    @cached_property
+    def X_BS(self) -> np.ndarray:
+        """Pose of the LiDAR on the vehicle B, (4, 4), from /tf_static."""
+        return self._mount(self._message(self._lidar_topic, self._scans[0]))
+
+    @cached_property
+    def X_BI(self) -> np.ndarray | None:
+        """Pose of the IMU on the vehicle B, (4, 4); None without an IMU."""
+        if _IMU_TOPIC not in self._message_types:
+            return None
+        first = self._file.locate(_IMU_TOPIC)[0]
+        return self._mount(self._message(_IMU_TOPIC, first))
+
+    def _mount(self, message) -> np.ndarray:
+        """Returns the pose of a sensor's frame, that of its message, in B."""
         first = self._file.locate(_ODOMETRY_TOPIC)[0]
         base = self._message(_ODOMETRY_TOPIC, first).child_frame_id
-        scan = self._message(self._lidar_topic, self._scans[0])
-        sensor = scan.header.frame_id
+        sensor = message.header.frame_id
         parents = {}
         for place in self._file.locate(_TF_STATIC_TOPIC):
             for edge in self._message(_TF_STATIC_TOPIC, place).transforms:
@@ -180,29 +208,31 @@ class McapSequence(Sequence):
             if child not in parents:
                 break
             edge = parents[child]
-            row = _position_quaternion(
-                edge.transform.translation, edge.transform.rotation
+            X_PC = self._to_poses(
+                np.array(_xyz(edge.transform.translation)),
+                np.array(_xyzw(edge.transform.rotation)),
             )
-            X_CS = self._to_poses([row])[0] @ X_CS
+            X_CS = X_PC @ X_CS
             child = edge.header.frame_id
         raise InputError(
             f"{self._path}: {_TF_STATIC_TOPIC}: no transform from {base} to"
             f" {sensor}"
         )
 
-    def _to_poses(self, rows: list[np.ndarray]) -> np.ndarray:
-        """Returns poses (N, 4, 4) of N rows of position and quat_xyzw."""
-        values = np.array(rows)
-        if not np.isfinite(values).all():
+    def _to_poses(self, p: np.ndarray, quat_xyzw: np.ndarray) -> np.ndarray:
+        """Returns poses (..., 4, 4) of positions and quaternions."""
+        if not (np.isfinite(p).all() and np.isfinite(quat_xyzw).all()):
             raise InputError(f"{self._path}: a pose is not finite")
         try:
-            R = poses.rotation_from_quaternion(values[:, 3:])
+            R = poses.rotation_from_quaternion(quat_xyzw)
         except ValueError as error:
             raise InputError(f"{self._path}: a pose has {error}") from error
-        return poses.make_pose(R, values[:, :3])
+        return poses.make_pose(R, p)
 
     def _message(self, topic: str, place: Location):
-        data = self._file.read(place)
+        return self._decode(topic, self._file.read(place))
+
+    def _decode(self, topic: str, data: bytes | memoryview):
         try:
             return _TYPESTORE.deserialize_cdr(data, self._message_types[topic])
         except Exception as error:
@@ -212,9 +242,8 @@ class McapSequence(Sequence):
                 f" ({type(error).__name__}: {error})"
             ) from error
 
-    def _scan_stamp_ns(self, place: Location) -> int:
+    def _scan_stamp_ns(self, data: memoryview) -> int:
         """Reads a scan's stamp, which leads the message, and no more."""
-        data = self._file.read(place)
         try:
             order = "<" if data[1] & 1 else ">"
             sec, nanosec = struct.unpack_from(f"{order}iI", data, 4)
@@ -224,16 +253,25 @@ class McapSequence(Sequence):
             ) from error
         return sec * 1_000_000_000 + nanosec
 
-    def _find_lidar_topic(self) -> str:
-        """Returns /lidar/points, or else the only topic of point clouds."""
+    def _find_lidar_topic(self, lidar: str | None) -> str:
+        """Returns the named LiDAR's topic, /lidar/points, or the only one."""
         clouds = [
             topic
             for topic, message_type in self._file.topics.items()
             if message_type == _POINT_CLOUD
         ]
-        if _LIDAR_TOPIC in self._file.topics or len(clouds) != 1:
-            return _LIDAR_TOPIC
-        return clouds[0]
+        if lidar is not None:
+            wanted = f"/{lidar}/points"
+        elif _LIDAR_TOPIC in self._file.topics or len(clouds) != 1:
+            wanted = _LIDAR_TOPIC
+        else:
+            wanted = clouds[0]
+        if wanted not in self._file.topics and clouds:
+            raise InputError(
+                f"{self._path}: no topic {wanted} (point clouds:"
+                f" {' '.join(clouds)})"
+            )
+        return wanted
 
     def _check_topic(self, topic: str, message_type: str) -> None:
         found = self._file.topics.get(topic)
@@ -288,5 +326,29 @@ def _stamp_ns(header) -> int:
     return header.stamp.sec * 1_000_000_000 + header.stamp.nanosec
 
 
-def _position_quaternion(p, q) -> np.ndarray:
-    return np.array([p.x, p.y, p.z, q.x, q.y, q.z, q.w])
+def _odometry_row(message) -> tuple:
+    pose, twist = message.pose.pose, message.twist.twist
+    return (
+        _stamp_ns(message.header),
+        _xyz(pose.position),
+        _xyzw(pose.orientation),
+        _xyz(twist.linear),
+        _xyz(twist.angular),
+    )
+
+
+def _imu_row(message) -> tuple:
+    return (
+        _stamp_ns(message.header),
+        _xyzw(message.orientation),
+        _xyz(message.angular_velocity),
+        _xyz(message.linear_acceleration),
+    )
+
+
+def _xyz(v) -> tuple[float, float, float]:
+    return v.x, v.y, v.z
+
+
+def _xyzw(q) -> tuple[float, float, float, float]:
+    return q.x, q.y, q.z, q.w

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import abc
+from collections.abc import Mapping
 from pathlib import Path
+import re
 
 import numpy as np
+import yaml
 
 from evaluation.errors import InputError
 from evaluation.sequences.sequence import Sequence
 from evaluation.sequences.text_tables import check_increasing, parse_stamps_ns
 
+# A drive's name also names files.
+_NAME = re.compile(r"\w[\w.-]*")
 # No LiDAR sees that far [m]: numbers beyond are no coordinates.
 _FARTHEST = 10_000.0
 
@@ -27,6 +32,7 @@ class FileSequence(Sequence):
         X_WS: np.ndarray,
         notes: tuple[str, ...] = (),
         datum: str | None = None,
+        scenario: Mapping | None = None,
     ):
         """Describes a drive of N >= 1 scans.
 
@@ -38,6 +44,7 @@ class FileSequence(Sequence):
             X_WS: (N, 4, 4).
             notes: see `Sequence.notes`.
             datum: see `Sequence.datum`.
+            scenario: see `Sequence.scenario`.
         """
         self.name = name
         self.world_frame = world_frame
@@ -46,6 +53,7 @@ class FileSequence(Sequence):
         self._X_WS = X_WS
         self._notes = notes
         self._datum = datum
+        self._scenario = scenario
 
     def __len__(self) -> int:
         return len(self._files)
@@ -66,6 +74,10 @@ class FileSequence(Sequence):
     def datum(self) -> str | None:
         return self._datum
 
+    @property
+    def scenario(self) -> Mapping | None:
+        return self._scenario
+
     def scan(self, index: int) -> np.ndarray:
         if not 0 <= index < len(self):
             raise IndexError(f"scan {index} of {len(self)}")
@@ -85,6 +97,30 @@ class FileSequence(Sequence):
             ValueError: if the file is not of its format.
             OSError: if it cannot be read.
         """
+
+
+def read_scenario(folder: Path) -> Mapping | None:
+    """Returns what `scenario.yaml` in an exported drive says, if it is there.
+
+    Raises:
+        InputError: if it is no mapping in YAML.
+    """
+    path = folder / "scenario.yaml"
+    if not path.is_file():
+        return None
+    try:
+        scenario = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from error
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        # YAML's messages have several lines.
+        raise InputError(f"{path}: {' '.join(str(error).split())}") from error
+    if not isinstance(scenario, dict):
+        raise InputError(f"{path}: no mapping of a scenario's fields")
+    name = scenario.get("name")
+    if name is not None and not _NAME.fullmatch(str(name)):
+        raise InputError(f"{path}: name: {name!r} is no name of a drive")
+    return scenario
 
 
 def list_stamped(folder: Path, suffix: str) -> tuple[list[Path], np.ndarray]:

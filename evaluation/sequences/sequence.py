@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import abc
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -56,6 +56,21 @@ class Sequence(abc.ABC):
             InputError: if the scan cannot be read.
         """
 
+    def __iter__(self) -> Iterator[np.ndarray]:
+        """Yields the scans in order, each read when its turn comes."""
+        for index in range(len(self)):
+            yield self.scan(index)
+
+    @property
+    def odometry(self) -> np.ndarray | None:
+        """Motion of the vehicle, (M,) of `ODOMETRY_DTYPE`, if recorded."""
+        return None
+
+    @property
+    def imu(self) -> np.ndarray | None:
+        """What the IMU measured, (M,) of `IMU_DTYPE`, if recorded."""
+        return None
+
     @property
     def datum(self) -> str | None:
         """Name of the survey grid that W follows, if it follows one.
@@ -80,8 +95,29 @@ class Sequence(abc.ABC):
 
     @property
     def instances(self) -> Mapping[int, Mapping] | None:
-        """Instance id -> structure `name` and `class`, if recorded."""
+        """Instance id -> structure `name`, `class` and `label`, if recorded.
+
+        The id and the label are those of the scans' points.
+        """
         return None
+
+
+def index_instances(table: object, source: str) -> dict[int, Mapping]:
+    """Returns a recording's table of structures by instance id.
+
+    Args:
+        table: as JSON: a list of objects with at least an `instance`.
+        source: where it comes from, for messages.
+
+    Raises:
+        InputError: if it is no such table.
+    """
+    try:
+        return {entry["instance"]: entry for entry in table}
+    except (TypeError, KeyError) as error:
+        raise InputError(
+            f"{source}: no list of entries with an instance"
+        ) from error
 
 
 def check_same_world(first: Sequence, second: Sequence) -> None:
