@@ -157,7 +157,10 @@ def scan(
 def reproduce(
     maps: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[MAP]...", help="Which maps; all by default."),
+        typer.Argument(
+            metavar="[MAP]...",
+            help="Which maps, by name or folder; all shipped ones by default.",
+        ),
     ] = None,
     *,
     output: Output,

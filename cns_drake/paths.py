@@ -38,17 +38,26 @@ def shipped_sequences() -> dict[str, Path]:
 
 
 def recordable_sequences() -> dict[str, Path]:
-    """Returns the shipped sequences whose stage is shipped as well.
+    """Returns the shipped sequences whose stage is shipped as well, by name.
 
     A map's roads and drives may be there before its city is.
     """
     return {
-        name: path
-        for name, path in shipped_sequences().items()
+        sequence_name(path): path
+        for folder in shipped_maps().values()
+        for path in sequences_of_map(folder)
+    }
+
+
+def sequences_of_map(folder: Path) -> list[Path]:
+    """Returns the sequences in a map's folder whose stage is there as well."""
+    return [
+        path
+        for path in sorted(folder.glob("sequence_*.yaml"))
         if path.with_name(path.name.replace("sequence_", "stage_"))
         .with_suffix(".sdf")
         .is_file()
-    }
+    ]
 
 
 def sequence_name(path: Path) -> str:
@@ -58,5 +67,5 @@ def sequence_name(path: Path) -> str:
     its stem.
     """
     if path.stem.startswith("sequence_"):
-        return f"{path.parent.name}_{path.stem.removeprefix('sequence_')}"
+        return f"{path.resolve().parent.name}_{path.stem.removeprefix('sequence_')}"
     return path.stem

@@ -9,7 +9,7 @@ import sys
 
 from cns_drake.errors import InputError
 from cns_drake.jobs import record_all
-from cns_drake.paths import recordable_sequences, shipped_maps
+from cns_drake.paths import sequences_of_map, shipped_maps
 from cns_drake.scenario import Scenario, load_scenario
 
 
@@ -23,30 +23,23 @@ def reproduce_maps(
     figures. What is recorded already is not recorded again.
 
     Args:
-        maps: which maps; all shipped ones if empty.
+        maps: which maps, by name or folder; all shipped ones if empty.
         output: the folder for everything.
         num_processes: how many sequences to simulate side by side.
 
     Raises:
         InputError: a map is not known, or a step failed.
     """
-    folders = {path.parent for path in recordable_sequences().values()}
-    known = {
-        name: folder
-        for name, folder in shipped_maps().items()
-        if folder in folders
-    }
-    for name in maps or ():
-        if name not in known:
-            raise InputError(f"unknown map '{name}'; known: {', '.join(known)}")
+    folders = [_map_folder(name) for name in maps or _recordable_maps()]
     scenarios = [
-        scenario
-        for name in maps or known
-        for scenario in _scenarios_of_map(name)
+        scenario for folder in folders for scenario in _scenarios_of_map(folder)
     ]
     record_all(scenarios, output, num_processes)
-    for name in maps or known:
-        _draw_stages(known[name], output / "pictures" / f"{name}_stages.png")
+    for folder in folders:
+        # A map of one's own may do without views.
+        if (folder / "views.yaml").is_file():
+            name = f"{folder.resolve().name}_stages.png"
+            _draw_stages(folder, output / "pictures" / name)
     # A process of its own: the evaluation stands without the simulator.
     command = [sys.executable, "-m", "evaluation", "report", str(output)]
     done = subprocess.run(
@@ -56,18 +49,41 @@ def reproduce_maps(
         raise InputError(f"{output}: the evaluation failed (see above)")
 
 
-def _scenarios_of_map(name: str) -> list[Scenario]:
+def _recordable_maps() -> list[str]:
+    return [
+        name
+        for name, folder in shipped_maps().items()
+        if sequences_of_map(folder)
+    ]
+
+
+def _map_folder(name: str) -> Path:
+    """Returns the folder of a map that can be recorded.
+
+    Raises:
+        InputError: there is no such map.
+    """
+    folder = shipped_maps().get(name, Path(name))
+    if not folder.is_dir():
+        known = ", ".join(_recordable_maps())
+        raise InputError(
+            f"unknown map '{name}'; known: {known}; or give a folder"
+        )
+    if not sequences_of_map(folder):
+        raise InputError(
+            f"{folder}: no sequence_NN.yaml whose stage_NN.sdf is there"
+        )
+    return folder
+
+
+def _scenarios_of_map(folder: Path) -> list[Scenario]:
     """Returns a map's sequences, and its control drives.
 
     A control drive is the route of an earlier stage through the last one:
     compared with the last stage's own sequence, whatever it shows as change
     is due to the routes and not to the city.
     """
-    sequences = [
-        load_scenario(sequence)
-        for sequence, path in recordable_sequences().items()
-        if path.parent == shipped_maps()[name]
-    ]
+    sequences = [load_scenario(path) for path in sequences_of_map(folder)]
     last = max(sequences, key=lambda sequence: sequence.stage)
     controls = [
         sequence.model_copy(

@@ -63,7 +63,8 @@ def sample(
     height = round(height, 3)
     x0, y0, x1, y1 = footprint.bounds
     low, high = kind.widths
-    if min(x1 - x0, y1 - y0) < low or max(x1 - x0, y1 - y0) > high:
+    sides = np.round((x1 - x0, y1 - y0), 6)
+    if sides.min() < low or sides.max() > high:
         raise ValueError(f"{name}: {archetype} has sides of {low} to {high} m")
     low, high = kind.heights
     if not low <= height <= high:

@@ -11,6 +11,7 @@ from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.buildings import ARCHETYPES, sample
+from cns_drake.city.buildings.site import Site
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.placement.districts import District, corners_area
 from cns_drake.city.placement.draft import Draft
@@ -23,6 +24,8 @@ from cns_drake.errors import InputError
 _PARTY_WALL = 3.1
 # Buildings that are not neighbours in a row keep this distance [m].
 _YARD = 3.1
+# A house stands as high as the ground this far in front of it [m].
+_DOORSTEP = 1.0
 # Where a lot does not fit, the next trial starts this much further on [m].
 _STEP = 1.0
 # Parts of the drawn width and depth that are tried in turn; never less than
@@ -65,7 +68,8 @@ def place_buildings(draft: Draft, district: District, source: str) -> None:
         source: the plan's file name, for messages.
 
     Raises:
-        InputError: if a single building has no room or cannot be built.
+        InputError: if a single building has no room, or an archetype cannot
+            be built in the size that the plan asks for.
     """
     name = district.plan.name
     draft.open_range()
@@ -84,7 +88,12 @@ def place_buildings(draft: Draft, district: District, source: str) -> None:
         )
         for k, house in enumerate(houses):
             rng = draft.rng(name, "row", index, k)
-            _build(draft, district, row.kind, house, rng)
+            try:
+                _build(draft, district, row.kind, house, rng)
+            except ValueError as error:
+                raise InputError(
+                    f"{source}: districts.{name}.rows.{index}: {error}"
+                ) from error
 
 
 def _build(
@@ -109,11 +118,22 @@ def _build(
             name,
             "building",
             model,
-            (x, y, draft.level),
+            (x, y, _floor(draft, house)),
             round(house.yaw, 5),
             (district.plan.name, house.archetype),
         )
     )
+
+
+def _floor(draft: Draft, house: _House) -> float:
+    """Returns the height of the ground in front of a house [m]."""
+    start, end = Site(house.footprint, house.archetype).outline[:2]
+    along = (end - start) / np.hypot(*(end - start))
+    step = (start + end) / 2 + _DOORSTEP * np.array([along[1], -along[0]])
+    c, s = math.cos(house.yaw), math.sin(house.yaw)
+    x = house.xy[0] + c * step[0] - s * step[1]
+    y = house.xy[1] + s * step[0] + c * step[1]
+    return round(float(draft.base(np.array([x]), np.array([y]))[0]), 3)
 
 
 def _single_house(
