@@ -6,6 +6,7 @@ Everything slow to import is imported by the command that needs it, so that
 
 from __future__ import annotations
 
+from enum import Enum
 from pathlib import Path
 import sys
 from typing import Annotated
@@ -45,6 +46,13 @@ Graphviz = Annotated[
 Overwrite = Annotated[
     bool, typer.Option("--overwrite", help="Replace an existing recording.")
 ]
+
+
+class ExportFormat(str, Enum):
+    """Layouts to which sequences are exported."""
+
+    CNS = "cns"
+    KITTI = "kitti"
 
 
 @app.command("list")
@@ -151,6 +159,46 @@ def scan(
     points = scan_world(load_world(world), X_WS, pattern)
     save_scan(points, output)
     typer.echo(f"{output}: {len(points)} points")
+
+
+@app.command()
+def export(
+    sequence: Annotated[
+        Path,
+        typer.Argument(
+            metavar="SEQUENCE", help="A recorded folder, or its .mcap file."
+        ),
+    ],
+    layout: Annotated[
+        ExportFormat,
+        typer.Option(
+            "--format", help="Layout of the CNS data set, or KITTI odometry."
+        ),
+    ],
+    output: Annotated[
+        Path,
+        typer.Option(
+            help="Folder of drives: new, empty, or of earlier exports."
+        ),
+    ],
+    sensor: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Which LiDAR, if there are several."),
+    ] = None,
+) -> None:
+    """Export a recorded sequence to a layout that exists already."""
+    from cns_drake.export.exporting import export_sequence
+
+    with terminal.show_progress() as progress:
+        task = progress.add_task(sequence.name, total=None, note="reading")
+        drive = export_sequence(
+            sequence,
+            layout.value,
+            output,
+            lidar=sensor,
+            on_frame=terminal.count_progress(progress, task),
+        )
+    typer.echo(drive)
 
 
 @app.command()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from cns_drake.beam_pattern import BeamPattern
 from cns_drake.errors import InputError
 from cns_drake.files import complete_part, part_path, user_errors
 from cns_drake.lidar import Lidar
+from cns_drake.point_files import encode_bin, encode_pcd, to_xyzi
 from cns_drake.world import World
 
 
@@ -68,10 +70,10 @@ def check_ending(path: Path) -> None:
     Raises:
         InputError: it does not.
     """
-    if path.suffix not in _WRITERS:
+    if path.suffix not in _ENCODERS:
         raise InputError(
             f"{path}: unknown ending '{path.suffix}'; known: "
-            f"{', '.join(_WRITERS)}"
+            f"{', '.join(_ENCODERS)}"
         )
 
 
@@ -85,31 +87,17 @@ def save_scan(scan: np.ndarray, path: Path) -> None:
         InputError: the ending is none of these, or the file cannot be
             written.
     """
-    xyzi = np.stack([scan[name] for name in ("x", "y", "z", "intensity")], 1)
     check_ending(path)
     with user_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        _WRITERS[path.suffix](xyzi, part_path(path))
+        part_path(path).write_bytes(_ENCODERS[path.suffix](scan))
     complete_part(path)
 
 
-def _save_bin(xyzi: np.ndarray, part: Path) -> None:
-    part.write_bytes(xyzi.astype("<f4").tobytes())
+def _encode_npy(scan: np.ndarray) -> bytes:
+    stream = io.BytesIO()
+    np.save(stream, to_xyzi(scan))
+    return stream.getvalue()
 
 
-def _save_npy(xyzi: np.ndarray, part: Path) -> None:
-    with part.open("wb") as file:  # np.save would add an ending of its own.
-        np.save(file, xyzi)
-
-
-def _save_pcd(xyzi: np.ndarray, part: Path) -> None:
-    header = (
-        "# .PCD v0.7 - Point Cloud Data file format\n"
-        "VERSION 0.7\nFIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F F\n"
-        f"COUNT 1 1 1 1\nWIDTH {len(xyzi)}\nHEIGHT 1\n"
-        f"VIEWPOINT 0 0 0 1 0 0 0\nPOINTS {len(xyzi)}\nDATA binary\n"
-    )
-    part.write_bytes(header.encode() + xyzi.astype("<f4").tobytes())
-
-
-_WRITERS = {".bin": _save_bin, ".npy": _save_npy, ".pcd": _save_pcd}
+_ENCODERS = {".bin": encode_bin, ".npy": _encode_npy, ".pcd": encode_pcd}

@@ -84,8 +84,31 @@ def show_progress() -> Iterator[Progress]:
 def frame_progress(progress: Progress, task) -> Callable[[int, int], None]:
     """Returns a callback that shows the frames of a simulation.
 
-    On a terminal the bar moves, with simulated time and real-time factor
-    behind it; elsewhere a line tells the same every few seconds.
+    As `count_progress`, with simulated time and real-time factor behind.
+    """
+
+    def note(done: int, elapsed: float) -> str:
+        simulated = done * FRAME_PERIOD
+        factor = simulated / max(elapsed, 1e-9)
+        return f"{simulated:.1f} s simulated, {factor:.1f} x real time"
+
+    return count_progress(progress, task, note)
+
+
+def count_progress(
+    progress: Progress,
+    task,
+    note: Callable[[int, float], str] = lambda done, elapsed: "",
+) -> Callable[[int, int], None]:
+    """Returns a callback that shows how many frames of how many are done.
+
+    On a terminal the bar moves; elsewhere a line tells the same every few
+    seconds.
+
+    Args:
+        progress: where the task is shown.
+        task: its id.
+        note: of the frames done and the time [s] they took -> what to add.
     """
     console = progress.console
     interval = 0.5 if console.is_terminal else _LINE_INTERVAL
@@ -97,16 +120,14 @@ def frame_progress(progress: Progress, task) -> Callable[[int, int], None]:
         if done < total and now - shown < interval:
             return
         shown = now
-        factor = done * FRAME_PERIOD / max(now - start, 1e-9)
-        note = (
-            f"{done * FRAME_PERIOD:.1f} s simulated, {factor:.1f} x real time"
-        )
-        progress.update(task, completed=done, total=total, note=note)
+        elapsed = now - start
+        text = note(done, elapsed)
+        progress.update(task, completed=done, total=total, note=text)
         if not console.is_terminal:
             name = progress.tasks[task].description
-            left = (now - start) * (total - done) / done
-            console.print(
-                f"{name}: {done}/{total} frames, {note}, {left:.0f} s left"
-            )
+            left = elapsed * (total - done) / done
+            parts = [f"{name}: {done}/{total} frames", text]
+            parts.append(f"{left:.0f} s left")
+            console.print(", ".join(part for part in parts if part))
 
     return on_frame

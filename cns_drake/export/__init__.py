@@ -1,0 +1,1 @@
+"""Recorded sequences in the layouts of data sets that exist already."""

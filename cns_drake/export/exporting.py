@@ -1,0 +1,161 @@
+"""Exporting one recording into a folder of drives.
+
+The folder may hold several drives of one format. It is known to be ours by
+`export.yaml`, which says what its files are. A drive's own folder grows
+under a `.part` name and gets its final one when all of it is there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import os
+from pathlib import Path
+import shutil
+
+import yaml
+
+from cns_drake.errors import InputError
+from cns_drake.export.cns import CNS
+from cns_drake.export.kitti import KITTI
+from cns_drake.export.layout import Layout
+from cns_drake.files import complete_part, part_path, user_errors, write_part
+from cns_drake.rosbag2_metadata import to_yaml
+from evaluation.errors import InputError as ReadingError
+from evaluation.sequences.mcap_sequence import McapSequence, holds_mcap
+
+_LAYOUTS = {"cns": CNS, "kitti": KITTI}
+_MARKER = "export.yaml"
+
+
+def export_sequence(
+    recording: Path,
+    format_name: str,
+    output: Path,
+    *,
+    lidar: str | None = None,
+    on_frame: Callable[[int, int], None] = lambda done, total: None,
+) -> Path:
+    """Exports a recording.
+
+    Args:
+        recording: the .mcap file, or the folder that holds it.
+        format_name: `cns` or `kitti`.
+        output: the folder of drives; new, empty, or one that this function
+            has written drives of the same format to.
+        lidar: whose scans, if the recording has several LiDARs.
+        on_frame: is told how many frames of how many are done.
+
+    Returns:
+        The folder of the drive.
+
+    Raises:
+        InputError: if the recording cannot be read, the folder is of
+            another origin or has this drive already, or the files cannot be
+            written.
+    """
+    layout = _LAYOUTS[format_name]
+    try:
+        if not holds_mcap(recording):
+            raise InputError(f"{recording}: no recording (.mcap) there")
+        sequence = McapSequence(recording, lidar)
+        drive = output / layout.drive_folder(sequence)
+        outer = {
+            output / name: text
+            for name, text in layout.outer_files(sequence).items()
+        }
+        _claim(output, format_name, layout)
+        if drive.exists():
+            raise InputError(f"{drive}: is there already")
+        if layout.shared_outer_files:
+            for path, text in outer.items():
+                _check_equal(path, text)
+        part = part_path(drive)
+        try:
+            _write_drive(sequence, layout, part, on_frame)
+            for path, text in outer.items():
+                _write_text(path, text)
+            with user_errors(drive):
+                os.replace(part, drive)
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
+    except ReadingError as error:
+        raise InputError(str(error)) from error
+    return drive
+
+
+def _claim(output: Path, format_name: str, layout: Layout) -> None:
+    """Makes the folder of drives, or finds that it is one of ours."""
+    marker = output / _MARKER
+    with user_errors(output):
+        if marker.is_file():
+            _check_marker(marker, format_name)
+            return
+        if output.exists() and (not output.is_dir() or any(output.iterdir())):
+            raise InputError(
+                f"{output}: holds something else; give a new or an empty folder"
+            )
+        output.mkdir(parents=True, exist_ok=True)
+    values = {
+        "writer": "cns-drake export",
+        "format": format_name,
+        "files": layout.files,
+    }
+    _write_text(marker, to_yaml(values))
+
+
+def _check_marker(marker: Path, format_name: str) -> None:
+    try:
+        values = yaml.safe_load(marker.read_text(encoding="utf-8"))
+    except (yaml.YAMLError, ValueError, RecursionError):
+        values = None
+    found = values.get("format") if isinstance(values, dict) else None
+    if found not in _LAYOUTS:
+        raise InputError(f"{marker}: not of an export by cns-drake")
+    if found != format_name:
+        raise InputError(f"{marker}: format: the folder holds {found} drives")
+
+
+def _check_equal(path: Path, text: str) -> None:
+    with user_errors(path):
+        if path.is_file() and path.read_bytes() != text.encode():
+            raise InputError(
+                f"{path}: differs: the drives there have another sensor"
+                " mount; give another folder"
+            )
+
+
+def _write_drive(
+    sequence: McapSequence,
+    layout: Layout,
+    folder: Path,
+    on_frame: Callable[[int, int], None],
+) -> None:
+    with user_errors(folder):
+        # What an export left that was killed.
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        for name, text in layout.inner_files(sequence).items():
+            (folder / name).write_text(text, encoding="utf-8")
+        for frame, (stamp_ns, scan) in enumerate(
+            zip(sequence.stamps_ns.tolist(), sequence, strict=True)
+        ):
+            try:
+                files = layout.scan_files(frame, stamp_ns, scan)
+            except ValueError as error:
+                raise InputError(
+                    f"{sequence.name}: scan {frame}: {error}"
+                ) from error
+            for name, content in files.items():
+                path = folder / name
+                if frame == 0:
+                    path.parent.mkdir()
+                path.write_bytes(content)
+            on_frame(frame + 1, len(sequence))
+
+
+def _write_text(path: Path, text: str) -> None:
+    """Writes a file that gets its name when it is complete."""
+    with user_errors(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    write_part(path, text)
+    complete_part(path)
