@@ -13,7 +13,7 @@ from evaluation.methods.btc_keypoints import (
     suppress,
 )
 
-LEVEL = image_axes(np.array([0.0, 0.0, 1.0]))
+LEVEL = image_axes(np.array([0.0, 0.0, 1.0]), orthogonal=True)
 CORNERS = np.array(
     [[x, y, 0.05] for x in (-10.25, 10.25) for y in (-10.25, 10.25)]
 )
@@ -58,11 +58,41 @@ class TestAxes:
     )
     def test_orthonormal_with_columns_along_x(self, normal):
         normal = np.asarray(normal, float) / np.linalg.norm(normal)
-        axes = image_axes(normal)
+        axes = image_axes(normal, orthogonal=True)
         np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
         np.testing.assert_array_equal(axes[2], normal)
         assert axes[1, 1] == 0.0
         assert axes[1, 0] >= 0.0
+
+    @pytest.mark.parametrize(
+        "normal", [[0.1, 0.2, 1.0], [-0.3, -0.1, 1.0], [0.2, 0.0, 1.0]]
+    )
+    def test_public_axes_lean_by_the_normals_y(self, normal):
+        normal = np.asarray(normal, float) / np.linalg.norm(normal)
+        across, along, up = image_axes(normal, orthogonal=False)
+        np.testing.assert_array_equal(up, normal)
+        np.testing.assert_allclose(
+            np.linalg.norm([across, along], axis=1), 1.0, atol=1e-12
+        )
+        assert along[1] == 0.0
+        # (1, 0, -(a + b) / c) has -b along the normal, before its scaling.
+        scale = np.hypot(1.0, (normal[0] + normal[1]) / normal[2])
+        assert along @ up == pytest.approx(-normal[1] / scale, abs=1e-12)
+        assert across @ up == pytest.approx(0.0, abs=1e-12)
+        assert across @ along == pytest.approx(0.0, abs=1e-12)
+
+    @pytest.mark.parametrize(
+        ("normal", "along"),
+        [
+            ([0.6, 0.8, 0.0], [0.8, -0.6, 0.0]),
+            ([0.0, 1.0, 0.0], [1.0, 0.0, 0.0]),
+            ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0]),
+        ],
+    )
+    def test_public_axes_on_a_wall(self, normal, along):
+        axes = image_axes(np.array(normal), orthogonal=False)
+        np.testing.assert_allclose(axes[1], along, atol=1e-12)
+        np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
 
 
 class TestCountBits:
@@ -154,6 +184,21 @@ class TestHeightImage:
                 image.means[cell], np.mean(places, axis=0), atol=1e-12
             )
         assert np.count_nonzero(~np.isnan(image.means[..., 0])) == len(members)
+
+
+class TestLeaningAxes:
+    def test_image_is_of_the_plane_whatever_the_axes(self):
+        """A post along the normal is one cell, though an axis leans."""
+        normal = np.array([0.05, 0.3, 1.0]) / np.linalg.norm([0.05, 0.3, 1.0])
+        foot = np.array([3.0, -2.0, 0.0])
+        points = foot + np.arange(0.05, 3.5, 0.1)[:, None] * normal
+        corners = CORNERS - (CORNERS @ normal)[:, None] * normal
+        points = np.concatenate([corners + 0.01 * normal, points])
+        axes = image_axes(normal, orthogonal=False)
+        image = draw(points, foot, axes)
+        assert count_bits(image.heights).max() == 35
+        (keypoint,) = find_keypoints(image, foot, axes, 10).positions
+        np.testing.assert_allclose(keypoint, foot, atol=1e-9)
 
 
 class TestPeaks:

@@ -88,23 +88,20 @@ class TestVoxelPlanes:
         zero = np.array([[0.0, 0.1 * k, 0.3] for k in range(11)])
         inside = np.array([[1.9, 0.1 * k, 0.3] for k in range(11)])
         found = voxels(np.concatenate([edge, zero, inside]))
-        assert found.counts.tolist() == [22, 11]
+        assert sorted(found.counts) == [11, 22]
 
-    def test_sorted_by_index_whatever_the_order_of_points(self):
+    def test_come_in_the_order_of_the_hash_table(self):
         parts = [
             patch(k, 20, center, [0.0, 0.0, 1.0])
             for k, center in enumerate(
                 [[5.0, 1.0, 1.0], [-3.0, 9.0, 1.0], [-3.0, -9.0, 1.0]]
             )
         ]
-        points = np.concatenate(parts)
-        planes = voxels(points)
-        expected = [moments(parts[k])[0] for k in (2, 1, 0)]
-        np.testing.assert_allclose(planes.centers, expected, atol=1e-12)
-        shuffled = np.random.default_rng(4).permutation(points)
-        np.testing.assert_allclose(
-            voxels(shuffled).centers, planes.centers, atol=1e-12
-        )
+        # A table of few elements that share no bucket: the last one leads.
+        for order in ([0, 1, 2], [2, 0, 1]):
+            planes = voxels(np.concatenate([parts[k] for k in order]))
+            expected = [moments(parts[k])[0] for k in reversed(order)]
+            np.testing.assert_allclose(planes.centers, expected, atol=1e-12)
 
     @pytest.mark.parametrize("number", [0, 1])
     def test_next_to_nothing(self, number):
@@ -177,40 +174,24 @@ class TestMerging:
         both = merge(planes, 0.1, 0.3, keep_single=True)
         assert sorted(both.counts) == [sum(map(len, parts)), 400]
 
-    def test_small_patches_found_groups_before_large_ones(self):
-        # A chain in which only neighbours are alike, by size D, A, B, C:
-        # the smallest two choose their neighbours, A and B stay apart.
+    def test_the_last_patches_choose_first(self):
+        # A chain D, A, B, C in which only neighbours are alike.
         heights = {"D": -0.25, "A": 0.0, "B": 0.25, "C": 0.5}
         counts = {"D": 15, "A": 40, "B": 30, "C": 20}
-        centers = np.array([[0.0, 0.0, heights[name]] for name in "ABCD"])
-        planes = Planes(
-            centers,
-            np.tile([0.0, 0.0, 1.0], (4, 1)),
-            np.tile(np.diag([0.3, 0.3, 0.0]), (4, 1, 1)),
-            np.array([counts[name] for name in "ABCD"]),
-        )
-        for order in ([0, 1, 2, 3], [3, 2, 1, 0], [2, 0, 3, 1]):
-            merged = merge(planes.take(order), 0.1, 0.3, keep_single=False)
-            assert sorted(merged.counts) == [50, 55]
 
-    def test_does_not_depend_on_the_order(self):
-        rng = np.random.default_rng(33)
-        parts = [
-            patch(
-                k,
-                20 + k,
-                [4.0 * (k % 6), 4.0 * (k // 6), rng.normal(0.0, 0.1)],
-                [*rng.normal(0.0, 0.04, 2), 1.0],
-                0.01,
+        def merged(order):
+            planes = Planes(
+                np.array([[0.0, 0.0, heights[name]] for name in order]),
+                np.tile([0.0, 0.0, 1.0], (4, 1)),
+                np.tile(np.diag([0.3, 0.3, 0.0]), (4, 1, 1)),
+                np.array([counts[name] for name in order]),
             )
-            for k in range(36)
-        ]
-        planes = voxels(np.concatenate(parts), voxel_size=4.0)
-        mixed = planes.take(rng.permutation(len(planes)))
-        np.testing.assert_array_equal(
-            np.sort(merge(planes, 0.1, 0.3, keep_single=True).counts),
-            np.sort(merge(mixed, 0.1, 0.3, keep_single=True).counts),
-        )
+            return sorted(merge(planes, 0.1, 0.3, keep_single=False).counts)
+
+        # D and C found groups with their only neighbours.
+        assert merged("ABCD") == [50, 55]
+        # B takes A in first, and C and D follow.
+        assert merged("DCAB") == [105]
 
 
 class TestBasePlane:
@@ -259,6 +240,24 @@ class TestBasePlane:
         center, normal = base_plane(planes, 0.1, 0.3)
         np.testing.assert_allclose(center, [11.5, 0.0, 0.0], atol=1e-12)
         np.testing.assert_allclose(normal, [0.0, 0.0, 1.0], atol=1e-12)
+
+    def test_second_time_the_largest_go_first(self):
+        # Groups of a chain, by height: 20 points, 60, 40 and 80. Only
+        # neighbours are alike; the smallest founds a group first.
+        sizes = [20, 60, 40, 80]
+        heights = [0.0, 0.25, 0.5, 0.75]
+        pairs = [(h, s) for h, s in zip(heights, sizes, strict=True)] * 2
+        planes = Planes(
+            np.array([[100.0 * s, 0.0, h] for h, s in pairs]),
+            np.tile([0.0, 0.0, 1.0], (8, 1)),
+            np.tile(np.diag([0.3, 0.3, 0.0]), (8, 1, 1)),
+            np.array([s for _, s in pairs]),
+        )
+        exact = merge(planes, 0.1, 1e-6, keep_single=False)
+        assert sorted(exact.counts) == [40, 80, 120, 160]
+        by_size = exact.take(np.argsort(-exact.counts))
+        twice = merge(by_size, 0.1, 0.3, keep_single=True)
+        assert sorted(twice.counts) == [160, 240]
 
     def test_none_without_a_pair(self):
         alone = voxels(patch(0, 30, [1.0, 1.0, 1.0], [0.0, 0.0, 1.0]))

@@ -57,23 +57,32 @@ class HeightImage:
     means: np.ndarray
 
 
-def image_axes(normal: np.ndarray) -> np.ndarray:
-    """Returns the directions of an image on a plane, (3, 3) orthonormal.
+def image_axes(normal: np.ndarray, orthogonal: bool) -> np.ndarray:
+    """Returns the directions of an image on a plane, (3, 3) of length 1.
 
     They are, one a row: along the rows' numbers, along the columns' (which
-    follows the x axis as far as the plane allows), and the normal. (The
-    public program means the same, but by a wrong term its second direction
-    leaves the plane by the y component of the normal.)
+    follows the x axis as far as the plane allows), and the normal.
+
+    By a wrong term, the second direction of the public program has a
+    component along the normal that is the normal's y component. Keypoints
+    then lie on a plane through the same center that is tilted by as much:
+    on level ground, about as much as the ground itself. It is followed
+    unless `orthogonal`.
 
     Args:
-        normal: (3,) unit.
+        normal: (3,) unit, z >= 0.
+        orthogonal: whether all directions are.
     """
-    if abs(normal[1]) < 1.0:
-        along = np.array([normal[2], 0.0, -normal[0]])
-        along /= np.linalg.norm(along)
+    a, b, c = normal
+    if orthogonal:
+        along = [c, 0.0, -a] if abs(b) < 1.0 else [1.0, 0.0, 0.0]
+    elif c != 0.0:
+        along = [1.0, 0.0, -(a + b) / c]
     else:
-        along = np.array([1.0, 0.0, 0.0])
-    return np.stack([np.cross(normal, along), along, normal])
+        along = [1.0, -a / b, 0.0] if b != 0.0 else [0.0, 1.0, 0.0]
+    along = np.array(along) / np.linalg.norm(along)
+    across = np.cross(normal, along)
+    return np.stack([across / np.linalg.norm(across), along, normal])
 
 
 def height_image(
@@ -230,6 +239,10 @@ def _project(points, center, axes, low, high):
         z = points[i, 2] - center[2]
         height = axes[2, 0] * x + axes[2, 1] * y + axes[2, 2] * z
         if low <= height <= high:
+            # On the plane: the other axes need not be orthogonal to it.
+            x -= height * axes[2, 0]
+            y -= height * axes[2, 1]
+            z -= height * axes[2, 2]
             near[num_near, 0] = axes[0, 0] * x + axes[0, 1] * y + axes[0, 2] * z
             near[num_near, 1] = axes[1, 0] * x + axes[1, 1] * y + axes[1, 2] * z
             near[num_near, 2] = height

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from evaluation.compiled import compiled
+from evaluation.methods.btc_voxel_order import voxel_order
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,10 @@ class Planes:
 def voxel_planes(
     points: np.ndarray, voxel_size: float, max_points: int, flatness: float
 ) -> Planes:
-    """Returns the voxels whose points lie on a plane, by index of the voxel.
+    """Returns the voxels whose points lie on a plane.
+
+    They come in the order of the public program, which the order of the
+    points decides; see `evaluation.methods.btc_voxel_order`.
 
     Args:
         points: (N, 3) [m].
@@ -52,11 +56,14 @@ def voxel_planes(
         max_points: a voxel with more than these is looked at.
         flatness: upper limit of the variance along the normal [m^2].
     """
-    numbers = _voxel_numbers(points, voxel_size)
+    index, numbers = _voxels(points, voxel_size)
     order = np.argsort(numbers, kind="stable")
     starts = np.flatnonzero(np.diff(numbers[order], prepend=-1))
     counts = np.diff(starts, append=len(points))
-    dense = counts > max_points
+    by_first_point = np.argsort(order[starts])
+    firsts = order[starts[by_first_point]]
+    visited = by_first_point[voxel_order(index[firsts])]
+    dense = visited[counts[visited] > max_points]
     counts = counts[dense]
     centers, covariances = _moments(points, order, starts[dense], counts)
     planes, variances = _fit(centers, covariances, counts)
@@ -69,7 +76,7 @@ def base_plane(
     """Returns the largest plane that the patches form; outdoors, the ground.
 
     Patches that are alike are merged, those without a partner dropped, and
-    the merged ones merged once more.
+    the merged ones merged once more, the largest first.
 
     Args:
         planes: of the voxels.
@@ -83,6 +90,7 @@ def base_plane(
     groups = merge(planes, normal_limit, distance_limit, keep_single=False)
     if len(groups) == 0:
         return None
+    groups = groups.take(np.argsort(-groups.counts, kind="stable"))
     groups = merge(groups, normal_limit, distance_limit, keep_single=True)
     largest = int(groups.counts.argmax())
     normal = groups.normals[largest]
@@ -97,18 +105,13 @@ def merge(
 ) -> Planes:
     """Returns the planes that alike patches form together.
 
-    Which patches come together depends on the order in which they are
-    compared. The public program takes them first as its hash table happens
-    to hold them, then by size; here they go by size both times, ties as they
-    are, so that the result depends on the patches alone.
-
     Args:
-        planes: of which some are alike.
+        planes: of which some are alike. Which of them come together depends
+            on their order.
         normal_limit: see `base_plane`.
         distance_limit: see `base_plane`.
         keep_single: keep also patches that are like no other.
     """
-    planes = planes.take(np.argsort(-planes.counts, kind="stable"))
     labels = group_alike(
         planes.centers, planes.normals, normal_limit, distance_limit
     )
@@ -181,8 +184,11 @@ def group_alike(centers, normals, normal_limit, distance_limit):
 
 
 @compiled
-def _voxel_numbers(points, voxel_size):
-    """Returns (N,) int64 numbers >= 0 of voxels, by index along x, y, z."""
+def _voxels(points, voxel_size):
+    """Returns (N, 3) int64 indices of voxels, and (N,) numbers >= 0 of them.
+
+    The numbers go by index along x, then y, then z.
+    """
     num_points = len(points)
     index = np.empty((num_points, 3), dtype=np.int64)
     first = np.full(3, np.iinfo(np.int64).max)
@@ -203,7 +209,7 @@ def _voxel_numbers(points, voxel_size):
             number *= last[axis] - first[axis] + 1
             number += index[i, axis] - first[axis]
         numbers[i] = number
-    return numbers
+    return index, numbers
 
 
 @compiled
