@@ -7,6 +7,7 @@ from pathlib import Path
 import sys
 
 from cns_drake.city.generate import differing_files, generate_city
+from cns_drake.city.starter import start_city
 from cns_drake.errors import InputError
 from cns_drake.scenario import load_scenario
 from cns_drake.sequence_table import write_table
@@ -24,6 +25,18 @@ def main(arguments: list[str] | None = None) -> int:
             "folder with roads.yaml, city.yaml and stages.yaml, and the "
             "sequences of the city, whose figures are brought up to date"
         ),
+    )
+    parser.add_argument(
+        "--start",
+        action="store_true",
+        help="first write what is missing besides roads.yaml: a plan with a "
+        "district for each block, two stages, a sequence for each",
+    )
+    parser.add_argument(
+        "--seed",
+        type=int,
+        default=0,
+        help="of what --start draws by lot (default: %(default)s)",
     )
     parser.add_argument(
         "--check",
@@ -61,6 +74,8 @@ def main(arguments: list[str] | None = None) -> int:
             for path in changed:
                 print(path)
             return 1 if changed else 0
+        if options.start:
+            start_city(options.world, options.seed, progress)
         files = generate_city(options.world, progress)
         write_table(options.world, progress)
     except InputError as error:
