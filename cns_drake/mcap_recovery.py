@@ -49,7 +49,11 @@ _CHUNK_START = re.compile(
     re.DOTALL,
 )
 _LONGEST_CHUNK_START = 9 + 28 + 8 + 8
-_SEARCH_BLOCK = 4 * 1024 * 1024
+_FIRST_SEARCH_BLOCK = 4096
+_LAST_SEARCH_BLOCK = 4 * 1024 * 1024
+# What is shaped like a chunk but is none, is read in vain. A file made for
+# that could keep a reader busy for days, hence a limit: so often its size.
+_MOST_READ = 16
 _FAULTS = (
     McapError,
     ValueError,
@@ -91,10 +95,15 @@ def read_records(stream: BinaryIO) -> Iterator[McapRecord | Fault]:
     if stream.read(position) != MCAP0_MAGIC:
         yield Fault(0, "does not begin as an MCAP file")
         position = _next_chunk(stream, 0, size)
+    budget = _MOST_READ * size
     while position is not None:
         end = None
         try:
             opcode, end = _read_header(stream, position, size)
+            budget -= end - position
+            if budget < 0:
+                yield Fault(position, "too much damage, the rest is not read")
+                return
             yield from _parse(opcode, _read_content(stream, position, end))
         except _FAULTS as error:
             yield Fault(position, _describe(error))
@@ -143,10 +152,11 @@ def _begins_record(stream: BinaryIO, position: int, size: int) -> bool:
 
 def _next_chunk(stream: BinaryIO, start: int, size: int) -> int | None:
     """Returns where the next thing lies that is shaped like a chunk."""
+    block_size = _FIRST_SEARCH_BLOCK
     while start < size:
         stream.seek(start)
         # The overlap lets no chunk hide on the border of two blocks.
-        block = stream.read(_SEARCH_BLOCK + _LONGEST_CHUNK_START)
+        block = stream.read(block_size + _LONGEST_CHUNK_START)
         for match in _CHUNK_START.finditer(block):
             length, compression, content_length = map(
                 match.group, ("length", "compression", "content_length")
@@ -156,10 +166,11 @@ def _next_chunk(stream: BinaryIO, start: int, size: int) -> int | None:
             if (
                 int.from_bytes(length, "little")
                 == int.from_bytes(content_length, "little") + fields
-                and match.start() < _SEARCH_BLOCK
+                and match.start() < block_size
             ):
                 return start + match.start()
-        start += _SEARCH_BLOCK
+        start += block_size
+        block_size = min(2 * block_size, _LAST_SEARCH_BLOCK)
     return None
 
 
@@ -168,23 +179,28 @@ def _parse(opcode: int, content: bytes) -> Iterator[McapRecord]:
     stream = _Content(content)
     if opcode == Opcode.CHUNK:
         yield from _records_in_chunk(Chunk.read(stream))
-    elif opcode == Opcode.MESSAGE:
-        yield Message.read(stream, len(content))
+    elif opcode == Opcode.HEADER:
+        yield Header.read(stream)
+    elif opcode == Opcode.METADATA:
+        yield Metadata.read(stream)
     elif opcode == Opcode.ATTACHMENT:
         (crc,) = struct.unpack("<I", content[-4:])
         if crc and crc != zlib.crc32(content[:-4]):
             raise _DamageError("an attachment's checksum is wrong")
         yield Attachment.read(stream)
-    elif opcode in _SIMPLE_RECORDS:
-        yield _SIMPLE_RECORDS[opcode].read(stream)
+    else:
+        yield from _parse_content(opcode, content)
 
 
-_SIMPLE_RECORDS = {
-    Opcode.HEADER: Header,
-    Opcode.SCHEMA: Schema,
-    Opcode.CHANNEL: Channel,
-    Opcode.METADATA: Metadata,
-}
+def _parse_content(opcode: int, content: bytes) -> Iterator[McapRecord]:
+    """Like `_parse`, for the records that a chunk may contain."""
+    stream = _Content(content)
+    if opcode == Opcode.MESSAGE:
+        yield Message.read(stream, len(content))
+    elif opcode == Opcode.SCHEMA:
+        yield Schema.read(stream)
+    elif opcode == Opcode.CHANNEL:
+        yield Channel.read(stream)
 
 
 def _records_in_chunk(chunk: Chunk) -> Iterator[McapRecord]:
@@ -195,10 +211,8 @@ def _records_in_chunk(chunk: Chunk) -> Iterator[McapRecord]:
         raise _DamageError("a chunk's checksum is wrong")
     stream = _Content(data)
     while stream.left:
-        opcode, length = _RECORD_HEADER.unpack(stream.read(9))
-        if opcode == Opcode.CHUNK:
-            raise _DamageError("a chunk within a chunk")
-        yield from _parse(opcode, stream.read(length))
+        opcode, length = _RECORD_HEADER.unpack(stream.read(_RECORD_HEADER.size))
+        yield from _parse_content(opcode, stream.read(length))
 
 
 def _uncompressed(chunk: Chunk) -> bytes:

@@ -33,8 +33,8 @@ class RecordingFolder:
     def check(self, overwrite: bool) -> None:
         """Refuses a folder that a recording must not go into.
 
-        Without `overwrite`, that is any folder with something in it but what
-        an interrupted recording of this name leaves.
+        Without `overwrite`, that is one with a finished recording, and one
+        that holds files but none of a recording of this name.
 
         Raises:
             InputError: the folder must not be used, or cannot be looked at.
@@ -55,12 +55,10 @@ class RecordingFolder:
                 )
             own = (self.mcap, self.scenario, self.metadata)
             names = {file.name for file in (*own, *map(part_path, own))}
-            others = sorted(
-                {entry.name for entry in self.path.iterdir()} - names
-            )
-        if others:
+            found = sorted(entry.name for entry in self.path.iterdir())
+        if found and names.isdisjoint(found):
             raise InputError(
                 f"{self.path}: the folder already exists and holds other "
-                f"files, such as '{others[0]}' (--overwrite keeps them and "
+                f"files, such as '{found[0]}' (--overwrite keeps them and "
                 "records beside them)"
             )

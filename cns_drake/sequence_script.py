@@ -58,6 +58,7 @@ def run_sequence(
             graphviz_file=graphviz,
             overwrite=overwrite,
             on_frame=on_frame,
+            on_note=lambda text: terminal.print_note(progress, text),
         )
     print(
         f"{run.folder}: {run.num_frames} frames, {run.simulated_s:.2f} s "

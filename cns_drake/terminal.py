@@ -12,10 +12,13 @@ from rich.console import Console
 from rich.progress import (
     BarColumn,
     Progress,
+    Task,
     TextColumn,
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
+from rich.table import Column
+from rich.text import Text
 import typer
 
 from cns_drake.errors import InputError
@@ -60,36 +63,56 @@ def interrupt_on_termination() -> None:
     signal.signal(signal.SIGTERM, interrupt)
 
 
+class _ShortenedColumn(TextColumn):
+    """Text that gives way in a narrow terminal instead of wrapping."""
+
+    def render(self, task: Task) -> Text:
+        text = super().render(task)
+        text.no_wrap = True
+        text.overflow = "ellipsis"
+        return text
+
+
 @contextlib.contextmanager
-def show_progress() -> Iterator[Progress]:
-    """Shows progress bars on stderr, with elapsed and remaining time.
+def show_progress(console: Console | None = None) -> Iterator[Progress]:
+    """Shows progress bars, each one line, with elapsed and remaining time.
 
     The field `note` of a task is shown behind its bar.
+
+    Args:
+        console: where; stderr by default.
     """
+    fixed = Column(no_wrap=True)
     progress = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:>3.0f} %"),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[note]}"),
-        console=Console(stderr=True),
+        TextColumn("{task.description}", table_column=fixed),
+        BarColumn(table_column=Column(max_width=40)),
+        TextColumn("{task.percentage:>3.0f} %", table_column=fixed),
+        TimeElapsedColumn(table_column=fixed),
+        TextColumn("left", table_column=fixed),
+        TimeRemainingColumn(table_column=fixed),
+        _ShortenedColumn("{task.fields[note]}", table_column=Column()),
+        console=console or Console(stderr=True),
         refresh_per_second=2,
     )
     with progress:
         yield progress
 
 
+def print_note(progress: Progress, text: str) -> None:
+    """Prints a line above the progress bars."""
+    # Where there is no terminal, a line stays one line.
+    progress.console.print(text, soft_wrap=True, markup=False, highlight=False)
+
+
 def frame_progress(progress: Progress, task) -> Callable[[int, int], None]:
     """Returns a callback that shows the frames of a simulation.
 
-    As `count_progress`, with simulated time and real-time factor behind.
+    It is `count_progress` with simulated time and real-time factor.
     """
 
-    def note(done: int, elapsed: float) -> str:
+    def note(done: int, new: int, elapsed: float) -> str:
+        factor = new * FRAME_PERIOD / max(elapsed, 1e-9)
         simulated = done * FRAME_PERIOD
-        factor = simulated / max(elapsed, 1e-9)
         return f"{simulated:.1f} s simulated, {factor:.1f} x real time"
 
     return count_progress(progress, task, note)
@@ -98,7 +121,8 @@ def frame_progress(progress: Progress, task) -> Callable[[int, int], None]:
 def count_progress(
     progress: Progress,
     task,
-    note: Callable[[int, float], str] = lambda done, elapsed: "",
+    note: Callable[[int, int, float], str] = lambda done, new, elapsed: "",
+    unit: str = "frames",
 ) -> Callable[[int, int], None]:
     """Returns a callback that shows how many frames of how many are done.
 
@@ -108,26 +132,31 @@ def count_progress(
     Args:
         progress: where the task is shown.
         task: its id.
-        note: of the frames done and the time [s] they took -> what to add.
+        note: of the frames done, how many of them are new since the first
+            call, and the time [s] they took -> what to add.
+        unit: what is counted.
     """
     console = progress.console
     interval = 0.5 if console.is_terminal else _LINE_INTERVAL
     start = shown = time.monotonic()
+    found: int | None = None  # What an earlier run had done is no speed.
 
     def on_frame(done: int, total: int) -> None:
-        nonlocal shown
+        nonlocal shown, found
+        if found is None:
+            found = done - 1
         now = time.monotonic()
         if done < total and now - shown < interval:
             return
         shown = now
         elapsed = now - start
-        text = note(done, elapsed)
+        text = note(done, done - found, elapsed)
         progress.update(task, completed=done, total=total, note=text)
         if not console.is_terminal:
             name = progress.tasks[task].description
-            left = elapsed * (total - done) / done
-            parts = [f"{name}: {done}/{total} frames", text]
+            left = elapsed * (total - done) / (done - found)
+            parts = [f"{name}: {done}/{total} {unit}", text]
             parts.append(f"{left:.0f} s left")
-            console.print(", ".join(part for part in parts if part))
+            print_note(progress, ", ".join(part for part in parts if part))
 
     return on_frame
