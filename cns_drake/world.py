@@ -12,7 +12,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 
 from cns_drake.errors import InputError
-from cns_drake.perception_geometry import check_shape
+from cns_drake.perception_geometry import check_shape, structure_name
 from cns_drake.structure_table import StructureTable, load_structure_table
 
 
@@ -24,7 +24,8 @@ class World:
         scene_graph: holds the geometry; add it to a DiagramBuilder.
         plant: owns bodies and frames; finalized, not meant for a Diagram.
         vehicle: the vehicle's model instance, None where there is none.
-        structures: class and instance id of every structure in the world.
+        structures: class and instance id of every structure in the world,
+            also of those that no table lists.
     """
 
     scene_graph: SceneGraph
@@ -70,11 +71,11 @@ def load_world(
             f"{sdf}: no visual: the world has no perception geometry that a "
             "LiDAR can see"
         )
+    names = []
     for geometry_id in inspector.GetAllGeometryIds(Role.kPerception):
+        names.append(inspector.GetName(geometry_id))
         try:
-            check_shape(
-                inspector.GetName(geometry_id), inspector.GetShape(geometry_id)
-            )
+            check_shape(names[-1], inspector.GetShape(geometry_id))
         except InputError as error:
             raise InputError(f"{sdf}: {error}") from None
     vehicle_model = None
@@ -87,6 +88,10 @@ def load_world(
         entries = load_structure_table(table)
     else:
         entries = StructureTable(())
+    try:
+        entries = entries.completed(map(structure_name, names))
+    except InputError as error:
+        raise InputError(f"{sdf}: {error}") from None
     return World(scene_graph, plant, vehicle_model, entries)
 
 

@@ -5,6 +5,7 @@ from small_map import box_visual, world_text
 
 from cns_drake.errors import InputError
 from cns_drake.paths import vehicle_file
+from cns_drake.structure_table import StructureEntry
 from cns_drake.world import load_world
 
 MESH = "<mesh><uri>{}</uri></mesh>"
@@ -68,4 +69,23 @@ def test_table_beside_the_world_is_optional(tmp_path):
     path.write_text(
         world_text([box_visual("hut/wall", (0, 0, 1, 0, 0, 0), (1, 1, 2))])
     )
-    assert list(load_world(path).structures) == []
+    assert list(load_world(path).structures) == [
+        StructureEntry(1, "hut", "unlabeled")
+    ]
+
+
+def test_structures_that_the_table_lacks_follow_behind(tmp_path):
+    visuals = [
+        box_visual(f"{name}/wall", (0, 0, 1, 0, 0, 0), (1, 1, 2))
+        for name in ("shed", "barn", "hut")
+    ]
+    (tmp_path / "world.sdf").write_text(world_text(visuals))
+    (tmp_path / "structures.csv").write_text(
+        "instance,name,class\n7,hut,building\n"
+    )
+    world = load_world(tmp_path / "world.sdf", vehicle=vehicle_file())
+    assert list(world.structures) == [
+        StructureEntry(7, "hut", "building"),
+        StructureEntry(8, "barn", "unlabeled"),
+        StructureEntry(9, "shed", "unlabeled"),
+    ]
