@@ -16,7 +16,7 @@ _AMBIENT_RGB = np.array([0.52, 0.57, 0.66])
 _HORIZON_RGB = np.array([0.83, 0.88, 0.93])
 _ZENITH_RGB = np.array([0.42, 0.60, 0.84])
 # Distance at which haze has taken two thirds of the contrast [m].
-_HAZE_LENGTH = 1200.0
+HAZE_LENGTH = 1200.0
 _FAR = 5000.0
 _DEFAULT_RGB = (0.7, 0.7, 0.7)
 
@@ -46,6 +46,7 @@ def render(
     height: int = 540,
     fov_y_deg: float = 50.0,
     samples: int = 2,
+    haze_length: float = HAZE_LENGTH,
 ) -> np.ndarray:
     """Renders a view with sun, shadows, sky light and haze.
 
@@ -57,6 +58,8 @@ def render(
         height: rows [pixel].
         fov_y_deg: vertical field of view [deg].
         samples: rays per pixel and axis.
+        haze_length: distance at which haze has taken two thirds of the
+            contrast; infinite: clear air [m].
 
     Returns:
         (height, width, 3) uint8 sRGB image.
@@ -77,14 +80,14 @@ def render(
         ).reshape(-1, 3)
         d_C /= np.linalg.norm(d_C, axis=1, keepdims=True)
         d_W = d_C @ X_WC.rotation().matrix().T
-        image += _shade(scene, rgb, X_WC.translation(), d_W).reshape(
-            height, width, 3
-        )
+        image += _shade(
+            scene, rgb, X_WC.translation(), d_W, haze_length
+        ).reshape(height, width, 3)
     srgb = np.clip(image / samples**2, 0.0, 1.0) ** (1.0 / 1.6)
     return np.round(255.0 * srgb).astype(np.uint8)
 
 
-def _shade(scene, rgb, p_WC, d_W) -> np.ndarray:
+def _shade(scene, rgb, p_WC, d_W, haze_length) -> np.ndarray:
     hits = scene.cast_rays(p_WC, d_W, _FAR, with_normals=True)
     height = np.clip(d_W[:, 2:], 0.0, 1.0) ** 0.6
     color = (1.0 - height) * _HORIZON_RGB + height * _ZENITH_RGB
@@ -106,7 +109,7 @@ def _shade(scene, rgb, p_WC, d_W) -> np.ndarray:
         + sky[:, None] * _AMBIENT_RGB
     )
     albedo = rgb[hits.geometry[hit]] ** 1.6
-    haze = np.exp(-distance / _HAZE_LENGTH)
+    haze = np.exp(-distance / haze_length)
     color[hit] = haze * albedo * light + (1.0 - haze) * _HORIZON_RGB
     return color
 

@@ -18,9 +18,10 @@ def reproduce_maps(
 ) -> None:
     """Records the sequences of maps, evaluates them and reports.
 
-    `<output>/<name>/` gets each recording, `<output>/pictures` a street of
-    each map in its first and last stage, `<output>/report` the tables and
-    figures. What is recorded already is not recorded again.
+    `<output>/<name>/` gets each recording, `<output>/pictures` the drives of
+    each map from above and a street in its first and last stage,
+    `<output>/report` the tables and figures. What is recorded already is not
+    recorded again.
 
     Args:
         maps: which maps, by name or folder; all shipped ones if empty.
@@ -36,10 +37,7 @@ def reproduce_maps(
     ]
     record_all(scenarios, output, num_processes)
     for folder in folders:
-        # A map of one's own may do without views.
-        if (folder / "views.yaml").is_file():
-            name = f"{folder.resolve().name}_stages.png"
-            _draw_stages(folder, output / "pictures" / name)
+        _draw(folder, output / "pictures")
     # A process of its own: the evaluation stands without the simulator.
     command = [sys.executable, "-m", "evaluation", "report", str(output)]
     done = subprocess.run(
@@ -100,13 +98,25 @@ def _scenarios_of_map(folder: Path) -> list[Scenario]:
     return sequences + controls
 
 
-def _draw_stages(folder: Path, path: Path) -> None:
+def _draw(folder: Path, pictures: Path) -> None:
     # matplotlib is not needed by those who only record.
+    from cns_drake.aerial_pictures import draw_drives
     from cns_drake.stage_pictures import draw_stages, load_views
 
+    name = folder.resolve().name
+    path = pictures / f"{name}_drives.png"
     print(f"drawing {path}", file=sys.stderr)
-    files = sorted(folder.glob("stage_*.sdf"))
-    stages = {
-        file.stem.replace("_", " "): file for file in (files[0], files[-1])
-    }
-    draw_stages(stages, load_views(folder / "views.yaml")["street"], path)
+    scenarios = [load_scenario(file) for file in sequences_of_map(folder)]
+    draw_drives(
+        {scenario.name.replace("_", " "): scenario for scenario in scenarios},
+        path,
+    )
+    # A map of one's own may do without views.
+    if (folder / "views.yaml").is_file():
+        path = pictures / f"{name}_stages.png"
+        print(f"drawing {path}", file=sys.stderr)
+        files = sorted(folder.glob("stage_*.sdf"))
+        stages = {
+            file.stem.replace("_", " "): file for file in (files[0], files[-1])
+        }
+        draw_stages(stages, load_views(folder / "views.yaml")["street"], path)

@@ -6,42 +6,18 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 import numpy as np
-from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
-from pydrake.math import RigidTransform
+from pydantic import TypeAdapter, ValidationError
 import yaml
 
 from cns_drake.beam_pattern import make_beam_pattern
 from cns_drake.errors import InputError, describe_validation_error
 from cns_drake.files import complete_part, part_path, user_errors
 from cns_drake.frame_clock import FRAME_PERIOD
-from cns_drake.perception_geometry import read_perception_geometry
-from cns_drake.ray_casting import RayCastingScene
-from cns_drake.rendering import look_at, render
-from cns_drake.world import load_world
+from cns_drake.stage_scene import StageScene, View
 
 _WIDTH, _HEIGHT = 960, 540
 # Height of the LiDAR below the camera's mast [m].
 _SENSOR_HEIGHT = 1.6
-
-
-class View(BaseModel):
-    """A camera.
-
-    Attributes:
-        position: of the camera in the world [m].
-        target: a point in the middle of the picture [m].
-        fov_y: vertical field of view [deg].
-    """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    position: tuple[float, float, float]
-    target: tuple[float, float, float]
-    fov_y: float = 50.0
-
-    def pose(self) -> RigidTransform:
-        """Returns X_WC; x forward, y left, z up."""
-        return look_at(self.position, self.target)
 
 
 def load_views(path: Path) -> dict[str, View]:
@@ -82,10 +58,10 @@ def draw_stages(stages: dict[str, Path], view: View, path: Path) -> None:
     )
     axes = figure.subplots(2, len(stages), squeeze=False)
     for column, (title, world) in enumerate(stages.items()):
-        scene = _Scene(world)
-        axes[0, column].imshow(scene.photograph(view))
+        scene = StageScene(world)
+        axes[0, column].imshow(scene.photograph(view, _WIDTH, _HEIGHT))
         axes[0, column].set_title(title)
-        pixels, distances = scene.scan_seen_by(view)
+        pixels, distances = _scan_seen_by(scene, view)
         axes[1, column].scatter(
             *pixels.T, c=distances, s=1.5, cmap="viridis_r", vmin=0, vmax=100,
             linewidths=0, rasterized=True,
@@ -104,53 +80,19 @@ def draw_stages(stages: dict[str, Path], view: View, path: Path) -> None:
     complete_part(path)
 
 
-def _project(view: View, p_WQset: np.ndarray):
-    """Returns (M, 2) pixels and which (M,) points of N they belong to."""
-    scale = _HEIGHT / 2 / np.tan(np.deg2rad(view.fov_y) / 2)
-    p_C = (view.pose().inverse() @ p_WQset.T).T
-    ahead = np.flatnonzero(p_C[:, 0] > 0.1)
-    slopes = p_C[ahead, 1:] / p_C[ahead, :1]
-    pixels = np.array([_WIDTH, _HEIGHT]) / 2 - scale * slopes
-    inside = ((pixels > 0) & (pixels < [_WIDTH, _HEIGHT])).all(axis=1)
-    return pixels[inside], ahead[inside]
-
-
-class _Scene:
-    """A stage that can be photographed and scanned."""
-
-    def __init__(self, path: Path):
-        world = load_world(path)
-        self._geometries = read_perception_geometry(
-            world.scene_graph.model_inspector()
-        )
-        self._scene = RayCastingScene(
-            self._geometries,
-            {geometry.frame_id for geometry in self._geometries},
-            lambda frame_id: RigidTransform(),
-        )
-
-    def photograph(self, view: View) -> np.ndarray:
-        """Returns the rendered (height, width, 3) picture."""
-        return render(
-            self._scene,
-            self._geometries,
-            view.pose(),
-            width=_WIDTH,
-            height=_HEIGHT,
-            fov_y_deg=view.fov_y,
-        )
-
-    def scan_seen_by(self, view: View) -> tuple[np.ndarray, np.ndarray]:
-        """Returns pixels of a scan's points and their distances [m]."""
-        x, y, z = view.position
-        down = self._scene.cast_rays(
-            np.array([x, y, z]), np.array([[0.0, 0.0, -1.0]]), 100.0
-        )
-        p_WS = np.array([x, y, z - down.ranges[0] + _SENSOR_HEIGHT])
-        pattern = make_beam_pattern("cns", FRAME_PERIOD)
-        hits = self._scene.cast_rays(p_WS, pattern.d_Sset, pattern.max_range)
-        hit = np.isfinite(hits.ranges)
-        ranges = hits.ranges[hit]
-        points = p_WS + ranges[:, None] * pattern.d_Sset[hit]
-        pixels, seen = _project(view, points)
-        return pixels, ranges[seen]
+def _scan_seen_by(
+    scene: StageScene, view: View
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns pixels of a scan's points and their distances [m]."""
+    x, y, z = view.position
+    down = scene.cast_rays(
+        np.array([x, y, z]), np.array([[0.0, 0.0, -1.0]]), 100.0
+    )
+    p_WS = np.array([x, y, z - down.ranges[0] + _SENSOR_HEIGHT])
+    pattern = make_beam_pattern("cns", FRAME_PERIOD)
+    hits = scene.cast_rays(p_WS, pattern.d_Sset, pattern.max_range)
+    hit = np.isfinite(hits.ranges)
+    ranges = hits.ranges[hit]
+    points = p_WS + ranges[:, None] * pattern.d_Sset[hit]
+    pixels, seen = view.project(points, _WIDTH, _HEIGHT)
+    return pixels, ranges[seen]
