@@ -67,5 +67,6 @@ def sequence_name(path: Path) -> str:
     its stem.
     """
     if path.stem.startswith("sequence_"):
-        return f"{path.resolve().parent.name}_{path.stem.removeprefix('sequence_')}"
+        number = path.stem.removeprefix("sequence_")
+        return f"{path.resolve().parent.name}_{number}"
     return path.stem
