@@ -24,6 +24,8 @@ import numpy as np
 TRIANGLE, CONE, ROUND_SEGMENT, SPHERE, DISC, INSTANCE = (
     0, 15, 16, 50, 52, 121,
 )  # fmt: skip
+# Kinds of geometry besides instances.
+NUM_KINDS = 5
 INDEX_BUFFER, VERTEX_BUFFER, NORMAL_BUFFER = 0, 1, 3
 UINT, UINT3, FLOAT3, FLOAT4 = 0x5001, 0x5003, 0x9003, 0x9004
 FLOAT3X4_ROW_MAJOR = 0x9134

@@ -13,6 +13,7 @@ the unit sphere.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 import ctypes
 from dataclasses import dataclass
 import weakref
@@ -29,6 +30,10 @@ from cns_drake.perception_geometry import (
     Surface,
     TriangleSurface,
 )
+
+# Threads take this many rays at a time: whole packets, and many enough that
+# a call costs little beside them.
+_BLOCK = 2048
 
 
 @dataclass(frozen=True)
@@ -79,7 +84,9 @@ class RayCastingScene:
         # Where a hit's (group, Embree geometry, primitive) is looked up.
         self._owners: list[np.ndarray] = []
         self._num_primitives = 0
-        first_primitive = np.zeros((max(1, len(groups)), 4), np.int64)
+        first_primitive = np.zeros(
+            (max(1, len(groups)), embree.NUM_KINDS), np.int64
+        )
 
         scenes = [
             self._build_scene(group, first_primitive[row])
@@ -122,6 +129,7 @@ class RayCastingScene:
         max_range: float,
         *,
         with_normals: bool = False,
+        num_threads: int = 1,
     ) -> RayHits:
         """Casts N rays.
 
@@ -130,6 +138,8 @@ class RayCastingScene:
             d_Wset: (N, 3) unit directions, expressed in the world.
             max_range: how far to look [m].
             with_normals: also return the normals of the surfaces.
+            num_threads: how many threads to share the rays between; the
+                result does not depend on it.
         """
         p_OSset = np.atleast_2d(p_WSset) - self._p_WO
         d_Wset = np.ascontiguousarray(d_Wset, dtype=np.float32)
@@ -140,20 +150,31 @@ class RayCastingScene:
         owner = np.empty(num_rays, np.int32)
         group = np.empty(num_rays, np.int32)
         normals = np.zeros((num_rays, 3 if with_normals else 0), np.float32)
-        embree.cast_packets(
-            ctypes.cast(self._lib.rtcIntersect16, ctypes.c_void_p).value,
-            self._top,
-            ctypes.addressof(self._arguments),
-            p_OSset.astype(np.float32),
-            d_Wset,
-            np.float32(max_range),
-            self._first_primitive,
-            self._owner_of_primitive,
-            ranges,
-            owner,
-            group,
-            normals,
-        )
+        origins = p_OSset.astype(np.float32)
+
+        def cast(block: slice) -> None:
+            embree.cast_packets(
+                ctypes.cast(self._lib.rtcIntersect16, ctypes.c_void_p).value,
+                self._top,
+                ctypes.addressof(self._arguments),
+                origins if len(origins) == 1 else origins[block],
+                d_Wset[block],
+                np.float32(max_range),
+                self._first_primitive,
+                self._owner_of_primitive,
+                ranges[block],
+                owner[block],
+                group[block],
+                normals[block],
+            )
+
+        if num_threads == 1:
+            cast(slice(0, num_rays))
+        else:
+            starts = range(0, num_rays, _BLOCK)
+            with ThreadPoolExecutor(num_threads) as threads:
+                # Consumed, so that an error in a thread is raised here.
+                list(threads.map(cast, (slice(s, s + _BLOCK) for s in starts)))
         if not with_normals:
             return RayHits(ranges, owner)
         return RayHits(ranges, owner, self._face_rays(normals, group, d_Wset))

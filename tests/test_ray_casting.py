@@ -259,3 +259,24 @@ def test_agrees_with_open3d_on_triangle_soup():
     ids = answer["geometry_ids"].numpy()[hit].astype(int)
     # Triangles may touch: the same range may belong to either.
     assert np.mean(hits.geometry[hit] == ids) > 0.999
+
+
+@pytest.mark.parametrize("num_rays", [0, 1, 17, 2048, 2049, 9001])
+def test_threads_change_nothing(num_rays):
+    rng = np.random.default_rng(num_rays)
+    geometries = [
+        geometry(surface or box_surface((2, 3, 1)), RigidTransform([9, k, 0]))
+        for k, (surface, _) in enumerate(SHAPES.values())
+    ]
+    scene = RayCastingScene(geometries, {WORLD}, lambda f: RigidTransform())
+    origins = rng.normal(size=(num_rays, 3))
+    d = rng.normal(size=(num_rays, 3)) * 0.2 + [1, 0.2, 0]
+    d /= np.linalg.norm(d, axis=1, keepdims=True)
+    one, three = (
+        scene.cast_rays(origins, d, 50.0, with_normals=True, num_threads=n)
+        for n in (1, 3)
+    )
+    assert num_rays < 17 or np.isfinite(one.ranges).any()
+    np.testing.assert_array_equal(one.ranges, three.ranges)
+    np.testing.assert_array_equal(one.geometry, three.geometry)
+    np.testing.assert_array_equal(one.normals_W, three.normals_W)
