@@ -45,14 +45,19 @@ _Align = Annotated[
 ]
 _Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 _MethodName = Annotated[
-    str, typer.Option("--method", help="Place-recognition method.")
+    str,
+    typer.Option(
+        "--method",
+        help="Place-recognition method, or a Python file that registers one.",
+    ),
 ]
 _Parameters = Annotated[
     list[str] | None,
     typer.Option(
         "--set",
         metavar="NAME=VALUE",
-        help="A parameter of the method; may be repeated.",
+        help="A parameter of the method; may be repeated. Several numbers"
+        " are separated by commas.",
     ),
 ]
 _SensorHeight = Annotated[
@@ -159,7 +164,11 @@ def scores(
     from evaluation import scan_folders
 
     chosen = _make_method(method, parameter, sensor_height)
-    scan_folders.write_scores(chosen, database, query, output, console.track)
+    num_ignored = scan_folders.write_scores(
+        chosen, database, query, output, console.track
+    )
+    if num_ignored:
+        console.note(f"{num_ignored} points not finite")
     console.note(f"wrote {output}")
 
 
@@ -197,13 +206,16 @@ def _tell_notes(sequence) -> None:
 def _make_method(name: str, assignments: list[str] | None, height: float):
     from evaluation.errors import InputError
     from evaluation.methods import make_method
+    from evaluation.methods.own_file import load_method
 
     parameters: dict[str, object] = {"sensor_height": height}
     for assignment in assignments or []:
         key, equals, value = assignment.partition("=")
         if not (key and equals):
             raise InputError(f"--set: {assignment!r} is not NAME=VALUE")
-        parameters[key] = value
+        parameters[key] = value.split(",") if "," in value else value
+    if name.endswith(".py"):
+        name = load_method(Path(name)).name
     return make_method(name, parameters)
 
 

@@ -21,6 +21,7 @@ import numpy as np
 
 from evaluation import points as point_arrays
 from evaluation import poses
+from evaluation.errors import InputError
 from evaluation.methods.method import Method
 from evaluation.progress import Track, silent
 from evaluation.sequences.sequence import Sequence, check_same_world
@@ -174,7 +175,8 @@ def describe_drive(
         What each method made of it.
 
     Raises:
-        InputError: if the sequence cannot be read.
+        InputError: if the sequence cannot be read, or no described cloud has
+            a point within the limits of the protocol.
     """
     methods = list(methods)
     positions = sequence.X_WS[:, :3, 3]
@@ -199,8 +201,10 @@ def describe_drive(
     if visit is not None:
         sizes.add(1)
     wanted = sorted(set().union(*members.values()))
+    num_points = 0
     for frame in track(wanted, f"describing {sequence.name}", len(wanted)):
         clouds = {size: gather(sequence, frame, size) for size in sizes}
+        num_points += max(map(len, clouds.values()))
         if visit is not None:
             visit(frame, clouds[1])
         for method, result in zip(methods, described, strict=True):
@@ -213,6 +217,11 @@ def describe_drive(
                 if place is None or not method.describes_alike:
                     place = method.describe(cloud)
                 result.queries.append(place)
+    if num_points == 0:
+        raise InputError(
+            f"{sequence.name}: no finite point within {CROP:g} m of the LiDAR"
+            f" in any of {len(wanted)} scans"
+        )
     return described
 
 

@@ -22,7 +22,7 @@ def write_scores(
     query: Path,
     output: Path,
     track: Track = silent,
-) -> None:
+) -> int:
     """Writes the score of every query with every place as CSV.
 
     Columns `query`, `database` (file stems) and `score`, which is empty
@@ -36,20 +36,23 @@ def write_scores(
         output: the file to write.
         track: reports progress.
 
+    Returns:
+        How many points were left out as not finite.
+
     Raises:
-        InputError: if a folder or a scan cannot be read, or the output not
-            be written.
+        InputError: if a folder or a scan cannot be read, a scan has no point
+            within the limits of the protocol, or the output cannot be
+            written.
     """
     place_files = _scan_files(database)
     query_files = _scan_files(query)
-    places = method.build_database(
-        [
-            method.describe_place(_read(path))
-            for path in track(
-                place_files, "describing places", len(place_files)
-            )
-        ]
-    )
+    num_ignored = 0
+    descriptors = []
+    for path in track(place_files, "describing places", len(place_files)):
+        points, ignored = _read(path)
+        descriptors.append(method.describe_place(points))
+        num_ignored += ignored
+    places = method.build_database(descriptors)
     with (
         completing(output) as part,
         open(part, "w", newline="", encoding="utf-8") as stream,
@@ -57,19 +60,25 @@ def write_scores(
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(["query", "database", "score"])
         for path in track(query_files, "querying", len(query_files)):
+            points, ignored = _read(path)
+            num_ignored += ignored
             values = method.score(
-                method.describe(_read(path)), places, exhaustive=True
+                method.describe(points), places, exhaustive=True
             )
             for place, value in zip(place_files, values, strict=True):
                 text = "" if np.isnan(value) else repr(float(value))
                 writer.writerow([path.stem, place.stem, text])
+    return num_ignored
 
 
-def _read(path: Path) -> np.ndarray:
-    points = crop(point_arrays.xyz(read_cloud(path)))
-    if len(points) == 0:
+def _read(path: Path) -> tuple[np.ndarray, int]:
+    """Returns a cropped scan (N, 3), N > 0, and how many are not finite."""
+    points = point_arrays.xyz(read_cloud(path))
+    num_finite = int(np.isfinite(points).all(axis=1).sum())
+    cropped = crop(points)
+    if len(cropped) == 0:
         raise InputError(f"{path}: no finite point within range")
-    return points
+    return cropped, len(points) - num_finite
 
 
 def _scan_files(folder: Path) -> list[Path]:

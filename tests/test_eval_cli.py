@@ -1,5 +1,7 @@
 import csv
 import json
+from pathlib import Path
+import re
 import subprocess
 import sys
 
@@ -8,6 +10,7 @@ import numpy as np
 import pytest
 
 from evaluation import cli
+from evaluation.methods import method
 
 
 def make_block_scene(seed):
@@ -254,6 +257,66 @@ def test_the_module_is_the_program(data):
     assert done.stderr == ("cns-eval: error: nowhere: no such file or folder\n")
 
 
+def readme_method(folder):
+    """Saves the method that the README shows, as a file of a name."""
+    readme = Path(__file__).parents[1] / "README.md"
+    (example,) = re.findall(
+        r"^```python\n(.*?@register.*?)^```",
+        readme.read_text(encoding="utf-8"),
+        re.DOTALL | re.MULTILINE,
+    )
+    path = folder / "readme_heights.py"
+    path.write_text(example, encoding="utf-8")
+    return path
+
+
+def test_the_method_in_the_readme(capsys, data, tmp_path, monkeypatch):
+    # Others need not know of it.
+    monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
+    path = readme_method(tmp_path)
+    assert len(path.read_text().splitlines()) < 30
+    both = ["pr", data / "town_01", data / "town_02", "--method", path]
+    status, out, _ = run(capsys, *both, "--set", "rings=30", "--json")
+    assert status == 0
+    values = json.loads(out)
+    assert values["method"] == "heights"
+    assert values["parameters"] == {"sensor_height": 1.6, "rings": 30}
+    assert values["recall_at_1"] > 0.8
+    assert_refused(capsys, [*both, "--set", "rings=x"], "heights: rings")
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("x = ", "SyntaxError"),
+        ("1 / 0", "ZeroDivisionError: division by zero"),
+        ("x = 1", "registers 0 methods"),
+        (
+            "from evaluation.methods import Method, register\n"
+            "register('btc')(type('A', (Method,), {}))",
+            "there is another method 'btc'",
+        ),
+    ],
+)
+def test_files_that_are_no_method(capsys, data, tmp_path, text, fault):
+    path = tmp_path / "no_method.py"
+    path.write_text(text)
+    both = ["pr", data / "town_01", data / "town_02", "--method"]
+    assert_refused(capsys, [*both, path], path, fault)
+    nowhere = tmp_path / "nowhere.py"
+    assert_refused(capsys, [*both, nowhere], nowhere, "no such file")
+
+
+def test_parameters_of_several_numbers(capsys, data):
+    both = ["pr", data / "town_01", data / "town_02", "--json"]
+    both += ["--method", "scan-context++", "--set", "variant=cart"]
+    status, out, _ = run(capsys, *both, "--set", "cart_cell=10,4")
+    assert status == 0
+    assert json.loads(out)["parameters"]["cart_cell"] == [10.0, 4.0]
+    for value in ("10", "10,4,2", "10,x", ","):
+        assert_refused(capsys, [*both, "--set", f"cart_cell={value}"], "cart")
+
+
 def test_bad_usage(capsys, data):
     town = data / "town_01"
     assert_refused(capsys, ["evaluate"], "No such command 'evaluate'")
@@ -321,6 +384,15 @@ def test_bad_folders_of_scans(capsys, data, tmp_path):
     far.mkdir()
     np.save(far / "a.npy", np.full((10, 3), 300.0))
     assert_refused(capsys, scores(good, far), "a.npy", "no finite point")
+    void = tmp_path / "void"
+    void.mkdir()
+    (void / "a.bin").write_bytes(b"")
+    assert_refused(capsys, scores(good, void), "a.bin", "no finite point")
+    noise = tmp_path / "noise"
+    noise.mkdir()
+    junk = np.random.default_rng(9).bytes(1600)
+    (noise / "a.bin").write_bytes(junk)
+    assert_refused(capsys, scores(good, noise), "a.bin", "point", "is at")
     assert not (tmp_path / "out.csv").exists()
     assert not (tmp_path / "out.csv.part").exists()
     blocked = tmp_path / "a file" / "out.csv"

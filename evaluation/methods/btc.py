@@ -12,10 +12,11 @@ method's authors describe them in a common world frame, which favours it:
 the grids on which planes and keypoints are found then coincide.)
 
 Scores are those of the public program (equal for 243 single scans of two
-LiDARs and 163 submaps, each against 308 places). Two things that the method leaves open are taken from it for that: the
-order in which it compares planes (`btc_voxel_order`), so that the order of a
-cloud's points matters; and a slight lean of keypoints where the ground leans
-sideways, which `image_axes: orthogonal` corrects.
+LiDARs and 163 submaps, each against 308 places). Two things are taken from it
+for that, which the method leaves open: the order in which planes are compared
+(`btc_voxel_order`), so that the order of a cloud's points matters; and a lean
+of keypoints where the ground leans sideways, which lowers scores there and
+which `image_axes: orthogonal` corrects.
 
 The steps are one module each: `btc_planes`, `btc_keypoints`,
 `btc_triangles` and `btc_verification`.

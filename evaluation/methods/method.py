@@ -102,9 +102,20 @@ _MethodClass = TypeVar("_MethodClass", bound=type[Method])
 
 
 def register(name: str) -> Callable[[_MethodClass], _MethodClass]:
-    """Decorates a Method: makes it known by a name."""
+    """Decorates a Method: makes it known by a name.
+
+    Raises:
+        ValueError: if another method has that name.
+    """
 
     def enter(method: _MethodClass) -> _MethodClass:
+        other = _METHODS.get(name, method)
+        # The same class may be defined anew, when its file is run again.
+        if (other.__module__, other.__qualname__) != (
+            method.__module__,
+            method.__qualname__,
+        ):
+            raise ValueError(f"there is another method {name!r}")
         method.name = name
         _METHODS[name] = method
         return method

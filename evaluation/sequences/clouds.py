@@ -39,7 +39,9 @@ def read_cloud(path: Path) -> np.ndarray:
             f"{path}: unknown kind of point cloud (known: {' '.join(_READERS)})"
         )
     try:
-        return reader(path)
+        points = reader(path)
+        _check_coordinates(points)
+        return points
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}") from error
     except (ValueError, EOFError, UnicodeDecodeError) as error:
@@ -51,11 +53,42 @@ def is_cloud(path: Path) -> bool:
     return path.suffix.lower() in _READERS
 
 
+def _check_coordinates(points: np.ndarray) -> None:
+    """Refuses coordinates that are none: bytes of something else.
+
+    What is not finite passes: many sensors say so of a beam that met nothing.
+
+    Raises:
+        ValueError: if a coordinate is out of this world.
+    """
+    for name in "xyz":
+        far = (np.abs(points[name]) >= _FARTHEST) & np.isfinite(points[name])
+        if far.any():
+            first = int(far.argmax())
+            raise ValueError(
+                f"{name}: point {first} of {len(points)} is at"
+                f" {points[name][first]:g} m"
+            )
+
+
 def _read_npy(path: Path) -> np.ndarray:
-    values = np.load(path, mmap_mode="r", allow_pickle=False)
+    try:
+        values = np.load(path, mmap_mode="r", allow_pickle=False)
+    except OSError:
+        raise
+    except Exception as error:
+        # NumPy evaluates the header as Python, and fails in as many ways.
+        raise ValueError(
+            f"no NumPy array ({type(error).__name__}: {error})"
+        ) from error
+    if not isinstance(values, np.ndarray):
+        values.close()
+        raise ValueError("an archive instead of one array")
     if values.dtype.names is not None:
-        if not {"x", "y", "z"} <= set(values.dtype.names):
-            raise ValueError("the records have no fields x, y, z")
+        for name in "xyz":
+            field = values.dtype.fields.get(name)
+            if field is None or field[0].kind not in "fiu":
+                raise ValueError(f"the records have no number {name}")
         return values.reshape(-1)
     if values.ndim != 2 or values.shape[1] not in (3, 4):
         raise ValueError(
@@ -79,6 +112,10 @@ def _read_bin(path: Path) -> np.ndarray:
     values = np.memmap(path, dtype="<f4", mode="r").reshape(-1, 4)
     return point_arrays.from_xyz(values)
 
+
+# Farther from the origin than any point of a map on Earth [m]: coordinates
+# of survey grids reach 1e7.
+_FARTHEST = 1e8
 
 _READERS: dict[str, Callable[[Path], np.ndarray]] = {
     ".pcd": read_pcd,

@@ -79,7 +79,10 @@ def _describe(header: dict[str, list[str]]) -> tuple[np.dtype, int]:
         scalar = f"<{kinds[position]}{sizes[position]}"
         shape = () if counts[position] == 1 else (counts[position],)
         fields.append((unique, scalar, shape))
-    dtype = np.dtype(fields)
+    try:
+        dtype = np.dtype(fields)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"PCD header: {error}") from error
     for name in "xyz":
         if name not in names or dtype.fields[name][0].kind != "f":
             raise ValueError(f"PCD header: no field {name} of type F")
