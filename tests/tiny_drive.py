@@ -1,0 +1,54 @@
+"""A drive that costs next to nothing: one hall, few beams, three seconds."""
+
+import contextlib
+import signal
+import sys
+
+from small_map import box_visual, world_text
+
+from cns_drake import terminal
+from cns_drake.scenario import make_scenario
+from cns_drake.simulation import simulate
+
+FRAMES = 60
+INTERRUPTED = 130
+
+
+def tiny_scenario(folder, **changes):
+    """Writes world and waypoints; returns their scenario, `tiny_01`."""
+    visuals = [
+        box_visual("ground/plate", (0, 0, -0.5, 0, 0, 0), (200, 200, 1)),
+        box_visual("hall/body", (30, 25, 5, 0, 0, 0.3), (20, 12, 10)),
+    ]
+    (folder / "tiny.sdf").write_text(world_text(visuals))
+    (folder / "tiny.csv").write_text("x,y\n-10,5\n40,5\n40,60\n")
+    values = {
+        "name": "tiny_01",
+        "world": str(folder / "tiny.sdf"),
+        "waypoints": str(folder / "tiny.csv"),
+        "speeds": {
+            "cruise": 6.0,
+            "longitudinal_acceleration": 1.5,
+            "lateral_acceleration": 2.0,
+        },
+        "lidars": {"lidar": {"preset": "vlp-16", "columns": 8}},
+        "frames": FRAMES,
+    }
+    return make_scenario(values | changes, "test")
+
+
+def run_and_tell(scenario, output, sender):
+    """Simulates in a process of its own and tells of each frame.
+
+    Exits with INTERRUPTED if SIGTERM has ended the run in good order.
+    """
+    status = INTERRUPTED
+    with contextlib.suppress(KeyboardInterrupt):
+        terminal.interrupt_on_termination()
+        sender.send(0)
+        simulate(
+            scenario, output, on_frame=lambda done, total: sender.send(done)
+        )
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        status = 0
+    sys.exit(status)
