@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from evaluation.errors import InputError
-from evaluation.methods import Method, MethodConfig
+from evaluation.methods import Method, MethodConfig, make_method
 from evaluation.place_recognition import run
 from evaluation.retrieval import crop, gather, retrieve, sample_frames
 from evaluation.sequences import open_sequence
@@ -157,6 +157,15 @@ def test_database_far_from_every_query(tmp_path):
     query = record_line(tmp_path / "b", [60.0, 70.0])
     with pytest.raises(InputError, match=r"b: no query lies within 7.5 m .*55"):
         run(database, query, OddOneOut())
+
+
+def test_a_drive_that_saw_nothing(tmp_path):
+    poses = [yaw_pose(20.0 * i, 0.0, 0.0, 0.0) for i in range(3)]
+    far = np.array([[300.0, 0.0, 0.0]])
+    write_recording(tmp_path / "blind", [make_scan(far)] * 3, poses)
+    blind = open_sequence(tmp_path / "blind")
+    with pytest.raises(InputError, match=r"blind: no finite point .* 3 scans"):
+        retrieve(blind, blind, make_method("solid", {}))
 
 
 def test_different_worlds(tmp_path):

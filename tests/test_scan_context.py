@@ -91,6 +91,13 @@ class TestPolarContext:
         assert not _polar_context(four, self.config).any()
         assert _polar_context(five, self.config)[7, 5] == 9.0
 
+    @pytest.mark.parametrize(("r", "seen"), [(79.999, True), (80.001, False)])
+    def test_far_points_may_be_dropped(self, r, seen):
+        config = ScanContextConfig(far_points="dropped")
+        image = _polar_context(cluster(r, 200.0, 7.0), config)
+        assert image[19, 33] == (7.0 if seen else 0.0)
+        assert np.count_nonzero(image) == int(seen)
+
     def test_below_the_ground_is_kept(self):
         image = _polar_context(cluster(30.0, 33.0, -0.5), self.config)
         assert image[7, 5] == -0.5

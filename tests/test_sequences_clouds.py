@@ -240,6 +240,59 @@ def test_faults_are_one_line_that_names_the_file(tmp_path):
         assert "\n" not in str(info.value)
 
 
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        (b"'descr': '<f4'", b"'descr': '<f4"),
+        (b"(500, 3)", b"(500, -3)"),
+        (b"(500, 3)", b"(500, 3"),
+        (b"(500, 3)", b"('a', 3)"),
+        (b"(500, 3)", b"(500.)"),
+        (b"'shape'", b"7      "),
+    ],
+)
+def test_damaged_npy_headers(tmp_path, old, new):
+    path = tmp_path / "map.npy"
+    np.save(path, POINTS)
+    data = path.read_bytes()
+    assert old in data
+    path.write_bytes(data.replace(old, new.ljust(len(old))))
+    with pytest.raises(InputError, match=r"map.npy: "):
+        read_cloud(path)
+
+
+def test_archives_and_records_of_no_numbers(tmp_path):
+    np.savez(tmp_path / "a.npz", POINTS)
+    (tmp_path / "a.npz").rename(tmp_path / "a.npy")
+    with pytest.raises(InputError, match="an archive"):
+        read_cloud(tmp_path / "a.npy")
+    np.save(tmp_path / "b.npy", np.zeros(3, [(n, "S4") for n in "xyz"]))
+    with pytest.raises(InputError, match="no number x"):
+        read_cloud(tmp_path / "b.npy")
+
+
+def test_pcd_field_of_no_size(tmp_path):
+    write_pcd(
+        tmp_path / "map.pcd",
+        HEADER | {"SIZE": "4 4 5", "DATA": "ascii"},
+        b"1 2 3\n" * 500,
+    )
+    with pytest.raises(InputError, match=r"map.pcd: PCD header: "):
+        read_cloud(tmp_path / "map.pcd")
+
+
+@pytest.mark.parametrize(("z", "fine"), [(9.9e7, True), (1.01e8, False)])
+def test_coordinates_out_of_this_world(tmp_path, z, fine):
+    points = np.zeros((3, 3))
+    points[1] = np.nan, np.inf, z
+    np.save(tmp_path / "map.npy", points)
+    if fine:
+        assert len(read_cloud(tmp_path / "map.npy")) == 3
+        return
+    with pytest.raises(InputError, match=r"z: point 1 of 3 is at 1.01e\+08 m"):
+        read_cloud(tmp_path / "map.npy")
+
+
 def test_unknown_or_missing_files(tmp_path):
     with pytest.raises(InputError, match="unknown kind of point cloud"):
         read_cloud(tmp_path / "a.las")
