@@ -56,14 +56,15 @@ def draw_drives(scenarios: Mapping[str, Scenario], path: Path) -> None:
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     for axes in panels:
         axes.set_axis_off()
-    scenes: dict[Path, np.ndarray] = {}
+    pictures: dict[tuple, np.ndarray] = {}
     for axes, (title, positions) in zip(panels, drives.items(), strict=False):
-        world = scenarios[title].world_file
-        if world not in scenes:
-            scenes[world] = StageScene(world).photograph(
+        scenario = scenarios[title]
+        world = (scenario.world_file, scenario.without)
+        if world not in pictures:
+            pictures[world] = StageScene(*world).photograph(
                 view, _WIDTH, _HEIGHT, haze_length=np.inf
             )
-        axes.imshow(scenes[world])
+        axes.imshow(pictures[world])
         axes.set_title(title)
         _draw_route(axes, view, positions)
     with user_errors(path):

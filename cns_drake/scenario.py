@@ -161,6 +161,7 @@ class Scenario(_Model):
             one (`roads.yaml`, `stage_<stage>.sdf`, `structures.csv`).
         stage: which stage of the map.
         world: an SDF file instead, with visuals for the LiDAR.
+        without: names of structures that are left out of it.
         title: what the sequence shows, in words.
         route: the lanes to follow.
         waypoints: a CSV file of places to pass instead; see
@@ -176,6 +177,7 @@ class Scenario(_Model):
     map: str | None = None
     stage: Name | None = Field(None, validate_default=True)
     world: str | None = Field(None, validate_default=True)
+    without: tuple[str, ...] = ()
     title: str = ""
     route: Route | None = Field(None, validate_default=True)
     waypoints: str | None = Field(None, validate_default=True)

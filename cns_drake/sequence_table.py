@@ -153,7 +153,7 @@ def _measure(path: Path, checksum: str) -> SequenceRow:
 
     scenario = load_scenario(path)
     facts = sequence_facts(scenario)
-    world = load_world(scenario.world_file)
+    world = load_world(scenario.world_file, without=scenario.without)
     geometries = read_perception_geometry(world.scene_graph.model_inspector())
     return SequenceRow(
         sequence=scenario.name,

@@ -225,7 +225,12 @@ def _structure_list(world: World) -> list[dict]:
 
 
 def _other_stage(scenario: Scenario) -> World | None:
-    """Returns the stage to compare with: the last, or else the first."""
+    """Returns the stage to compare with: the last, or else the first.
+
+    Where structures are left out, it is the same world with them.
+    """
+    if scenario.without:
+        return load_stage(scenario.model_copy(update={"without": ()}))
     if scenario.stage is None:
         return None
     stages = sorted(scenario.map_folder.glob("stage_*.sdf"))

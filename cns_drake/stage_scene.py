@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
@@ -54,13 +55,17 @@ class View(BaseModel):
 class StageScene:
     """The geometry of a stage, ready for pictures and scans."""
 
-    def __init__(self, path: Path):
+    def __init__(self, path: Path, without: Collection[str] = ()):
         """Loads an SDF world.
+
+        Args:
+            path: of the world.
+            without: names of structures to leave out.
 
         Raises:
             InputError: the world cannot be loaded.
         """
-        world = load_world(path)
+        world = load_world(path, without=without)
         self._geometries = read_perception_geometry(
             world.scene_graph.model_inspector()
         )

@@ -127,7 +127,9 @@ def make_station(
 
 def load_stage(scenario: Scenario) -> World:
     """Loads the stage of a scenario with the vehicle in it."""
-    return load_world(scenario.world_file, vehicle=vehicle_file())
+    return load_world(
+        scenario.world_file, vehicle=vehicle_file(), without=scenario.without
+    )
 
 
 def _connect(builder, name, recorder, measured) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 import re
@@ -43,7 +44,11 @@ class World:
 
 
 def load_world(
-    sdf: Path, *, vehicle: Path | None = None, structures: Path | None = None
+    sdf: Path,
+    *,
+    vehicle: Path | None = None,
+    structures: Path | None = None,
+    without: Collection[str] = (),
 ) -> World:
     """Parses a world and, in it, a vehicle.
 
@@ -52,10 +57,11 @@ def load_world(
         vehicle: the vehicle's model file.
         structures: table of structures; by default `structures.csv` beside
             the world, if there is one.
+        without: names of structures to leave out.
 
     Raises:
-        InputError: a file is missing or cannot be parsed, or the world has
-            nothing to see.
+        InputError: a file is missing or cannot be parsed, a structure to
+            leave out is not there, or the world has nothing to see.
     """
     scene_graph = SceneGraph()
     # The plant parses models and knows their frames. It stays out of the
@@ -65,6 +71,8 @@ def load_world(
     plant.RegisterAsSourceForSceneGraph(scene_graph)
     parser = Parser(plant)
     _parse(parser, sdf)
+    if without:
+        _remove(scene_graph, plant.get_source_id(), set(without), sdf)
     inspector = scene_graph.model_inspector()
     if not inspector.GetAllGeometryIds(Role.kPerception):
         raise InputError(
@@ -93,6 +101,22 @@ def load_world(
     except InputError as error:
         raise InputError(f"{sdf}: {error}") from None
     return World(scene_graph, plant, vehicle_model, entries)
+
+
+def _remove(
+    scene_graph: SceneGraph, source_id, names: set[str], sdf: Path
+) -> None:
+    """Removes the geometry of structures."""
+    inspector = scene_graph.model_inspector()
+    found = set()
+    for geometry_id in inspector.GetAllGeometryIds():
+        structure = structure_name(inspector.GetName(geometry_id))
+        if structure in names:
+            found.add(structure)
+            scene_graph.RemoveGeometry(source_id, geometry_id)
+    missing = sorted(names - found)
+    if missing:
+        raise InputError(f"{sdf}: no structure {missing[0]} to leave out")
 
 
 def _parse(parser: Parser, path: Path) -> list[ModelInstanceIndex]:

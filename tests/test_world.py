@@ -1,10 +1,14 @@
 """Loading SDF worlds, and the faults they may have."""
 
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 from small_map import box_visual, world_text
 
+from cns_drake.beam_pattern import make_beam_pattern
 from cns_drake.errors import InputError
 from cns_drake.paths import vehicle_file
+from cns_drake.scanning import scan_world
 from cns_drake.structure_table import StructureEntry
 from cns_drake.world import load_world
 
@@ -72,6 +76,33 @@ def test_table_beside_the_world_is_optional(tmp_path):
     assert list(load_world(path).structures) == [
         StructureEntry(1, "hut", "unlabeled")
     ]
+
+
+def test_what_is_left_out_is_neither_seen_nor_in_the_way(small_map):
+    """The last stage without what it adds is the first stage."""
+    added = [f"tower_{k:03d}" for k in range(19, 40)]
+    later = load_world(small_map / "stage_04.sdf", without=added)
+    earlier = load_world(small_map / "stage_01.sdf")
+    names = [
+        {
+            inspector.GetName(geometry_id)
+            for geometry_id in inspector.GetAllGeometryIds()
+        }
+        for inspector in (
+            world.scene_graph.model_inspector() for world in (later, earlier)
+        )
+    ]
+    assert names[0] == names[1]
+    X_WS = RigidTransform(RollPitchYaw(0.02, -0.01, 0.7), [3.0, -40.0, 1.6])
+    pattern = make_beam_pattern("vlp-16", 0.05)
+    scans = [scan_world(world, X_WS, pattern) for world in (later, earlier)]
+    assert len(scans[0]) > 5000
+    np.testing.assert_array_equal(scans[0], scans[1])
+
+
+def test_leaving_out_what_is_not_there_is_an_error(small_map):
+    with pytest.raises(InputError, match=r"stage_01\.sdf: no structure spire"):
+        load_world(small_map / "stage_01.sdf", without=["tower_001", "spire"])
 
 
 def test_structures_that_the_table_lacks_follow_behind(tmp_path):
