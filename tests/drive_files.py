@@ -63,6 +63,7 @@ def write_recording(
     lidar_topic: str = "/lidar/points",
     world_frame: str = "map",
     mast: str = "mast",
+    compression: CompressionType = CompressionType.ZSTD,
 ) -> Path:
     """Writes a rosbag2 folder; rotations of X_WBs are about z only.
 
@@ -80,6 +81,7 @@ def write_recording(
         lidar_topic: under which the scans are written.
         world_frame: of the odometry.
         mast: parent of the sensor's frame; the vehicle carries `mast`.
+        compression: of the chunks.
 
     Returns:
         The path of the .mcap file.
@@ -89,9 +91,7 @@ def write_recording(
     if stamps_ns is None:
         stamps_ns = [T0_NS + i * PERIOD_NS for i in range(len(scans))]
     with open(path, "wb") as stream:
-        writer = Writer(
-            stream, chunk_size=chunk_size, compression=CompressionType.ZSTD
-        )
+        writer = Writer(stream, chunk_size=chunk_size, compression=compression)
         writer.start(profile="ros2", library="test")
         for name, value in (attachments or {}).items():
             writer.add_attachment(

@@ -1,4 +1,6 @@
 import builtins
+import struct
+import tracemalloc
 
 from drive_files import (
     PERIOD_NS,
@@ -9,10 +11,11 @@ from drive_files import (
     write_recording,
     yaw_pose,
 )
+from mcap.writer import CompressionType
 import numpy as np
 import pytest
 
-from evaluation import poses
+from evaluation import poses, sequences
 from evaluation.errors import InputError
 from evaluation.sequences import check_same_world, mcap_file, open_sequence
 from evaluation.sequences.point_cloud2 import to_points
@@ -85,6 +88,17 @@ def test_small_and_large_chunks_read_alike(tmp_path):
     np.testing.assert_array_equal(sequences[0].X_WS, sequences[1].X_WS)
 
 
+@pytest.mark.parametrize("compression", list(CompressionType))
+def test_all_compressions_are_read(tmp_path, compression):
+    path, scans, X_WBs = record(tmp_path / "s", compression=compression)
+    sequence = open_sequence(path)
+    for read, written in zip(sequence, scans, strict=True):
+        np.testing.assert_array_equal(read, written)
+    np.testing.assert_allclose(
+        sequence.odometry["position"], np.array(X_WBs)[:, :3, 3]
+    )
+
+
 def test_a_scan_is_read_without_reading_the_file(tmp_path, monkeypatch):
     # Random bytes do not compress, so 60 scans make 60 chunks.
     scans, X_WBs = make_drive(num_frames=60, points=4000)
@@ -153,6 +167,67 @@ def test_another_lidar_topic_if_it_is_the_only_one(tmp_path):
     np.testing.assert_array_equal(open_sequence(path).scan(2), scans[2])
 
 
+def test_odometry_and_imu_of_a_simulated_drive(short_recording):
+    sequence = sequences.open(short_recording)
+    odometry, imu = sequence.odometry, sequence.imu
+    assert len(odometry) == len(imu) == len(sequence) == 40
+    for table in (odometry, imu):
+        np.testing.assert_array_equal(table["stamp_ns"], sequence.stamps_ns)
+    # The LiDAR sits upright above the vehicle, the IMU in line with both.
+    np.testing.assert_allclose(
+        odometry["position"] + [0.0, 0.0, 1.6],
+        sequence.X_WS[:, :3, 3],
+        atol=1e-12,
+    )
+    np.testing.assert_allclose(odometry["quat_xyzw"], imu["quat_xyzw"])
+    # From rest on level ground: the change of speed is the specific force.
+    speed = odometry["velocity"][:, 0]
+    assert speed[0] == 0.0
+    assert speed[-1] > 0.5
+    force = imu["specific_force"]
+    np.testing.assert_allclose(force[:, 2], 9.81, atol=1e-9)
+    gained = np.sum(0.5 * (force[1:, 0] + force[:-1, 0])) * 0.05
+    assert gained == pytest.approx(speed[-1], rel=1e-2)
+    np.testing.assert_array_equal(sequence.X_BI[:3, 3], [-1.0, 0.0, 1.6])
+
+
+def test_without_an_imu(tmp_path):
+    sequence = open_sequence(record(tmp_path / "s")[0])
+    assert sequence.imu is None
+    assert sequence.X_BI is None
+
+
+def test_one_lidar_of_several_by_name(tmp_path):
+    path, scans, _ = record(tmp_path / "s", lidar_topic="/roof/points")
+    sequence = sequences.open(path, lidar="roof")
+    np.testing.assert_array_equal(sequence.scan(2), scans[2])
+    with pytest.raises(
+        InputError, match=r"no topic /rear/points \(point clouds: /roof/points"
+    ):
+        sequences.open(path, lidar="rear")
+
+
+def test_memory_does_not_grow_with_the_drive(tmp_path):
+    scans, X_WBs = make_drive(num_frames=150, points=4000)
+    path = write_recording(tmp_path / "s", scans, X_WBs, chunk_size=100_000)
+    del scans
+    sequence = open_sequence(path)
+    _ = sequence.X_WS
+    peaks = []
+    tracemalloc.start()
+    try:
+        for _ in range(2):
+            for i, scan in enumerate(sequence):
+                assert len(scan) == 4000
+                if i in (20, 149):
+                    peaks.append(tracemalloc.get_traced_memory()[1])
+    finally:
+        tracemalloc.stop()
+    # All scans take 17 MB.
+    assert peaks[-1] < 1.2 * peaks[0]
+    assert peaks[-1] < 2_000_000
+
+
 @pytest.mark.parametrize(
     ("options", "fault"),
     [
@@ -218,6 +293,37 @@ def test_flipped_bits_are_noticed(tmp_path):
         else:
             assert fault.startswith(str(path))
             assert "\n" not in fault
+
+
+def tamper(path, change):
+    """Replaces the record of the first chunk by what `change` makes of it."""
+    data = path.read_bytes()
+    stream = open_sequence(path)._file
+    start = stream._chunk_indexes[0].chunk_start_offset
+    (length,) = struct.unpack_from("<Q", data, start + 1)
+    body = bytearray(data[start + 9 : start + 9 + length])
+    change(body)
+    assert len(body) == length
+    path.write_bytes(data[: start + 9] + body + data[start + 9 + length :])
+
+
+@pytest.mark.parametrize("compression", list(CompressionType))
+def test_a_chunk_that_claims_to_be_huge(tmp_path, compression):
+    path, _, _ = record(tmp_path / "s", compression=compression)
+    # The size follows two times.
+    tamper(path, lambda body: struct.pack_into("<Q", body, 16, 1 << 40))
+    with pytest.raises(InputError, match=r"damaged MCAP file .*1099511627776"):
+        open_sequence(path).scan(0)
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4"])
+def test_a_chunk_that_unpacks_to_more_than_it_says(tmp_path, compression):
+    path, _, _ = record(
+        tmp_path / "s", compression=CompressionType[compression.upper()]
+    )
+    tamper(path, lambda body: struct.pack_into("<Q", body, 16, 1000))
+    with pytest.raises(InputError, match=r"damaged MCAP file .* 1000 bytes"):
+        open_sequence(path).scan(0)
 
 
 def test_what_is_no_recording(tmp_path):

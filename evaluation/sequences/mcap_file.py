@@ -287,22 +287,24 @@ def _uncompress(chunk: Chunk) -> bytes:
         zstandard.ZstdError: likewise.
     """
     size = chunk.uncompressed_size
-    if chunk.compression == "zstd":
-        # The library reserves what the data says of itself.
-        size = max(size, zstandard.frame_content_size(chunk.data))
     if size > _CHUNK_LIMIT_BYTES:
         raise ValueError(f"a chunk of {size} bytes")
     if chunk.compression == "zstd":
+        # The library reserves what the data says of itself.
+        claimed = zstandard.frame_content_size(chunk.data)
+        if claimed not in (-1, size):
+            raise ValueError(f"a chunk of {claimed} instead of {size} bytes")
         data = zstandard.decompress(chunk.data, size)
     elif chunk.compression == "lz4":
-        data = lz4.frame.LZ4FrameDecompressor().decompress(
-            chunk.data, max_length=size
-        )
+        unpacker = lz4.frame.LZ4FrameDecompressor()
+        data = unpacker.decompress(chunk.data, max_length=size)
+        if not unpacker.eof:
+            raise ValueError(f"a chunk of more than {size} bytes")
     elif chunk.compression == "":
         data = chunk.data
     else:
         raise ValueError(f"unknown compression {chunk.compression!r}")
-    if len(data) != chunk.uncompressed_size:
+    if len(data) != size:
         raise ValueError(f"a chunk of {len(data)} instead of {size} bytes")
     if chunk.uncompressed_crc not in (0, zlib.crc32(data)):
         raise ValueError("the checksum of a chunk is wrong")
