@@ -12,8 +12,9 @@ from cns_drake.city.buildings import ARCHETYPES
 from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.ground.bridges import bridge_structures
+from cns_drake.city.ground.elevation import apron, make_ground
 from cns_drake.city.ground.markings import marking_structure
-from cns_drake.city.ground.streets import street_structures
+from cns_drake.city.ground.streets import kerb_height, street_structures
 from cns_drake.city.ground.terrain import GroundShape, ground_structures
 from cns_drake.city.objects import OBJECTS
 from cns_drake.city.placement.building_rows import place_buildings
@@ -28,6 +29,7 @@ from cns_drake.city.placement.sidewalks import (
 )
 from cns_drake.city.plan import CityPlan, DistrictPlan, load_plan
 from cns_drake.city.roads.network import RoadNetwork, load_road_network
+from cns_drake.city.roads.surface import RoadSurface
 from cns_drake.errors import InputError
 
 
@@ -87,12 +89,21 @@ def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
     _check_names(plan, source)
     draft = Draft(network, plan.seed)
     districts = share_out(plan, draft.streets, source)
+    surface, kerb = RoadSurface(network), kerb_height(network)
+    place = surface, kerb, draft.streets, plan.bounds
+    terraces = [pad for district in districts for pad in district.terraces]
+    draft.base = make_ground(*place, terraces)
     for district in districts:
         place_buildings(draft, district, source)
+    aprons = [apron(s, draft.streets) for s in draft.structures]
+    draft.base = make_ground(*place, [*aprons, *terraces])
     shape = GroundShape(
-        draft.level,
+        draft.base,
         districts,
-        unary_union([s.footprint_W for s in draft.structures]),
+        unary_union(
+            [s.footprint_W for s in draft.structures]
+            + [pad.area for pad in draft.base.pads]
+        ),
         lambda name: draft.rng(name, "relief"),
     )
     draft.ground_height = shape

@@ -90,12 +90,15 @@ class PatchPlan(_Model):
         area: corners of the patch in W [m]; or
         line: points of a path's middle line in W [m] and its
         width: [m].
+        level: height at which the patch is held level; default: it follows
+            the ground around it [m].
     """
 
     ground: Ground
     area: list[Point] | None = None
     line: list[Point] | None = None
     width: float = Field(default=3.0, gt=0)
+    level: float | None = None
 
     @model_validator(mode="after")
     def _has_one_shape(self) -> PatchPlan:

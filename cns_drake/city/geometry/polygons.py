@@ -80,24 +80,67 @@ def surface_mesh(
         spacing: where positive, the polygons are first cut into squares of
             this size [m], so that the mesh can follow a height map.
     """
-    pieces = [geometry]
+    squares, pieces = np.zeros((0, 4, 2)), [geometry]
     if spacing > 0:
-        pieces = [piece for _, _, piece in tiles(geometry, spacing)]
+        squares, pieces = _cut_into_squares(geometry, spacing)
+    is_plane = iter(_are_planes(squares, height))
+    whole = iter(squares)
+    halves = triangulate(box(0, 0, spacing, spacing))
     corners, faces = [], []
-    for polygon in (p for piece in pieces for p in polygons_of(piece)):
-        if _is_convex_quad(polygon):
-            # A square of the grid stays one face where it is level.
-            ring = np.array(shapely.normalize(polygon).exterior.coords[:4])
-            ring = _counter_clockwise(ring)
-            if _is_plane(ring, height):
-                faces.append(tuple(range(len(corners), len(corners) + 4)))
-                corners.extend(ring)
-                continue
-        for triangle in triangulate(polygon):
-            faces.append(tuple(range(len(corners), len(corners) + 3)))
-            corners.extend(triangle)
+
+    def add(ring: np.ndarray) -> None:
+        faces.append(tuple(range(len(corners), len(corners) + len(ring))))
+        corners.extend(ring)
+
+    for piece in pieces:
+        if piece is None:
+            # A square of the grid stays one face where it is plane.
+            ring = next(whole)
+            rings = [ring] if next(is_plane) else halves + ring[3]
+        else:
+            rings = _faces(piece, height)
+        for ring in rings:
+            add(ring)
     xy = np.array(corners).reshape(-1, 2)
     return Mesh(np.column_stack([xy, _heights(xy, height)]), tuple(faces))
+
+
+def _faces(geometry: BaseGeometry, height: HeightMap | float):
+    """Yields the corners of the faces that polygons are cut into."""
+    for polygon in polygons_of(geometry):
+        if _is_convex_quad(polygon):
+            ring = np.array(shapely.normalize(polygon).exterior.coords[:4])
+            ring = _counter_clockwise(ring)
+            if _are_planes(ring[None], height)[0]:
+                yield ring
+                continue
+        yield from triangulate(polygon)
+
+
+def _cut_into_squares(
+    geometry: BaseGeometry, size: float
+) -> tuple[np.ndarray, list[BaseGeometry | None]]:
+    """Cuts polygons along a world-anchored grid.
+
+    Returns:
+        (N, 4, 2) corners of the squares that lie wholly inside, counter-
+        clockwise from the right and lower one; and in the order of the grid
+        the pieces in all squares, None for each whole one.
+    """
+    if geometry.is_empty:
+        return np.zeros((0, 4, 2)), []
+    x0, y0, x1, y1 = np.floor(np.array(geometry.bounds) / size).astype(int)
+    y, x = np.mgrid[y0 : y1 + 1, x0 : x1 + 1].reshape(2, -1) * size
+    squares = shapely.box(x, y, x + size, y + size)
+    shapely.prepare(geometry)
+    hit = shapely.intersects(geometry, squares)
+    x, y, squares = x[hit], y[hit], squares[hit]
+    is_whole = shapely.contains_properly(geometry, squares)
+    pieces = np.full(len(squares), None)
+    pieces[~is_whole] = snap(geometry.intersection(squares[~is_whole]))
+    x, y = x[is_whole], y[is_whole]
+    xx, yy = (x + size, x + size, x, x), (y, y + size, y + size, y)
+    return np.stack([np.transpose(xx), np.transpose(yy)], axis=2), list(pieces)
 
 
 def wall_mesh(
@@ -167,6 +210,7 @@ def _is_convex_quad(polygon: Polygon) -> bool:
     )
 
 
-def _is_plane(ring: np.ndarray, height: HeightMap | float) -> bool:
-    z = np.round(_heights(ring, height), 3)
-    return abs(z[0] - z[1] + z[2] - z[3]) < 0.0005
+def _are_planes(rings: np.ndarray, height: HeightMap | float) -> np.ndarray:
+    """Tells which of (N, 4, 2) rings have their corners in one plane."""
+    z = np.round(_heights(rings.reshape(-1, 2), height), 3).reshape(-1, 4)
+    return abs(z[:, 0] - z[:, 1] + z[:, 2] - z[:, 3]) < 0.0005

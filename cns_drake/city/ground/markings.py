@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+import itertools
 
 import numpy as np
 
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.ground.streets import as_structure
+from cns_drake.city.roads.centreline import sample_stations
 from cns_drake.city.roads.network import RoadNetwork
 from cns_drake.city.roads.road import Road
 
@@ -20,6 +22,8 @@ _LINE_WIDTH = 0.14
 _DASH, _GAP = 3.0, 6.0
 # Middle lines are drawn in pieces, so that they follow curves [m].
 _PIECE = 4.0
+# On slopes all paint is laid in pieces of this length [m].
+_SLOPE_PIECE = 1.0
 # From a junction's edge to its crossing, and to the stop line behind [m].
 _CROSSING = (0.8, 3.8)
 _STOP_LINE = (4.8, 5.2)
@@ -112,7 +116,20 @@ def _from_end(
 def _strip(
     road: Road, first: float, last: float, right: float, left: float
 ) -> Mesh:
-    """Returns the quadrilateral between two stations and two offsets."""
+    """Returns the area between two stations and two offsets."""
+    if np.ptp(road.height([first, (first + last) / 2, last])) > 0:
+        ends = sample_stations(first, last, _SLOPE_PIECE)
+        return merge_meshes(
+            _quadrilateral(road, a, b, right, left)
+            for a, b in itertools.pairwise(ends)
+        )
+    return _quadrilateral(road, first, last, right, left)
+
+
+def _quadrilateral(
+    road: Road, first: float, last: float, right: float, left: float
+) -> Mesh:
+    """Returns the plane face between two stations and two offsets."""
     corners = np.concatenate(
         [
             road.evaluate([first, last], right)[:, :3],

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
+import numpy as np
+import shapely
 from shapely.geometry import MultiPolygon
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 from cns_drake.city.geometry.polygons import (
+    HeightMap,
     polygons_of,
     snap,
     surface_mesh,
@@ -16,6 +21,7 @@ from cns_drake.city.geometry.polygons import (
 )
 from cns_drake.city.geometry.structures import MeshShape, Model, Part, Structure
 from cns_drake.city.roads.network import RoadNetwork
+from cns_drake.city.roads.surface import RoadSurface
 
 # Marks the structures that are ground: no stage lacks them.
 GROUND_TAG = "ground"
@@ -24,6 +30,19 @@ GROUND_TAG = "ground"
 TILE = 64.0
 # Width of the kerb stones [m].
 _KERB_WIDTH = 0.15
+# On slopes the meshes have vertices this far apart: the steepest ramp bends
+# by 10 % over 1 m, so that they are true to 1.5 mm, less than the paint's
+# thickness [m].
+_SPACING = 1.0
+# Where they climb less than this, this distance does as well [m].
+_GENTLE, _GENTLE_SPACING = 0.06, 4.0
+# On slopes sidewalks are edged by stones that reach this deep, so that no
+# slit opens towards the coarser mesh of the ground beside them [m].
+_EDGING = 0.4
+# A tile whose heights differ by less is level [m].
+_LEVEL = 1e-4
+# Edges that two polygons share are found within this distance [m].
+_NEAR = 0.01
 
 _ROAD_RGB = (0.30, 0.30, 0.32)
 _BAY_RGB = (0.38, 0.37, 0.38)
@@ -33,11 +52,11 @@ _MEDIAN_RGB = (0.47, 0.55, 0.34)
 
 
 def street_structures(network: RoadNetwork) -> list[Structure]:
-    """Returns the ground of all streets, the carriageway at z = 0.
+    """Returns the ground of all streets, true to the heights of the roads.
 
     Kinds of ground that these streets do not have are left out.
     """
-    height = kerb_height(network)
+    road, walk = _heights(network)
     medians = snap(network.medians())
     paved = snap(network.carriageway()).difference(medians)
     bays = snap(unary_union(list(network.parking_bays().values())))
@@ -49,24 +68,40 @@ def street_structures(network: RoadNetwork) -> list[Structure]:
         )
     )
     sidewalks = snap(network.sidewalks()).difference(kerbs)
+    outer = unary_union([paved, kerbs, sidewalks, medians]).boundary
     structures = [
-        ground_structure(
-            "carriageway", "road", paved.difference(bays), 0.0, _ROAD_RGB
+        _surface(
+            "carriageway", "road", paved.difference(bays), road, _ROAD_RGB
         ),
-        ground_structure("parking_bays", "parking", bays, 0.0, _BAY_RGB),
-        _kerb_structure(kerbs, paved, height),
-        ground_structure(
-            "sidewalks", "sidewalk", sidewalks, height, _SIDEWALK_RGB
+        _surface("parking_bays", "parking", bays, road, _BAY_RGB),
+        _kerb_structure(kerbs, paved, road, walk),
+        _surface(
+            "sidewalks", "sidewalk", sidewalks, walk, _SIDEWALK_RGB, outer
         ),
-        ground_structure(
+        _surface(
             "medians",
             "terrain",
             medians.difference(kerbs),
-            height,
+            walk,
             _MEDIAN_RGB,
         ),
     ]
     return [structure for structure in structures if structure.model.parts]
+
+
+def _heights(
+    network: RoadNetwork,
+) -> tuple[HeightMap | float, HeightMap | float]:
+    """Returns the heights of the roads and of the sidewalks beside them."""
+    kerb = kerb_height(network)
+    surface = RoadSurface(network)
+    if surface.is_level:
+        return 0.0, kerb
+
+    def road(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return surface.heights(np.column_stack([x, y]))
+
+    return road, lambda x, y: road(x, y) + kerb
 
 
 def kerb_height(network: RoadNetwork) -> float:
@@ -117,15 +152,69 @@ def as_structure(
     return Structure(name, semantic_class, model, origin, tags=(GROUND_TAG,))
 
 
+def _surface(
+    name: str,
+    semantic_class: str,
+    area: BaseGeometry,
+    height: HeightMap | float,
+    rgb: tuple[float, float, float],
+    edge: BaseGeometry | None = None,
+) -> Structure:
+    """Returns the upper side of streets, with edging stones on slopes.
+
+    Args:
+        name, semantic_class, area, height, rgb: as for `ground_structure`.
+        edge: line in W along which the slopes are edged [m].
+    """
+    pieces = {}
+    for part, piece, top, spacing in _street_tiles(area, height):
+        pieces[part] = surface_mesh(piece, top, spacing)
+        if edge is not None and spacing > 0:
+            rim = piece.buffer(1.0, join_style="mitre").difference(piece)
+            stones = wall_mesh(
+                shapely.segmentize(rim, spacing),
+                lambda x, y, top=top: top(x, y) - _EDGING,
+                top,
+                along=edge.intersection(piece.buffer(_NEAR)).buffer(_NEAR),
+            )
+            pieces[part] = merge_meshes([pieces[part], stones])
+    return as_structure(name, semantic_class, pieces, area, rgb)
+
+
 def _kerb_structure(
-    kerbs: BaseGeometry, paved: BaseGeometry, height: float
+    kerbs: BaseGeometry,
+    paved: BaseGeometry,
+    road: HeightMap | float,
+    walk: HeightMap | float,
 ) -> Structure:
     pieces = {}
-    for k, (_, _, piece) in enumerate(tiles(kerbs, TILE)):
-        top = surface_mesh(piece, height)
+    for part, piece, top, spacing in _street_tiles(kerbs, walk):
         # The upstand faces the carriageway, so it is the carriageway's rim
         # seen from inside, where this tile's kerb stones border on it.
-        near = piece.buffer(0.01)
-        upstand = wall_mesh(paved, 0.0, height, along=near)
-        pieces[f"tile_{k:02d}"] = merge_meshes([top, upstand])
+        near = piece.buffer(_NEAR)
+        rim = shapely.segmentize(paved, spacing) if spacing > 0 else paved
+        upstand = wall_mesh(rim, road, top, along=near)
+        pieces[part] = merge_meshes(
+            [surface_mesh(piece, top, spacing), upstand]
+        )
     return as_structure("kerbs", "sidewalk", pieces, kerbs, _KERB_RGB)
+
+
+def _street_tiles(
+    area: BaseGeometry, height: HeightMap | float
+) -> Iterator[tuple[str, BaseGeometry, HeightMap | float, float]]:
+    """Yields name, polygons, height and mesh spacing of each tile."""
+    for k, (_, _, piece) in enumerate(tiles(area, TILE)):
+        name = f"tile_{k:02d}"
+        if not callable(height):
+            yield name, piece, height, 0.0
+            continue
+        corners = shapely.get_coordinates(shapely.segmentize(piece, 2.0))
+        z = height(*corners.T)
+        grades = np.diff(z) / np.hypot(*np.diff(corners, axis=0).T).clip(0.5)
+        if np.ptp(z) < _LEVEL:
+            yield name, piece, float(z[0]), 0.0
+        elif np.abs(grades).max() < _GENTLE:
+            yield name, piece, height, _GENTLE_SPACING
+        else:
+            yield name, piece, height, _SPACING

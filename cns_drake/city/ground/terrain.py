@@ -8,11 +8,19 @@ import math
 
 import numpy as np
 import shapely
+from shapely.geometry import MultiPolygon
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
-from cns_drake.city.geometry.polygons import tiles, wall_mesh
+from cns_drake.city.geometry.mesh import merge_meshes
+from cns_drake.city.geometry.polygons import (
+    snap,
+    surface_mesh,
+    tiles,
+    wall_mesh,
+)
 from cns_drake.city.geometry.structures import Structure
+from cns_drake.city.ground.elevation import LevelGround, SlopingGround
 from cns_drake.city.ground.streets import TILE, as_structure, ground_structure
 from cns_drake.city.placement.districts import District
 
@@ -27,6 +35,9 @@ _LOOK = {
 _QUAY_RGB = (0.55, 0.53, 0.50)
 # Meshes of ground with relief have vertices this far apart [m].
 _SPACING = 4.0
+# Where the streets around differ by more than this in height, the meshes have
+# vertices this far apart [m].
+_GENTLE, _FINE_SPACING = 1.0, 2.0
 # Wavelengths of the swells [m].
 _WAVELENGTHS = (22.0, 60.0)
 
@@ -65,7 +76,7 @@ class GroundShape:
 
     def __init__(
         self,
-        level: float,
+        base: LevelGround | SlopingGround,
         districts: Iterable[District],
         buildings: BaseGeometry,
         rng_of,
@@ -73,12 +84,12 @@ class GroundShape:
         """Shapes the ground around what is built.
 
         Args:
-            level: height of the sidewalks [m].
+            base: without relief.
             districts: with their ground.
             buildings: footprints of all buildings in W.
             rng_of: district name -> generator.
         """
-        self._level = level
+        self.base = base
         self._swells = [
             _make_swell(district, buildings, rng_of(district.plan.name))
             for district in districts
@@ -88,7 +99,7 @@ class GroundShape:
     def __call__(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Returns the height of the ground at points in W [m]."""
         x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-        z = np.full(x.shape, self._level)
+        z = self.base(x, y)
         for swell in self._swells:
             inside = shapely.intersects_xy(swell.area, x, y)
             z[inside] += swell.height(x[inside], y[inside])
@@ -132,17 +143,48 @@ def ground_structures(
                 )
                 continue
             has_relief = ground == "lawn" and district.plan.relief > 0
-            structures.append(
-                ground_structure(
-                    name,
-                    semantic_class,
-                    area,
-                    shape,
-                    rgb,
-                    _SPACING if has_relief else 0.0,
+            if shape.base.is_level:
+                spacing = _SPACING if has_relief else 0.0
+                structures.append(
+                    ground_structure(
+                        name, semantic_class, area, shape, rgb, spacing
+                    )
                 )
-            )
+            else:
+                structures.append(
+                    _slope(name, semantic_class, area, shape, rgb)
+                )
     return structures
+
+
+def _slope(
+    name: str,
+    semantic_class: str,
+    area: MultiPolygon,
+    shape: GroundShape,
+    rgb: tuple[float, float, float],
+) -> Structure:
+    """Returns ground that slopes between level pads, one part a tile."""
+    spacing = _SPACING if _fall(area, shape.base) < _GENTLE else _FINE_SPACING
+    pieces = {}
+    for k, (_, _, piece) in enumerate(tiles(area, TILE)):
+        meshes = []
+        rest: BaseGeometry = piece
+        for pad in shape.base.pads:
+            if not pad.area.intersects(rest):
+                continue
+            level = snap(rest.intersection(pad.area))
+            rest = snap(rest.difference(pad.area))
+            meshes.append(surface_mesh(level, pad.height))
+        meshes.append(surface_mesh(rest, shape, spacing))
+        pieces[f"tile_{k:02d}"] = merge_meshes(meshes)
+    return as_structure(name, semantic_class, pieces, area, rgb)
+
+
+def _fall(area: BaseGeometry, base: SlopingGround) -> float:
+    """Returns the difference between the heights on an area's outline [m]."""
+    outline = shapely.segmentize(area, _SPACING)
+    return float(np.ptp(base(*shapely.get_coordinates(outline).T)))
 
 
 def _make_swell(

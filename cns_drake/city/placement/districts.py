@@ -10,6 +10,7 @@ from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
 from cns_drake.city.geometry.polygons import polygons_of, snap
+from cns_drake.city.ground.elevation import Pad
 from cns_drake.city.plan import CityPlan, DistrictPlan, PatchPlan
 from cns_drake.errors import InputError
 
@@ -22,11 +23,13 @@ class District:
         plan: what it should become.
         area: all of its ground in W [m].
         grounds: kind of ground -> area; together they are `area`.
+        terraces: patches that are held level.
     """
 
     plan: DistrictPlan
     area: MultiPolygon
     grounds: dict[str, MultiPolygon]
+    terraces: tuple[Pad, ...] = ()
 
 
 def share_out(
@@ -58,7 +61,14 @@ def share_out(
         pieces = MultiPolygon(polygons_of(snap(area)))
         if pieces.is_empty:
             raise InputError(f"{field}.{fault}")
-        districts.append(District(district, pieces, _grounds(district, pieces)))
+        districts.append(
+            District(
+                district,
+                pieces,
+                _grounds(district, pieces),
+                _terraces(district, pieces),
+            )
+        )
         free = snap(free.difference(pieces))
     left = sum(piece.area for piece in polygons_of(free))
     if left > 1.0:
@@ -100,6 +110,14 @@ def _grounds(plan: DistrictPlan, area: MultiPolygon) -> dict[str, MultiPolygon]:
         ground: MultiPolygon(polygons_of(snap(unary_union(shapes))))
         for ground, shapes in pieces.items()
     }
+
+
+def _terraces(plan: DistrictPlan, area: MultiPolygon) -> tuple[Pad, ...]:
+    return tuple(
+        Pad(snap(_patch_shape(patch).intersection(area)), patch.level)
+        for patch in plan.patches
+        if patch.level is not None
+    )
 
 
 def _patch_shape(patch: PatchPlan) -> BaseGeometry:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
+from dataclasses import replace
 import zlib
 
 import numpy as np
+import shapely
 from shapely.geometry import Point
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
@@ -14,9 +16,13 @@ from shapely.ops import unary_union
 from cns_drake.city.geometry.occupancy import Occupancy
 from cns_drake.city.geometry.polygons import HeightMap, snap
 from cns_drake.city.geometry.structures import MeshShape, Model, Structure
+from cns_drake.city.ground.elevation import LevelGround
 from cns_drake.city.ground.streets import kerb_height
 from cns_drake.city.roads.network import RoadNetwork
 
+# An object stands upright where the ground falls by at most this much below
+# it, half of it sunk in on the upper side [m].
+_STEEPEST = 0.5
 # Numbers in names start anew at multiples of this.
 _RANGE = 50
 
@@ -27,7 +33,8 @@ class Draft:
     Attributes:
         network: the roads.
         streets: all ground that belongs to them, sidewalks included, in W.
-        level: height of sidewalks and of level ground in W [m].
+        base: height of sidewalks and of the ground between them in W,
+            without what buildings and relief change about it.
         structures: what has been placed, in the order of placement.
         ground_height: height of the finished ground in W; set once the
             buildings stand and the ground has been shaped around them.
@@ -40,7 +47,7 @@ class Draft:
                 [network.carriageway(), network.sidewalks(), network.medians()]
             )
         )
-        self.level = kerb_height(network)
+        self.base: HeightMap = LevelGround(kerb_height(network))
         self.structures: list[Structure] = []
         self.ground_height: HeightMap | None = None
         self._seed = seed
@@ -144,6 +151,11 @@ class Draft:
             tuple(tags),
         )
         footprint = structure.footprint_W
+        fall = self._fall(footprint)
+        if fall > _STEEPEST:
+            return None
+        if fall > 0:
+            structure = replace(structure, xyz=(x, y, round(z - fall / 2, 3)))
         if within is not None and not within.contains(footprint):
             return None
         if not self.is_free(footprint, clearance):
@@ -154,6 +166,11 @@ class Draft:
         self._occupancy.add(footprint)
         self.structures.append(structure)
         return structure
+
+    def _fall(self, footprint: BaseGeometry) -> float:
+        """Returns how far the ground falls below a footprint [m]."""
+        corners = shapely.get_coordinates(footprint)
+        return float(np.ptp(np.round(self.base(*corners.T), 3)))
 
 
 def _reach(model: Model) -> float:

@@ -33,6 +33,8 @@ _CROWN_PART = 0.8
 # Runs (fences, hedges) are at most this long, so that one can be missing
 # at a stage without all of them being so [m].
 _LONGEST_RUN = 24.0
+# On slopes each run is at most this much higher than the next one [m].
+_HIGHEST_STEP = 0.3
 
 
 def furnish(
@@ -120,6 +122,10 @@ def _place_run(
     """Places fences or hedges end to end between two points."""
     length = float(np.hypot(*(end - start)))
     count = max(1, math.ceil(length / _LONGEST_RUN))
+    # On a slope runs go down it in steps.
+    line = np.linspace(start, end, math.ceil(length) + 1)
+    fall = float(np.abs(np.diff(draft.base(*line.T))).sum())
+    count = max(count, math.ceil(round(fall, 3) / _HIGHEST_STEP))
     yaw = math.atan2(*(end - start)[::-1])
     name = pick(plan.objects, rng)
     builder = OBJECTS[name]

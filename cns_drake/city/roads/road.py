@@ -105,6 +105,10 @@ class Road:
         y = y + offset * np.cos(heading)
         return np.stack([x, y, self._height(stations), heading], axis=1)
 
+    def height(self, stations) -> np.ndarray:
+        """Returns the (N,) heights at arc lengths of the centreline [m]."""
+        return self._height(np.asarray(stations, dtype=float))
+
     def stations(self, spacing: float = 1.0, clearance: float = 0.0):
         """Returns the (N,) evenly spaced stations of the road itself.
 

@@ -34,6 +34,11 @@ class RoadSurface:
         self._stations = np.concatenate(stations)
         self._tree = cKDTree(self._places[:, :2])
 
+    @property
+    def is_level(self) -> bool:
+        """Whether all roads lie at z = 0 throughout."""
+        return not self._places[:, 2].any()
+
     def heights(self, xy) -> np.ndarray:
         """Returns the (N,) heights at (N, 2) places [m]."""
         xy = np.asarray(xy, dtype=float).reshape(-1, 2)
@@ -46,8 +51,9 @@ class RoadSurface:
         ahead = np.clip(ahead, -_SPACING, _SPACING)
         stations = self._stations[index] + ahead
         z = np.empty(len(xy))
-        for k, road in enumerate(self._roads):
-            chosen = self._owners[index] == k
+        owners = self._owners[index]
+        for k in np.unique(owners):
+            chosen, road = owners == k, self._roads[k]
             inside = np.clip(stations[chosen], 0.0, road.full_length)
-            z[chosen] = road.evaluate(inside)[:, 2]
+            z[chosen] = road.height(inside)
         return z

@@ -1,0 +1,281 @@
+"""The height of the finished ground: level streets, or streets with slopes.
+
+Between streets that lie at different heights the ground is a smooth field
+that meets every sidewalk at its height. Buildings and terraces hold level
+pads in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.linalg import spsolve
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from cns_drake.city.geometry.polygons import snap
+from cns_drake.city.geometry.structures import Structure
+from cns_drake.city.roads.surface import RoadSurface
+
+# Distance of the nodes between which the field is interpolated [m].
+_NODES = 2.0
+# Width of the level ground around buildings [m].
+_APRON = 0.6
+# Nodes this close to a pad are level with it [m].
+_HELD = 1.0
+# Over this distance the field is drawn to the exact height of a street or
+# pad [m].
+_REACH = 4.0
+# The nodes' heights are rounded, so that what the last bits of a solver do
+# never shows in a file [m].
+_ROUNDING = 6
+# Nearer than this counts as touching [m].
+_TOUCHING = 1e-6
+
+
+@dataclass(frozen=True)
+class Pad:
+    """Ground that is held level.
+
+    Attributes:
+        area: in W [m].
+        height: in W [m].
+    """
+
+    area: BaseGeometry
+    height: float
+
+
+class LevelGround:
+    """The ground of a city whose streets are all level."""
+
+    pads: tuple[Pad, ...] = ()
+    is_level = True
+
+    def __init__(self, height: float):
+        """Makes level ground at a height [m]."""
+        self._height = height
+
+    def __call__(self, x, y) -> np.ndarray:
+        """Returns the (N,) heights at points in W [m]."""
+        return np.full(np.shape(x), self._height)
+
+
+class SlopingGround:
+    """Sidewalks that follow their roads, and the field between them.
+
+    The field is harmonic: its nodes lie at the mean of their neighbours,
+    but for those on streets and pads, whose heights are given, and at the
+    rim of the city it is level across. Near a street or pad at distance d
+    the field is averaged with the exact height there, with weight
+    1/d - 1/R against 1/R of the field (Shepard's interpolation, R the
+    reach), so that it meets the edge exactly and without a step.
+    """
+
+    is_level = False
+
+    def __init__(
+        self,
+        surface: RoadSurface,
+        kerb_height: float,
+        streets: BaseGeometry,
+        bounds: tuple[float, float, float, float],
+        pads: Sequence[Pad] = (),
+    ):
+        """Shapes the ground.
+
+        Args:
+            surface: of the roads.
+            kerb_height: of sidewalks above the roads [m].
+            streets: carriageways, sidewalks and medians in W [m].
+            bounds: x0, y0, x1, y1 of the city [m].
+            pads: outside the streets; of two that meet the first wins.
+        """
+        self.pads = tuple(pads)
+        self._surface = surface
+        self._kerb_height = kerb_height
+        self._streets = streets
+        shapely.prepare(streets)
+        self._edges = _segments(streets)
+        self._edge_tree = shapely.STRtree(shapely.linestrings(self._edges))
+        self._pad_tree = shapely.STRtree([pad.area for pad in self.pads])
+        self._pad_heights = np.array([pad.height for pad in self.pads])
+        x0, y0, x1, y1 = bounds
+        self._x = _nodes(x0, x1)
+        self._y = _nodes(y0, y1)
+        self._z = self._field()
+
+    def __call__(self, x, y) -> np.ndarray:
+        """Returns the (N,) heights at points in W [m]."""
+        x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+        z = self._interpolate(x, y)
+        inside = shapely.intersects_xy(self._streets, x, y)
+        z[inside] = self._sidewalk(x[inside], y[inside])
+        outside = np.flatnonzero(~inside)
+        z[outside] = self._drawn(x[outside], y[outside], z[outside])
+        return z
+
+    def _sidewalk(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        heights = self._surface.heights(np.column_stack([x, y]))
+        return heights + self._kerb_height
+
+    def _drawn(self, x, y, field: np.ndarray) -> np.ndarray:
+        """Returns the field drawn to the streets and pads nearby."""
+        points = shapely.points(x, y)
+        weight = np.full(len(x), 1 / _REACH)
+        total = field * weight
+        near, edge = self._edge_tree.query_nearest(
+            points, max_distance=_REACH, all_matches=False
+        )
+        if len(near):
+            p = np.column_stack([x, y])[near]
+            foot = _foot_points(p, self._edges[edge])
+            gain = _gain(np.hypot(*(foot - p).T))
+            weight[near] += gain
+            total[near] += gain * self._sidewalk(*foot.T)
+        if self.pads:
+            near, pad = self._pad_tree.query(
+                points, predicate="dwithin", distance=_REACH
+            )
+            areas = self._pad_tree.geometries[pad]
+            gain = _gain(shapely.distance(points[near], areas))
+            # Of pads that touch a point only the first counts.
+            order = np.lexsort((pad, near))
+            near, pad, gain = near[order], pad[order], gain[order]
+            touching = gain > _gain(np.array([2 * _TOUCHING]))[0]
+            _, first = np.unique(near[touching], return_index=True)
+            keep = ~touching
+            keep[np.flatnonzero(touching)[first]] = True
+            np.add.at(weight, near[keep], gain[keep])
+            np.add.at(
+                total,
+                near[keep],
+                gain[keep] * self._pad_heights[pad[keep]],
+            )
+        return total / weight
+
+    def _field(self) -> np.ndarray:
+        """Returns the (rows, columns) heights of the nodes [m]."""
+        x, y = (a.ravel() for a in np.meshgrid(self._x, self._y))
+        z = np.full(len(x), np.nan)
+        for pad in reversed(self.pads):
+            held = pad.area.buffer(_HELD)
+            x0, y0, x1, y1 = held.bounds
+            close = np.flatnonzero((x > x0) & (x < x1) & (y > y0) & (y < y1))
+            shapely.prepare(held)
+            inside = shapely.intersects_xy(held, x[close], y[close])
+            z[close[inside]] = pad.height
+        inside = shapely.intersects_xy(self._streets, x, y)
+        z[inside] = self._sidewalk(x[inside], y[inside])
+        shape = len(self._y), len(self._x)
+        return np.round(relaxed(z.reshape(shape)), _ROUNDING)
+
+    def _interpolate(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Returns the bilinear interpolation of the nodes."""
+        column = np.clip((x - self._x[0]) / _NODES, 0, len(self._x) - 1.001)
+        row = np.clip((y - self._y[0]) / _NODES, 0, len(self._y) - 1.001)
+        i, j = row.astype(int), column.astype(int)
+        v, u = row - i, column - j
+        z = self._z
+        lower = z[i, j] * (1 - u) + z[i, j + 1] * u
+        upper = z[i + 1, j] * (1 - u) + z[i + 1, j + 1] * u
+        return lower * (1 - v) + upper * v
+
+
+def make_ground(
+    surface: RoadSurface,
+    kerb_height: float,
+    streets: BaseGeometry,
+    bounds: tuple[float, float, float, float],
+    pads: Sequence[Pad] = (),
+) -> LevelGround | SlopingGround:
+    """Returns level ground where all roads and pads are level, else slopes.
+
+    Args:
+        surface: of the roads.
+        kerb_height: of sidewalks above the roads [m].
+        streets: carriageways, sidewalks and medians in W [m].
+        bounds: x0, y0, x1, y1 of the city [m].
+        pads: outside the streets; of two that meet the first wins.
+    """
+    if surface.is_level and all(pad.height == kerb_height for pad in pads):
+        return LevelGround(kerb_height)
+    return SlopingGround(surface, kerb_height, streets, bounds, pads)
+
+
+def apron(building: Structure, streets: BaseGeometry) -> Pad:
+    """Returns the level ground around a building.
+
+    Args:
+        building: at the height of its floor.
+        streets: their area in W [m].
+    """
+    around = building.footprint_W.buffer(_APRON, join_style="mitre")
+    beside = around.difference(streets.buffer(_APRON))
+    area = snap(beside.union(building.footprint_W))
+    return Pad(area, building.xyz[2])
+
+
+def relaxed(z: np.ndarray) -> np.ndarray:
+    """Fills the gaps of a grid by a harmonic field.
+
+    Args:
+        z: (rows, columns) heights, NaN in the gaps; at least one is given.
+
+    Returns:
+        The grid with every gap at the mean of its two to four neighbours.
+    """
+    rows, columns = z.shape
+    free = np.isnan(z)
+    number = np.cumsum(free.ravel()).reshape(z.shape) - 1
+    count = int(free.sum())
+    degree, known = np.zeros(count), np.zeros(count)
+    entries = []
+    for step_row, step_column in ((0, 1), (0, -1), (1, 0), (-1, 0)):
+        i, j = np.nonzero(free)
+        k, m = i + step_row, j + step_column
+        inside = (k >= 0) & (k < rows) & (m >= 0) & (m < columns)
+        own = number[i, j][inside]
+        k, m = k[inside], m[inside]
+        degree[own] += 1
+        is_free = free[k, m]
+        known[own[~is_free]] += z[k, m][~is_free]
+        entries.append((own[is_free], number[k, m][is_free]))
+    own = np.concatenate([e[0] for e in entries] + [np.arange(count)])
+    other = np.concatenate([e[1] for e in entries] + [np.arange(count)])
+    value = np.concatenate([-np.ones(len(own) - count), degree])
+    matrix = coo_matrix((value, (own, other)), (count, count)).tocsc()
+    result = z.copy()
+    result[free] = spsolve(matrix, known)
+    return result
+
+
+def _nodes(start: float, end: float) -> np.ndarray:
+    """Returns the coordinates of nodes that reach over both ends [m]."""
+    first = np.floor(start / _NODES)
+    return np.arange(first, np.ceil(end / _NODES) + 1) * _NODES
+
+
+def _segments(area: BaseGeometry) -> np.ndarray:
+    """Returns the (N, 2, 2) edges of an area's outlines."""
+    rings = shapely.get_rings(shapely.get_parts(area))
+    corners = [np.array(ring.coords)[:, :2] for ring in rings]
+    return np.concatenate(
+        [np.stack([ring[:-1], ring[1:]], axis=1) for ring in corners]
+    )
+
+
+def _foot_points(p: np.ndarray, segments: np.ndarray) -> np.ndarray:
+    """Returns the (N, 2) points of (N, 2, 2) segments nearest to p."""
+    start, along = segments[:, 0], segments[:, 1] - segments[:, 0]
+    part = ((p - start) * along).sum(axis=1) / (along**2).sum(axis=1)
+    return start + np.clip(part, 0.0, 1.0)[:, None] * along
+
+
+def _gain(distance: np.ndarray) -> np.ndarray:
+    """Returns the weight of what lies at a distance [1/m]."""
+    weight = 1 / np.maximum(distance, _TOUCHING) - 1 / _REACH
+    return np.maximum(weight, 0.0)
