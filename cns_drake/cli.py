@@ -202,6 +202,75 @@ def export(
 
 
 @app.command()
+def generate(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[NAME]...",
+            help="Shipped sequences or scenario files; all shipped ones by "
+            "default.",
+        ),
+    ] = None,
+    *,
+    output: Output,
+    frames: Frames = None,
+    jobs: Annotated[
+        int, typer.Option(min=1, help="Sequences simulated side by side.")
+    ] = 2,
+    overwrite: Overwrite = False,
+) -> None:
+    """Record many sequences; skip finished ones, resume interrupted ones."""
+    from cns_drake.jobs import record_all
+    from cns_drake.paths import recordable_sequences
+    from cns_drake.scenario import load_scenario
+
+    scenarios = [
+        load_scenario(name).model_copy(
+            update={} if frames is None else {"frames": frames}
+        )
+        for name in names or recordable_sequences()
+    ]
+    record_all(scenarios, output, jobs, overwrite=overwrite)
+    for scenario in scenarios:
+        typer.echo(output / scenario.name)
+
+
+@app.command()
+def repair(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE", help="Any MCAP file, or what is left of one."
+        ),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(help="The new file; <name>_repaired.mcap by default."),
+    ] = None,
+) -> None:
+    """Make a whole MCAP file of what is readable of a damaged one."""
+    from cns_drake.repair import repair_mcap
+
+    with terminal.show_progress() as progress:
+        task = progress.add_task(file.name, total=None, note="")
+        result = repair_mcap(
+            file,
+            output,
+            terminal.count_progress(progress, task, unit="bytes"),
+        )
+    typer.echo(
+        f"{result.output}: {result.num_messages} messages over "
+        f"{result.seconds:.2f} s recovered; "
+        + (
+            f"damaged places: {result.num_faults}, the first at "
+            f"{result.first_fault}"
+            if result.num_faults
+            else "the file was whole"
+        )
+    )
+
+
+@app.command()
 def reproduce(
     maps: Annotated[
         list[str] | None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -15,8 +16,9 @@ from cns_drake.cli import (
     Overwrite,
     Recording,
 )
-from cns_drake.scenario import load_scenario
-from cns_drake.simulation import Run, simulate
+
+if TYPE_CHECKING:
+    from cns_drake.simulation import Run
 
 
 def run_sequence(
@@ -43,6 +45,10 @@ def run_sequence(
     Raises:
         InputError: something of this cannot be used.
     """
+    # Slow to import; by now an interrupt ends the program in good order.
+    from cns_drake.scenario import load_scenario
+    from cns_drake.simulation import simulate
+
     scenario = load_scenario(name_or_file)
     if lidar is not None:
         scenario = scenario.with_lidar_preset(lidar)

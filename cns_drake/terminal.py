@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 import contextlib
+import os
 import signal
 import sys
 import time
@@ -37,20 +38,34 @@ _LINE_INTERVAL = 5.0
 def run(app: typer.Typer) -> None:
     """Runs a command line; bad usage and bad input never show a traceback.
 
-    Exits with 2 and one line on stderr for an InputError and for words that
-    the command line does not take, with 130 when interrupted (also by
-    SIGTERM, so that recordings are closed).
+    Exits with 2 and one line on stderr for an InputError, for words that the
+    command line does not take and for files that cannot be used; with 130
+    when interrupted (also by SIGTERM, so that recordings are closed).
     """
-    interrupt_on_termination()
+    message, status = None, 0
     try:
-        raise SystemExit(app(standalone_mode=False))
+        interrupt_on_termination()
+        status = app(standalone_mode=False)
+        sys.stdout.flush()
     except InputError as error:
         message, status = f"error: {error}", _BAD_INPUT
     except _UsageError as error:
         message, status = f"error: {error.format_message()}", _BAD_INPUT
     except (KeyboardInterrupt, typer.Abort):
         message, status = "interrupted", _INTERRUPTED
-    print(message, file=sys.stderr)
+    except BrokenPipeError:
+        # Whoever read the results has seen enough of them. Python flushes
+        # once more at its end, which must not fail again.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except OSError as error:
+        where = error.filename or "standard output"
+        message = f"error: {where}: {error.strerror or error}"
+        status = _BAD_INPUT
+    # What the command does is done; nothing is left to interrupt.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
+    if message is not None:
+        print(message, file=sys.stderr)
     raise SystemExit(status)
 
 
