@@ -88,6 +88,8 @@ class City:
 def find_cities(folder: Path) -> list[City]:
     """Opens all recordings in a folder and its direct subfolders.
 
+    Drives in the layout of CNS, and in that of KITTI if a `scenario.yaml`
+    lies in them, are found up to three levels down, where exports put them.
     A recording states its map and stage in its scenario; without one they
     are taken from its name, `<map>_<stage>`.
 
@@ -101,12 +103,7 @@ def find_cities(folder: Path) -> list[City]:
     folder = Path(folder)
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder")
-    paths = sorted(
-        path
-        for path in folder.iterdir()
-        if path.suffix == ".mcap"
-        or (path.is_dir() and any(path.glob("*.mcap")))
-    )
+    paths = _find_drives(folder)
     if not paths:
         raise InputError(f"{folder}: no recorded sequence in it")
     recordings = [_place(path) for path in paths]
@@ -114,6 +111,28 @@ def find_cities(folder: Path) -> list[City]:
         _make_city(folder, name, [r for r in recordings if r.map_name == name])
         for name in sorted({recording.map_name for recording in recordings})
     ]
+
+
+def _find_drives(folder: Path) -> list[Path]:
+    """Returns the paths of the drives in a folder, in order."""
+    paths = []
+    for child in sorted(folder.iterdir()):
+        if child.suffix == ".mcap":
+            paths.append(child)
+        elif child.is_dir() and any(child.glob("*.mcap")):
+            paths.append(child)
+        elif child.is_dir():
+            below = [*child.glob("*"), *child.glob("*/*")]
+            paths.extend(sorted(filter(_is_exported_drive, below)))
+    return paths
+
+
+def _is_exported_drive(path: Path) -> bool:
+    if path.suffix == ".part":
+        return False
+    return (path / "gt.csv").is_file() or (
+        (path / "velodyne").is_dir() and (path / "scenario.yaml").is_file()
+    )
 
 
 def _place(path: Path) -> Recording:

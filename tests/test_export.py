@@ -15,6 +15,7 @@ from cns_drake.errors import InputError
 from cns_drake.export.exporting import export_sequence
 from cns_drake.point_files import encode_labels
 from evaluation import sequences
+from evaluation.collection import find_cities
 from evaluation.errors import InputError as ReadingError
 
 # A place in the world and on the vehicle that nothing can be confused with.
@@ -305,6 +306,28 @@ def test_a_full_disk_leaves_nothing_half(
         export_sequence(drive, format_name, tmp_path / "out")
     left = [p.name for p in (tmp_path / "out").rglob("*") if p.is_file()]
     assert left == ["export.yaml"]
+
+
+@pytest.mark.parametrize("format_name", ["cns", "kitti"])
+@pytest.mark.parametrize("depth", [".", "exports"])
+def test_a_report_finds_exports(tmp_path, format_name, depth):
+    """As it finds recordings, by the map and stage that they tell."""
+    for number in ("1", "2"):
+        name = f"town_0{number}"
+        recording = write_drive(
+            tmp_path / "recordings" / name,
+            attachments={
+                "scenario.json": {"map": "town", "stage": f"s{number}"}
+            },
+        )
+        export_sequence(recording, format_name, tmp_path / "in" / depth)
+    (tmp_path / "in" / "notes").mkdir()
+    (city,) = find_cities(tmp_path / "in")
+    assert city.name == "town"
+    assert {stage: one.name for stage, one in city.stages.items()} == {
+        "s1": "town_01",
+        "s2": "town_02",
+    }
 
 
 def test_one_of_several_lidars(drive, tmp_path):
