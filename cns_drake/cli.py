@@ -218,18 +218,31 @@ def generate(
         int, typer.Option(min=1, help="Sequences simulated side by side.")
     ] = 2,
     overwrite: Overwrite = False,
+    vary: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FAMILY.yaml",
+            help="Record the members of a family, whose scenario files go to "
+            "<output>/scenarios, and whatever is named.",
+        ),
+    ] = None,
 ) -> None:
     """Record many sequences; skip finished ones, resume interrupted ones."""
     from cns_drake.jobs import record_all
     from cns_drake.paths import recordable_sequences
     from cns_drake.scenario import load_scenario
 
-    scenarios = [
-        load_scenario(name).model_copy(
-            update={} if frames is None else {"frames": frames}
-        )
-        for name in names or recordable_sequences()
-    ]
+    if not names and vary is None:
+        names = list(recordable_sequences())
+    scenarios = [load_scenario(name) for name in names or ()]
+    if vary is not None:
+        from cns_drake.variation import load_family, write_scenarios
+
+        members = load_family(vary)
+        write_scenarios(members, output / "scenarios")
+        scenarios += members
+    if frames is not None:
+        scenarios = [s.model_copy(update={"frames": frames}) for s in scenarios]
     record_all(scenarios, output, jobs, overwrite=overwrite)
     for scenario in scenarios:
         typer.echo(output / scenario.name)

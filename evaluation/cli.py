@@ -193,6 +193,31 @@ def report(
     print(path)
 
 
+@app.command()
+def trend(
+    databases: Annotated[list[Path], typer.Argument(metavar="DATABASE...")],
+    query: Annotated[Path, typer.Option(help="The drive that asks.")],
+    output: Annotated[Path, typer.Option(help="Folder to write.")],
+    jobs: Annotated[
+        int | None,
+        typer.Option(
+            help="Processes that work at the same time; as many as there are"
+            " cores if left out."
+        ),
+    ] = None,
+) -> None:
+    """AUC of every method over TCR_sym, one query drive and many databases.
+
+    Writes trend.csv and a figure with 95 % bands.
+    """
+    from evaluation import trend as trends
+    from evaluation.workers import num_cores
+
+    num_jobs = num_cores() if jobs is None else jobs
+    points = trends.measure_trend(query, databases, num_jobs, console.track)
+    print(trends.write_trend(points, output))
+
+
 def main() -> None:
     """Runs the command line and exits with its status."""
     raise SystemExit(console.run(app, "cns-eval"))

@@ -3,42 +3,12 @@ import csv
 from drive_files import make_scan, write_recording, yaw_pose
 import numpy as np
 import pytest
+from small_towns import drive
 
 from evaluation import paper
 from evaluation.collection import find_cities
 from evaluation.errors import InputError
 from evaluation.report import write_report
-
-ROUTES = {"a": {"lanes": [1]}, "b": {"lanes": [2]}}
-
-
-def make_town(stage):
-    rng = np.random.default_rng(3)
-    ground = rng.uniform([-40, -40], [120, 40], (4000, 2))
-    parts = [np.c_[ground, np.zeros(4000)]]
-    for block in range(6):
-        box = rng.uniform(size=(500, 3)) * [12.0, 10.0, 20.0]
-        box += np.array([-30.0 + 25.0 * block, 15.0, 0.0])
-        if stage != "01" or block % 2:
-            parts.append(box)
-    return np.concatenate(parts)
-
-
-def drive(folder, stage, route, *, city="metropolis", scenario=True):
-    points = make_town(stage)
-    scans, X_WBs = [], []
-    for i in range(9):
-        X_WB = yaw_pose(10.0 * i, 2.0 if route == "a" else -2.0, 0.0, 0.05)
-        p = (points - X_WB[:3, 3]) @ X_WB[:3, :3]
-        near = p[np.linalg.norm(p, axis=1) < 60.0]
-        scans.append(make_scan(near - [0.0, 0.0, 1.6]))
-        X_WBs.append(X_WB)
-    attachments = {
-        "scenario.json": {"map": city, "stage": stage, "route": ROUTES[route]}
-    }
-    write_recording(
-        folder, scans, X_WBs, attachments=attachments if scenario else None
-    )
 
 
 @pytest.fixture(scope="module")

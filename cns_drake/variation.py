@@ -1,0 +1,234 @@
+"""Families of scenarios that one small file describes.
+
+A city that decays from a place outwards: each member of a family lacks the
+buildings and plants nearest to that place, a given part of them all. Members
+with more missing lack all that those with less lack. Routes by lot and other
+LiDARs multiply the family. Every member is a scenario of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import csv
+from itertools import product
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+)
+import yaml
+
+from cns_drake.city.roads.network import load_road_network
+from cns_drake.errors import InputError, describe_validation_error
+from cns_drake.files import complete_part, user_errors, write_part
+from cns_drake.paths import shipped_sequences
+from cns_drake.route import Route
+from cns_drake.route_drawing import draw_route
+from cns_drake.scenario import Scenario, load_scenario
+
+# What can be missing; streets, ground and street furniture stay.
+_REMOVABLE = ("building", "vegetation")
+
+_Part = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def _spread(value):
+    """Turns {from, to, count} into the numbers themselves."""
+    if not isinstance(value, dict):
+        return value
+    steps = _Steps.model_validate(value)
+    numbers = np.linspace(steps.first, steps.last, steps.count)
+    return tuple(float(number) for number in numbers.round(4))
+
+
+class _Steps(_Model):
+    first: _Part = Field(alias="from")
+    last: _Part = Field(alias="to")
+    count: int = Field(ge=1, le=10_000)
+
+
+class DrawnRoutes(_Model):
+    """Routes by lot.
+
+    Attributes:
+        count: how many.
+        length: least length of each [m].
+        seed: of the draws.
+    """
+
+    count: int = Field(ge=1, le=10_000)
+    length: float = Field(gt=0.0, le=100_000.0)
+    seed: int = Field(0, ge=0)
+
+
+class Family(_Model):
+    """What a family of scenarios has in common, and what varies.
+
+    Attributes:
+        base: sequence or scenario file that gives map, route, speeds and
+            sensors.
+        stage: of which something is missing; the map's last one by default.
+        missing: parts of the buildings and plants that are missing, each
+            from 0 to 1; or {from, to, count} for evenly spread ones.
+        seeds: for each of these, another place from which the city decays.
+        routes: routes by lot in place of the base's.
+        lidars: presets in place of the base's LiDARs.
+    """
+
+    base: str
+    stage: str | None = None
+    missing: Annotated[tuple[_Part, ...], BeforeValidator(_spread)] = Field(
+        (0.0,), min_length=1
+    )
+    seeds: tuple[Annotated[int, Field(ge=0)], ...] = Field((0,), min_length=1)
+    routes: DrawnRoutes | None = None
+    lidars: tuple[str, ...] = ()
+
+
+def load_family(path: Path) -> list[Scenario]:
+    """Reads a family's file and returns its members.
+
+    A member's name tells what it is: base, part missing in per mille, seed,
+    and where they vary route and LiDAR.
+
+    Raises:
+        InputError: the file or what it refers to cannot be used.
+    """
+    with user_errors(path):
+        text = path.read_bytes()
+    try:
+        family = Family.model_validate(yaml.safe_load(text))
+    except yaml.YAMLError as error:
+        fault = " ".join(str(error).split())
+        raise InputError(f"{path}: not readable as YAML: {fault}") from None
+    except ValidationError as error:
+        raise InputError(describe_validation_error(path, error)) from None
+    base = family.base
+    if base not in shipped_sequences():
+        base = path.parent / base
+    return vary(load_scenario(base), family, path)
+
+
+def vary(base: Scenario, family: Family, source) -> list[Scenario]:
+    """Returns the members of a family.
+
+    Args:
+        base: what they all start from.
+        family: what varies.
+        source: the file that errors name.
+
+    Raises:
+        InputError: the base has no map, or something the family asks for is
+            not there.
+    """
+    if base.map is None:
+        raise InputError(f"{source}: base: {base.name} has no map to vary")
+    stage = family.stage or max(
+        path.stem.removeprefix("stage_")
+        for path in base.map_folder.glob("stage_*.sdf")
+    )
+    orders = {
+        seed: _decay_order(base.map_folder / "structures.csv", seed)
+        for seed in family.seeds
+    }
+    members = []
+    for part, seed, (route_label, route), lidar in product(
+        family.missing,
+        family.seeds,
+        _routes(base, family),
+        family.lidars or (None,),
+    ):
+        labels = [base.name, f"m{round(1000 * part):03d}", f"s{seed}"]
+        labels += [label for label in (route_label, lidar) if label]
+        order = orders[seed]
+        update = {
+            "name": "_".join(labels).replace("-", "_"),
+            "stage": stage,
+            "without": tuple(sorted(order[: round(part * len(order))])),
+            "title": f"{100 * part:.1f} % of buildings and plants missing",
+        }
+        if route is not None:
+            update |= {"route": route, "waypoints": None}
+        member = base.model_copy(update=update)
+        if lidar is not None:
+            member = member.with_lidar_preset(lidar)
+        member.check_files(source)
+        members.append(member)
+    return members
+
+
+def write_scenarios(scenarios: Sequence[Scenario], folder: Path) -> list[Path]:
+    """Writes scenarios as `<folder>/<name>.yaml`.
+
+    Raises:
+        InputError: if that fails.
+    """
+    with user_errors(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    paths = []
+    for scenario in scenarios:
+        path = folder / f"{scenario.name}.yaml"
+        values = scenario.model_dump(mode="json", exclude_none=True)
+        write_part(path, yaml.safe_dump(values, sort_keys=False))
+        complete_part(path)
+        paths.append(path)
+    return paths
+
+
+def _routes(
+    base: Scenario, family: Family
+) -> list[tuple[str | None, Route | None]]:
+    """Returns the routes with their labels; None for the base's own."""
+    if family.routes is None:
+        return [(None, None)]
+    network = load_road_network(base.roads_file)
+    return [
+        (
+            f"r{k}",
+            draw_route(
+                network,
+                family.routes.length,
+                np.random.default_rng([family.routes.seed, k]),
+            ),
+        )
+        for k in range(family.routes.count)
+    ]
+
+
+def _decay_order(table: Path, seed: int) -> list[str]:
+    """Returns what can be missing, what goes first at the head.
+
+    Raises:
+        InputError: the table cannot be read or does not say where things
+            are.
+    """
+    with user_errors(table):
+        text = table.read_text(encoding="utf-8")
+    rows = [
+        row
+        for row in csv.DictReader(text.splitlines())
+        if row.get("class") in _REMOVABLE
+    ]
+    if not rows:
+        raise InputError(f"{table}: nothing in it that could be missing")
+    try:
+        xy = np.array([(float(row["x"]), float(row["y"])) for row in rows])
+        names = [row["name"] for row in rows]
+    except (KeyError, TypeError, ValueError):
+        raise InputError(
+            f"{table}: x, y: not the place of every structure"
+        ) from None
+    rng = np.random.default_rng(seed)
+    low, high = xy.min(axis=0), xy.max(axis=0)
+    distance = np.linalg.norm(xy - rng.uniform(low, high), axis=1)
+    return [names[k] for k in np.argsort(distance, kind="stable")]
