@@ -117,9 +117,9 @@ def _find_drives(folder: Path) -> list[Path]:
     """Returns the paths of the drives in a folder, in order."""
     paths = []
     for child in sorted(folder.iterdir()):
-        if child.suffix == ".mcap":
-            paths.append(child)
-        elif child.is_dir() and any(child.glob("*.mcap")):
+        if child.suffix == ".mcap" or (
+            child.is_dir() and any(child.glob("*.mcap"))
+        ):
             paths.append(child)
         elif child.is_dir():
             below = [*child.glob("*"), *child.glob("*/*")]

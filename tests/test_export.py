@@ -2,6 +2,8 @@
 
 import json
 import shutil
+import subprocess
+import sys
 
 from drive_files import make_scan, write_recording, yaw_pose
 from kiss_icp.datasets.kitti import KITTIOdometryDataset
@@ -217,6 +219,28 @@ def test_same_recording_gives_same_bytes(drive, kitti, tmp_path):
     for path in files:
         again = tmp_path / "again" / path.relative_to(kitti)
         assert again.read_bytes() == path.read_bytes()
+
+
+def test_command(drive, tmp_path):
+    def run(*arguments):
+        return subprocess.run(
+            [sys.executable, "-m", "cns_drake", "export", *arguments],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+
+    arguments = (drive, "--format", "kitti", "--output", tmp_path / "out")
+    done = run(*arguments)
+    assert done.returncode == 0
+    assert done.stdout == f"{tmp_path / 'out/sequences/07'}\n"
+    assert f"{NUM_SCANS}/{NUM_SCANS} frames" in done.stderr
+    again = run(*arguments)
+    assert again.returncode == 2
+    assert again.stdout == ""
+    assert again.stderr.splitlines()[-1] == (
+        f"error: {tmp_path / 'out/sequences/07'}: is there already"
+    )
 
 
 def test_several_drives_share_a_folder(drive, tmp_path):

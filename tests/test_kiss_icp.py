@@ -62,3 +62,8 @@ def test_kiss_icp_finds_the_drive(recording, tmp_path, capsys):
     # exact they are. With os1-128 the angle is a tenth.
     assert errors.max() < 0.04 * length
     assert angle_deg < 3.0
+
+
+def test_a_frame_takes_less_than_300_kb(recording):
+    (mcap,) = recording.glob("*.mcap")
+    assert mcap.stat().st_size < 300_000 * NUM_FRAMES

@@ -268,6 +268,7 @@ class McapFile:
             EOFError,
             StopIteration,
             MemoryError,
+            OverflowError,
             ValueError,
             RuntimeError,
             struct.error,
