@@ -1,0 +1,226 @@
+"""Rays a second: this project's caster, its limit, and Open3D.
+
+    python tests/benchmarks/ray_casting_rates.py [SEQUENCE ...] [--rounds N]
+
+From sensor poses along the drive to ranges and the geometry that was hit,
+32 x 1024 rays a scan. `limit` is a C program that calls Embree with coherent
+packets on the same hierarchy (needs a C compiler; left out without one).
+Aims: 0.85 of the limit and 2.5 times Open3D on one thread, 1.8 times as much
+on two threads, at most 15 % more time with 20 moving cars.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ctypes
+from pathlib import Path
+import shutil
+import subprocess
+import tempfile
+
+import numpy as np
+import open3d
+from pydrake.geometry import FrameId, GeometryId
+from pydrake.math import RigidTransform, RollPitchYaw
+from stages import interleaved, read_stage, sensor_poses
+
+from cns_drake.beam_pattern import make_beam_pattern
+from cns_drake.open3d_scene import Open3dScene
+from cns_drake.perception_geometry import PerceptionGeometry, TriangleSurface
+from cns_drake.ray_casting import RayCastingScene
+from cns_drake.ray_groups import group_geometries
+
+SEQUENCES = ("metropolis_04", "downtown_04")
+POSES = 16
+CARS = 20
+# Rays that pass an edge this closely may differ [m].
+EDGE = 1e-4
+
+
+def build_limit(folder: Path):
+    """Returns the compiled `cast_limit`, or None without a compiler."""
+    compiler = shutil.which("cc") or shutil.which("gcc")
+    if compiler is None:
+        return None
+    source = Path(__file__).with_name("packet_limit.c")
+    library = folder / "packet_limit.so"
+    flags = ["-O3", "-march=native", "-shared", "-fPIC"]
+    subprocess.run([compiler, *flags, source, "-o", library], check=True)
+    return ctypes.CDLL(str(library)).cast_limit
+
+
+def car_body() -> TriangleSurface:
+    """A rounded body of 1280 triangles, as large as a car."""
+    mesh = open3d.geometry.TriangleMesh.create_icosahedron()
+    mesh = mesh.subdivide_loop(3)
+    return TriangleSurface(
+        np.asarray(mesh.vertices) * [2.2, 0.9, 0.7],
+        np.asarray(mesh.triangles),
+    )
+
+
+def with_cars(geometries, poses):
+    """Returns the scene with moving cars, and what moves them."""
+    body = car_body()
+    frames = [FrameId.get_new_id() for _ in range(CARS)]
+    cars = [
+        PerceptionGeometry(
+            GeometryId.get_new_id(), "car", f, RigidTransform(), body, None
+        )
+        for f in frames
+    ]
+    rng = np.random.default_rng(0)
+    places = {}
+
+    def move(step: int) -> None:
+        for k, frame in enumerate(frames):
+            X_WS = poses[(step + k) % len(poses)]
+            yaw = RollPitchYaw(X_WS.rotation()).yaw_angle()
+            ahead = rng.uniform(6.0, 40.0)
+            forward = np.array([np.cos(yaw), np.sin(yaw), 0.0])
+            p = X_WS.translation() + ahead * forward - [0.0, 0.0, 0.9]
+            places[frame] = RigidTransform(RollPitchYaw(0, 0, yaw), p)
+
+    move(0)
+    stands = {geometry.frame_id for geometry in geometries}
+    scene = RayCastingScene(
+        [*geometries, *cars],
+        stands,
+        lambda f: places.get(f, RigidTransform()),
+    )
+    return scene, move, lambda f: places.get(f, RigidTransform())
+
+
+def benchmark(sequence: str, rounds: int, folder: Path) -> None:
+    geometries = read_stage(sequence)
+    poses = sensor_poses(sequence, POSES)
+    pattern = make_beam_pattern("cns", 0.05)
+    d_S = pattern.d_Sset[pattern.packet_order]
+    reach = pattern.max_range
+    stands = {geometry.frame_id for geometry in geometries}
+
+    def still(frame_id):
+        return RigidTransform()
+
+    scene = RayCastingScene(geometries, stands, still)
+    moving, move, pose_of = with_cars(geometries, poses)
+    p_WO, groups = group_geometries(geometries, stands, still)
+    theirs = Open3dScene(groups)._scenes[0]
+
+    def cast(caster, X_WS, **options):
+        d_W = d_S @ X_WS.rotation().matrix().T
+        return caster.cast_rays(X_WS.translation(), d_W, reach, **options)
+
+    def ours(**options):
+        for X_WS in poses:
+            cast(scene, X_WS, **options)
+
+    def ours_with_cars():
+        for step, X_WS in enumerate(poses):
+            move(step)
+            moving.set_frame_poses(pose_of)
+            cast(moving, X_WS)
+
+    def open3d_rays(X_WS):
+        rays = np.empty((len(d_S), 6), np.float32)
+        rays[:, :3] = X_WS.translation() - p_WO
+        rays[:, 3:] = d_S @ X_WS.rotation().matrix().T
+        return open3d.core.Tensor.from_numpy(rays)
+
+    def open3d_cast():
+        for X_WS in poses:
+            theirs.cast_rays(open3d_rays(X_WS), nthreads=1)["t_hit"].numpy()
+
+    variants = {
+        "cns-drake": ours,
+        "cns-drake, 2 threads": lambda: ours(num_threads=2),
+        f"cns-drake, {CARS} moving cars": ours_with_cars,
+        "Open3D": open3d_cast,
+    }
+    limit = build_limit(folder)
+    if limit is not None:
+        variants["limit (C)"] = _limit_variant(limit, scene, poses, d_S, reach)
+    times = interleaved(variants, rounds)
+
+    triangles = sum(
+        len(g.surface.triangles)
+        for g in geometries
+        if isinstance(g.surface, TriangleSurface)
+    )
+    rays = POSES * pattern.num_beams
+    base = times["cns-drake"]
+    print(f"{sequence}: {triangles} triangles, {rounds} rounds, medians")
+    for name, spent in times.items():
+        print(
+            f"  {name:<28} {1e3 * spent.wall / POSES:6.2f} ms a scan "
+            f"(CPU {1e3 * spent.cpu / POSES:6.2f}) "
+            f"{1e-6 * rays / spent.wall:6.2f} Mrays/s, "
+            f"{spent.wall / base.wall:5.2f} of our time "
+            f"(CPU {spent.cpu / base.cpu:5.2f})"
+        )
+    _compare(scene, theirs, poses, cast, open3d_rays, reach)
+
+
+def _limit_variant(limit, scene, poses, d_S, reach):
+    backend = scene._scene
+    count = len(d_S)
+    rows = np.ascontiguousarray(d_S.T, dtype=np.float32)
+    ranges = np.empty(count, np.float32)
+    prim, geom = (np.empty(count, np.uint32) for _ in range(2))
+
+    def pointer(array):
+        return ctypes.c_void_p(array.ctypes.data)
+
+    def run():
+        for X_WS in poses:
+            R = X_WS.rotation().matrix().astype(np.float32).ravel()
+            p = (X_WS.translation() - scene._p_WO).astype(np.float32)
+            limit(
+                backend._lib.rtcIntersect16,
+                ctypes.c_void_p(backend._top),
+                ctypes.byref(backend._arguments),
+                pointer(R),
+                pointer(p),
+                pointer(rows),
+                ctypes.c_int64(count),
+                ctypes.c_float(reach),
+                pointer(ranges),
+                pointer(prim),
+                pointer(geom),
+            )
+
+    return run
+
+
+def _compare(scene, theirs, poses, cast, open3d_rays, reach) -> None:
+    """Counts rays whose range differs from Open3D's."""
+    total = far = 0
+    worst = 0.0
+    for X_WS in poses:
+        a = cast(scene, X_WS).ranges
+        b = theirs.cast_rays(open3d_rays(X_WS))["t_hit"].numpy()
+        b = np.where(b <= reach, b, np.inf)
+        both = np.isfinite(a) & np.isfinite(b)
+        error = np.abs(a[both] - b[both])
+        apart = int((error > EDGE).sum()) + int((~both & (a != b)).sum())
+        total, far = total + len(a), far + apart
+        if (error <= EDGE).any():
+            worst = max(worst, float(error[error <= EDGE].max()))
+    print(
+        f"  {far} of {total} rays differ from Open3D by more than {EDGE} m "
+        f"(edges, curved shapes); the others by {worst:.1e} m at most"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("sequences", nargs="*", default=SEQUENCES)
+    parser.add_argument("--rounds", type=int, default=9)
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        for sequence in arguments.sequences:
+            benchmark(sequence, arguments.rounds, Path(folder))
+
+
+if __name__ == "__main__":
+    main()
