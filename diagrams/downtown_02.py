@@ -1,0 +1,14 @@
+"""Downtown, stage 02: half built.
+
+The shopping hall, the gas station and the plateau's station have come, the
+office towers, the hotel and the car park not yet. A drive round the ring and
+over the plateau, through the roundabout and round the south-western blocks.
+
+What is driven is data, `worlds/downtown/sequence_02.yaml`; how it is wired
+is `cns_drake.station.make_station`.
+"""
+
+from cns_drake.sequence_script import main
+
+if __name__ == "__main__":
+    main("downtown_02", __doc__)

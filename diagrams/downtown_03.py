@@ -1,0 +1,14 @@
+"""Downtown, stage 03: nearly complete.
+
+Only the east is open: the building site is a field, and the towers at the
+roundabout and beyond the ring are to come. A drive round the north-east the
+other way than that of `diagrams/downtown_04.py`, which overlaps with it.
+
+What is driven is data, `worlds/downtown/sequence_03.yaml`; how it is wired
+is `cns_drake.station.make_station`.
+"""
+
+from cns_drake.sequence_script import main
+
+if __name__ == "__main__":
+    main("downtown_03", __doc__)

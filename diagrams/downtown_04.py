@@ -1,0 +1,15 @@
+"""Downtown, stage 04: the complete city.
+
+Towers and offices around the roundabout, the plateau with its station, the
+slabs beyond the ring and a tower under construction. A drive down from the
+plateau, round the ring and round the south-western blocks, against which those
+of the three earlier stages are compared.
+
+What is driven is data, `worlds/downtown/sequence_04.yaml`; how it is wired
+is `cns_drake.station.make_station`.
+"""
+
+from cns_drake.sequence_script import main
+
+if __name__ == "__main__":
+    main("downtown_04", __doc__)
