@@ -59,6 +59,8 @@ def main(arguments: list[str] | None = None) -> int:
         "to reach this TCR_sym",
     )
     options = parser.parse_args(arguments)
+    if options.seed < 0:
+        parser.error(f"--seed: {options.seed} is negative")
     if options.target is not None and not options.calibrate:
         parser.error("--target: only with --calibrate")
 
