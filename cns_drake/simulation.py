@@ -136,6 +136,7 @@ def simulate(
                 f"{scenario.name}: found {resumed_frames} of {num_frames} "
                 "frames of an interrupted run, going on from there"
             )
+            on_frame(resumed_frames, num_frames)
         begin = min(resumed_frames * FRAME_PERIOD, end)
         diagram = make_station(
             scenario, world=world, trajectory=trajectory, bag=bag, page=page

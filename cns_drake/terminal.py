@@ -46,6 +46,8 @@ def run(app: typer.Typer) -> None:
     try:
         interrupt_on_termination()
         status = app(standalone_mode=False)
+        if status == _INTERRUPTED:  # Typer has caught the interrupt itself.
+            message = "interrupted"
         sys.stdout.flush()
     except InputError as error:
         message, status = f"error: {error}", _BAD_INPUT

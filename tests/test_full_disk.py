@@ -8,10 +8,10 @@ import resource
 import subprocess
 import sys
 
+from bag_recordings import FRAMES as BAG_FRAMES
+from bag_recordings import contents, record
 from mcap.reader import make_reader
 import pytest
-from test_resuming import FRAMES as BAG_FRAMES
-from test_resuming import contents, record
 from tiny_drive import FRAMES, tiny_scenario
 import yaml
 

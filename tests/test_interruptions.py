@@ -12,6 +12,7 @@ import multiprocessing
 import os
 import signal
 
+from bag_recordings import contents
 from mcap.exceptions import McapError
 from mcap.reader import NonSeekingReader
 import numpy as np
@@ -75,10 +76,6 @@ def readable_frames(folder):
     stamps = sorted(stamp for stamp in topics if topics[stamp] >= TOPICS)
     assert (np.diff(stamps) == 50_000_000).all()
     return len(stamps)
-
-
-def contents(folder):
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
 @pytest.fixture(scope="module")

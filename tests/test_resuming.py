@@ -2,51 +2,22 @@
 
 import os
 
+from bag_recordings import (
+    FRAMES,
+    TOPICS,
+    contents,
+    open_bag,
+    record,
+    write_frame,
+)
 import numpy as np
 import pytest
 
 from cns_drake import files
-from cns_drake.bag_writer import BagWriter
 from cns_drake.errors import InputError
-from cns_drake.frame_clock import START_NS, frame_stamp_ns
-from cns_drake.mcap_recorder import recording_topics
-from cns_drake.resuming import take_over_frames
+from cns_drake.frame_clock import frame_stamp_ns
 
-TOPICS = recording_topics(["lidar"])
-FRAMES = 50
 FRAMES_A_SECOND = 20
-
-
-def open_bag(folder, title="drive", **kwargs):
-    return BagWriter(
-        folder,
-        TOPICS,
-        start_ns=START_NS,
-        attachments={"scenario.json": {"title": title}},
-        scenario={"title": title},
-        **kwargs,
-    )
-
-
-def record(folder, frames=FRAMES, size=60, **kwargs):
-    """Records, or goes on recording; returns the frames taken over."""
-    with open_bag(folder, **kwargs) as bag:
-        taken_over = take_over_frames(bag, TOPICS)
-        for frame in range(taken_over, frames):
-            write_frame(bag, frame, size)
-    return taken_over
-
-
-def write_frame(bag, frame, size=60):
-    rng = np.random.default_rng(frame)
-    for topic in reversed(TOPICS):
-        if not topic.latched or frame == 0:
-            data = rng.bytes(size)
-            bag.write(topic.name, frame_stamp_ns(frame), data, frame)
-
-
-def contents(folder):
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
 @pytest.fixture(scope="module")

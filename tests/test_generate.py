@@ -1,0 +1,174 @@
+"""`cns-drake generate`: what it skips, resumes, refuses and leaves behind."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+
+from bag_recordings import contents
+from mcap.reader import make_reader
+import pytest
+from tiny_drive import FRAMES, tiny_scenario
+import yaml
+
+from cns_drake.errors import InputError
+from cns_drake.jobs import is_recorded, record_all
+from cns_drake.simulation import simulate
+
+LONG = 300
+
+
+class Generation:
+    """A run of the command line, in a group of processes of its own."""
+
+    def __init__(self, files, output, *options):
+        command = [sys.executable, "-m", "cns_drake", "generate", *files]
+        self.process = subprocess.Popen(
+            [*command, "--output", output, *options],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+        self.told = []
+
+    def wait_for(self, text):
+        """Reads until a line contains a text."""
+        for line in self.process.stderr:
+            self.told.append(line)
+            if text in line:
+                return
+        pytest.fail("".join(self.told))
+
+    def end(self):
+        """Returns exit status and results once every process has ended.
+
+        All have the same stderr: it ends when the last of them does.
+        """
+        self.told.extend(self.process.stderr)
+        results = self.process.stdout.read().splitlines()
+        return self.process.wait(), results
+
+
+@pytest.fixture(scope="module")
+def scenarios(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("scenarios")
+    return [
+        tiny_scenario(folder, name="short"),
+        tiny_scenario(folder, name="long", frames=LONG),
+    ]
+
+
+@pytest.fixture(scope="module")
+def files(scenarios, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("files")
+    for scenario in scenarios:
+        values = scenario.model_dump(exclude_none=True)
+        file = folder / f"{scenario.name}.yaml"
+        file.write_text(yaml.safe_dump(values))
+    return [folder / f"{scenario.name}.yaml" for scenario in scenarios]
+
+
+def test_interrupted_killed_and_run_again(scenarios, files, tmp_path):
+    # Ctrl-C reaches every process of the terminal.
+    output = tmp_path / "output"
+    run = Generation(files, output, "--jobs", "2")
+    run.wait_for(f"{FRAMES}/{FRAMES} frames")
+    os.killpg(run.process.pid, signal.SIGINT)
+    status, results = run.end()
+    assert (status, results) == (130, [])
+    assert run.told[-1] == "interrupted\n"
+    assert not [line for line in run.told if "Traceback" in line]
+    assert not (output / "long" / "metadata.yaml").exists()
+
+    # A parent that is killed cannot end its processes; they do so themselves.
+    run = Generation(files, output, "--jobs", "2")
+    run.wait_for("frames")
+    run.process.kill()
+    status, _ = run.end()
+    assert status == -signal.SIGKILL
+    assert not [line for line in run.told if "Traceback" in line]
+
+    run = Generation(files, output, "--jobs", "2")
+    status, results = run.end()
+    assert status == 0, run.told
+    assert results == [str(output / "short"), str(output / "long")]
+    # It had told of its last frame, and may have had its name or not.
+    assert any(
+        line.startswith(("short: found ", "short: finished already"))
+        for line in run.told
+    )
+    for scenario in scenarios:
+        folder = simulate(scenario, tmp_path / "whole").folder
+        assert contents(output / scenario.name) == contents(folder)
+
+
+def test_what_is_finished_and_what_is_another(scenarios, tmp_path, capsys):
+    short, _ = scenarios
+    folder = simulate(short, tmp_path).folder
+    before = contents(folder)
+    record_all([short], tmp_path, 1, overwrite=False)
+    assert "short: finished already" in capsys.readouterr().err
+    for other in (
+        short.model_copy(update={"frames": FRAMES - 1}),
+        short.model_copy(update={"frames": None}),
+        short.model_copy(update={"seed": 5}),
+    ):
+        assert not is_recorded(other, tmp_path)
+        with pytest.raises(
+            InputError, match=r"another scenario.*: short \(--overwrite"
+        ):
+            record_all([other], tmp_path, 1, overwrite=False)
+    assert contents(folder) == before
+
+
+def test_a_recording_of_the_whole_drive_is_no_prefix_of_it(scenarios, tmp_path):
+    whole = scenarios[0].model_copy(update={"frames": None})
+    frames = simulate(whole, tmp_path).num_frames
+    assert is_recorded(whole, tmp_path)
+    assert is_recorded(whole.model_copy(update={"frames": frames}), tmp_path)
+
+
+@pytest.mark.parametrize("name", ["tiny.sdf", "tiny.csv"])
+def test_a_world_or_a_route_that_has_changed(tmp_path, name):
+    scenario = tiny_scenario(tmp_path, frames=3)
+    simulate(scenario, tmp_path / "output")
+    assert is_recorded(scenario, tmp_path / "output")
+    file = tmp_path / name
+    file.write_text(file.read_text() + "\n")
+    assert not is_recorded(scenario, tmp_path / "output")
+
+
+@pytest.mark.parametrize("damage", ["", "{", "a: 1", "- 1"])
+@pytest.mark.parametrize("name", ["metadata.yaml", "scenario.yaml"])
+def test_damaged_files_are_no_recording(tmp_path, name, damage):
+    scenario = tiny_scenario(tmp_path, frames=3)
+    folder = tmp_path / "output" / "tiny_01"
+    folder.mkdir(parents=True)
+    (folder / "tiny_01_0.mcap").touch()
+    (folder / "metadata.yaml").touch()
+    (folder / name).write_text(damage)
+    assert not is_recorded(scenario, tmp_path / "output")
+
+
+def test_two_sequences_of_one_name(scenarios, tmp_path):
+    with pytest.raises(InputError, match="short: 2 sequences"):
+        record_all([scenarios[0]] * 2, tmp_path, 1)
+
+
+def test_what_it_was_made_of_is_in_the_file(tmp_path):
+    scenario = tiny_scenario(tmp_path, frames=2)
+    folder = simulate(scenario, tmp_path / "output").folder
+    with (folder / "tiny_01_0.mcap").open("rb") as stream:
+        attachments = {
+            attachment.name: json.loads(attachment.data)
+            for attachment in make_reader(stream).iter_attachments()
+        }
+    assert attachments["scenario.json"]["name"] == "tiny_01"
+    versions = attachments["provenance.json"]["versions"]
+    assert {"cns-drake", "python", "drake", "numpy", "mcap"} <= versions.keys()
+    inputs = attachments["provenance.json"]["inputs_sha256"]
+    assert inputs.keys() == {"world", "vehicle", "waypoints"}
+    names = [entry["name"] for entry in attachments["structures.json"]]
+    assert names == ["ground", "hall"]
