@@ -68,7 +68,7 @@ def test_list_names_the_sequences():
 def test_no_arguments_show_the_help():
     result = run()
     assert result.returncode == 0
-    for command in ("list", "simulate", "scan", "reproduce"):
+    for command in ("list", "simulate", "generate", "repair", "scan"):
         assert command in result.stdout
 
 
