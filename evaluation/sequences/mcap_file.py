@@ -18,9 +18,7 @@ import os
 from pathlib import Path
 import struct
 from typing import TypeVar
-import zlib
 
-import lz4.frame
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.reader import SeekingReader
@@ -29,22 +27,25 @@ import numpy as np
 import zstandard
 
 from evaluation.errors import InputError
+from evaluation.sequences.mcap_records import (
+    MAGIC,
+    RECORD_HEADER,
+    RECORD_LIMIT_BYTES,
+    check_summary,
+    read_attachment,
+    uncompress,
+)
 from evaluation.workers import num_cores
 
 _Parsed = TypeVar("_Parsed")
 
-_MAGIC = b"\x89MCAP0\r\n"
-_RECORD_HEADER = struct.Struct("<BQ")
 # Of a message, after its record header: channel id, sequence, two times.
-_MESSAGE_HEADER_BYTES = 2 + 4 + 8 + 8
+_MESSAGE_HEADER = struct.Struct("<HIQQ")
 # Of a message index, after its record header: channel id, length of the rest.
 _INDEX_HEADER = struct.Struct("<HI")
 _INDEX_ENTRY = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
 # The frame that is being read, and its neighbour when two of them interleave.
 _CHUNKS_KEPT = 2
-# A broken or hostile length must not be taken for the size of a buffer.
-_RECORD_LIMIT_BYTES = 1 << 30
-_CHUNK_LIMIT_BYTES = 1 << 28
 
 
 @dataclass(frozen=True)
@@ -55,11 +56,13 @@ class Location:
         chunk: number of the chunk in the file's index.
         offset: of the message record in the uncompressed chunk [bytes].
         log_time_ns: when the message was logged [ns].
+        channel_id: of its topic.
     """
 
     chunk: int
     offset: int
     log_time_ns: int
+    channel_id: int
 
 
 class McapFile:
@@ -79,8 +82,9 @@ class McapFile:
         self.path = Path(path)
         with self._reading() as stream:
             self._check_ends(stream)
+            check_summary(stream)
             self._summary = SeekingReader(
-                stream, record_size_limit=_RECORD_LIMIT_BYTES
+                stream, record_size_limit=RECORD_LIMIT_BYTES
             ).get_summary()
         if self._summary is None or not self._summary.chunk_indexes:
             raise InputError(f"{self.path}: the MCAP file has no chunk index")
@@ -178,16 +182,11 @@ class McapFile:
 
     def attachment(self, name: str) -> bytes | None:
         """Returns the content of the attachment of this name, if any."""
-        if not any(
-            index.name == name for index in self._summary.attachment_indexes
-        ):
-            return None
-        with self._reading() as stream:
-            for attachment in SeekingReader(
-                stream, record_size_limit=_RECORD_LIMIT_BYTES
-            ).iter_attachments():
-                if attachment.name == name:
-                    return attachment.data
+        for index in self._summary.attachment_indexes:
+            if index.name == name:
+                with self._reading() as stream:
+                    stream.seek(index.offset)
+                    return read_attachment(stream).data
         return None
 
     def _read_locations(self, topic: str) -> list[Location]:
@@ -198,15 +197,16 @@ class McapFile:
                 offset = chunk.message_index_offsets.get(channel_id)
                 if offset is None:
                     continue
-                stream.seek(offset + _RECORD_HEADER.size)
+                stream.seek(offset + RECORD_HEADER.size)
                 _, length = _INDEX_HEADER.unpack(
                     stream.read(_INDEX_HEADER.size)
                 )
                 entries = np.frombuffer(stream.read(length), _INDEX_ENTRY)
                 locations.extend(
-                    Location(number, message_offset, log_time)
+                    Location(number, message_offset, log_time, channel_id)
                     for log_time, message_offset in entries.tolist()
                 )
+            self._check_count(channel_id, len(locations))
         # Stable, so that messages of one time keep the file's order.
         return sorted(locations, key=lambda location: location.log_time_ns)
 
@@ -226,25 +226,46 @@ class McapFile:
         with self._reading() as stream:
             stream.seek(
                 self._chunk_indexes[number].chunk_start_offset
-                + _RECORD_HEADER.size
+                + RECORD_HEADER.size
             )
-            return memoryview(_uncompress(Chunk.read(ReadDataStream(stream))))
+            return memoryview(uncompress(Chunk.read(ReadDataStream(stream))))
 
     def _message(self, chunk: memoryview, location: Location) -> memoryview:
         with self._faults():
-            start = location.offset + _RECORD_HEADER.size
-            _, length = _RECORD_HEADER.unpack(chunk[location.offset : start])
-            message = chunk[start + _MESSAGE_HEADER_BYTES : start + length]
-            if len(message) != length - _MESSAGE_HEADER_BYTES:
+            start = location.offset + RECORD_HEADER.size
+            _, length = RECORD_HEADER.unpack(chunk[location.offset : start])
+            body = chunk[start : start + length]
+            if len(body) != length:
                 raise EOFError("a message ends behind its chunk")
-        return message
+            channel_id, _, log_time_ns, _ = _MESSAGE_HEADER.unpack_from(body)
+            # Nothing else would tell that a message index is damaged.
+            if (channel_id, log_time_ns) != (
+                location.channel_id,
+                location.log_time_ns,
+            ):
+                raise ValueError("a message is not where the index says")
+        return body[_MESSAGE_HEADER.size :]
+
+    def _check_count(self, channel_id: int, found: int) -> None:
+        """Refuses an index that lists not all messages of a channel.
+
+        Raises:
+            ValueError: that tells the numbers.
+        """
+        if self._summary.statistics is None:
+            return
+        counts = self._summary.statistics.channel_message_counts
+        if found != counts.get(channel_id, found):
+            raise ValueError(
+                f"the index has {found} of {counts[channel_id]} messages"
+            )
 
     def _check_ends(self, stream) -> None:
-        if stream.read(len(_MAGIC)) != _MAGIC:
+        if stream.read(len(MAGIC)) != MAGIC:
             raise InputError(f"{self.path}: not an MCAP file")
         size = stream.seek(0, os.SEEK_END)
-        stream.seek(max(size - len(_MAGIC), len(_MAGIC)))
-        if stream.read() != _MAGIC:
+        stream.seek(max(size - len(MAGIC), len(MAGIC)))
+        if stream.read() != MAGIC:
             raise InputError(
                 f"{self.path}: the MCAP file is cut off or was not finished"
             )
@@ -277,36 +298,3 @@ class McapFile:
             raise InputError(
                 f"{self.path}: damaged MCAP file ({error})"
             ) from error
-
-
-def _uncompress(chunk: Chunk) -> bytes:
-    """Returns a chunk's records; a small file cannot fill the memory.
-
-    Raises:
-        ValueError: if it is damaged, too large or of unknown compression.
-        RuntimeError: if lz4 finds it damaged.
-        zstandard.ZstdError: likewise.
-    """
-    size = chunk.uncompressed_size
-    if size > _CHUNK_LIMIT_BYTES:
-        raise ValueError(f"a chunk of {size} bytes")
-    if chunk.compression == "zstd":
-        # The library reserves what the data says of itself.
-        claimed = zstandard.frame_content_size(chunk.data)
-        if claimed not in (-1, size):
-            raise ValueError(f"a chunk of {claimed} instead of {size} bytes")
-        data = zstandard.decompress(chunk.data, size)
-    elif chunk.compression == "lz4":
-        unpacker = lz4.frame.LZ4FrameDecompressor()
-        data = unpacker.decompress(chunk.data, max_length=size)
-        if not unpacker.eof:
-            raise ValueError(f"a chunk of more than {size} bytes")
-    elif chunk.compression == "":
-        data = chunk.data
-    else:
-        raise ValueError(f"unknown compression {chunk.compression!r}")
-    if len(data) != size:
-        raise ValueError(f"a chunk of {len(data)} instead of {size} bytes")
-    if chunk.uncompressed_crc not in (0, zlib.crc32(data)):
-        raise ValueError("the checksum of a chunk is wrong")
-    return data

@@ -1,0 +1,97 @@
+"""Records of an MCAP file, read so that damage and malice are noticed.
+
+The `mcap` package checks the checksums of chunks alone, and trusts the sizes
+that a chunk claims.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import struct
+import zlib
+
+import lz4.frame
+from mcap.data_stream import ReadDataStream
+from mcap.records import Attachment, Chunk
+import zstandard
+
+MAGIC = b"\x89MCAP0\r\n"
+# Opcode and length.
+RECORD_HEADER = struct.Struct("<BQ")
+# A broken or hostile length must not be taken for the size of a buffer.
+RECORD_LIMIT_BYTES = 1 << 30
+_CHUNK_LIMIT_BYTES = 1 << 28
+# The last record: its header, where the summary begins, its offsets, its
+# checksum.
+_FOOTER = struct.Struct("<BQQQI")
+
+
+def check_summary(stream) -> None:
+    """Refuses a file whose summary is not what its checksum says.
+
+    Raises:
+        ValueError: if so, or if the footer is none.
+    """
+    size = stream.seek(0, os.SEEK_END)
+    end = stream.seek(max(size - len(MAGIC) - _FOOTER.size, 0))
+    _, _, start, _, checksum = _FOOTER.unpack(stream.read(_FOOTER.size))
+    if start > end:
+        raise ValueError("the summary begins behind its end")
+    if start > 0 and checksum > 0:
+        stream.seek(start)
+        # Up to the checksum itself.
+        summary = stream.read(end + _FOOTER.size - 4 - start)
+        if zlib.crc32(summary) != checksum:
+            raise ValueError("the checksum of the summary is wrong")
+    stream.seek(0)
+
+
+def read_attachment(stream) -> Attachment:
+    """Reads the attachment at the stream's position.
+
+    Raises:
+        ValueError: if its checksum is wrong, or the record too large.
+    """
+    _, length = RECORD_HEADER.unpack(stream.read(RECORD_HEADER.size))
+    if length > RECORD_LIMIT_BYTES:
+        raise ValueError(f"an attachment of {length} bytes")
+    body = stream.read(length)
+    # The checksum of all that precedes it ends the record; 0 is none.
+    checksum = int.from_bytes(body[-4:], "little")
+    if checksum not in (0, zlib.crc32(body[:-4])):
+        raise ValueError("the checksum of an attachment is wrong")
+    return Attachment.read(ReadDataStream(io.BytesIO(body)))
+
+
+def uncompress(chunk: Chunk) -> bytes:
+    """Returns a chunk's records; a small file cannot fill the memory.
+
+    Raises:
+        ValueError: if it is damaged, too large or of unknown compression.
+        RuntimeError: if lz4 finds it damaged.
+        zstandard.ZstdError: likewise.
+    """
+    size = chunk.uncompressed_size
+    if size > _CHUNK_LIMIT_BYTES:
+        raise ValueError(f"a chunk of {size} bytes")
+    if chunk.compression == "zstd":
+        # The library reserves what the data says of itself.
+        claimed = zstandard.frame_content_size(chunk.data)
+        if claimed not in (-1, size):
+            raise ValueError(f"a chunk of {claimed} instead of {size} bytes")
+        data = zstandard.decompress(chunk.data, size)
+    elif chunk.compression == "lz4":
+        unpacker = lz4.frame.LZ4FrameDecompressor()
+        data = unpacker.decompress(chunk.data, max_length=size)
+        if not unpacker.eof:
+            raise ValueError(f"a chunk of more than {size} bytes")
+    elif chunk.compression == "":
+        data = chunk.data
+    else:
+        raise ValueError(f"unknown compression {chunk.compression!r}")
+    if len(data) != size:
+        raise ValueError(f"a chunk of {len(data)} instead of {size} bytes")
+    if chunk.uncompressed_crc not in (0, zlib.crc32(data)):
+        raise ValueError("the checksum of a chunk is wrong")
+    return data
