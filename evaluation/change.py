@@ -44,14 +44,12 @@ class Surveyed:
         voxels: the map on the grid of the TCR.
         positions: (N, 3) of the sensor [m]; None for a map file.
         sequence: the drive; None for a map file.
-        num_ignored: points of a map file that are not finite.
     """
 
     name: str
     voxels: VoxelMap
     positions: np.ndarray | None = None
     sequence: Sequence | None = None
-    num_ignored: int = 0
 
 
 @dataclass(frozen=True)
@@ -241,8 +239,8 @@ def _survey(source: Sequence | Path, track: Track) -> Surveyed:
     if isinstance(source, Sequence):
         voxels = map_sequence(source, VOXEL_SIZE, track)
         return survey_sequence(source, voxels)
-    voxels, num_ignored = voxelise(read_cloud(source))
-    return Surveyed(source.name, voxels, num_ignored=num_ignored)
+    voxels, _ = voxelise(read_cloud(source))
+    return Surveyed(source.name, voxels)
 
 
 def _same_stage_partner(

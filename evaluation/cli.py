@@ -92,17 +92,18 @@ def tcr(
     surveys, alignments = change.survey_in_one_world(
         paths, align.value, console.track
     )
-    for one in surveys:
-        _tell_notes(one.sequence)
-        if one.num_ignored:
-            console.note(f"{one.name}: {one.num_ignored} points not finite")
-    for alignment in alignments:
-        console.note(alignment.to_text())
     report = change.compare(
         *surveys[:2],
         control=None if control is None else surveys[2],
         alignment=alignments[0] if alignments else None,
     )
+    for one in surveys:
+        _tell_notes(one.sequence)
+        ignored = one.voxels.num_ignored
+        if ignored:
+            console.note(f"{one.name}: {ignored} points not finite")
+    for alignment in alignments:
+        console.note(alignment.to_text())
     if json:
         console.print_json(report.to_json())
     else:

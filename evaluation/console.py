@@ -46,6 +46,8 @@ def run(app: typer.Typer, program: str) -> int:
         # once more at its end, which must not fail again.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except MemoryError:
+        return _fail(program, "not enough memory for this input")
     except OSError as error:
         where = error.filename or "standard output"
         return _fail(program, f"{where}: {error.strerror or error}")

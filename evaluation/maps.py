@@ -53,12 +53,14 @@ class VoxelMap:
         centroids_W: (V, 3) float64 mean of each voxel's points [m].
         counts: (V,) int64 points in each voxel.
         voxel_size: length of a voxel's side [m].
+        num_ignored: points that were left out as not finite.
     """
 
     indices: np.ndarray
     centroids_W: np.ndarray
     counts: np.ndarray
     voxel_size: float
+    num_ignored: int = 0
 
     def __len__(self) -> int:
         return len(self.counts)
@@ -88,6 +90,7 @@ class VoxelMap:
             centroids_W=_corners(indices, voxel_size) + sums / counts[:, None],
             counts=counts,
             voxel_size=voxel_size,
+            num_ignored=self.num_ignored,
         )
 
 
@@ -108,6 +111,7 @@ class VoxelAccumulator:
         self._voxel_size = voxel_size
         self._table = np.zeros(2 * _BATCH, dtype=_SLOT)
         self._size = 0
+        self._num_ignored = 0
 
     def add(self, points: np.ndarray, X_WS: np.ndarray | None = None) -> int:
         """Adds a cloud.
@@ -131,6 +135,7 @@ class VoxelAccumulator:
                 batch, X, self._voxel_size, self._table, self._size
             )
             ignored += skipped
+        self._num_ignored += ignored
         return ignored
 
     def to_map(self) -> VoxelMap:
@@ -146,6 +151,7 @@ class VoxelAccumulator:
             + sums / counts[:, None],
             counts=counts,
             voxel_size=self._voxel_size,
+            num_ignored=self._num_ignored,
         )
 
     def _reserve(self, number: int) -> None:

@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+# Farther than anything on Earth from the origin of a survey grid [m].
+FARTHEST = 1e8
+
 
 def make_pose(R: np.ndarray, p: np.ndarray) -> np.ndarray:
     """Returns poses X, shape (..., 4, 4).

@@ -155,7 +155,7 @@ def test_points_that_are_not_finite_are_counted(tmp_path):
     points = TOWN["late"].copy()
     points[[5, 900], 1] = np.nan, np.inf
     np.save(tmp_path / "a.npy", points)
-    assert survey(tmp_path / "a.npy").num_ignored == 2
+    assert survey(tmp_path / "a.npy").voxels.num_ignored == 2
 
 
 def test_other_worlds_are_refused(tmp_path, drives):

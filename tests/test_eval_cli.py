@@ -260,11 +260,12 @@ def test_the_module_is_the_program(data):
 def readme_method(folder):
     """Saves the method that the README shows, as a file of a name."""
     readme = Path(__file__).parents[1] / "README.md"
-    (example,) = re.findall(
-        r"^```python\n(.*?@register.*?)^```",
+    blocks = re.findall(
+        r"^```python\n(.*?)^```",
         readme.read_text(encoding="utf-8"),
         re.DOTALL | re.MULTILINE,
     )
+    (example,) = (block for block in blocks if "@register" in block)
     path = folder / "readme_heights.py"
     path.write_text(example, encoding="utf-8")
     return path
@@ -330,7 +331,10 @@ def test_bad_usage(capsys, data):
     assert_refused(capsys, [*pr, "--set", "candidates"], "is not NAME=VALUE")
     assert_refused(capsys, [*pr, "--set", "x=1"], "no parameter 'x'")
     assert_refused(capsys, [*pr, "--set", "rings=many"], "rings")
-    assert_refused(capsys, [*pr, "--sensor-height", "nan"], "sensor_height")
+    for height in ("nan", "inf", "-1.6"):
+        assert_refused(
+            capsys, [*pr, f"--sensor-height={height}"], "sensor_height"
+        )
 
 
 def test_bad_input(capsys, data, tmp_path):
@@ -351,6 +355,44 @@ def test_bad_input(capsys, data, tmp_path):
         "town_01.npy",
         "not a recorded sequence",
     )
+
+
+def test_points_that_are_not_finite_are_told(capsys, data, tmp_path):
+    scan = make_scan(make_block_scene(0))
+    scan["y"][:7] = np.nan
+    write_recording(tmp_path / "holes", [scan], [yaw_pose(0.0, 0.0, 0.0, 0.0)])
+    town = data / "town_01"
+    status, _, err = run(capsys, "tcr", town, tmp_path / "holes")
+    assert status == 0
+    assert err == "holes: 7 points not finite\n"
+    (tmp_path / "scans").mkdir()
+    np.save(
+        tmp_path / "scans" / "a.npy",
+        np.stack([scan[axis] for axis in "xyz"], axis=1),
+    )
+    folders = ["--database", tmp_path / "scans", "--query", tmp_path / "scans"]
+    output = tmp_path / "scores.csv"
+    scores = ["scores", "--method", "solid", *folders, "--output", output]
+    status, _, err = run(capsys, *scores)
+    assert status == 0
+    assert err.startswith("14 points not finite\n")
+    (row,) = csv.DictReader(output.open())
+    assert float(row["score"]) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_poses_out_of_this_world(capsys, data, tmp_path):
+    scan = make_scan(make_block_scene(0))
+    write_recording(tmp_path / "lost", [scan], [yaw_pose(1e9, 0.0, 0.0, 0.0)])
+    for command in (["tcr"], ["pr", "--method", "solid"]):
+        lost = [*command, data / "town_01", tmp_path / "lost"]
+        assert_refused(capsys, lost, "lost_0.mcap: a pose is 1e+09 m from")
+
+
+def test_parameters_that_need_too_much_memory(capsys, data):
+    town = data / "town_01"
+    large = ["pr", town, town, "--method", "scan-context++"]
+    large += ["--set", "rings=10000000000000"]
+    assert_refused(capsys, large, "not enough memory")
 
 
 def test_bad_folders_of_scans(capsys, data, tmp_path):

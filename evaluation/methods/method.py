@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, NonNegativeFloat, ValidationError
 
 from evaluation.errors import InputError
 
@@ -25,7 +25,7 @@ class MethodConfig(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
-    sensor_height: float = 1.6
+    sensor_height: NonNegativeFloat = 1.6
 
 
 class Method(abc.ABC, Generic[Descriptor, Database]):

@@ -9,6 +9,7 @@ import numpy as np
 
 from evaluation import points as point_arrays
 from evaluation.errors import InputError
+from evaluation.poses import FARTHEST
 from evaluation.sequences.pcd import read_pcd
 from evaluation.sequences.ply import read_ply
 
@@ -62,7 +63,7 @@ def _check_coordinates(points: np.ndarray) -> None:
         ValueError: if a coordinate is out of this world.
     """
     for name in "xyz":
-        far = (np.abs(points[name]) >= _FARTHEST) & np.isfinite(points[name])
+        far = (np.abs(points[name]) >= FARTHEST) & np.isfinite(points[name])
         if far.any():
             first = int(far.argmax())
             raise ValueError(
@@ -112,10 +113,6 @@ def _read_bin(path: Path) -> np.ndarray:
     values = np.memmap(path, dtype="<f4", mode="r").reshape(-1, 4)
     return point_arrays.from_xyz(values)
 
-
-# Farther from the origin than any point of a map on Earth [m]: coordinates
-# of survey grids reach 1e7.
-_FARTHEST = 1e8
 
 _READERS: dict[str, Callable[[Path], np.ndarray]] = {
     ".pcd": read_pcd,

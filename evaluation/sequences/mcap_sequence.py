@@ -223,6 +223,10 @@ class McapSequence(Sequence):
         """Returns poses (..., 4, 4) of positions and quaternions."""
         if not (np.isfinite(p).all() and np.isfinite(quat_xyzw).all()):
             raise InputError(f"{self._path}: a pose is not finite")
+        if not (np.abs(p) < poses.FARTHEST).all():
+            raise InputError(
+                f"{self._path}: a pose is {np.abs(p).max():g} m from the origin"
+            )
         try:
             R = poses.rotation_from_quaternion(quat_xyzw)
         except ValueError as error:

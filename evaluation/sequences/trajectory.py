@@ -132,6 +132,7 @@ def read_quaternions(path: Path, separator: str | None) -> Trajectory:
             f" {lengths[bad[0]]:.4g} instead of 1"
         )
     R = poses.rotation_from_quaternion(values[:, 3:])
+    _check_near(path, values[:, :3])
     return _in_order(path, stamps_ns, poses.make_pose(R, values[:, :3]))
 
 
@@ -157,7 +158,18 @@ def pose_matrices(path: Path, values: np.ndarray) -> np.ndarray:
         raise InputError(
             f"{path}: row {np.flatnonzero(bad)[0] + 1}: no rotation matrix"
         )
+    _check_near(path, upper[:, :, 3])
     return poses.make_pose(R, upper[:, :, 3])
+
+
+def _check_near(path: Path, positions: np.ndarray) -> None:
+    far = (np.abs(positions) >= poses.FARTHEST).any(axis=1)
+    if far.any():
+        row = int(far.argmax())
+        raise InputError(
+            f"{path}: row {row + 1}: {np.abs(positions[row]).max():g} m from"
+            " the origin"
+        )
 
 
 def _in_order(
