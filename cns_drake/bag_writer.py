@@ -157,6 +157,13 @@ class BagWriter:
         finally:
             self._close_stream()
 
+    def follows_interruption(self) -> bool:
+        """Tells whether an interrupted run has left anything to take over.
+
+        It does so as long as nothing but that has been written.
+        """
+        return self._stream.replaying
+
     def interrupted(self) -> Iterator[RecordedMessage]:
         """Yields the messages that an interrupted run recorded.
 

@@ -129,14 +129,15 @@ def simulate(
     end = (num_frames - 1) * FRAME_PERIOD
     resumed_frames = 0
     with bag:
-        if page is None:
+        if page is None and bag.follows_interruption():
+            on_note(f"{scenario.name}: found an interrupted run, reading it")
             resumed_frames = take_over_frames(bag, topics)
-        if resumed_frames > 0:
             on_note(
-                f"{scenario.name}: found {resumed_frames} of {num_frames} "
-                "frames of an interrupted run, going on from there"
+                f"{scenario.name}: {resumed_frames} of {num_frames} frames "
+                "are there, going on with the next"
             )
-            on_frame(resumed_frames, num_frames)
+            if resumed_frames > 0:
+                on_frame(resumed_frames, num_frames)
         begin = min(resumed_frames * FRAME_PERIOD, end)
         diagram = make_station(
             scenario, world=world, trajectory=trajectory, bag=bag, page=page

@@ -130,7 +130,8 @@ def test_a_real_run_ends_in_one_line_and_goes_on(tmp_path, request, disk):
     # A tmpfs has room for whole pages only.
     assert run.resumed_frames in ({20, 40} if disk == "tmpfs" else {40})
     assert told == [
-        f"tiny_01: found {run.resumed_frames} of {FRAMES} frames of an "
-        "interrupted run, going on from there"
+        "tiny_01: found an interrupted run, reading it",
+        f"tiny_01: {run.resumed_frames} of {FRAMES} frames are there, going "
+        "on with the next",
     ]
     assert contents(folder) == whole
