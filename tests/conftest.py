@@ -1,5 +1,6 @@
 """Fixtures that several test modules use."""
 
+from eval_program import write_towns
 import pytest
 from small_map import scenario_values, write_small_map
 
@@ -19,3 +20,11 @@ def short_recording(small_map, tmp_path_factory):
     output = tmp_path_factory.mktemp("recordings")
     values = scenario_values(small_map) | {"frames": 40}
     return simulate(make_scenario(values, "test"), output).folder
+
+
+@pytest.fixture(scope="session")
+def towns(tmp_path_factory):
+    """Folder of two small drives, see `eval_program.write_towns`."""
+    folder = tmp_path_factory.mktemp("towns")
+    write_towns(folder)
+    return folder
