@@ -94,7 +94,8 @@ class _ShortenedColumn(TextColumn):
 def show_progress(console: Console | None = None) -> Iterator[Progress]:
     """Shows progress bars, each one line, with elapsed and remaining time.
 
-    The field `note` of a task is shown behind its bar.
+    The field `note` of a task is shown behind its bar. Where there is no
+    terminal, no bar is drawn; see `count_progress`.
 
     Args:
         console: where; stderr by default.
@@ -111,7 +112,10 @@ def show_progress(console: Console | None = None) -> Iterator[Progress]:
         console=console or Console(stderr=True),
         refresh_per_second=2,
     )
-    with progress:
+    if progress.console.is_terminal:
+        with progress:
+            yield progress
+    else:  # A bar would be drawn once, at the end, beside an error's line.
         yield progress
 
 

@@ -42,6 +42,13 @@ def test_without_a_terminal_progress_is_whole_lines():
     assert lines[1].split() == ["[bold]"] + 30 * ["word"]
 
 
+def test_without_a_terminal_a_failure_shows_no_bar():
+    paper = Console(file=io.StringIO(), width=40)
+    with terminal.show_progress(paper) as progress:
+        progress.add_task("metropolis_01", total=None, note="loading")
+    assert paper.file.getvalue() == ""
+
+
 def test_what_an_earlier_run_did_is_no_speed(monkeypatch):
     now = [100.0]
     monkeypatch.setattr(terminal.time, "monotonic", lambda: now[0])
