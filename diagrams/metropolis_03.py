@@ -1,0 +1,15 @@
+"""Metropolis, stage 03: the last year before the towers.
+
+Little has come since stage 02: an observation tower over the park, and trees
+around the lots of the skyline. A drive round the middle and half the ring;
+`diagrams/metropolis_04.py` drives through the same streets once everything
+is built.
+
+What is driven is data, `worlds/metropolis/sequence_03.yaml`; how it is wired
+is `cns_drake.station.make_station`.
+"""
+
+from cns_drake.sequence_script import main
+
+if __name__ == "__main__":
+    main("metropolis_03", __doc__)
