@@ -239,6 +239,12 @@ def test_recorded_poses_deskew(swept_recording, frame):
     assert frame == 0 or moved > 0.05
 
 
+def test_readers_are_told_of_distortion(swept_recording, short_recording):
+    (note,) = open_sequence(swept_recording[1]).notes
+    assert "taken while the LiDAR moved" in note
+    assert open_sequence(short_recording).notes == ()
+
+
 def test_swept_pose_is_where_the_vehicle_is(small_map):
     """The poses of a sweep, one by one, against the trajectory's."""
     trajectory = plan_drive(scenario_of(small_map, lidar={}))

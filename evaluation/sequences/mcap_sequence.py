@@ -88,6 +88,19 @@ class McapSequence(Sequence):
         return self._message(_ODOMETRY_TOPIC, first).header.frame_id
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        lidars = (self.scenario or {}).get("lidars")
+        lidar = {}
+        if isinstance(lidars, dict):
+            lidar = lidars.get(self._lidar_topic.strip("/").split("/")[0])
+        if not (isinstance(lidar, dict) and lidar.get("motion_distortion")):
+            return ()
+        return (
+            f"{self._path}: taken while the LiDAR moved, and used as taken"
+            " (evaluation.deskewing takes the motion out)",
+        )
+
+    @property
     def scenario(self) -> Mapping | None:
         scenario = self._json("scenario.json")
         if scenario is not None and not isinstance(scenario, dict):
