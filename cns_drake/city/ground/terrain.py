@@ -102,7 +102,8 @@ class GroundShape:
         z = self.base(x, y)
         for swell in self._swells:
             inside = shapely.intersects_xy(swell.area, x, y)
-            z[inside] += swell.height(x[inside], y[inside])
+            if inside.any():
+                z[inside] += swell.height(x[inside], y[inside])
         return z
 
 

@@ -141,21 +141,15 @@ class Draft:
             The structure, or None where there is no room.
         """
         x, y = (round(float(value), 3) for value in xy)
-        z = float(self.ground_height(np.array([x]), np.array([y]))[0])
         structure = Structure(
             self.next_name(kind),
             semantic_class,
             model,
-            (x, y, round(z, 3)),
+            (x, y, 0.0),
             float(yaw),
             tuple(tags),
         )
         footprint = structure.footprint_W
-        fall = self._fall(footprint)
-        if fall > _STEEPEST:
-            return None
-        if fall > 0:
-            structure = replace(structure, xyz=(x, y, round(z - fall / 2, 3)))
         if within is not None and not within.contains(footprint):
             return None
         if not self.is_free(footprint, clearance):
@@ -163,6 +157,11 @@ class Draft:
         crown = Point(x, y).buffer(crown_part * _reach(model))
         if not crown.is_empty and not self._walls.is_free(crown):
             return None
+        fall = self._fall(footprint)
+        if fall > _STEEPEST:
+            return None
+        z = float(self.ground_height(np.array([x]), np.array([y]))[0])
+        structure = replace(structure, xyz=(x, y, round(z - fall / 2, 3)))
         self._occupancy.add(footprint)
         self.structures.append(structure)
         return structure
