@@ -29,7 +29,10 @@ from evaluation.maps import VoxelAccumulator
 from evaluation.retrieval import sample_frames
 from evaluation.tcr import temporal_change
 
-# Distance between two scans [m]; a recording has one every 0.5 m or so.
+# Distance between two scans [m]; a recording has one every 0.5 m or so. For
+# the three pairs of Metropolis the estimates are then within 0.001 of what
+# recordings give, and those of controls within 0.002 above it. At 4 m the
+# estimates are up to 0.003 higher.
 SCAN_SPACING = 2.0
 # Stands for a stage where `candidates` are meant.
 CANDIDATES = "candidates"
