@@ -151,3 +151,57 @@ def test_parapets_stand_on_both_sides_of_the_street_bridges(x):
         length = sum(wall.bounds[3] - wall.bounds[1] for wall in beside)
         assert RIVER[1] - RIVER[0] - 1.0 < length < RIVER[1] - RIVER[0]
         assert not any(wall.intersects(lanes) for wall in beside)
+
+
+def test_the_river_runs_from_bound_to_bound_below_its_banks():
+    x0, y0, x1, y1 = structures()["ground_river_water"].model.footprint.bounds
+    assert (y0, y1) == pytest.approx(RIVER)
+    ground = [
+        s.model.footprint.bounds
+        for s in structures().values()
+        if GROUND_TAG in s.tags
+    ]
+    # Quay walls are drawn a little longer than the world.
+    assert x0 == pytest.approx(min(b[0] for b in ground), abs=0.5)
+    assert x1 == pytest.approx(max(b[2] for b in ground), abs=0.5)
+    # Whatever stands on the banks stands above the water.
+    for structure in structures().values():
+        _, y, z = structure.xyz
+        if GROUND_TAG not in structure.tags and RIVER[0] - 9 < y < RIVER[1] + 9:
+            assert z > WATER + 2.0, structure.name
+
+
+def test_cars_park_in_bays_and_on_drives_but_in_no_lane():
+    network = load_road_network(world_of("riverside") / "roads.yaml")
+    lanes = network.lane_area()
+    shapely.prepare(lanes)
+    cars = [s for s in structures().values() if s.semantic_class == "car"]
+    for car in cars:
+        assert not lanes.intersects(car.footprint_W), car.name
+    bays = network.parking_bays()
+    in_bays = [car for car in cars if car.tags[0] == "bay"]
+    assert {car.tags[1] for car in in_bays} == {name for name, _ in bays}
+    for car in in_bays:
+        assert any(
+            area.contains(Point(car.xyz[:2]))
+            for (name, _), area in bays.items()
+            if name == car.tags[1]
+        ), car.name
+    # Bays take room from sidewalks, and leave room to walk.
+    for (name, _), area in bays.items():
+        assert not area.intersects(lanes.buffer(-0.01))
+        assert network.roads[name].sidewalk - network.roads[name].parking > 1.5
+
+
+def test_front_gardens_are_fenced():
+    """Along the garden street, but for paths and drives."""
+    runs = shapely.union_all(
+        [
+            s.footprint_W.buffer(0.1)
+            for s in structures().values()
+            if "gardens" in s.tags
+            and s.name.startswith(("hedge", "picket_fence", "garden_wall"))
+        ]
+    )
+    front = LineString([(100.0, -66.4), (301.0, -66.4)])
+    assert front.intersection(runs).length > 0.7 * front.length
