@@ -7,7 +7,8 @@ from small_map import box_visual, world_text
 import yaml
 
 from cns_drake.city.__main__ import main
-from cns_drake.city.calibration import Calibration, report_lines
+from cns_drake.city.calibration import Calibration
+from cns_drake.city.calibration_report import report_lines
 from cns_drake.errors import InputError
 from cns_drake.scenario import load_scenario
 from cns_drake.simulation import simulate

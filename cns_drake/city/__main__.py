@@ -89,7 +89,8 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _calibrate(world: Path, stages: list[str], target: float | None) -> None:
     # Only who calibrates needs the evaluation.
-    from cns_drake.city.calibration import Calibration, report_lines
+    from cns_drake.city.calibration import Calibration
+    from cns_drake.city.calibration_report import report_lines
 
     earlier, later = (
         load_scenario(world / f"sequence_{stage}.yaml") for stage in stages
