@@ -2,16 +2,23 @@
 
 import sys
 
+from cns_drake.interrupts import (
+    end_interrupted,
+    interrupt_on_termination,
+    uninterrupted,
+)
+
 
 def main() -> None:
     """Runs the command; an interrupt while it is imported is no fault."""
     try:
-        from cns_drake.cli import main as run
-
+        interrupt_on_termination()
+        with uninterrupted():
+            from cns_drake.cli import main as run
         run()
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
-        sys.exit(130)
+        end_interrupted()
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """The command `cns-drake`.
 
 Everything slow to import is imported by the command that needs it, so that
-`--help` and `list` answer at once.
+`--help` and `list` answer at once; interrupts wait meanwhile.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import typer
 
 from cns_drake import terminal
 from cns_drake.errors import InputError
+from cns_drake.interrupts import uninterrupted
 
 app = typer.Typer(
     help="Cities that change, driven and recorded by simulated LiDAR.",
@@ -66,11 +67,12 @@ def list_sequences(
     ] = None,
 ) -> None:
     """List sequences: length, duration, frames; the size of their stage."""
-    from rich.console import Console
-    from rich.table import Table
+    with uninterrupted():
+        from rich.console import Console
+        from rich.table import Table
 
-    from cns_drake.paths import shipped_maps
-    from cns_drake.sequence_table import sequence_rows
+        from cns_drake.paths import shipped_maps
+        from cns_drake.sequence_table import sequence_rows
 
     # Without a frame the table fits into 80 columns.
     table = Table("sequence", "map", "stage", box=None, padding=(0, 1, 0, 0))
@@ -113,7 +115,8 @@ def simulate(
     overwrite: Overwrite = False,
 ) -> None:
     """Drive a sequence and record it as a rosbag2 folder of MCAP."""
-    from cns_drake.sequence_script import run_sequence
+    with uninterrupted():
+        from cns_drake.sequence_script import run_sequence
 
     run_sequence(
         scenario,
@@ -144,12 +147,13 @@ def scan(
     lidar: LidarPreset = "cns",
 ) -> None:
     """Take one scan of any SDF world."""
-    import numpy as np
-    from pydrake.math import RigidTransform, RollPitchYaw
+    with uninterrupted():
+        import numpy as np
+        from pydrake.math import RigidTransform, RollPitchYaw
 
-    from cns_drake.scanning import check_ending, save_scan, scan_world
-    from cns_drake.scenario import make_lidar_config
-    from cns_drake.world import load_world
+        from cns_drake.scanning import check_ending, save_scan, scan_world
+        from cns_drake.scenario import make_lidar_config
+        from cns_drake.world import load_world
 
     if not np.isfinite(pose).all():
         raise InputError("--pose: not finite")
@@ -187,7 +191,8 @@ def export(
     ] = None,
 ) -> None:
     """Export a recorded sequence to a layout that exists already."""
-    from cns_drake.export.exporting import export_sequence
+    with uninterrupted():
+        from cns_drake.export.exporting import export_sequence
 
     with terminal.show_progress() as progress:
         task = progress.add_task(sequence.name, total=None, note="reading")
@@ -228,9 +233,10 @@ def generate(
     ] = None,
 ) -> None:
     """Record many sequences; skip finished ones, resume interrupted ones."""
-    from cns_drake.jobs import record_all
-    from cns_drake.paths import recordable_sequences
-    from cns_drake.scenario import load_scenario
+    with uninterrupted():
+        from cns_drake.jobs import record_all
+        from cns_drake.paths import recordable_sequences
+        from cns_drake.scenario import load_scenario
 
     if not names and vary is None:
         names = list(recordable_sequences())
@@ -262,7 +268,8 @@ def repair(
     ] = None,
 ) -> None:
     """Make a whole MCAP file of what is readable of a damaged one."""
-    from cns_drake.repair import repair_mcap
+    with uninterrupted():
+        from cns_drake.repair import repair_mcap
 
     with terminal.show_progress() as progress:
         task = progress.add_task(file.name, total=None, note="")
@@ -299,7 +306,8 @@ def reproduce(
     ] = 2,
 ) -> None:
     """Simulate a map's sequences, evaluate them and report."""
-    from cns_drake.reproduction import reproduce_maps
+    with uninterrupted():
+        from cns_drake.reproduction import reproduce_maps
 
     reproduce_maps(maps, output, jobs)
 

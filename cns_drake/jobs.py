@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import contextlib
 import multiprocessing
 import multiprocessing.connection
+import multiprocessing.resource_tracker
 import os
 from pathlib import Path
 import signal
@@ -23,10 +24,18 @@ import yaml
 from cns_drake import terminal
 from cns_drake.errors import InputError
 from cns_drake.frame_clock import frames_within
+from cns_drake.interrupts import (
+    end_interrupted,
+    interrupt_on_termination,
+    uninterrupted,
+)
 from cns_drake.planning import plan_drive
 from cns_drake.provenance import INPUTS_KEY, combined_digest, digest_inputs
 from cns_drake.recording_folder import RecordingFolder
 from cns_drake.scenario import Scenario, make_scenario
+
+# How long a process may take to close its recording [s].
+_PATIENCE = 30.0
 
 
 def record_all(
@@ -140,7 +149,9 @@ class _Job:
             daemon=True,
         )
         # Ctrl-C reaches all processes of a terminal at once, also those that
-        # have only begun to import. It is for the parent to end them.
+        # have only begun to import. It is for the parent to end them. The
+        # first start of a process would unblock the signal on its way.
+        multiprocessing.resource_tracker.ensure_running()
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             self.process.start()
@@ -174,18 +185,22 @@ def _stop(jobs) -> None:
     for job in jobs:
         job.process.terminate()
     for job in jobs:
+        job.process.join(_PATIENCE)
+        job.process.kill()
         job.process.join()
 
 
 def _record(scenario: Scenario, output: Path, overwrite: bool, sender) -> None:
     try:
-        terminal.interrupt_on_termination()
-        threading.Thread(target=_end_with_parent, daemon=True).start()
+        interrupt_on_termination(once=True)
+        with uninterrupted():  # The thread keeps it so: main is to be struck.
+            threading.Thread(target=_end_with_parent, daemon=True).start()
         _simulate(scenario, output, overwrite, sender)
     except InputError as error:
         _tell(sender, "fault", str(error))
     except KeyboardInterrupt:
         _tell(sender, "fault", f"{scenario.name}: interrupted")
+        end_interrupted()
     except BaseException as error:
         traceback.print_exc()
         _tell(
@@ -197,7 +212,8 @@ def _record(scenario: Scenario, output: Path, overwrite: bool, sender) -> None:
 
 
 def _simulate(scenario, output, overwrite, sender) -> None:
-    from cns_drake.simulation import simulate
+    with uninterrupted():
+        from cns_drake.simulation import simulate
 
     def on_frame(done: int, total: int) -> None:
         if done % 20 == 0 or done == total:

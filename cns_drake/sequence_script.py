@@ -16,6 +16,7 @@ from cns_drake.cli import (
     Overwrite,
     Recording,
 )
+from cns_drake.interrupts import uninterrupted
 
 if TYPE_CHECKING:
     from cns_drake.simulation import Run
@@ -45,9 +46,9 @@ def run_sequence(
     Raises:
         InputError: something of this cannot be used.
     """
-    # Slow to import; by now an interrupt ends the program in good order.
-    from cns_drake.scenario import load_scenario
-    from cns_drake.simulation import simulate
+    with uninterrupted():  # Slow to import, not needed for `--help`.
+        from cns_drake.scenario import load_scenario
+        from cns_drake.simulation import simulate
 
     scenario = load_scenario(name_or_file)
     if lidar is not None:

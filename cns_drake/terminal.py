@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 import contextlib
 import os
-import signal
 import sys
 import time
 
@@ -24,13 +23,18 @@ import typer
 
 from cns_drake.errors import InputError
 from cns_drake.frame_clock import FRAME_PERIOD
+from cns_drake.interrupts import (
+    INTERRUPTED,
+    end_interrupted,
+    ignore_interrupts,
+    interrupt_on_termination,
+)
 
 # What typer raises for bad usage; which module defines it depends on typer's
 # version.
 _UsageError = typer.BadParameter.__mro__[1]
 
 _BAD_INPUT = 2
-_INTERRUPTED = 130
 # Where there is no terminal, a line of progress this often [s].
 _LINE_INTERVAL = 5.0
 
@@ -46,7 +50,7 @@ def run(app: typer.Typer) -> None:
     try:
         interrupt_on_termination()
         status = app(standalone_mode=False)
-        if status == _INTERRUPTED:  # Typer has caught the interrupt itself.
+        if status == INTERRUPTED:  # Typer has caught the interrupt itself.
             message = "interrupted"
         sys.stdout.flush()
     except InputError as error:
@@ -54,7 +58,7 @@ def run(app: typer.Typer) -> None:
     except _UsageError as error:
         message, status = f"error: {error.format_message()}", _BAD_INPUT
     except (KeyboardInterrupt, typer.Abort):
-        message, status = "interrupted", _INTERRUPTED
+        message, status = "interrupted", INTERRUPTED
     except BrokenPipeError:
         # Whoever read the results has seen enough of them. Python flushes
         # once more at its end, which must not fail again.
@@ -64,20 +68,12 @@ def run(app: typer.Typer) -> None:
         message = f"error: {where}: {error.strerror or error}"
         status = _BAD_INPUT
     # What the command does is done; nothing is left to interrupt.
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.SIG_IGN)
+    ignore_interrupts()
     if message is not None:
         print(message, file=sys.stderr)
+    if status == INTERRUPTED:
+        end_interrupted()
     raise SystemExit(status)
-
-
-def interrupt_on_termination() -> None:
-    """Makes SIGTERM an exception, so that open recordings are closed."""
-
-    def interrupt(signal_number, frame):
-        raise KeyboardInterrupt
-
-    signal.signal(signal.SIGTERM, interrupt)
 
 
 class _ShortenedColumn(TextColumn):

@@ -17,7 +17,9 @@ from mcap.exceptions import McapError
 from mcap.reader import NonSeekingReader
 import numpy as np
 import pytest
-from tiny_drive import FRAMES, INTERRUPTED, run_and_tell, tiny_scenario
+from tiny_drive import FRAMES, run_and_tell, tiny_scenario
+
+from cns_drake.interrupts import INTERRUPTED
 
 KILLS = 50
 KILLS_EACH = 10

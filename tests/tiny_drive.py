@@ -6,12 +6,11 @@ import sys
 
 from small_map import box_visual, world_text
 
-from cns_drake import terminal
+from cns_drake.interrupts import INTERRUPTED, interrupt_on_termination
 from cns_drake.scenario import make_scenario
 from cns_drake.simulation import simulate
 
 FRAMES = 60
-INTERRUPTED = 130
 
 
 def tiny_scenario(folder, **changes):
@@ -53,7 +52,7 @@ def run_and_tell(scenario, output, sender):
     """
     status = INTERRUPTED
     with contextlib.suppress(KeyboardInterrupt):
-        terminal.interrupt_on_termination()
+        interrupt_on_termination()
         sender.send(0)
         simulate(
             scenario, output, on_frame=lambda done, total: sender.send(done)
