@@ -1,5 +1,7 @@
 """The error that a user can mend."""
 
+from evaluation.errors import one_line
+
 
 class InputError(Exception):
     """Input that cannot be used; the message is one line for the user.
@@ -7,6 +9,10 @@ class InputError(Exception):
     The message names the file (or argument), the field where there is one,
     and the fault. The command line prints it and exits with status 2.
     """
+
+    def __init__(self, message: object):
+        """Takes what to tell."""
+        super().__init__(one_line(message))
 
 
 def describe_validation_error(source, error) -> str:

@@ -10,6 +10,8 @@ from cns_drake.errors import InputError
 
 # A path must be longer than this for a trajectory to be made of it [m].
 _MIN_LENGTH = 20.0
+# And not be longer, for planning takes time and memory by the metre [m].
+_MAX_LENGTH = 100_000.0
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,24 @@ class LanePath:
         return self.spacing * (len(self.points) - 1)
 
 
+def check_length(length: float, source) -> None:
+    """Checks the length of a path [m].
+
+    Raises:
+        InputError: beginning with `source`, if no drive can be made of it.
+    """
+    if length < _MIN_LENGTH:
+        raise InputError(
+            f"{source}: {length:.1f} m long, at least {_MIN_LENGTH:.0f} m "
+            "are needed"
+        )
+    if length > _MAX_LENGTH:
+        raise InputError(
+            f"{source}: {length:.0f} m long, at most {_MAX_LENGTH:.0f} m can "
+            "be driven"
+        )
+
+
 def sample_lane_path(points, speed_limits, spacing: float, source) -> LanePath:
     """Returns evenly spaced points along a polyline.
 
@@ -45,16 +65,12 @@ def sample_lane_path(points, speed_limits, spacing: float, source) -> LanePath:
         source: what an error begins with.
 
     Raises:
-        InputError: the polyline is too short for a drive.
+        InputError: the polyline is too short or too long for a drive.
     """
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     travelled = np.concatenate([[0.0], np.cumsum(steps)])
     length = float(travelled[-1])
-    if length < _MIN_LENGTH:
-        raise InputError(
-            f"{source}: {length:.1f} m long, at least {_MIN_LENGTH:.0f} m "
-            "are needed"
-        )
+    check_length(length, source)
     count = max(1, round(length / spacing))
     wanted = np.linspace(0.0, length, count + 1)
     xyz = [np.interp(wanted, travelled, axis) for axis in points.T]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform
 
+from cns_drake.drake_log import told_by_drake
 from cns_drake.errors import InputError
 
 # The corners of a unit cube and its faces, counter-clockwise from outside.
@@ -35,6 +36,9 @@ _CUBE_TRIANGLES = np.array(
         (2, 6, 7), (2, 7, 3), (0, 4, 6), (0, 6, 2), (1, 3, 7), (1, 7, 5),
     ]
 )  # fmt: skip
+# Rays are cast in single precision: beyond this they tell no metre from the
+# next [m].
+_LARGEST = 1e7
 
 
 @dataclass(frozen=True)
@@ -120,7 +124,7 @@ def structure_name(geometry_name: str) -> str:
 
 
 def check_shape(name: str, shape: Shape) -> None:
-    """Checks that rays can be cast on a shape.
+    """Checks that rays can be cast on a shape, and that its size is sane.
 
     Args:
         name: of the geometry.
@@ -134,6 +138,21 @@ def check_shape(name: str, shape: Shape) -> None:
             f"geometry '{name}': a LiDAR cannot see a {type(shape).__name__}; "
             "use a box, sphere, cylinder, capsule, ellipsoid or mesh"
         )
+    if not np.max(_dimensions(shape)) <= _LARGEST:
+        raise InputError(f"geometry '{name}': larger than {_LARGEST:g} m")
+
+
+def _dimensions(shape: Shape) -> Sequence[float]:
+    """Returns what a shape's size is given by; of a mesh its file tells."""
+    if isinstance(shape, Mesh):
+        return (0.0,)
+    if isinstance(shape, Box):
+        return shape.size()
+    if isinstance(shape, Sphere):
+        return (shape.radius(),)
+    if isinstance(shape, Ellipsoid):
+        return (shape.a(), shape.b(), shape.c())
+    return (shape.radius(), shape.length())
 
 
 def read_perception_geometry(
@@ -209,7 +228,14 @@ class _MeshFiles:
         scale = shape.scale3()
         if np.prod(scale) < 0.0:  # A reflection turns the faces inside out.
             triangles = triangles[:, ::-1]
-        return TriangleSurface(surface.p_GVset * scale, triangles)
+        with np.errstate(over="ignore", invalid="ignore"):
+            p_GVset = surface.p_GVset * scale
+            is_small = np.abs(p_GVset).max() <= _LARGEST  # False for NaN.
+        if not is_small:
+            raise InputError(
+                f"{path}: geometry '{name}': larger than {_LARGEST:g} m"
+            )
+        return TriangleSurface(p_GVset, triangles)
 
 
 def _read_mesh_file(name: str, path: Path) -> TriangleSurface:
@@ -217,14 +243,13 @@ def _read_mesh_file(name: str, path: Path) -> TriangleSurface:
         raise InputError(f"{path}: geometry '{name}': no such mesh file")
     read = _read_obj if path.suffix.lower() == ".obj" else _read_with_open3d
     try:
-        p_GVset, triangles = read(path)
+        with told_by_drake():
+            p_GVset, triangles = read(path)
     except (RuntimeError, ValueError) as error:
         fault = " ".join(str(error).split())
         raise InputError(f"{path}: geometry '{name}': {fault}") from error
     if len(triangles) == 0:
         raise InputError(f"{path}: geometry '{name}': holds no triangles")
-    if not np.isfinite(p_GVset).all():
-        raise InputError(f"{path}: geometry '{name}': a vertex is not finite")
     return TriangleSurface(p_GVset, triangles)
 
 

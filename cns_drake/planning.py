@@ -21,6 +21,6 @@ def plan_drive(scenario: Scenario) -> Trajectory:
     else:
         network = load_road_network(scenario.roads_file)
         path = make_lane_path(
-            network, scenario.route, POINT_SPACING, scenario.name
+            network, scenario.route, POINT_SPACING, scenario.source
         )
     return Trajectory(path, scenario.speeds)

@@ -11,6 +11,7 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
+    PrivateAttr,
     StringConstraints,
     ValidationError,
     ValidationInfo,
@@ -18,7 +19,6 @@ from pydantic import (
     model_validator,
 )
 from pydrake.math import RigidTransform, RollPitchYaw
-import yaml
 
 from cns_drake.beam_pattern import (
     LIDAR_PRESETS,
@@ -31,6 +31,7 @@ from cns_drake.measurement import MeasurementModel
 from cns_drake.paths import sequence_name, shipped_maps, shipped_sequences
 from cns_drake.route import Route
 from cns_drake.speed_profile import Speeds
+from cns_drake.yaml_files import read_yaml
 
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_]*$")]
 Triple = tuple[float, float, float]
@@ -189,6 +190,9 @@ class Scenario(_Model):
     frames: int | None = Field(None, ge=1)
     seed: int = Field(0, ge=0)
 
+    # The file that it was read from.
+    _file: Path | None = PrivateAttr(None)
+
     # A field that did not validate is missing in `info.data`: then its own
     # fault is enough.
 
@@ -230,6 +234,17 @@ class Scenario(_Model):
             raise ValueError(f"'{taken.pop()}' is the name of another frame")
         return lidars
 
+    def __eq__(self, other) -> bool:
+        """Tells whether two are the same, wherever they were read from."""
+        if not isinstance(other, Scenario):
+            return NotImplemented
+        return self.__dict__ == other.__dict__
+
+    @property
+    def source(self) -> str:
+        """What errors begin with: its file, or else its name."""
+        return str(self._file or self.name)
+
     @property
     def map_folder(self) -> Path:
         """The folder of the map; of a world, where its file is."""
@@ -263,15 +278,16 @@ class Scenario(_Model):
         }
         return self.model_copy(update={"lidars": lidars})
 
-    def check_files(self, source="scenario") -> None:
+    def check_files(self, source=None) -> None:
         """Checks that the map and its stage, or the other files, exist.
 
         Args:
-            source: the file or name that errors begin with.
+            source: the file that errors begin with; by default its own.
 
         Raises:
             InputError: they do not.
         """
+        source = source or self.source
         for field in ("world", "waypoints"):
             file = getattr(self, field)
             if file is not None and not Path(file).is_file():
@@ -340,11 +356,7 @@ def load_scenario(name_or_file: str | Path) -> Scenario:
                 f"{', '.join(shipped)}; or give a scenario file"
             )
         raise InputError(f"{path}: no such scenario file")
-    try:
-        values = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        fault = " ".join(str(error).split())
-        raise InputError(f"{path}: not readable as YAML: {fault}") from None
+    values = read_yaml(path)
     if not isinstance(values, dict):
         raise InputError(f"{path}: not a mapping of scenario fields")
     values.setdefault("name", sequence_name(path))
@@ -354,5 +366,6 @@ def load_scenario(name_or_file: str | Path) -> Scenario:
             # Relative to the file, independent of where it is read from.
             values[field] = str((path.parent / place).resolve())
     scenario = make_scenario(values, path)
-    scenario.check_files(path)
+    scenario._file = path
+    scenario.check_files()
     return scenario

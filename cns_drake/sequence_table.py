@@ -14,11 +14,11 @@ import io
 from pathlib import Path
 import zlib
 
-import yaml
-
+from cns_drake.csv_files import read_records
 from cns_drake.errors import InputError
 from cns_drake.files import complete_part, user_errors, write_part
 from cns_drake.paths import sequence_name
+from cns_drake.yaml_files import read_yaml
 
 TABLE_NAME = "sequences.csv"
 
@@ -103,13 +103,7 @@ def write_table(
 
 
 def _entries(path: Path) -> dict:
-    with user_errors(path):
-        text = path.read_bytes()
-    try:
-        entries = yaml.load(text, yaml.CSafeLoader)
-    except yaml.YAMLError as error:
-        fault = " ".join(str(error).split())
-        raise InputError(f"{path}: not readable as YAML: {fault}") from None
+    entries = read_yaml(path)
     if not isinstance(entries, dict):
         raise InputError(f"{path}: not a mapping of scenario fields")
     return entries
@@ -132,12 +126,11 @@ def _read(path: Path) -> list[SequenceRow]:
     types |= dict.fromkeys(("frames", "structures", "triangles"), int)
     names = [field.name for field in fields(SequenceRow)]
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            return [
-                SequenceRow(*(types.get(n, str)(row[n]) for n in names))
-                for row in csv.DictReader(file)
-            ]
-    except (OSError, KeyError, ValueError, TypeError):
+        return [
+            SequenceRow(*(types.get(n, str)(row[n]) for n in names))
+            for _, row in read_records(path, names)
+        ]
+    except (InputError, ValueError):
         return []
 
 

@@ -103,13 +103,13 @@ def simulate(
             check_writable(file)
     # What can be found wrong at once is found before anything slow.
     files.check(overwrite)
-    scenario.check_files(scenario.name)
+    scenario.check_files()
     trajectory = plan_drive(scenario)
     available = frames_within(trajectory.duration)
     num_frames = scenario.frames or available
     if num_frames > available:
         raise InputError(
-            f"{scenario.name}: frames: {num_frames} asked for, but the route "
+            f"{scenario.source}: frames: {num_frames} asked for, but the route "
             f"takes only {available}"
         )
     scenario = scenario.model_copy(update={"frames": num_frames})

@@ -22,7 +22,7 @@ _MARGIN = 0.998
 # The smoothed drive runs ahead of the unsmoothed by less than this [m].
 _SMOOTHING_SLACK = 0.2
 
-Acceleration = Annotated[float, Field(gt=0, le=9.81, allow_inf_nan=False)]
+Acceleration = Annotated[float, Field(ge=0.05, le=9.81, allow_inf_nan=False)]
 
 
 class Speeds(BaseModel):
@@ -36,7 +36,7 @@ class Speeds(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
-    cruise: float = Field(13.5, gt=0, le=60, allow_inf_nan=False)
+    cruise: float = Field(13.5, ge=0.5, le=60, allow_inf_nan=False)
     longitudinal_acceleration: Acceleration = 2.0
     lateral_acceleration: Acceleration = 3.0
 

@@ -7,13 +7,13 @@ from pathlib import Path
 from matplotlib.figure import Figure
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
-import yaml
 
 from cns_drake.beam_pattern import make_beam_pattern
 from cns_drake.errors import InputError, describe_validation_error
 from cns_drake.files import complete_part, part_path, user_errors
 from cns_drake.frame_clock import FRAME_PERIOD
 from cns_drake.stage_scene import StageScene, View
+from cns_drake.yaml_files import read_yaml
 
 _WIDTH, _HEIGHT = 960, 540
 # Height of the LiDAR below the camera's mast [m].
@@ -26,17 +26,11 @@ def load_views(path: Path) -> dict[str, View]:
     Raises:
         InputError: the file is missing or not a mapping of views.
     """
-    with user_errors(path):
-        text = path.read_text(encoding="utf-8")
+    content = read_yaml(path)
     try:
-        return TypeAdapter(dict[str, View]).validate_python(
-            yaml.safe_load(text)
-        )
+        return TypeAdapter(dict[str, View]).validate_python(content)
     except ValidationError as error:
         raise InputError(describe_validation_error(path, error)) from None
-    except yaml.YAMLError as error:
-        fault = " ".join(str(error).split())
-        raise InputError(f"{path}: not readable as YAML: {fault}") from None
 
 
 def draw_stages(stages: dict[str, Path], view: View, path: Path) -> None:

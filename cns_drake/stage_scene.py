@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydrake.math import RigidTransform
 
 from cns_drake.perception_geometry import read_perception_geometry
 from cns_drake.ray_casting import RayCastingScene, RayHits
 from cns_drake.rendering import HAZE_LENGTH, look_at, render
 from cns_drake.world import load_world
+
+_Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
+Place = tuple[_Coordinate, _Coordinate, _Coordinate]
 
 
 class View(BaseModel):
@@ -26,9 +30,15 @@ class View(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    position: tuple[float, float, float]
-    target: tuple[float, float, float]
-    fov_y: float = 50.0
+    position: Place
+    target: Place
+    fov_y: float = Field(50.0, ge=0.1, le=179.0)
+
+    @model_validator(mode="after")
+    def _looks_somewhere(self) -> View:
+        if np.linalg.norm(np.subtract(self.target, self.position)) < 1e-3:
+            raise ValueError("position and target are the same")
+        return self
 
     def pose(self) -> RigidTransform:
         """Returns X_WC; x forward, y left, z up."""

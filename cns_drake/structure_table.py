@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 
+from cns_drake.csv_files import read_records
 from cns_drake.errors import InputError
 from cns_drake.semantics import CLASS_IDS
 
@@ -74,32 +74,27 @@ def load_structure_table(path: Path) -> StructureTable:
     """
     entries: dict[str, StructureEntry] = {}
     instances: set[int] = set()
-    with path.open(newline="", encoding="utf-8") as file:
-        reader = csv.DictReader(file)
-        for column in ("instance", "name", "class"):
-            if column not in (reader.fieldnames or ()):
-                raise InputError(f"{path}: no column '{column}'")
-        for row in reader:
-            where = f"{path}: line {reader.line_num}"
-            name, semantic_class = row["name"], row["class"]
-            try:
-                instance = int(row["instance"])
-            except (TypeError, ValueError):
-                raise InputError(
-                    f"{where}: instance: {row['instance']!r} is not a number"
-                ) from None
-            if not 1 <= instance <= _MAX_INSTANCE or instance in instances:
-                raise InputError(
-                    f"{where}: instance: {instance} is not a new number from "
-                    f"1 to {_MAX_INSTANCE}"
-                )
-            if semantic_class not in CLASS_IDS:
-                raise InputError(
-                    f"{where}: class: '{semantic_class}' is none of "
-                    f"{', '.join(CLASS_IDS)}"
-                )
-            if not name or name in entries:
-                raise InputError(f"{where}: name: '{name}' is not a new name")
-            instances.add(instance)
-            entries[name] = StructureEntry(instance, name, semantic_class)
+    for line, row in read_records(path, ("instance", "name", "class")):
+        where = f"{path}: line {line}"
+        name, semantic_class = row["name"], row["class"]
+        try:
+            instance = int(row["instance"])
+        except ValueError:
+            raise InputError(
+                f"{where}: instance: {row['instance']!r} is not a number"
+            ) from None
+        if not 1 <= instance <= _MAX_INSTANCE or instance in instances:
+            raise InputError(
+                f"{where}: instance: {instance} is not a new number from "
+                f"1 to {_MAX_INSTANCE}"
+            )
+        if semantic_class not in CLASS_IDS:
+            raise InputError(
+                f"{where}: class: '{semantic_class}' is none of "
+                f"{', '.join(CLASS_IDS)}"
+            )
+        if not name or name in entries:
+            raise InputError(f"{where}: name: '{name}' is not a new name")
+        instances.add(instance)
+        entries[name] = StructureEntry(instance, name, semantic_class)
     return StructureTable(entries.values())

@@ -9,7 +9,6 @@ LiDARs multiply the family. Every member is a scenario of its own.
 from __future__ import annotations
 
 from collections.abc import Sequence
-import csv
 from itertools import product
 from pathlib import Path
 from typing import Annotated
@@ -25,12 +24,14 @@ from pydantic import (
 import yaml
 
 from cns_drake.city.roads.network import load_road_network
+from cns_drake.csv_files import read_records
 from cns_drake.errors import InputError, describe_validation_error
 from cns_drake.files import complete_part, user_errors, write_part
 from cns_drake.paths import shipped_sequences
 from cns_drake.route import Route
 from cns_drake.route_drawing import draw_route
 from cns_drake.scenario import Scenario, load_scenario
+from cns_drake.yaml_files import read_yaml
 
 # What can be missing; streets, ground and street furniture stay.
 _REMOVABLE = ("building", "vegetation")
@@ -104,13 +105,9 @@ def load_family(path: Path) -> list[Scenario]:
     Raises:
         InputError: the file or what it refers to cannot be used.
     """
-    with user_errors(path):
-        text = path.read_bytes()
+    values = read_yaml(path)
     try:
-        family = Family.model_validate(yaml.safe_load(text))
-    except yaml.YAMLError as error:
-        fault = " ".join(str(error).split())
-        raise InputError(f"{path}: not readable as YAML: {fault}") from None
+        family = Family.model_validate(values)
     except ValidationError as error:
         raise InputError(describe_validation_error(path, error)) from None
     base = family.base
@@ -212,23 +209,20 @@ def _decay_order(table: Path, seed: int) -> list[str]:
         InputError: the table cannot be read or does not say where things
             are.
     """
-    with user_errors(table):
-        text = table.read_text(encoding="utf-8")
     rows = [
         row
-        for row in csv.DictReader(text.splitlines())
-        if row.get("class") in _REMOVABLE
+        for _, row in read_records(table, ("name", "class"))
+        if row["class"] in _REMOVABLE
     ]
     if not rows:
         raise InputError(f"{table}: nothing in it that could be missing")
     try:
         xy = np.array([(float(row["x"]), float(row["y"])) for row in rows])
-        names = [row["name"] for row in rows]
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, ValueError):
         raise InputError(
             f"{table}: x, y: not the place of every structure"
         ) from None
     rng = np.random.default_rng(seed)
     low, high = xy.min(axis=0), xy.max(axis=0)
     distance = np.linalg.norm(xy - rng.uniform(low, high), axis=1)
-    return [names[k] for k in np.argsort(distance, kind="stable")]
+    return [rows[k]["name"] for k in np.argsort(distance, kind="stable")]

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from cns_drake.city.roads.centreline import Centreline
+from cns_drake.csv_files import read_rows
 from cns_drake.errors import InputError
-from cns_drake.lane_path import LanePath, sample_lane_path
+from cns_drake.lane_path import LanePath, check_length, sample_lane_path
 
 # Corners are rounded by arcs of this radius, or what fits between the
 # neighbouring waypoints [m].
@@ -19,6 +19,8 @@ _CORNER_RADIUS = 8.0
 _SHARPEST_TURN_DEG = 150.0
 # Waypoints closer than this to the one before are taken for the same [m].
 _SAME_PLACE = 1e-3
+# Beyond this a coordinate is a slip, not a place [m].
+_FARTHEST = 1_000_000.0
 # Distance between the points from which the path is interpolated [m].
 _DENSE_SPACING = 0.25
 
@@ -63,7 +65,7 @@ def make_waypoint_path(
 
     Raises:
         InputError: fewer than two different waypoints, a turn by more than
-            150 degrees, or less than 20 m to drive.
+            150 degrees, or too little or too much to drive.
     """
     waypoints = np.asarray(waypoints, dtype=float)
     if names is None:
@@ -86,6 +88,7 @@ def make_waypoint_path(
     tangents = np.tan(turns / 2)
     radii = np.minimum(_CORNER_RADIUS, room / np.maximum(tangents, 1e-9))
     curve = Centreline(waypoints[:, :2], radii)
+    check_length(curve.length, source)
     count = int(np.ceil(curve.length / _DENSE_SPACING)) + 1
     along = np.linspace(0.0, curve.length, count)
     # Where the curve passes each waypoint: the middle of its corner's arc.
@@ -101,19 +104,10 @@ def make_waypoint_path(
 
 def _read(path: Path) -> tuple[np.ndarray, list[int]]:
     """Returns the (N, 3) waypoints of a file and the lines they are on."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not UTF-8 text"
-        raise InputError(f"{path}: {reason}") from error
     points, lines = [], []
     columns = None
-    reader = csv.reader(text.splitlines(), skipinitialspace=True)
-    for row in reader:
-        cells = [cell.strip() for cell in row]
-        if not any(cells):
-            continue
-        where = f"{path}: line {reader.line_num}"
+    for line, cells in read_rows(path):
+        where = f"{path}: line {line}"
         if columns is None:
             columns = _columns(cells, where)
             if not _is_number(cells[columns[0]]):
@@ -124,9 +118,13 @@ def _read(path: Path) -> tuple[np.ndarray, list[int]]:
         for value in values:
             if not _is_number(value):
                 raise InputError(f"{where}: {value!r} is not a finite number")
+            if abs(float(value)) > _FARTHEST:
+                raise InputError(
+                    f"{where}: {value} m are more than {_FARTHEST:.0f} m"
+                )
         x, y, *z = map(float, values)
         points.append((x, y, z[0] if z else 0.0))
-        lines.append(reader.line_num)
+        lines.append(line)
     if not points:
         raise InputError(f"{path}: no waypoint")
     return np.array(points), lines

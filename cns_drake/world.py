@@ -12,6 +12,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 
+from cns_drake.drake_log import told_by_drake
 from cns_drake.errors import InputError
 from cns_drake.perception_geometry import check_shape, structure_name
 from cns_drake.structure_table import StructureTable, load_structure_table
@@ -71,6 +72,7 @@ def load_world(
     plant.RegisterAsSourceForSceneGraph(scene_graph)
     parser = Parser(plant)
     _parse(parser, sdf)
+    _check_names(scene_graph, sdf)
     if without:
         _remove(scene_graph, plant.get_source_id(), set(without), sdf)
     inspector = scene_graph.model_inspector()
@@ -103,6 +105,15 @@ def load_world(
     return World(scene_graph, plant, vehicle_model, entries)
 
 
+def _check_names(scene_graph: SceneGraph, sdf: Path) -> None:
+    inspector = scene_graph.model_inspector()
+    for geometry_id in inspector.GetAllGeometryIds():
+        try:
+            inspector.GetName(geometry_id)
+        except UnicodeDecodeError:
+            raise InputError(f"{sdf}: a name is not UTF-8 text") from None
+
+
 def _remove(
     scene_graph: SceneGraph, source_id, names: set[str], sdf: Path
 ) -> None:
@@ -122,17 +133,29 @@ def _remove(
 def _parse(parser: Parser, path: Path) -> list[ModelInstanceIndex]:
     if not path.is_file():
         raise InputError(f"{path}: no such file")
-    try:
-        models = parser.AddModels(str(path))
-    except RuntimeError as error:
-        # Drake and libsdformat begin with the path and a severity, too.
-        fault = " ".join(str(error).split())
-        fault = re.sub(
+    with told_by_drake() as errors:
+        try:
+            models = parser.AddModels(str(path))
+        except (RuntimeError, UnicodeDecodeError) as error:
+            raise _parse_fault(path, str(error), *errors) from error
+        if errors:
+            raise _parse_fault(path, *errors)
+    if not models:
+        raise InputError(f"{path}: holds no model")
+    return models
+
+
+def _parse_fault(path: Path, *texts: str) -> InputError:
+    """Returns the error that tells the first two of what Drake told."""
+    # Drake and libsdformat begin with the path, a severity and a code.
+    faults = [" ".join(text.split()) for text in texts[:2]]
+    faults = [re.sub(r"^SDFormat Error .*?Msg: ", "", f) for f in faults]
+    faults = [
+        re.sub(
             rf"/*{re.escape(str(path))}:(?:(\d+):)? error: ",
             lambda match: f"line {match[1]}: " if match[1] else "",
             fault,
         )
-        raise InputError(f"{path}: cannot be parsed: {fault}") from error
-    if not models:
-        raise InputError(f"{path}: holds no model")
-    return models
+        for fault in faults
+    ]
+    return InputError(f"{path}: cannot be parsed: {': '.join(faults)}")

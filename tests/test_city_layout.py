@@ -160,7 +160,7 @@ def poses(city: City) -> list:
         ("size: [16, 14], ", "", "give either size or outline"),
         ("spacing: 8", "spacing: eight", "scatter.0.spacing"),
         ("relief: 1.5", "releif: 1.5", "districts.1.releif: Extra inputs"),
-        ("seed: 3", "seed: [", "not YAML"),
+        ("seed: 3", "seed: [", "not readable as YAML"),
         (PLAN, "", "(top level)"),
     ],
 )

@@ -54,7 +54,7 @@ def test_there_is_no_stage_03(tmp_path):
         ('"01"', '"one"', "stages.one"),
         ("story: a tower", "tale: a tower", "stages.02.story"),
         ("candidates", "candidate", "candidate: Extra inputs"),
-        ("stages:", "stages: [", "not YAML"),
+        ("stages:", "stages: [", "not readable as YAML"),
         (GOOD, "stages: {}", "at least one stage"),
         (GOOD, "", "(top level)"),
     ],

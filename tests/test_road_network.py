@@ -431,7 +431,7 @@ def test_faults_name_file_field_and_fault(load, cross, fault):
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
-        ("roads: [", "not YAML"),
+        ("roads: [", "not readable as YAML"),
         ("- 1", r"\(top level\)"),
         ("", r"\(top level\)"),
         ("roads: {}\njunctions: {}", "junctions: Dictionary should have at"),
@@ -449,7 +449,7 @@ def test_files_that_cannot_be_read(tmp_path):
     with pytest.raises(InputError, match=r"gone\.yaml: No such file"):
         load_road_network(tmp_path / "gone.yaml")
     (tmp_path / "binary.yaml").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(InputError, match="not UTF-8"):
+    with pytest.raises(InputError, match="not readable as YAML"):
         load_road_network(tmp_path / "binary.yaml")
 
 

@@ -8,6 +8,7 @@ import yaml
 
 from cns_drake.errors import InputError
 from cns_drake.paths import recordable_sequences
+from cns_drake.planning import plan_drive
 from cns_drake.scenario import LidarConfig, Mount, load_scenario, make_scenario
 
 
@@ -137,3 +138,30 @@ def test_files_that_are_no_scenario(tmp_path, text, fault):
 def test_unknown_sequence_names_the_known_ones():
     with pytest.raises(InputError, match=r"'metropolis_99'; .*metropolis_04"):
         load_scenario("metropolis_99")
+
+
+def test_errors_of_the_route_name_the_file(small_map, tmp_path):
+    values = scenario_values(small_map) | {"name": "drive"}
+    path = tmp_path / "drive.yaml"
+    path.write_text(
+        yaml.safe_dump(
+            values | {"route": [dict(values["route"][0], road="milky_way")]}
+        )
+    )
+    for scenario in (
+        load_scenario(path),
+        load_scenario(path).with_lidar_preset("vlp-16"),
+    ):
+        with pytest.raises(InputError, match=r"drive\.yaml: route\.0 \(milky"):
+            plan_drive(scenario)
+
+
+def test_where_it_was_read_from_makes_no_other_scenario(small_map, tmp_path):
+    values = scenario_values(small_map)
+    path = tmp_path / "drive.yaml"
+    path.write_text(yaml.safe_dump(values))
+    loaded = load_scenario(path)
+    assert loaded == make_scenario(values, "test")
+    assert loaded != make_scenario(values | {"seed": 1}, "test")
+    assert loaded.source == str(path)
+    assert make_scenario(values, "test").source == values["name"]

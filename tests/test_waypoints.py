@@ -118,6 +118,8 @@ def test_ways_to_write_the_same(load, text):
         ("0,0,0,0\n", r"line 1: 4 column\(s\), not x, y or x, y, z"),
         ("lat,lon\n1,2\n", r"line 1: neither numbers nor the names"),
         ("0,0\n12,0\n", r"drive\.csv: 12\.0 m long, at least 20 m"),
+        ("0,0\n30,0\n1e7,0\n", r"line 3: 1e7 m are more than 1000000 m"),
+        ("0,0\n9e5,0\n", r"drive\.csv: 900000 m long, at most 100000 m"),
         ("0,0\n30,0\n1,1\n", r"line 2: turns by 178 deg"),
         ("x,y\n0,0\n30,0\n30,0\n1,1\n", r"line 3: turns by 178 deg"),
     ],

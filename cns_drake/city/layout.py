@@ -68,7 +68,12 @@ def make_city(world: Path) -> City:
     Raises:
         InputError: if one of the files cannot be used.
     """
-    network = load_road_network(world / "roads.yaml")
+    roads = world / "roads.yaml"
+    network = load_road_network(roads)
+    try:
+        network.carriageway()
+    except ValueError as error:
+        raise InputError(f"{roads}: {error}") from error
     source = world / "city.yaml"
     return lay_out(network, load_plan(source), str(source))
 

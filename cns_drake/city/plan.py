@@ -12,9 +12,9 @@ from pydantic import (
     ValidationError,
     model_validator,
 )
-import yaml
 
 from cns_drake.errors import InputError, describe_validation_error
+from cns_drake.yaml_files import read_yaml
 
 Point = tuple[float, float]
 # Least and greatest value of something that is drawn.
@@ -276,14 +276,8 @@ def load_plan(path: Path) -> CityPlan:
     Raises:
         InputError: if it cannot be read or has a wrong key or type.
     """
+    content = read_yaml(path)
     try:
-        return CityPlan.model_validate(
-            yaml.safe_load(path.read_text(encoding="utf-8"))
-        )
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        fault = " ".join(str(error).split())
-        raise InputError(f"{path}: not YAML: {fault}") from error
+        return CityPlan.model_validate(content)
     except ValidationError as error:
         raise InputError(describe_validation_error(path, error)) from error

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
-import yaml
 
 from cns_drake.errors import InputError, describe_validation_error
+from cns_drake.yaml_files import read_yaml
 
 StageName = Annotated[str, Field(pattern=r"^\d\d$")]
 
@@ -75,15 +75,9 @@ def load_stages(path: Path, structures: Collection[str]) -> Stages:
             stages are out of order, the last one lacks something, or a name
             is unknown or listed twice.
     """
+    content = read_yaml(path)
     try:
-        stages = Stages.model_validate(
-            yaml.safe_load(path.read_text(encoding="utf-8"))
-        )
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        fault = " ".join(str(error).split())
-        raise InputError(f"{path}: not YAML: {fault}") from error
+        stages = Stages.model_validate(content)
     except ValidationError as error:
         raise InputError(describe_validation_error(path, error)) from error
     _check(stages, path, set(structures))

@@ -32,6 +32,7 @@ from evaluation.sequences.scan_files import (
 )
 from evaluation.sequences.text_tables import read_stamped_rows
 from evaluation.sequences.trajectory import pose_matrices, read_quaternions
+from evaluation.yaml_text import parse_yaml
 
 _POSES = "gt.csv"
 _IMU = "imu.csv"
@@ -126,12 +127,11 @@ def _read_mount(path: Path | None) -> np.ndarray:
         text = path.read_text(encoding="utf-8")
         # OpenCV begins its files with a directive that YAML does not know.
         lines = [x for x in text.splitlines() if not x.startswith("%")]
-        X_BS = _find_pose(yaml.load("\n".join(lines), _Loader), path)
+        X_BS = _find_pose(parse_yaml("\n".join(lines), _Loader), path)
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}") from error
-    except (yaml.YAMLError, UnicodeDecodeError, ValueError) as error:
-        # YAML's messages have several lines.
-        raise InputError(f"{path}: {' '.join(str(error).split())}") from error
+    except ValueError as error:
+        raise InputError(f"{path}: {error}") from error
     if X_BS is None:
         raise InputError(
             f"{path}: no transformation (a matrix of 4 x 4 or 3 x 4 numbers,"

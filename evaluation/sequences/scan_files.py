@@ -8,11 +8,11 @@ from pathlib import Path
 import re
 
 import numpy as np
-import yaml
 
 from evaluation.errors import InputError
 from evaluation.sequences.sequence import Sequence
 from evaluation.sequences.text_tables import check_increasing, parse_stamps_ns
+from evaluation.yaml_text import parse_yaml
 
 # A drive's name also names files.
 _NAME = re.compile(r"\w[\w.-]*")
@@ -109,12 +109,11 @@ def read_scenario(folder: Path) -> Mapping | None:
     if not path.is_file():
         return None
     try:
-        scenario = yaml.safe_load(path.read_text(encoding="utf-8"))
+        scenario = parse_yaml(path.read_bytes())
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}") from error
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        # YAML's messages have several lines.
-        raise InputError(f"{path}: {' '.join(str(error).split())}") from error
+    except ValueError as error:
+        raise InputError(f"{path}: {error}") from error
     if not isinstance(scenario, dict):
         raise InputError(f"{path}: no mapping of a scenario's fields")
     name = scenario.get("name")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import itertools
 
 import numpy as np
-from shapely import set_precision, unary_union
+from shapely import GEOSException, set_precision, unary_union
 from shapely.geometry import LineString, MultiPolygon, Point, Polygon
 
 # Segments of a quarter circle in rounded outlines: a kerb of 13 m radius is
@@ -49,6 +49,9 @@ def corner_setback(half_width, other_half_width, angle, kerb_radius) -> float:
         angle: between the two roads [rad].
         kerb_radius: r [m].
     """
+    # Roads that lie upon one another never part.
+    if angle < 1e-6:
+        return np.inf
     # Towards a straight angle the corner, and with it the need, vanishes.
     if angle > np.radians(150.0):
         return kerb_radius
@@ -185,8 +188,16 @@ def _simplified(area):
     On an evenly sampled arc many vertices are equally dispensable. Rounding
     before, not after, makes the choice independent of the last bits, which
     differ from one version of the numerical libraries to the next.
+
+    Raises:
+        ValueError: if the outline crosses itself.
     """
-    return set_precision(area, _GRID).simplify(_SIMPLIFY)
+    try:
+        return set_precision(area, _GRID).simplify(_SIMPLIFY)
+    except GEOSException as error:
+        raise ValueError(
+            f"the outline crosses itself, as in too tight a bend ({error})"
+        ) from error
 
 
 def _join(parts):

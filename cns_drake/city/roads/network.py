@@ -343,7 +343,12 @@ def _derived_setback(ends, k: int, kerb_radius: float) -> float:
 
 def _check_crossings(path, network: RoadNetwork):
     names = list(network.roads)
-    strips = [carriageway.road_strip(network.roads[name]) for name in names]
+    strips = []
+    for name in names:
+        try:
+            strips.append(carriageway.road_strip(network.roads[name]))
+        except ValueError as error:
+            raise InputError(f"{path}: roads.{name}: {error}") from error
     pairs = STRtree(strips).query(strips, predicate="intersects")
     for a, b in sorted(pairs.T.tolist()):
         if a < b and strips[a].intersection(strips[b]).area > (

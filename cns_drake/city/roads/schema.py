@@ -6,13 +6,15 @@ from pathlib import Path
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError
-import yaml
 
 from cns_drake.errors import InputError, describe_validation_error
+from cns_drake.yaml_files import read_yaml
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
+# A town is not larger, nor anything in it wider [m].
+_LARGEST = 100_000.0
+Finite = Annotated[float, Field(ge=-_LARGEST, le=_LARGEST, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, le=_LARGEST, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0, le=_LARGEST, allow_inf_nan=False)]
 LaneCount = Annotated[int, Field(ge=0, le=4)]
 # YAML has lists where the models have tuples; numbers stay strict.
 Corner = Annotated[tuple[Finite, Finite, NonNegative], Strict(False)]
@@ -101,14 +103,7 @@ def read_roads_file(path) -> RoadsFile:
             key, a missing one or a value of the wrong type.
     """
     path = Path(path)
-    try:
-        content = yaml.load(path.read_text(encoding="utf-8"), yaml.CSafeLoader)
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not UTF-8 text"
-        raise InputError(f"{path}: {reason}") from error
-    except yaml.YAMLError as error:
-        fault = " ".join(str(error).split())
-        raise InputError(f"{path}: not YAML: {fault}") from error
+    content = read_yaml(path)
     try:
         return RoadsFile.model_validate(_with_defaults(content))
     except ValidationError as error:

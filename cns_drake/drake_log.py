@@ -1,0 +1,37 @@
+"""What Drake logs while it reads a file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import contextlib
+import logging
+
+
+@contextlib.contextmanager
+def told_by_drake() -> Iterator[list[str]]:
+    """Collects what Drake logs as errors, which else would be printed.
+
+    Warnings are passed on at the end if nothing was raised meanwhile: beside
+    an error they would be a second line.
+    """
+    errors: list[str] = []
+    records: list[logging.LogRecord] = []
+
+    class Collector(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            if record.levelno >= logging.ERROR:
+                errors.append(record.getMessage())
+            else:
+                records.append(record)
+
+    logger = logging.getLogger("drake")
+    collector, propagate = Collector(), logger.propagate
+    logger.addHandler(collector)
+    logger.propagate = False
+    try:
+        yield errors
+    finally:
+        logger.removeHandler(collector)
+        logger.propagate = propagate
+    for record in records:
+        logger.handle(record)
