@@ -11,7 +11,7 @@ from typing import NoReturn
 
 # Exit status of a process that was interrupted, as shells have it.
 INTERRUPTED = 130
-_SIGNALS = {signal.SIGINT, signal.SIGTERM}
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 def interrupt_on_termination(once: bool = False) -> None:
@@ -35,13 +35,21 @@ def uninterrupted() -> Iterator[None]:
     """Makes interrupts wait; for imports.
 
     An extension module that is interrupted while it is initialised fails
-    with another error, or brings the process down later.
+    with another error, or brings the process down later. Blocking the
+    signals would not do: a library's threads can take them as well.
     """
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
+    waiting: list[int] = []
+    before = {
+        number: signal.signal(number, lambda n, frame: waiting.append(n))
+        for number in _SIGNALS
+    }
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        if waiting:
+            signal.raise_signal(waiting[0])
 
 
 def ignore_interrupts() -> None:

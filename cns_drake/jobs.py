@@ -193,8 +193,7 @@ def _stop(jobs) -> None:
 def _record(scenario: Scenario, output: Path, overwrite: bool, sender) -> None:
     try:
         interrupt_on_termination(once=True)
-        with uninterrupted():  # The thread keeps it so: main is to be struck.
-            threading.Thread(target=_end_with_parent, daemon=True).start()
+        threading.Thread(target=_end_with_parent, daemon=True).start()
         _simulate(scenario, output, overwrite, sender)
     except InputError as error:
         _tell(sender, "fault", str(error))

@@ -95,7 +95,7 @@ def _referenced_files(model: Path) -> set[str]:
             place = file.parent / uri
             name = os.path.relpath(place, model.parent)
             # Only what is really a file: no folder, no device.
-            if name not in found and place.is_file():
+            if name not in found and os.path.isfile(place):
                 found.add(name)
                 if place.suffix == ".sdf":
                     waiting.append(place)
