@@ -19,16 +19,18 @@ import subprocess
 import tempfile
 
 import numpy as np
-import open3d
-from pydrake.geometry import FrameId, GeometryId
-from pydrake.math import RigidTransform, RollPitchYaw
-from stages import interleaved, read_stage, sensor_poses
+from stages import (
+    MovingCars,
+    Open3dStage,
+    count_triangles,
+    interleaved,
+    read_stage,
+    sensor_poses,
+    still,
+)
 
 from cns_drake.beam_pattern import make_beam_pattern
-from cns_drake.open3d_scene import Open3dScene
-from cns_drake.perception_geometry import PerceptionGeometry, TriangleSurface
 from cns_drake.ray_casting import RayCastingScene
-from cns_drake.ray_groups import group_geometries
 
 SEQUENCES = ("metropolis_04", "downtown_04")
 POSES = 16
@@ -49,48 +51,6 @@ def build_limit(folder: Path):
     return ctypes.CDLL(str(library)).cast_limit
 
 
-def car_body() -> TriangleSurface:
-    """A rounded body of 1280 triangles, as large as a car."""
-    mesh = open3d.geometry.TriangleMesh.create_icosahedron()
-    mesh = mesh.subdivide_loop(3)
-    return TriangleSurface(
-        np.asarray(mesh.vertices) * [2.2, 0.9, 0.7],
-        np.asarray(mesh.triangles),
-    )
-
-
-def with_cars(geometries, poses):
-    """Returns the scene with moving cars, and what moves them."""
-    body = car_body()
-    frames = [FrameId.get_new_id() for _ in range(CARS)]
-    cars = [
-        PerceptionGeometry(
-            GeometryId.get_new_id(), "car", f, RigidTransform(), body, None
-        )
-        for f in frames
-    ]
-    rng = np.random.default_rng(0)
-    places = {}
-
-    def move(step: int) -> None:
-        for k, frame in enumerate(frames):
-            X_WS = poses[(step + k) % len(poses)]
-            yaw = RollPitchYaw(X_WS.rotation()).yaw_angle()
-            ahead = rng.uniform(6.0, 40.0)
-            forward = np.array([np.cos(yaw), np.sin(yaw), 0.0])
-            p = X_WS.translation() + ahead * forward - [0.0, 0.0, 0.9]
-            places[frame] = RigidTransform(RollPitchYaw(0, 0, yaw), p)
-
-    move(0)
-    stands = {geometry.frame_id for geometry in geometries}
-    scene = RayCastingScene(
-        [*geometries, *cars],
-        stands,
-        lambda f: places.get(f, RigidTransform()),
-    )
-    return scene, move, lambda f: places.get(f, RigidTransform())
-
-
 def benchmark(sequence: str, rounds: int, folder: Path) -> None:
     geometries = read_stage(sequence)
     poses = sensor_poses(sequence, POSES)
@@ -98,14 +58,9 @@ def benchmark(sequence: str, rounds: int, folder: Path) -> None:
     d_S = pattern.d_Sset[pattern.packet_order]
     reach = pattern.max_range
     stands = {geometry.frame_id for geometry in geometries}
-
-    def still(frame_id):
-        return RigidTransform()
-
     scene = RayCastingScene(geometries, stands, still)
-    moving, move, pose_of = with_cars(geometries, poses)
-    p_WO, groups = group_geometries(geometries, stands, still)
-    theirs = Open3dScene(groups)._scenes[0]
+    moving = MovingCars(geometries, poses, CARS)
+    theirs = Open3dStage(geometries)
 
     def cast(caster, X_WS, **options):
         d_W = d_S @ X_WS.rotation().matrix().T
@@ -117,19 +72,12 @@ def benchmark(sequence: str, rounds: int, folder: Path) -> None:
 
     def ours_with_cars():
         for step, X_WS in enumerate(poses):
-            move(step)
-            moving.set_frame_poses(pose_of)
-            cast(moving, X_WS)
-
-    def open3d_rays(X_WS):
-        rays = np.empty((len(d_S), 6), np.float32)
-        rays[:, :3] = X_WS.translation() - p_WO
-        rays[:, 3:] = d_S @ X_WS.rotation().matrix().T
-        return open3d.core.Tensor.from_numpy(rays)
+            moving.move(step)
+            cast(moving.scene, X_WS)
 
     def open3d_cast():
         for X_WS in poses:
-            theirs.cast_rays(open3d_rays(X_WS), nthreads=1)["t_hit"].numpy()
+            theirs.cast(theirs.rays(X_WS, d_S))
 
     variants = {
         "cns-drake": ours,
@@ -142,11 +90,7 @@ def benchmark(sequence: str, rounds: int, folder: Path) -> None:
         variants["limit (C)"] = _limit_variant(limit, scene, poses, d_S, reach)
     times = interleaved(variants, rounds)
 
-    triangles = sum(
-        len(g.surface.triangles)
-        for g in geometries
-        if isinstance(g.surface, TriangleSurface)
-    )
+    triangles = count_triangles(geometries)
     rays = POSES * pattern.num_beams
     base = times["cns-drake"]
     print(f"{sequence}: {triangles} triangles, {rounds} rounds, medians")
@@ -158,7 +102,7 @@ def benchmark(sequence: str, rounds: int, folder: Path) -> None:
             f"{spent.wall / base.wall:5.2f} of our time "
             f"(CPU {spent.cpu / base.cpu:5.2f})"
         )
-    _compare(scene, theirs, poses, cast, open3d_rays, reach)
+    _compare(scene, theirs, poses, d_S, cast, reach)
 
 
 def _limit_variant(limit, scene, poses, d_S, reach):
@@ -192,13 +136,13 @@ def _limit_variant(limit, scene, poses, d_S, reach):
     return run
 
 
-def _compare(scene, theirs, poses, cast, open3d_rays, reach) -> None:
+def _compare(scene, theirs, poses, d_S, cast, reach) -> None:
     """Counts rays whose range differs from Open3D's."""
     total = far = 0
     worst = 0.0
     for X_WS in poses:
         a = cast(scene, X_WS).ranges
-        b = theirs.cast_rays(open3d_rays(X_WS))["t_hit"].numpy()
+        b = theirs.cast(theirs.rays(X_WS, d_S))
         b = np.where(b <= reach, b, np.inf)
         both = np.isfinite(a) & np.isfinite(b)
         error = np.abs(a[both] - b[both])

@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+import contextlib
 from dataclasses import dataclass
+import io
 import time
 
 import numpy as np
-from pydrake.math import RigidTransform
+import open3d
+from pydrake.geometry import FrameId, GeometryId
+from pydrake.math import RigidTransform, RollPitchYaw
 
+from cns_drake.open3d_scene import Open3dScene
 from cns_drake.perception_geometry import (
     PerceptionGeometry,
+    TriangleSurface,
     read_perception_geometry,
 )
 from cns_drake.planning import plan_drive
+from cns_drake.ray_casting import RayCastingScene
+from cns_drake.ray_groups import group_geometries
 from cns_drake.scenario import load_scenario
 from cns_drake.world import load_world
 
@@ -30,6 +38,99 @@ def sensor_poses(sequence: str, count: int) -> list[RigidTransform]:
     times = np.linspace(0.0, trajectory.duration, count)
     X_BS = RigidTransform([0.0, 0.0, 1.6])
     return [trajectory.pose(t) @ X_BS for t in times]
+
+
+def count_triangles(geometries: Sequence[PerceptionGeometry]) -> int:
+    """Returns how many triangles there are, without curved shapes."""
+    return sum(
+        len(geometry.surface.triangles)
+        for geometry in geometries
+        if isinstance(geometry.surface, TriangleSurface)
+    )
+
+
+def still(frame_id: FrameId) -> RigidTransform:
+    """The pose of every frame of a stage in the world."""
+    return RigidTransform()
+
+
+class Open3dStage:
+    """A stage in Open3D: what stands in the world, as one scene."""
+
+    def __init__(self, geometries: Sequence[PerceptionGeometry]):
+        """Builds the scene."""
+        stands = {geometry.frame_id for geometry in geometries}
+        self._p_WO, groups = group_geometries(geometries, stands, still)
+        # It would say that it stands in for Embree.
+        with contextlib.redirect_stderr(io.StringIO()):
+            self.scene = Open3dScene(groups[:1])._scenes[0]
+
+    def rays(self, X_WS: RigidTransform, d_Sset) -> open3d.core.Tensor:
+        """Returns the rays of (N, 3) beams from a sensor's pose."""
+        rays = np.empty((len(d_Sset), 6), np.float32)
+        rays[:, :3] = X_WS.translation() - self._p_WO
+        rays[:, 3:] = d_Sset @ X_WS.rotation().matrix().T
+        return open3d.core.Tensor.from_numpy(rays)
+
+    def cast(self, rays: open3d.core.Tensor) -> np.ndarray:
+        """Returns their ranges, inf for a miss; on one thread."""
+        return self.scene.cast_rays(rays, nthreads=1)["t_hit"].numpy()
+
+
+class MovingCars:
+    """A stage with cars that are somewhere else at every step.
+
+    A car is a rounded body of 1280 triangles, 6 m to 40 m ahead of one of
+    the sensor's poses.
+    """
+
+    def __init__(
+        self,
+        geometries: Sequence[PerceptionGeometry],
+        poses: Sequence[RigidTransform],
+        count: int,
+    ):
+        """Builds the scene with so many cars."""
+        body = _car_body()
+        self._frames = [FrameId.get_new_id() for _ in range(count)]
+        cars = [
+            PerceptionGeometry(
+                GeometryId.get_new_id(), "car", f, RigidTransform(), body, None
+            )
+            for f in self._frames
+        ]
+        self._poses = poses
+        self._rng = np.random.default_rng(0)
+        self._places: dict[FrameId, RigidTransform] = {}
+        self._draw_places(0)
+        stands = {geometry.frame_id for geometry in geometries}
+        self.scene = RayCastingScene([*geometries, *cars], stands, self._pose)
+
+    def move(self, step: int) -> None:
+        """Moves every car."""
+        self._draw_places(step)
+        self.scene.set_frame_poses(self._pose)
+
+    def _draw_places(self, step: int) -> None:
+        for k, frame in enumerate(self._frames):
+            X_WS = self._poses[(step + k) % len(self._poses)]
+            yaw = RollPitchYaw(X_WS.rotation()).yaw_angle()
+            ahead = self._rng.uniform(6.0, 40.0)
+            forward = np.array([np.cos(yaw), np.sin(yaw), 0.0])
+            p = X_WS.translation() + ahead * forward - [0.0, 0.0, 0.9]
+            self._places[frame] = RigidTransform(RollPitchYaw(0, 0, yaw), p)
+
+    def _pose(self, frame_id: FrameId) -> RigidTransform:
+        return self._places.get(frame_id, RigidTransform())
+
+
+def _car_body() -> TriangleSurface:
+    mesh = open3d.geometry.TriangleMesh.create_icosahedron()
+    mesh = mesh.subdivide_loop(3)
+    return TriangleSurface(
+        np.asarray(mesh.vertices) * [2.2, 0.9, 0.7],
+        np.asarray(mesh.triangles),
+    )
 
 
 @dataclass(frozen=True)
