@@ -155,23 +155,24 @@ def count_progress(
     """
     console = progress.console
     interval = 0.5 if console.is_terminal else _LINE_INTERVAL
-    start = shown = time.monotonic()
-    found: int | None = None  # What an earlier run had done is no speed.
+    shown = 0.0
+    # Neither loading nor what an earlier run had done tells the speed.
+    first: tuple[float, int] | None = None
 
     def on_frame(done: int, total: int) -> None:
-        nonlocal shown, found
-        if found is None:
-            found = done - 1
+        nonlocal shown, first
         now = time.monotonic()
+        if first is None:
+            first, shown = (now, done), now
         if done < total and now - shown < interval:
             return
         shown = now
-        elapsed = now - start
-        text = note(done, done - found, elapsed)
+        elapsed, new = now - first[0], done - first[1]
+        text = note(done, new, elapsed)
         progress.update(task, completed=done, total=total, note=text)
         if not console.is_terminal:
             name = progress.tasks[task].description
-            left = elapsed * (total - done) / (done - found)
+            left = elapsed * (total - done) / max(new, 1)
             parts = [f"{name}: {done}/{total} {unit}", text]
             parts.append(f"{left:.0f} s left")
             print_note(progress, ", ".join(part for part in parts if part))
