@@ -245,11 +245,11 @@ def _read_mesh_file(name: str, path: Path) -> TriangleSurface:
     try:
         with told_by_drake():
             p_GVset, triangles = read(path)
+            if len(triangles) == 0:
+                raise ValueError("holds no triangles")
     except (RuntimeError, ValueError) as error:
         fault = " ".join(str(error).split())
         raise InputError(f"{path}: geometry '{name}': {fault}") from error
-    if len(triangles) == 0:
-        raise InputError(f"{path}: geometry '{name}': holds no triangles")
     return TriangleSurface(p_GVset, triangles)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from pathlib import Path
 import re
 from typing import Annotated
@@ -290,18 +291,18 @@ class Scenario(_Model):
         source = source or self.source
         for field in ("world", "waypoints"):
             file = getattr(self, field)
-            if file is not None and not Path(file).is_file():
+            if file is not None and not os.path.isfile(file):
                 raise InputError(f"{source}: {field}: {file}: no such file")
         if self.map is None:
             return
         folder = self.map_folder
-        if not folder.is_dir():
+        if not os.path.isdir(folder):
             known = ", ".join(shipped_maps())
             raise InputError(
                 f"{source}: map: '{self.map}' is neither a shipped map "
                 f"({known}) nor a folder"
             )
-        if not self.world_file.is_file():
+        if not os.path.isfile(self.world_file):
             stages = sorted(
                 path.stem.removeprefix("stage_")
                 for path in folder.glob("stage_*.sdf")
@@ -349,7 +350,8 @@ def load_scenario(name_or_file: str | Path) -> Scenario:
     """
     shipped = shipped_sequences()
     path = shipped.get(str(name_or_file), Path(name_or_file))
-    if not path.is_file():
+    # Unlike pathlib, os.path takes names that no file can have.
+    if not os.path.isfile(path):
         if re.fullmatch(r"\w+", str(name_or_file)):
             raise InputError(
                 f"unknown sequence '{name_or_file}'; known: "
@@ -364,7 +366,10 @@ def load_scenario(name_or_file: str | Path) -> Scenario:
         place = values.get(field)
         if isinstance(place, str) and place not in shipped_maps():
             # Relative to the file, independent of where it is read from.
-            values[field] = str((path.parent / place).resolve())
+            try:
+                values[field] = str((path.parent / place).resolve())
+            except ValueError as error:
+                raise InputError(f"{path}: {field}: {error}") from error
     scenario = make_scenario(values, path)
     scenario._file = path
     scenario.check_files()

@@ -14,6 +14,7 @@ from pydrake.multibody.tree import ModelInstanceIndex
 
 from cns_drake.drake_log import told_by_drake
 from cns_drake.errors import InputError
+from cns_drake.files import user_errors
 from cns_drake.perception_geometry import check_shape, structure_name
 from cns_drake.structure_table import StructureTable, load_structure_table
 
@@ -133,6 +134,13 @@ def _remove(
 def _parse(parser: Parser, path: Path) -> list[ModelInstanceIndex]:
     if not path.is_file():
         raise InputError(f"{path}: no such file")
+    # Drake itself stumbles over what it would quote of it.
+    with user_errors(path):
+        content = path.read_bytes()
+    try:
+        content.decode("utf-8")
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not UTF-8 text") from None
     with told_by_drake() as errors:
         try:
             models = parser.AddModels(str(path))

@@ -37,3 +37,23 @@ def from_xyz(coordinates: np.ndarray) -> np.ndarray:
     contiguous = np.ascontiguousarray(coordinates)
     dtype = np.dtype([(name, contiguous.dtype) for name in names])
     return contiguous.view(dtype).reshape(len(coordinates))
+
+
+def store(points: np.ndarray, name: str, values: np.ndarray) -> None:
+    """Stores numbers that were written as text in a field of points.
+
+    Args:
+        points: (N,) structured array.
+        name: of the field.
+        values: (N,) or (N, K) float64.
+
+    Raises:
+        ValueError: if a number does not fit the field's type.
+    """
+    with np.errstate(over="raise", invalid="raise"):
+        try:
+            points[name] = values
+        except FloatingPointError as error:
+            raise ValueError(
+                f"{name}: a number does not fit {points.dtype[name].base}"
+            ) from error

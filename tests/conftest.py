@@ -8,6 +8,18 @@ from cns_drake.scenario import make_scenario
 from cns_drake.simulation import simulate
 
 
+def pytest_addoption(parser):
+    parser.addoption(
+        "--fuzz",
+        type=int,
+        default=5200,
+        help="how many files test_fuzz damages (default: %(default)s)",
+    )
+    parser.addoption(
+        "--fuzz-seed", type=int, default=0, help="in which ways it does"
+    )
+
+
 @pytest.fixture(scope="session")
 def small_map(tmp_path_factory):
     """Folder of a map that loads at once, with stages 01 and 04."""

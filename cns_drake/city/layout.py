@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from shapely import GEOSException
 from shapely.ops import unary_union
 
 from cns_drake.city.buildings import ARCHETYPES
@@ -75,7 +76,13 @@ def make_city(world: Path) -> City:
     except ValueError as error:
         raise InputError(f"{roads}: {error}") from error
     source = world / "city.yaml"
-    return lay_out(network, load_plan(source), str(source))
+    plan = load_plan(source)
+    try:
+        return lay_out(network, plan, str(source))
+    except GEOSException as error:
+        raise InputError(
+            f"{source}: a shape cannot be used: {error}"
+        ) from error
 
 
 def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:

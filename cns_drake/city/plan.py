@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     ConfigDict,
     Field,
@@ -17,9 +18,20 @@ from cns_drake.errors import InputError, describe_validation_error
 from cns_drake.yaml_files import read_yaml
 
 Point = tuple[float, float]
+Line = Annotated[list[Point], Field(min_length=2)]
+Area = Annotated[list[Point], Field(min_length=3)]
+
+
+def _in_order(values: tuple[float, float]) -> tuple[float, float]:
+    if values[0] > values[1]:
+        raise ValueError(f"{values[0]:g} is greater than {values[1]:g}")
+    return values
+
+
 # Least and greatest value of something that is drawn.
 Range = Annotated[
     tuple[float, float],
+    AfterValidator(_in_order),
     Field(description="least and greatest value"),
 ]
 Weights = dict[str, Annotated[float, Field(gt=0)]]
@@ -27,7 +39,7 @@ Ground = Literal["paved", "lawn", "gravel", "parking", "water"]
 
 
 class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class BuildingPlan(_Model):
@@ -46,7 +58,7 @@ class BuildingPlan(_Model):
     archetype: str
     at: Point
     size: Point | None = None
-    outline: list[Point] | None = None
+    outline: Area | None = None
     yaw_deg: float = 0.0
     height: float = Field(gt=0)
     kind: str | None = None
@@ -79,7 +91,7 @@ class RowPlan(_Model):
     gap: Range = (0.0, 3.0)
     fill: float = Field(default=1.0, gt=0, le=1)
     kind: str | None = None
-    within: list[Point] | None = None
+    within: Area | None = None
 
 
 class PatchPlan(_Model):
@@ -95,8 +107,8 @@ class PatchPlan(_Model):
     """
 
     ground: Ground
-    area: list[Point] | None = None
-    line: list[Point] | None = None
+    area: Area | None = None
+    line: Line | None = None
     width: float = Field(default=3.0, gt=0)
     level: float | None = None
 
@@ -139,7 +151,7 @@ class ScatterPlan(_Model):
     objects: Weights = Field(min_length=1)
     spacing: float = Field(gt=0.2)
     fill: float = Field(default=1.0, gt=0, le=1)
-    within: list[Point] | None = None
+    within: Area | None = None
     clearance: float = Field(default=1.5, ge=0)
     ground: tuple[Ground, ...] = ("lawn",)
     kind: str | None = None
@@ -159,7 +171,7 @@ class LinePlan(_Model):
     """
 
     objects: Weights = Field(min_length=1)
-    points: list[Point] = Field(min_length=2)
+    points: Line
     spacing: Range | None = None
     yaw_deg: float = 0.0
     kind: str | None = None
@@ -220,7 +232,7 @@ class DistrictPlan(_Model):
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_]*$")
     block: Point | None = None
-    area: list[Point] | None = None
+    area: Area | None = None
     ground: Ground = "lawn"
     relief: float = Field(default=0.0, ge=0)
     relief_margin: float = Field(default=12.0, gt=0)

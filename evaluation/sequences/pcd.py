@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from evaluation.compiled import compiled
+from evaluation.points import store
 
 _KINDS = {"F": "f", "I": "i", "U": "u"}
 # A header is some hundred bytes; a file without one is not searched further.
@@ -110,7 +111,7 @@ def _read_ascii(
     points = np.empty(count, dtype=dtype)
     columns = np.split(values, np.cumsum(widths)[:-1], axis=1)
     for name, column in zip(dtype.names, columns, strict=True):
-        points[name] = column.reshape(points[name].shape)
+        store(points, name, column.reshape(points[name].shape))
     return points
 
 

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from evaluation.points import store
+
 _TYPES = {
     "char": "i1",
     "int8": "i1",
@@ -117,5 +119,5 @@ def _read_ascii(
         )
     vertices = np.empty(count, dtype=dtype)
     for column, name in enumerate(dtype.names):
-        vertices[name] = values[:, column]
+        store(vertices, name, values[:, column])
     return vertices

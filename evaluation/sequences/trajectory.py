@@ -124,7 +124,8 @@ def read_quaternions(path: Path, separator: str | None) -> Trajectory:
         InputError: like `read_matrices`.
     """
     stamps_ns, values = read_stamped_rows(path, 7, separator)
-    lengths = np.linalg.norm(values[:, 3:], axis=1)
+    with np.errstate(over="ignore"):
+        lengths = np.linalg.norm(values[:, 3:], axis=1)
     bad = np.flatnonzero(np.abs(lengths - 1.0) > _ROTATION_TOLERANCE)
     if len(bad):
         raise InputError(
@@ -152,8 +153,10 @@ def pose_matrices(path: Path, values: np.ndarray) -> np.ndarray:
     check_finite(path, values)
     upper = values.reshape(-1, 3, 4)
     R = upper[:, :, :3]
-    error = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2))
-    bad = (error > _ROTATION_TOLERANCE) | (np.linalg.det(R) < 0.0)
+    # Numbers that overflow, or NaN after that, are no rotation either.
+    with np.errstate(over="ignore", invalid="ignore"):
+        error = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2))
+        bad = ~((error <= _ROTATION_TOLERANCE) & (np.linalg.det(R) > 0.0))
     if bad.any():
         raise InputError(
             f"{path}: row {np.flatnonzero(bad)[0] + 1}: no rotation matrix"
