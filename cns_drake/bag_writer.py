@@ -42,8 +42,10 @@ from cns_drake.rosbag2_metadata import (
 
 _CHUNK_BYTES = 1024 * 1024
 # A chunk that is not closed is lost when the process is killed. Without a
-# LiDAR a chunk of 1 MiB lasts for many seconds, hence the flush by time.
-_FLUSH_PERIOD_NS = 1_000_000_000
+# LiDAR a chunk of 1 MiB lasts for many seconds, hence the flush by time. A
+# kill may cost a second; some of that is left for frames that are still on
+# their way to the file.
+_FLUSH_PERIOD_NS = 800_000_000
 
 
 class RecordedMessage(NamedTuple):

@@ -17,8 +17,6 @@ from cns_drake import files
 from cns_drake.errors import InputError
 from cns_drake.frame_clock import frame_stamp_ns
 
-FRAMES_A_SECOND = 20
-
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
@@ -47,9 +45,9 @@ def test_cut_off_at_any_byte(folder, whole):
         leave(folder, mcap[:size])
         found.append(record(folder))
         assert contents(folder) == whole
-    # Whole seconds, and at last all that there is.
+    # Whole chunks, and at last all that there is.
     assert sorted(found) == found
-    assert set(found) == {0, FRAMES_A_SECOND, 2 * FRAMES_A_SECOND, FRAMES}
+    assert set(found) == {0, 16, 32, 48, FRAMES}
 
 
 def test_damaged_at_any_byte(folder, whole):
