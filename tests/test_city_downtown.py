@@ -176,7 +176,7 @@ def test_buildings_stand_on_level_ground():
     assert np.quantile(sunk, 0.95) < 0.05
     floors = np.array([building.xyz[2] for building in buildings])
     # Some on the plateau, some on the way up, most at the foot.
-    assert (floors > 8.0).sum() >= 15
+    assert (floors > 8.0).sum() >= 12
     assert (floors < 1.0).sum() >= 100
 
 

@@ -37,7 +37,7 @@ _QUAY_RGB = (0.55, 0.53, 0.50)
 _SPACING = 4.0
 # Where the streets around differ by more than this in height, the meshes have
 # vertices this far apart [m].
-_GENTLE, _FINE_SPACING = 1.0, 2.0
+_GENTLE, _FINE_SPACING = 4.0, 2.0
 # Wavelengths of the swells [m].
 _WAVELENGTHS = (22.0, 60.0)
 
