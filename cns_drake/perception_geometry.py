@@ -23,7 +23,7 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform
 
-from cns_drake.drake_log import told_by_drake
+from cns_drake.drake_errors import PARSER_ERRORS, told_by_drake
 from cns_drake.errors import InputError
 
 # The corners of a unit cube and its faces, counter-clockwise from outside.
@@ -218,6 +218,10 @@ class _MeshFiles:
         self._unscaled: dict[Path, TriangleSurface] = {}
 
     def read(self, name: str, shape: Mesh) -> TriangleSurface:
+        with told_by_drake():  # Beside an error, no warning.
+            return self._read(name, shape)
+
+    def _read(self, name: str, shape: Mesh) -> TriangleSurface:
         if not shape.source().is_path():
             raise InputError(f"geometry '{name}': its mesh is not a file")
         path = Path(shape.source().path())
@@ -243,11 +247,13 @@ def _read_mesh_file(name: str, path: Path) -> TriangleSurface:
         raise InputError(f"{path}: geometry '{name}': no such mesh file")
     read = _read_obj if path.suffix.lower() == ".obj" else _read_with_open3d
     try:
-        with told_by_drake():
-            p_GVset, triangles = read(path)
-            if len(triangles) == 0:
-                raise ValueError("holds no triangles")
-    except (RuntimeError, ValueError) as error:
+        p_GVset, triangles = read(path)
+        if len(triangles) == 0:
+            raise ValueError("holds no triangles")
+        # Drake warns of it and goes on; a ray caster reads foreign memory.
+        if not 0 <= triangles.min() <= triangles.max() < len(p_GVset):
+            raise ValueError("a face has a vertex that is not there")
+    except PARSER_ERRORS as error:
         fault = " ".join(str(error).split())
         raise InputError(f"{path}: geometry '{name}': {fault}") from error
     return TriangleSurface(p_GVset, triangles)
@@ -265,5 +271,8 @@ def _read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
 def _read_with_open3d(path: Path) -> tuple[np.ndarray, np.ndarray]:
     import open3d  # Slow to import, and only foreign mesh formats need it.
 
-    mesh = open3d.io.read_triangle_mesh(str(path))
+    # What it would warn of makes a mesh without triangles.
+    errors = open3d.utility.VerbosityLevel.Error
+    with open3d.utility.VerbosityContextManager(errors):
+        mesh = open3d.io.read_triangle_mesh(str(path))
     return np.asarray(mesh.vertices), np.asarray(mesh.triangles, np.int32)

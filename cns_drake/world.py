@@ -12,7 +12,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 
-from cns_drake.drake_log import told_by_drake
+from cns_drake.drake_errors import PARSER_ERRORS, told_by_drake
 from cns_drake.errors import InputError
 from cns_drake.files import user_errors
 from cns_drake.perception_geometry import check_shape, structure_name
@@ -144,7 +144,7 @@ def _parse(parser: Parser, path: Path) -> list[ModelInstanceIndex]:
     with told_by_drake() as errors:
         try:
             models = parser.AddModels(str(path))
-        except (RuntimeError, UnicodeDecodeError) as error:
+        except PARSER_ERRORS as error:
             raise _parse_fault(path, str(error), *errors) from error
         if errors:
             raise _parse_fault(path, *errors)

@@ -8,6 +8,7 @@ from small_map import box_visual, world_text
 from cns_drake.beam_pattern import make_beam_pattern
 from cns_drake.errors import InputError
 from cns_drake.paths import vehicle_file
+from cns_drake.perception_geometry import read_perception_geometry
 from cns_drake.scanning import scan_world
 from cns_drake.structure_table import StructureEntry
 from cns_drake.world import load_world
@@ -38,6 +39,8 @@ def test_static_models_are_anchored_and_the_vehicle_is_not(small_map):
     [
         ("<plane><normal>0 0 1</normal></plane>", "'city::thing'.*HalfSpace"),
         (MESH.format("missing.obj"), r"missing\.obj"),
+        ("<sphere><radius>1e8</radius></sphere>", "larger than 1e"),
+        ("<box><size>1 1 2e7</size></box>", "larger than 1e"),
     ],
 )
 def test_geometry_that_no_ray_can_hit(tmp_path, geometry, fault):
@@ -61,6 +64,39 @@ def test_files_that_are_no_world(tmp_path, text):
     with pytest.raises(InputError, match=r"broken\.sdf: ") as caught:
         load_world(path)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        ('version="1.9"', 'version="#"', "cannot be parsed"),
+        ("<pose>1", "<pose>one", "Unable to set value"),
+        ("body", "b\udca5dy", "not UTF-8"),
+    ],
+)
+def test_faults_that_drake_tells_in_several_ways(
+    tmp_path, capfd, old, new, fault
+):
+    text = world_text([box_visual("body", (1, 2, 3, 0, 0, 0), (4, 5, 6))])
+    path = tmp_path / "broken.sdf"
+    path.write_text(text.replace(old, new), errors="surrogateescape")
+    with pytest.raises(InputError, match=rf"broken\.sdf: .*{fault}"):
+        load_world(path)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_mesh_that_is_no_mesh(tmp_path, capfd):
+    (tmp_path / "wedge.obj").touch()
+    world = load_world(write_world(tmp_path, MESH.format("wedge.obj")))
+    inspector = world.scene_graph.model_inspector()
+    for text, fault in [
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "a vertex that is not there"),
+        ("v 0 0 0\nv 1e9 0 0\nv 0 1 0\nf 1 2 3\n", "larger than"),
+    ]:
+        (tmp_path / "wedge.obj").write_text(text)
+        with pytest.raises(InputError, match=rf"wedge\.obj: .*({fault})"):
+            read_perception_geometry(inspector)
+    assert capfd.readouterr().err == ""
 
 
 def test_missing_file(tmp_path):

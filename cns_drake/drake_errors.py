@@ -1,10 +1,14 @@
-"""What Drake logs while it reads a file."""
+"""What Drake tells of a file that it cannot read."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 import contextlib
 import logging
+
+# Besides Drake's own, exceptions of the C++ library come through: of numbers
+# that are none or too large, of what is too long.
+PARSER_ERRORS = (RuntimeError, ValueError, LookupError, OverflowError)
 
 
 @contextlib.contextmanager

@@ -1,0 +1,171 @@
+"""The commands on damaged files: a result, or one line and status 2.
+
+As `test_fuzz`, but of whole programs, of which a few dozen runs must do.
+"""
+
+from concurrent.futures import ThreadPoolExecutor
+import os
+from pathlib import Path
+import shutil
+import subprocess
+import sys
+
+from fuzz_mutations import mutate
+from fuzz_targets import find_target
+import numpy as np
+import pytest
+
+# A program takes seconds; the machine may be busy.
+_DEADLINE_S = 120.0
+_DRAKE = ("-m", "cns_drake")
+_EVALUATION = ("-m", "evaluation")
+# Name, target whose files are damaged, which of them, words of the command,
+# how many runs.
+COMMANDS = {
+    "simulate": (
+        "drive",
+        ("sequence_01.yaml", "roads.yaml", "stage_01.sdf", "structures.csv"),
+        (*_DRAKE, "simulate", "sequence_01.yaml", "--output", "out"),
+        4,
+    ),
+    "vary": (
+        "family",
+        ("family.yaml",),
+        (*_DRAKE, "generate", "--vary", "family.yaml", "--output", "out"),
+        2,
+    ),
+    "scan": (
+        "world",
+        ("stage_01.sdf", "wedge.obj"),
+        (
+            *(*_DRAKE, "scan", "stage_01.sdf", "--output", "out/scan.pcd"),
+            *("--pose", "0", "0", "2", "0", "0", "0"),
+        ),
+        4,
+    ),
+    "list": (
+        "listing",
+        ("sequence_01.yaml", "roads.yaml"),
+        (*_DRAKE, "list", "."),
+        2,
+    ),
+    "city": (
+        "city",
+        ("city.yaml", "roads.yaml", "stages.yaml"),
+        ("-m", "cns_drake.city", "--check", "."),
+        3,
+    ),
+    "export": (
+        "mcap",
+        ("town_07/town_07_0.mcap",),
+        (*_DRAKE, "export", "town_07", "--format", "kitti", "--output", "out"),
+        3,
+    ),
+    "repair": (
+        "repair",
+        ("source.mcap",),
+        (*_DRAKE, "repair", "source.mcap", "--output", "out/new.mcap"),
+        3,
+    ),
+    "tcr": (
+        "clouds",
+        ("*.pcd", "*.ply", "*.npy"),
+        (*_EVALUATION, "tcr", "{file}", "points.bin", "--json"),
+        3,
+    ),
+    "pr": (
+        "kitti",
+        ("kitti/**/*.*",),
+        (
+            *(*_EVALUATION, "pr", "kitti/sequences/07", "kitti/sequences/07"),
+            *("--method", "solid"),
+        ),
+        3,
+    ),
+}
+# How errors begin, where not in "error: ".
+_BEGINNINGS = {
+    "city": "",
+    "tcr": "cns-eval: error: ",
+    "pr": "cns-eval: error: ",
+}
+# These tell in lines what they are at before they meet the fault.
+_TELL_PROGRESS = ("city", "list")
+
+
+def damaged_runs():
+    """Yields command, number of the run."""
+    for command, (_, _, _, count) in COMMANDS.items():
+        for number in range(count):
+            yield command, number
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory, request):
+    """All runs, two at a time: (command, number) -> folder, result."""
+    top = tmp_path_factory.mktemp("commands")
+    seed = request.config.option.fuzz_seed
+    with ThreadPoolExecutor(2) as pool:
+        return dict(
+            zip(
+                damaged_runs(),
+                pool.map(lambda key: run(top, seed, *key), damaged_runs()),
+                strict=True,
+            )
+        )
+
+
+def run(top: Path, seed: int, command: str, number: int):
+    target, patterns, words, _ = COMMANDS[command]
+    folder = top / f"{command}_{number}"
+    folder.mkdir()
+    find_target(target).build(folder)
+    (folder / "out").mkdir()
+    files = sorted(
+        path
+        for pattern in patterns
+        for path in folder.glob(pattern)
+        if path.is_file()
+    )
+    rng = np.random.default_rng([seed, number, len(command)])
+    path = files[int(rng.integers(len(files)))]
+    path.write_bytes(mutate(path, path.read_bytes(), rng))
+    words = [word.replace("{file}", path.name) for word in words]
+    result = subprocess.run(
+        [sys.executable, *words],
+        cwd=folder,
+        env=os.environ
+        | {"PYTHONPATH": os.pathsep.join([os.getcwd(), *sys.path])},
+        capture_output=True,
+        check=False,
+        timeout=_DEADLINE_S,
+    )
+    return folder, result
+
+
+@pytest.mark.parametrize(("command", "number"), damaged_runs())
+def test_a_result_or_one_line_and_status_2(runs, command, number):
+    folder, result = runs[command, number]
+    errors = result.stderr.decode()
+    told = f"{folder}: status {result.returncode}:\n{errors}"
+    assert "Traceback" not in errors, told
+    if command == "city" and result.returncode == 1:
+        # There are no generated files yet: all of them would change.
+        assert result.stdout
+        return
+    assert result.returncode in (0, 2), told
+    if result.returncode == 2:
+        *progress, line = errors.splitlines()
+        assert line.startswith(_BEGINNINGS.get(command, "error: ")), told
+        assert not progress or command in _TELL_PROGRESS, told
+        assert result.stdout == b""
+        finished = [
+            path
+            for path in (folder / "out").rglob("*")
+            if path.is_file()
+            # The folder's mark, made before the first drive is read.
+            and path.name != "export.yaml"
+            and ".part" not in str(path.relative_to(folder))
+        ]
+        assert not finished, told
+    shutil.rmtree(folder)
