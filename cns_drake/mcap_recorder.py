@@ -10,6 +10,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
 from cns_drake import messages
+from cns_drake.background_writer import BackgroundWriter
 from cns_drake.bag_writer import BagWriter
 from cns_drake.frame_clock import frame_stamp_ns
 from cns_drake.rosbag2_metadata import Topic
@@ -53,7 +54,7 @@ class McapRecorder(LeafSystem):
 
     def __init__(
         self,
-        bag: BagWriter,
+        bag: BagWriter | BackgroundWriter,
         *,
         X_BSs: Mapping[str, RigidTransform],
         X_BI: RigidTransform,

@@ -12,6 +12,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 
 from cns_drake import __version__
+from cns_drake.background_writer import BackgroundWriter
 from cns_drake.bag_writer import BagWriter
 from cns_drake.errors import InputError
 from cns_drake.files import check_writable, complete_part, write_part
@@ -139,8 +140,9 @@ def simulate(
             if resumed_frames > 0:
                 on_frame(resumed_frames, num_frames)
         begin = min(resumed_frames * FRAME_PERIOD, end)
+        writer = BackgroundWriter(bag.write)
         diagram = make_station(
-            scenario, world=world, trajectory=trajectory, bag=bag, page=page
+            scenario, world=world, trajectory=trajectory, bag=writer, page=page
         )
         if graphviz_file is not None:
             write_part(graphviz_file, diagram.GetGraphvizString())
@@ -155,7 +157,8 @@ def simulate(
         simulator.set_monitor(monitor)
         if resumed_frames < num_frames:
             simulator.get_mutable_context().SetTime(begin)
-            simulator.AdvanceTo(end)
+            with writer:
+                simulator.AdvanceTo(end)
     finished = time.perf_counter()
     if page is not None:
         page.save(page_file, title=scenario.name)

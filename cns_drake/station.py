@@ -5,6 +5,7 @@ from __future__ import annotations
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
+from cns_drake.background_writer import BackgroundWriter
 from cns_drake.bag_writer import BagWriter
 from cns_drake.frame_clock import FRAME_PERIOD, START_NS
 from cns_drake.imu import add_imu
@@ -26,7 +27,7 @@ def make_station(
     *,
     world: World | None = None,
     trajectory: Trajectory | None = None,
-    bag: BagWriter | None = None,
+    bag: BagWriter | BackgroundWriter | None = None,
     page: MeshcatRecorder | None = None,
 ) -> Diagram:
     """Makes the Diagram of a scenario.
