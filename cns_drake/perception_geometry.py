@@ -25,6 +25,7 @@ from pydrake.math import RigidTransform
 
 from cns_drake.drake_errors import PARSER_ERRORS, told_by_drake
 from cns_drake.errors import InputError
+from cns_drake.foreign_meshes import ForeignMeshes
 
 # The corners of a unit cube and its faces, counter-clockwise from outside.
 _CUBE_CORNERS = np.array(
@@ -168,7 +169,15 @@ def read_perception_geometry(
         InputError: a shape is of a kind that no ray can be cast on, or a
             mesh file is missing or cannot be read; the geometry is named.
     """
-    meshes = _MeshFiles()
+    with ForeignMeshes() as foreign:
+        return _read_geometry(inspector, keep_frame, _MeshFiles(foreign))
+
+
+def _read_geometry(
+    inspector: SceneGraphInspector,
+    keep_frame: Callable[[FrameId], bool],
+    meshes: _MeshFiles,
+) -> tuple[PerceptionGeometry, ...]:
     geometries = []
     for geometry_id in inspector.GetAllGeometryIds(Role.kPerception):
         frame_id = inspector.GetFrameId(geometry_id)
@@ -214,7 +223,8 @@ def _surface(name: str, shape: Shape, meshes: _MeshFiles) -> Surface:
 class _MeshFiles:
     """Reads mesh files, each once however many geometries refer to it."""
 
-    def __init__(self):
+    def __init__(self, foreign: ForeignMeshes):
+        self._foreign = foreign
         self._unscaled: dict[Path, TriangleSurface] = {}
 
     def read(self, name: str, shape: Mesh) -> TriangleSurface:
@@ -227,7 +237,7 @@ class _MeshFiles:
         path = Path(shape.source().path())
         surface = self._unscaled.get(path)
         if surface is None:
-            surface = self._unscaled[path] = _read_mesh_file(name, path)
+            surface = self._unscaled[path] = self._read_file(name, path)
         triangles = surface.triangles
         scale = shape.scale3()
         if np.prod(scale) < 0.0:  # A reflection turns the faces inside out.
@@ -241,22 +251,22 @@ class _MeshFiles:
             )
         return TriangleSurface(p_GVset, triangles)
 
-
-def _read_mesh_file(name: str, path: Path) -> TriangleSurface:
-    if not path.is_file():
-        raise InputError(f"{path}: geometry '{name}': no such mesh file")
-    read = _read_obj if path.suffix.lower() == ".obj" else _read_with_open3d
-    try:
-        p_GVset, triangles = read(path)
-        if len(triangles) == 0:
-            raise ValueError("holds no triangles")
-        # Drake warns of it and goes on; a ray caster reads foreign memory.
-        if not 0 <= triangles.min() <= triangles.max() < len(p_GVset):
-            raise ValueError("a face has a vertex that is not there")
-    except PARSER_ERRORS as error:
-        fault = " ".join(str(error).split())
-        raise InputError(f"{path}: geometry '{name}': {fault}") from error
-    return TriangleSurface(p_GVset, triangles)
+    def _read_file(self, name: str, path: Path) -> TriangleSurface:
+        if not path.is_file():
+            raise InputError(f"{path}: geometry '{name}': no such mesh file")
+        is_obj = path.suffix.lower() == ".obj"
+        read = _read_obj if is_obj else self._foreign.read
+        try:
+            p_GVset, triangles = read(path)
+            if len(triangles) == 0:
+                raise ValueError("holds no triangles")
+            # Drake warns of it and goes on; a ray caster reads foreign memory.
+            if not 0 <= triangles.min() <= triangles.max() < len(p_GVset):
+                raise ValueError("a face has a vertex that is not there")
+        except PARSER_ERRORS as error:
+            fault = " ".join(str(error).split())
+            raise InputError(f"{path}: geometry '{name}': {fault}") from error
+        return TriangleSurface(p_GVset, triangles)
 
 
 def _read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
@@ -266,13 +276,3 @@ def _read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
         np.asarray(mesh.vertices(), dtype=float).reshape(-1, 3),
         np.asarray(triangles, dtype=np.int32).reshape(-1, 3),
     )
-
-
-def _read_with_open3d(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    import open3d  # Slow to import, and only foreign mesh formats need it.
-
-    # What it would warn of makes a mesh without triangles.
-    errors = open3d.utility.VerbosityLevel.Error
-    with open3d.utility.VerbosityContextManager(errors):
-        mesh = open3d.io.read_triangle_mesh(str(path))
-    return np.asarray(mesh.vertices), np.asarray(mesh.triangles, np.int32)
