@@ -536,3 +536,29 @@ def test_metropolis_blocks_and_sidewalks(metropolis):
     assert len(metropolis.sidewalks().geoms) == blocks + 1
     for road in metropolis.roads.values():
         assert (road.sidewalk, road.lane_width) == (6.0, 3.5)
+
+
+_TWO_ROADS = """
+junctions: {{a: {{position: [0, 0]}}, b: {{position: [{far}, 0]}}}}
+roads:
+  one: {{start: a, end: b, via: [{via}]}}
+  two: {{start: a, end: b}}
+"""
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    ("far", "via", "fault"),
+    [
+        # One upon the other: they would never part.
+        (200, "", r"roads\.one: its junctions need inf m"),
+        ("1.0e+308", "", r"junctions\.b\.position\.0: .*less than or equal"),
+        # On the inside of the bend the road's edge crosses itself.
+        (200, "[0, 80, 20], [200, 80, 0]", r"roads\.one: the outline crosses"),
+    ],
+)
+def test_roads_of_no_shape(tmp_path, far, via, fault):
+    path = tmp_path / "roads.yaml"
+    path.write_text(_TWO_ROADS.format(far=far, via=via))
+    with pytest.raises(InputError, match=rf"roads\.yaml: {fault}"):
+        load_road_network(path)

@@ -182,6 +182,7 @@ def faulty_files(folder):
     pcds = {
         "cut.pcd": ({"DATA": "binary"}, bytes(5999), "cut off"),
         "cut_ascii.pcd": ({"DATA": "ascii"}, b"1 2 3\n" * 499, "499 x 3 num"),
+        "large.pcd": ({"POINTS": 1, "DATA": "ascii"}, b"1 2 1e39", "z: a num"),
         "huge.pcd": ({"POINTS": 10**15, "DATA": "ascii"}, b"1 2 3", "cut off"),
         "words.pcd": ({"DATA": "ascii"}, b"a b c\n" * 500, "convert"),
         "odd.pcd": ({"DATA": "zip"}, b"", "unknown PCD encoding"),

@@ -78,6 +78,15 @@ def test_stages_are_drawn_side_by_side(small_map, tmp_path):
     [
         ("street: {position: [0, 0], target: [1, 1, 1]}", "street.position"),
         ("street: {position: [0, 0, 1]}", "street.target"),
+        (
+            "street: {position: [0, 0, 1], target: [0, 0, 1]}",
+            "street: position and target are the same",
+        ),
+        (
+            "street: {position: [0, 0, 1], target: [1, 0, 1], fov_y: 0}",
+            "street.fov_y",
+        ),
+        ("street: {position: [0, 0, .inf], target: [1, 0, 1]}", "position.2"),
         ("street: [", "not readable as YAML"),
         ("- 1", "views.yaml: "),
     ],
