@@ -35,6 +35,8 @@ from cns_drake.yaml_files import read_yaml
 
 # What can be missing; streets, ground and street furniture stay.
 _REMOVABLE = ("building", "vegetation")
+# No city reaches farther [m].
+_FARTHEST = 1e6
 
 _Part = Annotated[float, Field(ge=0.0, le=1.0)]
 
@@ -218,6 +220,8 @@ def _decay_order(table: Path, seed: int) -> list[str]:
         raise InputError(f"{table}: nothing in it that could be missing")
     try:
         xy = np.array([(float(row["x"]), float(row["y"])) for row in rows])
+        if not (np.abs(xy) <= _FARTHEST).all():  # Nor is NaN a place.
+            raise ValueError
     except (KeyError, ValueError):
         raise InputError(
             f"{table}: x, y: not the place of every structure"

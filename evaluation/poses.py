@@ -36,7 +36,8 @@ def rotation_from_quaternion(quat_xyzw: np.ndarray) -> np.ndarray:
         ValueError: if a quaternion has no direction (its norm is zero or
             not finite).
     """
-    norm = np.linalg.norm(quat_xyzw, axis=-1, keepdims=True)
+    with np.errstate(over="ignore"):
+        norm = np.linalg.norm(quat_xyzw, axis=-1, keepdims=True)
     if not np.all(np.isfinite(norm) & (norm > 0.0)):
         raise ValueError("a quaternion of zero or infinite length")
     x, y, z, w = np.moveaxis(quat_xyzw / norm, -1, 0)

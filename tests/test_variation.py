@@ -119,6 +119,11 @@ def test_a_city_needs_a_table_with_places(tmp_path):
     with pytest.raises(InputError, match=r"structures\.csv: No such file"):
         family(tmp_path, base="town/sequence_04.yaml")
     table = folder / "structures.csv"
-    table.write_text("instance,name,class\n1,hut,building\n")
-    with pytest.raises(InputError, match=r"structures\.csv: x, y: not the"):
-        family(tmp_path, base="town/sequence_04.yaml")
+    for text in (
+        "name,class\nhut,building\n",
+        "name,class,x,y\nhut,building,1,nan\n",
+        "name,class,x,y\nhut,building,1,1e300\n",
+    ):
+        table.write_text(text)
+        with pytest.raises(InputError, match=r"s\.csv: x, y: not the"):
+            family(tmp_path, base="town/sequence_04.yaml")
