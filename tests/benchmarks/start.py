@@ -26,16 +26,18 @@ import time
 def seconds(arguments: list[str], caches: Path) -> float:
     """Returns how long a command takes whose caches are in a folder."""
     start = time.perf_counter()
-    subprocess.run(
+    done = subprocess.run(
         [sys.executable, "-m", "cns_drake", *arguments],
         env={
             **os.environ,
             "NUMBA_CACHE_DIR": str(caches / "numba"),
             "XDG_CACHE_HOME": str(caches),
         },
-        check=True,
-        stdout=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
     )
+    if done.returncode != 0:
+        raise SystemExit(done.stderr)
     return time.perf_counter() - start
 
 
