@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 import json
 import math
 import os
 import sys
+import time
 from typing import Any
 
 import typer
@@ -16,6 +17,9 @@ from evaluation.errors import InputError
 # Typer brings click along, in new versions under a private name. The base
 # class of all its usage errors is reached through the one that is public.
 _USAGE_ERRORS = typer.BadParameter.__mro__[2]
+_INTERRUPTED = 130
+# Where there is no terminal, a line of progress this often [s].
+_LINE_INTERVAL = 5.0
 
 
 def run(app: typer.Typer, program: str) -> int:
@@ -31,6 +35,8 @@ def run(app: typer.Typer, program: str) -> int:
     """
     try:
         status = app(prog_name=program, standalone_mode=False)
+        if status == _INTERRUPTED:  # Typer has caught the interrupt itself.
+            return _fail(program, "interrupted", status)
         sys.stdout.flush()
     except _USAGE_ERRORS as error:
         if not sys.argv[1:]:
@@ -40,7 +46,7 @@ def run(app: typer.Typer, program: str) -> int:
     except InputError as error:
         return _fail(program, str(error))
     except (KeyboardInterrupt, typer.Abort):
-        return _fail(program, "interrupted", status=130)
+        return _fail(program, "interrupted", _INTERRUPTED)
     except BrokenPipeError:
         # Whoever read the results has seen enough of them. Python flushes
         # once more at its end, which must not fail again.
@@ -55,19 +61,30 @@ def run(app: typer.Typer, program: str) -> int:
 
 
 def track(items: Iterable[Any], description: str, total: int) -> Iterable[Any]:
-    """Shows a progress bar on stderr, if that is a terminal."""
+    """Shows progress on stderr: a bar, or lines where that is no terminal."""
     from rich.console import Console
     from rich.progress import track as rich_track
 
     console = Console(stderr=True)
+    if not console.is_terminal:
+        return _track_by_lines(items, description, total)
     return rich_track(
         items,
         description=description,
         total=total,
         console=console,
         transient=True,
-        disable=not console.is_terminal,
     )
+
+
+def _track_by_lines(items, description: str, total: int) -> Iterator[Any]:
+    """Says every few seconds how many of the items are done."""
+    said = time.monotonic()
+    for done, item in enumerate(items):
+        if time.monotonic() - said >= _LINE_INTERVAL:
+            note(f"{description}: {done} of {total}")
+            said = time.monotonic()
+        yield item
 
 
 def note(message: str) -> None:
