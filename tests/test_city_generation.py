@@ -137,7 +137,7 @@ def test_budgets(name):
     for path in stage_files(name):
         inspector = parse_strictly(path).model_inspector()
         count = len(inspector.GetAllGeometryIds(Role.kPerception))
-        assert 1000 < count < 6000
+        assert 1000 < count < 7000
         uris = ElementTree.parse(path).iter("uri")
         names = [uri.text.removeprefix("meshes/") for uri in uris]
         assert sum(triangles[name] for name in names) <= 1_500_000

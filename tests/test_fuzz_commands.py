@@ -143,7 +143,7 @@ def run(top: Path, seed: int, command: str, number: int):
     return folder, result
 
 
-@pytest.mark.parametrize(("command", "number"), damaged_runs())
+@pytest.mark.parametrize(("command", "number"), list(damaged_runs()))
 def test_a_result_or_one_line_and_status_2(runs, command, number):
     folder, result = runs[command, number]
     errors = result.stderr.decode()
