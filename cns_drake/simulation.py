@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 import math
 from pathlib import Path
@@ -105,6 +105,7 @@ def simulate(
     # What can be found wrong at once is found before anything slow.
     files.check(overwrite)
     scenario.check_files()
+    inputs = digest_inputs(scenario)
     trajectory = plan_drive(scenario)
     available = frames_within(trajectory.duration)
     num_frames = scenario.frames or available
@@ -115,8 +116,12 @@ def simulate(
         )
     scenario = scenario.model_copy(update={"frames": num_frames})
     world = load_stage(scenario)
+    if digest_inputs(scenario) != inputs:
+        raise InputError(
+            f"{scenario.world_file}: changed while it was being read"
+        )
     topics = recording_topics(scenario.lidars)
-    bag = _make_bag(files.path, topics, scenario, world, overwrite)
+    bag = _make_bag(files.path, topics, scenario, world, inputs, overwrite)
     page = None
     if page_file is not None:
         page = MeshcatRecorder(
@@ -178,11 +183,11 @@ def _make_bag(
     topics: Sequence[Topic],
     scenario: Scenario,
     world: World,
+    inputs: Mapping[str, str],
     overwrite: bool,
 ) -> BagWriter:
     """Makes the recording of a scenario, which has a number of frames."""
     described = scenario.model_dump(mode="json", exclude_none=True)
-    inputs = digest_inputs(scenario)
     return BagWriter(
         folder,
         topics,

@@ -3,13 +3,14 @@
 from bag_recordings import contents
 import pytest
 from rosbags.highlevel import AnyReader
-from small_map import scenario_values
+from small_map import scenario_values, write_small_map
 import yaml
 
 from cns_drake.errors import InputError
 from cns_drake.jobs import is_recorded, record_all
 from cns_drake.scenario import load_scenario, make_scenario
 from cns_drake.simulation import simulate
+from cns_drake.station import load_stage
 
 TOPICS = ("/lidar/points", "/imu/data", "/odometry", "/tf")
 
@@ -88,6 +89,26 @@ def test_existing_recording_is_kept_unless_overwritten(scenario, tmp_path):
     assert (folder / "metropolis_04_0.mcap").read_bytes() == before
     simulate(longer, tmp_path, overwrite=True)
     assert load_scenario(folder / "scenario.yaml").frames == 9
+
+
+def test_a_world_that_changes_under_its_reader_is_refused(
+    tmp_path, monkeypatch
+):
+    """Else the recording would bear the name of a world it does not show."""
+    folder = write_small_map(tmp_path / "map")
+    scenario = make_scenario(scenario_values(folder) | {"frames": 2}, "test")
+
+    def load_and_change(scenario):
+        world = load_stage(scenario)
+        scenario.world_file.write_text(
+            scenario.world_file.read_text() + "<!-- changed -->"
+        )
+        return world
+
+    monkeypatch.setattr("cns_drake.simulation.load_stage", load_and_change)
+    with pytest.raises(InputError, match=r"stage_\d\d\.sdf: changed while"):
+        simulate(scenario, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
 
 
 def test_graphviz_shows_the_station(scenario, tmp_path):
