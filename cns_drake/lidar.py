@@ -81,7 +81,11 @@ class Lidar(LeafSystem):
         self._pattern = pattern
         self._measurement = measurement
         structures = structures or StructureTable(())
-        self._d_Sset = pattern.d_Sset.astype(np.float32)
+        self._d_S_by_axis = np.ascontiguousarray(
+            pattern.d_Sset.T, dtype=np.float32
+        )
+        # Where in packet order each beam is.
+        self._firing_order = np.argsort(pattern.packet_order)
         self._d_Sset_cast = pattern.d_Sset[pattern.packet_order]
 
         self._geometry_query = self.DeclareAbstractInputPort(
@@ -132,29 +136,25 @@ class Lidar(LeafSystem):
             *self._calc_beams(context, query_object),
             self._measurement.reach(self._pattern.max_range),
         )
-        order = self._pattern.packet_order
-        true_ranges = np.empty_like(hits.ranges)
-        true_ranges[order] = hits.ranges
-        geometry = np.empty_like(hits.geometry)
-        geometry[order] = hits.geometry
+        true_ranges = hits.ranges.take(self._firing_order)
         beams, ranges, intensity = self._measurement.measure(
             true_ranges,
             self._pattern.min_range,
             self._pattern.max_range,
             round(context.get_time() / self._pattern.period),
         )
-        geometry = geometry[beams]
-        p_SRset = self._measurement.round_positions(
-            self._d_Sset[beams] * ranges[:, None]
-        )
+        geometry = hits.geometry.take(self._firing_order.take(beams))
         # Zeros, so that the padding between fields is defined, too.
         scan = np.zeros(len(beams), POINT_DTYPE)
-        scan["x"], scan["y"], scan["z"] = p_SRset.T
+        for name, d in zip("xyz", self._d_S_by_axis, strict=True):
+            scan[name] = self._measurement.round_positions(
+                d.take(beams) * ranges
+            )
         scan["intensity"] = intensity
-        scan["ring"] = self._pattern.ring[beams]
-        scan["t"] = self._pattern.t_ns[beams]
-        scan["label"] = seen.label[geometry]
-        scan["instance"] = seen.instance[geometry]
+        scan["ring"] = self._pattern.ring.take(beams)
+        scan["t"] = self._pattern.t_ns.take(beams)
+        scan["label"] = seen.label.take(geometry)
+        scan["instance"] = seen.instance.take(geometry)
         output.set_value(scan)
 
     def _scan_prerequisites(self) -> set:

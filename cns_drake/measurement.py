@@ -114,9 +114,9 @@ class MeasurementModel:
             beams, ranges[beams], self._rounded_to(intensity, _INTENSITY_STEP)
         )
 
-    def round_positions(self, p_SRset: np.ndarray) -> np.ndarray:
-        """Returns (N, 3) float32 positions at the model's resolution [m]."""
-        return self._rounded_to(p_SRset, self.resolution)
+    def round_positions(self, coordinates: np.ndarray) -> np.ndarray:
+        """Returns float32 coordinates at the model's resolution [m]."""
+        return self._rounded_to(coordinates, self.resolution)
 
     def _rounded_to(self, values: np.ndarray, step: float) -> np.ndarray:
         if self.resolution == 0.0:
