@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
@@ -27,6 +28,22 @@ class AngleMotion:
     angle: np.ndarray
     rate: np.ndarray
     acceleration: np.ndarray
+
+
+class Moments(NamedTuple):
+    """The path at N times, from which everything else follows.
+
+    Attributes:
+        u: (N,) path parameters.
+        rate: (N,) their rates [1/s].
+        acceleration: (N,) their accelerations [1/s^2].
+        jet: the path there.
+    """
+
+    u: np.ndarray
+    rate: np.ndarray
+    acceleration: np.ndarray
+    jet: PathJet
 
 
 class Trajectory:
@@ -66,6 +83,11 @@ class Trajectory:
         values = self._time_scaling.evaluate(np.atleast_1d(t))
         return [value[:, 0] for value in values]
 
+    def at(self, t) -> Moments:
+        """Returns the path at (N,) times."""
+        u, rate, acceleration = self.path_parameter(t)
+        return Moments(u, rate, acceleration, self._path.evaluate(u))
+
     def travelled(self, t) -> np.ndarray:
         """Returns the (N,) distances travelled at (N,) times [m]."""
         return self._travelled.evaluate(self.path_parameter(t)[0])
@@ -76,10 +98,7 @@ class Trajectory:
 
     def pose(self, t: float) -> RigidTransform:
         """Returns X_WB at a time."""
-        jet, _, _ = self._at(t)
-        return RigidTransform(
-            RollPitchYaw(0.0, -jet.climb[0], jet.yaw[0]), jet.p[0]
-        )
+        return pose_at(self.at(t))
 
     def poses(self, t) -> tuple[np.ndarray, np.ndarray]:
         """Returns R_WB (N, 3, 3) and p_WB (N, 3) [m] at (N,) times."""
@@ -90,28 +109,43 @@ class Trajectory:
 
     def spatial_velocity(self, t: float) -> SpatialVelocity:
         """Returns V_WB, expressed in the world [rad/s, m/s]."""
-        jet, rate, _ = self._at(t)
-        yaw_rate, pitch_rate = jet.dyaw[0] * rate, -jet.dclimb[0] * rate
-        w = yaw_rate * _UP + pitch_rate * _left(jet)
-        return SpatialVelocity(w, jet.dp[0] * rate)
+        return spatial_velocity_at(self.at(t))
 
     def spatial_acceleration(self, t: float) -> SpatialAcceleration:
         """Returns A_WB, expressed in the world [rad/s^2, m/s^2]."""
-        jet, rate, acceleration = self._at(t)
-        yaw_rate, pitch_rate = jet.dyaw[0] * rate, -jet.dclimb[0] * rate
-        left = _left(jet)
-        alpha = (
-            (jet.ddyaw[0] * rate**2 + jet.dyaw[0] * acceleration) * _UP
-            - (jet.ddclimb[0] * rate**2 + jet.dclimb[0] * acceleration) * left
-            # The pitch axis turns with the vehicle.
-            + yaw_rate * pitch_rate * np.cross(_UP, left)
-        )
-        a = jet.ddp[0] * rate**2 + jet.dp[0] * acceleration
-        return SpatialAcceleration(alpha, a)
+        return spatial_acceleration_at(self.at(t))
 
-    def _at(self, t: float) -> tuple[PathJet, float, float]:
-        u, rate, acceleration = self.path_parameter(t)
-        return self._path.evaluate(u), rate[0], acceleration[0]
+
+def pose_at(moment: Moments) -> RigidTransform:
+    """Returns X_WB at one time."""
+    jet = moment.jet
+    return RigidTransform(
+        RollPitchYaw(0.0, -jet.climb[0], jet.yaw[0]), jet.p[0]
+    )
+
+
+def spatial_velocity_at(moment: Moments) -> SpatialVelocity:
+    """Returns V_WB at one time, expressed in the world [rad/s, m/s]."""
+    jet, rate = moment.jet, moment.rate[0]
+    yaw_rate, pitch_rate = jet.dyaw[0] * rate, -jet.dclimb[0] * rate
+    w = yaw_rate * _UP + pitch_rate * _left(jet)
+    return SpatialVelocity(w, jet.dp[0] * rate)
+
+
+def spatial_acceleration_at(moment: Moments) -> SpatialAcceleration:
+    """Returns A_WB at one time, in the world [rad/s^2, m/s^2]."""
+    jet, rate = moment.jet, moment.rate[0]
+    acceleration = moment.acceleration[0]
+    yaw_rate, pitch_rate = jet.dyaw[0] * rate, -jet.dclimb[0] * rate
+    left = _left(jet)
+    alpha = (
+        (jet.ddyaw[0] * rate**2 + jet.dyaw[0] * acceleration) * _UP
+        - (jet.ddclimb[0] * rate**2 + jet.dclimb[0] * acceleration) * left
+        # The pitch axis turns with the vehicle.
+        + yaw_rate * pitch_rate * np.cross(_UP, left)
+    )
+    a = jet.ddp[0] * rate**2 + jet.dp[0] * acceleration
+    return SpatialAcceleration(alpha, a)
 
 
 _UP = np.array([0.0, 0.0, 1.0])
@@ -148,29 +182,41 @@ class WheelMotion:
     def _ground_velocity(self, jet: PathJet) -> tuple[np.ndarray, np.ndarray]:
         return jet.speed - jet.turn * self._y, jet.turn * self._x
 
-    def evaluate(self, t) -> tuple[AngleMotion, AngleMotion]:
-        """Returns the motions of steering and rolling at (N,) times.
-
-        Steering is positive to the left, rolling positive forwards and zero
-        at the start.
-        """
-        u, rate, acceleration = self._trajectory.path_parameter(t)
-        jet = self._trajectory.path.evaluate(u)
-        a, b = self._ground_velocity(jet)
-        da, db = jet.dspeed - jet.dturn * self._y, jet.dturn * self._x
-        dda, ddb = jet.ddspeed - jet.ddturn * self._y, jet.ddturn * self._x
-        g = np.hypot(a, b)
-        dg = (a * da + b * db) / g
-        dsteer = (a * db - b * da) / g**2
-        ddsteer = (a * ddb - b * dda) / g**2 - 2 * dsteer * dg / g
-        steering = AngleMotion(
+    def steering(self, moments: Moments) -> AngleMotion:
+        """Returns the steering at (N,) times, positive to the left."""
+        _, rate, acceleration, jet = moments
+        a, b, da, db, dda, ddb = self._ground_motion(jet)
+        squared = a**2 + b**2
+        dsquared = 2.0 * (a * da + b * db)
+        dsteer = (a * db - b * da) / squared
+        ddsteer = (a * ddb - b * dda - dsteer * dsquared) / squared
+        return AngleMotion(
             angle=np.arctan2(b, a),
             rate=dsteer * rate,
             acceleration=ddsteer * rate**2 + dsteer * acceleration,
         )
-        rolling = AngleMotion(
+
+    def rolling(self, moments: Moments) -> AngleMotion:
+        """Returns the rolling at (N,) times.
+
+        It is positive forwards and zero at the start.
+        """
+        u, rate, acceleration, jet = moments
+        a, b, da, db, _, _ = self._ground_motion(jet)
+        g = np.hypot(a, b)
+        dg = (a * da + b * db) / g
+        return AngleMotion(
             angle=self._rolled.evaluate(u) / self._radius,
             rate=g * rate / self._radius,
             acceleration=(dg * rate**2 + g * acceleration) / self._radius,
         )
-        return steering, rolling
+
+    def _ground_motion(self, jet: PathJet) -> tuple[np.ndarray, ...]:
+        """Returns the ground's velocity and its two derivatives by u."""
+        return (
+            *self._ground_velocity(jet),
+            jet.dspeed - jet.dturn * self._y,
+            jet.dturn * self._x,
+            jet.ddspeed - jet.ddturn * self._y,
+            jet.ddturn * self._x,
+        )

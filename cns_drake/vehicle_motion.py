@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +13,15 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Joint, ModelInstanceIndex, RevoluteJoint
 from pydrake.systems.framework import LeafSystem, ValueProducer
 
-from cns_drake.trajectory import Trajectory, WheelMotion
+from cns_drake.trajectory import (
+    AngleMotion,
+    Moments,
+    Trajectory,
+    WheelMotion,
+    pose_at,
+    spatial_acceleration_at,
+    spatial_velocity_at,
+)
 
 
 class _State(NamedTuple):
@@ -110,43 +119,45 @@ class VehicleMotion(LeafSystem):
                 prerequisites,
             )
 
-    def _describe(self, joint: Joint) -> tuple[WheelMotion, bool, float]:
-        """Returns a joint's wheel, whether it steers, and its sign."""
+    def _describe(
+        self, joint: Joint
+    ) -> tuple[Callable[[Moments], AngleMotion], float]:
+        """Returns how a joint turns, and its sign."""
         context = self._plant_context
         frame = joint.frame_on_child()
         X_BJ = frame.CalcPose(context, self._base.body_frame())
         if isinstance(joint, RevoluteJoint):
             axis_B = X_BJ.rotation().matrix() @ joint.revolute_axis()
-            for steers, direction in ((False, axis_B[1]), (True, axis_B[2])):
+            wheel = WheelMotion(self._trajectory, X_BJ.translation())
+            for turn, direction in (
+                (wheel.rolling, axis_B[1]),
+                (wheel.steering, axis_B[2]),
+            ):
                 if abs(direction) > 1 - 1e-9:
-                    wheel = WheelMotion(self._trajectory, X_BJ.translation())
-                    return wheel, steers, float(np.sign(direction))
+                    return turn, float(np.sign(direction))
         raise ValueError(
             f"joint {joint.name()} does not turn about the vehicle's y (a "
             "wheel) or z (its steering)"
         )
 
     def _calc_state(self, context, value):
-        time = context.get_time()
         plant, plant_context, base = (
             self._plant,
             self._plant_context,
             self._base,
         )
         plant.SetPositions(plant_context, self._default_q)
-        plant.SetFreeBodyPose(plant_context, base, self._trajectory.pose(time))
+        moment = self._trajectory.at(context.get_time())
+        plant.SetFreeBodyPose(plant_context, base, pose_at(moment))
         v = np.zeros(plant.num_velocities())
         vdot = np.zeros_like(v)
         # A floating base's velocities are V_WB, expressed in the world.
         start = base.floating_velocities_start_in_v()
         rows = slice(start, start + 6)
-        velocity = self._trajectory.spatial_velocity(time)
-        v[rows] = velocity.get_coeffs()
-        acceleration = self._trajectory.spatial_acceleration(time)
-        vdot[rows] = acceleration.get_coeffs()
-        for joint, wheel, steers, sign in self._joints:
-            steering, rolling = wheel.evaluate(time)
-            motion = steering if steers else rolling
+        v[rows] = spatial_velocity_at(moment).get_coeffs()
+        vdot[rows] = spatial_acceleration_at(moment).get_coeffs()
+        for joint, turn, sign in self._joints:
+            motion = turn(moment)
             joint.set_angle(plant_context, sign * motion.angle[0])
             v[joint.velocity_start()] = sign * motion.rate[0]
             vdot[joint.velocity_start()] = sign * motion.acceleration[0]

@@ -184,7 +184,9 @@ def test_wheels_of_a_steady_bend_roll_on_circles():
     t = trajectory.duration / 2 + np.array([0.0, 0.5])
     yaw_rate = trajectory.path_parameter(t)[1] / radius
     for x, y in ((0.0, 0.8), (0.0, -0.8), (2.8, 0.8), (2.8, -0.8)):
-        steering, rolling = WheelMotion(trajectory, (x, y, 0.3)).evaluate(t)
+        wheel = WheelMotion(trajectory, (x, y, 0.3))
+        steering = wheel.steering(trajectory.at(t))
+        rolling = wheel.rolling(trajectory.at(t))
         # The turning centre lies at (0, r) in the vehicle frame.
         own_radius = np.hypot(r - y, x)
         np.testing.assert_allclose(steering.angle, np.arctan2(x, r - y))
@@ -201,12 +203,10 @@ def test_wheel_rates_are_derivatives_of_the_angles():
     wheel = WheelMotion(trajectory, (2.8, -0.8, 0.33))
     t = np.linspace(1.0, trajectory.duration - 1.0, 200)
     step = 1e-4
-    for now, before, after in zip(
-        wheel.evaluate(t),
-        wheel.evaluate(t - step),
-        wheel.evaluate(t + step),
-        strict=True,
-    ):
+    for turn in (wheel.steering, wheel.rolling):
+        now, before, after = (
+            turn(trajectory.at(t + shift)) for shift in (0.0, -step, step)
+        )
         rate = (after.angle - before.angle) / (2 * step)
         np.testing.assert_allclose(now.rate, rate, atol=1e-5)
         acceleration = (after.rate - before.rate) / (2 * step)
