@@ -1,11 +1,17 @@
 """Fixtures that several test modules use."""
 
+import signal
+
 from eval_program import write_towns
 import pytest
 from small_map import scenario_values, write_small_map
 
 from cns_drake.scenario import make_scenario
 from cns_drake.simulation import simulate
+
+# What is started in the background ignores Ctrl-C, and so does all that it
+# starts; the tests of interrupts need it.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_addoption(parser):
