@@ -17,6 +17,7 @@ from cns_drake.bag_writer import BagWriter
 from cns_drake.errors import InputError
 from cns_drake.files import check_writable, complete_part, write_part
 from cns_drake.frame_clock import FRAME_PERIOD, START_NS, frames_within
+from cns_drake.interrupts import interrupts_wait
 from cns_drake.mcap_recorder import make_calibration, recording_topics
 from cns_drake.meshcat_recording import MeshcatRecorder
 from cns_drake.planning import plan_drive
@@ -97,6 +98,30 @@ def simulate(
     Raises:
         InputError: the scenario cannot be run or its output not be written.
     """
+    with interrupts_wait() as strike:
+        return _simulate(
+            scenario,
+            output,
+            page_file,
+            graphviz_file,
+            overwrite,
+            on_frame,
+            on_note,
+            strike,
+        )
+
+
+def _simulate(
+    scenario: Scenario,
+    output: Path,
+    page_file: Path | None,
+    graphviz_file: Path | None,
+    overwrite: bool,
+    on_frame: ProgressCallback,
+    on_note: NoteCallback,
+    strike: Callable[[], None],
+) -> Run:
+    """Does what `simulate` does; interrupts come up in `strike` only."""
     files = RecordingFolder(output / scenario.name)
     start = time.perf_counter()
     for file in (page_file, graphviz_file):
@@ -120,6 +145,7 @@ def simulate(
         raise InputError(
             f"{scenario.world_file}: changed while it was being read"
         )
+    strike()
     topics = recording_topics(scenario.lidars)
     bag = _make_bag(files.path, topics, scenario, world, inputs, overwrite)
     page = None
@@ -153,9 +179,11 @@ def simulate(
             write_part(graphviz_file, diagram.GetGraphvizString())
             complete_part(graphviz_file)
         simulator = Simulator(diagram)
+        strike()
         loaded = time.perf_counter()
 
         def monitor(context):
+            strike()
             done = round(context.get_time() / FRAME_PERIOD) + 1
             on_frame(min(done, num_frames), num_frames)
 
