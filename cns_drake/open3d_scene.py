@@ -12,13 +12,8 @@ import sys
 
 import numpy as np
 
-from cns_drake.perception_geometry import (
-    CylinderSurface,
-    EllipsoidSurface,
-    Surface,
-    TriangleSurface,
-)
 from cns_drake.ray_groups import RayGroup
+from cns_drake.surface_merging import tessellate
 
 # Sides of a round shape, so that it is within 0.03 % of its radius.
 _SIDES = 128
@@ -37,12 +32,9 @@ class Open3dScene:
         self._scenes = []
         self._owners = []
         for group in groups:
-            surfaces = [
-                (index, X_LG, _triangles(surface))
-                for index, X_LG, surface in group.members
-            ]
             vertices, triangles, owners, count = [], [], [], 0
-            for index, X_LG, surface in surfaces:
+            for index, X_LG, shape in group.members:
+                surface = tessellate(shape, _SIDES)
                 p_LVset = X_LG.multiply(surface.p_GVset.T).T
                 vertices.append(p_LVset.astype(np.float32))
                 triangles.append((surface.triangles + count).astype(np.uint32))
@@ -105,46 +97,3 @@ def _say_once() -> None:
         "is slower and takes curved shapes as polyhedra",
         file=sys.stderr,
     )
-
-
-def _triangles(surface: Surface) -> TriangleSurface:
-    """Returns a surface as triangles."""
-    if isinstance(surface, TriangleSurface):
-        return surface
-    if isinstance(surface, EllipsoidSurface):
-        quarter = np.linspace(-np.pi / 2, np.pi / 2, _SIDES // 2 + 1)
-        profile = np.column_stack([np.cos(quarter), np.sin(quarter)])
-        return _revolve(profile, np.array(surface.semi_axes))
-    half = surface.length / 2.0
-    if isinstance(surface, CylinderSurface):
-        r = surface.radius
-        profile = np.array([[0, -half], [r, -half], [r, half], [0, half]])
-    else:
-        quarter = np.linspace(0.0, np.pi / 2, _SIDES // 4 + 1)
-        upper = surface.radius * np.column_stack(
-            [np.cos(quarter), np.sin(quarter)]
-        ) + [0.0, half]
-        profile = np.concatenate([upper[::-1] * [1, -1], upper])
-    return _revolve(profile, np.ones(3))
-
-
-def _revolve(profile: np.ndarray, scale: np.ndarray) -> TriangleSurface:
-    """Returns the surface that a profile (N, 2) of r and z sweeps about z."""
-    angle = np.arange(_SIDES) * 2.0 * np.pi / _SIDES
-    r, z = profile.T
-    p_GVset = scale * np.stack(
-        [
-            np.outer(r, np.cos(angle)),
-            np.outer(r, np.sin(angle)),
-            np.repeat(z[:, None], _SIDES, axis=1),
-        ],
-        axis=-1,
-    ).reshape(-1, 3)
-    ring, side = np.meshgrid(
-        np.arange(len(profile) - 1), np.arange(_SIDES), indexing="ij"
-    )
-    a = (ring * _SIDES + side).ravel()
-    b = (ring * _SIDES + (side + 1) % _SIDES).ravel()
-    lower = np.column_stack([a, b, b + _SIDES])
-    upper = np.column_stack([a, b + _SIDES, a + _SIDES])
-    return TriangleSurface(p_GVset, np.concatenate([lower, upper]))

@@ -17,9 +17,8 @@ from cns_drake.perception_geometry import (
     TriangleSurface,
 )
 
-# Sides of a round shape; lamp posts are many and thin.
-_NUM_MERIDIANS = 12
-_NUM_PARALLELS = 6  # of a half sphere
+# Sides of a round shape in pictures; lamp posts are many and thin.
+_SIDES = 12
 
 
 def merge_surfaces(
@@ -49,27 +48,36 @@ def merge_surfaces(
     )
 
 
-def tessellate(surface: Surface) -> TriangleSurface:
-    """Returns triangles for any surface, inscribed where it is curved."""
+def tessellate(surface: Surface, sides: int = _SIDES) -> TriangleSurface:
+    """Returns triangles for any surface, inscribed where it is curved.
+
+    Args:
+        surface: the shape.
+        sides: of a circle about the z axis of G; a half sphere has half as
+            many parallels.
+    """
     if isinstance(surface, TriangleSurface):
         return surface
     if isinstance(surface, EllipsoidSurface):
-        radius, z = _arc(_NUM_PARALLELS)
+        radius, z = _arc(sides // 2)
         unit = _revolve(
             np.concatenate([radius, radius[-2::-1]]),
             np.concatenate([z, -z[-2::-1]]),
+            sides,
         )
         return TriangleSurface(unit.p_GVset * surface.semi_axes, unit.triangles)
     half = surface.length / 2.0
     if isinstance(surface, CylinderSurface):
         r = surface.radius
-        return _revolve(np.array([0, r, r, 0]), np.array([1, 1, -1, -1]) * half)
+        z = np.array([1, 1, -1, -1]) * half
+        return _revolve(np.array([0, r, r, 0]), z, sides)
     if isinstance(surface, CapsuleSurface):
-        radius, z = _arc(_NUM_PARALLELS)
+        radius, z = _arc(sides // 2)
         radius, z = radius * surface.radius, z * surface.radius + half
         return _revolve(
             np.concatenate([radius, radius[::-1]]),
             np.concatenate([z, -z[::-1]]),
+            sides,
         )
     raise TypeError(f"no triangles for {type(surface).__name__}")
 
@@ -80,15 +88,16 @@ def _arc(num_steps: int) -> tuple[np.ndarray, np.ndarray]:
     return np.sin(angle), np.cos(angle)
 
 
-def _revolve(radius: np.ndarray, z: np.ndarray) -> TriangleSurface:
+def _revolve(radius: np.ndarray, z: np.ndarray, sides: int) -> TriangleSurface:
     """Returns the surface that a profile sweeps about z.
 
     Args:
         radius: (N,) radii from the upper to the lower pole, both of which
             have radius zero [m].
         z: (N,) heights [m].
+        sides: of each circle.
     """
-    angle = 2.0 * np.pi * np.arange(_NUM_MERIDIANS) / _NUM_MERIDIANS
+    angle = 2.0 * np.pi * np.arange(sides) / sides
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     inner = range(1, len(radius) - 1)
     vertices = [[(0.0, 0.0, z[0])]]
@@ -98,16 +107,16 @@ def _revolve(radius: np.ndarray, z: np.ndarray) -> TriangleSurface:
     ]
     vertices += [[(0.0, 0.0, z[-1])]]
 
-    first = np.arange(_NUM_MERIDIANS)
-    second = (first + 1) % _NUM_MERIDIANS
-    upper_ring, lower_pole = 1, 1 + len(inner) * _NUM_MERIDIANS
+    first = np.arange(sides)
+    second = (first + 1) % sides
+    upper_ring, lower_pole = 1, 1 + len(inner) * sides
     triangles = [
         np.column_stack(
             [np.zeros_like(first), upper_ring + first, upper_ring + second]
         )
     ]
     for _ in inner[:-1]:
-        lower_ring = upper_ring + _NUM_MERIDIANS
+        lower_ring = upper_ring + sides
         a, b = upper_ring + first, upper_ring + second
         c, d = lower_ring + first, lower_ring + second
         triangles += [np.column_stack([a, c, d]), np.column_stack([a, d, b])]

@@ -64,6 +64,14 @@ _SensorHeight = Annotated[
     float, typer.Option(help="Height of the LiDAR above the ground [m].")
 ]
 
+_Jobs = Annotated[
+    int | None,
+    typer.Option(
+        help="Processes that work at the same time; as many as there are"
+        " cores if left out."
+    ),
+]
+
 
 @app.command()
 def tcr(
@@ -177,13 +185,7 @@ def scores(
 def report(
     recordings: Annotated[Path, typer.Argument(metavar="DIR")],
     output: Annotated[Path, typer.Option(help="Folder to write.")],
-    jobs: Annotated[
-        int | None,
-        typer.Option(
-            help="Processes that work at the same time; as many as there are"
-            " cores if left out."
-        ),
-    ] = None,
+    jobs: _Jobs = None,
 ) -> None:
     """Tables, figures and report.html from all recordings in a folder."""
     from evaluation import report as reporting
@@ -199,13 +201,7 @@ def trend(
     databases: Annotated[list[Path], typer.Argument(metavar="DATABASE...")],
     query: Annotated[Path, typer.Option(help="The drive that asks.")],
     output: Annotated[Path, typer.Option(help="Folder to write.")],
-    jobs: Annotated[
-        int | None,
-        typer.Option(
-            help="Processes that work at the same time; as many as there are"
-            " cores if left out."
-        ),
-    ] = None,
+    jobs: _Jobs = None,
 ) -> None:
     """AUC of every method over TCR_sym, one query drive and many databases.
 
