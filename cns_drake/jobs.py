@@ -19,8 +19,6 @@ import signal
 import threading
 import traceback
 
-import yaml
-
 from cns_drake import terminal
 from cns_drake.errors import InputError
 from cns_drake.frame_clock import frames_within
@@ -33,6 +31,7 @@ from cns_drake.planning import plan_drive
 from cns_drake.provenance import INPUTS_KEY, combined_digest, digest_inputs
 from cns_drake.recording_folder import RecordingFolder
 from cns_drake.scenario import Scenario, make_scenario
+from cns_drake.yaml_files import read_yaml
 
 # How long a process may take to close its recording [s].
 _PATIENCE = 30.0
@@ -112,16 +111,11 @@ def is_recorded(scenario: Scenario, output: Path) -> bool:
     if not files.is_finished() or not files.mcap.is_file():
         return False
     try:
-        recorded = make_scenario(
-            yaml.safe_load(files.scenario.read_text(encoding="utf-8")),
-            files.scenario,
-        )
-        metadata = yaml.safe_load(files.metadata.read_text(encoding="utf-8"))
+        recorded = make_scenario(read_yaml(files.scenario), files.scenario)
+        metadata = read_yaml(files.metadata)
         custom_data = metadata["rosbag2_bagfile_information"]["custom_data"]
         inputs = custom_data[INPUTS_KEY]
-    except (OSError, ValueError, LookupError, TypeError):
-        return False
-    except (yaml.YAMLError, InputError):
+    except (InputError, LookupError, TypeError):
         return False
     # A recording always says how many frames it has.
     if recorded.model_copy(update={"frames": scenario.frames}) != scenario:
