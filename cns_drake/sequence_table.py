@@ -7,7 +7,7 @@ measured from, and is measured anew when they have changed.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 import csv
 from dataclasses import astuple, dataclass, fields
 import io
@@ -66,13 +66,19 @@ def sequence_rows(
             be parsed.
     """
     known = {row.checksum: row for row in _read(folder / TABLE_NAME)}
+    # Of the meshes, names and sizes have to do: reading them all would take
+    # longer than a listing may.
+    meshes = "".join(
+        f"{mesh.name} {mesh.stat().st_size}"
+        for mesh in sorted((folder / "meshes").glob("*"))
+    ).encode()
     rows = []
     for path in sorted(folder.glob("sequence_*.yaml")):
         entries = _entries(path)
         stage = folder / f"stage_{entries.get('stage')}.sdf"
         if not stage.is_file():
             continue
-        checksum = _checksum(path, folder / "roads.yaml", stage)
+        checksum = _checksum((path, folder / "roads.yaml", stage), meshes)
         row = known.get(checksum)
         if row is None:
             progress(f"measuring {sequence_name(path)}")
@@ -109,20 +115,13 @@ def _entries(path: Path) -> dict:
     return entries
 
 
-def _checksum(*paths: Path) -> str:
-    """Returns the checksum of a sequence, its roads and its stage.
-
-    Of the meshes beside them, names and sizes have to do: reading them all
-    would take longer than a listing may.
-    """
+def _checksum(paths: Iterable[Path], more: bytes) -> str:
+    """Returns the checksum of what files hold, and of more."""
     total = 0
     for path in paths:
         with user_errors(path):
             total = zlib.crc32(path.read_bytes(), total)
-    for mesh in sorted((paths[0].parent / "meshes").glob("*")):
-        entry = f"{mesh.name} {mesh.stat().st_size}"
-        total = zlib.crc32(entry.encode(), total)
-    return f"{total:08x}"
+    return f"{zlib.crc32(more, total):08x}"
 
 
 def _read(path: Path) -> list[SequenceRow]:
