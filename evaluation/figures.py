@@ -15,7 +15,13 @@ from scipy.spatial import cKDTree
 from evaluation.drawing import save, unit
 from evaluation.hull import in_convex_hull
 from evaluation.maps import VoxelMap
-from evaluation.point_rendering import Picture, View, render, shade_by_height
+from evaluation.point_rendering import (
+    Picture,
+    View,
+    colour_by_height,
+    render,
+    shade_by_height,
+)
 from evaluation.tcr import TAU, TemporalChange
 
 _UNCHANGED = (214, 214, 214)
@@ -25,6 +31,9 @@ _ABSENT_OUTSIDE = (240, 170, 160)
 _IN_O = (120, 170, 215)
 _ONLY_IN_H = (213, 94, 0)
 _OUTSIDE_H = (228, 228, 228)
+# From above, as plans have it: streets pale, walls dark.
+_GROUND = (226, 229, 232)
+_HIGHEST = (72, 88, 112)
 
 _OBLIQUE = View(azimuth_deg=-55.0, elevation_deg=38.0, pixels_per_metre=3.0)
 _SMALL_OBLIQUE = View(
@@ -32,7 +41,7 @@ _SMALL_OBLIQUE = View(
 )
 _FROM_ABOVE = View(azimuth_deg=-90.0, elevation_deg=90.0, pixels_per_metre=2.5)
 # Red at the start and blue at the end, as in the paper.
-_ROUTE_COLOURS = "turbo_r"
+ROUTE_COLOURS = "turbo_r"
 # What a view from above shows beyond the route [m].
 _MARGIN = 60.0
 _SCALE_BAR = 50.0
@@ -92,10 +101,8 @@ def top_view(points: VoxelMap, positions: np.ndarray) -> Picture:
     if not near.any():
         near[:] = True
     shown = centroids[near]
-    rgb = np.full((len(shown), 3), _UNCHANGED, dtype=np.uint8)
-    return render(
-        shown, shade_by_height(rgb, shown[:, 2], darkest=0.6), _FROM_ABOVE
-    )
+    rgb = colour_by_height(shown[:, 2], _GROUND, _HIGHEST)
+    return render(shown, rgb, _FROM_ABOVE)
 
 
 def draw_routes(map_name: str, stages: Sequence[Stage], stem: Path) -> None:
@@ -271,7 +278,7 @@ def _draw_route(axes, line: np.ndarray) -> None:
     """Draws a route (N, 2) with a triangle at its start, a square at end."""
     segments = LineCollection(
         np.stack([line[:-1], line[1:]], axis=1),
-        cmap=_ROUTE_COLOURS,
+        cmap=ROUTE_COLOURS,
         array=np.linspace(0.0, 1.0, max(len(line) - 1, 1)),
         linewidths=2.0,
         capstyle="round",

@@ -128,11 +128,32 @@ def shade_by_height(
         heights: (N,) [m].
         darkest: factor at the lowest point.
     """
+    factor = darkest + (1.0 - darkest) * _height_parts(heights)
+    return (rgb * factor[:, None]).astype(np.uint8)
+
+
+def colour_by_height(
+    heights: np.ndarray,
+    lowest: tuple[int, int, int],
+    highest: tuple[int, int, int],
+) -> np.ndarray:
+    """Returns colours (N, 3) uint8 between two by height.
+
+    Args:
+        heights: (N,) [m].
+        lowest: colour of the lowest point.
+        highest: colour of the highest.
+    """
+    part = _height_parts(heights)[:, None]
+    return ((1.0 - part) * lowest + part * highest).astype(np.uint8)
+
+
+def _height_parts(heights: np.ndarray) -> np.ndarray:
+    """Returns 0 for low points to 1 for high ones; stray ones do not count."""
     low, high = np.quantile(heights, [0.01, 0.99])
     part = np.clip((heights - low) / max(high - low, 1e-9), 0.0, 1.0)
     # Root, because most of a city is near the ground.
-    factor = darkest + (1.0 - darkest) * np.sqrt(part)
-    return (rgb * factor[:, None]).astype(np.uint8)
+    return np.sqrt(part)
 
 
 def _shade(depth: np.ndarray) -> np.ndarray:

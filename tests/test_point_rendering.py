@@ -1,7 +1,12 @@
 import numpy as np
 import pytest
 
-from evaluation.point_rendering import View, render, shade_by_height
+from evaluation.point_rendering import (
+    View,
+    colour_by_height,
+    render,
+    shade_by_height,
+)
 
 RED, GREEN = (200, 0, 0), (0, 200, 0)
 
@@ -77,3 +82,16 @@ def test_lower_points_are_darker():
     assert shaded[-1].tolist() == [200] * 3
     level = shade_by_height(colours, np.full(101, 3.0), darkest=0.5)
     assert (level == 100).all()
+
+
+def test_colours_between_two():
+    heights = np.linspace(0.0, 50.0, 101)
+    low, high = (200, 100, 0), (0, 100, 200)
+    rgb = colour_by_height(heights, low, high).astype(int)
+    assert rgb[0].tolist() == list(low)
+    assert rgb[-1].tolist() == list(high)
+    assert (np.diff(rgb[:, 0]) <= 0).all()
+    # Stray points take no part: 49 of 50 m is the 99 % quantile less 1 %.
+    assert rgb[50].tolist() == pytest.approx(
+        [200 * (1 - 0.5**0.5), 100, 200 * 0.5**0.5], abs=1.0
+    )
