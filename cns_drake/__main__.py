@@ -2,7 +2,7 @@
 
 import sys
 
-from cns_drake.interrupts import (
+from evaluation.interrupts import (
     end_interrupted,
     interrupt_on_termination,
     uninterrupted,

@@ -15,7 +15,7 @@ import typer
 
 from cns_drake import terminal
 from cns_drake.errors import InputError
-from cns_drake.interrupts import uninterrupted
+from evaluation.interrupts import uninterrupted
 
 app = typer.Typer(
     help="Cities that change, driven and recorded by simulated LiDAR.",

@@ -1,18 +1,9 @@
 """The error that a user can mend."""
 
-from evaluation.errors import one_line
+# One error for both packages: the evaluation knows nothing of this one.
+from evaluation.errors import InputError
 
-
-class InputError(Exception):
-    """Input that cannot be used; the message is one line for the user.
-
-    The message names the file (or argument), the field where there is one,
-    and the fault. The command line prints it and exits with status 2.
-    """
-
-    def __init__(self, message: object):
-        """Takes what to tell."""
-        super().__init__(one_line(message))
+__all__ = ["InputError", "describe_validation_error"]
 
 
 def describe_validation_error(source, error) -> str:

@@ -22,16 +22,16 @@ import traceback
 from cns_drake import terminal
 from cns_drake.errors import InputError
 from cns_drake.frame_clock import frames_within
-from cns_drake.interrupts import (
-    end_interrupted,
-    interrupt_on_termination,
-    uninterrupted,
-)
 from cns_drake.planning import plan_drive
 from cns_drake.provenance import INPUTS_KEY, combined_digest, digest_inputs
 from cns_drake.recording_folder import RecordingFolder
 from cns_drake.scenario import Scenario, make_scenario
 from cns_drake.yaml_files import read_yaml
+from evaluation.interrupts import (
+    end_interrupted,
+    interrupt_on_termination,
+    uninterrupted,
+)
 
 # How long a process may take to close its recording [s].
 _PATIENCE = 30.0

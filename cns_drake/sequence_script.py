@@ -16,7 +16,7 @@ from cns_drake.cli import (
     Overwrite,
     Recording,
 )
-from cns_drake.interrupts import uninterrupted
+from evaluation.interrupts import uninterrupted
 
 if TYPE_CHECKING:
     from cns_drake.simulation import Run

@@ -10,33 +10,29 @@ import time
 
 from rich.console import Console
 from rich.progress import (
-    BarColumn,
     Progress,
-    Task,
     TextColumn,
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
-from rich.table import Column
-from rich.text import Text
 import typer
 
 from cns_drake.errors import InputError
 from cns_drake.frame_clock import FRAME_PERIOD
-from cns_drake.interrupts import (
+from evaluation.interrupts import (
     INTERRUPTED,
     end_interrupted,
     ignore_interrupts,
     interrupt_on_termination,
 )
+from evaluation.progress import LINE_INTERVAL
+from evaluation.progress_bars import fixed_column, print_note, show_bars
 
 # What typer raises for bad usage; which module defines it depends on typer's
 # version.
 _UsageError = typer.BadParameter.__mro__[1]
 
 _BAD_INPUT = 2
-# Where there is no terminal, a line of progress this often [s].
-_LINE_INTERVAL = 5.0
 
 
 def run(app: typer.Typer) -> None:
@@ -54,7 +50,7 @@ def run(app: typer.Typer) -> None:
             message = "interrupted"
         sys.stdout.flush()
     except InputError as error:
-        message, status = f"error: {error}", _BAD_INPUT
+        message, status = f"error: {error}", error.exit_status
     except _UsageError as error:
         message, status = f"error: {error.format_message()}", _BAD_INPUT
     except (KeyboardInterrupt, typer.Abort):
@@ -76,49 +72,22 @@ def run(app: typer.Typer) -> None:
     raise SystemExit(status)
 
 
-class _ShortenedColumn(TextColumn):
-    """Text that gives way in a narrow terminal instead of wrapping."""
-
-    def render(self, task: Task) -> Text:
-        text = super().render(task)
-        text.no_wrap = True
-        text.overflow = "ellipsis"
-        return text
-
-
 @contextlib.contextmanager
 def show_progress(console: Console | None = None) -> Iterator[Progress]:
     """Shows progress bars, each one line, with elapsed and remaining time.
 
-    The field `note` of a task is shown behind its bar. Where there is no
-    terminal, no bar is drawn; see `count_progress`.
+    See `show_bars`; where there is no terminal, see `count_progress`.
 
     Args:
         console: where; stderr by default.
     """
-    fixed = Column(no_wrap=True)
-    progress = Progress(
-        TextColumn("{task.description}", table_column=fixed),
-        BarColumn(table_column=Column(max_width=40)),
-        TextColumn("{task.percentage:>3.0f} %", table_column=fixed),
-        TimeElapsedColumn(table_column=fixed),
-        TextColumn("left", table_column=fixed),
-        TimeRemainingColumn(table_column=fixed),
-        _ShortenedColumn("{task.fields[note]}", table_column=Column()),
-        console=console or Console(stderr=True),
-        refresh_per_second=2,
-    )
-    if progress.console.is_terminal:
-        with progress:
-            yield progress
-    else:  # A bar would be drawn once, at the end, beside an error's line.
+    with show_bars(
+        TimeElapsedColumn(table_column=fixed_column()),
+        TextColumn("left", table_column=fixed_column()),
+        TimeRemainingColumn(table_column=fixed_column()),
+        console=console,
+    ) as progress:
         yield progress
-
-
-def print_note(progress: Progress, text: str) -> None:
-    """Prints a line above the progress bars."""
-    # Where there is no terminal, a line stays one line.
-    progress.console.print(text, soft_wrap=True, markup=False, highlight=False)
 
 
 def frame_progress(progress: Progress, task) -> Callable[[int, int], None]:
@@ -154,7 +123,7 @@ def count_progress(
         unit: what is counted.
     """
     console = progress.console
-    interval = 0.5 if console.is_terminal else _LINE_INTERVAL
+    interval = 0.5 if console.is_terminal else LINE_INTERVAL
     shown = 0.0
     # Neither loading nor what an earlier run had done tells the speed.
     first: tuple[float, int] | None = None

@@ -13,13 +13,12 @@ from typing import Any
 import typer
 
 from evaluation.errors import InputError
+from evaluation.progress import LINE_INTERVAL
 
 # Typer brings click along, in new versions under a private name. The base
 # class of all its usage errors is reached through the one that is public.
 _USAGE_ERRORS = typer.BadParameter.__mro__[2]
 _INTERRUPTED = 130
-# Where there is no terminal, a line of progress this often [s].
-_LINE_INTERVAL = 5.0
 
 
 def run(app: typer.Typer, program: str) -> int:
@@ -44,7 +43,7 @@ def run(app: typer.Typer, program: str) -> int:
             return 2
         return _fail(program, error.format_message())
     except InputError as error:
-        return _fail(program, str(error))
+        return _fail(program, str(error), error.exit_status)
     except (KeyboardInterrupt, typer.Abort):
         return _fail(program, "interrupted", _INTERRUPTED)
     except BrokenPipeError:
@@ -81,7 +80,7 @@ def _track_by_lines(items, description: str, total: int) -> Iterator[Any]:
     """Says every few seconds how many of the items are done."""
     said = time.monotonic()
     for done, item in enumerate(items):
-        if time.monotonic() - said >= _LINE_INTERVAL:
+        if time.monotonic() - said >= LINE_INTERVAL:
             note(f"{description}: {done} of {total}")
             said = time.monotonic()
         yield item

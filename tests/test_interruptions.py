@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from tiny_drive import FRAMES, run_and_tell, tiny_scenario
 
-from cns_drake.interrupts import INTERRUPTED
+from evaluation.interrupts import INTERRUPTED
 
 KILLS = 50
 KILLS_EACH = 10

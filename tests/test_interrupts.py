@@ -6,11 +6,8 @@ import threading
 
 import pytest
 
-from cns_drake.interrupts import (
-    interrupt_on_termination,
-    interrupts_wait,
-    uninterrupted,
-)
+from cns_drake.interrupts import interrupts_wait
+from evaluation.interrupts import interrupt_on_termination, uninterrupted
 
 
 @pytest.fixture

@@ -6,9 +6,9 @@ import sys
 
 from small_map import box_visual, world_text
 
-from cns_drake.interrupts import INTERRUPTED, interrupt_on_termination
 from cns_drake.scenario import make_scenario
 from cns_drake.simulation import simulate
+from evaluation.interrupts import INTERRUPTED, interrupt_on_termination
 
 FRAMES = 60
 

@@ -1,0 +1,119 @@
+"""Where jobs run: on processes of this machine, or on a cluster."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import contextlib
+from dataclasses import dataclass
+import logging
+import multiprocessing.resource_tracker
+import os
+import signal
+from typing import TYPE_CHECKING
+
+from evaluation.errors import InputError
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+# The address of a scheduler, for whoever gives none; Dask's own name for it.
+_ADDRESS_VARIABLE = "DASK_SCHEDULER_ADDRESS"
+# How long a scheduler may take to answer [s].
+_ANSWER_TIMEOUT = 10.0
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """A scheduler of Dask and its workers.
+
+    Attributes:
+        num_workers: processes of this machine, each for one job at a time.
+        scheduler: the address of an existing scheduler instead, such as
+            `tcp://10.0.0.1:8786`; its workers must have this package and
+            share the file system.
+    """
+
+    num_workers: int = 1
+    scheduler: str | None = None
+
+    @contextlib.contextmanager
+    def connect(self) -> Iterator[Client]:
+        """Yields a client; workers of this machine live as long as it.
+
+        Raises:
+            InputError: if the scheduler does not answer.
+        """
+        # Slow to import, and needed by nobody who asks for help.
+        from distributed import Client
+
+        # What happens to jobs is told by whoever runs them, in other words.
+        logging.getLogger("distributed").setLevel(logging.CRITICAL)
+        if self.scheduler is None:
+            with (
+                _local_cluster(self.num_workers) as cluster,
+                Client(cluster, set_as_default=False) as client,
+            ):
+                yield client
+            return
+        try:
+            client = Client(
+                self.scheduler, timeout=_ANSWER_TIMEOUT, set_as_default=False
+            )
+        except (OSError, ValueError) as error:
+            raise InputError(
+                f"--scheduler: {self.scheduler}: no answer ({error})"
+            ) from error
+        with client:
+            yield client
+
+
+def choose_cluster(num_jobs: int | None, scheduler: str | None) -> Cluster:
+    """Returns the cluster that a user asks for.
+
+    Args:
+        num_jobs: `--jobs`: work on this machine, so many jobs at a time.
+        scheduler: `--scheduler`. Without either it is the one of the
+            environment variable DASK_SCHEDULER_ADDRESS, or else this machine
+            with a job for each core.
+
+    Raises:
+        InputError: if both are given, or the number is not positive.
+    """
+    if num_jobs is not None:
+        if scheduler is not None:
+            raise InputError("--jobs and --scheduler: give one of them")
+        if num_jobs < 1:
+            raise InputError(f"--jobs: {num_jobs} is not a positive number")
+        return Cluster(num_workers=num_jobs)
+    return Cluster(
+        num_workers=num_cores(),
+        scheduler=scheduler or os.environ.get(_ADDRESS_VARIABLE) or None,
+    )
+
+
+def num_cores() -> int:
+    """Returns how many cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _local_cluster(num_workers: int):
+    from distributed import LocalCluster
+
+    # Ctrl-C reaches all processes of a terminal at once. It is for this one
+    # to end the others: they, and the threads that start them, inherit that
+    # the signal is blocked. The first start of a process would unblock it.
+    multiprocessing.resource_tracker.ensure_running()
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        return LocalCluster(
+            n_workers=num_workers,
+            threads_per_worker=1,
+            # What takes memory are the processes of the jobs.
+            memory_limit=0,
+            dashboard_address=None,
+            silence_logs=logging.CRITICAL,
+        )
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
