@@ -18,7 +18,12 @@ from scipy.spatial import cKDTree
 from evaluation.errors import InputError
 from evaluation.maps import VOXEL_SIZE, VoxelMap, map_sequence, voxelise
 from evaluation.progress import Track, silent
-from evaluation.sequences import Sequence, check_same_world, open_sequence
+from evaluation.sequences import (
+    Placed,
+    Sequence,
+    check_same_world,
+    open_sequence,
+)
 from evaluation.sequences.clouds import is_cloud, read_cloud
 from evaluation.tcr import (
     COVERAGE_RADIUS,
@@ -43,13 +48,13 @@ class Surveyed:
         name: of the sequence or file.
         voxels: the map on the grid of the TCR.
         positions: (N, 3) of the sensor [m]; None for a map file.
-        sequence: the drive; None for a map file.
+        sequence: the drive, or where it lay; None for a map file.
     """
 
     name: str
     voxels: VoxelMap
     positions: np.ndarray | None = None
-    sequence: Sequence | None = None
+    sequence: Placed | None = None
 
 
 @dataclass(frozen=True)

@@ -63,12 +63,26 @@ _Parameters = Annotated[
 _SensorHeight = Annotated[
     float, typer.Option(help="Height of the LiDAR above the ground [m].")
 ]
-
+_OwnMethods = Annotated[
+    list[Path] | None,
+    typer.Option(
+        help="Python file that registers a method, to run besides the four;"
+        " may be repeated."
+    ),
+]
 _Jobs = Annotated[
     int | None,
     typer.Option(
         help="Processes that work at the same time; as many as there are"
         " cores if left out."
+    ),
+]
+_Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ADDRESS",
+        help="Scheduler of a Dask cluster that shares the file system, such"
+        " as tcp://10.0.0.1:8786. Also DASK_SCHEDULER_ADDRESS.",
     ),
 ]
 
@@ -185,15 +199,19 @@ def scores(
 def report(
     recordings: Annotated[Path, typer.Argument(metavar="DIR")],
     output: Annotated[Path, typer.Option(help="Folder to write.")],
+    method: _OwnMethods = None,
     jobs: _Jobs = None,
+    scheduler: _Scheduler = None,
 ) -> None:
-    """Tables, figures and report.html from all recordings in a folder."""
-    from evaluation import report as reporting
-    from evaluation.workers import num_cores
+    """Tables, figures and report.html from all recordings in a folder.
 
-    num_jobs = num_cores() if jobs is None else jobs
-    path = reporting.write_report(recordings, output, console.track, num_jobs)
-    print(path)
+    Interrupted, the same command goes on where it was.
+    """
+    from evaluation import report as reporting
+    from evaluation.cluster import choose_cluster
+
+    cluster = choose_cluster(jobs, scheduler)
+    print(reporting.write_report(recordings, output, cluster, method or ()))
 
 
 @app.command()
@@ -201,18 +219,22 @@ def trend(
     databases: Annotated[list[Path], typer.Argument(metavar="DATABASE...")],
     query: Annotated[Path, typer.Option(help="The drive that asks.")],
     output: Annotated[Path, typer.Option(help="Folder to write.")],
+    method: _OwnMethods = None,
     jobs: _Jobs = None,
+    scheduler: _Scheduler = None,
 ) -> None:
     """AUC of every method over TCR_sym, one query drive and many databases.
 
-    Writes trend.csv and a figure with 95 % bands.
+    Writes trend.csv and a figure with 95 % bands. Interrupted, the same
+    command goes on where it was.
     """
-    from evaluation import trend as trends
-    from evaluation.workers import num_cores
+    from evaluation.cluster import choose_cluster
+    from evaluation.study.trend_points import measure_trend
+    from evaluation.trend import write_trend
 
-    num_jobs = num_cores() if jobs is None else jobs
-    points = trends.measure_trend(query, databases, num_jobs, console.track)
-    print(trends.write_trend(points, output))
+    cluster = choose_cluster(jobs, scheduler)
+    points = measure_trend(query, databases, output, cluster, method or ())
+    print(write_trend(points, output))
 
 
 def main() -> None:

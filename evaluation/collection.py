@@ -2,38 +2,46 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 import re
 
 from evaluation import paper
+from evaluation.drive_source import DriveSource, RecordedDrive
 from evaluation.errors import InputError
-from evaluation.sequences import Sequence, open_sequence
+from evaluation.sequences import open_sequence
 
 _NAME = re.compile(r"(?P<map>.+)_(?P<stage>[^_]+)")
 
 
 @dataclass(frozen=True)
-class Recording:
-    """A sequence with its place in a collection.
+class RecordingInfo:
+    """A recording, or one that is going to be made, and what it is of.
 
     Attributes:
-        path: where it lies.
-        sequence: the drive.
+        name: of the recording.
+        path: where it lies, or will lie.
         map_name: of the city.
         stage: of the city's life; stages sort by name.
-        route: what the scenario says about it; None if it is unknown.
+        route: what the scenario says about it; None if it is unknown. Only
+            compared with those of other recordings.
+        needs: names of the jobs that make the recording.
+        made_by: opens the drive where it is not read from `path`.
     """
 
+    name: str
     path: Path
-    sequence: Sequence
     map_name: str
     stage: str
     route: object | None
+    needs: tuple[str, ...] = ()
+    made_by: DriveSource | None = None
 
     @property
-    def name(self) -> str:
-        return self.sequence.name
+    def source(self) -> DriveSource:
+        """What opens the drive."""
+        return self.made_by or RecordedDrive(self.path.absolute())
 
 
 @dataclass(frozen=True)
@@ -48,15 +56,15 @@ class City:
     """
 
     name: str
-    stages: dict[str, Recording]
-    others: tuple[Recording, ...]
+    stages: dict[str, RecordingInfo]
+    others: tuple[RecordingInfo, ...]
 
-    def change_pairs(self) -> list[tuple[Recording, Recording]]:
+    def change_pairs(self) -> list[tuple[RecordingInfo, RecordingInfo]]:
         """Returns every stage with the last one, as the paper compares."""
         *earlier, last = (self.stages[key] for key in sorted(self.stages))
         return [(recording, last) for recording in earlier]
 
-    def recognition_pairs(self) -> list[tuple[Recording, Recording]]:
+    def recognition_pairs(self) -> list[tuple[RecordingInfo, RecordingInfo]]:
         """Returns pairs of database and query.
 
         Every earlier stage is a database for the last one; the other way
@@ -72,7 +80,9 @@ class City:
                 pairs.append((last, earlier))
         return pairs
 
-    def control(self, first: Recording, second: Recording) -> Recording | None:
+    def control(
+        self, first: RecordingInfo, second: RecordingInfo
+    ) -> RecordingInfo | None:
         """Returns a drive on the route of one in the stage of the other."""
         for other in self.others:
             for stage, route in ((second, first), (first, second)):
@@ -85,7 +95,7 @@ class City:
         return None
 
 
-def find_cities(folder: Path) -> list[City]:
+def find_recordings(folder: Path) -> list[RecordingInfo]:
     """Opens all recordings in a folder and its direct subfolders.
 
     Drives in the layout of CNS, and in that of KITTI if a `scenario.yaml`
@@ -93,12 +103,9 @@ def find_cities(folder: Path) -> list[City]:
     A recording states its map and stage in its scenario; without one they
     are taken from its name, `<map>_<stage>`.
 
-    Returns:
-        The cities by name.
-
     Raises:
-        InputError: if there is no recording, one cannot be read or placed,
-            or two claim the same place.
+        InputError: if there is no recording, or one cannot be read or
+            placed.
     """
     folder = Path(folder)
     if not folder.is_dir():
@@ -106,9 +113,26 @@ def find_cities(folder: Path) -> list[City]:
     paths = _find_drives(folder)
     if not paths:
         raise InputError(f"{folder}: no recorded sequence in it")
-    recordings = [_place(path) for path in paths]
+    return [_place(path) for path in paths]
+
+
+def group_cities(recordings: Iterable[RecordingInfo]) -> list[City]:
+    """Returns the cities that recordings are of, by name.
+
+    Raises:
+        InputError: if two have one name, or claim the same place.
+    """
+    recordings = list(recordings)
+    paths: dict[str, Path] = {}
+    for one in recordings:
+        if one.name in paths:
+            raise InputError(
+                f"{one.path}: {one.name} is there twice (also"
+                f" {paths[one.name]})"
+            )
+        paths[one.name] = one.path
     return [
-        _make_city(folder, name, [r for r in recordings if r.map_name == name])
+        _make_city(name, [r for r in recordings if r.map_name == name])
         for name in sorted({recording.map_name for recording in recordings})
     ]
 
@@ -135,32 +159,36 @@ def _is_exported_drive(path: Path) -> bool:
     )
 
 
-def _place(path: Path) -> Recording:
+def _place(path: Path) -> RecordingInfo:
     sequence = open_sequence(path)
     scenario = sequence.scenario or {}
     # A city has lanes to follow, any other world has waypoints.
     route = scenario.get("route") or scenario.get("waypoints")
     if {"map", "stage"} <= set(scenario):
-        name = Path(str(scenario["map"])).name
-        return Recording(path, sequence, name, str(scenario["stage"]), route)
+        map_name = Path(str(scenario["map"])).name
+        stage = str(scenario["stage"])
+        return RecordingInfo(sequence.name, path, map_name, stage, route)
     match = _NAME.fullmatch(sequence.name)
     if match is None:
         raise InputError(
             f"{path}: neither a scenario nor a name <map>_<stage> tells map"
             " and stage"
         )
-    return Recording(path, sequence, match["map"], match["stage"], route)
+    return RecordingInfo(
+        sequence.name, path, match["map"], match["stage"], route
+    )
 
 
-def _make_city(folder: Path, name: str, recordings: list[Recording]) -> City:
+def _make_city(name: str, recordings: list[RecordingInfo]) -> City:
     stages = {}
     for stage in sorted({recording.stage for recording in recordings}):
         candidates = [r for r in recordings if r.stage == stage]
         named = [r for r in candidates if r.name == f"{name}_{stage}"]
         if len(candidates) > 1 and len(named) != 1:
             raise InputError(
-                f"{folder}: {len(candidates)} recordings of {name} at stage"
-                f" {stage}, and not one of them named {name}_{stage}"
+                f"{candidates[0].path}: one of {len(candidates)} recordings of"
+                f" {name} at stage {stage}, and not one of them named"
+                f" {name}_{stage}"
             )
         stages[stage] = (named or candidates)[0]
     chosen = {recording.name for recording in stages.values()}

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from evaluation.maps import VoxelAccumulator, VoxelMap
+from evaluation.progress import Track, silent
 from evaluation.sequences.sequence import Sequence
 
 
@@ -60,9 +61,14 @@ class MappedSequence(Sequence):
             return self._recent[index]
         return self._sequence.scan(index)
 
-    def finish(self) -> VoxelMap:
-        """Reads what nobody asked for; returns the map of all scans."""
-        while self._num_mapped < len(self):
+    def finish(self, track: Track = silent) -> VoxelMap:
+        """Reads what nobody asked for; returns the map of all scans.
+
+        Args:
+            track: reports progress.
+        """
+        left = range(self._num_mapped, len(self))
+        for _ in track(left, f"mapping {self.name}", len(left)):
             self._map_next()
         return self._accumulator.to_map()
 

@@ -2,20 +2,49 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence as Several
 from collections.abc import Set
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from evaluation.errors import InputError
 from evaluation.mapped_sequence import MappedSequence
 from evaluation.maps import PICTURE_DIVISIONS, VOXEL_SIZE, VoxelMap
-from evaluation.methods import known_methods, make_method
-from evaluation.page_data import PageDrive, make_drive
+from evaluation.methods import Method, MethodConfig
+from evaluation.progress import Track, silent
 from evaluation.retrieval import DescribedDrive, Role, describe_drive
-from evaluation.sequences import open_sequence
+from evaluation.sequences import PlacedDrive, Sequence
 from evaluation.thumbnails import thumbnail
+
+
+@dataclass(frozen=True)
+class SurveyedDrive:
+    """A drive with its map on the grid of the TCR.
+
+    Attributes:
+        placed: its name, and the world that it lies in.
+        X_WS: (N, 4, 4) poses of the sensor along the drive.
+        coarse: the map.
+        frames: (K,) frames that are places or queries, increasing; none if
+            the drive has no role.
+        thumbnails: K reduced scans (see `evaluation.thumbnails`).
+    """
+
+    placed: PlacedDrive
+    X_WS: np.ndarray
+    coarse: VoxelMap
+    frames: np.ndarray
+    thumbnails: list[np.ndarray]
+
+    @property
+    def name(self) -> str:
+        return self.placed.name
+
+    @property
+    def positions(self) -> np.ndarray:
+        """(N, 3) of the sensor [m]."""
+        return self.X_WS[:, :3, 3]
 
 
 @dataclass(frozen=True)
@@ -23,61 +52,65 @@ class RecordingSurvey:
     """A recording's maps, places and queries; no scan is needed any more.
 
     Attributes:
-        name: of the recording.
+        drive: with its map on the grid of the TCR.
         fine: map for pictures.
-        coarse: map on the grid of the TCR.
-        positions: (N, 3) of the sensor along the drive [m].
         described: method -> what it keeps of the drive; empty if the
             recording has no role.
-        page: the drive as the page shows it.
     """
 
-    name: str
+    drive: SurveyedDrive
     fine: VoxelMap
-    coarse: VoxelMap
-    positions: np.ndarray
     described: dict[str, DescribedDrive]
-    page: PageDrive
 
 
-def survey_recording(path: Path, roles: Set[Role]) -> RecordingSurvey:
+def survey_recording(
+    recording: Sequence,
+    roles: Set[Role],
+    methods: Several[Method],
+    track: Track = silent,
+) -> RecordingSurvey:
     """Maps a recording and describes its places and queries.
 
+    Each scan is asked for once, in order.
+
     Args:
-        path: of the recording.
+        recording: the drive.
         roles: what it serves as in place recognition; may be empty.
+        methods: that describe it; may be none.
+        track: reports progress.
 
     Raises:
         InputError: if it cannot be read, or holds no point.
     """
     frames, thumbnails = [], []
-    methods = [make_method(name, {}) for name in known_methods()]
     sequence = MappedSequence(
-        open_sequence(path),
+        recording,
         VOXEL_SIZE / PICTURE_DIVISIONS,
-        kept=max(method.scans_per_place for method in methods),
+        kept=max((method.scans_per_place for method in methods), default=1),
     )
 
     def keep_thumbnail(frame: int, cloud: np.ndarray) -> None:
         frames.append(frame)
-        height = methods[0].config.sensor_height
+        height = MethodConfig().sensor_height
         thumbnails.append(thumbnail(cloud, height, seed=frame))
 
     described = {}
     if roles:
-        drives = describe_drive(sequence, methods, roles, visit=keep_thumbnail)
+        drives = describe_drive(
+            sequence, methods, roles, track, visit=keep_thumbnail
+        )
         described = {
             method.name: drive
             for method, drive in zip(methods, drives, strict=True)
         }
-    fine = sequence.finish()
+    fine = sequence.finish(track)
     if len(fine) == 0:
         raise InputError(f"{sequence.name}: no scan holds a point")
-    return RecordingSurvey(
-        name=sequence.name,
-        fine=fine,
+    drive = SurveyedDrive(
+        placed=PlacedDrive.of(recording),
+        X_WS=sequence.X_WS,
         coarse=fine.coarsen(PICTURE_DIVISIONS),
-        positions=sequence.X_WS[:, :3, 3],
-        described=described,
-        page=make_drive(sequence.name, fine, sequence.X_WS, frames, thumbnails),
+        frames=np.array(frames, dtype=np.int64),
+        thumbnails=thumbnails,
     )
+    return RecordingSurvey(drive, fine, described)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 import csv
-from dataclasses import astuple, dataclass, fields
+from dataclasses import astuple, fields
 import io
 from pathlib import Path
 
@@ -16,17 +16,9 @@ from matplotlib.figure import Figure
 import numpy as np
 
 from evaluation.drawing import method_style, save
-from evaluation.errors import InputError
 from evaluation.files import completing, make_folder
-from evaluation.methods import known_methods, make_method
-from evaluation.place_recognition import judge_retrieval
-from evaluation.progress import Track, silent
-from evaluation.recording_survey import RecordingSurvey, survey_recording
 from evaluation.results import in_paper_order, title
-from evaluation.retrieval import compare as score
-from evaluation.sequences import check_same_world, open_sequence
-from evaluation.tcr import temporal_change
-from evaluation.workers import Workers
+from evaluation.study.trend_points import TrendPoint
 
 # Of the kernel that smooths over TCR_sym, as part of its range; and how the
 # band is found: by drawing databases with replacement.
@@ -34,97 +26,6 @@ _BANDWIDTH = 0.15
 _RESAMPLES = 1000
 _LEAST_POINTS = 5
 _GRID = 60
-
-
-@dataclass(frozen=True)
-class TrendPoint:
-    """A method on one database.
-
-    Attributes:
-        database: name of the drive.
-        method: its name.
-        tcr_sym: between database and query.
-        auc, auc_low, auc_high: with its 95 % interval over queries.
-        recall_at_1: over queries with a match.
-        queries, with_match: how many.
-    """
-
-    database: str
-    method: str
-    tcr_sym: float
-    auc: float
-    auc_low: float
-    auc_high: float
-    recall_at_1: float
-    queries: int
-    with_match: int
-
-
-def measure_trend(
-    query: Path,
-    databases: Sequence[Path],
-    num_jobs: int = 1,
-    track: Track = silent,
-) -> list[TrendPoint]:
-    """Returns the points of all databases and methods.
-
-    Args:
-        query: the drive that asks.
-        databases: the drives that are asked.
-        num_jobs: processes that work at the same time.
-        track: shows progress.
-
-    Raises:
-        InputError: a recording cannot be read, two have one name, or a
-            database is of another world or shares no place with the query.
-    """
-    asking = open_sequence(query)
-    names = [asking.name]
-    for path in databases:
-        sequence = open_sequence(path)
-        if sequence.name in names:
-            raise InputError(f"{path}: {sequence.name} is there twice")
-        names.append(sequence.name)
-        check_same_world(sequence, asking)
-    asked = survey_recording(query, {"queries"})
-    with Workers(num_jobs) as workers:
-        results = workers.map(
-            _measure,
-            [(path, asked) for path in databases],
-            "measuring databases",
-            track,
-        )
-    return [point for points in results for point in points]
-
-
-def _measure(path: Path, query: RecordingSurvey) -> list[TrendPoint]:
-    database = survey_recording(path, {"places"})
-    change = temporal_change(
-        database.coarse.centroids_W, query.coarse.centroids_W
-    )
-    points = []
-    for name in known_methods():
-        method = make_method(name, {})
-        retrieval = score(
-            method, database.described[name], query.described[name]
-        )
-        metrics = judge_retrieval(
-            method, database.name, query.name, retrieval
-        ).metrics
-        points.append(
-            TrendPoint(
-                database=database.name,
-                method=name,
-                tcr_sym=float(change.symmetric),
-                auc=float(metrics.auc),
-                auc_low=float(metrics.auc_interval.low),
-                auc_high=float(metrics.auc_interval.high),
-                recall_at_1=float(metrics.recall_at_1),
-                queries=metrics.num_queries,
-                with_match=metrics.num_with_match,
-            )
-        )
-    return points
 
 
 def write_trend(points: Sequence[TrendPoint], folder: Path) -> Path:

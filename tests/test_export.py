@@ -17,7 +17,7 @@ from cns_drake.errors import InputError
 from cns_drake.export.exporting import export_sequence
 from cns_drake.point_files import encode_labels
 from evaluation import sequences
-from evaluation.collection import find_cities
+from evaluation.collection import find_recordings, group_cities
 from evaluation.errors import InputError as ReadingError
 
 # A place in the world and on the vehicle that nothing can be confused with.
@@ -346,7 +346,7 @@ def test_a_report_finds_exports(tmp_path, format_name, depth):
         )
         export_sequence(recording, format_name, tmp_path / "in" / depth)
     (tmp_path / "in" / "notes").mkdir()
-    (city,) = find_cities(tmp_path / "in")
+    (city,) = group_cities(find_recordings(tmp_path / "in"))
     assert city.name == "town"
     assert {stage: one.name for stage, one in city.stages.items()} == {
         "s1": "town_01",

@@ -4,11 +4,41 @@ from drive_files import make_scan, write_recording, yaw_pose
 import numpy as np
 import pytest
 from small_towns import drive
+import studies
 
 from evaluation import paper
-from evaluation.collection import find_cities
+from evaluation.cluster import Cluster
+from evaluation.collection import find_recordings, group_cities
 from evaluation.errors import InputError
+from evaluation.methods import method
 from evaluation.report import write_report
+from evaluation.study import choose_methods
+
+# Describes a scan by how many points it has.
+OWN_METHOD = """
+from dataclasses import dataclass
+
+import numpy as np
+
+from evaluation.methods import Method, register
+
+
+@dataclass
+class Count:
+    points: int
+
+
+@register("counting")
+class Counting(Method):
+    def describe(self, points):
+        return Count(len(points))
+
+    def build_database(self, places):
+        return np.array([place.points for place in places])
+
+    def score(self, query, database, *, exhaustive=False):
+        return -np.abs(database - query.points).astype(float)
+"""
 
 
 @pytest.fixture(scope="module")
@@ -19,6 +49,10 @@ def recordings(tmp_path_factory):
     drive(folder / "metropolis_04_control", "04", "a")
     (folder / "notes.txt").write_text("no recording")
     return folder
+
+
+def find_cities(folder):
+    return group_cities(find_recordings(folder))
 
 
 def test_recordings_find_their_roles(recordings):
@@ -67,7 +101,7 @@ def test_no_recordings_or_too_many(tmp_path):
 @pytest.fixture(scope="module")
 def report(recordings, tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
-    write_report(recordings, folder)
+    studies.report(recordings, folder)
     return folder
 
 
@@ -130,17 +164,29 @@ def test_figures_for_print_and_page(report):
 
 
 def test_report_is_the_same_whoever_works(recordings, report, tmp_path):
-    write_report(recordings, tmp_path, num_jobs=2)
-    paths = sorted(path for path in report.rglob("*.*") if path.is_file())
-    assert len(paths) == 8 + 15
-    for path in paths:
-        other = tmp_path / path.relative_to(report)
-        assert path.read_bytes() == other.read_bytes(), path.name
+    write_report(recordings, tmp_path, Cluster(num_workers=2))
+    files = studies.report_files(tmp_path)
+    assert len(files) == 8 + 15
+    assert files == studies.report_files(report)
+
+
+def test_own_method_beside_the_others(recordings, tmp_path, monkeypatch):
+    # Others need not know of it.
+    monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
+    path = tmp_path / "counting.py"
+    path.write_text(OWN_METHOD)
+    choices = choose_methods([path])
+    studies.report(recordings, tmp_path / "out", choices)
+    rows = read_csv(tmp_path / "out" / "place_recognition.csv")
+    methods = list(dict.fromkeys(row["method"] for row in rows))
+    assert methods == ["btc", "ring++", "scan-context++", "solid", "counting"]
+    for name in ("report.md", "report.html"):
+        assert "counting" in (tmp_path / "out" / name).read_text()
 
 
 def test_report_of_a_single_stage(tmp_path):
     drive(tmp_path / "in" / "metropolis_01", "01", "a")
-    text = write_report(tmp_path / "in", tmp_path / "out").read_text()
+    text = studies.report(tmp_path / "in", tmp_path / "out").read_text()
     assert "routes_metropolis.png" in text
     assert "Temporal change ratio" not in text
     page = (tmp_path / "out" / "report.html").read_text()
@@ -153,7 +199,7 @@ def test_several_cities(tmp_path):
             tmp_path / "in" / f"riverside_{stage}", stage, "a", city="riverside"
         )
     drive(tmp_path / "in" / "metropolis_04", "04", "b")
-    write_report(tmp_path / "in", tmp_path / "out")
+    studies.report(tmp_path / "in", tmp_path / "out")
     rows = read_csv(tmp_path / "out" / "place_recognition.csv")
     pairs = dict.fromkeys((row["map"], row["DB → query"]) for row in rows)
     assert list(pairs) == [("riverside", "01 → 02"), ("riverside", "02 → 01")]
@@ -169,13 +215,13 @@ def test_scans_without_points_are_refused(tmp_path):
         tmp_path / "town_01", nothing, [yaw_pose(x, 0, 0, 0) for x in (0, 1)]
     )
     with pytest.raises(InputError, match="town_01: no scan holds a point"):
-        write_report(tmp_path, tmp_path / "out")
+        studies.report(tmp_path, tmp_path / "out")
 
 
 def test_output_that_cannot_be_written(recordings, tmp_path):
     (tmp_path / "out").write_text("a file")
     with pytest.raises(InputError, match=f"^{tmp_path / 'out'}"):
-        write_report(recordings, tmp_path / "out")
+        write_report(recordings, tmp_path / "out", Cluster())
 
 
 def test_paper_values():

@@ -5,18 +5,17 @@ import csv
 import numpy as np
 import pytest
 from small_towns import drive
+import studies
 
 from evaluation.change import compare, survey
+from evaluation.cluster import Cluster
 from evaluation.errors import InputError
 from evaluation.methods import known_methods, make_method
 from evaluation.place_recognition import run
 from evaluation.sequences import open_sequence
-from evaluation.trend import (
-    measure_trend,
-    smooth,
-    smooth_band,
-    write_trend,
-)
+from evaluation.study import trend_points
+from evaluation.study.trend_points import measure_trend
+from evaluation.trend import smooth, smooth_band, write_trend
 
 
 @pytest.fixture(scope="module")
@@ -29,9 +28,18 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def points(folder):
+def points(folder, tmp_path_factory):
     databases = [folder / "metropolis_01", folder / "metropolis_04_control"]
-    return measure_trend(folder / "metropolis_04", databases)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            trend_points, "run_jobs", lambda jobs, cluster: studies.do(jobs)
+        )
+        return measure_trend(
+            folder / "metropolis_04",
+            databases,
+            tmp_path_factory.mktemp("trend"),
+            Cluster(),
+        )
 
 
 def test_every_method_on_every_database(points):
@@ -71,16 +79,25 @@ def test_the_table_holds_what_was_measured(points, tmp_path):
     assert (path.parent / "trend.pdf").stat().st_size > 1000
 
 
-def test_processes_change_nothing(folder, points):
+def test_processes_change_nothing_and_are_not_needed_twice(
+    folder, points, tmp_path, monkeypatch
+):
     databases = [folder / "metropolis_01", folder / "metropolis_04_control"]
-    again = measure_trend(folder / "metropolis_04", databases, num_jobs=2)
-    assert again == points
+    arguments = (folder / "metropolis_04", databases, tmp_path)
+    assert measure_trend(*arguments, Cluster(num_workers=2)) == points
+    monkeypatch.setattr(
+        trend_points, "run_jobs", lambda jobs, cluster: studies.do(jobs)
+    )
+    monkeypatch.setattr(
+        trend_points, "survey_recording", lambda *_: pytest.fail("again")
+    )
+    assert measure_trend(*arguments, Cluster()) == points
 
 
-def test_a_drive_given_twice_is_named(folder):
+def test_a_drive_given_twice_is_named(folder, tmp_path):
     path = folder / "metropolis_04"
     with pytest.raises(InputError, match="metropolis_04 is there twice"):
-        measure_trend(path, [path])
+        measure_trend(path, [path], tmp_path, Cluster())
 
 
 def test_a_line_stays_a_line():

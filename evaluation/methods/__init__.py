@@ -12,6 +12,7 @@ from evaluation.methods.method import (
     known_methods,
     make_method,
     register,
+    shipped_methods,
 )
 
 __all__ = [
@@ -20,4 +21,5 @@ __all__ = [
     "known_methods",
     "make_method",
     "register",
+    "shipped_methods",
 ]

@@ -128,6 +128,16 @@ def known_methods() -> tuple[str, ...]:
     return tuple(sorted(_METHODS))
 
 
+def shipped_methods() -> tuple[str, ...]:
+    """Returns the names of those that are part of this package."""
+    package = __name__.rpartition(".")[0]
+    return tuple(
+        name
+        for name in known_methods()
+        if _METHODS[name].__module__.startswith(f"{package}.")
+    )
+
+
 def make_method(name: str, parameters: Mapping[str, Any]) -> Method:
     """Returns a method with these parameters, others as by default.
 

@@ -5,9 +5,21 @@ from __future__ import annotations
 from pathlib import Path
 
 from evaluation.errors import InputError
-from evaluation.sequences.sequence import Sequence, check_same_world
+from evaluation.sequences.sequence import (
+    Placed,
+    PlacedDrive,
+    Sequence,
+    check_same_world,
+)
 
-__all__ = ["Sequence", "check_same_world", "open", "open_sequence"]
+__all__ = [
+    "Placed",
+    "PlacedDrive",
+    "Sequence",
+    "check_same_world",
+    "open",
+    "open_sequence",
+]
 
 
 def open_sequence(path: Path, lidar: str | None = None) -> Sequence:

@@ -26,6 +26,7 @@ from mcap.records import Chunk, ChunkIndex
 import numpy as np
 import zstandard
 
+from evaluation.cluster import num_cores
 from evaluation.errors import InputError
 from evaluation.sequences.mcap_records import (
     MAGIC,
@@ -35,7 +36,6 @@ from evaluation.sequences.mcap_records import (
     read_attachment,
     uncompress,
 )
-from evaluation.workers import num_cores
 
 _Parsed = TypeVar("_Parsed")
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -120,7 +122,38 @@ def index_instances(table: object, source: str) -> dict[int, Mapping]:
         ) from error
 
 
-def check_same_world(first: Sequence, second: Sequence) -> None:
+class Placed(Protocol):
+    """What is known to lie in some world; see `Sequence`."""
+
+    name: str
+    world_frame: str
+    scenario: Mapping | None
+
+
+@dataclass(frozen=True)
+class PlacedDrive:
+    """What stays known of where a drive lay when it is closed.
+
+    Attributes:
+        name: of the drive.
+        world_frame: name of the frame of its poses.
+        scenario: its `map`, if it names one.
+    """
+
+    name: str
+    world_frame: str
+    scenario: Mapping | None
+
+    @classmethod
+    def of(cls, sequence: Sequence) -> PlacedDrive:
+        """Returns where a drive lies."""
+        scenario = sequence.scenario
+        if scenario is not None:
+            scenario = {k: v for k, v in scenario.items() if k == "map"}
+        return cls(sequence.name, sequence.world_frame, scenario)
+
+
+def check_same_world(first: Placed, second: Placed) -> None:
     """Refuses two sequences whose poses cannot be compared.
 
     Raises:
@@ -134,7 +167,7 @@ def check_same_world(first: Sequence, second: Sequence) -> None:
     check_same_map(first, second)
 
 
-def check_same_map(first: Sequence, second: Sequence) -> None:
+def check_same_map(first: Placed, second: Placed) -> None:
     """Refuses two sequences that are known to be of different places.
 
     Raises:
@@ -148,7 +181,7 @@ def check_same_map(first: Sequence, second: Sequence) -> None:
         )
 
 
-def _map_name(sequence: Sequence) -> str | None:
+def _map_name(sequence: Placed) -> str | None:
     """Returns the last part of the map's name, which may be a path."""
     if sequence.scenario is None or "map" not in sequence.scenario:
         return None

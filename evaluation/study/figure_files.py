@@ -1,0 +1,77 @@
+"""The figures of a study: their file names, and what they show."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from evaluation.collection import City, RecordingInfo
+from evaluation.page_data import Illustration
+from evaluation.study.views import PAGE_KIND
+
+
+def routes_stem(city: City) -> str:
+    """Returns the name of the figure of a city's routes, without ending."""
+    return f"routes_{city.name}"
+
+
+def change_stems(
+    city: City, pair: tuple[RecordingInfo, RecordingInfo]
+) -> tuple[str, str]:
+    """Returns the names of the figures of a change: points, and sets."""
+    earlier, later = (one.stage for one in pair)
+    change, sets = (
+        f"{kind}_{city.name}_{earlier}_{later}" for kind in ("change", "sets")
+    )
+    return change, sets
+
+
+def curves_stem(city: City) -> str:
+    """Returns the name of the figure of a city's precision and recall."""
+    return f"pr_{city.name}"
+
+
+def illustrations(city: City, folder: Path) -> list[Illustration]:
+    """Returns the figures of a city, in the order of the report."""
+    shown = [
+        Illustration(
+            folder / routes_stem(city),
+            f"Routes in {city.name}, from red to blue",
+            PAGE_KIND,
+        )
+    ]
+    for pair in city.change_pairs():
+        first, last = (one.stage for one in pair)
+        change, sets = change_stems(city, pair)
+        shown.append(
+            Illustration(
+                folder / change,
+                f"What changed in {city.name} between {first} and {last}",
+                PAGE_KIND,
+            )
+        )
+        shown.append(
+            Illustration(
+                folder / sets,
+                f"Sets H and O of {city.name} {first} and {last}: both orders"
+                " and their union",
+                PAGE_KIND,
+            )
+        )
+    if city.recognition_pairs():
+        shown.append(
+            Illustration(
+                folder / curves_stem(city),
+                f"Precision over recall in {city.name}; numbers are AUC",
+                "svg",
+            )
+        )
+    return shown
+
+
+def auc_illustration(folder: Path) -> Illustration:
+    """Returns the figure of all cities together."""
+    return Illustration(
+        folder / "auc_over_tcr",
+        "AUC against TCR_sym with 95 % intervals, and the paper's",
+        "svg",
+    )

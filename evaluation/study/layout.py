@@ -1,0 +1,92 @@
+"""Where the files of a study lie in its output folder."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import quote
+
+from evaluation.study.chosen_methods import MethodChoice
+
+
+@dataclass(frozen=True)
+class SurveyFiles:
+    """The parts that hold the survey of a recording.
+
+    Who needs one method's descriptions reads no other's.
+
+    Attributes:
+        folder: in which they lie.
+    """
+
+    folder: Path
+
+    @property
+    def drive(self) -> Path:
+        """Of the `SurveyedDrive`."""
+        return self.folder / "drive.data"
+
+    @property
+    def fine(self) -> Path:
+        """Of the map for pictures."""
+        return self.folder / "fine.data"
+
+    def described(self, method: MethodChoice) -> Path:
+        """Of (`PlacedDrive`, `DescribedDrive`)."""
+        return self.folder / f"described_{_safe(method.name)}.data"
+
+
+@dataclass(frozen=True)
+class StudyFiles:
+    """The files of a study.
+
+    Attributes:
+        output: its folder.
+    """
+
+    output: Path
+
+    @property
+    def figures(self) -> Path:
+        """The folder of all figures."""
+        return self.output / "figures"
+
+    @property
+    def _parts(self) -> Path:
+        return self.output / "parts"
+
+    def survey(self, recording: str) -> SurveyFiles:
+        return SurveyFiles(self._parts / "surveys" / _safe(recording))
+
+    def change(self, earlier: str, later: str) -> Path:
+        """Of the `ChangeResult` of two recordings."""
+        name = f"{_safe(earlier)},{_safe(later)}.data"
+        return self._parts / "changes" / name
+
+    def recognition(
+        self, database: str, query: str, method: MethodChoice
+    ) -> Path:
+        """Of the `RecognitionResult` of two recordings and a method."""
+        name = f"{_safe(database)},{_safe(query)},{_safe(method.name)}.data"
+        return self._parts / "recognition" / name
+
+    def page_drives(self, city: str) -> Path:
+        """Of the `PageDrive`s of a city's stages, by name."""
+        return self._parts / "pages" / f"{_safe(city)}.data"
+
+    def trend_points(self, database: str, query: str) -> Path:
+        """Of the `TrendPoint`s of two recordings."""
+        name = f"{_safe(database)},{_safe(query)}.data"
+        return self._parts / "trend" / name
+
+    def drawn(self, stem: str) -> Path:
+        """Says what a figure was drawn of."""
+        return self._parts / "figures" / f"{_safe(stem)}.data"
+
+
+def _safe(name: str) -> str:
+    """Returns a name that is a file name; different ones stay different.
+
+    What joins several of them, a comma, is in none.
+    """
+    return quote(name, safe="+ ")

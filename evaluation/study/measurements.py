@@ -1,0 +1,101 @@
+"""Measurements between two surveyed recordings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from evaluation.change import Surveyed
+from evaluation.change import compare as compare_maps
+from evaluation.jobs import Tell
+from evaluation.place_recognition import judge_retrieval
+from evaluation.recording_survey import SurveyedDrive
+from evaluation.results import ChangeResult, RecognitionResult
+from evaluation.retrieval import compare as score
+from evaluation.sequences import check_same_world
+from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.code_digest import measuring_code
+from evaluation.study.layout import SurveyFiles
+from evaluation.study.parts import (
+    is_current,
+    part_digest,
+    read_part,
+    write_part,
+)
+from evaluation.study.surveys import tracking
+
+
+def measure_change(
+    map_name: str,
+    stages: tuple[str, str],
+    surveys: tuple[SurveyFiles, ...],
+    result: Path,
+) -> None:
+    """Writes the `ChangeResult` of two drives.
+
+    Args:
+        map_name: of the city.
+        stages: of the earlier drive, and of the later one.
+        surveys: of the earlier drive, the later one, and their control if
+            there is one.
+        result: to write.
+
+    Raises:
+        InputError: if the drives are of different worlds, or a file cannot
+            be read or written.
+    """
+    inputs = {
+        "map": map_name,
+        "stages": stages,
+        "drives": [part_digest(survey.drive) for survey in surveys],
+        "code": measuring_code(),
+    }
+    if is_current(result, inputs):
+        return
+    drives = [_to_surveyed(read_part(survey.drive)) for survey in surveys]
+    change = ChangeResult(map_name, stages, compare_maps(*drives))
+    write_part(result, inputs, change)
+
+
+def recognise_places(
+    map_name: str,
+    stages: tuple[str, str],
+    surveys: tuple[SurveyFiles, SurveyFiles],
+    method: MethodChoice,
+    result: Path,
+    tell: Tell,
+) -> None:
+    """Writes the `RecognitionResult` of two drives and a method: a job.
+
+    Args:
+        map_name: of the city.
+        stages: of the database, and of the query.
+        surveys: likewise.
+        method: that described both.
+        result: to write.
+        tell: is told how far it is.
+
+    Raises:
+        InputError: if the drives are of different worlds, no query has a
+            match, or a file cannot be read or written.
+    """
+    parts = [survey.described(method) for survey in surveys]
+    inputs = {
+        "map": map_name,
+        "stages": stages,
+        "method": method.inputs(),
+        "drives": [part_digest(part) for part in parts],
+        "code": measuring_code(),
+    }
+    if is_current(result, inputs):
+        return
+    # The method comes first: what it kept may be of a type of its own.
+    comparing = method.make()
+    (placed, database), (placed_query, query) = map(read_part, parts)
+    check_same_world(placed, placed_query)
+    retrieval = score(comparing, database, query, tracking(tell))
+    outcome = judge_retrieval(comparing, database.name, query.name, retrieval)
+    write_part(result, inputs, RecognitionResult.of(map_name, stages, outcome))
+
+
+def _to_surveyed(drive: SurveyedDrive) -> Surveyed:
+    return Surveyed(drive.name, drive.coarse, drive.positions, drive.placed)

@@ -1,0 +1,106 @@
+"""Files of intermediate results that state what they were made of.
+
+A part is a line that says so, a line of JSON with its inputs, and a value:
+pickled, since a method describes places by whatever type it likes, also one
+of the user's own, and every array must come back bit by bit; compressed by
+zstd at its fastest level, which halves maps and takes a tenth of a second
+for 50 MB of spectra that hardly shrink. Parts are no exchange format: like
+any pickle they can run code, so they are as trusted as the program itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import hashlib
+import json
+from pathlib import Path
+import pickle
+
+import zstandard
+
+from evaluation.errors import InputError
+from evaluation.files import completing, make_folder
+
+_MAGIC = b"cns-eval part 1\n"
+_LEVEL = 1
+
+
+def digest(inputs: Mapping) -> str:
+    """Returns a short name for inputs, which must be ready for JSON."""
+    text = json.dumps(inputs, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def write_part(path: Path, inputs: Mapping, value: object) -> None:
+    """Writes a part; its folder is made if needed.
+
+    Args:
+        path: of the file.
+        inputs: all that the value depends on, ready for JSON.
+        value: anything that can be pickled.
+
+    Raises:
+        InputError: if it cannot be written.
+    """
+    data = zstandard.ZstdCompressor(level=_LEVEL, write_checksum=True).compress(
+        pickle.dumps(value, protocol=5)
+    )
+    header = {"digest": digest(inputs), "bytes": len(data), "inputs": inputs}
+    make_folder(path.parent)
+    with completing(path) as unfinished, open(unfinished, "wb") as stream:
+        stream.write(_MAGIC)
+        stream.write(json.dumps(header, sort_keys=True).encode() + b"\n")
+        stream.write(data)
+
+
+def is_current(path: Path, inputs: Mapping) -> bool:
+    """Returns whether a whole part is there that was made of these inputs."""
+    try:
+        return part_digest(path) == digest(inputs)
+    except InputError:
+        return False
+
+
+def part_digest(path: Path) -> str:
+    """Returns the digest of what a part was made of.
+
+    Raises:
+        InputError: if there is no such part, or it is cut off.
+    """
+    try:
+        with open(path, "rb") as stream:
+            return _read_header(path, stream)["digest"]
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from error
+
+
+def read_part(path: Path):
+    """Returns the value of a part.
+
+    Raises:
+        InputError: if there is no such part, or it is damaged.
+    """
+    try:
+        with open(path, "rb") as stream:
+            _read_header(path, stream)
+            data = stream.read()
+        return pickle.loads(zstandard.ZstdDecompressor().decompress(data))
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from error
+    except zstandard.ZstdError as error:
+        raise InputError(f"{path}: damaged ({error}); delete it") from error
+
+
+def _read_header(path: Path, stream) -> dict:
+    """Reads up to the value, which must be there in its full length."""
+    try:
+        if stream.readline(len(_MAGIC)) != _MAGIC:
+            raise ValueError("no part of a study")
+        header = json.loads(stream.readline())
+        start = stream.tell()
+        if stream.seek(0, 2) - start != header["bytes"]:
+            raise ValueError("cut off")
+        stream.seek(start)
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{path}: damaged ({error}); delete it") from error
+    return header

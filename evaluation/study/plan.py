@@ -1,0 +1,185 @@
+"""Which jobs a study consists of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from evaluation.collection import City, RecordingInfo, group_cities
+from evaluation.jobs import Job, Tell
+from evaluation.retrieval import Role
+from evaluation.study.chosen_methods import MethodChoice, choose_methods
+from evaluation.study.figure_files import change_stems, routes_stem
+from evaluation.study.layout import StudyFiles, SurveyFiles
+from evaluation.study.measurements import measure_change, recognise_places
+from evaluation.study.surveys import START_COST, survey_job, survey_name
+from evaluation.study.views import draw_city, draw_pair
+
+# Expected seconds of the jobs beyond their start: with 3000 scans, 250 places
+# and 150 queries.
+_CHANGE_COST = 6.0
+_CITY_COST = 4.0
+_RECOGNITION_COST = {
+    "ring++": 4.0,
+    "btc": 1.5,
+    "scan-context++": 1.0,
+    "solid": 0.1,
+}
+_OTHER_RECOGNITION_COST = 2.0
+
+
+def plan_study(
+    recordings: Iterable[RecordingInfo],
+    output: Path,
+    methods: Sequence[MethodChoice] | None = None,
+) -> list[Job]:
+    """Returns the jobs that leave what `assemble` makes a report of.
+
+    A city with one stage only gets its route drawn.
+
+    Args:
+        recordings: which need not exist before the jobs that they need are
+            done; drives of one map that share stage and route with others
+            serve as same-stage controls.
+        output: folder to write.
+        methods: those of this package if left out.
+
+    Raises:
+        InputError: if two recordings claim the same place.
+    """
+    files = StudyFiles(output.absolute())
+    chosen = choose_methods() if methods is None else tuple(methods)
+    return [
+        job
+        for city in group_cities(recordings)
+        for job in _plan_city(city, files, chosen)
+    ]
+
+
+def _plan_city(
+    city: City, files: StudyFiles, methods: tuple[MethodChoice, ...]
+) -> list[Job]:
+    jobs = [
+        survey_job(
+            recording.name,
+            recording.source,
+            roles,
+            methods,
+            files.survey(recording.name),
+            recording.needs,
+        )
+        for recording, roles in _roles(city)
+    ]
+    stages = city.stages.values()
+    jobs.append(
+        Job(
+            name=f"draw {city.name}",
+            function=draw_city,
+            arguments=(
+                city.name,
+                tuple((r.stage, files.survey(r.name)) for r in stages),
+                files.figures / routes_stem(city),
+                files.drawn(routes_stem(city)),
+                files.page_drives(city.name),
+            ),
+            needs=_survey_names(stages),
+            cost=START_COST + _CITY_COST,
+            output=files.page_drives(city.name),
+        )
+    )
+    jobs += [_change_job(city, pair, files) for pair in city.change_pairs()]
+    jobs += [
+        _recognition_job(city, pair, method, files)
+        for pair in city.recognition_pairs()
+        for method in methods
+    ]
+    return jobs
+
+
+def _roles(city: City) -> list[tuple[RecordingInfo, set[Role]]]:
+    """Returns all drives that are needed, with what they serve as."""
+    roles: dict[str, tuple[RecordingInfo, set[Role]]] = {}
+
+    def need(recording: RecordingInfo, *new: Role) -> None:
+        roles.setdefault(recording.name, (recording, set()))[1].update(new)
+
+    for recording in city.stages.values():
+        need(recording)
+    for pair in city.change_pairs():
+        control = city.control(*pair)
+        if control is not None:
+            need(control)
+    for database, query in city.recognition_pairs():
+        need(database, "places")
+        need(query, "queries")
+    return list(roles.values())
+
+
+def _change_job(
+    city: City, pair: tuple[RecordingInfo, RecordingInfo], files: StudyFiles
+) -> Job:
+    control = city.control(*pair)
+    drives = [*pair] if control is None else [*pair, control]
+    earlier, later = pair
+    return Job(
+        name=f"change {city.name} {earlier.stage} > {later.stage}",
+        function=measure_and_draw,
+        arguments=(
+            city.name,
+            (earlier.stage, later.stage),
+            tuple(files.survey(one.name) for one in drives),
+            files.change(earlier.name, later.name),
+            tuple(files.figures / stem for stem in change_stems(city, pair)),
+            files.drawn(change_stems(city, pair)[0]),
+        ),
+        needs=_survey_names(drives),
+        cost=START_COST + _CHANGE_COST,
+        output=files.change(earlier.name, later.name),
+    )
+
+
+def measure_and_draw(
+    map_name: str,
+    stages: tuple[str, str],
+    surveys: tuple[SurveyFiles, ...],
+    result: Path,
+    stems: tuple[Path, Path],
+    drawn: Path,
+    tell: Tell,
+) -> None:
+    """Measures the change between two drives and draws it: a job.
+
+    See `measure_change` and `draw_pair` for arguments and errors.
+    """
+    del tell
+    measure_change(map_name, stages, surveys, result)
+    draw_pair(surveys[:2], result, stems, drawn)
+
+
+def _recognition_job(
+    city: City,
+    pair: tuple[RecordingInfo, RecordingInfo],
+    method: MethodChoice,
+    files: StudyFiles,
+) -> Job:
+    database, query = pair
+    cost = _RECOGNITION_COST.get(method.name, _OTHER_RECOGNITION_COST)
+    result = files.recognition(database.name, query.name, method)
+    return Job(
+        name=f"{city.name} {database.stage} > {query.stage}, {method.name}",
+        function=recognise_places,
+        arguments=(
+            city.name,
+            (database.stage, query.stage),
+            (files.survey(database.name), files.survey(query.name)),
+            method,
+            result,
+        ),
+        needs=_survey_names(pair),
+        cost=START_COST + cost,
+        output=result,
+    )
+
+
+def _survey_names(recordings: Iterable[RecordingInfo]) -> tuple[str, ...]:
+    return tuple(survey_name(recording.name) for recording in recordings)

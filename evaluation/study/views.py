@@ -1,0 +1,110 @@
+"""Pictures of maps: routes of a city, changes between two stages."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from evaluation.drawing import PRINTED
+from evaluation.figures import Stage, draw_change, draw_routes
+from evaluation.files import make_folder
+from evaluation.jobs import Tell
+from evaluation.page_data import make_drive
+from evaluation.study.code_digest import all_code
+from evaluation.study.layout import SurveyFiles
+from evaluation.study.parts import (
+    is_current,
+    part_digest,
+    read_part,
+    write_part,
+)
+
+# Of a figure that consists of pixels, on the page.
+PAGE_KIND = "webp"
+
+
+def draw_city(
+    map_name: str,
+    stages: tuple[tuple[str, SurveyFiles], ...],
+    stem: Path,
+    drawn: Path,
+    pages: Path,
+    tell: Tell,
+) -> None:
+    """Draws the routes of a city; writes its drives for the page: a job.
+
+    Args:
+        map_name: of the city.
+        stages: name of each, and the survey of its drive.
+        stem: of the figure, without ending.
+        drawn: part that says what the figure was drawn of.
+        pages: part for the drives, name -> `PageDrive`.
+        tell: is told how far it is.
+
+    Raises:
+        InputError: if a file cannot be read or written.
+    """
+    inputs = _inputs(map_name, [survey for _, survey in stages])
+    if is_current(pages, inputs) and _is_drawn([stem], drawn, inputs):
+        return
+    shown, drives = [], {}
+    for done, (name, survey) in enumerate(stages):
+        tell.progress(done, len(stages) + 1)
+        drive, fine = read_part(survey.drive), read_part(survey.fine)
+        shown.append(Stage(name, fine, drive.coarse, drive.positions))
+        drives[drive.name] = make_drive(
+            drive.name, fine, drive.X_WS, drive.frames, drive.thumbnails
+        )
+    write_part(pages, inputs, drives)
+    tell.progress(len(stages), len(stages) + 1)
+    make_folder(stem.parent)
+    draw_routes(map_name, shown, stem)
+    write_part(drawn, inputs, None)
+
+
+def draw_pair(
+    surveys: tuple[SurveyFiles, SurveyFiles],
+    change: Path,
+    stems: tuple[Path, Path],
+    drawn: Path,
+) -> None:
+    """Draws what changed between two stages, and the sets of the TCR.
+
+    Args:
+        surveys: of the earlier drive, and of the later one.
+        change: part with their `ChangeResult`.
+        stems: of the two figures, without endings.
+        drawn: part that says what they were drawn of.
+
+    Raises:
+        InputError: if a file cannot be read or written.
+    """
+    inputs = _inputs(part_digest(change), surveys)
+    if _is_drawn(stems, drawn, inputs):
+        return
+    result = read_part(change)
+    shown = []
+    for name, survey in zip(result.stages, surveys, strict=True):
+        drive = read_part(survey.drive)
+        fine = read_part(survey.fine)
+        shown.append(Stage(name, fine, drive.coarse, drive.positions))
+    make_folder(stems[0].parent)
+    draw_change(result.map_name, *shown, result.report.change, stems)
+    write_part(drawn, inputs, None)
+
+
+def _inputs(what: str, surveys: Sequence[SurveyFiles]) -> dict:
+    return {
+        "what": what,
+        "drives": [part_digest(survey.drive) for survey in surveys],
+        "maps": [part_digest(survey.fine) for survey in surveys],
+        "code": all_code(),
+    }
+
+
+def _is_drawn(stems: Sequence[Path], drawn: Path, inputs: dict) -> bool:
+    return is_current(drawn, inputs) and all(
+        stem.with_name(f"{stem.name}.{kind}").is_file()
+        for stem in stems
+        for kind in (*PRINTED, PAGE_KIND)
+    )

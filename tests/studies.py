@@ -1,0 +1,31 @@
+"""Studies whose jobs run in the process of a test, one after the other.
+
+That jobs run anywhere else is the business of `evaluation.jobs` and its
+tests; processes would only make these slow.
+"""
+
+from evaluation.collection import find_recordings
+from evaluation.jobs import Tell
+from evaluation.study import assemble, plan_study
+
+
+def do(jobs):
+    """Does jobs in their order, in which none needs a later one."""
+    for job in jobs:
+        job.function(*job.arguments, Tell())
+
+
+def report(recordings, output, methods=None):
+    """Returns the path of the report on a folder of recordings."""
+    found = find_recordings(recordings)
+    do(plan_study(found, output, methods))
+    return assemble(found, output, methods)
+
+
+def report_files(output):
+    """Returns name -> bytes of all files that a report consists of."""
+    return {
+        path.relative_to(output).as_posix(): path.read_bytes()
+        for path in sorted(output.rglob("*"))
+        if path.is_file() and output / "parts" not in path.parents
+    }
