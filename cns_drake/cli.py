@@ -47,6 +47,22 @@ Graphviz = Annotated[
 Overwrite = Annotated[
     bool, typer.Option("--overwrite", help="Replace an existing recording.")
 ]
+Jobs = Annotated[
+    int | None,
+    typer.Option(
+        metavar="N",
+        help="Work on this machine, on N jobs side by side; as many as it has "
+        "cores by default.",
+    ),
+]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ADDRESS",
+        help="Work on the cluster of this Dask scheduler; by default that of "
+        "DASK_SCHEDULER_ADDRESS, if that is set.",
+    ),
+]
 
 
 class ExportFormat(str, Enum):
@@ -219,9 +235,8 @@ def generate(
     *,
     output: Output,
     frames: Frames = None,
-    jobs: Annotated[
-        int, typer.Option(min=1, help="Sequences simulated side by side.")
-    ] = 2,
+    jobs: Jobs = None,
+    scheduler: Scheduler = None,
     overwrite: Overwrite = False,
     vary: Annotated[
         Path | None,
@@ -237,7 +252,9 @@ def generate(
         from cns_drake.jobs import record_all
         from cns_drake.paths import recordable_sequences
         from cns_drake.scenario import load_scenario
+        from evaluation.cluster import choose_cluster
 
+    cluster = choose_cluster(jobs, scheduler)
     if not names and vary is None:
         names = list(recordable_sequences())
     scenarios = [load_scenario(name) for name in names or ()]
@@ -249,7 +266,7 @@ def generate(
         scenarios += members
     if frames is not None:
         scenarios = [s.model_copy(update={"frames": frames}) for s in scenarios]
-    record_all(scenarios, output, jobs, overwrite=overwrite)
+    record_all(scenarios, output, cluster, overwrite=overwrite)
     for scenario in scenarios:
         typer.echo(output / scenario.name)
 
@@ -301,15 +318,15 @@ def reproduce(
     ] = None,
     *,
     output: Output,
-    jobs: Annotated[
-        int, typer.Option(min=1, help="Sequences simulated side by side.")
-    ] = 2,
+    jobs: Jobs = None,
+    scheduler: Scheduler = None,
 ) -> None:
     """Simulate a map's sequences, evaluate them and report."""
     with uninterrupted():
         from cns_drake.reproduction import reproduce_maps
+        from evaluation.cluster import choose_cluster
 
-    reproduce_maps(maps, output, jobs)
+    reproduce_maps(maps, output, choose_cluster(jobs, scheduler))
 
 
 def main() -> None:

@@ -1,25 +1,12 @@
-"""Recording many scenarios side by side, each in a process of its own.
-
-A process each, because Python systems in a Drake diagram are not freed on
-this release of Drake, because Python code holds its interpreter's lock, and
-because whatever happens to one then does not happen to the others.
-"""
+"""Recordings as jobs, side by side, each in a process of its own."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-import contextlib
-import multiprocessing
-import multiprocessing.connection
-import multiprocessing.resource_tracker
-import os
 from pathlib import Path
-import signal
-import threading
-import traceback
+import sys
 
-from cns_drake import terminal
 from cns_drake.errors import InputError
 from cns_drake.frame_clock import frames_within
 from cns_drake.planning import plan_drive
@@ -27,20 +14,21 @@ from cns_drake.provenance import INPUTS_KEY, combined_digest, digest_inputs
 from cns_drake.recording_folder import RecordingFolder
 from cns_drake.scenario import Scenario, make_scenario
 from cns_drake.yaml_files import read_yaml
-from evaluation.interrupts import (
-    end_interrupted,
-    interrupt_on_termination,
-    uninterrupted,
-)
+from evaluation.cluster import Cluster
+from evaluation.interrupts import uninterrupted
+from evaluation.jobs import Job, Tell, run_jobs
 
-# How long a process may take to close its recording [s].
-_PATIENCE = 30.0
+# Expected time to load a stage, and to simulate a frame with the default
+# LiDAR [s]; how many frames a drive has that does not say.
+_LOADING = 4.0
+_FRAME = 0.018
+_USUAL_FRAMES = 3000
 
 
 def record_all(
     scenarios: Sequence[Scenario],
     output: Path,
-    num_processes: int,
+    cluster: Cluster,
     *,
     overwrite: bool = True,
 ) -> None:
@@ -52,19 +40,51 @@ def record_all(
     Args:
         scenarios: what to record.
         output: the folder of recordings.
-        num_processes: how many to simulate side by side.
+        cluster: where.
         overwrite: replace whatever else has one of the names.
 
     Raises:
         InputError: some could not be recorded; all are named.
     """
+    run_jobs(plan_recordings(scenarios, output, overwrite=overwrite), cluster)
+
+
+def plan_recordings(
+    scenarios: Sequence[Scenario],
+    output: Path,
+    *,
+    overwrite: bool = True,
+    pages: Path | None = None,
+) -> list[Job]:
+    """Returns a job for each recording that is not finished; says which are.
+
+    The job has the recording's name.
+
+    Args:
+        scenarios: what to record.
+        output: the folder of recordings.
+        overwrite: replace whatever else has one of the names.
+        pages: a folder for a web page of each drive, `<name>.html`. A
+            recording without its page counts as not finished.
+
+    Raises:
+        InputError: two have one name, or a folder must not be used.
+    """
     for name, count in Counter(s.name for s in scenarios).items():
         if count > 1:
             raise InputError(f"{name}: {count} sequences have this name")
-    finished = [s for s in scenarios if is_recorded(s, output)]
-    waiting = [s for s in scenarios if s not in finished]
+    output = output.absolute()
+    waiting = []
+    for scenario in scenarios:
+        page = None
+        if pages is not None:
+            page = pages.absolute() / f"{scenario.name}.html"
+        if _is_done(scenario, output, page):
+            print(f"{scenario.name}: finished already", file=sys.stderr)
+        else:
+            waiting.append((scenario, page))
     # What can be found wrong at once is found before anything slow.
-    folders = [RecordingFolder(output / s.name) for s in waiting]
+    folders = [RecordingFolder(output / s.name) for s, _ in waiting]
     others = [files.path.name for files in folders if files.is_finished()]
     if others and not overwrite:
         raise InputError(
@@ -73,30 +93,51 @@ def record_all(
         )
     for files in folders:
         files.check(overwrite)
-    context = multiprocessing.get_context("spawn")
-    running: dict[str, _Job] = {}
-    faults: list[str] = []
-    with terminal.show_progress() as progress, contextlib.ExitStack() as stack:
-        stack.callback(lambda: _stop(running.values()))
-        for scenario in finished:
-            terminal.print_note(progress, f"{scenario.name}: finished already")
-        while waiting or running:
-            while waiting and len(running) < num_processes:
-                scenario = waiting.pop(0)
-                running[scenario.name] = _Job(
-                    context, progress, scenario, output, overwrite
-                )
-            multiprocessing.connection.wait(
-                [job.messages for job in running.values()]
-            )
-            for name, job in list(running.items()):
-                job.read()
-                if job.ended:
-                    del running[name]
-                    if job.fault:
-                        faults.append(job.fault)
-    if faults:
-        raise InputError("; ".join(faults))
+    return [
+        Job(
+            name=scenario.name,
+            function=record,
+            arguments=(scenario, output, overwrite, page),
+            cost=_LOADING + _FRAME * (scenario.frames or _USUAL_FRAMES),
+            output=output / scenario.name,
+        )
+        for scenario, page in waiting
+    ]
+
+
+def record(
+    scenario: Scenario,
+    output: Path,
+    overwrite: bool,
+    page: Path | None,
+    tell: Tell,
+) -> None:
+    """Records one scenario: a job.
+
+    Args:
+        scenario: what to record.
+        output: the folder of recordings.
+        overwrite: replace another recording of that name.
+        page: where to save a web page of the drive, if anywhere.
+        tell: is told how far it is.
+
+    Raises:
+        InputError: see `simulate`.
+    """
+    # Another copy of the job may have ended with its work done.
+    if _is_done(scenario, output, page):
+        return
+    with uninterrupted():
+        from cns_drake.simulation import simulate
+
+    simulate(
+        scenario,
+        output,
+        page_file=page,
+        overwrite=overwrite,
+        on_frame=tell.progress,
+        on_note=tell.note,
+    )
 
 
 def is_recorded(scenario: Scenario, output: Path) -> bool:
@@ -126,108 +167,7 @@ def is_recorded(scenario: Scenario, output: Path) -> bool:
     return recorded.frames == frames
 
 
-class _Job:
-    """A process that records one scenario, and what it tells."""
-
-    def __init__(self, context, progress, scenario, output, overwrite):
-        self.messages, sender = context.Pipe(duplex=False)
-        self.ended = False
-        self.fault: str | None = None
-        self._name = scenario.name
-        self._progress = progress
-        task = progress.add_task(scenario.name, total=None, note="loading")
-        self._on_frame = terminal.frame_progress(progress, task)
-        self.process = context.Process(
-            target=_record,
-            args=(scenario, output, overwrite, sender),
-            daemon=True,
-        )
-        # Ctrl-C reaches all processes of a terminal at once, also those that
-        # have only begun to import. It is for the parent to end them. The
-        # first start of a process would unblock the signal on its way.
-        multiprocessing.resource_tracker.ensure_running()
-        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        try:
-            self.process.start()
-        finally:
-            signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
-        sender.close()  # So that the pipe ends with the process.
-
-    def read(self) -> None:
-        """Takes in what has arrived."""
-        try:
-            while self.messages.poll():
-                kind, *values = self.messages.recv()
-                if kind == "frame":
-                    self._on_frame(*values)
-                elif kind == "note":
-                    terminal.print_note(self._progress, *values)
-                else:
-                    self.fault = values[0]
-        except EOFError:
-            self.process.join()
-            self.ended = True
-            status = self.process.exitcode
-            if status != 0 and self.fault is None:
-                self.fault = (
-                    f"{self._name}: its process ended with status {status}"
-                )
-
-
-def _stop(jobs) -> None:
-    """Ends the processes of jobs, all at the same time."""
-    for job in jobs:
-        job.process.terminate()
-    for job in jobs:
-        job.process.join(_PATIENCE)
-        job.process.kill()
-        job.process.join()
-
-
-def _record(scenario: Scenario, output: Path, overwrite: bool, sender) -> None:
-    try:
-        interrupt_on_termination(once=True)
-        threading.Thread(target=_end_with_parent, daemon=True).start()
-        _simulate(scenario, output, overwrite, sender)
-    except InputError as error:
-        _tell(sender, "fault", str(error))
-    except KeyboardInterrupt:
-        _tell(sender, "fault", f"{scenario.name}: interrupted")
-        end_interrupted()
-    except BaseException as error:
-        traceback.print_exc()
-        _tell(
-            sender, "fault", f"{scenario.name}: {type(error).__name__}: {error}"
-        )
-        raise
-    finally:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
-
-
-def _simulate(scenario, output, overwrite, sender) -> None:
-    with uninterrupted():
-        from cns_drake.simulation import simulate
-
-    def on_frame(done: int, total: int) -> None:
-        if done % 20 == 0 or done == total:
-            _tell(sender, "frame", done, total)
-
-    simulate(
-        scenario,
-        output,
-        overwrite=overwrite,
-        on_frame=on_frame,
-        on_note=lambda text: _tell(sender, "note", text),
-    )
-
-
-def _tell(sender, *message) -> None:
-    # Where the parent has gone, there is nobody to tell.
-    with contextlib.suppress(BrokenPipeError):
-        sender.send(message)
-
-
-def _end_with_parent() -> None:
-    """Interrupts this process when its parent has ended, even if killed."""
-    multiprocessing.parent_process().join()
-    os.kill(os.getpid(), signal.SIGTERM)
+def _is_done(scenario: Scenario, output: Path, page: Path | None) -> bool:
+    if page is not None and not page.is_file():
+        return False
+    return is_recorded(scenario, output)

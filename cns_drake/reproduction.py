@@ -11,10 +11,11 @@ from cns_drake.errors import InputError
 from cns_drake.jobs import record_all
 from cns_drake.paths import sequences_of_map, shipped_maps
 from cns_drake.scenario import Scenario, load_scenario
+from evaluation.cluster import Cluster
 
 
 def reproduce_maps(
-    maps: Sequence[str] | None, output: Path, num_processes: int
+    maps: Sequence[str] | None, output: Path, cluster: Cluster
 ) -> None:
     """Records the sequences of maps, evaluates them and reports.
 
@@ -26,7 +27,7 @@ def reproduce_maps(
     Args:
         maps: which maps, by name or folder; all shipped ones if empty.
         output: the folder for everything.
-        num_processes: how many sequences to simulate side by side.
+        cluster: where to simulate.
 
     Raises:
         InputError: a map is not known, or a step failed.
@@ -35,7 +36,7 @@ def reproduce_maps(
     scenarios = [
         scenario for folder in folders for scenario in _scenarios_of_map(folder)
     ]
-    record_all(scenarios, output, num_processes)
+    record_all(scenarios, output, cluster)
     for folder in folders:
         _draw(folder, output / "pictures")
     # A process of its own: the evaluation stands without the simulator.

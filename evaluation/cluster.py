@@ -112,7 +112,9 @@ def _local_cluster(num_workers: int):
             threads_per_worker=1,
             # What takes memory are the processes of the jobs.
             memory_limit=0,
-            dashboard_address=None,
+            # On a free port; no dashboard is shown there.
+            dashboard_address="127.0.0.1:0",
+            scheduler_kwargs={"dashboard": False},
             silence_logs=logging.CRITICAL,
         )
     finally:

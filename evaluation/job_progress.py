@@ -123,7 +123,9 @@ class JobProgress:
         self._tasks: dict[str, int] = {}
         self._notes: dict[str, str] = {}
         self._num_ended = 0
-        self._said = time.monotonic()
+        # When the next line is due where there is no terminal.
+        self._due = time.monotonic() + LINE_INTERVAL
+        self._silent = True
 
     def __enter__(self) -> JobProgress:
         self._bars = self._stack.enter_context(show_bars(console=self._console))
@@ -154,6 +156,8 @@ class JobProgress:
             total=total,
             note=self._notes[name],
         )
+        if self._silent:  # Something has begun: that is soon told.
+            self._due = 0.0
         self.refresh()
 
     def end(self, name: str, fault: bool = False) -> None:
@@ -179,9 +183,9 @@ class JobProgress:
             note=f"{left} left",
         )
         now = time.monotonic()
-        if self._bars.console.is_terminal or now - self._said < LINE_INTERVAL:
+        if self._bars.console.is_terminal or now < self._due:
             return
-        self._said = now
+        self._due, self._silent = now + LINE_INTERVAL, False
         running = [f"{name} {note}" for name, note in self._notes.items()]
         self.note("; ".join([f"{self._summary()}, {left} left", *running]))
 

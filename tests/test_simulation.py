@@ -11,6 +11,7 @@ from cns_drake.jobs import is_recorded, record_all
 from cns_drake.scenario import load_scenario, make_scenario
 from cns_drake.simulation import simulate
 from cns_drake.station import load_stage
+from evaluation.cluster import Cluster
 
 TOPICS = ("/lidar/points", "/imu/data", "/odometry", "/tf")
 
@@ -135,17 +136,17 @@ def test_jobs_record_side_by_side_and_skip_what_is_there(small_map, tmp_path):
         )
         for k in range(3)
     ]
-    record_all(scenarios[:1], tmp_path, 1)
+    record_all(scenarios[:1], tmp_path, Cluster(1))
     alone = simulate(scenarios[0], tmp_path / "alone").folder
     assert contents(tmp_path / "drive_0") == contents(alone)
     first = tmp_path / "drive_0" / "drive_0_0.mcap"
     inode = first.stat().st_ino
-    record_all(scenarios, tmp_path, 2)
+    record_all(scenarios, tmp_path, Cluster(2))
     assert first.stat().st_ino == inode
     assert all(is_recorded(scenario, tmp_path) for scenario in scenarios)
     changed = scenarios[1].model_copy(update={"frames": 5})
     assert not is_recorded(changed, tmp_path)
-    record_all([changed], tmp_path, 1)
+    record_all([changed], tmp_path, Cluster(1))
     assert is_recorded(changed, tmp_path)
 
 
@@ -154,5 +155,5 @@ def test_jobs_that_fail_are_named_and_do_not_stop_others(small_map, tmp_path):
     good = make_scenario(values | {"name": "good"}, "test")
     bad = make_scenario(values | {"name": "bad", "stage": "99"}, "test")
     with pytest.raises(InputError, match=r"bad: .*no stage '99'"):
-        record_all([bad, good], tmp_path, 1)
+        record_all([bad, good], tmp_path, Cluster(1))
     assert is_recorded(good, tmp_path)
