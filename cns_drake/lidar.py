@@ -132,9 +132,12 @@ class Lidar(LeafSystem):
         query_object = self._geometry_query.Eval(context)
         seen = self._scene.Eval(context)
         seen.update(query_object)
+        p_WSset, R_WSset = self._calc_poses(context, query_object)
         hits = seen.scene.cast_rays(
-            *self._calc_beams(context, query_object),
+            p_WSset,
+            self._d_Sset_cast,
             self._measurement.reach(self._pattern.max_range),
+            R_WSset=R_WSset,
         )
         true_ranges = hits.ranges.take(self._firing_order)
         beams, ranges, intensity = self._measurement.measure(
@@ -165,23 +168,18 @@ class Lidar(LeafSystem):
             prerequisites.add(self.time_ticket())
         return prerequisites
 
-    def _calc_beams(self, context, query_object):
-        """Returns origins, (3,) or (num_beams, 3), and directions in W.
+    def _calc_poses(self, context, query_object):
+        """Returns positions and orientations of S: one, or each column's.
 
         In packet order, which takes one column after the other for each
-        ring.
+        ring, beam i belongs to column i mod num_columns.
         """
-        if self._sweep is None:
-            X_WP = query_object.GetPoseInWorld(self._parent_frame_id)
-            X_WS = X_WP @ self._X_PS
-            d_Wset = self._d_Sset_cast @ X_WS.rotation().matrix().T
-            return X_WS.translation(), d_Wset
-        sweep = self._sweep.Eval(context).of_frame(self._X_PS)
-        num_rings = self._pattern.num_rings
-        d_Sset = self._d_Sset_cast.reshape(num_rings, -1, 3)
-        d_Wset = np.einsum("cij,rcj->rci", sweep.R_WPset, d_Sset)
-        p_WSset = np.tile(sweep.p_WPset, (num_rings, 1))
-        return p_WSset, d_Wset.reshape(-1, 3)
+        if self._sweep is not None:
+            sweep = self._sweep.Eval(context).of_frame(self._X_PS)
+            return sweep.p_WPset, sweep.R_WPset
+        X_WP = query_object.GetPoseInWorld(self._parent_frame_id)
+        X_WS = X_WP @ self._X_PS
+        return X_WS.translation(), X_WS.rotation().matrix()
 
     def _calc_point_cloud(self, context: Context, output) -> None:
         scan = self._scan.Eval(context)

@@ -13,6 +13,7 @@ import sys
 import numpy as np
 
 from cns_drake.ray_groups import RayGroup
+from cns_drake.rays import Hits, Rays
 from cns_drake.surface_merging import tessellate
 
 # Sides of a round shape, so that it is within 0.03 % of its radius.
@@ -22,13 +23,14 @@ _SIDES = 128
 class Open3dScene:
     """An Open3D scene for each group; see `RayCastingScene`."""
 
-    def __init__(self, groups: Sequence[RayGroup]):
+    def __init__(self, groups: Sequence[RayGroup], num_threads: int):
         """Builds the scenes."""
         import open3d
 
         _say_once()
         self._open3d = open3d
         self._groups = groups
+        self._num_threads = num_threads
         self._scenes = []
         self._owners = []
         for group in groups:
@@ -51,43 +53,35 @@ class Open3dScene:
     def place(self, rows: Collection[int]) -> None:
         """Does nothing: rays are brought to the groups when they are cast."""
 
-    def cast_rays(
-        self,
-        p_OSset: np.ndarray,
-        d_Oset: np.ndarray,
-        max_range: float,
-        normals_L: np.ndarray,
-        num_threads: int,
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Casts N rays; see `EmbreeScene.cast_rays`."""
-        num_rays = len(d_Oset)
-        ranges = np.full(num_rays, np.inf, np.float32)
-        owner = np.full(num_rays, -1, np.int32)
-        group_row = np.full(num_rays, -1, np.int32)
+    def cast_rays(self, rays: Rays, with_normals: bool) -> Hits:
+        """Casts rays; see `EmbreeScene.cast_rays`."""
+        num_rays = len(rays.d_Sset)
+        p_Oset, d_Oset = rays.p_Oset(), rays.d_Oset()
+        max_ranges = rays.max_ranges_of(np.arange(num_rays))
+        result = Hits.misses(num_rays, with_normals)
         for row, group in enumerate(self._groups):
             X_OL = np.vstack([group.X_OL, [0, 0, 0, 1]])
             X_LO = np.linalg.inv(X_OL)
             # Not of unit length in a stretched group: then distances along
             # the ray stay those in O.
-            d_Lset = d_Oset @ X_LO[:3, :3].T
-            p_LSset = p_OSset @ X_LO[:3, :3].T + X_LO[:3, 3]
-            rays = np.empty((num_rays, 6), np.float32)
-            rays[:, :3], rays[:, 3:] = p_LSset, d_Lset
+            rays_L = np.empty((num_rays, 6), np.float32)
+            rays_L[:, :3] = p_Oset @ X_LO[:3, :3].T + X_LO[:3, 3]
+            rays_L[:, 3:] = d_Oset @ X_LO[:3, :3].T
             hits = self._scenes[row].cast_rays(
-                self._open3d.core.Tensor(rays), nthreads=num_threads
+                self._open3d.core.Tensor(rays_L), nthreads=self._num_threads
             )
             distance = hits["t_hit"].numpy()
             nearer = np.flatnonzero(
-                (distance < ranges) & (distance <= max_range)
+                (distance < result.ranges) & (distance <= max_ranges)
             )
-            ranges[nearer] = distance[nearer]
+            result.ranges[nearer] = distance[nearer]
             primitive = hits["primitive_ids"].numpy()[nearer]
-            owner[nearer] = self._owners[row][primitive]
-            group_row[nearer] = row
-            if normals_L.shape[1]:
+            result.owner[nearer] = self._owners[row][primitive]
+            result.group[nearer] = row
+            if with_normals:
                 normals = hits["primitive_normals"].numpy()
-                normals_L[nearer] = normals[nearer]
-        return ranges, owner, group_row
+                result.normals[nearer] = normals[nearer]
+        return result
 
 
 @functools.cache

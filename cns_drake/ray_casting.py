@@ -16,9 +16,11 @@ from pydrake.math import RigidTransform
 
 from cns_drake.perception_geometry import PerceptionGeometry
 from cns_drake.ray_groups import RayGroup, group_geometries
+from cns_drake.rays import Hits, Rays
 
 # The package whose wheel holds Embree's C library.
 _EMBREE_PACKAGE = "embreex"
+_IDENTITY = np.eye(3)
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,8 @@ class RayCastingScene:
         geometries: Sequence[PerceptionGeometry],
         anchored_frames: Collection[FrameId],
         calc_X_WF: Callable[[FrameId], RigidTransform],
+        *,
+        num_threads: int = 1,
     ):
         """Builds the scene.
 
@@ -59,13 +63,15 @@ class RayCastingScene:
             geometries: what rays can hit; hits give indices into it.
             anchored_frames: the frames that never move.
             calc_X_WF: gives the pose of a frame in the world.
+            num_threads: how many threads share the rays of a cast; hits do
+                not depend on it.
         """
         self._p_WO, self._groups = group_geometries(
             geometries, anchored_frames, calc_X_WF
         )
         for group in self._groups:
             group.place(self._p_WO, calc_X_WF)
-        self._scene = _make_scene(self._groups)
+        self._scene = _make_scene(self._groups, num_threads)
         self._moving = [
             row
             for row, group in enumerate(self._groups)
@@ -84,53 +90,65 @@ class RayCastingScene:
     def cast_rays(
         self,
         p_WSset: np.ndarray,
-        d_Wset: np.ndarray,
+        d_Sset: np.ndarray,
         max_range: float,
         *,
+        R_WSset: np.ndarray = _IDENTITY,
         with_normals: bool = False,
-        num_threads: int = 1,
     ) -> RayHits:
-        """Casts N rays.
+        """Casts N rays, from one pose of a sensor S or from several.
 
         Args:
-            p_WSset: (3,) common origin or (N, 3) origins in the world [m].
-            d_Wset: (N, 3) unit directions, expressed in the world.
+            p_WSset: (3,) or (K, 3) origins in the world [m]; ray i starts at
+                origin i mod K.
+            d_Sset: (N, 3) unit directions, expressed in S.
             max_range: how far to look [m].
+            R_WSset: (3, 3) or (L, 3, 3) orientations of S in the world, taken
+                in turn likewise.
             with_normals: also return the normals of the surfaces.
-            num_threads: how many threads to share the rays between; the
-                result does not depend on it.
+
+        Raises:
+            ValueError: N is not a multiple of K or of L.
         """
         p_OSset = np.atleast_2d(p_WSset) - self._p_WO
-        d_Wset = np.ascontiguousarray(d_Wset, dtype=np.float32)
-        num_rays = len(d_Wset)
-        if len(p_OSset) not in (1, num_rays):
-            raise ValueError(f"{len(p_OSset)} origins for {num_rays} rays")
-        normals = np.zeros((num_rays, 3 if with_normals else 0), np.float32)
-        ranges, owner, group = self._scene.cast_rays(
-            p_OSset.astype(np.float32), d_Wset, max_range, normals, num_threads
+        R_WSset = np.reshape(R_WSset, (-1, 3, 3))
+        for count, what in (
+            (len(p_OSset), "origins"),
+            (len(R_WSset), "frames"),
+        ):
+            if len(d_Sset) % max(count, 1) or (count == 0 and len(d_Sset)):
+                raise ValueError(f"{count} {what} for {len(d_Sset)} rays")
+        rays = Rays(
+            p_OSset.astype(np.float32),
+            np.ascontiguousarray(R_WSset, dtype=float),
+            np.array([max_range], np.float32),
+            np.ascontiguousarray(d_Sset, dtype=float),
         )
+        hits = self._scene.cast_rays(rays, with_normals)
         if not with_normals:
-            return RayHits(ranges, owner)
-        return RayHits(ranges, owner, self._face_rays(normals, group, d_Wset))
+            return RayHits(hits.ranges, hits.owner)
+        return RayHits(hits.ranges, hits.owner, self._face_rays(hits, rays))
 
-    def _face_rays(self, normals, group, d_Wset) -> np.ndarray:
+    def _face_rays(self, hits: Hits, rays: Rays) -> np.ndarray:
         """Returns unit world normals, turned towards the rays' origins."""
+        normals = hits.normals
         for row, placed in enumerate(self._groups):
             if not placed.is_merged_world:
-                of_group = group == row
+                of_group = hits.group == row
                 # Normals transform by the inverse transpose.
                 normals[of_group] @= np.linalg.inv(placed.X_OL[:, :3])
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         normals /= np.where(length > 0.0, length, 1.0)
-        normals[np.einsum("ij,ij->i", normals, d_Wset) > 0.0] *= -1.0
+        away = np.einsum("ij,ij->i", normals, rays.d_Oset()) > 0.0
+        normals[away] *= -1.0
         return normals
 
 
-def _make_scene(groups: Sequence[RayGroup]):
+def _make_scene(groups: Sequence[RayGroup], num_threads: int):
     if importlib.util.find_spec(_EMBREE_PACKAGE) is not None:
         from cns_drake.embree_scene import EmbreeScene
 
-        return EmbreeScene(groups)
+        return EmbreeScene(groups, num_threads)
     from cns_drake.open3d_scene import Open3dScene
 
-    return Open3dScene(groups)
+    return Open3dScene(groups, num_threads)

@@ -268,15 +268,55 @@ def test_threads_change_nothing(num_rays):
         geometry(surface or box_surface((2, 3, 1)), RigidTransform([9, k, 0]))
         for k, (surface, _) in enumerate(SHAPES.values())
     ]
-    scene = RayCastingScene(geometries, {WORLD}, lambda f: RigidTransform())
     origins = rng.normal(size=(num_rays, 3))
     d = rng.normal(size=(num_rays, 3)) * 0.2 + [1, 0.2, 0]
     d /= np.linalg.norm(d, axis=1, keepdims=True)
     one, three = (
-        scene.cast_rays(origins, d, 50.0, with_normals=True, num_threads=n)
+        RayCastingScene(geometries, {WORLD}, identity, num_threads=n).cast_rays(
+            origins, d, 50.0, with_normals=True
+        )
         for n in (1, 3)
     )
     assert num_rays < 17 or np.isfinite(one.ranges).any()
     np.testing.assert_array_equal(one.ranges, three.ranges)
     np.testing.assert_array_equal(one.geometry, three.geometry)
     np.testing.assert_array_equal(one.normals_W, three.normals_W)
+
+
+@pytest.mark.parametrize(
+    ("num_positions", "num_frames"), [(1, 6), (6, 1), (3, 2)]
+)
+def test_poses_are_taken_in_turn(num_positions, num_frames):
+    """As if each ray had been given in the world."""
+    rng = np.random.default_rng(7)
+    scene = RayCastingScene(
+        [
+            geometry(surface or box_surface((2.0, 3.0, 1.0)), X_WG)
+            for surface, _ in SHAPES.values()
+        ],
+        {WORLD},
+        identity,
+    )
+    p = rng.normal(size=(num_positions, 3))
+    R = np.array(
+        [
+            RollPitchYaw(*rng.uniform(-3, 3, 3)).ToRotationMatrix().matrix()
+            for _ in range(num_frames)
+        ]
+    )
+    d = X_WG.translation() + rng.normal(size=(600, 3))
+    d /= np.linalg.norm(d, axis=1, keepdims=True)
+    rows = np.arange(600)
+    d_S = np.einsum("nij,ni->nj", R[rows % num_frames], d)
+    hits = scene.cast_rays(p, d_S, 50.0, R_WSset=R, with_normals=True)
+    expected = scene.cast_rays(
+        p[rows % num_positions], d, 50.0, with_normals=True
+    )
+    same = hits.geometry == expected.geometry
+    assert same.mean() > 0.99
+    assert np.isfinite(hits.ranges).sum() > 200
+    hit = same & (hits.geometry >= 0)
+    error = np.abs(hits.ranges[hit] - expected.ranges[hit])
+    assert np.quantile(error, 0.98) < 2e-5
+    cosine = np.einsum("ij,ij->i", hits.normals_W, expected.normals_W)[hit]
+    assert np.quantile(cosine, 0.02) > 1 - 1e-5

@@ -226,9 +226,11 @@ class _Scanner:
         accumulator = VoxelAccumulator()
         d_Sset = self._beams.d_Sset[self._beams.packet_order]
         for X_WS in self._X_WSs:
-            d_Wset = d_Sset @ X_WS.rotation().matrix().T
             ranges = scene.cast_rays(
-                X_WS.translation(), d_Wset, self._beams.max_range
+                X_WS.translation(),
+                d_Sset,
+                self._beams.max_range,
+                R_WSset=X_WS.rotation().matrix(),
             ).ranges
             seen = (ranges >= self._beams.min_range) & np.isfinite(ranges)
             points = np.empty(np.count_nonzero(seen), _XYZ)

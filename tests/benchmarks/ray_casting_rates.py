@@ -3,8 +3,10 @@
     python tests/benchmarks/ray_casting_rates.py [SEQUENCE ...] [--rounds N]
 
 From sensor poses along the drive to ranges and the geometry that was hit,
-32 x 1024 rays a scan. `limit` is a C program that calls Embree with coherent
-packets on the same hierarchy (needs a C compiler; left out without one).
+32 x 1024 rays a scan. The limit is a C program that calls Embree with
+coherent packets (needs a C compiler; left out without one): once on one
+hierarchy of the same shapes, and once on triangles only, with polyhedra in
+place of curved shapes.
 Aims: 0.85 of the limit and 2.5 times Open3D on one thread, 1.8 times as much
 on two threads, at most 15 % more time with 20 moving cars.
 """
@@ -30,7 +32,10 @@ from stages import (
 )
 
 from cns_drake.beam_pattern import make_beam_pattern
+from cns_drake.embree_hierarchy import EmbreeHierarchy
+from cns_drake.embree_primitives import SOLID, merge_curved, merge_flat
 from cns_drake.ray_casting import RayCastingScene
+from cns_drake.ray_groups import group_geometries
 
 SEQUENCES = ("metropolis_04", "downtown_04")
 POSES = 16
@@ -59,16 +64,17 @@ def benchmark(sequence: str, rounds: int, folder: Path) -> None:
     reach = pattern.max_range
     stands = {geometry.frame_id for geometry in geometries}
     scene = RayCastingScene(geometries, stands, still)
+    on_two_threads = RayCastingScene(geometries, stands, still, num_threads=2)
     moving = MovingCars(geometries, poses, CARS)
     theirs = Open3dStage(geometries)
 
-    def cast(caster, X_WS, **options):
-        d_W = d_S @ X_WS.rotation().matrix().T
-        return caster.cast_rays(X_WS.translation(), d_W, reach, **options)
+    def cast(caster, X_WS):
+        R_WS = X_WS.rotation().matrix()
+        return caster.cast_rays(X_WS.translation(), d_S, reach, R_WSset=R_WS)
 
-    def ours(**options):
+    def ours(caster):
         for X_WS in poses:
-            cast(scene, X_WS, **options)
+            cast(caster, X_WS)
 
     def ours_with_cars():
         for step, X_WS in enumerate(poses):
@@ -80,14 +86,21 @@ def benchmark(sequence: str, rounds: int, folder: Path) -> None:
             theirs.cast(theirs.rays(X_WS, d_S))
 
     variants = {
-        "cns-drake": ours,
-        "cns-drake, 2 threads": lambda: ours(num_threads=2),
+        "cns-drake": lambda: ours(scene),
+        "cns-drake, 2 threads": lambda: ours(on_two_threads),
         f"cns-drake, {CARS} moving cars": ours_with_cars,
         "Open3D": open3d_cast,
     }
     limit = build_limit(folder)
     if limit is not None:
-        variants["limit (C)"] = _limit_variant(limit, scene, poses, d_S, reach)
+        kept = EmbreeHierarchy(*_all_in_one(geometries, stands))
+        for name, hierarchy in (
+            ("limit (C), same shapes", kept),
+            ("limit (C), triangles only", scene._scene._flat),
+        ):
+            variants[name] = _limit_variant(
+                limit, hierarchy, scene._p_WO, poses, d_S, reach
+            )
     times = interleaved(variants, rounds)
 
     triangles = count_triangles(geometries)
@@ -105,8 +118,23 @@ def benchmark(sequence: str, rounds: int, folder: Path) -> None:
     _compare(scene, theirs, poses, d_S, cast, reach)
 
 
-def _limit_variant(limit, scene, poses, d_S, reach):
-    backend = scene._scene
+def _all_in_one(geometries, stands):
+    """Returns the still groups with all that is in them, uncut."""
+    _, groups = group_geometries(geometries, stands, still)
+    for group in groups:
+        group.place(np.zeros(3), still)
+    parts = {
+        row: [
+            *(p for p in merge_flat(group.members) if p.mask == SOLID),
+            *merge_curved(group.members),
+        ]
+        for row, group in enumerate(groups)
+    }
+    return groups, parts
+
+
+def _limit_variant(limit, hierarchy, p_WO, poses, d_S, reach):
+    tree = hierarchy._tree
     count = len(d_S)
     rows = np.ascontiguousarray(d_S.T, dtype=np.float32)
     ranges = np.empty(count, np.float32)
@@ -118,11 +146,11 @@ def _limit_variant(limit, scene, poses, d_S, reach):
     def run():
         for X_WS in poses:
             R = X_WS.rotation().matrix().astype(np.float32).ravel()
-            p = (X_WS.translation() - scene._p_WO).astype(np.float32)
+            p = (X_WS.translation() - p_WO).astype(np.float32)
             limit(
-                backend._lib.rtcIntersect16,
-                ctypes.c_void_p(backend._top),
-                ctypes.byref(backend._arguments),
+                ctypes.c_void_p(tree.intersect16),
+                ctypes.c_void_p(tree.fixed),
+                ctypes.c_void_p(tree.arguments),
                 pointer(R),
                 pointer(p),
                 pointer(rows),

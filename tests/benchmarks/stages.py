@@ -63,7 +63,7 @@ class Open3dStage:
         self._p_WO, groups = group_geometries(geometries, stands, still)
         # It would say that it stands in for Embree.
         with contextlib.redirect_stderr(io.StringIO()):
-            self.scene = Open3dScene(groups[:1])._scenes[0]
+            self.scene = Open3dScene(groups[:1], num_threads=1)._scenes[0]
 
     def rays(self, X_WS: RigidTransform, d_Sset) -> open3d.core.Tensor:
         """Returns the rays of (N, 3) beams from a sensor's pose."""
@@ -92,36 +92,40 @@ class MovingCars:
     ):
         """Builds the scene with so many cars."""
         body = _car_body()
-        self._frames = [FrameId.get_new_id() for _ in range(count)]
+        frames = [FrameId.get_new_id() for _ in range(count)]
         cars = [
             PerceptionGeometry(
                 GeometryId.get_new_id(), "car", f, RigidTransform(), body, None
             )
-            for f in self._frames
+            for f in frames
         ]
-        self._poses = poses
-        self._rng = np.random.default_rng(0)
-        self._places: dict[FrameId, RigidTransform] = {}
-        self._draw_places(0)
+        rng = np.random.default_rng(0)
+        self._steps = [
+            {
+                frame: _ahead(poses[(step + k) % len(poses)], rng)
+                for k, frame in enumerate(frames)
+            }
+            for step in range(len(poses))
+        ]
+        self._step = 0
         stands = {geometry.frame_id for geometry in geometries}
         self.scene = RayCastingScene([*geometries, *cars], stands, self._pose)
 
     def move(self, step: int) -> None:
         """Moves every car."""
-        self._draw_places(step)
+        self._step = step
         self.scene.set_frame_poses(self._pose)
 
-    def _draw_places(self, step: int) -> None:
-        for k, frame in enumerate(self._frames):
-            X_WS = self._poses[(step + k) % len(self._poses)]
-            yaw = RollPitchYaw(X_WS.rotation()).yaw_angle()
-            ahead = self._rng.uniform(6.0, 40.0)
-            forward = np.array([np.cos(yaw), np.sin(yaw), 0.0])
-            p = X_WS.translation() + ahead * forward - [0.0, 0.0, 0.9]
-            self._places[frame] = RigidTransform(RollPitchYaw(0, 0, yaw), p)
-
     def _pose(self, frame_id: FrameId) -> RigidTransform:
-        return self._places.get(frame_id, RigidTransform())
+        return self._steps[self._step].get(frame_id, RigidTransform())
+
+
+def _ahead(X_WS: RigidTransform, rng: np.random.Generator) -> RigidTransform:
+    """Returns a pose of a car 6 m to 40 m ahead of a sensor's pose."""
+    yaw = RollPitchYaw(X_WS.rotation()).yaw_angle()
+    forward = np.array([np.cos(yaw), np.sin(yaw), 0.0])
+    ahead = rng.uniform(6.0, 40.0) * forward - [0.0, 0.0, 0.9]
+    return RigidTransform(RollPitchYaw(0, 0, yaw), X_WS.translation() + ahead)
 
 
 def _car_body() -> TriangleSurface:

@@ -1,0 +1,142 @@
+"""Surfaces as buffers of Embree's primitives."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from cns_drake import embree
+from cns_drake.curved_proxies import circumscribe
+from cns_drake.perception_geometry import (
+    CylinderSurface,
+    EllipsoidSurface,
+    TriangleSurface,
+)
+from cns_drake.ray_groups import Member
+
+# Which rays hit a geometry: all do hit solids, some also hit proxies.
+SOLID, PROXY = 1, 2
+ALL = SOLID | PROXY
+# Owns the primitives of proxies.
+PROXY_OWNER = -2
+
+
+class Primitives(NamedTuple):
+    """One Embree geometry.
+
+    Attributes:
+        kind: of its primitives.
+        buffers: (slot, format, array) each.
+        owners: (P,) int32, the index of the geometry that each primitive
+            belongs to.
+        mask: `SOLID` or `PROXY`.
+    """
+
+    kind: int
+    buffers: list[tuple[int, int, np.ndarray]]
+    owners: np.ndarray
+    mask: int = SOLID
+
+
+def merge_flat(members: Sequence[Member]) -> Iterator[Primitives]:
+    """Yields the triangles of surfaces, and those about curved ones."""
+    flat = [m for m in members if isinstance(m[2], TriangleSurface)]
+    curved = [
+        (PROXY_OWNER, X_LG, circumscribe(surface))
+        for _, X_LG, surface in members
+        if not isinstance(surface, TriangleSurface)
+    ]
+    for surfaces, mask in ((flat, SOLID), (curved, PROXY)):
+        if surfaces:
+            yield _merge_triangles(surfaces, mask)
+
+
+def _merge_triangles(surfaces: Sequence[Member], mask: int) -> Primitives:
+    vertices, triangles, owners, num_vertices = [], [], [], 0
+    for index, X_LG, surface in surfaces:
+        vertices.append(
+            surface.p_GVset @ X_LG.rotation().matrix().T + X_LG.translation()
+        )
+        triangles.append(surface.triangles + num_vertices)
+        owners.append(np.full(len(surface.triangles), index))
+        num_vertices += len(surface.p_GVset)
+    return Primitives(
+        embree.TRIANGLE,
+        [
+            (embree.VERTEX_BUFFER, embree.FLOAT3, _float32(vertices)),
+            (
+                embree.INDEX_BUFFER,
+                embree.UINT3,
+                np.concatenate(triangles).astype(np.uint32),
+            ),
+        ],
+        np.concatenate(owners).astype(np.int32),
+        mask,
+    )
+
+
+def merge_curved(members: Sequence[Member]) -> Iterator[Primitives]:
+    """Yields one geometry for each kind of curved primitive.
+
+    Embree intersects spheres, cones, discs and rounded segments exactly (in
+    single precision).
+    """
+    cones, capsules, spheres = [], [], []
+    for index, X_LG, surface in members:
+        if isinstance(surface, TriangleSurface):
+            continue
+        if isinstance(surface, EllipsoidSurface):
+            radius = surface.semi_axes[0]
+            spheres.append((index, [[*X_LG.translation(), radius]]))
+            continue
+        axis = X_LG.rotation().matrix()[:, 2]
+        ends = [
+            [*(X_LG.translation() + side * axis), surface.radius]
+            for side in (-surface.length / 2.0, surface.length / 2.0)
+        ]
+        if isinstance(surface, CylinderSurface):
+            cones.append((index, ends, [-axis, axis]))
+        else:
+            capsules.append((index, ends))
+
+    for kind, segments in [
+        (embree.CONE, cones),
+        (embree.ROUND_SEGMENT, capsules),
+    ]:
+        if segments:
+            first_ends = 2 * np.arange(len(segments), dtype=np.uint32)
+            yield Primitives(
+                kind,
+                [
+                    _vertices(segments),
+                    (embree.INDEX_BUFFER, embree.UINT, first_ends),
+                ],
+                np.array([s[0] for s in segments], np.int32),
+            )
+    if cones:  # A cone is open at its ends: discs close it.
+        normals = _float32(c[2] for c in cones)
+        yield Primitives(
+            embree.DISC,
+            [
+                _vertices(cones),
+                (embree.NORMAL_BUFFER, embree.FLOAT3, normals),
+            ],
+            np.repeat([c[0] for c in cones], 2).astype(np.int32),
+        )
+    if spheres:
+        yield Primitives(
+            embree.SPHERE,
+            [_vertices(spheres)],
+            np.array([s[0] for s in spheres], np.int32),
+        )
+
+
+def _vertices(shapes) -> tuple[int, int, np.ndarray]:
+    places = _float32(shape[1] for shape in shapes)
+    return embree.VERTEX_BUFFER, embree.FLOAT4, places
+
+
+def _float32(arrays) -> np.ndarray:
+    return np.concatenate([np.asarray(a) for a in arrays]).astype(np.float32)

@@ -1,0 +1,78 @@
+"""Many rays, and what they hit, as arrays.
+
+O is the frame of a ray-casting scene: world axes, at a point near by.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Rays(NamedTuple):
+    """N rays from one pose of a sensor S or from several.
+
+    Ray i takes entry i mod length of the first three arrays.
+
+    Attributes:
+        p_OSset: (K, 3) float32 origins [m].
+        R_OSset: (L, 3, 3) float64 orientations of S.
+        max_ranges: (M,) float32, how far to look [m].
+        d_Sset: (N, 3) float64 unit directions.
+    """
+
+    p_OSset: np.ndarray
+    R_OSset: np.ndarray
+    max_ranges: np.ndarray
+    d_Sset: np.ndarray
+
+    def select(self, rows: np.ndarray, max_ranges: np.ndarray) -> Rays:
+        """Returns the rays of some rows, each with a range of its own."""
+        return Rays(
+            self.p_OSset[rows % len(self.p_OSset)],
+            self.R_OSset[rows % len(self.R_OSset)],
+            max_ranges,
+            self.d_Sset[rows],
+        )
+
+    def max_ranges_of(self, rows: np.ndarray) -> np.ndarray:
+        """Returns how far the rays of some rows look."""
+        return self.max_ranges[rows % len(self.max_ranges)]
+
+    def p_Oset(self) -> np.ndarray:
+        """Returns the (N, 3) float32 origin of each ray."""
+        rows = np.arange(len(self.d_Sset)) % len(self.p_OSset)
+        return self.p_OSset[rows]
+
+    def d_Oset(self) -> np.ndarray:
+        """Returns the (N, 3) float64 direction of each ray in O."""
+        turns = self.d_Sset.reshape(-1, len(self.R_OSset), 3)
+        return np.einsum("lij,nlj->nli", self.R_OSset, turns).reshape(-1, 3)
+
+
+class Hits(NamedTuple):
+    """What N rays met first.
+
+    Attributes:
+        ranges: (N,) float32 [m], inf for a miss.
+        owner: (N,) int32 index of the geometry, -1 for a miss.
+        group: (N,) int32 row of its group, -1 for a miss.
+        normals: (N, 3) float32 normal of the surface, in the group's frame L
+            and of any length, zero for a miss; (N, 0) if none are wanted.
+    """
+
+    ranges: np.ndarray
+    owner: np.ndarray
+    group: np.ndarray
+    normals: np.ndarray
+
+    @classmethod
+    def misses(cls, num_rays: int, with_normals: bool) -> Hits:
+        """Returns hits of rays that all missed."""
+        return cls(
+            np.full(num_rays, np.inf, np.float32),
+            np.full(num_rays, -1, np.int32),
+            np.full(num_rays, -1, np.int32),
+            np.zeros((num_rays, 3 if with_normals else 0), np.float32),
+        )
