@@ -39,6 +39,8 @@ def draw_pr_curves(
             for method in in_paper_order(of_method):
                 _draw_curve(axes, method, of_method[method].metrics[mode])
             axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.02))
+            # A phone shows one panel at a time.
+            axes.tick_params(labelleft=True)
             axes.set_title(
                 f"{map_name} {' → '.join(pair[1:])}, {mode} queries", fontsize=9
             )
@@ -83,6 +85,7 @@ def draw_auc_over_change(
         _draw_paper(panels[2], method)
     panels[2].set_title("the paper (RING++ filtered, others all)", fontsize=9)
     for axes in panels:
+        axes.tick_params(labelleft=True)
         axes.set(xlabel=r"TCR$_\mathrm{sym}$", ylim=(0.0, 1.02))
         axes.grid(alpha=0.3)
     panels[0].set_ylabel("AUC")

@@ -24,6 +24,9 @@ _OTHER_STYLES = (
     ("#000000", "-.", "X"),
 )
 
+# Colours (red, green, blue) and what they mean.
+Legend = tuple[tuple[tuple[int, int, int], str], ...]
+
 # What figures are written as. On the page they are SVG where they consist of
 # lines, WebP where they consist of pixels.
 PRINTED = ("pdf", "png")

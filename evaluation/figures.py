@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 import numpy as np
 from scipy.spatial import cKDTree
 
-from evaluation.drawing import save, unit
+from evaluation.drawing import Legend, save, unit
 from evaluation.hull import in_convex_hull
 from evaluation.maps import VoxelMap
 from evaluation.point_rendering import (
@@ -31,6 +31,16 @@ _ABSENT_OUTSIDE = (240, 170, 160)
 _IN_O = (120, 170, 215)
 _ONLY_IN_H = (213, 94, 0)
 _OUTSIDE_H = (228, 228, 228)
+CHANGE_LEGEND: Legend = (
+    (_CHANGED, "absent from the other"),
+    (_ABSENT_OUTSIDE, "absent, outside the other's hull: not counted"),
+    (_UNCHANGED, "unchanged"),
+)
+SETS_LEGEND: Legend = (
+    (_IN_O, "O: in H and unchanged"),
+    (_ONLY_IN_H, "in H, changed"),
+    (_OUTSIDE_H, "outside H"),
+)
 # From above, as plans have it: streets pale, walls dark.
 _GROUND = (226, 229, 232)
 _HIGHEST = (72, 88, 112)
@@ -188,12 +198,7 @@ def _draw_absent(map_name, stages, stem: Path) -> None:
     for axes, picture, text in zip(grid, pictures, titles, strict=True):
         _show(axes, picture)
         axes.set_title(text, fontsize=9)
-    _legend(
-        figure,
-        (_CHANGED, "absent from the other"),
-        (_ABSENT_OUTSIDE, "absent, outside the other's hull: not counted"),
-        (_UNCHANGED, "unchanged"),
-    )
+    _show_legend(figure, CHANGE_LEGEND)
     save(figure, stem, "webp")
 
 
@@ -223,12 +228,7 @@ def _draw_sets(map_name, stages, change: TemporalChange, stem: Path) -> None:
     for axes, picture, text in zip(grid, pictures, titles, strict=True):
         _show(axes, picture)
         axes.set_title(f"{map_name} {text}", fontsize=9)
-    _legend(
-        figure,
-        (_IN_O, "O: in H and unchanged"),
-        (_ONLY_IN_H, "in H, changed"),
-        (_OUTSIDE_H, "outside H"),
-    )
+    _show_legend(figure, SETS_LEGEND)
     save(figure, stem, "webp")
 
 
@@ -292,7 +292,7 @@ def _draw_route(axes, line: np.ndarray) -> None:
     axes.legend(fontsize=7, loc="upper right", framealpha=0.8)
 
 
-def _legend(figure: Figure, *entries: tuple[tuple[int, int, int], str]) -> None:
+def _show_legend(figure: Figure, entries: Legend) -> None:
     figure.legend(
         handles=[
             Patch(color=unit(colour), label=label) for colour, label in entries

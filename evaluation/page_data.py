@@ -7,11 +7,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import io
 from pathlib import Path
+from typing import Literal
 import zlib
 
 from matplotlib import image
 import numpy as np
 
+from evaluation.drawing import Legend
 from evaluation.figures import top_view
 from evaluation.maps import VoxelMap
 from evaluation.metrics import MODES
@@ -28,6 +30,8 @@ _NUM_BEST = 5
 _ROUTE_STEP = 2.0
 _WEBP_QUALITY = 75
 
+Section = Literal["change", "recognition", "figures", "print"]
+
 
 @dataclass(frozen=True)
 class Illustration:
@@ -37,11 +41,18 @@ class Illustration:
         stem: its path without ending.
         title: what it shows.
         page_kind: "svg" or "webp", the form in which the page holds it.
+        section: of the page that shows it; "print" for none.
+        num_panels: that lie side by side; a phone shows one at a time.
+        legend: red, green, blue and meaning of colours, told again below
+            the figure, where a phone shows it legibly.
     """
 
     stem: Path
     title: str
     page_kind: str
+    section: Section = "figures"
+    num_panels: int = 1
+    legend: Legend = ()
 
 
 @dataclass(frozen=True)
@@ -110,13 +121,19 @@ def browser_data(
     recognitions: Sequence[RecognitionResult],
     drives: Mapping[str, PageDrive],
     changes: Mapping[tuple[str, str, str], float],
+    pages: Mapping[str, str],
 ) -> dict:
     """Returns what the query browser reads, ready for JSON.
+
+    The maps from above are not in it: it takes them from
+    `evaluation.page_routes.route_picture`.
 
     Args:
         recognitions: of all pairs and methods.
         drives: name -> drive, all that occur in a pair.
         changes: TCR_sym of each pair.
+        pages: drive -> address of its recording to look around in; drives
+            without one may be left out.
     """
     pairs: dict[tuple, list[RecognitionResult]] = {}
     for result in recognitions:
@@ -133,7 +150,9 @@ def browser_data(
         "cell": CELL,
         "heightStep": HEIGHT_STEP,
         "drives": {
-            name: _drive_data(drives[name], num_points) for name in sorted(used)
+            name: _drive_data(drives[name], num_points)
+            | {"page": pages.get(name)}
+            for name in sorted(used)
         },
         "pairs": [
             _pair_data(pair, results, drives, changes.get(pair))
@@ -158,9 +177,8 @@ def _drive_data(drive: PageDrive, num_points: int) -> dict:
         "frames": drive.frames.tolist(),
         "route": np.round(drive.route, 1).tolist(),
         "extent": np.round(drive.extent, 3).tolist(),
-        "view": _to_base64(drive.view),
         "counts": [len(points) for points in scans],
-        "points": _to_base64(zlib.compress(planes, 9)),
+        "points": base64.b64encode(zlib.compress(planes, 9)).decode("ascii"),
     }
 
 
@@ -219,7 +237,3 @@ def _method_data(result: RecognitionResult) -> dict:
         "metrics": metrics,
         "recall": None if np.isnan(recall) else round(recall, 4),
     }
-
-
-def _to_base64(data: bytes) -> str:
-    return base64.b64encode(data).decode("ascii")
