@@ -85,9 +85,12 @@ def survey_drive(
                 files.described(method), described_inputs(inputs, method)
             )
         ]
-    if not missing and all(
-        is_current(path, inputs) for path in (files.drive, files.fine)
-    ):
+    maps = [
+        path
+        for path in (files.fine, files.drive)
+        if not is_current(path, inputs)
+    ]
+    if not missing and not maps:
         return
     survey = survey_recording(
         source(), roles, [method.make() for method in missing], tracking(tell)
@@ -100,8 +103,12 @@ def survey_drive(
             described_inputs(inputs, method),
             (survey.drive.placed, described),
         )
-    write_part(files.fine, inputs, survey.fine)
-    write_part(files.drive, inputs, survey.drive)
+    for path in maps:
+        write_part(
+            path,
+            inputs,
+            survey.fine if path == files.fine else survey.drive,
+        )
 
 
 def survey_inputs(source: DriveSource, roles: frozenset[Role]) -> dict:
