@@ -320,13 +320,17 @@ def reproduce(
     output: Output,
     jobs: Jobs = None,
     scheduler: Scheduler = None,
+    pages: Annotated[
+        bool, typer.Option(help="Also make a web page of each drive.")
+    ] = True,
 ) -> None:
     """Simulate a map's sequences, evaluate them and report."""
     with uninterrupted():
         from cns_drake.reproduction import reproduce_maps
         from evaluation.cluster import choose_cluster
 
-    reproduce_maps(maps, output, choose_cluster(jobs, scheduler))
+    cluster = choose_cluster(jobs, scheduler)
+    typer.echo(reproduce_maps(maps, output, cluster, with_pages=pages))
 
 
 def main() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 import sys
 
@@ -54,7 +54,7 @@ def plan_recordings(
     output: Path,
     *,
     overwrite: bool = True,
-    pages: Path | None = None,
+    pages: Mapping[str, Path] | None = None,
 ) -> list[Job]:
     """Returns a job for each recording that is not finished; says which are.
 
@@ -64,8 +64,8 @@ def plan_recordings(
         scenarios: what to record.
         output: the folder of recordings.
         overwrite: replace whatever else has one of the names.
-        pages: a folder for a web page of each drive, `<name>.html`. A
-            recording without its page counts as not finished.
+        pages: name -> where to save a web page of the drive. Without it
+            such a recording counts as not finished.
 
     Raises:
         InputError: two have one name, or a folder must not be used.
@@ -76,9 +76,9 @@ def plan_recordings(
     output = output.absolute()
     waiting = []
     for scenario in scenarios:
-        page = None
-        if pages is not None:
-            page = pages.absolute() / f"{scenario.name}.html"
+        page = (pages or {}).get(scenario.name)
+        if page is not None:
+            page = page.absolute()
         if _is_done(scenario, output, page):
             print(f"{scenario.name}: finished already", file=sys.stderr)
         else:

@@ -62,7 +62,7 @@ def digest_inputs(scenario: Scenario) -> dict[str, str]:
         inputs["waypoints"] = Path(scenario.waypoints)
     else:
         inputs["roads"] = scenario.roads_file
-    return {name: _digest(path) for name, path in inputs.items()}
+    return {name: digest_file(path) for name, path in inputs.items()}
 
 
 def combined_digest(inputs: dict[str, str]) -> str:
@@ -70,7 +70,12 @@ def combined_digest(inputs: dict[str, str]) -> str:
     return hashlib.sha256(json.dumps(inputs).encode()).hexdigest()
 
 
-def _digest(path: Path) -> str:
+def digest_file(path: Path) -> str:
+    """Returns the SHA-256 digest of a file and of the files it names.
+
+    Raises:
+        InputError: a file cannot be read.
+    """
     digest = hashlib.sha256()
     for name in sorted(_referenced_files(path)):
         content = _read(path.parent / name)

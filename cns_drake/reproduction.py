@@ -4,48 +4,118 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-import subprocess
-import sys
 
 from cns_drake.errors import InputError
-from cns_drake.jobs import record_all
+from cns_drake.jobs import plan_recordings
+from cns_drake.map_pictures import plan_pictures
 from cns_drake.paths import sequences_of_map, shipped_maps
 from cns_drake.scenario import Scenario, load_scenario
 from evaluation.cluster import Cluster
+from evaluation.collection import RecordingInfo
+from evaluation.jobs import run_jobs
+from evaluation.study import assemble, plan_study
 
 
 def reproduce_maps(
-    maps: Sequence[str] | None, output: Path, cluster: Cluster
-) -> None:
+    maps: Sequence[str] | None,
+    output: Path,
+    cluster: Cluster,
+    *,
+    with_pages: bool = True,
+) -> Path:
     """Records the sequences of maps, evaluates them and reports.
 
-    `<output>/<name>/` gets each recording, `<output>/pictures` the drives of
-    each map from above and a street in its first and last stage,
-    `<output>/report` the tables and figures. What is recorded already is not
-    recorded again.
+    `<output>/<name>/` gets each recording, `<output>/pages/<name>.html` a
+    web page of each sequence's drive, `<output>/pictures` the drives of each
+    map from above and a street in its first and last stage,
+    `<output>/report` the tables and figures. What is done already is not
+    done again.
 
     Args:
         maps: which maps, by name or folder; all shipped ones if empty.
         output: the folder for everything.
-        cluster: where to simulate.
+        cluster: where the work is done.
+        with_pages: whether the web pages are made.
+
+    Returns:
+        The path of the report.
 
     Raises:
         InputError: a map is not known, or a step failed.
     """
     folders = [_map_folder(name) for name in maps or _recordable_maps()]
-    scenarios = [
-        scenario for folder in folders for scenario in _scenarios_of_map(folder)
-    ]
-    record_all(scenarios, output, cluster)
+    sequences, controls, pictures = [], [], []
     for folder in folders:
-        _draw(folder, output / "pictures")
-    # A process of its own: the evaluation stands without the simulator.
-    command = [sys.executable, "-m", "evaluation", "report", str(output)]
-    done = subprocess.run(
-        [*command, "--output", str(output / "report")], check=False
+        of_map = _sequences(folder)
+        sequences += of_map
+        controls += control_drives(of_map)
+        pictures += plan_pictures(folder, output / "pictures")
+    pages = {}
+    if with_pages:
+        pages = {s.name: output / "pages" / f"{s.name}.html" for s in sequences}
+    jobs = plan_recordings([*sequences, *controls], output, pages=pages)
+    waiting = {job.name for job in jobs}
+    recordings = [
+        recording_info(scenario, output, is_waiting=scenario.name in waiting)
+        for scenario in (*sequences, *controls)
+    ]
+    # In the order in which `cns-eval report` finds them.
+    recordings.sort(key=lambda recording: recording.name)
+    report = output / "report"
+    run_jobs([*jobs, *plan_study(recordings, report), *pictures], cluster)
+    return assemble(recordings, report)
+
+
+def _sequences(folder: Path) -> list[Scenario]:
+    sequences = [load_scenario(path) for path in sequences_of_map(folder)]
+    for sequence in sequences:
+        if sequence.map is None:
+            raise InputError(
+                f"{sequence.source}: map: needed to compare stages"
+            )
+    return sequences
+
+
+def control_drives(sequences: Sequence[Scenario]) -> list[Scenario]:
+    """Returns the control drives of a map's sequences.
+
+    A control drive is the route of an earlier stage through the last one:
+    compared with the last stage's own sequence, whatever it shows as change
+    is due to the routes and not to the city.
+    """
+    last = max(sequences, key=lambda sequence: sequence.stage)
+    return [
+        sequence.model_copy(
+            update={
+                "name": f"{sequence.name}_stage_{last.stage}",
+                "stage": last.stage,
+                "title": f"Control: the route of {sequence.name} "
+                f"in stage {last.stage}",
+            }
+        )
+        for sequence in sequences
+        if sequence is not last
+    ]
+
+
+def recording_info(
+    scenario: Scenario, output: Path, is_waiting: bool
+) -> RecordingInfo:
+    """Returns what the evaluation knows of a recording before it is made.
+
+    Args:
+        scenario: of a map.
+        output: the folder of recordings.
+        is_waiting: whether the job of its name has to be done first.
+    """
+    return RecordingInfo(
+        name=scenario.name,
+        path=output.absolute() / scenario.name,
+        map_name=Path(scenario.map).name,
+        stage=scenario.stage,
+        route=scenario.route or scenario.waypoints,
+        needs=(scenario.name,) if is_waiting else (),
     )
-    if done.returncode != 0:
-        raise InputError(f"{output}: the evaluation failed (see above)")
 
 
 def _recordable_maps() -> list[str]:
@@ -73,51 +143,3 @@ def _map_folder(name: str) -> Path:
             f"{folder}: no sequence_NN.yaml whose stage_NN.sdf is there"
         )
     return folder
-
-
-def _scenarios_of_map(folder: Path) -> list[Scenario]:
-    """Returns a map's sequences, and its control drives.
-
-    A control drive is the route of an earlier stage through the last one:
-    compared with the last stage's own sequence, whatever it shows as change
-    is due to the routes and not to the city.
-    """
-    sequences = [load_scenario(path) for path in sequences_of_map(folder)]
-    last = max(sequences, key=lambda sequence: sequence.stage)
-    controls = [
-        sequence.model_copy(
-            update={
-                "name": f"{sequence.name}_stage_{last.stage}",
-                "stage": last.stage,
-                "title": f"Control: the route of {sequence.name} "
-                f"in stage {last.stage}",
-            }
-        )
-        for sequence in sequences
-        if sequence is not last
-    ]
-    return sequences + controls
-
-
-def _draw(folder: Path, pictures: Path) -> None:
-    # matplotlib is not needed by those who only record.
-    from cns_drake.aerial_pictures import draw_drives
-    from cns_drake.stage_pictures import draw_stages, load_views
-
-    name = folder.resolve().name
-    path = pictures / f"{name}_drives.png"
-    print(f"drawing {path}", file=sys.stderr)
-    scenarios = [load_scenario(file) for file in sequences_of_map(folder)]
-    draw_drives(
-        {scenario.name.replace("_", " "): scenario for scenario in scenarios},
-        path,
-    )
-    # A map of one's own may do without views.
-    if (folder / "views.yaml").is_file():
-        path = pictures / f"{name}_stages.png"
-        print(f"drawing {path}", file=sys.stderr)
-        files = sorted(folder.glob("stage_*.sdf"))
-        stages = {
-            file.stem.replace("_", " "): file for file in (files[0], files[-1])
-        }
-        draw_stages(stages, load_views(folder / "views.yaml")["street"], path)
