@@ -15,6 +15,7 @@ from cns_drake.beam_pattern import POINT_DTYPE, BeamPattern
 from cns_drake.errors import InputError
 from cns_drake.measurement import IDEAL, MeasurementModel
 from cns_drake.perception_geometry import read_perception_geometry
+from cns_drake.point_assembly import BeamTable, assemble_points
 from cns_drake.ray_casting import RayCastingScene
 from cns_drake.structure_table import StructureTable
 
@@ -81,11 +82,12 @@ class Lidar(LeafSystem):
         self._pattern = pattern
         self._measurement = measurement
         structures = structures or StructureTable(())
-        self._d_S_by_axis = np.ascontiguousarray(
-            pattern.d_Sset.T, dtype=np.float32
+        self._table = BeamTable(
+            pattern.d_Sset.astype(np.float32),
+            pattern.ring,
+            pattern.t_ns,
+            np.argsort(pattern.packet_order),
         )
-        # Where in packet order each beam is.
-        self._firing_order = np.argsort(pattern.packet_order)
         self._d_Sset_cast = pattern.d_Sset[pattern.packet_order]
 
         self._geometry_query = self.DeclareAbstractInputPort(
@@ -139,25 +141,25 @@ class Lidar(LeafSystem):
             self._measurement.reach(self._pattern.max_range),
             R_WSset=R_WSset,
         )
-        true_ranges = hits.ranges.take(self._firing_order)
         beams, ranges, intensity = self._measurement.measure(
-            true_ranges,
+            hits.ranges.take(self._table.place),
             self._pattern.min_range,
             self._pattern.max_range,
             round(context.get_time() / self._pattern.period),
         )
-        geometry = hits.geometry.take(self._firing_order.take(beams))
         # Zeros, so that the padding between fields is defined, too.
         scan = np.zeros(len(beams), POINT_DTYPE)
-        for name, d in zip("xyz", self._d_S_by_axis, strict=True):
-            scan[name] = self._measurement.round_positions(
-                d.take(beams) * ranges
-            )
-        scan["intensity"] = intensity
-        scan["ring"] = self._pattern.ring.take(beams)
-        scan["t"] = self._pattern.t_ns.take(beams)
-        scan["label"] = seen.label.take(geometry)
-        scan["instance"] = seen.instance.take(geometry)
+        assemble_points(
+            scan,
+            self._table,
+            beams,
+            ranges,
+            intensity,
+            hits.geometry,
+            seen.label,
+            seen.instance,
+            np.float32(self._measurement.resolution),
+        )
         output.set_value(scan)
 
     def _scan_prerequisites(self) -> set:

@@ -110,18 +110,10 @@ class MeasurementModel:
             )
             kept = draw < survival
             beams, intensity = beams[kept], intensity[kept]
-        return Returns(
-            beams, ranges[beams], self._rounded_to(intensity, _INTENSITY_STEP)
-        )
-
-    def round_positions(self, coordinates: np.ndarray) -> np.ndarray:
-        """Returns float32 coordinates at the model's resolution [m]."""
-        return self._rounded_to(coordinates, self.resolution)
-
-    def _rounded_to(self, values: np.ndarray, step: float) -> np.ndarray:
-        if self.resolution == 0.0:
-            return values
-        return np.rint(values / np.float32(step)) * np.float32(step)
+        if self.resolution > 0.0:
+            step = np.float32(_INTENSITY_STEP)
+            intensity = np.rint(intensity / step) * step
+        return Returns(beams, ranges[beams], intensity)
 
     def _generator(self, purpose: int, frame: int) -> np.random.Generator:
         key = (purpose, frame, *self.sensor_name.encode())
