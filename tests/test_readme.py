@@ -1,24 +1,58 @@
-"""The README's example in Python does what it says."""
+"""Every command and example of the README runs, and does what it says."""
 
-from pathlib import Path
-import re
+import pytest
+import readme
+from readme_recipes import NOT_RUN, RECIPES
+from readme_workplace import Workplace, claims
 
-README = Path(__file__).parent.parent / "README.md"
+
+@pytest.fixture(scope="module")
+def workplace(tmp_path_factory):
+    workplace = Workplace(tmp_path_factory.mktemp("reader"))
+    yield workplace
+    workplace.close()
 
 
-def test_example(short_recording, capsys):
-    blocks = re.findall(
-        r"^```python\n(.*?)^```", README.read_text(), re.DOTALL | re.MULTILINE
-    )
-    (example,) = (block for block in blocks if "sequences.open(" in block)
-    assert len(example.strip().splitlines()) <= 6
-    assert '"output/metropolis_04"' in example
-    code = example.replace("output/metropolis_04", str(short_recording))
-    names = {}
-    exec(code, names)
-    printed = capsys.readouterr().out
-    assert str(1_700_000_000_000_000_000 + 30 * 50_000_000) in printed
-    assert "'ground'" in printed
-    fields = "x y z intensity ring t label instance"
-    assert " ".join(names["scan"].dtype.names) == fields
-    assert fields in example
+@pytest.mark.parametrize("name", RECIPES)
+def test_it_runs(name, workplace):
+    printed = workplace.follow(name)
+    for text in RECIPES[name].prints:
+        assert text in printed
+    for pattern in RECIPES[name].makes:
+        assert list(workplace.folder.glob(pattern)), pattern
+
+
+def test_each_piece_has_one_recipe():
+    pieces = readme.pieces(readme.read())
+    claimed = {piece: claims(piece) for piece in pieces}
+    faults = [
+        f"README.md:{piece.line}: {len(names)} tests run this: {piece.text}"
+        for piece, names in claimed.items()
+        if len(names) != 1
+    ]
+    assert not faults, "\n".join(faults)
+    names = [name for names in claimed.values() for name in names]
+    assert sorted(names) == sorted([*RECIPES, *NOT_RUN.values()])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "```\n.venv/bin/cns-drake dance\n```",
+        "- a list:\n\n  ```bash\n  ls\n  ```",
+        "```yaml\nmap: nowhere\n```",
+        "Type `cns-drake scan --twice` now.",
+        "Type `cns-drake\nscan --twice` now.",
+        "| `dask scheduler` | starts |",
+    ],
+)
+def test_what_is_new_is_noticed(text):
+    before = readme.pieces(readme.read())
+    markdown = readme.read() + "\n" + text + "\n"
+    (new,) = set(readme.pieces(markdown)) - set(before)
+    assert claims(new) == []
+    assert new.line > max(piece.line for piece in before)
+
+
+def test_names_of_commands_are_not_run():
+    assert readme.pieces("See `cns-drake scan`, or `--help`, or `a.py`.") == []
