@@ -16,6 +16,7 @@ from evaluation import points as point_arrays
 from evaluation.compiled import compiled
 from evaluation.progress import Track, silent
 from evaluation.sequences.sequence import Sequence
+from evaluation.sorting import cell_order
 
 VOXEL_SIZE = 5.0
 Z_ORIGIN = -2.5
@@ -73,7 +74,7 @@ class VoxelMap:
         """
         coarse = np.floor_divide(self.indices, factor)
         # Sorted by fine index is not sorted by coarse one.
-        order = np.lexsort(coarse.T[::-1])
+        order = cell_order(coarse)
         sorted_coarse = coarse[order]
         is_first = np.ones(len(self), dtype=bool)
         is_first[1:] = (np.diff(sorted_coarse, axis=0) != 0).any(axis=1)
@@ -141,10 +142,11 @@ class VoxelAccumulator:
     def to_map(self) -> VoxelMap:
         """Returns the map of all points so far."""
         cells = self._table[self._table["count"] > 0]
-        cells = cells[np.lexsort((cells["iz"], cells["iy"], cells["ix"]))]
+        indices = np.stack([cells[name] for name in ("ix", "iy", "iz")], axis=1)
+        order = cell_order(indices)
+        cells, indices = cells[order], indices[order]
         counts = cells["count"].astype(np.int64)
         sums = np.stack([cells[name] for name in ("sx", "sy", "sz")], axis=1)
-        indices = np.stack([cells[name] for name in ("ix", "iy", "iz")], axis=1)
         return VoxelMap(
             indices=indices,
             centroids_W=_corners(indices, self._voxel_size)

@@ -11,6 +11,7 @@ import numpy as np
 
 from evaluation.compiled import compiled
 from evaluation.methods.btc_voxel_order import voxel_order
+from evaluation.sorting import stable_order
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ def voxel_planes(
         flatness: upper limit of the variance along the normal [m^2].
     """
     index, numbers = _voxels(points, voxel_size)
-    order = np.argsort(numbers, kind="stable")
+    order = stable_order(numbers)
     starts = np.flatnonzero(np.diff(numbers[order], prepend=-1))
     counts = np.diff(starts, append=len(points))
     by_first_point = np.argsort(order[starts])

@@ -85,11 +85,8 @@ def survey_drive(
                 files.described(method), described_inputs(inputs, method)
             )
         ]
-    maps = [
-        path
-        for path in (files.fine, files.drive)
-        if not is_current(path, inputs)
-    ]
+    maps = {files.fine: "fine", files.drive: "drive"}
+    maps = {p: name for p, name in maps.items() if not is_current(p, inputs)}
     if not missing and not maps:
         return
     survey = survey_recording(
@@ -103,12 +100,8 @@ def survey_drive(
             described_inputs(inputs, method),
             (survey.drive.placed, described),
         )
-    for path in maps:
-        write_part(
-            path,
-            inputs,
-            survey.fine if path == files.fine else survey.drive,
-        )
+    for path, name in maps.items():
+        write_part(path, inputs, getattr(survey, name))
 
 
 def survey_inputs(source: DriveSource, roles: frozenset[Role]) -> dict:
