@@ -11,7 +11,12 @@ from pydrake.multibody.math import SpatialAcceleration, SpatialVelocity
 from scipy.spatial.transform import Rotation
 
 from cns_drake.lane_path import LanePath
-from cns_drake.path_geometry import PathIntegral, PathJet, SmoothPath
+from cns_drake.path_geometry import (
+    PathIntegral,
+    PathJet,
+    PathSection,
+    SmoothPath,
+)
 from cns_drake.speed_profile import Speeds, make_time_scaling
 from cns_drake.uniform_spline import SplineDerivatives
 
@@ -38,12 +43,14 @@ class Moments(NamedTuple):
         rate: (N,) their rates [1/s].
         acceleration: (N,) their accelerations [1/s^2].
         jet: the path there.
+        section: the path that leads up to them, for integrals along it.
     """
 
     u: np.ndarray
     rate: np.ndarray
     acceleration: np.ndarray
     jet: PathJet
+    section: PathSection
 
 
 class Trajectory:
@@ -86,11 +93,12 @@ class Trajectory:
     def at(self, t) -> Moments:
         """Returns the path at (N,) times."""
         u, rate, acceleration = self.path_parameter(t)
-        return Moments(u, rate, acceleration, self._path.evaluate(u))
+        jet, section = self._path.evaluate_with_section(u)
+        return Moments(u, rate, acceleration, jet, section)
 
     def travelled(self, t) -> np.ndarray:
         """Returns the (N,) distances travelled at (N,) times [m]."""
-        return self._travelled.evaluate(self.path_parameter(t)[0])
+        return self._travelled.evaluate(self.at(t).section)
 
     def positions(self, t) -> np.ndarray:
         """Returns the (N, 3) positions p_WB at (N,) times [m]."""
@@ -184,7 +192,7 @@ class WheelMotion:
 
     def steering(self, moments: Moments) -> AngleMotion:
         """Returns the steering at (N,) times, positive to the left."""
-        _, rate, acceleration, jet = moments
+        _, rate, acceleration, jet, _ = moments
         a, b, da, db, dda, ddb = self._ground_motion(jet)
         squared = a**2 + b**2
         dsquared = 2.0 * (a * da + b * db)
@@ -201,12 +209,12 @@ class WheelMotion:
 
         It is positive forwards and zero at the start.
         """
-        u, rate, acceleration, jet = moments
+        _, rate, acceleration, jet, section = moments
         a, b, da, db, _, _ = self._ground_motion(jet)
         g = np.hypot(a, b)
         dg = (a * da + b * db) / g
         return AngleMotion(
-            angle=self._rolled.evaluate(u) / self._radius,
+            angle=self._rolled.evaluate(section) / self._radius,
             rate=g * rate / self._radius,
             acceleration=(dg * rate**2 + g * acceleration) / self._radius,
         )
