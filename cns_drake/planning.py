@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from cns_drake.city.roads.network import load_road_network
+from cns_drake.errors import InputError
+from cns_drake.frame_clock import frames_within
 from cns_drake.route import make_lane_path
 from cns_drake.scenario import Scenario
 from cns_drake.trajectory import POINT_SPACING, Trajectory
@@ -24,3 +26,18 @@ def plan_drive(scenario: Scenario) -> Trajectory:
             network, scenario.route, POINT_SPACING, scenario.source
         )
     return Trajectory(path, scenario.speeds)
+
+
+def count_frames(scenario: Scenario, trajectory: Trajectory) -> int:
+    """Returns how many frames a scenario's drive has.
+
+    Raises:
+        InputError: it asks for more than the drive takes.
+    """
+    available = frames_within(trajectory.duration)
+    if scenario.frames is not None and scenario.frames > available:
+        raise InputError(
+            f"{scenario.source}: frames: {scenario.frames} asked for, but the "
+            f"route takes only {available}"
+        )
+    return scenario.frames or available

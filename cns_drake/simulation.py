@@ -16,11 +16,11 @@ from cns_drake.background_writer import BackgroundWriter
 from cns_drake.bag_writer import BagWriter
 from cns_drake.errors import InputError
 from cns_drake.files import check_writable, complete_part, write_part
-from cns_drake.frame_clock import FRAME_PERIOD, START_NS, frames_within
+from cns_drake.frame_clock import FRAME_PERIOD, START_NS
 from cns_drake.interrupts import interrupts_wait
 from cns_drake.mcap_recorder import make_calibration, recording_topics
 from cns_drake.meshcat_recording import MeshcatRecorder
-from cns_drake.planning import plan_drive
+from cns_drake.planning import count_frames, plan_drive
 from cns_drake.provenance import (
     INPUTS_KEY,
     combined_digest,
@@ -132,13 +132,7 @@ def _simulate(
     scenario.check_files()
     inputs = digest_inputs(scenario)
     trajectory = plan_drive(scenario)
-    available = frames_within(trajectory.duration)
-    num_frames = scenario.frames or available
-    if num_frames > available:
-        raise InputError(
-            f"{scenario.source}: frames: {num_frames} asked for, but the route "
-            f"takes only {available}"
-        )
+    num_frames = count_frames(scenario, trajectory)
     scenario = scenario.model_copy(update={"frames": num_frames})
     world = load_stage(scenario)
     if digest_inputs(scenario) != inputs:
