@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import datetime
 import time
 
-from rich.console import Console
+from rich.console import Console, RenderableType
 
 from evaluation.progress import LINE_INTERVAL
 from evaluation.progress_bars import print_note, show_bars
@@ -135,6 +135,10 @@ class JobProgress:
 
     def __exit__(self, *error) -> None:
         self._stack.__exit__(*error)
+
+    def __rich__(self) -> RenderableType:
+        """Returns what is shown."""
+        return self._bars.get_renderable()
 
     def start(self, name: str) -> None:
         """A job starts, or starts again."""

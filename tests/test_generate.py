@@ -3,14 +3,12 @@
 import json
 import os
 import signal
-import subprocess
-import sys
 
 from bag_recordings import contents
+from generation import Generation
 from mcap.reader import make_reader
 import pytest
-from tiny_drive import FRAMES, tiny_scenario
-import yaml
+from tiny_drive import FRAMES, tiny_scenario, write_scenario
 
 from cns_drake.errors import InputError
 from cns_drake.jobs import is_recorded, record_all
@@ -19,38 +17,6 @@ from evaluation.cluster import Cluster
 
 LONG = 300
 ONE = Cluster(num_workers=1)
-
-
-class Generation:
-    """A run of the command line, in a group of processes of its own."""
-
-    def __init__(self, files, output, *options):
-        command = [sys.executable, "-m", "cns_drake", "generate", *files]
-        self.process = subprocess.Popen(
-            [*command, "--output", output, *options],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            start_new_session=True,
-        )
-        self.told = []
-
-    def wait_for(self, text):
-        """Reads until a line contains a text."""
-        for line in self.process.stderr:
-            self.told.append(line)
-            if text in line:
-                return
-        pytest.fail("".join(self.told))
-
-    def end(self):
-        """Returns exit status and results once every process has ended.
-
-        All have the same stderr: it ends when the last of them does.
-        """
-        self.told.extend(self.process.stderr)
-        results = self.process.stdout.read().splitlines()
-        return self.process.wait(), results
 
 
 @pytest.fixture(scope="module")
@@ -65,11 +31,7 @@ def scenarios(tmp_path_factory):
 @pytest.fixture(scope="module")
 def files(scenarios, tmp_path_factory):
     folder = tmp_path_factory.mktemp("files")
-    for scenario in scenarios:
-        values = scenario.model_dump(exclude_none=True)
-        file = folder / f"{scenario.name}.yaml"
-        file.write_text(yaml.safe_dump(values))
-    return [folder / f"{scenario.name}.yaml" for scenario in scenarios]
+    return [write_scenario(scenario, folder) for scenario in scenarios]
 
 
 def test_interrupted_killed_and_run_again(scenarios, files, tmp_path):

@@ -5,6 +5,7 @@ import signal
 import sys
 
 from small_map import box_visual, world_text
+import yaml
 
 from cns_drake.scenario import make_scenario
 from cns_drake.simulation import simulate
@@ -43,6 +44,13 @@ def tiny_scenario(folder, **changes):
         "frames": FRAMES,
     }
     return make_scenario(values | changes, "test")
+
+
+def write_scenario(scenario, folder):
+    """Writes a scenario as a file for the command line; returns its path."""
+    file = folder / f"{scenario.name}.yaml"
+    file.write_text(yaml.safe_dump(scenario.model_dump(exclude_none=True)))
+    return file
 
 
 def run_and_tell(scenario, output, sender):

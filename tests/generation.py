@@ -1,0 +1,40 @@
+"""`cns-drake generate` as a process that tests watch and kill."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+
+class Generation:
+    """A run of the command line, in a group of processes of its own."""
+
+    def __init__(self, files, output, *options, **environment):
+        command = [sys.executable, "-m", "cns_drake", "generate", *files]
+        self.process = subprocess.Popen(
+            [*command, "--output", output, *options],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+            env={**os.environ, **environment},
+        )
+        self.told = []
+
+    def wait_for(self, text):
+        """Reads until a line contains a text."""
+        for line in self.process.stderr:
+            self.told.append(line)
+            if text in line:
+                return
+        pytest.fail("".join(self.told))
+
+    def end(self):
+        """Returns exit status and results once every process has ended.
+
+        All have the same stderr: it ends when the last of them does.
+        """
+        self.told.extend(self.process.stderr)
+        results = self.process.stdout.read().splitlines()
+        return self.process.wait(), results

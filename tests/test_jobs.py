@@ -1,0 +1,228 @@
+"""Jobs on processes of this machine: order, faults, deaths, interrupts."""
+
+import os
+from pathlib import Path
+import pickle
+import subprocess
+import sys
+
+import job_functions
+import psutil
+import pytest
+
+from evaluation.cluster import Cluster, choose_cluster, num_cores
+from evaluation.errors import FailedJobsError, InputError
+from evaluation.files import exclusive
+from evaluation.job_process import JobError, ProcessDiedError, Tell, run_process
+from evaluation.jobs import Job, run_jobs
+
+
+def job(name, function, *arguments, needs=(), **options):
+    return Job(name, function, arguments, tuple(needs), **options)
+
+
+def test_what_is_needed_is_there_and_faults_stay_alone(tmp_path, capsys):
+    first, second, both, last = (tmp_path / name for name in "abcd")
+    process, tries, survivor = (tmp_path / name for name in "ptu")
+    jobs = [
+        # The one that needs most comes first in the list, not in time.
+        job("last", job_functions.join, [both], last, needs=["both"]),
+        job(
+            "both",
+            job_functions.join,
+            [first, second],
+            both,
+            needs=["first", "second"],
+            output=both,
+        ),
+        job("first", job_functions.join, [], first, cost=7.0, output=first),
+        job("second", job_functions.join, [], second),
+        job("process", job_functions.note_process, process),
+        job("refused", job_functions.refuse),
+        job("stumbles", job_functions.stumble),
+        job("dies", job_functions.die, tries),
+        job("survives", job_functions.die_first, tmp_path / "s", survivor),
+        job("orphan", job_functions.join, [], tmp_path / "o", needs=["dies"]),
+        job("orphan 2", job_functions.join, [], last, needs=["orphan"]),
+    ]
+    with pytest.raises(FailedJobsError) as raised:
+        run_jobs(jobs, Cluster(num_workers=2))
+    assert raised.value.exit_status == 1
+    *faults, left_out = str(raised.value).split("; ")
+    assert sorted(faults) == [
+        "dies: its process was ended by SIGKILL, perhaps for lack of memory",
+        "refused: FILE: field: cannot be used",
+        "stumbles: ZeroDivisionError: over nothing",
+    ]
+    assert left_out.endswith("need these: orphan, orphan 2")
+    assert last.read_text() == both.read_text() == "a+b"
+    assert tries.read_text() == "xxx"
+    assert survivor.read_text() == "at last"
+    # No lock is left behind.
+    assert {path.name for path in tmp_path.iterdir()} == set("abcdpstu")
+    # A process and a session of its own, for which Ctrl-C is not meant.
+    pid, parent, session = map(int, process.read_text().split())
+    assert pid == session
+    assert parent not in (os.getpid(), pid)
+    told = capsys.readouterr().err
+    assert "here I am" in told
+    assert "ZeroDivisionError" in told
+    assert "last: done" in told
+
+
+def test_nothing_to_do_starts_nothing():
+    run_jobs([], Cluster(scheduler="nowhere"))
+
+
+@pytest.mark.parametrize(
+    ("need_of_a", "message"),
+    [("b", "cycle"), ("c", "a: needs c, which is no job")],
+)
+def test_needs_must_make_sense(need_of_a, message):
+    jobs = [
+        job("a", job_functions.refuse, needs=[need_of_a]),
+        job("b", job_functions.refuse, needs=["a"]),
+    ]
+    with pytest.raises(ValueError, match=message):
+        run_jobs(jobs, Cluster())
+
+
+def test_names_differ():
+    jobs = [job("a", job_functions.refuse)] * 2
+    with pytest.raises(ValueError, match="a: several jobs"):
+        run_jobs(jobs, Cluster())
+
+
+def test_a_job_that_is_not_wanted_ends(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    told = []
+
+    def is_wanted():
+        if not told:
+            with pipe.open() as stream:
+                told.append(int(stream.read()))
+            return True
+        return False
+
+    with pytest.raises(ProcessDiedError, match="ended with status 130"):
+        run_process(
+            pickle.dumps((job_functions.hold, (pipe,), None)),
+            lambda *message: None,
+            is_wanted,
+        )
+    assert not psutil.pid_exists(told[0])
+
+
+def test_a_job_ends_with_its_parent_even_if_that_is_killed(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    parent = subprocess.Popen(
+        [
+            sys.executable,
+            "-c",
+            "import pickle, sys\n"
+            "from pathlib import Path\n"
+            "import job_functions\n"
+            "from evaluation.job_process import run_process\n"
+            "job = (job_functions.hold, (Path(sys.argv[1]),), None)\n"
+            "run_process(pickle.dumps(job), print, lambda: True)\n",
+            pipe,
+        ],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )
+    with pipe.open() as stream:
+        process = psutil.Process(int(stream.read()))
+    parent.kill()
+    parent.wait()
+    assert psutil.wait_procs([process], timeout=60)[1] == []
+
+
+def test_a_function_that_cannot_be_imported_is_a_fault():
+    missing = b"cno_such_module\nfunction\n."  # A pickle, by hand.
+    with pytest.raises(JobError, match=r"^ModuleNotFoundError: "):
+        run_process(missing, lambda *message: None, lambda: True)
+
+
+def test_freed_memory_is_kept_whatever_dask_has_its_workers_do(
+    tmp_path, monkeypatch
+):
+    for name, expected in (("MALLOC_TRIM_THRESHOLD_", None), ("HOME", "/x")):
+        monkeypatch.setenv(name, "/x")
+        output = tmp_path / name
+        function = job_functions.note_variable
+        run_process(
+            pickle.dumps((function, (name, output), None)),
+            lambda *message: None,
+            lambda: True,
+        )
+        assert output.read_text() == repr(expected)
+
+
+def test_two_never_work_on_the_same(tmp_path):
+    output, pipe = tmp_path / "new" / "output", tmp_path / "pipe"
+    os.mkfifo(pipe)
+    script = (
+        "import sys\n"
+        "from pathlib import Path\n"
+        "from evaluation.files import exclusive\n"
+        "output, pipe = map(Path, sys.argv[1:])\n"
+        "with exclusive(output, lambda: pipe.write_text('waiting')):\n"
+        "    output.write_text(output.read_text() + ' second')\n"
+    )
+    with exclusive(output, lambda: pytest.fail("there is nobody else")):
+        other = subprocess.Popen([sys.executable, "-c", script, output, pipe])
+        assert pipe.read_text() == "waiting"
+        output.write_text("first")
+    assert other.wait() == 0
+    assert output.read_text() == "first second"
+    assert list(output.parent.iterdir()) == [output]
+
+
+def test_a_lock_that_cannot_be_written(tmp_path):
+    (tmp_path / "file").touch()
+    with (
+        pytest.raises(InputError, match="file"),
+        exclusive(tmp_path / "file" / "x", lambda: None),
+    ):
+        pass
+
+
+def test_progress_is_told_now_and_then(monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr("time.monotonic", lambda: now[0])
+    told = []
+    tell = Tell(lambda *message: told.append(message))
+    for done in range(11):
+        tell.progress(done, 10)
+        now[0] += 0.2
+    # The first, the last, and one in half a second.
+    assert [done for _, done, _ in told] == [0, 3, 6, 9, 10]
+    tell.note(3)
+    assert told[-1] == ("note", "3")
+    Tell().progress(1, 2)
+
+
+def test_where_jobs_run(monkeypatch):
+    monkeypatch.delenv("DASK_SCHEDULER_ADDRESS", raising=False)
+    assert choose_cluster(None, None) == Cluster(num_cores())
+    monkeypatch.setenv("DASK_SCHEDULER_ADDRESS", "tcp://a:1")
+    assert choose_cluster(None, None).scheduler == "tcp://a:1"
+    assert choose_cluster(None, "tcp://b:2").scheduler == "tcp://b:2"
+    assert choose_cluster(3, None) == Cluster(3)
+    for num_jobs, message in ((0, "0 is not a positive"), (-1, "-1 is not")):
+        with pytest.raises(InputError, match=f"--jobs: {message}"):
+            choose_cluster(num_jobs, None)
+    with pytest.raises(InputError, match="--jobs and --scheduler"):
+        choose_cluster(1, "tcp://b:2")
+
+
+def test_commands_that_need_no_cluster_do_not_load_it():
+    script = (
+        "import sys\n"
+        "import cns_drake.cli, cns_drake.jobs, cns_drake.reproduction\n"
+        "import evaluation.cli, evaluation.jobs\n"
+        "assert not {'dask', 'distributed'} & sys.modules.keys()\n"
+    )
+    root = Path(__file__).parents[1]
+    subprocess.run([sys.executable, "-c", script], check=True, cwd=root)
