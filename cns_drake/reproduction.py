@@ -13,7 +13,8 @@ from cns_drake.scenario import Scenario, load_scenario
 from evaluation.cluster import Cluster
 from evaluation.collection import RecordingInfo
 from evaluation.jobs import run_jobs
-from evaluation.study import assemble, plan_study
+from evaluation.study.assembly import assemble
+from evaluation.study.plan import plan_study
 
 
 def reproduce_maps(

@@ -9,7 +9,9 @@ from evaluation.cluster import Cluster
 from evaluation.collection import find_recordings
 from evaluation.files import make_folder
 from evaluation.jobs import run_jobs
-from evaluation.study import assemble, choose_methods, plan_study
+from evaluation.study.assembly import assemble
+from evaluation.study.chosen_methods import choose_methods
+from evaluation.study.plan import plan_study
 
 
 def write_report(

@@ -6,7 +6,8 @@ tests; processes would only make these slow.
 
 from evaluation.collection import find_recordings
 from evaluation.jobs import Tell
-from evaluation.study import assemble, plan_study
+from evaluation.study.assembly import assemble
+from evaluation.study.plan import plan_study
 
 
 def do(jobs):

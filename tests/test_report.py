@@ -12,7 +12,7 @@ from evaluation.collection import find_recordings, group_cities
 from evaluation.errors import InputError
 from evaluation.methods import method
 from evaluation.report import write_report
-from evaluation.study import choose_methods
+from evaluation.study.chosen_methods import choose_methods
 
 # Describes a scan by how many points it has.
 OWN_METHOD = """

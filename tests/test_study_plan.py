@@ -7,7 +7,7 @@ import pytest
 
 from evaluation.collection import RecordingInfo
 from evaluation.errors import InputError
-from evaluation.study import plan_study
+from evaluation.study.plan import plan_study
 
 
 def info(name, stage, route="a", city="metropolis", needs=()):

@@ -7,8 +7,8 @@ from small_towns import drive
 import studies
 
 from evaluation.collection import find_recordings
-from evaluation.study import plan_study
 from evaluation.study.measurements import recognise_places
+from evaluation.study.plan import plan_study
 from evaluation.study.surveys import survey_drive
 
 

@@ -12,7 +12,7 @@ from evaluation.jobs import Tell
 from evaluation.recording_survey import survey_recording
 from evaluation.retrieval import describe_drive
 from evaluation.sequences import Sequence, open_sequence
-from evaluation.study import choose_methods
+from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.layout import SurveyFiles
 from evaluation.study.measurements import recognise_places
 from evaluation.study.parts import read_part

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -45,6 +45,7 @@ def assemble(
     recordings: Iterable[RecordingInfo],
     output: Path,
     methods: Sequence[MethodChoice] | None = None,
+    pages: Mapping[str, str] | None = None,
 ) -> Path:
     """Writes the report of a study whose jobs are done.
 
@@ -56,6 +57,8 @@ def assemble(
         recordings: as in `plan_study`.
         output: likewise.
         methods: likewise.
+        pages: recording -> address, relative to the page, of what shows it
+            in 3-D, for those that have one.
 
     Returns:
         The path of `report.md`.
@@ -77,7 +80,7 @@ def assemble(
             shown.stem,
         )
         collected.illustrations.insert(0, shown)
-    return _write_all(collected, output)
+    return _write_all(collected, output, pages or {})
 
 
 def _collect(
@@ -102,7 +105,9 @@ def _collect(
     collected.illustrations += illustrations(city, files.figures)
 
 
-def _write_all(collected: _Collected, output: Path) -> Path:
+def _write_all(
+    collected: _Collected, output: Path, pages: Mapping[str, str]
+) -> Path:
     changes, recognitions = collected.changes, collected.recognitions
     found = findings(recognitions, changes)
     change = change_table(changes)
@@ -129,6 +134,7 @@ def _write_all(collected: _Collected, output: Path) -> Path:
             illustrations=collected.illustrations,
             recognitions=recognitions,
             drives=collected.drives,
+            pages=pages,
         ),
     )
     path = output / "report.md"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from evaluation.collection import City, RecordingInfo
+from evaluation.figures import CHANGE_LEGEND, SETS_LEGEND
 from evaluation.page_data import Illustration
 from evaluation.study.views import PAGE_KIND
 
@@ -37,6 +38,8 @@ def illustrations(city: City, folder: Path) -> list[Illustration]:
             folder / routes_stem(city),
             f"Routes in {city.name}, from red to blue",
             PAGE_KIND,
+            # The page has each drive's map by itself.
+            section="print",
         )
     ]
     for pair in city.change_pairs():
@@ -47,6 +50,9 @@ def illustrations(city: City, folder: Path) -> list[Illustration]:
                 folder / change,
                 f"What changed in {city.name} between {first} and {last}",
                 PAGE_KIND,
+                section="change",
+                num_panels=2,
+                legend=CHANGE_LEGEND,
             )
         )
         shown.append(
@@ -55,14 +61,19 @@ def illustrations(city: City, folder: Path) -> list[Illustration]:
                 f"Sets H and O of {city.name} {first} and {last}: both orders"
                 " and their union",
                 PAGE_KIND,
+                section="change",
+                num_panels=3,
+                legend=SETS_LEGEND,
             )
         )
-    if city.recognition_pairs():
+    num_pairs = len(city.recognition_pairs())
+    if num_pairs:
         shown.append(
             Illustration(
                 folder / curves_stem(city),
                 f"Precision over recall in {city.name}; numbers are AUC",
                 "svg",
+                num_panels=num_pairs,
             )
         )
     return shown
@@ -74,4 +85,5 @@ def auc_illustration(folder: Path) -> Illustration:
         folder / "auc_over_tcr",
         "AUC against TCR_sym with 95 % intervals, and the paper's",
         "svg",
+        num_panels=3,
     )

@@ -6,14 +6,14 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from evaluation.collection import City, RecordingInfo, group_cities
-from evaluation.jobs import Job, Tell
+from evaluation.jobs import Job
 from evaluation.retrieval import Role
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.figure_files import change_stems, routes_stem
-from evaluation.study.layout import StudyFiles, SurveyFiles
-from evaluation.study.measurements import measure_change, recognise_places
+from evaluation.study.layout import StudyFiles
+from evaluation.study.measurements import recognise_places
 from evaluation.study.surveys import START_COST, survey_job, survey_name
-from evaluation.study.views import draw_city, draw_pair
+from evaluation.study.views import draw_city, measure_and_draw
 
 # Expected seconds of the jobs beyond their start: with 3000 scans, 250 places
 # and 150 queries.
@@ -136,24 +136,6 @@ def _change_job(
         cost=START_COST + _CHANGE_COST,
         output=files.change(earlier.name, later.name),
     )
-
-
-def measure_and_draw(
-    map_name: str,
-    stages: tuple[str, str],
-    surveys: tuple[SurveyFiles, ...],
-    result: Path,
-    stems: tuple[Path, Path],
-    drawn: Path,
-    tell: Tell,
-) -> None:
-    """Measures the change between two drives and draws it: a job.
-
-    See `measure_change` and `draw_pair` for arguments and errors.
-    """
-    del tell
-    measure_change(map_name, stages, surveys, result)
-    draw_pair(surveys[:2], result, stems, drawn)
 
 
 def _recognition_job(

@@ -12,6 +12,7 @@ from evaluation.jobs import Tell
 from evaluation.page_data import make_drive
 from evaluation.study.code_digest import all_code
 from evaluation.study.layout import SurveyFiles
+from evaluation.study.measurements import measure_change
 from evaluation.study.parts import (
     is_current,
     part_digest,
@@ -60,6 +61,24 @@ def draw_city(
     make_folder(stem.parent)
     draw_routes(map_name, shown, stem)
     write_part(drawn, inputs, None)
+
+
+def measure_and_draw(
+    map_name: str,
+    stages: tuple[str, str],
+    surveys: tuple[SurveyFiles, ...],
+    result: Path,
+    stems: tuple[Path, Path],
+    drawn: Path,
+    tell: Tell,
+) -> None:
+    """Measures the change between two drives and draws it: a job.
+
+    See `measure_change` and `draw_pair` for arguments and errors.
+    """
+    del tell
+    measure_change(map_name, stages, surveys, result)
+    draw_pair(surveys[:2], result, stems, drawn)
 
 
 def draw_pair(
