@@ -38,6 +38,7 @@ from cns_drake.scenario import load_scenario
 from cns_drake.simulation import simulate
 
 POSES = 8
+REACH = 120.0
 RINGS = (16, 32, 64, 128)
 COLUMNS = (512, 1024, 2048)
 TRIANGLES = (1e5, 2e5, 4e5, 8e5, 1.6e6, 2.5e6, 4e6)
@@ -50,18 +51,23 @@ TICKS = (1, 2, 5, 10, 20, 50, 100, 200)
 Series = list[tuple[int, float]]
 
 
-def pattern_of(rings: int, columns: int) -> BeamPattern:
+def beams(rings: int, columns: int) -> np.ndarray:
     """Returns beams over the elevations of the dataset's LiDAR."""
     elevations = np.deg2rad(np.linspace(22.5, -22.5, rings))
-    return BeamPattern(tuple(elevations), columns, 0.8, 120.0, 0.05)
+    pattern = BeamPattern(tuple(elevations), columns, 0.8, REACH, 0.05)
+    return pattern.d_Sset[pattern.packet_order]
 
 
-def cast_all(scene: RayCastingScene, poses, pattern: BeamPattern) -> None:
+def cast_all(scene: RayCastingScene, poses, d_S: np.ndarray) -> None:
     """Casts a scan from each pose."""
-    d_S = pattern.d_Sset[pattern.packet_order]
     for X_WS in poses:
-        d_W = d_S @ X_WS.rotation().matrix().T
-        scene.cast_rays(X_WS.translation(), d_W, pattern.max_range)
+        cast(scene, X_WS, d_S)
+
+
+def cast(scene: RayCastingScene, X_WS, d_S: np.ndarray) -> None:
+    """Casts a scan from one pose."""
+    R_WS = X_WS.rotation().matrix()
+    scene.cast_rays(X_WS.translation(), d_S, REACH, R_WSset=R_WS)
 
 
 def make_scene(geometries: Sequence[PerceptionGeometry]) -> RayCastingScene:
@@ -79,11 +85,11 @@ def ms_per_scan(variants: dict, rounds: int) -> dict:
 def against_rays(geometries, poses, rounds: int) -> Series:
     """Returns the number of rays and ms a scan."""
     scene = make_scene(geometries)
-    patterns = [pattern_of(r, c) for r in RINGS for c in COLUMNS]
+    patterns = {(r, c): beams(r, c) for r in RINGS for c in COLUMNS}
     times = ms_per_scan(
         {
-            (p.num_rings, p.num_columns): lambda p=p: cast_all(scene, poses, p)
-            for p in patterns
+            size: lambda d_S=d_S: cast_all(scene, poses, d_S)
+            for size, d_S in patterns.items()
         },
         rounds,
     )
@@ -168,14 +174,14 @@ def _divided(geometry: PerceptionGeometry) -> PerceptionGeometry:
 
 def against_triangles(geometries, poses, rounds: int) -> Series:
     """Returns the number of triangles and ms a scan."""
-    pattern = pattern_of(32, 1024)
+    d_S = beams(32, 1024)
     scenes = {}
     for count in TRIANGLES:
         stage = with_triangles(geometries, count)
         scenes[count_triangles(stage)] = make_scene(stage)
     times = ms_per_scan(
         {
-            count: lambda scene=scene: cast_all(scene, poses, pattern)
+            count: lambda scene=scene: cast_all(scene, poses, d_S)
             for count, scene in scenes.items()
         },
         rounds,
@@ -187,17 +193,12 @@ def against_triangles(geometries, poses, rounds: int) -> Series:
 
 def against_objects(geometries, poses, rounds: int) -> Series:
     """Returns the number of moving objects and ms a scan."""
-    pattern = pattern_of(32, 1024)
-    d_S = pattern.d_Sset[pattern.packet_order]
+    d_S = beams(32, 1024)
 
     def drive(cars: MovingCars) -> None:
         for step, X_WS in enumerate(poses):
             cars.move(step)
-            cars.scene.cast_rays(
-                X_WS.translation(),
-                d_S @ X_WS.rotation().matrix().T,
-                pattern.max_range,
-            )
+            cast(cars.scene, X_WS, d_S)
 
     stages = {n: MovingCars(geometries, poses, n) for n in OBJECTS}
     times = ms_per_scan(
