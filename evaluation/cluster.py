@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Iterator
 import contextlib
 from dataclasses import dataclass
@@ -55,15 +56,10 @@ class Cluster:
             ):
                 yield client
             return
-        try:
-            client = Client(
-                self.scheduler, timeout=_ANSWER_TIMEOUT, set_as_default=False
-            )
-        except (OSError, ValueError) as error:
-            raise InputError(
-                f"--scheduler: {self.scheduler}: no answer ({error})"
-            ) from error
-        with client:
+        _check_answer(self.scheduler)
+        with Client(
+            self.scheduler, timeout=_ANSWER_TIMEOUT, set_as_default=False
+        ) as client:
             yield client
 
 
@@ -119,3 +115,25 @@ def _local_cluster(num_workers: int):
         )
     finally:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+
+
+def _check_answer(address: str) -> None:
+    """Raises InputError unless a scheduler answers in time.
+
+    A client would wait for ever for one that takes the call but is silent.
+    """
+    from distributed import Security
+    from distributed.core import rpc
+
+    async def ask() -> None:
+        keys = Security().get_connection_args("client")
+        async with rpc(address, connection_args=keys) as scheduler:
+            await scheduler.identity()
+
+    fault = f"--scheduler: {address}: no answer"
+    try:
+        asyncio.run(asyncio.wait_for(ask(), _ANSWER_TIMEOUT))
+    except asyncio.TimeoutError:
+        raise InputError(f"{fault} in {_ANSWER_TIMEOUT:g} s") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{fault} ({error})") from error
