@@ -93,6 +93,8 @@ RECIPES = {
             "output/town_0[12]/metadata.yaml",
             "output/town_01_stage_02/metadata.yaml",
             "output/report/report.html",
+            "output/pages/town_01.html",
+            "town.html",
         ),
     ),
     "calibration": Recipe(
@@ -133,7 +135,7 @@ RECIPES = {
         "cns-drake simulate NAME|SCENARIO.yaml",
         changes=(
             ("NAME|SCENARIO.yaml", "town/sequence_01.yaml"),
-            ("DIR", "output"),
+            ("DIR", "output --recording town.html"),
         ),
         after=("own city",),
     ),
@@ -156,7 +158,7 @@ RECIPES = {
         "cns-drake scan WORLD.sdf",
         changes=(
             ("WORLD.sdf", "town/stage_01.sdf"),
-            ("X Y Z ROLL PITCH YAW", "70 0 1.6 0 0 0"),
+            ("X Y Z ROLL PITCH YAW", "90 0 1.6 0 0 0"),
             ("SCAN.pcd|.bin|.npy", "before.pcd"),
         ),
         after=("scans",),
@@ -259,6 +261,7 @@ RECIPES = {
     ),
     "scans": Recipe(
         ".venv/bin/cns-drake scan town",
+        changes=(("--pose 200", "--pose 90"),),
         after=("start a city",),
         prints=("before.pcd: ", "after.pcd: ", "TCR_sym"),
         makes=("before.pcd", "after.pcd"),
@@ -306,6 +309,12 @@ RECIPES = {
         makes=("shared/tour/metadata.yaml",),
     ),
     "method": Recipe("import numpy as np", file="heights.py"),
+    "linter": Recipe(
+        ".venv/bin/ruff check",
+        # Of the README's own examples, by the rules of this project.
+        after=("method", "Python"),
+        prints=("All checks passed!", "already formatted"),
+    ),
     "own method": Recipe(
         ".venv/bin/cns-eval pr output/metropolis_01",
         changes=(_FIRST, _LAST),
@@ -326,8 +335,8 @@ NOT_RUN = {
     "network and runs these tests; `.ci/run` takes this very line",
     "apt install": "changes the system; `.ci/run` installs the same packages",
     "npm ci": "installs from the network; `.ci/run` does it",
-    ".venv/bin/python -m pytest tests/test_lidar.py": "tests in a test, and "
-    "linting of what is being edited",
+    ".venv/bin/python -m pytest tests/test_lidar.py": "tests in a test; "
+    "`.ci/run` runs all of them",
     "ros2 bag": "needs ROS 2; test_mcap_recorder and others read "
     "recordings with rosbags' reader of rosbag2 folders",
     "@misc{song2025city": "a citation",

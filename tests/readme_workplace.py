@@ -36,7 +36,8 @@ class Workplace:
         self._followed: dict[str, str] = {}
         self._printed: dict[str, str] = {}
         (folder / ".venv").symlink_to(sys.prefix)
-        (folder / "diagrams").symlink_to(readme.ROOT / "diagrams")
+        for name in ("diagrams", "pyproject.toml"):
+            (folder / name).symlink_to(readme.ROOT / name)
 
     def follow(self, name: str) -> str:
         """Follows a recipe, after those that it needs; returns its stdout."""
