@@ -179,7 +179,7 @@ def _change(content: PageContent) -> str:
     parts = []
     if content.change.rows:
         parts.append("<h2>Table I: temporal change ratio</h2>")
-        parts.append(_scrolling(content.change))
+        parts.append(_scrolling(content.change, "plain"))
     figures = _figures(content.illustrations, "change")
     if figures:
         parts.append(f"<h2>What changed</h2>{figures}")
@@ -190,21 +190,27 @@ def _recognition(content: PageContent) -> str:
     if not content.recognitions:
         return ""
     parts = ["<h2>Table II: place recognition</h2>"]
-    parts.append(_scrolling(content.recognition[0]))
-    for name, table in (
-        ("All methods in mode all", content.recognition[1]),
-        ("All methods in mode filtered", content.recognition[2]),
-        ("All numbers: intervals, N, T, TP", content.audit),
+    parts.append(_scrolling(content.recognition[0], "grouped"))
+    for name, table, kind in (
+        ("All methods in mode all", content.recognition[1], "grouped"),
+        ("All methods in mode filtered", content.recognition[2], "grouped"),
+        ("All numbers: intervals, N, T, TP", content.audit, "plain audit"),
     ):
         parts.append(
-            f"<details><summary>{name}</summary>{_scrolling(table)}</details>"
+            f"<details><summary>{name}</summary>{_scrolling(table, kind)}"
+            "</details>"
         )
     parts.append(_figures(content.illustrations, "recognition"))
     return "".join(parts)
 
 
-def _scrolling(table: Table) -> str:
-    kind = "grouped" if table.groups else "plain"
+def _scrolling(table: Table, kind: str) -> str:
+    """Returns a table with its caption.
+
+    Args:
+        table: of which the first two columns say what a row is of.
+        kind: classes of style: "grouped", "plain", or "plain audit".
+    """
     return (
         f"<p>{html.escape(table.caption)}</p>"
         f'<div class="scrolling table {kind}" tabindex="0">'

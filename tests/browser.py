@@ -91,9 +91,14 @@ class Browser:
             self._send(f"{domain}.enable")
 
     def open(
-        self, address: str, width: int, height: int, scheme: str = "light"
+        self,
+        address: str,
+        width: int,
+        height: int,
+        scheme: str = "light",
+        media: str = "screen",
     ) -> None:
-        """Opens a page on a screen of so many pixels."""
+        """Opens a page, on a screen of so many pixels or on paper."""
         # Between, so that the same page with another fragment is loaded anew.
         self._load("about:blank")
         self.complaints.clear()
@@ -106,6 +111,7 @@ class Browser:
         )
         self._send(
             "Emulation.setEmulatedMedia",
+            media=media,
             features=[{"name": "prefers-color-scheme", "value": scheme}],
         )
         self._load(address)

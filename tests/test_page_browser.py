@@ -281,6 +281,21 @@ def test_links_to_recordings(reader):
     assert reader.evaluate(links.format("#match-caption")) == []
 
 
+def test_print_fits_its_paper(browser, address):
+    # As wide as A4 less its margins.
+    browser.open(address, 718, 1000, media="print")
+    shown(browser, 0, 0, 0, 0)
+    # All numbers of Table II are too many, and stay folded.
+    wide = browser.evaluate(
+        """[...document.querySelectorAll("h2, p, img, svg, table")]
+          .filter((one) => one.checkVisibility() && !one.closest("details") &&
+            one.getBoundingClientRect().right > innerWidth)
+          .map((one) => one.outerHTML)"""
+    )
+    assert wide == []
+    assert not browser.evaluate('byId("browser").checkVisibility()')
+
+
 def test_full_size(browser, address):
     browser.open(address, *PHONE)
     figures = browser.evaluate('document.querySelectorAll(".enlarge").length')
