@@ -129,7 +129,7 @@ class JobProgress:
 
     def __enter__(self) -> JobProgress:
         self._bars = self._stack.enter_context(show_bars(console=self._console))
-        self._total = self._bars.add_task("", total=1.0, note="")
+        self._total = self._bars.add_task(self._summary(), total=1.0, note="")
         self.refresh()
         return self
 
