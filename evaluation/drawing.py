@@ -50,7 +50,9 @@ def unit(rgb: tuple[int, int, int]) -> tuple[float, ...]:
 def save(figure: Figure, stem: Path, page_kind: str) -> None:
     """Writes a figure as PDF, as PNG, and for the page.
 
-    Equal figures give equal bytes: no time of creation, no random ids.
+    Equal figures give equal bytes: no time of creation, no random ids. The
+    page's has no legend of the whole figure: the page writes it below, in
+    letters that can be read on a phone.
 
     Args:
         figure: to write.
@@ -66,6 +68,8 @@ def save(figure: Figure, stem: Path, page_kind: str) -> None:
     figure.set_layout_engine("none")
     for kind in (*PRINTED, page_kind):
         path = stem.with_name(f"{stem.name}.{kind}")
+        for legend in figure.legends:
+            legend.set_visible(kind in PRINTED)
         options: dict = {"dpi": _DPI}
         if kind in ("pdf", "svg"):
             dated = "CreationDate" if kind == "pdf" else "Date"

@@ -1,5 +1,9 @@
+from matplotlib.figure import Figure
+from matplotlib.image import imread
+from matplotlib.patches import Patch
 import numpy as np
 
+from evaluation.drawing import save
 from evaluation.figures import judge_points, top_view, voxel_of_each
 from evaluation.maps import voxelise
 from evaluation.points import from_xyz
@@ -47,3 +51,14 @@ def test_fine_voxels_know_their_coarse_ones():
         coarse.indices[owners], np.floor_divide(fine.indices, 10)
     )
     assert set(owners) == set(range(len(coarse)))
+
+
+def test_legend_of_a_figure_is_not_in_the_picture_of_the_page(tmp_path):
+    figure = Figure(figsize=(2, 1))
+    figure.legend(handles=[Patch(color="red", label="gone")], loc="center")
+    save(figure, tmp_path / "figure", "webp")
+    printed = imread(tmp_path / "figure.png")[..., :3]
+    on_page = imread(tmp_path / "figure.webp")[..., :3] / 255.0
+    red = [1.0, 0.0, 0.0]
+    assert (np.abs(printed - red) < 0.2).all(axis=2).any()
+    assert on_page.min() > 0.9
