@@ -13,6 +13,7 @@ import signal
 from typing import TYPE_CHECKING
 
 from evaluation.errors import InputError
+from evaluation.interrupts import uninterrupted
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -48,18 +49,20 @@ class Cluster:
         from distributed import Client
 
         # What happens to jobs is told by whoever runs them, in other words.
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)
-        if self.scheduler is None:
-            with (
-                _local_cluster(self.num_workers) as cluster,
-                Client(cluster, set_as_default=False) as client,
-            ):
-                yield client
-            return
-        _check_answer(self.scheduler)
-        with Client(
-            self.scheduler, timeout=_ANSWER_TIMEOUT, set_as_default=False
-        ) as client:
+        for name in ("distributed", "distributed.client"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+        place = self.scheduler
+        if place is not None:
+            _check_answer(place)
+        with contextlib.ExitStack() as stack:
+            with uninterrupted():  # Half of it could not be closed.
+                if place is None:
+                    place = stack.enter_context(
+                        _local_cluster(self.num_workers)
+                    )
+                client = stack.enter_context(
+                    Client(place, timeout=_ANSWER_TIMEOUT, set_as_default=False)
+                )
             yield client
 
 

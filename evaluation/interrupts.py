@@ -7,6 +7,7 @@ import contextlib
 import os
 import signal
 import sys
+import threading
 from typing import NoReturn
 
 # Exit status of a process that was interrupted, as shells have it.
@@ -40,10 +41,13 @@ def uninterrupted() -> Iterator[None]:
     signals would not do: a library's threads can take them as well.
     """
     waiting: list[int] = []
-    before = {
-        number: signal.signal(number, lambda n, frame: waiting.append(n))
-        for number in SIGNALS
-    }
+    before = {}
+    # Only there can handlers be set, and only there they run.
+    if threading.current_thread() is threading.main_thread():
+        before = {
+            number: signal.signal(number, lambda n, frame: waiting.append(n))
+            for number in SIGNALS
+        }
     try:
         yield
     finally:
