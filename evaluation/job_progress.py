@@ -189,7 +189,8 @@ class JobProgress:
         now = time.monotonic()
         if self._bars.console.is_terminal or now < self._due:
             return
-        self._due, self._silent = now + LINE_INTERVAL, False
+        self._due = now + LINE_INTERVAL
+        self._silent = self._silent and not self._notes
         running = [f"{name} {note}" for name, note in self._notes.items()]
         self.note("; ".join([f"{self._summary()}, {left} left", *running]))
 
