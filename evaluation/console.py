@@ -13,12 +13,12 @@ from typing import Any
 import typer
 
 from evaluation.errors import InputError
+from evaluation.interrupts import INTERRUPTED, interrupt_on_termination
 from evaluation.progress import LINE_INTERVAL
 
 # Typer brings click along, in new versions under a private name. The base
 # class of all its usage errors is reached through the one that is public.
 _USAGE_ERRORS = typer.BadParameter.__mro__[2]
-_INTERRUPTED = 130
 
 
 def run(app: typer.Typer, program: str) -> int:
@@ -29,12 +29,14 @@ def run(app: typer.Typer, program: str) -> int:
         program: the name under which errors are reported.
 
     Returns:
-        0 on success; 2 on bad usage or input, after one line on stderr;
-        130 if the user interrupted.
+        0 on success; 2 on bad usage or input and 1 for jobs that failed,
+        after one line on stderr;
+        130 if the user interrupted, also by SIGTERM.
     """
     try:
+        interrupt_on_termination()
         status = app(prog_name=program, standalone_mode=False)
-        if status == _INTERRUPTED:  # Typer has caught the interrupt itself.
+        if status == INTERRUPTED:  # Typer has caught the interrupt itself.
             return _fail(program, "interrupted", status)
         sys.stdout.flush()
     except _USAGE_ERRORS as error:
@@ -45,7 +47,7 @@ def run(app: typer.Typer, program: str) -> int:
     except InputError as error:
         return _fail(program, str(error), error.exit_status)
     except (KeyboardInterrupt, typer.Abort):
-        return _fail(program, "interrupted", _INTERRUPTED)
+        return _fail(program, "interrupted", INTERRUPTED)
     except BrokenPipeError:
         # Whoever read the results has seen enough of them. Python flushes
         # once more at its end, which must not fail again.
