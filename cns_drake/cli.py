@@ -323,6 +323,14 @@ def reproduce(
     pages: Annotated[
         bool, typer.Option(help="Also make a web page of each drive.")
     ] = True,
+    quick: Annotated[
+        bool,
+        typer.Option(
+            "--quick",
+            help="The report alone: simulate without recording, and leave out "
+            "same-stage controls.",
+        ),
+    ] = False,
 ) -> None:
     """Simulate a map's sequences, evaluate them and report."""
     with uninterrupted():
@@ -330,7 +338,10 @@ def reproduce(
         from evaluation.cluster import choose_cluster
 
     cluster = choose_cluster(jobs, scheduler)
-    typer.echo(reproduce_maps(maps, output, cluster, with_pages=pages))
+    report = reproduce_maps(
+        maps, output, cluster, with_pages=pages, quick=quick
+    )
+    typer.echo(report)
 
 
 def main() -> None:

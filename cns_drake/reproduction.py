@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from cns_drake.errors import InputError
-from cns_drake.jobs import plan_recordings
+from cns_drake.jobs import is_recorded, plan_recordings
 from cns_drake.map_pictures import plan_pictures
 from cns_drake.paths import sequences_of_map, shipped_maps
 from cns_drake.scenario import Scenario, load_scenario
+from cns_drake.simulated_drive import SimulatedDrive
 from evaluation.cluster import Cluster
 from evaluation.collection import RecordingInfo
 from evaluation.jobs import run_jobs
@@ -23,6 +25,7 @@ def reproduce_maps(
     cluster: Cluster,
     *,
     with_pages: bool = True,
+    quick: bool = False,
 ) -> Path:
     """Records the sequences of maps, evaluates them and reports.
 
@@ -37,6 +40,9 @@ def reproduce_maps(
         output: the folder for everything.
         cluster: where the work is done.
         with_pages: whether the web pages are made.
+        quick: make the report alone, of the same frames, and without
+            same-stage controls: what is not recorded yet is evaluated while
+            it is simulated, and not recorded.
 
     Returns:
         The path of the report.
@@ -49,22 +55,37 @@ def reproduce_maps(
     for folder in folders:
         of_map = _sequences(folder)
         sequences += of_map
-        controls += control_drives(of_map)
-        pictures += plan_pictures(folder, output / "pictures")
-    pages = {}
-    if with_pages:
-        pages = {s.name: output / "pages" / f"{s.name}.html" for s in sequences}
-    jobs = plan_recordings([*sequences, *controls], output, pages=pages)
+        if not quick:
+            controls += control_drives(of_map)
+            pictures += plan_pictures(folder, output / "pictures")
+    pages = {s.name: output / "pages" / f"{s.name}.html" for s in sequences}
+    jobs = []
+    if not quick:
+        jobs = plan_recordings(
+            [*sequences, *controls], output, pages=pages if with_pages else {}
+        )
     waiting = {job.name for job in jobs}
     recordings = [
         recording_info(scenario, output, is_waiting=scenario.name in waiting)
         for scenario in (*sequences, *controls)
     ]
+    if quick:
+        recordings = [
+            recording
+            if is_recorded(scenario, output)
+            else replace(recording, made_by=SimulatedDrive(scenario))
+            for scenario, recording in zip(sequences, recordings, strict=True)
+        ]
     # In the order in which `cns-eval report` finds them.
     recordings.sort(key=lambda recording: recording.name)
     report = output / "report"
     run_jobs([*jobs, *plan_study(recordings, report), *pictures], cluster)
-    return assemble(recordings, report)
+    addresses = {
+        name: f"../pages/{page.name}"
+        for name, page in pages.items()
+        if page.is_file()
+    }
+    return assemble(recordings, report, pages=addresses)
 
 
 def _sequences(folder: Path) -> list[Scenario]:

@@ -1,5 +1,7 @@
 """`cns-drake reproduce`: one graph of jobs from recordings to figures."""
 
+import csv
+
 import pytest
 from small_map import scenario_values, write_small_map
 import yaml
@@ -8,26 +10,33 @@ from cns_drake import reproduction
 from cns_drake.errors import InputError
 from cns_drake.reproduction import control_drives, recording_info
 from cns_drake.scenario import load_scenario
+from cns_drake.simulated_drive import SimulatedDrive
 from cns_drake.simulation import simulate
 from evaluation.cluster import Cluster
 from evaluation.collection import find_recordings, group_cities
 
 
-@pytest.fixture(scope="module")
-def town(tmp_path_factory):
-    """Folder of a map with two sequences of a few frames."""
-    folder = write_small_map(tmp_path_factory.mktemp("maps") / "town")
-    for stage in ("01", "04"):
-        values = scenario_values(folder, f"metropolis_{stage}") | {
+def write_town(folder, routes, frames):
+    """Writes a map with a sequence for each stage, on a given route."""
+    write_small_map(folder)
+    for stage, route in routes.items():
+        values = scenario_values(folder, route) | {
             "map": ".",
             "stage": stage,
-            "frames": 3,
+            "frames": frames,
             "lidars": {"lidar": {"columns": 16}},
         }
         del values["name"]
         file = folder / f"sequence_{stage}.yaml"
         file.write_text(yaml.safe_dump(values))
     return folder
+
+
+@pytest.fixture(scope="module")
+def town(tmp_path_factory):
+    """Folder of a map with two sequences of a few frames."""
+    routes = {"01": "metropolis_01", "04": "metropolis_04"}
+    return write_town(tmp_path_factory.mktemp("maps") / "town", routes, 3)
 
 
 @pytest.fixture(scope="module")
@@ -45,8 +54,9 @@ def planned(monkeypatch):
         lambda jobs, cluster: runs.append({job.name: job for job in jobs}),
     )
 
-    def assemble(recordings, output):
+    def assemble(recordings, output, pages):
         runs[-1]["recordings"] = {one.name: one for one in recordings}
+        runs[-1]["pages"] = pages
         return output / "report.md"
 
     monkeypatch.setattr(reproduction, "assemble", assemble)
@@ -85,6 +95,7 @@ def test_everything_is_planned_before_anything_runs(
     assert path == tmp_path / "report" / "report.md"
     (jobs,) = planned
     recordings = jobs.pop("recordings")
+    assert jobs.pop("pages") == {}
     names = {"town_01", "town_04", "town_01_stage_04"}
     assert recordings.keys() == names
     for name in names:
@@ -105,6 +116,7 @@ def test_everything_is_planned_before_anything_runs(
     (tmp_path / "pages" / "town_01.html").touch()
     reproduction.reproduce_maps(*arguments)
     assert names & planned[1].keys() == {"town_04"}
+    assert planned[1]["pages"] == {"town_01": "../pages/town_01.html"}
     assert planned[1]["survey town_04"].needs == ("town_04",)
     assert planned[1]["survey town_01"].needs == ()
     reproduction.reproduce_maps(*arguments, with_pages=False)
@@ -127,3 +139,38 @@ def test_a_world_is_no_stage(tmp_path):
     (folder / "sequence_04.yaml").write_text(yaml.safe_dump(world))
     with pytest.raises(InputError, match=r"sequence_04.yaml: map: needed"):
         reproduction.reproduce_maps([str(folder)], tmp_path, Cluster())
+
+
+def test_quick_gives_the_same_tables(tmp_path):
+    """But the column of controls, from simulation alone."""
+    routes = {"01": "metropolis_04", "04": "metropolis_04"}
+    town = write_town(tmp_path / "town", routes, 60)
+    cluster = Cluster(2)
+    quick = reproduction.reproduce_maps(
+        [str(town)], tmp_path / "quick", cluster, quick=True
+    )
+    assert {path.name for path in (tmp_path / "quick").iterdir()} == {"report"}
+    full = reproduction.reproduce_maps(
+        [str(town)], tmp_path / "full", cluster, with_pages=False
+    )
+    assert (tmp_path / "full" / "town_01_stage_04" / "metadata.yaml").is_file()
+    name = "place_recognition.csv"
+    assert (quick.parent / name).read_text() == (full.parent / name).read_text()
+    ours, theirs = (_rows(path.parent / "tcr.csv") for path in (quick, full))
+    assert [r["TCR_sym"] for r in ours] == [r["TCR_sym"] for r in theirs]
+
+
+def test_quick_reads_what_is_recorded(town, sequences, planned, tmp_path):
+    simulate(sequences[0], tmp_path)
+    reproduction.reproduce_maps([str(town)], tmp_path, Cluster(), quick=True)
+    (jobs,) = planned
+    recordings = jobs.pop("recordings")
+    assert recordings.keys() == {"town_01", "town_04"}
+    assert recordings["town_01"].made_by is None
+    assert recordings["town_04"].made_by == SimulatedDrive(sequences[1])
+    assert not {"town_01", "town_04"} & jobs.keys()
+
+
+def _rows(path):
+    with open(path, newline="") as stream:
+        return list(csv.DictReader(stream))
