@@ -10,14 +10,10 @@ import weakref
 import numpy as np
 
 from cns_drake import embree
-from cns_drake.embree_packets import Tree, cast_packets
+from cns_drake.embree_packets import BLOCK, Tree, cast_packets
 from cns_drake.embree_primitives import ALL, Primitives
 from cns_drake.ray_groups import RayGroup
 from cns_drake.rays import Hits, Rays
-
-# Threads take this many rays at a time: whole packets, and many enough that
-# a call costs little beside them.
-_BLOCK = 4096
 
 
 class EmbreeHierarchy:
@@ -32,6 +28,7 @@ class EmbreeHierarchy:
         self,
         groups: Sequence[RayGroup],
         primitives: Mapping[int, Sequence[Primitives]],
+        num_threads: int = 1,
     ):
         """Builds the hierarchy.
 
@@ -39,11 +36,15 @@ class EmbreeHierarchy:
             groups: all groups, placed.
             primitives: row of a group -> what it holds, for those that hold
                 something.
+            num_threads: how many threads share the rays of a cast.
 
         Raises:
             MemoryError: Embree cannot build it.
         """
         self._groups = groups
+        self._num_threads = num_threads
+        # Threads start when they are first needed.
+        self._helpers = ThreadPoolExecutor(max(1, num_threads - 1))
         self._lib = embree.load()
         self._device = self._lib.rtcNewDevice(None)
         self._scenes: list[int] = []
@@ -97,7 +98,6 @@ class EmbreeHierarchy:
         *,
         mask: int = ALL,
         with_normals: bool = False,
-        threads: ThreadPoolExecutor | None = None,
     ) -> Hits:
         """Casts rays.
 
@@ -105,21 +105,19 @@ class EmbreeHierarchy:
             rays: N of them.
             mask: which geometries they hit.
             with_normals: whether to tell normals.
-            threads: share the rays between them.
         """
         num_rays = len(rays.d_Sset)
         hits = Hits.misses(num_rays, with_normals)
+        parts = min(self._num_threads, -(-num_rays // BLOCK))
 
-        def cast(first: int, last: int = num_rays) -> None:
-            cast_packets(self._tree, mask, rays, hits, first, last)
+        def cast(part: int) -> None:
+            cast_packets(self._tree, mask, rays, hits, part, parts)
 
-        if threads is None or num_rays <= _BLOCK:
+        others = [self._helpers.submit(cast, part) for part in range(1, parts)]
+        if parts > 0:
             cast(0)
-        else:
-            starts = range(0, num_rays, _BLOCK)
-            ends = [*starts[1:], num_rays]
-            # Consumed, so that an error in a thread is raised here.
-            list(threads.map(cast, starts, ends))
+        for other in others:
+            other.result()
         return hits._replace(group=self._rows.take(hits.group))
 
     def _new_scene(self) -> int:

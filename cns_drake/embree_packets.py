@@ -59,40 +59,52 @@ def _call_intersect16(typing_context, function, valid, scene, rays, arguments):
     return signature, generate
 
 
+LANES = 16
+# Rays that one thread casts before it leaves as many to the others: whole
+# packets, and few enough that all meet the same mixture of geometry.
+BLOCK = 1024
+
+
 @njit(cache=True, nogil=True)
-def cast_packets(tree, mask, rays, hits, first, last):
-    """Casts the rays from `first` to before `last`.
-
-    A packet is an RTCRayHit16: 12 ray fields and 9 hit fields (10 with room
-    for the primitive of an instance array) of 16 lanes. It and the mask of
-    lanes are aligned to 64 bytes, as Embree's vector loads demand.
-
-    Directions are rotated here, in double precision and in a fixed order:
-    what a library for matrices does depends on the processor.
+def cast_packets(tree, mask, rays, hits, part, num_parts):
+    """Casts every `num_parts`-th block of rays, beginning with the `part`-th.
 
     Args:
         tree: a `Tree`.
         mask: which geometries can be hit.
         rays: `Rays`.
-        hits: `Hits`, so far misses, to fill; the group is 0 in the fixed scene
-            and otherwise 1 + the number of the instance.
-        first, last: rows of both.
+        hits: `Hits`, so far misses, to fill; the group is 0 in the fixed
+            scene and otherwise 1 + the number of the instance.
+        part, num_parts: which blocks.
     """
-    if first >= last:
-        return
-    lanes = 16
-    storage = np.zeros((12 + 10 + 1 + 1) * lanes, np.float32)
+    # A packet is an RTCRayHit16: 12 ray fields and 9 hit fields (10 with
+    # room for the primitive of an instance array) of 16 lanes. It and the
+    # mask of lanes are aligned to 64 bytes, as Embree's vector loads demand.
+    storage = np.zeros((12 + 10 + 1 + 1) * LANES, np.float32)
     start = (-storage.ctypes.data % 64) // 4
-    aligned = storage[start : start + 23 * lanes].reshape(23, lanes)
+    aligned = storage[start : start + 23 * LANES].reshape(23, LANES)
     packet, valid = aligned[:22], aligned[22].view(np.int32)
+    num_rays = len(rays.d_Sset)
+    for first in range(part * BLOCK, num_rays, num_parts * BLOCK):
+        last = min(first + BLOCK, num_rays)
+        _cast_block(tree, mask, rays, hits, first, last, packet, valid)
+
+
+@njit(cache=True, nogil=True)
+def _cast_block(tree, mask, rays, hits, first, last, packet, valid):
+    """Casts the rays from `first` to before `last`.
+
+    Directions are rotated here, in double precision and in a fixed order:
+    what a library for matrices does depends on the processor.
+    """
     packet_id = packet.view(np.uint32)
     num_origins, num_rotations = len(rays.p_OSset), len(rays.R_OSset)
     num_ranges = len(rays.max_ranges)
     # Counted along: remainders would cost a tenth of the casting.
     origin, rotation = first % num_origins, first % num_rotations
     reach = first % num_ranges
-    for begin in range(first, last, lanes):
-        count = min(lanes, last - begin)
+    for begin in range(first, last, LANES):
+        count = min(LANES, last - begin)
         valid[:] = 0
         for lane in range(count):
             p = rays.p_OSset[origin]

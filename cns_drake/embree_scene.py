@@ -11,7 +11,6 @@ triangles tell which few rays have to be cast on it.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
@@ -44,12 +43,9 @@ class EmbreeScene:
             }
             for merge in (merge_flat, merge_curved)
         )
-        self._flat = EmbreeHierarchy(groups, flat)
+        self._flat = EmbreeHierarchy(groups, flat, num_threads)
         self._curved = EmbreeHierarchy(groups, curved) if curved else None
         self._near = [NearCurvedShapes(groups[row]) for row in curved]
-        self._threads = None
-        if num_threads > 1:
-            self._threads = ThreadPoolExecutor(num_threads)
 
     def place(self, rows: Collection[int]) -> None:
         """Moves groups to where their `X_OL` says."""
@@ -59,9 +55,7 @@ class EmbreeScene:
 
     def cast_rays(self, rays: Rays, with_normals: bool) -> Hits:
         """Casts rays."""
-        hits = self._flat.cast(
-            rays, with_normals=with_normals, threads=self._threads
-        )
+        hits = self._flat.cast(rays, with_normals=with_normals)
         if self._curved is None:
             return hits
         if any(shapes.contain(rays.p_OSset) for shapes in self._near):
