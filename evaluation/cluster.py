@@ -104,7 +104,7 @@ def _local_cluster(num_workers: int):
     # to end the others: they, and the threads that start them, inherit that
     # the signal is blocked. The first start of a process would unblock it.
     multiprocessing.resource_tracker.ensure_running()
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         return LocalCluster(
             n_workers=num_workers,
@@ -117,7 +117,7 @@ def _local_cluster(num_workers: int):
             silence_logs=logging.CRITICAL,
         )
     finally:
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _check_answer(address: str) -> None:
@@ -138,5 +138,7 @@ def _check_answer(address: str) -> None:
         asyncio.run(asyncio.wait_for(ask(), _ANSWER_TIMEOUT))
     except asyncio.TimeoutError:
         raise InputError(f"{fault} in {_ANSWER_TIMEOUT:g} s") from None
-    except (OSError, ValueError) as error:
+    # Dask has all of these for an address of which it can make nothing, such
+    # as one of TLS without a certificate.
+    except (ImportError, OSError, TypeError, ValueError) as error:
         raise InputError(f"{fault} ({error})") from error

@@ -118,7 +118,10 @@ def test_a_worker_that_dies_each_time_is_a_fault(dask, tmp_path):
     assert (tmp_path / "tries").read_text() == "xxxx"
 
 
-@pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense://here"])
+@pytest.mark.parametrize(
+    "address",
+    ["tcp://127.0.0.1:1", "nonsense://here", "nonsense", "tls://127.0.0.1:1"],
+)
 def test_a_scheduler_that_is_not_there(monkeypatch, address):
     monkeypatch.setattr(cluster, "_ANSWER_TIMEOUT", 0.5)
     with (
