@@ -8,7 +8,7 @@ from pathlib import Path
 from cns_drake import __version__
 from cns_drake.paths import sequences_of_map
 from cns_drake.provenance import digest_file, digest_inputs
-from cns_drake.scenario import load_scenario
+from cns_drake.scenario import Scenario, load_scenario
 from evaluation.interrupts import uninterrupted
 from evaluation.jobs import Job, Tell
 from evaluation.study.parts import is_current, write_part
@@ -29,7 +29,12 @@ def plan_pictures(folder: Path, pictures: Path) -> list[Job]:
     # Workers may run elsewhere.
     folder, pictures = folder.resolve(), pictures.absolute()
 
-    def job(what: str, function: Callable[..., None], num_stages: int) -> Job:
+    def job(
+        what: str,
+        function: Callable[..., None],
+        is_done: Callable[..., bool],
+        num_stages: int,
+    ) -> Job:
         path = pictures / f"{folder.name}_{what}.png"
         return Job(
             name=f"picture {folder.name} {what}",
@@ -37,11 +42,13 @@ def plan_pictures(folder: Path, pictures: Path) -> list[Job]:
             arguments=(folder, path),
             cost=_STAGE_COST * num_stages,
             output=path,
+            is_done=is_done,
         )
 
-    jobs = [job("drives", draw_map_drives, len(sequences_of_map(folder)))]
-    if (folder / "views.yaml").is_file():
-        jobs.append(job("stages", draw_map_stages, 2))
+    num_drives = len(sequences_of_map(folder))
+    jobs = [job("drives", draw_map_drives, are_drives_drawn, num_drives)]
+    if _views(folder).is_file():
+        jobs.append(job("stages", draw_map_stages, are_stages_drawn, 2))
     return jobs
 
 
@@ -57,18 +64,31 @@ def draw_map_drives(folder: Path, path: Path, tell: Tell) -> None:
         InputError: see `draw_drives`.
     """
     del tell
-    scenarios = [load_scenario(file) for file in sequences_of_map(folder)]
 
     def draw() -> None:
         with uninterrupted():
             from cns_drake.aerial_pictures import draw_drives
 
+        scenarios = _scenarios(folder)
         draw_drives({s.name.replace("_", " "): s for s in scenarios}, path)
 
-    inputs = {
-        s.name: [s.model_dump(mode="json"), digest_inputs(s)] for s in scenarios
+    _draw_once(path, _drives_inputs(folder), draw)
+
+
+def are_drives_drawn(folder: Path, path: Path) -> bool:
+    """Tells whether there is nothing to do; see `draw_map_drives`."""
+    return _is_drawn(path, _drives_inputs(folder))
+
+
+def _drives_inputs(folder: Path) -> dict:
+    return {
+        s.name: [s.model_dump(mode="json"), digest_inputs(s)]
+        for s in _scenarios(folder)
     }
-    _draw_once(path, inputs, draw)
+
+
+def _scenarios(folder: Path) -> list[Scenario]:
+    return [load_scenario(file) for file in sequences_of_map(folder)]
 
 
 def draw_map_stages(folder: Path, path: Path, tell: Tell) -> None:
@@ -83,27 +103,51 @@ def draw_map_stages(folder: Path, path: Path, tell: Tell) -> None:
         InputError: see `draw_stages`.
     """
     del tell
-    views = folder / "views.yaml"
-    files = sorted(folder.glob("stage_*.sdf"))
-    stages = {
-        file.stem.replace("_", " "): file for file in (files[0], files[-1])
-    }
 
     def draw() -> None:
         with uninterrupted():
             from cns_drake.stage_pictures import draw_stages, load_views
 
-        draw_stages(stages, load_views(views)["street"], path)
+        stages = {f.stem.replace("_", " "): f for f in _two_stages(folder)}
+        draw_stages(stages, load_views(_views(folder))["street"], path)
 
-    inputs = {title: digest_file(file) for title, file in stages.items()}
-    _draw_once(path, {**inputs, "views": digest_file(views)}, draw)
+    _draw_once(path, _stages_inputs(folder), draw)
+
+
+def are_stages_drawn(folder: Path, path: Path) -> bool:
+    """Tells whether there is nothing to do; see `draw_map_stages`."""
+    return _is_drawn(path, _stages_inputs(folder))
+
+
+def _stages_inputs(folder: Path) -> dict:
+    files = [*_two_stages(folder), _views(folder)]
+    return {file.name: digest_file(file) for file in files}
+
+
+def _two_stages(folder: Path) -> tuple[Path, Path]:
+    files = sorted(folder.glob("stage_*.sdf"))
+    return files[0], files[-1]
+
+
+def _views(folder: Path) -> Path:
+    return folder / "views.yaml"
 
 
 def _draw_once(path: Path, inputs: dict, draw: Callable[[], None]) -> None:
     """Draws a picture, unless one of these inputs is there."""
-    drawn = path.parent / "parts" / f"{path.stem}.data"
-    inputs = {**inputs, "version": __version__}
-    if path.is_file() and is_current(drawn, inputs):
-        return
-    draw()
-    write_part(drawn, inputs, None)
+    if not _is_drawn(path, inputs):
+        draw()
+        write_part(_note_of(path), _versioned(inputs), None)
+
+
+def _is_drawn(path: Path, inputs: dict) -> bool:
+    return path.is_file() and is_current(_note_of(path), _versioned(inputs))
+
+
+def _note_of(path: Path) -> Path:
+    """Returns the part that says what a picture was drawn of."""
+    return path.parent / "parts" / f"{path.stem}.data"
+
+
+def _versioned(inputs: dict) -> dict:
+    return {**inputs, "version": __version__}

@@ -8,7 +8,7 @@ jobs are run again.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Set
 from dataclasses import dataclass
 import graphlib
 import pickle
@@ -58,6 +58,9 @@ class Job:
         output: the file or folder that it writes. Two copies of a job, as
             when the connection to one is lost, never work on it at the same
             time; see `evaluation.files.exclusive`.
+        is_done: called with the arguments before anything runs, and only if
+            all that the job needs is done: whether it would find nothing to
+            do. Saves a process.
     """
 
     name: str
@@ -66,6 +69,7 @@ class Job:
     needs: tuple[str, ...] = ()
     cost: float = 1.0
     output: Path | None = None
+    is_done: Callable[..., bool] | None = None
 
 
 def run_jobs(jobs: Iterable[Job], cluster: Cluster) -> None:
@@ -81,6 +85,8 @@ def run_jobs(jobs: Iterable[Job], cluster: Cluster) -> None:
     """
     by_name = _by_name(jobs)
     urgency = _urgency(by_name)
+    done = _find_done(by_name)
+    by_name = {name: by_name[name] for name in by_name if name not in done}
     if not by_name:
         return
     from evaluation.job_progress import JobProgress
@@ -89,7 +95,7 @@ def run_jobs(jobs: Iterable[Job], cluster: Cluster) -> None:
         cluster.connect() as client,
         JobProgress({job.name: job.cost for job in by_name.values()}) as shown,
     ):
-        run = _Run(by_name, urgency, client, shown)
+        run = _Run(by_name, done, urgency, client, shown)
         run.run()
     run.raise_faults()
 
@@ -113,14 +119,31 @@ def _urgency(jobs: Mapping[str, Job]) -> dict[str, float]:
     Raises:
         ValueError: if jobs need each other.
     """
-    order = graphlib.TopologicalSorter(
-        {job.name: job.needs for job in jobs.values()}
-    )
     urgency = {name: job.cost for name, job in jobs.items()}
-    for name in reversed(list(order.static_order())):
+    for name in reversed(_ordered(jobs)):
         for need in jobs[name].needs:
             urgency[need] = max(urgency[need], jobs[need].cost + urgency[name])
     return urgency
+
+
+def _find_done(jobs: Mapping[str, Job]) -> set[str]:
+    """Returns the names of jobs that have nothing to do."""
+    done: set[str] = set()
+    for name in _ordered(jobs):
+        job = jobs[name]
+        if (
+            job.is_done is not None
+            and done.issuperset(job.needs)
+            and job.is_done(*job.arguments)
+        ):
+            done.add(name)
+    return done
+
+
+def _ordered(jobs: Mapping[str, Job]) -> list[str]:
+    """Returns names so that what a job needs comes before it."""
+    needs = {job.name: job.needs for job in jobs.values()}
+    return list(graphlib.TopologicalSorter(needs).static_order())
 
 
 class _Run:
@@ -129,6 +152,7 @@ class _Run:
     def __init__(
         self,
         jobs: Mapping[str, Job],
+        done: Set[str],
         urgency: Mapping[str, float],
         client: Client,
         shown: JobProgress,
@@ -143,7 +167,7 @@ class _Run:
         self._futures: dict[str, Future] = {}
         # Those that have a process, as far as is known here.
         self._running: set[str] = set()
-        self._done: set[str] = set()
+        self._done = set(done)
         self._deaths: Counter = Counter()
         self._faults: dict[str, str] = {}
 
@@ -227,12 +251,17 @@ class _Run:
             self._shown.end(name)
             self._submit_ready()
             return
-        if future.status != "error":
+        if future.status == "lost":
+            # Done, but its worker went before that was noticed here. Who does
+            # it again finds it done.
+            error = ProcessDiedError("its worker died")
+        elif future.status == "error":
+            error = future.exception()
+        else:
             raise InputError(
                 f"{self._client.scheduler.address}: the connection to the "
                 "scheduler was lost; the same command goes on from here"
             )
-        error = future.exception()
         if (
             isinstance(error, ProcessDiedError)
             and self._deaths[name] < _RETRIES

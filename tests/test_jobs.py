@@ -1,10 +1,12 @@
 """Jobs on processes of this machine: order, faults, deaths, interrupts."""
 
+import contextlib
 import os
 from pathlib import Path
 import pickle
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import job_functions
 import psutil
@@ -19,6 +21,42 @@ from evaluation.jobs import Job, run_jobs
 
 def job(name, function, *arguments, needs=(), **options):
     return Job(name, function, arguments, tuple(needs), **options)
+
+
+def test_what_is_done_starts_no_process(tmp_path, monkeypatch, capsys):
+    """Not even a cluster, if it is all; but what needs other work does."""
+    asked = []
+
+    def is_done(value):
+        def ask(*arguments):
+            asked.append(arguments)
+            return value
+
+        return ask
+
+    path = tmp_path / "path"
+    done = job("done", job_functions.refuse, is_done=is_done(True))
+    also = job(
+        "also", job_functions.join, [], path, needs=["done"],
+        is_done=is_done(True),
+    )  # fmt: skip
+    with monkeypatch.context() as patched:
+        patched.setattr(Cluster, "connect", None)
+        run_jobs([also, done], Cluster(num_workers=1))
+    assert asked == [(), ([], path)]
+    assert not path.exists()
+    new = job(
+        "new", job_functions.join, [], tmp_path / "new", needs=["done"],
+        is_done=is_done(False),
+    )  # fmt: skip
+    again = job(
+        "again", job_functions.join, [], path, needs=["new"],
+        is_done=is_done(True),
+    )  # fmt: skip
+    run_jobs([done, new, again], Cluster(num_workers=1))
+    assert (tmp_path / "new").is_file()
+    assert path.is_file()
+    assert "of 2 jobs" in capsys.readouterr().err
 
 
 def test_what_is_needed_is_there_and_faults_stay_alone(tmp_path, capsys):
@@ -68,6 +106,53 @@ def test_what_is_needed_is_there_and_faults_stay_alone(tmp_path, capsys):
     assert "here I am" in told
     assert "ZeroDivisionError" in told
     assert "last: done" in told
+
+
+class ScriptedCluster:
+    """Has a client whose futures end as they are told, one after the other.
+
+    Attributes:
+        keys: of what was submitted.
+    """
+
+    scheduler = SimpleNamespace(address="tcp://scripted:1")
+
+    def __init__(self, *statuses):
+        self._statuses = iter(statuses)
+        self.keys = []
+
+    @contextlib.contextmanager
+    def connect(self):
+        yield self
+
+    def subscribe_topic(self, topic, handler):
+        pass
+
+    def nthreads(self):
+        return {"worker": 1}
+
+    def submit(self, function, *arguments, key, **options):
+        self.keys.append(key)
+        return SimpleNamespace(
+            status=next(self._statuses), add_done_callback=lambda take: take(0)
+        )
+
+
+def test_what_is_lost_with_its_worker_is_asked_for_again(capsys):
+    cluster = ScriptedCluster("lost", "lost", "finished")
+    run_jobs([job("a", job_functions.refuse)], cluster)
+    # Under a new name each time: the old one stands for the old result.
+    assert len(set(cluster.keys)) == 3
+    assert "a: its worker died; it starts again" in capsys.readouterr().err
+    with pytest.raises(FailedJobsError, match=r"^a: its worker died$"):
+        run_jobs(
+            [job("a", job_functions.refuse)], ScriptedCluster(*["lost"] * 3)
+        )
+
+
+def test_a_scheduler_that_is_lost():
+    with pytest.raises(InputError, match=r"^tcp://scripted:1: the connection"):
+        run_jobs([job("a", job_functions.refuse)], ScriptedCluster("cancelled"))
 
 
 def test_nothing_to_do_starts_nothing():

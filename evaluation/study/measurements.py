@@ -6,6 +6,7 @@ from pathlib import Path
 
 from evaluation.change import Surveyed
 from evaluation.change import compare as compare_maps
+from evaluation.errors import InputError
 from evaluation.jobs import Tell
 from evaluation.place_recognition import judge_retrieval
 from evaluation.recording_survey import SurveyedDrive
@@ -43,17 +44,37 @@ def measure_change(
         InputError: if the drives are of different worlds, or a file cannot
             be read or written.
     """
-    inputs = {
-        "map": map_name,
-        "stages": stages,
-        "drives": [part_digest(survey.drive) for survey in surveys],
-        "code": measuring_code(),
-    }
+    inputs = _change_inputs(map_name, stages, surveys)
     if is_current(result, inputs):
         return
     drives = [_to_surveyed(read_part(survey.drive)) for survey in surveys]
     change = ChangeResult(map_name, stages, compare_maps(*drives))
     write_part(result, inputs, change)
+
+
+def is_measured(
+    map_name: str,
+    stages: tuple[str, str],
+    surveys: tuple[SurveyFiles, ...],
+    result: Path,
+) -> bool:
+    """Tells whether there is nothing to do; see `measure_change`."""
+    try:
+        inputs = _change_inputs(map_name, stages, surveys)
+    except InputError:  # For the job to tell.
+        return False
+    return is_current(result, inputs)
+
+
+def _change_inputs(
+    map_name: str, stages: tuple[str, str], surveys: tuple[SurveyFiles, ...]
+) -> dict:
+    return {
+        "map": map_name,
+        "stages": stages,
+        "drives": [part_digest(survey.drive) for survey in surveys],
+        "code": measuring_code(),
+    }
 
 
 def recognise_places(
@@ -78,16 +99,10 @@ def recognise_places(
         InputError: if the drives are of different worlds, no query has a
             match, or a file cannot be read or written.
     """
-    parts = [survey.described(method) for survey in surveys]
-    inputs = {
-        "map": map_name,
-        "stages": stages,
-        "method": method.inputs(),
-        "drives": [part_digest(part) for part in parts],
-        "code": measuring_code(),
-    }
+    inputs = _recognition_inputs(map_name, stages, surveys, method)
     if is_current(result, inputs):
         return
+    parts = [survey.described(method) for survey in surveys]
     # The method comes first: what it kept may be of a type of its own.
     comparing = method.make()
     (placed, database), (placed_query, query) = map(read_part, parts)
@@ -95,6 +110,37 @@ def recognise_places(
     retrieval = score(comparing, database, query, tracking(tell))
     outcome = judge_retrieval(comparing, database.name, query.name, retrieval)
     write_part(result, inputs, RecognitionResult.of(map_name, stages, outcome))
+
+
+def are_recognised(
+    map_name: str,
+    stages: tuple[str, str],
+    surveys: tuple[SurveyFiles, SurveyFiles],
+    method: MethodChoice,
+    result: Path,
+) -> bool:
+    """Tells whether there is nothing to do; see `recognise_places`."""
+    try:
+        inputs = _recognition_inputs(map_name, stages, surveys, method)
+    except InputError:  # For the job to tell.
+        return False
+    return is_current(result, inputs)
+
+
+def _recognition_inputs(
+    map_name: str,
+    stages: tuple[str, str],
+    surveys: tuple[SurveyFiles, SurveyFiles],
+    method: MethodChoice,
+) -> dict:
+    parts = [survey.described(method) for survey in surveys]
+    return {
+        "map": map_name,
+        "stages": stages,
+        "method": method.inputs(),
+        "drives": [part_digest(part) for part in parts],
+        "code": measuring_code(),
+    }
 
 
 def _to_surveyed(drive: SurveyedDrive) -> Surveyed:

@@ -11,9 +11,14 @@ from evaluation.retrieval import Role
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.figure_files import change_stems, routes_stem
 from evaluation.study.layout import StudyFiles
-from evaluation.study.measurements import recognise_places
+from evaluation.study.measurements import are_recognised, recognise_places
 from evaluation.study.surveys import START_COST, survey_job, survey_name
-from evaluation.study.views import draw_city, measure_and_draw
+from evaluation.study.views import (
+    draw_city,
+    is_city_drawn,
+    is_measured_and_drawn,
+    measure_and_draw,
+)
 
 # Expected seconds of the jobs beyond their start: with 3000 scans, 250 places
 # and 150 queries.
@@ -85,6 +90,7 @@ def _plan_city(
             needs=_survey_names(stages),
             cost=START_COST + _CITY_COST,
             output=files.page_drives(city.name),
+            is_done=is_city_drawn,
         )
     )
     jobs += [_change_job(city, pair, files) for pair in city.change_pairs()]
@@ -135,6 +141,7 @@ def _change_job(
         needs=_survey_names(drives),
         cost=START_COST + _CHANGE_COST,
         output=files.change(earlier.name, later.name),
+        is_done=is_measured_and_drawn,
     )
 
 
@@ -160,6 +167,7 @@ def _recognition_job(
         needs=_survey_names(pair),
         cost=START_COST + cost,
         output=result,
+        is_done=are_recognised,
     )
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from pathlib import Path
 from typing import Any
 
 from evaluation.drive_source import DriveSource
+from evaluation.errors import InputError
 from evaluation.jobs import Job, Tell
 from evaluation.progress import Track
 from evaluation.recording_survey import survey_recording
@@ -48,6 +50,7 @@ def survey_job(
         needs=needs,
         cost=START_COST + _MAP_COST + sum(_ROLE_COST[r] for r in roles),
         output=files.folder,
+        is_done=is_surveyed,
     )
 
 
@@ -76,17 +79,7 @@ def survey_drive(
         InputError: if the drive cannot be read, or a file not be written.
     """
     inputs = survey_inputs(source, roles)
-    missing = []
-    if roles:
-        missing = [
-            method
-            for method in methods
-            if not is_current(
-                files.described(method), described_inputs(inputs, method)
-            )
-        ]
-    maps = {files.fine: "fine", files.drive: "drive"}
-    maps = {p: name for p, name in maps.items() if not is_current(p, inputs)}
+    missing, maps = _missing(inputs, methods if roles else (), files)
     if not missing and not maps:
         return
     survey = survey_recording(
@@ -102,6 +95,39 @@ def survey_drive(
         )
     for path, name in maps.items():
         write_part(path, inputs, getattr(survey, name))
+
+
+def is_surveyed(
+    source: DriveSource,
+    roles: frozenset[Role],
+    methods: tuple[MethodChoice, ...],
+    files: SurveyFiles,
+) -> bool:
+    """Tells whether nothing is missing; see `survey_drive`."""
+    try:
+        inputs = survey_inputs(source, roles)
+        return _missing(inputs, methods if roles else (), files) == ([], {})
+    except InputError:  # For the job to tell.
+        return False
+
+
+def _missing(
+    inputs: dict, methods: Iterable[MethodChoice], files: SurveyFiles
+) -> tuple[list[MethodChoice], dict[Path, str]]:
+    """Returns methods without descriptions, and the maps to be written."""
+    missing = [
+        method
+        for method in methods
+        if not is_current(
+            files.described(method), described_inputs(inputs, method)
+        )
+    ]
+    maps = {files.fine: "fine", files.drive: "drive"}
+    return missing, {
+        path: name
+        for path, name in maps.items()
+        if not is_current(path, inputs)
+    }
 
 
 def survey_inputs(source: DriveSource, roles: frozenset[Role]) -> dict:

@@ -110,6 +110,7 @@ def measure_trend(
             needs=(jobs[0].name,),
             cost=_COST,
             output=result,
+            is_done=is_database_measured,
         )
         for name, result in points.items()
     ]
@@ -137,12 +138,7 @@ def measure_database(
         InputError: if the database cannot be read, no query has a match, or
             a file cannot be read or written.
     """
-    inputs = {
-        **survey_inputs(source, frozenset({"places"})),
-        "query": part_digest(query.drive),
-        "queries": [part_digest(query.described(one)) for one in methods],
-        "methods": [method.inputs() for method in methods],
-    }
+    inputs = _inputs(source, query, methods)
     if is_current(result, inputs):
         return
     running = [method.make() for method in methods]
@@ -177,3 +173,27 @@ def measure_database(
 
 def _recorded(path: Path) -> RecordedDrive:
     return RecordedDrive(path.absolute())
+
+
+def is_database_measured(
+    source: DriveSource,
+    query: SurveyFiles,
+    methods: tuple[MethodChoice, ...],
+    result: Path,
+) -> bool:
+    """Tells whether there is nothing to do; see `measure_database`."""
+    try:
+        return is_current(result, _inputs(source, query, methods))
+    except InputError:  # For the job to tell.
+        return False
+
+
+def _inputs(
+    source: DriveSource, query: SurveyFiles, methods: tuple[MethodChoice, ...]
+) -> dict:
+    return {
+        **survey_inputs(source, frozenset({"places"})),
+        "query": part_digest(query.drive),
+        "queries": [part_digest(query.described(one)) for one in methods],
+        "methods": [method.inputs() for method in methods],
+    }

@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from evaluation.drawing import PRINTED
+from evaluation.errors import InputError
 from evaluation.figures import Stage, draw_change, draw_routes
 from evaluation.files import make_folder
 from evaluation.jobs import Tell
 from evaluation.page_data import make_drive
 from evaluation.study.code_digest import all_code
 from evaluation.study.layout import SurveyFiles
-from evaluation.study.measurements import measure_change
+from evaluation.study.measurements import is_measured, measure_change
 from evaluation.study.parts import (
     is_current,
     part_digest,
@@ -63,6 +64,21 @@ def draw_city(
     write_part(drawn, inputs, None)
 
 
+def is_city_drawn(
+    map_name: str,
+    stages: tuple[tuple[str, SurveyFiles], ...],
+    stem: Path,
+    drawn: Path,
+    pages: Path,
+) -> bool:
+    """Tells whether there is nothing to do; see `draw_city`."""
+    try:
+        inputs = _inputs(map_name, [survey for _, survey in stages])
+    except InputError:  # For the job to tell.
+        return False
+    return is_current(pages, inputs) and _is_drawn([stem], drawn, inputs)
+
+
 def measure_and_draw(
     map_name: str,
     stages: tuple[str, str],
@@ -79,6 +95,20 @@ def measure_and_draw(
     del tell
     measure_change(map_name, stages, surveys, result)
     draw_pair(surveys[:2], result, stems, drawn)
+
+
+def is_measured_and_drawn(
+    map_name: str,
+    stages: tuple[str, str],
+    surveys: tuple[SurveyFiles, ...],
+    result: Path,
+    stems: tuple[Path, Path],
+    drawn: Path,
+) -> bool:
+    """Tells whether there is nothing to do; see `measure_and_draw`."""
+    if not is_measured(map_name, stages, surveys, result):
+        return False
+    return _is_drawn(stems, drawn, _inputs(part_digest(result), surveys[:2]))
 
 
 def draw_pair(
