@@ -270,6 +270,8 @@ def test_foreign_folders_are_left_alone(drive, tmp_path, format_name):
     (tmp_path / "photos/one.jpg").write_text("")
     (tmp_path / "marked").mkdir()
     (tmp_path / "marked/export.yaml").write_text("format: [")
+    (tmp_path / "foreign").mkdir()
+    (tmp_path / "foreign/export.yaml").write_text("format: [cns]")
     export_sequence(
         drive, "kitti" if format_name == "cns" else "cns", tmp_path / "other"
     )
@@ -277,7 +279,8 @@ def test_foreign_folders_are_left_alone(drive, tmp_path, format_name):
     for folder, fault in (
         ("file", "holds something else"),
         ("photos", "holds something else"),
-        ("marked", "export.yaml: not of an export"),
+        ("marked", "export.yaml: not readable as YAML"),
+        ("foreign", "export.yaml: not of an export"),
         ("other", "the folder holds"),
     ):
         with pytest.raises(InputError, match=fault):

@@ -12,15 +12,13 @@ import os
 from pathlib import Path
 import shutil
 
-import yaml
-
 from cns_drake.errors import InputError
 from cns_drake.export.cns import CNS
 from cns_drake.export.kitti import KITTI
 from cns_drake.export.layout import Layout
 from cns_drake.files import complete_part, part_path, user_errors, write_part
 from cns_drake.rosbag2_metadata import to_yaml
-from evaluation.errors import InputError as ReadingError
+from cns_drake.yaml_files import read_yaml
 from evaluation.sequences.mcap_sequence import McapSequence, holds_mcap
 
 _LAYOUTS = {"cns": CNS, "kitti": KITTI}
@@ -54,32 +52,29 @@ def export_sequence(
             written.
     """
     layout = _LAYOUTS[format_name]
+    if not holds_mcap(recording):
+        raise InputError(f"{recording}: no recording (.mcap) there")
+    sequence = McapSequence(recording, lidar)
+    drive = output / layout.drive_folder(sequence)
+    outer = {
+        output / name: text
+        for name, text in layout.outer_files(sequence).items()
+    }
+    _claim(output, format_name, layout)
+    if drive.exists():
+        raise InputError(f"{drive}: is there already")
+    if layout.shared_outer_files:
+        for path, text in outer.items():
+            _check_equal(path, text)
+    part = part_path(drive)
     try:
-        if not holds_mcap(recording):
-            raise InputError(f"{recording}: no recording (.mcap) there")
-        sequence = McapSequence(recording, lidar)
-        drive = output / layout.drive_folder(sequence)
-        outer = {
-            output / name: text
-            for name, text in layout.outer_files(sequence).items()
-        }
-        _claim(output, format_name, layout)
-        if drive.exists():
-            raise InputError(f"{drive}: is there already")
-        if layout.shared_outer_files:
-            for path, text in outer.items():
-                _check_equal(path, text)
-        part = part_path(drive)
-        try:
-            _write_drive(sequence, layout, part, on_frame)
-            for path, text in outer.items():
-                _write_text(path, text)
-            with user_errors(drive):
-                os.replace(part, drive)
-        finally:
-            shutil.rmtree(part, ignore_errors=True)
-    except ReadingError as error:
-        raise InputError(str(error)) from error
+        _write_drive(sequence, layout, part, on_frame)
+        for path, text in outer.items():
+            _write_text(path, text)
+        with user_errors(drive):
+            os.replace(part, drive)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
     return drive
 
 
@@ -104,12 +99,10 @@ def _claim(output: Path, format_name: str, layout: Layout) -> None:
 
 
 def _check_marker(marker: Path, format_name: str) -> None:
-    try:
-        values = yaml.safe_load(marker.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, ValueError, RecursionError):
-        values = None
+    values = read_yaml(marker)
     found = values.get("format") if isinstance(values, dict) else None
-    if found not in _LAYOUTS:
+    # A list of YAML is no key.
+    if not isinstance(found, str) or found not in _LAYOUTS:
         raise InputError(f"{marker}: not of an export by cns-drake")
     if found != format_name:
         raise InputError(f"{marker}: format: the folder holds {found} drives")
