@@ -32,6 +32,7 @@ from cns_drake.resuming import take_over_frames
 from cns_drake.rosbag2_metadata import Topic
 from cns_drake.scenario import Scenario
 from cns_drake.station import load_stage, make_station
+from cns_drake.trajectory import Trajectory
 from cns_drake.world import World
 
 # Reports that so many frames of so many are done.
@@ -98,37 +99,89 @@ def simulate(
     Raises:
         InputError: the scenario cannot be run or its output not be written.
     """
-    with interrupts_wait() as strike:
-        return _simulate(
-            scenario,
-            output,
-            page_file,
-            graphviz_file,
-            overwrite,
-            on_frame,
-            on_note,
-            strike,
-        )
-
-
-def _simulate(
-    scenario: Scenario,
-    output: Path,
-    page_file: Path | None,
-    graphviz_file: Path | None,
-    overwrite: bool,
-    on_frame: ProgressCallback,
-    on_note: NoteCallback,
-    strike: Callable[[], None],
-) -> Run:
-    """Does what `simulate` does; interrupts come up in `strike` only."""
-    files = RecordingFolder(output / scenario.name)
     start = time.perf_counter()
-    for file in (page_file, graphviz_file):
-        if file is not None:
-            check_writable(file)
-    # What can be found wrong at once is found before anything slow.
-    files.check(overwrite)
+    files = RecordingFolder(output / scenario.name)
+    topics = recording_topics(scenario.lidars)
+    # Interrupts come up where `strike` is called, and nowhere else.
+    with interrupts_wait() as strike:
+        # What can be found wrong at once is found before anything slow.
+        for file in (page_file, graphviz_file):
+            if file is not None:
+                check_writable(file)
+        files.check(overwrite)
+        drive = _load(scenario)
+        strike()
+        bag = _make_bag(files.path, topics, drive, overwrite)
+        page = None if page_file is None else _make_page(drive)
+        resumed_frames = 0
+        with bag:
+            if page is None and bag.follows_interruption():
+                resumed_frames = _resume(bag, topics, drive, on_frame, on_note)
+            writer = BackgroundWriter(bag.write)
+            diagram = make_station(
+                drive.scenario,
+                world=drive.world,
+                trajectory=drive.trajectory,
+                bag=writer,
+                page=page,
+            )
+            if graphviz_file is not None:
+                write_part(graphviz_file, diagram.GetGraphvizString())
+                complete_part(graphviz_file)
+            simulator = Simulator(diagram)
+            strike()
+            loaded = time.perf_counter()
+
+            def monitor(context):
+                strike()
+                done = round(context.get_time() / FRAME_PERIOD) + 1
+                on_frame(min(done, drive.num_frames), drive.num_frames)
+
+            simulator.set_monitor(monitor)
+            # Frame k is recorded at k periods; ending with the last one's
+            # time, no rounding can add or drop a frame.
+            end = (drive.num_frames - 1) * FRAME_PERIOD
+            begin = min(resumed_frames * FRAME_PERIOD, end)
+            if resumed_frames < drive.num_frames:
+                simulator.get_mutable_context().SetTime(begin)
+                with writer:
+                    simulator.AdvanceTo(end)
+        finished = time.perf_counter()
+        if page is not None:
+            page.save(page_file, title=scenario.name)
+    return Run(
+        name=scenario.name,
+        folder=files.path,
+        num_frames=drive.num_frames,
+        resumed_frames=resumed_frames,
+        simulated_s=end - begin,
+        wall_s=finished - loaded,
+        loading_s=loaded - start,
+    )
+
+
+@dataclass(frozen=True)
+class _Drive:
+    """A scenario with what it takes to run it.
+
+    Attributes:
+        scenario: that says how many frames it has.
+        inputs: digests of what it was read from.
+        trajectory: of the vehicle.
+        world: the stage.
+    """
+
+    scenario: Scenario
+    inputs: Mapping[str, str]
+    trajectory: Trajectory
+    world: World
+
+    @property
+    def num_frames(self) -> int:
+        return self.scenario.frames
+
+
+def _load(scenario: Scenario) -> _Drive:
     scenario.check_files()
     inputs = digest_inputs(scenario)
     trajectory = plan_drive(scenario)
@@ -139,76 +192,43 @@ def _simulate(
         raise InputError(
             f"{scenario.world_file}: changed while it was being read"
         )
-    strike()
-    topics = recording_topics(scenario.lidars)
-    bag = _make_bag(files.path, topics, scenario, world, inputs, overwrite)
-    page = None
-    if page_file is not None:
-        page = MeshcatRecorder(
-            world,
-            X_BSs=_lidar_poses(scenario),
-            period=FRAME_PERIOD,
-            other_stage=_other_stage(scenario),
-        )
-    # Frame k is recorded at k periods; ending with the last one's time, no
-    # rounding can add or drop a frame.
-    end = (num_frames - 1) * FRAME_PERIOD
-    resumed_frames = 0
-    with bag:
-        if page is None and bag.follows_interruption():
-            on_note(f"{scenario.name}: found an interrupted run, reading it")
-            resumed_frames = take_over_frames(bag, topics)
-            on_note(
-                f"{scenario.name}: {resumed_frames} of {num_frames} frames "
-                "are there, going on with the next"
-            )
-            if resumed_frames > 0:
-                on_frame(resumed_frames, num_frames)
-        begin = min(resumed_frames * FRAME_PERIOD, end)
-        writer = BackgroundWriter(bag.write)
-        diagram = make_station(
-            scenario, world=world, trajectory=trajectory, bag=writer, page=page
-        )
-        if graphviz_file is not None:
-            write_part(graphviz_file, diagram.GetGraphvizString())
-            complete_part(graphviz_file)
-        simulator = Simulator(diagram)
-        strike()
-        loaded = time.perf_counter()
+    return _Drive(scenario, inputs, trajectory, world)
 
-        def monitor(context):
-            strike()
-            done = round(context.get_time() / FRAME_PERIOD) + 1
-            on_frame(min(done, num_frames), num_frames)
 
-        simulator.set_monitor(monitor)
-        if resumed_frames < num_frames:
-            simulator.get_mutable_context().SetTime(begin)
-            with writer:
-                simulator.AdvanceTo(end)
-    finished = time.perf_counter()
-    if page is not None:
-        page.save(page_file, title=scenario.name)
-    return Run(
-        name=scenario.name,
-        folder=files.path,
-        num_frames=num_frames,
-        resumed_frames=resumed_frames,
-        simulated_s=end - begin,
-        wall_s=finished - loaded,
-        loading_s=loaded - start,
+def _resume(
+    bag: BagWriter,
+    topics: Sequence[Topic],
+    drive: _Drive,
+    on_frame: ProgressCallback,
+    on_note: NoteCallback,
+) -> int:
+    """Keeps what an interrupted run has recorded; returns how many frames."""
+    name, num_frames = drive.scenario.name, drive.num_frames
+    on_note(f"{name}: found an interrupted run, reading it")
+    resumed_frames = take_over_frames(bag, topics)
+    on_note(
+        f"{name}: {resumed_frames} of {num_frames} frames are there, going on "
+        "with the next"
+    )
+    if resumed_frames > 0:
+        on_frame(resumed_frames, num_frames)
+    return resumed_frames
+
+
+def _make_page(drive: _Drive) -> MeshcatRecorder:
+    return MeshcatRecorder(
+        drive.world,
+        X_BSs=_lidar_poses(drive.scenario),
+        period=FRAME_PERIOD,
+        other_stage=_other_stage(drive.scenario),
     )
 
 
 def _make_bag(
-    folder: Path,
-    topics: Sequence[Topic],
-    scenario: Scenario,
-    world: World,
-    inputs: Mapping[str, str],
-    overwrite: bool,
+    folder: Path, topics: Sequence[Topic], drive: _Drive, overwrite: bool
 ) -> BagWriter:
-    """Makes the recording of a scenario, which has a number of frames."""
+    """Makes the recording of a drive, so far without messages."""
+    scenario, inputs = drive.scenario, drive.inputs
     described = scenario.model_dump(mode="json", exclude_none=True)
     return BagWriter(
         folder,
@@ -216,7 +236,7 @@ def _make_bag(
         start_ns=START_NS,
         attachments={
             "scenario.json": described,
-            "structures.json": _structure_list(world),
+            "structures.json": _structure_list(drive.world),
             "calibration.json": make_calibration(
                 _lidar_poses(scenario), scenario.imu.pose()
             ),
