@@ -25,6 +25,8 @@ from cns_drake.uniform_spline import SplineDerivatives
 # town the path leaves the middle of the lane by less than 10 cm.
 POINT_SPACING = 2.0
 
+_UP = np.array([0.0, 0.0, 1.0])
+
 
 @dataclass(frozen=True)
 class AngleMotion:
@@ -156,9 +158,6 @@ def spatial_acceleration_at(moment: Moments) -> SpatialAcceleration:
     return SpatialAcceleration(alpha, a)
 
 
-_UP = np.array([0.0, 0.0, 1.0])
-
-
 def _left(jet: PathJet) -> np.ndarray:
     return np.array([-np.sin(jet.yaw[0]), np.cos(jet.yaw[0]), 0.0])
 
@@ -181,7 +180,6 @@ class WheelMotion:
             trajectory: of the vehicle.
             p_BC: position of the wheel's centre in the vehicle frame [m].
         """
-        self._trajectory = trajectory
         self._x, self._y, self._radius = p_BC
         self._rolled = PathIntegral(
             trajectory.path, lambda jet: np.hypot(*self._ground_velocity(jet))
