@@ -211,7 +211,10 @@ def report(
     from evaluation.cluster import choose_cluster
 
     cluster = choose_cluster(jobs, scheduler)
-    print(reporting.write_report(recordings, output, cluster, method or ()))
+    path = reporting.write_report(
+        recordings, output, cluster, method or (), on_note=console.note
+    )
+    print(path)
 
 
 @app.command()

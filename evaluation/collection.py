@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 import re
@@ -13,6 +13,7 @@ from evaluation.errors import InputError
 from evaluation.sequences import open_sequence
 
 _NAME = re.compile(r"(?P<map>.+)_(?P<stage>[^_]+)")
+_UNPLACED = "neither a scenario nor a name <map>_<stage> tells map and stage"
 
 
 @dataclass(frozen=True)
@@ -95,17 +96,24 @@ class City:
         return None
 
 
-def find_recordings(folder: Path) -> list[RecordingInfo]:
+def find_recordings(
+    folder: Path, on_note: Callable[[str], None] = lambda text: None
+) -> list[RecordingInfo]:
     """Opens all recordings in a folder and its direct subfolders.
 
     Drives in the layout of CNS, and in that of KITTI if a `scenario.yaml`
     lies in them, are found up to three levels down, where exports put them.
     A recording states its map and stage in its scenario; without one they
-    are taken from its name, `<map>_<stage>`.
+    are taken from its name, `<map>_<stage>`. Where neither tells them, it is
+    left out.
+
+    Args:
+        folder: that holds them.
+        on_note: is told what is left out.
 
     Raises:
-        InputError: if there is no recording, or one cannot be read or
-            placed.
+        InputError: if there is no recording of which map and stage are
+            known, or one cannot be read.
     """
     folder = Path(folder)
     if not folder.is_dir():
@@ -113,7 +121,14 @@ def find_recordings(folder: Path) -> list[RecordingInfo]:
     paths = _find_drives(folder)
     if not paths:
         raise InputError(f"{folder}: no recorded sequence in it")
-    return [_place(path) for path in paths]
+    placed = {path: _place(path) for path in paths}
+    found = [one for one in placed.values() if one is not None]
+    if not found:
+        raise InputError(f"{paths[0]}: {_UNPLACED}")
+    for path, one in placed.items():
+        if one is None:
+            on_note(f"{path}: left out: {_UNPLACED}")
+    return found
 
 
 def group_cities(recordings: Iterable[RecordingInfo]) -> list[City]:
@@ -159,7 +174,8 @@ def _is_exported_drive(path: Path) -> bool:
     )
 
 
-def _place(path: Path) -> RecordingInfo:
+def _place(path: Path) -> RecordingInfo | None:
+    """Returns a recording; None if nothing tells its map and stage."""
     sequence = open_sequence(path)
     scenario = sequence.scenario or {}
     # A city has lanes to follow, any other world has waypoints.
@@ -170,10 +186,7 @@ def _place(path: Path) -> RecordingInfo:
         return RecordingInfo(sequence.name, path, map_name, stage, route)
     match = _NAME.fullmatch(sequence.name)
     if match is None:
-        raise InputError(
-            f"{path}: neither a scenario nor a name <map>_<stage> tells map"
-            " and stage"
-        )
+        return None
     return RecordingInfo(
         sequence.name, path, match["map"], match["stage"], route
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from evaluation.cluster import Cluster
@@ -19,6 +19,7 @@ def write_report(
     output: Path,
     cluster: Cluster,
     own_methods: Iterable[Path] = (),
+    on_note: Callable[[str], None] = lambda text: None,
 ) -> Path:
     """Measures all recordings in a folder; writes tables, figures, a page.
 
@@ -32,6 +33,7 @@ def write_report(
         cluster: where the work is done.
         own_methods: Python files with one method each, to run besides those
             of this package.
+        on_note: is told which recordings are left out.
 
     Returns:
         The path of `report.md`.
@@ -41,7 +43,7 @@ def write_report(
             written.
     """
     methods = choose_methods(own_methods)
-    found = find_recordings(recordings)
+    found = find_recordings(recordings, on_note)
     jobs = plan_study(found, output, methods)
     make_folder(output)
     run_jobs(jobs, cluster)

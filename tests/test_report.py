@@ -82,9 +82,18 @@ def test_names_serve_without_scenarios(tmp_path):
     assert city.name == "old_town"
     assert list(city.stages) == ["1", "2"]
     assert city.control(*city.change_pairs()[0]) is None
+
+
+def test_what_cannot_be_placed_is_left_out(tmp_path):
     drive(tmp_path / "unnamed", "01", "a", scenario=False)
     with pytest.raises(InputError, match="unnamed: neither a scenario nor"):
         find_cities(tmp_path)
+    drive(tmp_path / "town_1", "01", "a", scenario=False)
+    told = []
+    (found,) = find_recordings(tmp_path, told.append)
+    assert found.name == "town_1"
+    (note,) = told
+    assert note.startswith(f"{tmp_path / 'unnamed'}: left out: neither a")
 
 
 def test_no_recordings_or_too_many(tmp_path):
