@@ -321,8 +321,13 @@ def reproduce(
     jobs: Jobs = None,
     scheduler: Scheduler = None,
     pages: Annotated[
-        bool, typer.Option(help="Also make a web page of each drive.")
-    ] = True,
+        bool | None,
+        typer.Option(
+            "--pages/--no-pages",
+            help="Also make a web page of each drive; by default, unless "
+            "--quick is given.",
+        ),
+    ] = None,
     quick: Annotated[
         bool,
         typer.Option(
@@ -338,8 +343,10 @@ def reproduce(
         from evaluation.cluster import choose_cluster
 
     cluster = choose_cluster(jobs, scheduler)
+    if quick and pages:
+        raise InputError("--quick and --pages: give one of them")
     report = reproduce_maps(
-        maps, output, cluster, with_pages=pages, quick=quick
+        maps, output, cluster, with_pages=pages is not False, quick=quick
     )
     typer.echo(report)
 

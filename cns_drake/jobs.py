@@ -15,6 +15,7 @@ from cns_drake.recording_folder import RecordingFolder
 from cns_drake.scenario import Scenario, make_scenario
 from cns_drake.yaml_files import read_yaml
 from evaluation.cluster import Cluster
+from evaluation.files import make_folder
 from evaluation.interrupts import uninterrupted
 from evaluation.jobs import Job, Tell, run_jobs
 
@@ -44,9 +45,12 @@ def record_all(
         overwrite: replace whatever else has one of the names.
 
     Raises:
-        InputError: some could not be recorded; all are named.
+        InputError: some could not be recorded; all are named. Or the folder
+            cannot be made.
     """
-    run_jobs(plan_recordings(scenarios, output, overwrite=overwrite), cluster)
+    jobs = plan_recordings(scenarios, output, overwrite=overwrite)
+    make_folder(output)
+    run_jobs(jobs, cluster)
 
 
 def plan_recordings(

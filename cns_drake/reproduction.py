@@ -14,6 +14,7 @@ from cns_drake.scenario import Scenario, load_scenario
 from cns_drake.simulated_drive import SimulatedDrive
 from evaluation.cluster import Cluster
 from evaluation.collection import RecordingInfo
+from evaluation.files import make_folder
 from evaluation.jobs import run_jobs
 from evaluation.study.assembly import assemble
 from evaluation.study.plan import plan_study
@@ -48,7 +49,8 @@ def reproduce_maps(
         The path of the report.
 
     Raises:
-        InputError: a map is not known, or a step failed.
+        InputError: a map is not known, the folder cannot be made, or a step
+            failed.
     """
     folders = [_map_folder(name) for name in maps or _recordable_maps()]
     sequences, controls, pictures = [], [], []
@@ -79,6 +81,7 @@ def reproduce_maps(
     # In the order in which `cns-eval report` finds them.
     recordings.sort(key=lambda recording: recording.name)
     report = output / "report"
+    make_folder(output)
     run_jobs([*jobs, *plan_study(recordings, report), *pictures], cluster)
     addresses = {
         name: f"../pages/{page.name}"

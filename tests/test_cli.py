@@ -141,6 +141,7 @@ def test_diagram_script(tmp_path):
             "--pose: not finite",
         ),
         (["reproduce", "atlantis"], "unknown map 'atlantis'"),
+        (["reproduce", "--quick", "--pages"], "--quick and --pages: give one"),
         (["teleport"], "teleport"),
     ],
 )
@@ -154,11 +155,12 @@ def test_faults_are_one_line(files, tmp_path, arguments, fault):
     assert not output.exists()
 
 
-@pytest.mark.parametrize("command", ["simulate", "scan"])
+@pytest.mark.parametrize("command", ["simulate", "scan", "generate"])
 def test_output_that_cannot_be_written(files, command):
     arguments = {
         "simulate": ["simulate", files / "drive.yaml"],
         "scan": ["scan", files / "good.sdf", *POSE],
+        "generate": ["generate", files / "drive.yaml"],
     }[command]
     result = run(*arguments, "--output", files / "file" / "below.bin")
     assert_one_line(result, "file")
