@@ -6,7 +6,6 @@ the two: few rays then have to be cast on the shapes themselves.
 
 from __future__ import annotations
 
-from numba import njit
 import numpy as np
 
 from cns_drake.perception_geometry import (
@@ -17,6 +16,7 @@ from cns_drake.perception_geometry import (
 )
 from cns_drake.ray_groups import RayGroup
 from cns_drake.surface_merging import tessellate
+from evaluation.compiled import compiled
 
 CurvedSurface = EllipsoidSurface | CylinderSurface | CapsuleSurface
 
@@ -81,7 +81,7 @@ class NearCurvedShapes:
         return _is_near(self._shapes, p_LS, spread * np.linalg.norm(R_LO))
 
 
-@njit(cache=True)
+@compiled
 def _is_near(shapes, p_LS, spread):
     """Tells whether a ball meets a segment that is widened by its reach.
 

@@ -134,6 +134,8 @@ class EmbreeHierarchy:
                 address = self._lib.rtcSetNewGeometryBuffer(
                     handle, slot, 0, form, array.strides[0], len(array)
                 )
+                if address is None:
+                    raise MemoryError("Embree has no room for the scene")
                 ctypes.memmove(address, array.ctypes.data, array.nbytes)
             self._lib.rtcSetGeometryMask(handle, part.mask)
             self._lib.rtcCommitGeometry(handle)

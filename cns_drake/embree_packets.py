@@ -9,11 +9,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
 import numpy as np
 
 from cns_drake.embree import INVALID_ID
+from evaluation.compiled import compiled
 
 
 class Tree(NamedTuple):
@@ -65,7 +66,7 @@ LANES = 16
 BLOCK = 1024
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def cast_packets(tree, mask, rays, hits, part, num_parts):
     """Casts every `num_parts`-th block of rays, beginning with the `part`-th.
 
@@ -90,7 +91,7 @@ def cast_packets(tree, mask, rays, hits, part, num_parts):
         _cast_block(tree, mask, rays, hits, first, last, packet, valid)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _cast_block(tree, mask, rays, hits, first, last, packet, valid):
     """Casts the rays from `first` to before `last`.
 

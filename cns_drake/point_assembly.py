@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from numba import njit
 import numpy as np
+
+from evaluation.compiled import compiled
 
 
 class BeamTable(NamedTuple):
@@ -27,7 +28,7 @@ class BeamTable(NamedTuple):
     place: np.ndarray
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def assemble_points(
     scan, table, beams, ranges, intensity, geometry, label, instance, step
 ):
