@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from cns_drake import embree
 from cns_drake.curved_proxies import circumscribe
 from cns_drake.perception_geometry import (
+    CapsuleSurface,
     CylinderSurface,
     EllipsoidSurface,
     TriangleSurface,
@@ -21,6 +23,11 @@ SOLID, PROXY = 1, 2
 ALL = SOLID | PROXY
 # Owns the primitives of proxies.
 PROXY_OWNER = -2
+# Longer than so many radii, cones and rounded segments lose hits to single
+# precision: one of 40 at 3000 (measured). Longer ones are cut, but for what
+# nobody needs into no more pieces than that.
+_SLENDEREST = 700.0
+_MOST_PIECES = 1000
 
 
 class Primitives(NamedTuple):
@@ -83,7 +90,7 @@ def merge_curved(members: Sequence[Member]) -> Iterator[Primitives]:
     Embree intersects spheres, cones, discs and rounded segments exactly (in
     single precision).
     """
-    cones, capsules, spheres = [], [], []
+    cones, capsules, discs, spheres = [], [], [], []
     for index, X_LG, surface in members:
         if isinstance(surface, TriangleSurface):
             continue
@@ -96,10 +103,11 @@ def merge_curved(members: Sequence[Member]) -> Iterator[Primitives]:
             [*(X_LG.translation() + side * axis), surface.radius]
             for side in (-surface.length / 2.0, surface.length / 2.0)
         ]
-        if isinstance(surface, CylinderSurface):
-            cones.append((index, ends, [-axis, axis]))
-        else:
-            capsules.append((index, ends))
+        is_cone = isinstance(surface, CylinderSurface)
+        segments = cones if is_cone else capsules
+        segments += [(index, piece) for piece in _cut(ends, surface)]
+        if is_cone:  # A cone is open at its ends: discs close it.
+            discs.append((index, ends, [-axis, axis]))
 
     for kind, segments in [
         (embree.CONE, cones),
@@ -115,15 +123,15 @@ def merge_curved(members: Sequence[Member]) -> Iterator[Primitives]:
                 ],
                 np.array([s[0] for s in segments], np.int32),
             )
-    if cones:  # A cone is open at its ends: discs close it.
-        normals = _float32(c[2] for c in cones)
+    if discs:
+        normals = _float32(d[2] for d in discs)
         yield Primitives(
             embree.DISC,
             [
-                _vertices(cones),
+                _vertices(discs),
                 (embree.NORMAL_BUFFER, embree.FLOAT3, normals),
             ],
-            np.repeat([c[0] for c in cones], 2).astype(np.int32),
+            np.repeat([d[0] for d in discs], 2).astype(np.int32),
         )
     if spheres:
         yield Primitives(
@@ -131,6 +139,19 @@ def merge_curved(members: Sequence[Member]) -> Iterator[Primitives]:
             [_vertices(spheres)],
             np.array([s[0] for s in spheres], np.int32),
         )
+
+
+def _cut(
+    ends: Sequence, surface: CylinderSurface | CapsuleSurface
+) -> list[np.ndarray]:
+    """Returns the (2, 4) ends of pieces that are not too slender.
+
+    Joints of rounded segments show to rays from inside.
+    """
+    slenderness = surface.length / surface.radius
+    num = math.ceil(min(slenderness / _SLENDEREST, _MOST_PIECES))
+    joints = np.linspace(*ends, max(num, 1) + 1)
+    return [joints[k : k + 2] for k in range(len(joints) - 1)]
 
 
 def _vertices(shapes) -> tuple[int, int, np.ndarray]:
