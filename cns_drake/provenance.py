@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import importlib.metadata
 import json
@@ -32,12 +33,18 @@ _URI = re.compile(r"<uri>\s*([^<>\0]+?)\s*</uri>")
 
 
 def dependency_versions() -> dict[str, str]:
-    """Returns package -> version, of cns-drake and what it computes with."""
-    return {
+    """Returns package -> version, of cns-drake and what it computes with.
+
+    What is not installed is left out: not all platforms have Embree's wheel.
+    """
+    versions = {
         "cns-drake": __version__,
         "python": platform.python_version(),
-        **{name: importlib.metadata.version(name) for name in _PACKAGES},
     }
+    for name in _PACKAGES:
+        with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+            versions[name] = importlib.metadata.version(name)
+    return versions
 
 
 def digest_inputs(scenario: Scenario) -> dict[str, str]:

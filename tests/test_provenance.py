@@ -1,5 +1,6 @@
 """What a recording was made from and with."""
 
+import importlib.metadata
 import shutil
 
 import pytest
@@ -82,3 +83,17 @@ def test_versions_name_what_can_change_a_byte():
     versions = dependency_versions()
     assert {"cns-drake", "python", "drake", "embreex", "numpy"} < set(versions)
     assert all(version[0].isdigit() for version in versions.values())
+
+
+def test_packages_that_a_platform_lacks_have_no_version(monkeypatch):
+    version = importlib.metadata.version
+
+    def without_embree(name):
+        if name == "embreex":
+            raise importlib.metadata.PackageNotFoundError(name)
+        return version(name)
+
+    versions = dependency_versions()
+    monkeypatch.setattr(importlib.metadata, "version", without_embree)
+    del versions["embreex"]
+    assert dependency_versions() == versions
