@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Set
+import contextlib
 from dataclasses import dataclass
 import graphlib
 import pickle
@@ -60,7 +61,8 @@ class Job:
             time; see `evaluation.files.exclusive`.
         is_done: called with the arguments before anything runs, and only if
             all that the job needs is done: whether it would find nothing to
-            do. Saves a process.
+            do. Saves a process. An InputError stands for no: it is for the
+            job to tell.
     """
 
     name: str
@@ -131,12 +133,10 @@ def _find_done(jobs: Mapping[str, Job]) -> set[str]:
     done: set[str] = set()
     for name in _ordered(jobs):
         job = jobs[name]
-        if (
-            job.is_done is not None
-            and done.issuperset(job.needs)
-            and job.is_done(*job.arguments)
-        ):
-            done.add(name)
+        if job.is_done is not None and done.issuperset(job.needs):
+            with contextlib.suppress(InputError):
+                if job.is_done(*job.arguments):
+                    done.add(name)
     return done
 
 

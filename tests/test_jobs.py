@@ -34,6 +34,9 @@ def test_what_is_done_starts_no_process(tmp_path, monkeypatch, capsys):
 
         return ask
 
+    def cannot_tell(*arguments):
+        raise InputError("FILE: cannot be read")
+
     path = tmp_path / "path"
     done = job("done", job_functions.refuse, is_done=is_done(True))
     also = job(
@@ -53,10 +56,15 @@ def test_what_is_done_starts_no_process(tmp_path, monkeypatch, capsys):
         "again", job_functions.join, [], path, needs=["new"],
         is_done=is_done(True),
     )  # fmt: skip
-    run_jobs([done, new, again], Cluster(num_workers=1))
+    unknown = job(
+        "unknown", job_functions.join, [], tmp_path / "unknown",
+        is_done=cannot_tell,
+    )  # fmt: skip
+    run_jobs([done, new, again, unknown], Cluster(num_workers=1))
     assert (tmp_path / "new").is_file()
+    assert (tmp_path / "unknown").is_file()
     assert path.is_file()
-    assert "of 2 jobs" in capsys.readouterr().err
+    assert "of 3 jobs" in capsys.readouterr().err
 
 
 def test_what_is_needed_is_there_and_faults_stay_alone(tmp_path, capsys):

@@ -10,9 +10,11 @@ from evaluation import paper
 from evaluation.cluster import Cluster
 from evaluation.collection import find_recordings, group_cities
 from evaluation.errors import InputError
+from evaluation.jobs import run_jobs
 from evaluation.methods import method
 from evaluation.report import write_report
 from evaluation.study.chosen_methods import choose_methods
+from evaluation.study.plan import plan_study
 
 # Describes a scan by how many points it has.
 OWN_METHOD = """
@@ -177,6 +179,19 @@ def test_report_is_the_same_whoever_works(recordings, report, tmp_path):
     files = studies.report_files(tmp_path)
     assert len(files) == 8 + 15
     assert files == studies.report_files(report)
+
+
+def test_what_is_done_needs_no_process(recordings, report, monkeypatch):
+    jobs = plan_study(find_recordings(recordings), report)
+    monkeypatch.setattr(Cluster, "connect", None)
+    run_jobs(jobs, Cluster())
+    (report / "figures" / "routes_metropolis.webp").rename(report / "aside")
+    try:
+        assert [j.name for j in jobs if not j.is_done(*j.arguments)] == [
+            "draw metropolis"
+        ]
+    finally:
+        (report / "aside").rename(report / "figures/routes_metropolis.webp")
 
 
 def test_own_method_beside_the_others(recordings, tmp_path, monkeypatch):

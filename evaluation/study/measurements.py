@@ -6,7 +6,6 @@ from pathlib import Path
 
 from evaluation.change import Surveyed
 from evaluation.change import compare as compare_maps
-from evaluation.errors import InputError
 from evaluation.jobs import Tell
 from evaluation.place_recognition import judge_retrieval
 from evaluation.recording_survey import SurveyedDrive
@@ -59,11 +58,7 @@ def is_measured(
     result: Path,
 ) -> bool:
     """Tells whether there is nothing to do; see `measure_change`."""
-    try:
-        inputs = _change_inputs(map_name, stages, surveys)
-    except InputError:  # For the job to tell.
-        return False
-    return is_current(result, inputs)
+    return is_current(result, _change_inputs(map_name, stages, surveys))
 
 
 def _change_inputs(
@@ -120,10 +115,7 @@ def are_recognised(
     result: Path,
 ) -> bool:
     """Tells whether there is nothing to do; see `recognise_places`."""
-    try:
-        inputs = _recognition_inputs(map_name, stages, surveys, method)
-    except InputError:  # For the job to tell.
-        return False
+    inputs = _recognition_inputs(map_name, stages, surveys, method)
     return is_current(result, inputs)
 
 

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from evaluation.drive_source import DriveSource
-from evaluation.errors import InputError
 from evaluation.jobs import Job, Tell
 from evaluation.progress import Track
 from evaluation.recording_survey import survey_recording
@@ -104,11 +103,8 @@ def is_surveyed(
     files: SurveyFiles,
 ) -> bool:
     """Tells whether nothing is missing; see `survey_drive`."""
-    try:
-        inputs = survey_inputs(source, roles)
-        return _missing(inputs, methods if roles else (), files) == ([], {})
-    except InputError:  # For the job to tell.
-        return False
+    inputs = survey_inputs(source, roles)
+    return _missing(inputs, methods if roles else (), files) == ([], {})
 
 
 def _missing(

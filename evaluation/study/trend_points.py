@@ -171,10 +171,6 @@ def measure_database(
     write_part(result, inputs, points)
 
 
-def _recorded(path: Path) -> RecordedDrive:
-    return RecordedDrive(path.absolute())
-
-
 def is_database_measured(
     source: DriveSource,
     query: SurveyFiles,
@@ -182,10 +178,7 @@ def is_database_measured(
     result: Path,
 ) -> bool:
     """Tells whether there is nothing to do; see `measure_database`."""
-    try:
-        return is_current(result, _inputs(source, query, methods))
-    except InputError:  # For the job to tell.
-        return False
+    return is_current(result, _inputs(source, query, methods))
 
 
 def _inputs(
@@ -197,3 +190,7 @@ def _inputs(
         "queries": [part_digest(query.described(one)) for one in methods],
         "methods": [method.inputs() for method in methods],
     }
+
+
+def _recorded(path: Path) -> RecordedDrive:
+    return RecordedDrive(path.absolute())

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from evaluation.drawing import PRINTED
-from evaluation.errors import InputError
 from evaluation.figures import Stage, draw_change, draw_routes
 from evaluation.files import make_folder
 from evaluation.jobs import Tell
@@ -72,10 +71,7 @@ def is_city_drawn(
     pages: Path,
 ) -> bool:
     """Tells whether there is nothing to do; see `draw_city`."""
-    try:
-        inputs = _inputs(map_name, [survey for _, survey in stages])
-    except InputError:  # For the job to tell.
-        return False
+    inputs = _inputs(map_name, [survey for _, survey in stages])
     return is_current(pages, inputs) and _is_drawn([stem], drawn, inputs)
 
 
