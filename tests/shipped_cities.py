@@ -4,11 +4,16 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 from pydrake.geometry import Role, SceneGraph
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
+from cns_drake.city.geometry.object_parts import part_triangles
+from cns_drake.city.geometry.structures import Structure
+from cns_drake.city.ground.streets import GROUND_TAG
 from cns_drake.city.layout import City, make_city
+from cns_drake.city.roads.network import RoadNetwork, load_road_network
 from cns_drake.paths import worlds_folder
 
 
@@ -46,6 +51,30 @@ def world_of(name: str) -> Path:
 def city(name: str) -> City:
     """Returns the generated city."""
     return make_city(world_of(name))
+
+
+@cache
+def network_of(name: str) -> RoadNetwork:
+    """Returns the roads of a map."""
+    return load_road_network(world_of(name) / "roads.yaml")
+
+
+@cache
+def structures_of(name: str) -> dict[str, Structure]:
+    """Returns the structures of the generated city, by name."""
+    return {structure.name: structure for structure in city(name).structures}
+
+
+@cache
+def ground_triangles(name: str, structure_name: str) -> np.ndarray:
+    """Returns the triangles (N, 3, 3) of a structure of the ground, in W."""
+    structure = structures_of(name)[structure_name]
+    assert GROUND_TAG in structure.tags
+    corners = []
+    for part in structure.model.parts:
+        p, triangles = part_triangles(part, structure.model.meshes)
+        corners.append(p[triangles])
+    return np.concatenate(corners)
 
 
 def stage_files(name: str) -> list[Path]:

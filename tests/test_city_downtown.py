@@ -1,16 +1,15 @@
 """The heights of Downtown, its monument, and what its districts hold."""
 
-from functools import cache
+from functools import cache, partial
 
 from drives import shipped_drive
 import numpy as np
 import pytest
 import shapely
-from shipped_cities import city, world_of
+from shipped_cities import ground_triangles, network_of, structures_of
 
 from cns_drake.city.geometry.object_parts import part_triangles
 from cns_drake.city.ground.streets import GROUND_TAG, kerb_height
-from cns_drake.city.roads.network import load_road_network
 from cns_drake.city.roads.surface import RoadSurface
 
 RAMPS = (
@@ -21,31 +20,13 @@ RAMPS = (
     "ramp_south_east",
 )
 
-
-@cache
-def network():
-    return load_road_network(world_of("downtown") / "roads.yaml")
-
-
-@cache
-def structures():
-    return {s.name: s for s in city("downtown").structures}
+network = partial(network_of, "downtown")
+structures = partial(structures_of, "downtown")
+triangles_of = partial(ground_triangles, "downtown")
 
 
 def standing(kind):
     return [s for s in structures().values() if s.semantic_class == kind]
-
-
-@cache
-def triangles_of(name):
-    """Returns the triangles (N, 3, 3) of a structure of the ground, in W."""
-    structure = structures()[name]
-    assert GROUND_TAG in structure.tags
-    corners = []
-    for part in structure.model.parts:
-        p, triangles = part_triangles(part, structure.model.meshes)
-        corners.append(p[triangles])
-    return np.concatenate(corners)
 
 
 class Surface:

@@ -1,16 +1,14 @@
 """The river of Riverside and what crosses it."""
 
-from functools import cache
+from functools import partial
 
 import numpy as np
 import pytest
 import shapely
 from shapely.geometry import LineString, Point, box
-from shipped_cities import city, world_of
+from shipped_cities import ground_triangles, network_of, structures_of
 
-from cns_drake.city.geometry.object_parts import part_triangles
 from cns_drake.city.ground.streets import GROUND_TAG
-from cns_drake.city.roads.network import load_road_network
 
 WATER = -2.8
 # From bank to bank; the quays are at y = -131 and -197.
@@ -20,22 +18,9 @@ RIVER = (-182.0, -146.0)
 STREETS = {"ring_west": 0.0, "mill": 90.4, "church": 336.8, "ring_east": 394.4}
 FOOTBRIDGE = 204.0
 
-
-@cache
-def structures():
-    return {s.name: s for s in city("riverside").structures}
-
-
-@cache
-def ground_triangles(name):
-    """Returns the triangles (N, 3, 3) of a structure of the ground, in W."""
-    structure = structures()[name]
-    assert GROUND_TAG in structure.tags
-    corners = []
-    for part in structure.model.parts:
-        p, triangles = part_triangles(part, structure.model.meshes)
-        corners.append(p[triangles])
-    return np.concatenate(corners)
+network = partial(network_of, "riverside")
+structures = partial(structures_of, "riverside")
+triangles_of = partial(ground_triangles, "riverside")
 
 
 def heights_at(x, y):
@@ -48,7 +33,7 @@ def heights_at(x, y):
         if not structure.model.footprint.intersects(at):
             continue
         heights = set()
-        for a, b, c in ground_triangles(name):
+        for a, b, c in triangles_of(name):
             edges = np.column_stack([b - a, c - a])[:2]
             if abs(np.linalg.det(edges)) < 1e-6:
                 continue  # A wall.
@@ -101,7 +86,7 @@ def test_the_river_has_walls_from_bank_to_bottom():
                 continue
             if name.endswith("_water"):
                 continue
-            triangles = ground_triangles(name)
+            triangles = triangles_of(name)
             on = np.ptp(triangles[:, :, 1], axis=1) < 1e-6
             on &= np.abs(triangles[:, 0, 1] - y) < 1e-6
             on &= triangles[:, :, 2].min(axis=1) < WATER + 1e-6
@@ -144,7 +129,7 @@ def test_parapets_stand_on_both_sides_of_the_street_bridges(x):
         for s in structures().values()
         if s.semantic_class == "fence" and "river" in s.tags
     ]
-    lanes = load_road_network(world_of("riverside") / "roads.yaml").lane_area()
+    lanes = network().lane_area()
     for left, right in ((x - 8.5, x - 4.5), (x + 4.5, x + 8.5)):
         strip = box(left, RIVER[0], right, RIVER[1])
         beside = [wall for wall in walls if strip.contains(wall)]
@@ -172,13 +157,12 @@ def test_the_river_runs_from_bound_to_bound_below_its_banks():
 
 
 def test_cars_park_in_bays_and_on_drives_but_in_no_lane():
-    network = load_road_network(world_of("riverside") / "roads.yaml")
-    lanes = network.lane_area()
+    lanes = network().lane_area()
     shapely.prepare(lanes)
     cars = [s for s in structures().values() if s.semantic_class == "car"]
     for car in cars:
         assert not lanes.intersects(car.footprint_W), car.name
-    bays = network.parking_bays()
+    bays = network().parking_bays()
     in_bays = [car for car in cars if car.tags[0] == "bay"]
     assert {car.tags[1] for car in in_bays} == {name for name, _ in bays}
     for car in in_bays:
@@ -190,7 +174,8 @@ def test_cars_park_in_bays_and_on_drives_but_in_no_lane():
     # Bays take room from sidewalks, and leave room to walk.
     for (name, _), area in bays.items():
         assert not area.intersects(lanes.buffer(-0.01))
-        assert network.roads[name].sidewalk - network.roads[name].parking > 1.5
+        road = network().roads[name]
+        assert road.sidewalk - road.parking > 1.5
 
 
 def test_front_gardens_are_fenced():

@@ -7,11 +7,10 @@ import pytest
 import shapely
 from shapely.affinity import affine_transform
 from shapely.strtree import STRtree
-from shipped_cities import PLANS, city, world_of
+from shipped_cities import PLANS, city, network_of
 
 from cns_drake.city.geometry.object_parts import HEADROOM, part_triangles
 from cns_drake.city.ground.streets import GROUND_TAG
-from cns_drake.city.roads.network import load_road_network
 from cns_drake.semantics import CLASS_IDS
 
 # Parts may reach this far outside a footprint: plinths, pilasters, steps.
@@ -35,7 +34,7 @@ def standing(name):
 
 @pytest.fixture(scope="module")
 def network(name):
-    return load_road_network(world_of(name) / "roads.yaml")
+    return network_of(name)
 
 
 def within(count, least_and_greatest) -> bool:

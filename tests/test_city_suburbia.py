@@ -1,28 +1,20 @@
 """The gardens, streets, park and village of Suburbia."""
 
-from functools import cache
+from functools import cache, partial
 import itertools
 
 import pytest
 import shapely
 from shapely.geometry import LineString, Point, box
-from shipped_cities import city, world_of
+from shipped_cities import network_of, structures_of, world_of
 
-from cns_drake.city.roads.network import load_road_network
 from cns_drake.city.stages import load_stages
 
 ENCLOSURES = ("hedge", "picket_fence", "garden_wall")
 HOUSES = ("detached_house", "semi_detached", "bungalow")
 
-
-@cache
-def structures():
-    return {s.name: s for s in city("suburbia").structures}
-
-
-@cache
-def network():
-    return load_road_network(world_of("suburbia") / "roads.yaml")
+network = partial(network_of, "suburbia")
+structures = partial(structures_of, "suburbia")
 
 
 def named(*stems):
