@@ -39,8 +39,9 @@ def run(app: typer.Typer) -> None:
     """Runs a command line; bad usage and bad input never show a traceback.
 
     Exits with 2 and one line on stderr for an InputError, for words that the
-    command line does not take and for files that cannot be used; with 130
-    when interrupted (also by SIGTERM, so that recordings are closed).
+    command line does not take, for files that cannot be used and for lack of
+    memory; with 1 for jobs that failed; with 130 when interrupted (also by
+    SIGTERM, so that recordings are closed).
     """
     message, status = None, 0
     try:
@@ -59,6 +60,8 @@ def run(app: typer.Typer) -> None:
         # Whoever read the results has seen enough of them. Python flushes
         # once more at its end, which must not fail again.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except MemoryError:
+        message, status = "error: not enough memory", _BAD_INPUT
     except OSError as error:
         where = error.filename or "standard output"
         message = f"error: {where}: {error.strerror or error}"

@@ -4,8 +4,38 @@ import io
 
 import pytest
 from rich.console import Console
+import typer
 
 from cns_drake import terminal
+from cns_drake.errors import InputError
+from evaluation.errors import FailedJobsError
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "line"),
+    [
+        (InputError("FILE: fault"), 2, "error: FILE: fault"),
+        (FailedJobsError("job: fault"), 1, "error: job: fault"),
+        (MemoryError(), 2, "error: not enough memory"),
+        (FileNotFoundError(2, "gone", "FILE"), 2, "error: FILE: gone"),
+        (OSError("full"), 2, "error: standard output: full"),
+    ],
+)
+def test_faults_are_one_line(monkeypatch, capsys, error, status, line):
+    app = typer.Typer()
+
+    @app.command()
+    def fail():
+        raise error
+
+    # Signals stay as the tests have them.
+    monkeypatch.setattr(terminal, "interrupt_on_termination", lambda: None)
+    monkeypatch.setattr(terminal, "ignore_interrupts", lambda: None)
+    monkeypatch.setattr("sys.argv", ["program"])
+    with pytest.raises(SystemExit) as raised:
+        terminal.run(app)
+    assert raised.value.code == status
+    assert capsys.readouterr().err == f"{line}\n"
 
 
 @pytest.mark.parametrize("width", [30, 40, 60, 80, 200])
