@@ -106,7 +106,9 @@ def merge_curved(members: Sequence[Member]) -> Iterator[Primitives]:
         is_cone = isinstance(surface, CylinderSurface)
         segments = cones if is_cone else capsules
         segments += [(index, piece) for piece in _cut(ends, surface)]
-        if is_cone:  # A cone is open at its ends: discs close it.
+        if is_cone:
+            # Embree closes cones as well, but rounding of the axis tilts the
+            # ends of flat ones; discs do not tilt.
             discs.append((index, ends, [-axis, axis]))
 
     for kind, segments in [
@@ -146,7 +148,7 @@ def _cut(
 ) -> list[np.ndarray]:
     """Returns the (2, 4) ends of pieces that are not too slender.
 
-    Joints of rounded segments show to rays from inside.
+    Joints show to rays from inside.
     """
     slenderness = surface.length / surface.radius
     num = math.ceil(min(slenderness / _SLENDEREST, _MOST_PIECES))
