@@ -20,6 +20,8 @@ from cns_drake.scenario import Scenario
 _PACKAGES = (
     "drake",
     "embreex",
+    "llvmlite",
+    "numba",
     "numpy",
     "scipy",
     "mcap",
