@@ -11,14 +11,17 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from pydrake.math import RotationMatrix
 
 from cns_drake import __version__
 from cns_drake.frame_clock import FRAME_PERIOD, frame_stamp_ns
-from cns_drake.messages import MAP_FRAME
+from cns_drake.messages import MAP_FRAME, to_quat_xyzw
 from cns_drake.planning import count_frames, plan_drive
 from cns_drake.provenance import combined_digest, digest_inputs
 from cns_drake.scenario import Scenario
 from cns_drake.station import make_station
+from cns_drake.trajectory import pose_at
+from evaluation import poses
 from evaluation.sequences import Sequence
 
 
@@ -78,9 +81,16 @@ class SimulatedSequence(Sequence):
 
     @cached_property
     def X_WS(self) -> np.ndarray:
-        R_WB, p_WB = self._trajectory.poses(FRAME_PERIOD * np.arange(len(self)))
-        X_WB = np.tile(np.eye(4), (len(self), 1, 1))
-        X_WB[:, :3, :3], X_WB[:, :3, 3] = R_WB, p_WB
+        moments = self._trajectory.at(FRAME_PERIOD * np.arange(len(self)))
+        X_WBs = [pose_at(moments, frame) for frame in range(len(self))]
+        # By way of quaternions, as a plant and a recording have it: to the
+        # last bit, on which a voxel or a plane may depend.
+        R_WBs = [RotationMatrix(X.rotation().ToQuaternion()) for X in X_WBs]
+        quat_xyzw = np.array([to_quat_xyzw(R_WB) for R_WB in R_WBs])
+        X_WB = poses.make_pose(
+            poses.rotation_from_quaternion(quat_xyzw),
+            np.array([X.translation() for X in X_WBs]),
+        )
         return X_WB @ self._X_BS
 
     @property

@@ -126,11 +126,11 @@ class Trajectory:
         return spatial_acceleration_at(self.at(t))
 
 
-def pose_at(moment: Moments) -> RigidTransform:
-    """Returns X_WB at one time."""
-    jet = moment.jet
+def pose_at(moments: Moments, row: int = 0) -> RigidTransform:
+    """Returns X_WB at one of several times."""
+    jet = moments.jet
     return RigidTransform(
-        RollPitchYaw(0.0, -jet.climb[0], jet.yaw[0]), jet.p[0]
+        RollPitchYaw(0.0, -jet.climb[row], jet.yaw[row]), jet.p[row]
     )
 
 
