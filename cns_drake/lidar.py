@@ -62,6 +62,7 @@ class Lidar(LeafSystem):
         motion_distortion: bool = False,
         structures: StructureTable | None = None,
         anchored_frames: Collection[FrameId] = (),
+        num_threads: int = 1,
     ):
         """Constructs the LiDAR.
 
@@ -75,6 +76,8 @@ class Lidar(LeafSystem):
             structures: gives labels and instance ids to returns.
             anchored_frames: frames that never move, besides the world's;
                 their geometry is cheaper to cast on.
+            num_threads: how many threads share its rays; what it measures
+                does not depend on it.
         """
         super().__init__()
         self._parent_frame_id = parent_frame_id
@@ -105,7 +108,12 @@ class Lidar(LeafSystem):
             value_producer=ValueProducer(
                 allocate=lambda: Value(object()),
                 calc=lambda context, value: value.set_value(
-                    _SeenGeometry(parent_frame_id, structures, anchored_frames)
+                    _SeenGeometry(
+                        parent_frame_id,
+                        structures,
+                        anchored_frames,
+                        num_threads,
+                    )
                 ),
             ),
             prerequisites_of_calc={self.nothing_ticket()},
@@ -200,10 +208,11 @@ class _SeenGeometry:
         instance: (num_geometries,) uint16 structure of each geometry.
     """
 
-    def __init__(self, own_frame_id, structures, anchored_frames):
+    def __init__(self, own_frame_id, structures, anchored_frames, num_threads):
         self._own_frame_id = own_frame_id
         self._structures = structures
         self._anchored_frames = frozenset(anchored_frames)
+        self._num_threads = num_threads
         self._count = None
 
     def update(self, query_object: QueryObject) -> None:
@@ -241,4 +250,5 @@ class _SeenGeometry:
             geometries,
             self._anchored_frames | {world},
             query_object.GetPoseInWorld,
+            num_threads=self._num_threads,
         )

@@ -32,7 +32,7 @@ def run_sequence(
     graphviz: Path | None = None,
     overwrite: bool = False,
 ) -> Run:
-    """Runs a sequence with progress on stderr; see `simulate`.
+    """Runs a sequence on all cores with progress on stderr; see `simulate`.
 
     Args:
         name_or_file: a shipped sequence or a scenario file.
@@ -49,6 +49,7 @@ def run_sequence(
     with uninterrupted():  # Slow to import, not needed for `--help`.
         from cns_drake.scenario import load_scenario
         from cns_drake.simulation import simulate
+        from evaluation.cluster import num_cores
 
     scenario = load_scenario(name_or_file)
     if lidar is not None:
@@ -64,6 +65,7 @@ def run_sequence(
             page_file=recording,
             graphviz_file=graphviz,
             overwrite=overwrite,
+            num_threads=num_cores(),
             on_frame=on_frame,
             on_note=lambda text: terminal.print_note(progress, text),
         )

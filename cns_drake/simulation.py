@@ -77,6 +77,7 @@ def simulate(
     page_file: Path | None = None,
     graphviz_file: Path | None = None,
     overwrite: bool = False,
+    num_threads: int = 1,
     on_frame: ProgressCallback = lambda done, total: None,
     on_note: NoteCallback = lambda text: None,
 ) -> Run:
@@ -93,6 +94,8 @@ def simulate(
         graphviz_file: where to save the Diagram as Graphviz text, if
             anywhere.
         overwrite: replace an existing recording of that name.
+        num_threads: how many threads cast the rays of a LiDAR; the recording
+            does not depend on it.
         on_frame: is told about progress.
         on_note: is told what was found of an interrupted run.
 
@@ -124,6 +127,7 @@ def simulate(
                 trajectory=drive.trajectory,
                 bag=writer,
                 page=page,
+                num_threads=num_threads,
             )
             if graphviz_file is not None:
                 write_part(graphviz_file, diagram.GetGraphvizString())

@@ -29,6 +29,7 @@ def make_station(
     trajectory: Trajectory | None = None,
     bag: BagWriter | BackgroundWriter | None = None,
     page: MeshcatRecorder | None = None,
+    num_threads: int = 1,
 ) -> Diagram:
     """Makes the Diagram of a scenario.
 
@@ -49,6 +50,7 @@ def make_station(
         trajectory: the drive, if already planned.
         bag: an open recording of the scenario's topics.
         page: a recorder of the same world for a web page.
+        num_threads: how many threads cast the rays of a LiDAR.
 
     Raises:
         InputError: the scenario's files cannot be used.
@@ -87,6 +89,7 @@ def make_station(
                 motion_distortion=config.motion_distortion,
                 structures=world.structures,
                 anchored_frames=world.anchored_frames(),
+                num_threads=num_threads,
             ),
         )
         builder.Connect(

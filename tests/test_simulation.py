@@ -42,8 +42,10 @@ def test_progress_is_told_to_the_last_frame(scenario, tmp_path):
 
 
 def test_same_scenario_same_bytes(scenario, tmp_path):
+    """However many threads cast the rays."""
     recordings = [
-        simulate(scenario, tmp_path / name).folder for name in ("a", "b")
+        simulate(scenario, tmp_path / name, num_threads=threads).folder
+        for name, threads in (("a", 1), ("b", 3))
     ]
     for name in ("metropolis_04_0.mcap", "metadata.yaml", "scenario.yaml"):
         first, second = ((r / name).read_bytes() for r in recordings)

@@ -41,6 +41,7 @@ from cns_drake.ray_casting import RayCastingScene
 from cns_drake.scenario import Scenario, load_scenario
 from cns_drake.simulation import simulate
 from cns_drake.vehicle_motion import VehicleMotion
+from evaluation.cluster import num_cores
 
 SEQUENCES = ("metropolis_04", "downtown_04")
 # Step -> what does it; of calls within calls, the innermost counts.
@@ -161,7 +162,12 @@ def take_turns(sequence: str, rounds: int, segment: int, label: str) -> None:
     scenario = scenario.model_copy(update={"frames": (rounds + 1) * segment})
     turns = TakingTurns(scenario, segment)
     with tempfile.TemporaryDirectory() as folder:
-        simulate(scenario, Path(folder), on_frame=turns.on_frame)
+        simulate(
+            scenario,
+            Path(folder),
+            num_threads=num_cores(),
+            on_frame=turns.on_frame,
+        )
     recorded, cast = np.array(turns.recorded), np.array(turns.cast)
     wall, cpu = np.median(recorded / cast, axis=0)
     ours, theirs = (
