@@ -44,10 +44,11 @@ class RayGroup:
         calc_X_WF: Callable[[FrameId], RigidTransform],
     ) -> None:
         """Sets `X_OL` by the pose of the group's frame."""
-        X_OF = RigidTransform(-p_WO)
+        X_WL = self.X_FL
         if self.frame_id is not None:
-            X_OF = X_OF @ calc_X_WF(self.frame_id)
-        self.X_OL = X_OF.GetAsMatrix4()[:3] @ self.X_FL
+            X_WL = calc_X_WF(self.frame_id).GetAsMatrix4() @ X_WL
+        self.X_OL = X_WL[:3].copy()
+        self.X_OL[:, 3] -= p_WO
 
 
 def group_geometries(
