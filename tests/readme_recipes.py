@@ -270,7 +270,8 @@ RECIPES = {
         "base: riverside_01",
         changes=(
             ("riverside_01", "town/sequence_01.yaml"),
-            ("count: 60", "count: 2"),
+            ("count: 20", "count: 2"),
+            ("0, 1, 2", "0"),
         ),
         file="family.yaml",
     ),
