@@ -1,14 +1,15 @@
 """Families of scenarios that one small file describes.
 
 A city that decays from a place outwards: each member of a family lacks the
-buildings and plants nearest to that place, a given part of them all. Members
-with more missing lack all that those with less lack. Routes by lot and other
-LiDARs multiply the family. Every member is a scenario of its own.
+buildings and plants nearest to that place, a given part of them all; or of
+what an earlier stage lacks, which makes stages between the two. Members with
+more missing lack all that those with less lack. Routes by lot and other LiDARs
+multiply the family. Every member is a scenario of its own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from itertools import product
 from pathlib import Path
 from typing import Annotated
@@ -31,6 +32,7 @@ from cns_drake.paths import shipped_sequences
 from cns_drake.route import Route
 from cns_drake.route_drawing import draw_route
 from cns_drake.scenario import Scenario, load_scenario
+from cns_drake.world import load_world, structures_in
 from cns_drake.yaml_files import read_yaml
 
 # What can be missing; streets, ground and street furniture stay.
@@ -81,8 +83,10 @@ class Family(_Model):
         base: sequence or scenario file that gives map, route, speeds and
             sensors.
         stage: of which something is missing; the map's last one by default.
-        missing: parts of the buildings and plants that are missing, each
-            from 0 to 1; or {from, to, count} for evenly spread ones.
+        towards: another stage; only what it lacks can be missing.
+        missing: parts of the buildings and plants, or of what `towards`
+            lacks, that are missing, each from 0 to 1; or {from, to, count}
+            for evenly spread ones.
         seeds: for each of these, another place from which the city decays.
         routes: routes by lot in place of the base's.
         lidars: presets in place of the base's LiDARs.
@@ -90,6 +94,7 @@ class Family(_Model):
 
     base: str
     stage: str | None = None
+    towards: str | None = None
     missing: Annotated[tuple[_Part, ...], BeforeValidator(_spread)] = Field(
         (0.0,), min_length=1
     )
@@ -136,10 +141,16 @@ def vary(base: Scenario, family: Family, source) -> list[Scenario]:
         path.stem.removeprefix("stage_")
         for path in base.map_folder.glob("stage_*.sdf")
     )
+    removable = None
+    if family.towards is not None:
+        removable = _difference(base, stage, family.towards, source)
     orders = {
-        seed: _decay_order(base.map_folder / "structures.csv", seed)
+        seed: _decay_order(base.map_folder / "structures.csv", seed, removable)
         for seed in family.seeds
     }
+    what = "buildings and plants"
+    if family.towards is not None:
+        what = f"what stage {family.towards} lacks"
     members = []
     for part, seed, (route_label, route), lidar in product(
         family.missing,
@@ -154,7 +165,7 @@ def vary(base: Scenario, family: Family, source) -> list[Scenario]:
             "name": "_".join(labels).replace("-", "_"),
             "stage": stage,
             "without": tuple(sorted(order[: round(part * len(order))])),
-            "title": f"{100 * part:.1f} % of buildings and plants missing",
+            "title": f"{100 * part:.1f} % of {what} missing",
         }
         if route is not None:
             update |= {"route": route, "waypoints": None}
@@ -204,8 +215,37 @@ def _routes(
     ]
 
 
-def _decay_order(table: Path, seed: int) -> list[str]:
+def _difference(
+    base: Scenario, stage: str, other: str, source
+) -> frozenset[str]:
+    """Returns the structures of a stage that another one lacks.
+
+    Raises:
+        InputError: a stage cannot be read, or the other lacks nothing.
+    """
+    names = []
+    for one in (stage, other):
+        scenario = base.model_copy(update={"stage": one})
+        scenario.check_files(source)
+        names.append(structures_in(load_world(scenario.world_file)))
+    difference = names[0] - names[1]
+    if not difference:
+        raise InputError(
+            f"{source}: towards: stage {other} lacks nothing of stage {stage}"
+        )
+    return frozenset(difference)
+
+
+def _decay_order(
+    table: Path, seed: int, removable: Set[str] | None
+) -> list[str]:
     """Returns what can be missing, what goes first at the head.
+
+    Args:
+        table: of all structures.
+        seed: of the place from which the city decays.
+        removable: names of what can be missing; all buildings and plants if
+            None.
 
     Raises:
         InputError: the table cannot be read or does not say where things
@@ -214,7 +254,11 @@ def _decay_order(table: Path, seed: int) -> list[str]:
     rows = [
         row
         for _, row in read_records(table, ("name", "class"))
-        if row["class"] in _REMOVABLE
+        if (
+            row["class"] in _REMOVABLE
+            if removable is None
+            else row["name"] in removable
+        )
     ]
     if not rows:
         raise InputError(f"{table}: nothing in it that could be missing")

@@ -115,6 +115,15 @@ def _check_names(scene_graph: SceneGraph, sdf: Path) -> None:
             raise InputError(f"{sdf}: a name is not UTF-8 text") from None
 
 
+def structures_in(world: World) -> set[str]:
+    """Returns the names of the structures that stand in a world."""
+    inspector = world.scene_graph.model_inspector()
+    return {
+        structure_name(inspector.GetName(geometry_id))
+        for geometry_id in inspector.GetAllGeometryIds()
+    }
+
+
 def _remove(
     scene_graph: SceneGraph, source_id, names: set[str], sdf: Path
 ) -> None:

@@ -11,6 +11,7 @@ from cns_drake.paths import shipped_maps
 from cns_drake.planning import plan_drive
 from cns_drake.scenario import load_scenario
 from cns_drake.variation import load_family, write_scenarios
+from cns_drake.world import load_world, structures_in
 
 
 def family(tmp_path, **values):
@@ -61,6 +62,28 @@ def test_parts_that_are_missing_grow_out_of_one_place(tmp_path):
     assert len(set(nearest) & set(gone)) > 0.6 * len(gone)
 
 
+def test_between_two_stages_lies_what_the_earlier_one_lacks(tmp_path):
+    values = {"stage": "04", "towards": "02", "missing": [0.0, 0.4, 1.0]}
+    members = family(tmp_path, seeds=[0, 1], **values)
+    folder = shipped_maps()["metropolis"]
+    first, last = (
+        structures_in(load_world(folder / f"stage_{stage}.sdf"))
+        for stage in ("02", "04")
+    )
+    gone = {m.name.split("_", 2)[2]: set(m.without) for m in members}
+    assert gone["m000_s0"] == gone["m000_s1"] == set()
+    assert gone["m1000_s0"] == gone["m1000_s1"] == last - first
+    for name in ("m400_s0", "m400_s1"):
+        assert gone[name] < last - first
+        assert len(gone[name]) == round(0.4 * len(last - first))
+    assert gone["m400_s0"] != gone["m400_s1"]
+    assert members[2].title == "40.0 % of what stage 02 lacks missing"
+    # All of it missing: the stage that it goes towards.
+    (whole,) = [m for m in members if m.name.endswith("m1000_s0")]
+    world = load_world(whole.world_file, without=whole.without)
+    assert structures_in(world) == first
+
+
 def test_seeds_choose_other_places(tmp_path):
     a, b, c = family(tmp_path, missing=[0.2], seeds=[0, 1, 0])
     assert a.without == c.without
@@ -95,6 +118,8 @@ def test_a_member_is_a_scenario_file_of_its_own(tmp_path):
         ({"missing": []}, r"missing"),
         ({"seed": [1]}, r"seed: Extra inputs"),
         ({"stage": "09"}, r"stage: map 'metropolis' has no stage '09'"),
+        ({"towards": "07"}, r"stage: map 'metropolis' has no stage '07'"),
+        ({"towards": "04"}, r"towards: stage 04 lacks nothing of stage 04"),
         ({"base": "nowhere"}, r"nowhere: no such scenario file"),
         ({"lidars": ["sonar"]}, r"unknown preset 'sonar'"),
     ],
