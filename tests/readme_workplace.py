@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import contextlib
+import os
 from pathlib import Path
+import queue
 import re
 import subprocess
 import sys
+import threading
 
 import readme
 from readme_recipes import NOT_RUN, RECIPES
+
+# A machine that runs other tests beside may take its time to answer.
+_PATIENT = {"DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "300s"}
 
 
 def claims(piece: readme.Piece) -> list[str]:
@@ -95,13 +101,27 @@ class Workplace:
             cwd=self.folder,
             stderr=subprocess.PIPE,
             text=True,
+            env=os.environ | _PATIENT,
         )
-        self._started.callback(process.communicate)
+        # Read to the end, or the process would stop when the pipe is full.
+        lines = queue.SimpleQueue()
+        reader = threading.Thread(target=_pass_on, args=(process, lines))
+        reader.start()
+        self._started.callback(reader.join)
+        self._started.callback(process.wait)
         self._started.callback(process.terminate)
         told = []
-        for line in process.stderr:
+        while (line := lines.get()) is not None:
             told.append(line)
             if match := re.search(ready, line):
                 self._values |= match.groupdict()
                 return
         raise AssertionError(f"{command}\n{''.join(told)}")
+
+
+def _pass_on(process, lines: queue.SimpleQueue) -> None:
+    """Puts the lines of a process's stderr into a queue, and None."""
+    with process.stderr:
+        for line in process.stderr:
+            lines.put(line)
+    lines.put(None)
