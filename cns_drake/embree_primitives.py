@@ -17,6 +17,7 @@ from cns_drake.perception_geometry import (
     TriangleSurface,
 )
 from cns_drake.ray_groups import Member
+from cns_drake.surface_merging import merge_triangles
 
 # Which rays hit a geometry: all do hit solids, some also hit proxies.
 SOLID, PROXY = 1, 2
@@ -57,29 +58,26 @@ def merge_flat(members: Sequence[Member]) -> Iterator[Primitives]:
     ]
     for surfaces, mask in ((flat, SOLID), (curved, PROXY)):
         if surfaces:
-            yield _merge_triangles(surfaces, mask)
+            yield _as_primitives(surfaces, mask)
 
 
-def _merge_triangles(surfaces: Sequence[Member], mask: int) -> Primitives:
-    vertices, triangles, owners, num_vertices = [], [], [], 0
-    for index, X_LG, surface in surfaces:
-        vertices.append(
-            surface.p_GVset @ X_LG.rotation().matrix().T + X_LG.translation()
-        )
-        triangles.append(surface.triangles + num_vertices)
-        owners.append(np.full(len(surface.triangles), index))
-        num_vertices += len(surface.p_GVset)
+def _as_primitives(surfaces: Sequence[Member], mask: int) -> Primitives:
+    merged, owners = merge_triangles(surfaces)
     return Primitives(
         embree.TRIANGLE,
         [
-            (embree.VERTEX_BUFFER, embree.FLOAT3, _float32(vertices)),
+            (
+                embree.VERTEX_BUFFER,
+                embree.FLOAT3,
+                merged.p_GVset.astype(np.float32),
+            ),
             (
                 embree.INDEX_BUFFER,
                 embree.UINT3,
-                np.concatenate(triangles).astype(np.uint32),
+                merged.triangles.astype(np.uint32),
             ),
         ],
-        np.concatenate(owners).astype(np.int32),
+        owners,
         mask,
     )
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from cns_drake.ray_groups import RayGroup
 from cns_drake.rays import Hits, Rays
-from cns_drake.surface_merging import tessellate
+from cns_drake.surface_merging import merge_triangles, tessellate
 
 # Sides of a round shape, so that it is within 0.03 % of its radius.
 _SIDES = 128
@@ -34,21 +34,19 @@ class Open3dScene:
         self._scenes = []
         self._owners = []
         for group in groups:
-            vertices, triangles, owners, count = [], [], [], 0
-            for index, X_LG, shape in group.members:
-                surface = tessellate(shape, _SIDES)
-                p_LVset = X_LG.multiply(surface.p_GVset.T).T
-                vertices.append(p_LVset.astype(np.float32))
-                triangles.append((surface.triangles + count).astype(np.uint32))
-                owners.append(np.full(len(surface.triangles), index, np.int32))
-                count += len(p_LVset)
+            merged, owners = merge_triangles(
+                [
+                    (index, X_LG, tessellate(shape, _SIDES))
+                    for index, X_LG, shape in group.members
+                ]
+            )
             scene = open3d.t.geometry.RaycastingScene()
             scene.add_triangles(
-                open3d.core.Tensor(np.concatenate(vertices)),
-                open3d.core.Tensor(np.concatenate(triangles)),
+                open3d.core.Tensor(merged.p_GVset.astype(np.float32)),
+                open3d.core.Tensor(merged.triangles.astype(np.uint32)),
             )
             self._scenes.append(scene)
-            self._owners.append(np.concatenate(owners))
+            self._owners.append(owners)
 
     def place(self, rows: Collection[int]) -> None:
         """Does nothing: rays are brought to the groups when they are cast."""

@@ -1,8 +1,8 @@
-"""Merging perception geometry into few triangle meshes, for pictures."""
+"""Merging perception geometry into few triangle meshes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 from pydrake.geometry import FrameId
@@ -32,20 +32,43 @@ def merge_surfaces(
         calc_X_TF: gives the pose of a geometry's frame F in the frame T
             that the merged surface shall be expressed in.
     """
+    members = [
+        (
+            index,
+            calc_X_TF(geometry.frame_id) @ geometry.X_FG,
+            tessellate(geometry.surface),
+        )
+        for index, geometry in enumerate(geometries)
+    ]
+    return merge_triangles(members)[0]
+
+
+def merge_triangles(
+    members: Sequence[tuple[int, RigidTransform, TriangleSurface]],
+) -> tuple[TriangleSurface, np.ndarray]:
+    """Returns triangles in one frame T, and whose they are.
+
+    Args:
+        members: index, pose X_TG and surface of each.
+
+    Returns:
+        The surface in T, and the (M,) int32 index of each of its triangles.
+    """
     vertices = [np.zeros((0, 3))]
     triangles = [np.zeros((0, 3), np.int32)]
+    owners = [np.zeros(0, np.int32)]
     num_vertices = 0
-    for geometry in geometries:
-        surface = tessellate(geometry.surface)
-        X_TG = calc_X_TF(geometry.frame_id) @ geometry.X_FG
+    for index, X_TG, surface in members:
         vertices.append(
             surface.p_GVset @ X_TG.rotation().matrix().T + X_TG.translation()
         )
         triangles.append(surface.triangles + np.int32(num_vertices))
+        owners.append(np.full(len(surface.triangles), index, np.int32))
         num_vertices += len(surface.p_GVset)
-    return TriangleSurface(
+    merged = TriangleSurface(
         np.concatenate(vertices), np.concatenate(triangles, dtype=np.int32)
     )
+    return merged, np.concatenate(owners)
 
 
 def tessellate(surface: Surface, sides: int = _SIDES) -> TriangleSurface:
