@@ -83,7 +83,7 @@ def plan_recordings(
         page = (pages or {}).get(scenario.name)
         if page is not None:
             page = page.absolute()
-        if _is_done(scenario, output, page):
+        if _is_done(scenario, output, overwrite, page):
             print(f"{scenario.name}: finished already", file=sys.stderr)
         else:
             waiting.append((scenario, page))
@@ -104,6 +104,7 @@ def plan_recordings(
             arguments=(scenario, output, overwrite, page),
             cost=_LOADING + _FRAME * (scenario.frames or _USUAL_FRAMES),
             output=output / scenario.name,
+            is_done=_is_done,
         )
         for scenario, page in waiting
     ]
@@ -128,9 +129,6 @@ def record(
     Raises:
         InputError: see `simulate`.
     """
-    # Another copy of the job may have ended with its work done.
-    if _is_done(scenario, output, page):
-        return
     with uninterrupted():
         from cns_drake.simulation import simulate
 
@@ -171,7 +169,11 @@ def is_recorded(scenario: Scenario, output: Path) -> bool:
     return recorded.frames == frames
 
 
-def _is_done(scenario: Scenario, output: Path, page: Path | None) -> bool:
+def _is_done(
+    scenario: Scenario, output: Path, overwrite: bool, page: Path | None
+) -> bool:
+    """Tells whether there is nothing to do; see `record`."""
+    del overwrite
     if page is not None and not page.is_file():
         return False
     return is_recorded(scenario, output)

@@ -64,15 +64,13 @@ def draw_map_drives(folder: Path, path: Path, tell: Tell) -> None:
         InputError: see `draw_drives`.
     """
     del tell
+    with uninterrupted():
+        from cns_drake.aerial_pictures import draw_drives
 
-    def draw() -> None:
-        with uninterrupted():
-            from cns_drake.aerial_pictures import draw_drives
-
-        scenarios = _scenarios(folder)
-        draw_drives({s.name.replace("_", " "): s for s in scenarios}, path)
-
-    _draw_once(path, _drives_inputs(folder), draw)
+    inputs = _drives_inputs(folder)
+    scenarios = _scenarios(folder)
+    draw_drives({s.name.replace("_", " "): s for s in scenarios}, path)
+    _write_note(path, inputs)
 
 
 def are_drives_drawn(folder: Path, path: Path) -> bool:
@@ -103,15 +101,13 @@ def draw_map_stages(folder: Path, path: Path, tell: Tell) -> None:
         InputError: see `draw_stages`.
     """
     del tell
+    with uninterrupted():
+        from cns_drake.stage_pictures import draw_stages, load_views
 
-    def draw() -> None:
-        with uninterrupted():
-            from cns_drake.stage_pictures import draw_stages, load_views
-
-        stages = {f.stem.replace("_", " "): f for f in _two_stages(folder)}
-        draw_stages(stages, load_views(_views(folder))["street"], path)
-
-    _draw_once(path, _stages_inputs(folder), draw)
+    inputs = _stages_inputs(folder)
+    stages = {f.stem.replace("_", " "): f for f in _two_stages(folder)}
+    draw_stages(stages, load_views(_views(folder))["street"], path)
+    _write_note(path, inputs)
 
 
 def are_stages_drawn(folder: Path, path: Path) -> bool:
@@ -133,11 +129,9 @@ def _views(folder: Path) -> Path:
     return folder / "views.yaml"
 
 
-def _draw_once(path: Path, inputs: dict, draw: Callable[[], None]) -> None:
-    """Draws a picture, unless one of these inputs is there."""
-    if not _is_drawn(path, inputs):
-        draw()
-        write_part(_note_of(path), _versioned(inputs), None)
+def _write_note(path: Path, inputs: dict) -> None:
+    """Says what a picture was drawn of."""
+    write_part(_note_of(path), _versioned(inputs), None)
 
 
 def _is_drawn(path: Path, inputs: dict) -> bool:

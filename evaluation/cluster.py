@@ -38,6 +38,15 @@ class Cluster:
     num_workers: int = 1
     scheduler: str | None = None
 
+    @property
+    def slots(self) -> int | None:
+        """How many jobs it runs at a time, if that is known beforehand.
+
+        A foreign scheduler is told of all jobs at once, since others may use
+        it, and it may start workers for them.
+        """
+        return self.num_workers if self.scheduler is None else None
+
     @contextlib.contextmanager
     def connect(self) -> Iterator[Client]:
         """Yields a client; workers of this machine live as long as it.

@@ -36,6 +36,14 @@ _TELL_INTERVAL = 0.5
 # How often a parent looks whether its job is still wanted [s].
 _LOOK_INTERVAL = 0.2
 
+# A job takes and frees the same arrays thousands of times. The C library
+# would return their memory each time, as Dask's workers ask for, or where it
+# guesses wrong; fetching it anew takes longer than filling it [bytes].
+_ALLOCATION = {
+    "MALLOC_MMAP_THRESHOLD_": str(1 << 25),  # The largest that glibc takes.
+    "MALLOC_TRIM_THRESHOLD_": str(1 << 28),
+}
+
 # The search path is the parent's, not what the folder it runs in makes of it.
 _START = (
     "import sys; number, *sys.path[:] = sys.argv[1:]; "
@@ -84,7 +92,8 @@ def run_process(
 
     Args:
         job: a pickled tuple: function, arguments, what it writes (see
-            `exclusive`) or None.
+            `exclusive`) or None, and what tells whether nothing is left to
+            do (see `nothing_left`).
         on_message: takes what the job tells; see `Tell`.
         is_wanted: asked often; where it says no, the process is ended.
 
@@ -96,16 +105,9 @@ def run_process(
     # In a session of its own no Ctrl-C reaches it: whoever is interrupted
     # there ends its jobs in good order.
     command = [sys.executable, "-c", _START, str(theirs.fileno()), *sys.path]
-    # Dask has its workers return memory at once. A job that takes and frees
-    # the arrays of a scan a thousand times would spend half its time on that.
-    environment = {
-        name: value
-        for name, value in os.environ.items()
-        if name != "MALLOC_TRIM_THRESHOLD_"
-    }
     process = subprocess.Popen(
         command,
-        env=environment,
+        env={**os.environ, **_ALLOCATION},
         pass_fds=[theirs.fileno()],
         stdin=subprocess.DEVNULL,
         stdout=sys.stderr.fileno(),
@@ -188,7 +190,7 @@ def _run(job: bytes, tell: Tell) -> tuple[str, str]:
     """Runs a job; returns what is left to tell."""
     try:
         with uninterrupted():
-            function, arguments, output = pickle.loads(job)
+            function, arguments, output, is_done = pickle.loads(job)
         with contextlib.ExitStack() as stack:
             if output is not None:
                 stack.enter_context(
@@ -200,7 +202,8 @@ def _run(job: bytes, tell: Tell) -> tuple[str, str]:
                         ),
                     )
                 )
-            function(*arguments, tell)
+            if not nothing_left(is_done, arguments):
+                function(*arguments, tell)
     except MemoryError:
         # Another time, or elsewhere, there may be enough.
         return "died", "not enough memory"
@@ -210,6 +213,21 @@ def _run(job: bytes, tell: Tell) -> tuple[str, str]:
         tell.note(traceback.format_exc())
         return "fault", one_line(f"{type(error).__name__}: {error}")
     return "done", ""
+
+
+def nothing_left(is_done: Callable[..., bool] | None, arguments: tuple) -> bool:
+    """Tells whether a job has nothing to do, as far as it can tell.
+
+    Args:
+        is_done: answers, or raises InputError; None stands for no.
+        arguments: of the job.
+    """
+    if is_done is None:
+        return False
+    try:
+        return is_done(*arguments)
+    except InputError:
+        return False
 
 
 def _end_with_parent(connection: Connection) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Set
-import contextlib
 from dataclasses import dataclass
 import graphlib
 import pickle
@@ -25,6 +24,7 @@ from evaluation.job_process import (
     JobError,
     ProcessDiedError,
     Tell,
+    nothing_left,
     run_process,
 )
 
@@ -39,6 +39,8 @@ __all__ = ["Job", "Tell", "run_jobs"]
 
 # How often a job is started again after its process has died.
 _RETRIES = 2
+# What Dask calls all jobs.
+_KIND = "job"
 # How often the display shows the time anew [s].
 _REFRESH_INTERVAL = 0.5
 
@@ -50,19 +52,20 @@ class Job:
     Attributes:
         name: unique, for people.
         function: of a module, so that it can be imported anywhere. It is
-            called with the arguments and a `Tell`. What it finds done
-            already it does not do again, and it writes no file under a final
-            name that is not complete. An InputError is its way to fail.
+            called with the arguments and a `Tell`, and writes no file under
+            a final name that is not complete. An InputError is its way to
+            fail.
         arguments: picklable; paths among them are absolute.
         needs: names of jobs that must have succeeded before.
         cost: expected time on one core [s].
         output: the file or folder that it writes. Two copies of a job, as
             when the connection to one is lost, never work on it at the same
             time; see `evaluation.files.exclusive`.
-        is_done: called with the arguments before anything runs, and only if
-            all that the job needs is done: whether it would find nothing to
-            do. Saves a process. An InputError stands for no: it is for the
-            job to tell.
+        is_done: likewise of a module; called with the arguments, once all
+            that the job needs is done: whether nothing is to be done. Asked
+            before anything runs, which saves a process, and again by the
+            process, since another copy of the job may have come before. An
+            InputError stands for no: it is for the job to tell.
     """
 
     name: str
@@ -97,7 +100,7 @@ def run_jobs(jobs: Iterable[Job], cluster: Cluster) -> None:
         cluster.connect() as client,
         JobProgress({job.name: job.cost for job in by_name.values()}) as shown,
     ):
-        run = _Run(by_name, done, urgency, client, shown)
+        run = _Run(by_name, done, urgency, client, shown, cluster.slots)
         run.run()
     run.raise_faults()
 
@@ -133,10 +136,10 @@ def _find_done(jobs: Mapping[str, Job]) -> set[str]:
     done: set[str] = set()
     for name in _ordered(jobs):
         job = jobs[name]
-        if job.is_done is not None and done.issuperset(job.needs):
-            with contextlib.suppress(InputError):
-                if job.is_done(*job.arguments):
-                    done.add(name)
+        if done.issuperset(job.needs) and nothing_left(
+            job.is_done, job.arguments
+        ):
+            done.add(name)
     return done
 
 
@@ -156,8 +159,10 @@ class _Run:
         urgency: Mapping[str, float],
         client: Client,
         shown: JobProgress,
+        slots: int | None,
     ):
         self._jobs = jobs
+        self._slots = slots
         self._urgency = urgency
         self._client = client
         self._shown = shown
@@ -200,11 +205,17 @@ class _Run:
         raise FailedJobsError("; ".join(parts))
 
     def _submit_ready(self) -> None:
-        ready = [
-            job
-            for job in self._waiting.values()
-            if self._done.issuperset(job.needs)
-        ]
+        ready = sorted(
+            (
+                job
+                for job in self._waiting.values()
+                if self._done.issuperset(job.needs)
+            ),
+            key=lambda job: -self._urgency[job.name],
+        )
+        if self._slots is not None:
+            # What Dask has it gives to a worker at once, busy or not.
+            ready = ready[: max(self._slots - len(self._futures), 0)]
         for job in ready:
             del self._waiting[job.name]
             self._submit(job)
@@ -214,9 +225,13 @@ class _Run:
         future = self._client.submit(
             work,
             job.name,
-            pickle.dumps((job.function, job.arguments, job.output)),
+            pickle.dumps(
+                (job.function, job.arguments, job.output, job.is_done)
+            ),
             self._id,
-            key=f"{job.name} {death}-{self._id}",
+            # Up to the first "-", what Dask knows the duration of: only then
+            # it moves jobs from a worker to an idle one.
+            key=f"{_KIND}-{job.name} {death}-{self._id}",
             priority=self._urgency[job.name],
             pure=False,
         )
@@ -272,6 +287,7 @@ class _Run:
             return
         self._faults[name] = _describe(error)
         self._shown.end(name, fault=True)
+        self._submit_ready()
         if self._futures:
             self._shown.note(f"{name}: failed: {self._faults[name]}")
 

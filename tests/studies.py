@@ -5,15 +5,17 @@ tests; processes would only make these slow.
 """
 
 from evaluation.collection import find_recordings
+from evaluation.job_process import nothing_left
 from evaluation.jobs import Tell
 from evaluation.study.assembly import assemble
 from evaluation.study.plan import plan_study
 
 
 def do(jobs):
-    """Does jobs in their order, in which none needs a later one."""
+    """Does what jobs leave to do, in their order; none needs a later one."""
     for job in jobs:
-        job.function(*job.arguments, Tell())
+        if not nothing_left(job.is_done, job.arguments):
+            job.function(*job.arguments, Tell())
 
 
 def report(recordings, output, methods=None):

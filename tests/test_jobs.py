@@ -25,46 +25,52 @@ def job(name, function, *arguments, needs=(), **options):
 
 def test_what_is_done_starts_no_process(tmp_path, monkeypatch, capsys):
     """Not even a cluster, if it is all; but what needs other work does."""
-    asked = []
-
-    def is_done(value):
-        def ask(*arguments):
-            asked.append(arguments)
-            return value
-
-        return ask
-
-    def cannot_tell(*arguments):
-        raise InputError("FILE: cannot be read")
-
-    path = tmp_path / "path"
-    done = job("done", job_functions.refuse, is_done=is_done(True))
+    old, path = tmp_path / "old", tmp_path / "path"
+    old.write_text("old")
+    done = job(
+        "done", job_functions.join, [], old, is_done=job_functions.is_there
+    )
     also = job(
-        "also", job_functions.join, [], path, needs=["done"],
-        is_done=is_done(True),
-    )  # fmt: skip
+        "also", job_functions.refuse, needs=["done"], is_done=job_functions.yes
+    )
     with monkeypatch.context() as patched:
         patched.setattr(Cluster, "connect", None)
         run_jobs([also, done], Cluster(num_workers=1))
-    assert asked == [(), ([], path)]
-    assert not path.exists()
+    assert old.read_text() == "old"
     new = job(
-        "new", job_functions.join, [], tmp_path / "new", needs=["done"],
-        is_done=is_done(False),
+        "new", job_functions.join, [], path, needs=["done"],
+        is_done=job_functions.is_there,
     )  # fmt: skip
+    # Whether this is done is known only to its own process, when `new` is.
     again = job(
         "again", job_functions.join, [], path, needs=["new"],
-        is_done=is_done(True),
+        is_done=job_functions.is_there,
     )  # fmt: skip
     unknown = job(
         "unknown", job_functions.join, [], tmp_path / "unknown",
-        is_done=cannot_tell,
+        is_done=job_functions.cannot_tell,
     )  # fmt: skip
     run_jobs([done, new, again, unknown], Cluster(num_workers=1))
-    assert (tmp_path / "new").is_file()
     assert (tmp_path / "unknown").is_file()
-    assert path.is_file()
+    assert path.read_text() == "path"
     assert "of 3 jobs" in capsys.readouterr().err
+
+
+def test_a_job_asks_again_when_it_has_its_output(tmp_path):
+    """Another copy of it may have come first."""
+    output = tmp_path / "output"
+    output.write_text("of the other")
+    for is_done, expected in (
+        (job_functions.is_there, "of the other"),
+        (job_functions.cannot_tell, "output"),
+    ):
+        arguments = ([], output)
+        run_process(
+            pickle.dumps((job_functions.join, arguments, output, is_done)),
+            lambda *message: None,
+            lambda: True,
+        )
+        assert output.read_text() == expected
 
 
 def test_what_is_needed_is_there_and_faults_stay_alone(tmp_path, capsys):
@@ -120,13 +126,15 @@ class ScriptedCluster:
     """Has a client whose futures end as they are told, one after the other.
 
     Attributes:
+        slots: see `Cluster`.
         keys: of what was submitted.
     """
 
     scheduler = SimpleNamespace(address="tcp://scripted:1")
 
-    def __init__(self, *statuses):
+    def __init__(self, *statuses, slots=None):
         self._statuses = iter(statuses)
+        self.slots = slots
         self.keys = []
 
     @contextlib.contextmanager
@@ -156,6 +164,33 @@ def test_what_is_lost_with_its_worker_is_asked_for_again(capsys):
         run_jobs(
             [job("a", job_functions.refuse)], ScriptedCluster(*["lost"] * 3)
         )
+
+
+@pytest.mark.parametrize(
+    ("slots", "order"),
+    [(1, "b first; c needs b; a; d"), (None, "b first; a; d; c needs b")],
+)
+def test_a_free_worker_gets_what_is_most_urgent_then(slots, order):
+    """Not what was most urgent when its last job began."""
+    jobs = [
+        job("a", job_functions.refuse, cost=3.0),
+        job("b first", job_functions.refuse, cost=1.0),
+        job("c needs b", job_functions.refuse, needs=["b first"], cost=4.0),
+        job("d", job_functions.refuse, cost=2.0),
+    ]
+    cluster = ScriptedCluster(*["finished"] * 4, slots=slots)
+    run_jobs(jobs, cluster)
+    names = [key.split("-")[1].removesuffix(" 0") for key in cluster.keys]
+    assert "; ".join(names) == order
+
+
+def test_a_fault_makes_room_for_the_next(capsys):
+    cluster = ScriptedCluster("lost", "lost", "lost", "finished", slots=1)
+    jobs = [job(name, job_functions.refuse) for name in "ab"]
+    with pytest.raises(FailedJobsError, match=r"^a: its worker died$"):
+        run_jobs(jobs, cluster)
+    assert len(cluster.keys) == 4
+    assert "a: failed: its worker died" in capsys.readouterr().err
 
 
 def test_a_scheduler_that_is_lost():
@@ -200,7 +235,7 @@ def test_a_job_that_is_not_wanted_ends(tmp_path):
 
     with pytest.raises(ProcessDiedError, match="ended with status 130"):
         run_process(
-            pickle.dumps((job_functions.hold, (pipe,), None)),
+            pickle.dumps((job_functions.hold, (pipe,), None, None)),
             lambda *message: None,
             is_wanted,
         )
@@ -218,7 +253,7 @@ def test_a_job_ends_with_its_parent_even_if_that_is_killed(tmp_path):
             "from pathlib import Path\n"
             "import job_functions\n"
             "from evaluation.job_process import run_process\n"
-            "job = (job_functions.hold, (Path(sys.argv[1]),), None)\n"
+            "job = (job_functions.hold, (Path(sys.argv[1]),), None, None)\n"
             "run_process(pickle.dumps(job), print, lambda: True)\n",
             pipe,
         ],
@@ -240,12 +275,15 @@ def test_a_function_that_cannot_be_imported_is_a_fault():
 def test_freed_memory_is_kept_whatever_dask_has_its_workers_do(
     tmp_path, monkeypatch
 ):
-    for name, expected in (("MALLOC_TRIM_THRESHOLD_", None), ("HOME", "/x")):
+    for name, expected in (
+        ("MALLOC_TRIM_THRESHOLD_", str(2**28)),
+        ("HOME", "/x"),
+    ):
         monkeypatch.setenv(name, "/x")
         output = tmp_path / name
         function = job_functions.note_variable
         run_process(
-            pickle.dumps((function, (name, output), None)),
+            pickle.dumps((function, (name, output), None, None)),
             lambda *message: None,
             lambda: True,
         )

@@ -95,8 +95,6 @@ def recognise_places(
             match, or a file cannot be read or written.
     """
     inputs = _recognition_inputs(map_name, stages, surveys, method)
-    if is_current(result, inputs):
-        return
     parts = [survey.described(method) for survey in surveys]
     # The method comes first: what it kept may be of a type of its own.
     comparing = method.make()

@@ -139,8 +139,6 @@ def measure_database(
             a file cannot be read or written.
     """
     inputs = _inputs(source, query, methods)
-    if is_current(result, inputs):
-        return
     running = [method.make() for method in methods]
     database = survey_recording(source(), {"places"}, running, tracking(tell))
     asking = read_part(query.drive)

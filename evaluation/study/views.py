@@ -46,8 +46,6 @@ def draw_city(
         InputError: if a file cannot be read or written.
     """
     inputs = _inputs(map_name, [survey for _, survey in stages])
-    if is_current(pages, inputs) and _is_drawn([stem], drawn, inputs):
-        return
     shown, drives = [], {}
     for done, (name, survey) in enumerate(stages):
         tell.progress(done, len(stages) + 1)
