@@ -161,9 +161,18 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         if len(query.filled) == 0:
             return np.full(num_places, np.nan)
         scores = np.empty(num_places)
+        weighted = self._weigh(query)
+        # One for all: where the C library returns freed memory at once,
+        # fetching it anew would take longer than the transforms.
+        product = np.empty((_PLACES_AT_ONCE, *weighted.shape), np.complex64)
         for start in range(0, num_places, _PLACES_AT_ONCE):
             some = slice(start, start + _PLACES_AT_ONCE)
-            correlations = self._correlate(query, database.conjugates[some])
+            conjugates = database.conjugates[some]
+            correlations = self._correlate(
+                np.multiply(
+                    weighted, conjugates, out=product[: len(conjugates)]
+                )
+            )
             scores[some] = correlations.max(axis=1)
         scores[database.is_empty] = np.nan
         return scores
@@ -179,7 +188,7 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
             return None
         num_cells = self.config.cells
         correlation = self._correlate(
-            query, database.conjugates[place : place + 1]
+            self._weigh(query) * database.conjugates[place : place + 1]
         )
         shift = -_signed(int(correlation.argmax()), num_cells)
         query_bev = query.bev(num_cells)
@@ -235,27 +244,32 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         _keep_greatest(image, np.minimum(cells, config.cells - 1), features)
         return image
 
-    def _correlate(self, query: Ring, conjugates: np.ndarray) -> np.ndarray:
+    def _weigh(self, query: Ring) -> np.ndarray:
+        """Returns the spectrum (6 F, F) whose product is correlated.
+
+        Of a sum over all frequencies, only half is stored. The scale is that
+        of the program, where the transforms are unitary.
+        """
+        n = self.config.cells
+        scale = _CORRELATION_SCALE * NUM_FEATURES * n * n * math.sqrt(n)
+        weights = np.tile(_frequency_weights(n) / scale, NUM_FEATURES)
+        return query.spectrum * weights[:, None].astype(np.float32)
+
+    def _correlate(self, product: np.ndarray) -> np.ndarray:
         """Correlates a query with some places.
 
         The circular correlation over the angles is taken for each channel
         and frequency, and the magnitudes are summed, as in the program.
 
         Args:
-            query: descriptor of the query.
-            conjugates: (B, 6 F, F) of the places.
+            product: (B, 6 F, F) of the query's weighted spectrum and the
+                places' conjugates; it is overwritten.
 
         Returns:
             (B, n) for each shift of the place's rows by 0, ..., n - 1.
         """
-        n = self.config.cells
-        # Of a sum over all frequencies, only half is stored. The scale is
-        # that of the program, where the transforms are unitary.
-        scale = _CORRELATION_SCALE * NUM_FEATURES * n * n * math.sqrt(n)
-        weights = np.tile(_frequency_weights(n) / scale, NUM_FEATURES)
-        weighted = query.spectrum * weights[:, None].astype(np.float32)
         correlations = scipy.fft.irfft(
-            weighted * conjugates, n=n, axis=2, overwrite_x=True
+            product, n=self.config.cells, axis=2, overwrite_x=True
         )
         np.abs(correlations, out=correlations)
         return correlations.sum(axis=1)
