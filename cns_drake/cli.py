@@ -243,7 +243,8 @@ def generate(
         typer.Option(
             metavar="FAMILY.yaml",
             help="Record the members of a family, whose scenario files go to "
-            "<output>/scenarios, and whatever is named.",
+            "<output>/scenarios and whose own cities to <output>/cities, and "
+            "whatever is named.",
         ),
     ] = None,
 ) -> None:
@@ -259,9 +260,13 @@ def generate(
         names = list(recordable_sequences())
     scenarios = [load_scenario(name) for name in names or ()]
     if vary is not None:
+        from cns_drake.redrawing import redraw_cities
         from cns_drake.variation import load_family, write_scenarios
 
-        members = load_family(vary)
+        def redraw(*city) -> dict[int, Path]:
+            return redraw_cities(*city, output / "cities", cluster)
+
+        members = load_family(vary, redraw)
         write_scenarios(members, output / "scenarios")
         scenarios += members
     if frames is not None:

@@ -3,19 +3,22 @@
 A city that decays from a place outwards: each member of a family lacks the
 buildings and plants nearest to that place, a given part of them all; or of
 what an earlier stage lacks, which makes stages between the two. Members with
-more missing lack all that those with less lack. Routes by lot and other LiDARs
-multiply the family. Every member is a scenario of its own.
+more missing lack all that those with less lack. Other draws of the city,
+routes by lot and other LiDARs multiply the family. Every member is a scenario
+of its own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections.abc import Callable, Mapping, Sequence, Set
 from itertools import product
+import os
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 from pydantic import (
+    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -41,6 +44,10 @@ _REMOVABLE = ("building", "vegetation")
 _FARTHEST = 1e6
 
 _Part = Annotated[float, Field(ge=0.0, le=1.0)]
+_Seed = Annotated[int, Field(ge=0)]
+# Draws the city of a map anew: the map's folder, what to call the stage, which
+# is the whole city, and seeds -> seed -> map folder of that city.
+Redraw = Callable[[Path, str, Sequence[int]], Mapping[int, Path]]
 
 
 class _Model(BaseModel):
@@ -54,6 +61,13 @@ def _spread(value):
     steps = _Steps.model_validate(value)
     numbers = np.linspace(steps.first, steps.last, steps.count)
     return tuple(float(number) for number in numbers.round(4))
+
+
+def _without_doubles(seeds: tuple[int, ...]) -> tuple[int, ...]:
+    for seed in seeds:
+        if seeds.count(seed) > 1:
+            raise ValueError(f"{seed} is there twice")
+    return seeds
 
 
 class _Steps(_Model):
@@ -73,7 +87,7 @@ class DrawnRoutes(_Model):
 
     count: int = Field(ge=1, le=10_000)
     length: float = Field(gt=0.0, le=100_000.0)
-    seed: int = Field(0, ge=0)
+    seed: _Seed = 0
 
 
 class Family(_Model):
@@ -88,6 +102,8 @@ class Family(_Model):
             lacks, that are missing, each from 0 to 1; or {from, to, count}
             for evenly spread ones.
         seeds: for each of these, another place from which the city decays.
+        city_seeds: for each of these, another draw of the city along the
+            same streets, in place of the map as it is.
         routes: routes by lot in place of the base's.
         lidars: presets in place of the base's LiDARs.
     """
@@ -98,16 +114,24 @@ class Family(_Model):
     missing: Annotated[tuple[_Part, ...], BeforeValidator(_spread)] = Field(
         (0.0,), min_length=1
     )
-    seeds: tuple[Annotated[int, Field(ge=0)], ...] = Field((0,), min_length=1)
+    seeds: tuple[_Seed, ...] = Field((0,), min_length=1)
+    city_seeds: Annotated[
+        tuple[_Seed, ...], AfterValidator(_without_doubles)
+    ] = Field((), min_length=1)
     routes: DrawnRoutes | None = None
     lidars: tuple[str, ...] = ()
 
 
-def load_family(path: Path) -> list[Scenario]:
+def load_family(path: Path, redraw: Redraw | None = None) -> list[Scenario]:
     """Reads a family's file and returns its members.
 
-    A member's name tells what it is: base, part missing in per mille, seed,
-    and where they vary route and LiDAR.
+    A member's name tells what it is: base, seed of the city where that
+    varies, part missing in per mille, seed, and where they vary route and
+    LiDAR.
+
+    Args:
+        path: the file.
+        redraw: see `vary`.
 
     Raises:
         InputError: the file or what it refers to cannot be used.
@@ -120,16 +144,20 @@ def load_family(path: Path) -> list[Scenario]:
     base = family.base
     if base not in shipped_sequences():
         base = path.parent / base
-    return vary(load_scenario(base), family, path)
+    return vary(load_scenario(base), family, path, redraw)
 
 
-def vary(base: Scenario, family: Family, source) -> list[Scenario]:
+def vary(
+    base: Scenario, family: Family, source, redraw: Redraw | None = None
+) -> list[Scenario]:
     """Returns the members of a family.
 
     Args:
         base: what they all start from.
         family: what varies.
         source: the file that errors name.
+        redraw: draws cities; only a family with `city_seeds` needs it. It is
+            called once nothing else can be wrong with the family.
 
     Raises:
         InputError: the base has no map, or something the family asks for is
@@ -137,41 +165,61 @@ def vary(base: Scenario, family: Family, source) -> list[Scenario]:
     """
     if base.map is None:
         raise InputError(f"{source}: base: {base.name} has no map to vary")
-    stage = family.stage or max(
+    last = max(
         path.stem.removeprefix("stage_")
         for path in base.map_folder.glob("stage_*.sdf")
     )
+    stage = family.stage or last
+    if family.city_seeds:
+        _check_redrawable(base, family, last, source)
+    what = "buildings and plants"
     removable = None
     if family.towards is not None:
+        what = f"what stage {family.towards} lacks"
         removable = _difference(base, stage, family.towards, source)
+    routes = _routes(base, family)
+    units = [(None, base.lidars)]
+    if family.lidars:
+        units = [
+            (preset, base.with_lidar_preset(preset).lidars)
+            for preset in family.lidars
+        ]
+    cities = {None: base}
+    if family.city_seeds:
+        folders = redraw(base.map_folder, stage, family.city_seeds)
+        cities = {
+            seed: base.model_copy(update={"map": str(folder)})
+            for seed, folder in folders.items()
+        }
     orders = {
-        seed: _decay_order(base.map_folder / "structures.csv", seed, removable)
+        (city_seed, seed): _decay_order(
+            city.map_folder / "structures.csv", seed, removable
+        )
+        for city_seed, city in cities.items()
         for seed in family.seeds
     }
-    what = "buildings and plants"
-    if family.towards is not None:
-        what = f"what stage {family.towards} lacks"
     members = []
-    for part, seed, (route_label, route), lidar in product(
-        family.missing,
-        family.seeds,
-        _routes(base, family),
-        family.lidars or (None,),
+    for (city_seed, city), part, seed, (route_label, route), unit in product(
+        cities.items(), family.missing, family.seeds, routes, units
     ):
+        preset, lidars = unit
         labels = [base.name, f"m{round(1000 * part):03d}", f"s{seed}"]
-        labels += [label for label in (route_label, lidar) if label]
-        order = orders[seed]
+        labels += [label for label in (route_label, preset) if label]
+        title = f"{100 * part:.1f} % of {what} missing"
+        if city_seed is not None:
+            labels.insert(1, f"c{city_seed}")
+            title += f", in the city as seed {city_seed} draws it"
+        order = orders[city_seed, seed]
         update = {
             "name": "_".join(labels).replace("-", "_"),
             "stage": stage,
             "without": tuple(sorted(order[: round(part * len(order))])),
-            "title": f"{100 * part:.1f} % of {what} missing",
+            "title": title,
+            "lidars": lidars,
         }
         if route is not None:
             update |= {"route": route, "waypoints": None}
-        member = base.model_copy(update=update)
-        if lidar is not None:
-            member = member.with_lidar_preset(lidar)
+        member = city.model_copy(update=update)
         member.check_files(source)
         members.append(member)
     return members
@@ -180,19 +228,55 @@ def vary(base: Scenario, family: Family, source) -> list[Scenario]:
 def write_scenarios(scenarios: Sequence[Scenario], folder: Path) -> list[Path]:
     """Writes scenarios as `<folder>/<name>.yaml`.
 
+    A map that lies where the folder does is told by its way from there, so
+    that both can be moved together.
+
     Raises:
         InputError: if that fails.
     """
     with user_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
+        here = folder.resolve()
     paths = []
     for scenario in scenarios:
         path = folder / f"{scenario.name}.yaml"
         values = scenario.model_dump(mode="json", exclude_none=True)
+        if Path(values.get("map", "")).is_relative_to(here.parent):
+            values["map"] = os.path.relpath(values["map"], here)
         write_part(path, yaml.safe_dump(values, sort_keys=False))
         complete_part(path)
         paths.append(path)
     return paths
+
+
+def _check_redrawable(
+    base: Scenario, family: Family, last: str, source
+) -> None:
+    """Checks that the city can be drawn anew.
+
+    Args:
+        base: of the family.
+        family: what varies.
+        last: the map's last stage.
+        source: the file that errors name.
+
+    Raises:
+        InputError: it cannot.
+    """
+    why = (
+        f"not with city_seeds: what stages before the last one, {last}, lack "
+        "has names that another draw of the city need not have"
+    )
+    if family.towards is not None:
+        raise InputError(f"{source}: towards: {why}")
+    if family.stage not in (None, last):
+        raise InputError(f"{source}: stage: {why}")
+    for file in (base.map_folder / "city.yaml", base.roads_file):
+        if not os.path.isfile(file):
+            raise InputError(
+                f"{source}: city_seeds: no {file}, so that the city of base "
+                f"{base.name} cannot be drawn anew"
+            )
 
 
 def _routes(

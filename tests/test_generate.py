@@ -2,18 +2,28 @@
 
 import json
 import os
+from pathlib import Path
 import signal
 
 from bag_recordings import contents
 from generation import Generation
 from mcap.reader import make_reader
+import numpy as np
 import pytest
+from small_city import write_small_city
+import studies
 from tiny_drive import FRAMES, tiny_scenario, write_scenario
+import yaml
 
+from cns_drake.city.generate import generate_city
 from cns_drake.errors import InputError
 from cns_drake.jobs import is_recorded, record_all
+from cns_drake.scenario import load_scenario
 from cns_drake.simulation import simulate
+from evaluation.change import compare, survey
 from evaluation.cluster import Cluster
+from evaluation.sequences import open_sequence
+from evaluation.study import trend_points
 
 LONG = 300
 ONE = Cluster(num_workers=1)
@@ -131,3 +141,73 @@ def test_what_it_was_made_of_is_in_the_file(tmp_path):
     assert inputs.keys() == {"world", "vehicle", "waypoints"}
     names = [entry["name"] for entry in attachments["structures.json"]]
     assert names == ["ground", "hall"]
+
+
+@pytest.fixture(scope="module")
+def town(tmp_path_factory):
+    """Folder of a generated town, with a drive through each of its stages."""
+    folder = write_small_city(tmp_path_factory.mktemp("maps") / "town")
+    generate_city(folder)
+    for stage in ("01", "02"):
+        drive = {
+            "map": ".",
+            "stage": stage,
+            "route": [
+                {"road": name, "direction": "forward", "lane": 1}
+                for name in ("north", "south")
+            ],
+            "speeds": {"cruise": 14.0, "longitudinal_acceleration": 8.0},
+            "lidars": {"lidar": {"columns": 128}},
+            "frames": FRAMES,
+        }
+        (folder / f"sequence_{stage}.yaml").write_text(yaml.safe_dump(drive))
+    return folder
+
+
+def test_families_on_other_cities_share_them(town, tmp_path, monkeypatch):
+    output = tmp_path / "output"
+
+    def generate(stage, **values):
+        family = tmp_path / f"family_{stage}.yaml"
+        base = {"base": str(town / f"sequence_{stage}.yaml")}
+        family.write_text(yaml.safe_dump(base | values))
+        run = Generation([], output, "--vary", family, "--jobs", "2")
+        status, results = run.end()
+        assert status == 0, run.told
+        return [Path(result) for result in results], "".join(run.told)
+
+    databases, told = generate("01", city_seeds=[7], missing=[0.0, 0.6])
+    names = [path.name for path in databases]
+    assert names == ["town_01_c7_m000_s0", "town_01_c7_m600_s0"]
+    assert "city town_c7: done" in told
+    stage = output / "cities" / "town_c7" / "stage_02.sdf"
+    drawn = stage.stat()
+
+    (other, query), told = generate("02", city_seeds=[8, 7])
+    assert query == output / "town_02_c7_m000_s0"
+    assert "city town_c8: done" in told
+    assert "city town_c7" not in told
+    assert stage.stat() == drawn
+
+    # Other cities are other places.
+    with pytest.raises(InputError, match=r"through town_c8, .* town_c7"):
+        compare(survey(query), survey(other))
+    monkeypatch.setattr(
+        trend_points, "run_jobs", lambda jobs, cluster: studies.do(jobs)
+    )
+    trend = tmp_path / "trend"
+    points = trend_points.measure_trend(query, databases, trend, ONE)
+    changes = {p.database: p.tcr_sym for p in points}
+    assert changes[names[0]] == 0.0  # The very same drive.
+    assert changes[names[1]] > 0.1
+
+    # Each member stands on its own, also at another place.
+    moved = tmp_path / "moved"
+    output.rename(moved)
+    member = load_scenario(moved / "scenarios" / f"{names[1]}.yaml")
+    assert is_recorded(member.model_copy(update={"frames": FRAMES}), moved)
+    again = open_sequence(simulate(member, tmp_path).folder)
+    before = open_sequence(moved / names[1])
+    assert len(again) == len(before) == FRAMES
+    for scan, scan_before in zip(again, before, strict=True):
+        np.testing.assert_array_equal(scan, scan_before)
