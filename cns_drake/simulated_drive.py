@@ -99,4 +99,4 @@ class SimulatedSequence(Sequence):
 
     def scan(self, index: int) -> np.ndarray:
         self._context.SetTime(index * FRAME_PERIOD)
-        return self._scan.Eval(self._context).copy()
+        return self._scan.Eval(self._context)
