@@ -287,6 +287,18 @@ RECIPES = {
         prints=("family/town_01_m600_s0", "trend/trend.csv"),
         makes=("family/scenarios/town_01_m600_s0.yaml", "trend/trend.pdf"),
     ),
+    "asking family": Recipe(
+        "base: riverside_02",
+        changes=(("riverside_02", "town/sequence_02.yaml"), ("1, 2, 3", "1")),
+        file="asking.yaml",
+    ),
+    "other cities": Recipe(
+        ".venv/bin/cns-drake generate --vary asking.yaml",
+        changes=(("--vary", "--frames 3 --vary"),),
+        after=("asking family", "start a city"),
+        prints=("family/town_02_c1_m000_s0",),
+        makes=("family/cities/town_c1/stage_02.sdf",),
+    ),
     "scheduler": Recipe(
         ".venv/bin/dask scheduler",
         changes=(("scheduler", "scheduler --host 127.0.0.1 --port 0"),),
