@@ -64,13 +64,13 @@ class Stage:
 
     Attributes:
         name: of the stage, e.g. `04`.
-        fine: map for pictures.
+        fine: (K, 3) cloud for pictures, in W [m].
         coarse: map on the grid of the TCR.
         positions: (N, 3) of the sensor [m].
     """
 
     name: str
-    fine: VoxelMap
+    fine: np.ndarray
     coarse: VoxelMap
     positions: np.ndarray
 
@@ -95,22 +95,20 @@ def judge_points(
     return distances > tau, in_convex_hull(points, other)
 
 
-def top_view(points: VoxelMap, positions: np.ndarray) -> Picture:
+def top_view(points: np.ndarray, positions: np.ndarray) -> Picture:
     """Returns the surroundings of a route from above, x to the right.
 
     Args:
-        points: fine map.
+        points: (K, 3) cloud for pictures, in W [m].
         positions: (N, 3) of the sensor along the route [m].
     """
     low, high = positions[:, :2].min(axis=0), positions[:, :2].max(axis=0)
-    centroids = points.centroids_W
     near = (
-        (centroids[:, :2] >= low - _MARGIN)
-        & (centroids[:, :2] <= high + _MARGIN)
+        (points[:, :2] >= low - _MARGIN) & (points[:, :2] <= high + _MARGIN)
     ).all(axis=1)
     if not near.any():
         near[:] = True
-    shown = centroids[near]
+    shown = points[near]
     rgb = colour_by_height(shown[:, 2], _GROUND, _HIGHEST)
     return render(shown, rgb, _FROM_ABOVE)
 
@@ -159,36 +157,31 @@ def draw_change(
     _draw_sets(map_name, stages, change, stems[1])
 
 
-def voxel_of_each(fine: VoxelMap, coarse: VoxelMap) -> np.ndarray:
-    """Returns in which coarse voxel each fine one lies.
+def voxel_of_each(points: np.ndarray, coarse: VoxelMap) -> np.ndarray:
+    """Returns in which voxel of their map some points lie.
+
+    A point on a border may have been counted on its other side, with a
+    rounding error. So the occupied voxel with the nearest centre is meant.
 
     Args:
-        fine: a map.
-        coarse: the same map after `coarsen`.
+        points: (N, 3) of those that were mapped [m].
+        coarse: their map.
 
     Returns:
         (N,) index into the coarse map.
     """
-    factor = round(coarse.voxel_size / fine.voxel_size)
-    owners = np.floor_divide(fine.indices, factor)
-    # Both as numbers that sort like the rows of indices do.
-    low = coarse.indices.min(axis=0)
-    spans = np.ptp(coarse.indices, axis=0).astype(np.int64) + 1
-    weights = np.array([spans[1] * spans[2], spans[2], 1])
-    keys = (coarse.indices - low) @ weights
-    return np.searchsorted(keys, (owners - low) @ weights)
+    _, owners = cKDTree(coarse.centres_W).query(points)
+    return owners
 
 
 def _draw_absent(map_name, stages, stem: Path) -> None:
     pictures = []
     for stage, other in zip(stages, stages[::-1], strict=True):
-        absent, in_hull = judge_points(
-            stage.fine.centroids_W, other.coarse.centroids_W
-        )
+        absent, in_hull = judge_points(stage.fine, other.coarse.centroids_W)
         rgb = np.full((len(absent), 3), _UNCHANGED, dtype=np.uint8)
         rgb[absent] = _ABSENT_OUTSIDE
         rgb[absent & in_hull] = _CHANGED
-        pictures.append(_render_shaded(stage.fine.centroids_W, rgb, _OBLIQUE))
+        pictures.append(_render_shaded(stage.fine, rgb, _OBLIQUE))
     figure, grid = _picture_grid(pictures)
     names = [stage.name for stage in stages]
     titles = (
@@ -210,7 +203,7 @@ def _draw_sets(map_name, stages, change: TemporalChange, stem: Path) -> None:
         rgb[side.in_hull] = _ONLY_IN_H
         rgb[side.unchanged] = _IN_O
         rgb = rgb[voxel_of_each(stage.fine, stage.coarse)]
-        clouds.append(stage.fine.centroids_W)
+        clouds.append(stage.fine)
         colours.append(rgb)
     clouds.append(np.concatenate(clouds))
     colours.append(np.concatenate(colours))

@@ -7,9 +7,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from evaluation.maps import VoxelAccumulator, VoxelMap
+from evaluation.maps import VOXEL_SIZE, VoxelAccumulator, VoxelMap
 from evaluation.progress import Track, silent
 from evaluation.sequences.sequence import Sequence
+
+# Of a voxel's side, for pictures: they show a point in each cube of 0.5 m.
+PICTURE_DIVISIONS = 10
 
 
 class MappedSequence(Sequence):
@@ -19,18 +22,17 @@ class MappedSequence(Sequence):
     scans in increasing order, give or take a few, has each read once.
     """
 
-    def __init__(self, sequence: Sequence, voxel_size: float, kept: int):
+    def __init__(self, sequence: Sequence, kept: int):
         """Starts an empty map.
 
         Args:
             sequence: the drive.
-            voxel_size: of the map [m].
             kept: how many of the last scans stay in memory; older ones are
                 read again.
         """
         self.name = sequence.name
         self._sequence = sequence
-        self._accumulator = VoxelAccumulator(voxel_size)
+        self._accumulator = VoxelAccumulator(VOXEL_SIZE, PICTURE_DIVISIONS)
         self._kept = kept
         self._recent: OrderedDict[int, np.ndarray] = OrderedDict()
         self._num_mapped = 0
@@ -61,16 +63,20 @@ class MappedSequence(Sequence):
             return self._recent[index]
         return self._sequence.scan(index)
 
-    def finish(self, track: Track = silent) -> VoxelMap:
-        """Reads what nobody asked for; returns the map of all scans.
+    def finish(self, track: Track = silent) -> tuple[VoxelMap, np.ndarray]:
+        """Reads what nobody asked for.
 
         Args:
             track: reports progress.
+
+        Returns:
+            The map of all scans on the grid of the TCR, as `map_sequence`
+            makes it; a finer cloud of them for pictures (K, 3) in W [m].
         """
         left = range(self._num_mapped, len(self))
         for _ in track(left, f"mapping {self.name}", len(left)):
             self._map_next()
-        return self._accumulator.to_map()
+        return self._accumulator.to_map(), self._accumulator.samples()
 
     def _map_next(self) -> None:
         index = self._num_mapped

@@ -21,9 +21,6 @@ from evaluation.sorting import cell_order
 VOXEL_SIZE = 5.0
 Z_ORIGIN = -2.5
 
-# A map for pictures shares the grid: so many voxels along a coarse one.
-PICTURE_DIVISIONS = 10
-
 # One slot of the hash table of voxels: the number of a voxel, how many points
 # it has (0: the slot is free), and their sum relative to its corner [m]. All
 # in one record, since the time goes into fetching slots from memory.
@@ -66,33 +63,10 @@ class VoxelMap:
     def __len__(self) -> int:
         return len(self.counts)
 
-    def coarsen(self, factor: int) -> VoxelMap:
-        """Returns the map on voxels that are `factor` times as long.
-
-        The result is that of the same points on the coarse grid (up to
-        rounding), because both grids have the same origin.
-        """
-        coarse = np.floor_divide(self.indices, factor)
-        # Sorted by fine index is not sorted by coarse one.
-        order = cell_order(coarse)
-        sorted_coarse = coarse[order]
-        is_first = np.ones(len(self), dtype=bool)
-        is_first[1:] = (np.diff(sorted_coarse, axis=0) != 0).any(axis=1)
-        starts = np.flatnonzero(is_first)
-        indices = sorted_coarse[starts]
-        voxel_size = self.voxel_size * factor
-        counts = np.add.reduceat(self.counts[order], starts)
-        offsets = self.centroids_W - _corners(coarse, voxel_size)
-        sums = np.add.reduceat(
-            (offsets * self.counts[:, None])[order], starts, axis=0
-        )
-        return VoxelMap(
-            indices=indices,
-            centroids_W=_corners(indices, voxel_size) + sums / counts[:, None],
-            counts=counts,
-            voxel_size=voxel_size,
-            num_ignored=self.num_ignored,
-        )
+    @property
+    def centres_W(self) -> np.ndarray:
+        """(V, 3) middle of each voxel [m]."""
+        return _corners(self.indices, self.voxel_size) + 0.5 * self.voxel_size
 
 
 class VoxelAccumulator:
@@ -101,17 +75,28 @@ class VoxelAccumulator:
     Sums are kept relative to each voxel's corner, so that coordinates far
     from the origin (UTM) lose nothing. The result depends only on the points
     and their order.
+
+    For pictures, samples of the points can be kept on a finer grid. Centroids
+    there would take twice as long: their table would not fit into the cache.
     """
 
-    def __init__(self, voxel_size: float = VOXEL_SIZE):
+    def __init__(self, voxel_size: float = VOXEL_SIZE, divisions: int = 0):
         """Starts an empty map.
 
         Args:
             voxel_size: length of a voxel's side [m].
+            divisions: of a voxel's side into parts that have a sample each;
+                0 for no samples.
         """
         self._voxel_size = voxel_size
+        self._divisions = divisions
         self._table = np.zeros(2 * _BATCH, dtype=_SLOT)
         self._size = 0
+        # A bit for each part of a slot's voxel: whether it has a sample.
+        num_bytes = (divisions**3 + 7) // 8
+        self._sampled = np.zeros((len(self._table), num_bytes), dtype=np.uint8)
+        self._samples = np.empty((0, 3))
+        self._num_samples = 0
         self._num_ignored = 0
 
     def add(self, points: np.ndarray, X_WS: np.ndarray | None = None) -> int:
@@ -132,8 +117,16 @@ class VoxelAccumulator:
         for start in range(0, len(points), _BATCH):
             batch = point_arrays.xyz(points[start : start + _BATCH])
             self._reserve(len(batch))
-            self._size, skipped = _add_points(
-                batch, X, self._voxel_size, self._table, self._size
+            self._size, self._num_samples, skipped = _add_points(
+                batch,
+                X,
+                self._voxel_size,
+                self._table,
+                self._size,
+                self._divisions,
+                self._sampled,
+                self._samples,
+                self._num_samples,
             )
             ignored += skipped
         self._num_ignored += ignored
@@ -156,16 +149,31 @@ class VoxelAccumulator:
             num_ignored=self._num_ignored,
         )
 
+    def samples(self) -> np.ndarray:
+        """Returns the first point in each part of a voxel.
+
+        Returns:
+            (K, 3), in the order in which they came [m].
+        """
+        lift = np.array([0.0, 0.0, Z_ORIGIN])
+        return self._samples[: self._num_samples] + lift
+
     def _reserve(self, number: int) -> None:
-        """Makes room for so many new voxels."""
+        """Makes room for so many new voxels, and samples if there are any."""
         slots = len(self._table)
         while _LOAD[1] * (self._size + number) > _LOAD[0] * slots:
             # Powers of two, because slots are found by masking.
             slots *= 2
         if slots > len(self._table):
-            larger = np.zeros(slots, dtype=_SLOT)
-            _move(self._table, larger)
-            self._table = larger
+            table = np.zeros(slots, dtype=_SLOT)
+            sampled = np.zeros((slots, self._sampled.shape[1]), dtype=np.uint8)
+            _move(self._table, self._sampled, table, sampled)
+            self._table, self._sampled = table, sampled
+        needed = self._num_samples + number
+        if self._divisions and needed > len(self._samples):
+            samples = np.empty((2 * needed, 3))
+            samples[: self._num_samples] = self._samples[: self._num_samples]
+            self._samples = samples
 
 
 def voxelise(
@@ -197,14 +205,13 @@ def thin(points: np.ndarray, voxel_size: float) -> np.ndarray:
 
 def map_sequence(
     sequence: Sequence,
-    voxel_size: float = VOXEL_SIZE / PICTURE_DIVISIONS,
+    voxel_size: float = VOXEL_SIZE,
     track: Track = silent,
 ) -> VoxelMap:
     """Returns the world-frame map of all scans of a sequence.
 
     One pass over the scans, one in memory at a time. The default grid is
-    fine enough for pictures; `coarsen(PICTURE_DIVISIONS)` gives the map on
-    which structural change is defined.
+    the one on which structural change is defined.
 
     Raises:
         InputError: if a scan or a pose cannot be read.
@@ -243,18 +250,33 @@ def _find(table, ix, iy, iz):
 
 
 @compiled
-def _move(table, larger):
+def _move(table, sampled, larger, larger_sampled):
     """Enters all voxels of one table into another, empty one."""
     for i in range(len(table)):
         if table[i].count != 0:
             slot = _find(larger, table[i].ix, table[i].iy, table[i].iz)
             larger[slot] = table[i]
+            larger_sampled[slot] = sampled[i]
 
 
 @compiled
-def _add_points(points, X, voxel_size, table, size):
-    """Adds points (N, 3); returns the new size and how many were skipped."""
+def _add_points(
+    points,
+    X,
+    voxel_size,
+    table,
+    size,
+    divisions,
+    sampled,
+    samples,
+    num_samples,
+):
+    """Adds points (N, 3).
+
+    Returns the new size and number of samples, and how many were skipped.
+    """
     limit = 2.0**31
+    scale = divisions / voxel_size
     skipped = 0
     for i in range(len(points)):
         px, py, pz = points[i, 0], points[i, 1], points[i, 2]
@@ -275,8 +297,31 @@ def _add_points(points, X, voxel_size, table, size):
             table[slot].iy = iy
             table[slot].iz = iz
             size += 1
+        dx = x - fx * voxel_size
+        dy = y - fy * voxel_size
+        dz = z - fz * voxel_size
         table[slot].count += 1
-        table[slot].sx += x - fx * voxel_size
-        table[slot].sy += y - fy * voxel_size
-        table[slot].sz += z - fz * voxel_size
-    return size, skipped
+        table[slot].sx += dx
+        table[slot].sy += dy
+        table[slot].sz += dz
+        if divisions > 0:
+            part = _part(dx * scale, divisions)
+            part = part * divisions + _part(dy * scale, divisions)
+            part = part * divisions + _part(dz * scale, divisions)
+            bit = np.uint8(1 << (part & 7))
+            if not sampled[slot, part >> 3] & bit:
+                sampled[slot, part >> 3] |= bit
+                samples[num_samples, 0] = x
+                samples[num_samples, 1] = y
+                samples[num_samples, 2] = z
+                num_samples += 1
+    return size, num_samples, skipped
+
+
+@compiled
+def _part(place, divisions):
+    """Returns in which part of a voxel's side a place is.
+
+    Rounding may put a point on an end just outside: -0.1 becomes 0 as well.
+    """
+    return min(int(place), divisions - 1)

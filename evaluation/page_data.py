@@ -15,7 +15,6 @@ import numpy as np
 
 from evaluation.drawing import Legend
 from evaluation.figures import top_view
-from evaluation.maps import VoxelMap
 from evaluation.metrics import MODES
 from evaluation.results import RecognitionResult, in_paper_order, title
 from evaluation.retrieval import MATCH_RADIUS
@@ -80,7 +79,7 @@ class PageDrive:
 
 def make_drive(
     name: str,
-    fine: VoxelMap,
+    fine: np.ndarray,
     X_WS: np.ndarray,
     frames: Sequence[int],
     thumbnails: list[np.ndarray],
@@ -89,7 +88,7 @@ def make_drive(
 
     Args:
         name: of the recording.
-        fine: map for pictures.
+        fine: (M, 3) cloud for pictures, in W [m].
         X_WS: (N, 4, 4) poses of the sensor at all frames.
         frames: K of these that are places or queries.
         thumbnails: K reduced scans.

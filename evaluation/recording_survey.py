@@ -10,7 +10,7 @@ import numpy as np
 
 from evaluation.errors import InputError
 from evaluation.mapped_sequence import MappedSequence
-from evaluation.maps import PICTURE_DIVISIONS, VOXEL_SIZE, VoxelMap
+from evaluation.maps import VoxelMap
 from evaluation.methods import Method, MethodConfig
 from evaluation.progress import Track, silent
 from evaluation.retrieval import DescribedDrive, Role, describe_drive
@@ -53,13 +53,13 @@ class RecordingSurvey:
 
     Attributes:
         drive: with its map on the grid of the TCR.
-        fine: map for pictures.
+        fine: (K, 3) cloud for pictures, in W [m].
         described: method -> what it keeps of the drive; empty if the
             recording has no role.
     """
 
     drive: SurveyedDrive
-    fine: VoxelMap
+    fine: np.ndarray
     described: dict[str, DescribedDrive]
 
 
@@ -85,7 +85,6 @@ def survey_recording(
     frames, thumbnails = [], []
     sequence = MappedSequence(
         recording,
-        VOXEL_SIZE / PICTURE_DIVISIONS,
         kept=max((method.scans_per_place for method in methods), default=1),
     )
 
@@ -103,13 +102,13 @@ def survey_recording(
             method.name: drive
             for method, drive in zip(methods, drives, strict=True)
         }
-    fine = sequence.finish(track)
-    if len(fine) == 0:
+    coarse, fine = sequence.finish(track)
+    if len(coarse) == 0:
         raise InputError(f"{sequence.name}: no scan holds a point")
     drive = SurveyedDrive(
         placed=PlacedDrive.of(recording),
         X_WS=sequence.X_WS,
-        coarse=fine.coarsen(PICTURE_DIVISIONS),
+        coarse=coarse,
         frames=np.array(frames, dtype=np.int64),
         thumbnails=thumbnails,
     )

@@ -3,12 +3,10 @@
 import numpy as np
 
 from evaluation.findings import Finding
-from evaluation.maps import voxelise
 from evaluation.methods import make_method
 from evaluation.page import PageContent
 from evaluation.page_data import Illustration, make_drive
 from evaluation.place_recognition import judge_retrieval
-from evaluation.points import from_xyz
 from evaluation.results import (
     RecognitionResult,
     audit_table,
@@ -76,11 +74,10 @@ def _poses(xs, y, yaw):
 def _drive(name, xs, y, yaw):
     rng = np.random.default_rng(5)
     ground = np.c_[rng.uniform(-60, 160, (4000, 2)), np.zeros(4000)]
-    fine, _ = voxelise(from_xyz(ground), 0.5)
     # A wall that is 20 m ahead.
     wall = np.c_[np.full(200, 20.25), np.linspace(-9, 9, 200), np.ones(200)]
     scans = [thumbnail(wall, 1.6, i) for i in range(len(xs))]
-    return make_drive(name, fine, _poses(xs, y, yaw), range(len(xs)), scans)
+    return make_drive(name, ground, _poses(xs, y, yaw), range(len(xs)), scans)
 
 
 def _result(method, best, back=False):

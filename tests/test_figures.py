@@ -2,10 +2,11 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.patches import Patch
 import numpy as np
+import pytest
 
 from evaluation.drawing import save
 from evaluation.figures import judge_points, top_view, voxel_of_each
-from evaluation.maps import voxelise
+from evaluation.maps import VoxelAccumulator, VoxelMap
 from evaluation.points import from_xyz
 
 
@@ -30,27 +31,38 @@ def test_change_picture_asks_the_metric():
 def test_view_from_above_shows_the_route_and_60_m_around():
     x = np.arange(0.25, 1000.0, 0.5)
     line = np.stack([x, np.full_like(x, 3.0), np.zeros_like(x)], axis=1)
-    points, _ = voxelise(from_xyz(line), 0.5)
     positions = np.array([[400.0, 3.0, 1.6], [500.0, 3.0, 1.6]])
-    picture = top_view(points, positions)
+    picture = top_view(line, positions)
     left, right, bottom, top = picture.extent
     np.testing.assert_allclose([left, right], [340.0, 560.0], atol=2.0)
     assert bottom <= 3.0 <= top
     assert picture.project(positions)[:, 0].tolist() == [400.0, 500.0]
     # Without a point in sight the whole map is shown.
-    far = top_view(points, positions + np.array([0.0, 500.0, 0.0]))
+    far = top_view(line, positions + np.array([0.0, 500.0, 0.0]))
     assert far.extent[1] > 990.0
 
 
-def test_fine_voxels_know_their_coarse_ones():
+def test_points_of_pictures_know_their_voxels():
+    accumulator = VoxelAccumulator(5.0, 10)
     rng = np.random.default_rng(8)
-    fine, _ = voxelise(from_xyz(rng.uniform(-40, 40, (3000, 3))), 0.5)
-    coarse = fine.coarsen(10)
-    owners = voxel_of_each(fine, coarse)
+    accumulator.add(from_xyz(rng.uniform(-40, 40, (3000, 3))))
+    points, coarse = accumulator.samples(), accumulator.to_map()
+    owners = voxel_of_each(points, coarse)
     np.testing.assert_array_equal(
-        coarse.indices[owners], np.floor_divide(fine.indices, 10)
+        coarse.indices[owners], np.floor((points - [0.0, 0.0, -2.5]) / 5.0)
     )
     assert set(owners) == set(range(len(coarse)))
+
+
+@pytest.mark.parametrize("side", [-np.inf, 0.0, np.inf])
+def test_points_on_a_border_know_a_voxel_beside_it(side):
+    """Also where the one that they seem to lie in has no point."""
+    indices = np.array([[-9, 0, 0], [2, 4, 3], [2, 4, 5], [9, 9, 9]], np.int32)
+    coarse = VoxelMap(indices, indices * 5.0, np.ones(4, np.int64), 5.0)
+    low, high = indices[1] * 5.0 + [0.0, 0.0, -2.5], coarse.centres_W[1] + 2.5
+    corners = np.array(np.meshgrid(*zip(low, high, strict=True))).T
+    points = np.nextafter(corners.reshape(-1, 3), side)
+    assert voxel_of_each(points, coarse).tolist() == [1] * 8
 
 
 def test_legend_of_a_figure_is_not_in_the_picture_of_the_page(tmp_path):

@@ -18,13 +18,20 @@ def drive(tmp_path):
 
 @pytest.mark.parametrize("asked", [[], [0], [5, 6, 7, 6, 2], [11, 0]])
 def test_same_map_and_scans_whoever_asks(drive, asked):
-    mapped = MappedSequence(drive, 0.5, kept=3)
+    mapped = MappedSequence(drive, kept=3)
     for index in asked:
         np.testing.assert_array_equal(mapped.scan(index), drive.scan(index))
-    expected = map_sequence(drive, 0.5)
-    result = mapped.finish()
+    expected = map_sequence(drive)
+    result, fine = mapped.finish()
     np.testing.assert_array_equal(result.indices, expected.indices)
     np.testing.assert_array_equal(result.centroids_W, expected.centroids_W)
+    np.testing.assert_array_equal(result.counts, expected.counts)
+    np.testing.assert_array_equal(fine, MappedSequence(drive, 1).finish()[1])
+    # A point in each cube of half a metre that has one.
+    cubes = map_sequence(drive, 0.5).indices
+    found = np.floor((fine - [0.0, 0.0, -2.5]) / 0.5)
+    assert set(map(tuple, found)) == set(map(tuple, cubes))
+    assert len(fine) == len(cubes)
     assert mapped.name == "drive_01"
     assert len(mapped) == 12
 
@@ -33,7 +40,7 @@ def test_scans_in_order_are_read_once(drive, monkeypatch):
     read = []
     scan = drive.scan
     monkeypatch.setattr(drive, "scan", lambda i: read.append(i) or scan(i))
-    mapped = MappedSequence(drive, 0.5, kept=3)
+    mapped = MappedSequence(drive, kept=3)
     for first in (0, 2, 7):
         for index in range(first, first + 3):
             mapped.scan(index)

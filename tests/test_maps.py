@@ -124,10 +124,58 @@ def test_large_coordinates_lose_nothing():
     np.testing.assert_array_equal(there.counts, here.counts)
 
 
-def test_coarse_map_of_a_fine_one():
+@pytest.mark.parametrize("divisions", [1, 3, 10])
+def test_samples_are_the_first_point_of_each_part(divisions):
     points = random_points(20_000)
-    fine, _ = voxelise(from_xyz(points), 0.5)
-    assert_is(fine.coarsen(10), reference_map(points, 5.0))
+    accumulator = VoxelAccumulator(5.0, divisions)
+    for start in range(0, len(points), 999):
+        accumulator.add(from_xyz(points[start : start + 999]))
+    cells = np.floor((points - [0.0, 0.0, -2.5]) / (5.0 / divisions))
+    _, firsts = np.unique(cells, axis=0, return_index=True)
+    np.testing.assert_allclose(
+        accumulator.samples(), points[np.sort(firsts)], atol=1e-12
+    )
+    # They change nothing about the map.
+    plain, _ = voxelise(from_xyz(points))
+    voxels = accumulator.to_map()
+    assert voxels.indices.tobytes() == plain.indices.tobytes()
+    assert voxels.centroids_W.tobytes() == plain.centroids_W.tobytes()
+
+
+def test_samples_stay_when_the_table_grows():
+    rng = np.random.default_rng(2)
+    points = rng.uniform(-60, 60, (120_000, 3))
+    accumulator = VoxelAccumulator(1.0, 2)
+    accumulator.add(from_xyz(points))
+    accumulator.add(from_xyz(points[::-1]))
+    cells = np.floor((points - [0.0, 0.0, -2.5]) / 0.5)
+    _, firsts = np.unique(cells, axis=0, return_index=True)
+    np.testing.assert_allclose(
+        accumulator.samples(), points[np.sort(firsts)], atol=1e-12
+    )
+
+
+@pytest.mark.parametrize("origin", [0.0, 35.0, -4_026_780.0])
+@pytest.mark.parametrize("voxel_size", [5.0, 0.7])
+def test_points_next_to_a_border_are_sampled_in_a_part_beside_it(
+    origin, voxel_size
+):
+    borders = origin + voxel_size * np.arange(-20, 21)
+    places = np.concatenate(
+        [borders, np.nextafter(borders, np.inf), np.nextafter(borders, -np.inf)]
+    )
+    for axis in range(3):
+        for place in places:
+            accumulator = VoxelAccumulator(voxel_size, 10)
+            points = np.full((1, 3), 0.25)
+            points[0, axis] = place
+            accumulator.add(from_xyz(points))
+            voxels, samples = accumulator.to_map(), accumulator.samples()
+            assert voxels.counts.tolist() == [1]
+            np.testing.assert_allclose(samples, points, rtol=1e-15, atol=1e-14)
+            # Whichever side it was counted on.
+            off = np.abs(voxels.centres_W - points)
+            assert off.max() <= 0.5 * voxel_size + 2e-9
 
 
 def test_empty_map():
@@ -135,7 +183,7 @@ def test_empty_map():
     assert len(voxels) == 0
     assert ignored == 0
     assert voxels.centroids_W.shape == (0, 3)
-    assert len(voxels.coarsen(10)) == 0
+    assert VoxelAccumulator(5.0, 10).samples().shape == (0, 3)
 
 
 def test_thin():
@@ -161,8 +209,8 @@ def test_map_of_a_recording(tmp_path):
         shown.append((description, total))
         return items
 
-    fine = map_sequence(open_sequence(path), track=track)
+    voxels = map_sequence(open_sequence(path), track=track)
     assert shown == [("mapping s", 6)]
-    assert_is(fine.coarsen(10), reference_map(np.concatenate(world), 5.0))
+    assert_is(voxels, reference_map(np.concatenate(world), 5.0))
     again = map_sequence(open_sequence(path))
-    assert again.centroids_W.tobytes() == fine.centroids_W.tobytes()
+    assert again.centroids_W.tobytes() == voxels.centroids_W.tobytes()

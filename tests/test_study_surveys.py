@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from small_towns import drive
 
+from evaluation.change import survey
 from evaluation.drive_source import RecordedDrive
 from evaluation.errors import InputError
 from evaluation.jobs import Tell
@@ -85,9 +86,14 @@ def assert_equal(one, other):
 
 
 @pytest.fixture(scope="module")
-def recorded(tmp_path_factory):
+def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("drives") / "metropolis_01"
     drive(folder, "01", "a")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def recorded(folder):
     return open_sequence(folder)
 
 
@@ -115,6 +121,13 @@ def test_what_is_kept_is_what_was_found(recorded, source, files):
         assert placed == found.drive.placed
     assert len(source.opened) == 1
     assert source.opened[0]._next == len(recorded)
+
+
+@pytest.mark.parametrize("roles", [frozenset(), BOTH])
+def test_maps_are_those_of_which_the_tcr_is_measured(folder, recorded, roles):
+    methods = [choose_methods()[0].make()]
+    found = survey_recording(recorded, roles, methods)
+    assert_equal(found.drive.coarse, survey(folder).voxels)
 
 
 def test_only_what_is_missing_or_of_something_else_is_found(source, files):

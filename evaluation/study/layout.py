@@ -28,7 +28,7 @@ class SurveyFiles:
 
     @property
     def fine(self) -> Path:
-        """Of the map for pictures."""
+        """Of the cloud for pictures."""
         return self.folder / "fine.data"
 
     def described(self, method: MethodChoice) -> Path:

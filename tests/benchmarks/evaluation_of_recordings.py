@@ -12,6 +12,7 @@ from pathlib import Path
 import resource
 import time
 
+from evaluation.mapped_sequence import MappedSequence
 from evaluation.maps import map_sequence
 from evaluation.methods import make_method
 from evaluation.place_recognition import run
@@ -46,6 +47,12 @@ def main() -> None:
     measure("map, first call", lambda: map_sequence(sequence), number)
     voxels = measure("map", lambda: map_sequence(sequence), number)
     print(f"{len(voxels)} voxels of {voxels.voxel_size} m")
+    _, fine = measure(
+        "map and cloud for pictures",
+        lambda: MappedSequence(sequence, kept=1).finish(),
+        number,
+    )
+    print(f"{len(fine)} points for pictures")
     method = make_method("scan-context++", {})
     clouds = [gather(sequence, i, 1) for i in range(0, number, 20)]
     places = measure(
