@@ -55,6 +55,7 @@ ROUTE_COLOURS = "turbo_r"
 # What a view from above shows beyond the route [m].
 _MARGIN = 60.0
 _SCALE_BAR = 50.0
+_ROUTE_POINTS = 400
 _PANEL_INCHES = 4.2
 
 
@@ -72,6 +73,21 @@ class Stage:
     name: str
     fine: np.ndarray
     coarse: VoxelMap
+    positions: np.ndarray
+
+
+@dataclass(frozen=True)
+class SeenRoute:
+    """A route in its surroundings.
+
+    Attributes:
+        name: of the stage, e.g. `04`.
+        view: of its surroundings from above.
+        positions: (N, 3) of the sensor [m].
+    """
+
+    name: str
+    view: Picture
     positions: np.ndarray
 
 
@@ -113,20 +129,19 @@ def top_view(points: np.ndarray, positions: np.ndarray) -> Picture:
     return render(shown, rgb, _FROM_ABOVE)
 
 
-def draw_routes(map_name: str, stages: Sequence[Stage], stem: Path) -> None:
+def draw_routes(map_name: str, routes: Sequence[SeenRoute], stem: Path) -> None:
     """Draws the routes of a city over their maps, red to blue, from above.
 
     Args:
         map_name: of the city.
-        stages: its drives.
+        routes: of its stages.
         stem: path to write, without ending.
     """
-    pictures = [top_view(one.fine, one.positions) for one in stages]
-    figure, grid = _picture_grid(pictures)
-    for axes, picture, stage in zip(grid, pictures, stages, strict=True):
-        _show(axes, picture)
-        _draw_route(axes, picture.project(stage.positions))
-        axes.set_title(f"{map_name} {stage.name}", fontsize=9)
+    figure, grid = _picture_grid([route.view for route in routes])
+    for axes, route in zip(grid, routes, strict=True):
+        _show(axes, route.view)
+        _draw_route(axes, route.view.project(route.positions))
+        axes.set_title(f"{map_name} {route.name}", fontsize=9)
     save(figure, stem, "webp")
 
 
@@ -170,7 +185,11 @@ def voxel_of_each(points: np.ndarray, coarse: VoxelMap) -> np.ndarray:
     Returns:
         (N,) index into the coarse map.
     """
-    _, owners = cKDTree(coarse.centres_W).query(points)
+    owners = coarse.find(points)
+    elsewhere = np.flatnonzero(owners < 0)
+    if len(elsewhere):
+        _, nearest = cKDTree(coarse.centres_W).query(points[elsewhere])
+        owners[elsewhere] = nearest
     return owners
 
 
@@ -269,6 +288,9 @@ def _show(axes, picture: Picture) -> None:
 
 def _draw_route(axes, line: np.ndarray) -> None:
     """Draws a route (N, 2) with a triangle at its start, a square at end."""
+    # No picture has room for more; each one is drawn by itself.
+    number = min(len(line), _ROUTE_POINTS)
+    line = line[np.linspace(0, len(line) - 1, number).round().astype(int)]
     segments = LineCollection(
         np.stack([line[:-1], line[1:]], axis=1),
         cmap=ROUTE_COLOURS,

@@ -68,6 +68,26 @@ class VoxelMap:
         """(V, 3) middle of each voxel [m]."""
         return _corners(self.indices, self.voxel_size) + 0.5 * self.voxel_size
 
+    def find(self, points_W: np.ndarray) -> np.ndarray:
+        """Returns in which voxels points (N, 3) lie [m].
+
+        Returns:
+            (N,) index into the map, -1 where its voxel is not occupied.
+        """
+        if len(self) == 0 or len(points_W) == 0:
+            return np.full(len(points_W), -1)
+        lifted = points_W - np.array([0.0, 0.0, Z_ORIGIN])
+        wanted = np.floor(lifted / self.voxel_size).astype(np.int64)
+        # Both as numbers that sort like the rows of indices do.
+        low, high = self.indices.min(axis=0), self.indices.max(axis=0)
+        spans = (high - low).astype(np.int64) + 1
+        weights = np.array([spans[1] * spans[2], spans[2], 1])
+        keys = (self.indices - low) @ weights
+        sought = (wanted - low) @ weights
+        places = np.minimum(np.searchsorted(keys, sought), len(keys) - 1)
+        inside = ((wanted >= low) & (wanted <= high)).all(axis=1)
+        return np.where(inside & (keys[places] == sought), places, -1)
+
 
 class VoxelAccumulator:
     """Sums points into voxels as they come, in memory of the voxels' order.

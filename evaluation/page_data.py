@@ -14,8 +14,8 @@ from matplotlib import image
 import numpy as np
 
 from evaluation.drawing import Legend
-from evaluation.figures import top_view
 from evaluation.metrics import MODES
+from evaluation.point_rendering import Picture
 from evaluation.results import RecognitionResult, in_paper_order, title
 from evaluation.retrieval import MATCH_RADIUS
 from evaluation.thumbnails import CELL, HEIGHT_STEP, MAX_POINTS
@@ -79,7 +79,7 @@ class PageDrive:
 
 def make_drive(
     name: str,
-    fine: np.ndarray,
+    view: Picture,
     X_WS: np.ndarray,
     frames: Sequence[int],
     thumbnails: list[np.ndarray],
@@ -88,17 +88,16 @@ def make_drive(
 
     Args:
         name: of the recording.
-        fine: (M, 3) cloud for pictures, in W [m].
+        view: its surroundings from above.
         X_WS: (N, 4, 4) poses of the sensor at all frames.
         frames: K of these that are places or queries.
         thumbnails: K reduced scans.
     """
     positions = X_WS[:, :3, 3]
-    picture = top_view(fine, positions)
     stream = io.BytesIO()
     image.imsave(
         stream,
-        picture.image,
+        view.image,
         format="webp",
         pil_kwargs={"quality": _WEBP_QUALITY},
     )
@@ -112,7 +111,7 @@ def make_drive(
         route=positions[np.flatnonzero(np.diff(passed, prepend=-1.0)), :2],
         thumbnails=thumbnails,
         view=stream.getvalue(),
-        extent=picture.extent,
+        extent=view.extent,
     )
 
 
@@ -163,8 +162,8 @@ def browser_data(
 def _drive_data(drive: PageDrive, num_points: int) -> dict:
     # Sorted, so that neighbours are alike and compress well.
     scans = [
-        np.array(sorted(points[:num_points].tolist()), np.uint8).reshape(-1, 3)
-        for points in drive.thumbnails
+        points[np.lexsort(points.T[::-1])]
+        for points in (whole[:num_points] for whole in drive.thumbnails)
     ]
     planes = np.concatenate(scans).T.tobytes() if scans else b""
     yaws = np.arctan2(drive.X_WS[:, 1, 0], drive.X_WS[:, 0, 0])

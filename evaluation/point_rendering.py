@@ -95,27 +95,27 @@ def render(
     width = int(column.max()) + size_px
     height = int(up.max()) + size_px
     row = height - size_px - up
-    depth = np.full(height * width, -np.inf)
-    nearest = np.full(height * width, -1, dtype=np.int64)
-    # From back to front: of equal pixels the last one assigned stays.
+    # From back to front, counted from 1: of those at one place the last one
+    # assigned stays, and the highest number where squares overlap.
     order = np.argsort(seen[:, 2], kind="stable")
-    first = row[order] * width + column[order]
-    for pixel_row in range(size_px):
-        for pixel_column in range(size_px):
-            pixel = first + pixel_row * width + pixel_column
-            candidate = np.full(height * width, -1, dtype=np.int64)
-            candidate[pixel] = order
-            closer = candidate >= 0
-            closer[closer] = seen[candidate[closer], 2] > depth[closer]
-            nearest[closer] = candidate[closer]
-            depth[closer] = seen[candidate[closer], 2]
-    image = np.full((height * width, 3), _WHITE, dtype=np.uint8)
-    filled = nearest >= 0
-    shade = _shade(depth.reshape(height, width)).ravel()
-    image[filled] = (rgb[nearest[filled]] * shade[filled, None]).astype(
+    corners = np.zeros((height - size_px + 1, width - size_px + 1), np.int32)
+    corners[row[order], column[order]] = np.arange(1, len(order) + 1)
+    frontmost = np.zeros((height, width), np.int32)
+    for down in range(size_px):
+        for right in range(size_px):
+            part = frontmost[
+                down : down + len(corners), right : right + len(corners[0])
+            ]
+            np.maximum(part, corners, out=part)
+    filled = frontmost > 0
+    nearest = order[frontmost[filled] - 1]
+    depth = np.full((height, width), -np.inf)
+    depth[filled] = seen[nearest, 2]
+    image = np.full((height, width, 3), _WHITE, dtype=np.uint8)
+    image[filled] = (rgb[nearest] * _shade(depth)[filled, None]).astype(
         np.uint8
     )
-    return Picture(image.reshape(height, width, 3), origin, view)
+    return Picture(image, origin, view)
 
 
 def shade_by_height(

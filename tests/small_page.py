@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from evaluation.figures import top_view
 from evaluation.findings import Finding
 from evaluation.methods import make_method
 from evaluation.page import PageContent
@@ -77,7 +78,9 @@ def _drive(name, xs, y, yaw):
     # A wall that is 20 m ahead.
     wall = np.c_[np.full(200, 20.25), np.linspace(-9, 9, 200), np.ones(200)]
     scans = [thumbnail(wall, 1.6, i) for i in range(len(xs))]
-    return make_drive(name, ground, _poses(xs, y, yaw), range(len(xs)), scans)
+    X_WS = _poses(xs, y, yaw)
+    view = top_view(ground, X_WS[:, :3, 3])
+    return make_drive(name, view, X_WS, range(len(xs)), scans)
 
 
 def _result(method, best, back=False):

@@ -214,3 +214,20 @@ def test_map_of_a_recording(tmp_path):
     assert_is(voxels, reference_map(np.concatenate(world), 5.0))
     again = map_sequence(open_sequence(path))
     assert again.centroids_W.tobytes() == voxels.centroids_W.tobytes()
+
+
+def test_points_find_their_voxels():
+    rng = np.random.default_rng(11)
+    points = rng.normal(scale=12.0, size=(400, 3))
+    voxels, _ = voxelise(from_xyz(points), 5.0)
+    occupied = {tuple(index): k for k, index in enumerate(voxels.indices)}
+    # Half of them somewhere else, also out of all bounds.
+    asked = np.concatenate([points, rng.normal(scale=40.0, size=(400, 3))])
+    lifted = asked + np.array([0.0, 0.0, 2.5])
+    cells = np.floor(lifted / 5.0).astype(int)
+    expected = [occupied.get(tuple(cell), -1) for cell in cells]
+    assert voxels.find(asked).tolist() == expected
+    assert -1 in expected[400:]
+    assert min(expected[:400]) >= 0
+    empty, _ = voxelise(from_xyz(np.empty((0, 3))), 5.0)
+    assert empty.find(asked[:2]).tolist() == [-1, -1]

@@ -6,7 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from evaluation.drawing import PRINTED
-from evaluation.figures import Stage, draw_change, draw_routes
+from evaluation.figures import (
+    SeenRoute,
+    Stage,
+    draw_change,
+    draw_routes,
+    top_view,
+)
 from evaluation.files import make_folder
 from evaluation.jobs import Tell
 from evaluation.page_data import make_drive
@@ -46,18 +52,19 @@ def draw_city(
         InputError: if a file cannot be read or written.
     """
     inputs = _inputs(map_name, [survey for _, survey in stages])
-    shown, drives = [], {}
+    routes, drives = [], {}
     for done, (name, survey) in enumerate(stages):
         tell.progress(done, len(stages) + 1)
-        drive, fine = read_part(survey.drive), read_part(survey.fine)
-        shown.append(Stage(name, fine, drive.coarse, drive.positions))
+        drive = read_part(survey.drive)
+        view = top_view(read_part(survey.fine), drive.positions)
+        routes.append(SeenRoute(name, view, drive.positions))
         drives[drive.name] = make_drive(
-            drive.name, fine, drive.X_WS, drive.frames, drive.thumbnails
+            drive.name, view, drive.X_WS, drive.frames, drive.thumbnails
         )
     write_part(pages, inputs, drives)
     tell.progress(len(stages), len(stages) + 1)
     make_folder(stem.parent)
-    draw_routes(map_name, shown, stem)
+    draw_routes(map_name, routes, stem)
     write_part(drawn, inputs, None)
 
 
