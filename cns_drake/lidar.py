@@ -28,7 +28,7 @@ class Lidar(LeafSystem):
         name: Lidar
         input_ports:
         - geometry_query
-        - sweep (with motion distortion only)
+        - sweep (if it is declared)
         output_ports:
         - scan
         - point_cloud_S
@@ -39,13 +39,14 @@ class Lidar(LeafSystem):
     closer than the minimum range or farther than the maximum range return
     nothing. `point_cloud_S` holds the same positions as a Drake point cloud.
 
-    The turn starts at the time of the output. Without motion distortion all
-    its beams are cast from the pose of S at that time (a deskewed scan).
-    With it, each column is cast from the pose of S at its own firing time,
-    which `sweep` tells (a `Sweep` of P with a pose for each column), and
-    its points are expressed in S at that time, as a real unit reports them:
-    X_WS(time + t) takes them to where they lie in the world. Other geometry
-    that moves stays for the turn where it is at its start.
+    The turn starts at the time of the output. All its beams are cast from
+    the pose of S at that time, by the pose of P in the SceneGraph (a deskewed
+    scan). With the port `sweep`, poses come from there instead (a `Sweep` of
+    P): one for the whole turn; or with motion distortion one for each column,
+    at its own firing time. Its points are then expressed in S at that time,
+    as a real unit reports them: X_WS(time + t) takes them to where they lie
+    in the world. Other geometry that moves stays for the turn where it is at
+    its start.
 
     Drake cannot cast rays, so the system reads shapes and poses from the
     QueryObject and casts on a hierarchy of its own, built anew only when
@@ -59,7 +60,7 @@ class Lidar(LeafSystem):
         pattern: BeamPattern,
         *,
         measurement: MeasurementModel = IDEAL,
-        motion_distortion: bool = False,
+        with_sweep: bool = False,
         structures: StructureTable | None = None,
         anchored_frames: Collection[FrameId] = (),
         num_threads: int = 1,
@@ -72,7 +73,7 @@ class Lidar(LeafSystem):
             X_PS: pose of the sensor in P.
             pattern: the beams.
             measurement: what it makes of true ranges.
-            motion_distortion: whether it moves while it turns.
+            with_sweep: whether the port `sweep` tells its poses.
             structures: gives labels and instance ids to returns.
             anchored_frames: frames that never move, besides the world's;
                 their geometry is cheaper to cast on.
@@ -97,7 +98,7 @@ class Lidar(LeafSystem):
             "geometry_query", Value(QueryObject())
         )
         self._sweep = None
-        if motion_distortion:
+        if with_sweep:
             self._sweep = self.DeclareAbstractInputPort(
                 "sweep", Value(object())
             )

@@ -7,15 +7,13 @@ from pathlib import Path
 
 import numpy as np
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import ConstantVectorSource
-from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
 from cns_drake.beam_pattern import BeamPattern
 from cns_drake.errors import InputError
 from cns_drake.files import complete_part, part_path, user_errors
 from cns_drake.lidar import Lidar
 from cns_drake.point_files import encode_bin, encode_pcd, to_xyzi
+from cns_drake.still_world import make_still_world
 from cns_drake.world import World
 
 
@@ -32,35 +30,14 @@ def scan_world(
     Returns:
         Structured array of `POINT_DTYPE`, in the sensor frame.
     """
-    plant, scene_graph = world.plant, world.scene_graph
-    builder = DiagramBuilder()
-    builder.AddNamedSystem("scene_graph", scene_graph)
-    positions = plant.GetPositions(plant.CreateDefaultContext())
-    source = builder.AddNamedSystem("position", ConstantVectorSource(positions))
-    to_pose = builder.AddNamedSystem(
-        "geometry_pose", MultibodyPositionToGeometryPose(plant)
+    lidar = Lidar(
+        world.scene_graph.world_frame_id(),
+        X_WS,
+        pattern,
+        structures=world.structures,
+        anchored_frames=world.anchored_frames(),
     )
-    builder.Connect(source.get_output_port(), to_pose.get_input_port())
-    builder.Connect(
-        to_pose.get_output_port(),
-        scene_graph.get_source_pose_port(plant.get_source_id()),
-    )
-    lidar = builder.AddNamedSystem(
-        "lidar",
-        Lidar(
-            scene_graph.world_frame_id(),
-            X_WS,
-            pattern,
-            structures=world.structures,
-            anchored_frames=world.anchored_frames(),
-        ),
-    )
-    builder.Connect(
-        scene_graph.get_query_output_port(),
-        lidar.GetInputPort("geometry_query"),
-    )
-    diagram = builder.Build()
-    context = diagram.CreateDefaultContext()
+    context = make_still_world(world, lidar).CreateDefaultContext()
     return lidar.GetOutputPort("scan").Eval(lidar.GetMyContextFromRoot(context))
 
 

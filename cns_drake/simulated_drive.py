@@ -11,16 +11,19 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from pydrake.math import RotationMatrix
+from pydrake.math import RigidTransform, RotationMatrix
 
 from cns_drake import __version__
 from cns_drake.frame_clock import FRAME_PERIOD, frame_stamp_ns
+from cns_drake.lidar import Lidar
 from cns_drake.messages import MAP_FRAME, to_quat_xyzw
 from cns_drake.planning import count_frames, plan_drive
 from cns_drake.provenance import combined_digest, digest_inputs
 from cns_drake.scenario import Scenario
-from cns_drake.station import make_station
+from cns_drake.still_world import make_still_world
+from cns_drake.sweep import Sweep
 from cns_drake.trajectory import pose_at
+from cns_drake.world import load_world
 from evaluation import poses
 from evaluation.sequences import Sequence
 
@@ -65,11 +68,25 @@ class SimulatedSequence(Sequence):
         self._scenario = scenario
         self._trajectory = plan_drive(scenario)
         self._num_frames = count_frames(scenario, self._trajectory)
-        name, lidar = next(iter(scenario.lidars.items()))
-        self._X_BS = lidar.pose().GetAsMatrix4()
-        self._station = make_station(scenario, trajectory=self._trajectory)
-        self._context = self._station.CreateDefaultContext()
-        self._scan = self._station.GetOutputPort(f"{name}_scan")
+        name, config = next(iter(scenario.lidars.items()))
+        self._X_BS = config.pose()
+        pattern = config.pattern()
+        self._column_t = None
+        if config.motion_distortion:
+            self._column_t = pattern.column_t_ns * 1e-9
+        # No LiDAR sees the vehicle that carries it.
+        world = load_world(scenario.world_file, without=scenario.without)
+        self._lidar = Lidar(
+            world.scene_graph.world_frame_id(),
+            RigidTransform(),
+            pattern,
+            measurement=config.measurement(name, scenario.seed),
+            with_sweep=True,
+            structures=world.structures,
+            anchored_frames=world.anchored_frames(),
+        )
+        self._diagram = make_still_world(world, self._lidar)
+        self._context = self._diagram.CreateDefaultContext()
 
     def __len__(self) -> int:
         return self._num_frames
@@ -81,22 +98,42 @@ class SimulatedSequence(Sequence):
 
     @cached_property
     def X_WS(self) -> np.ndarray:
-        moments = self._trajectory.at(FRAME_PERIOD * np.arange(len(self)))
-        X_WBs = [pose_at(moments, frame) for frame in range(len(self))]
+        quat_xyzw = [to_quat_xyzw(X_WB.rotation()) for X_WB in self._X_WBs]
+        X_WB = poses.make_pose(
+            poses.rotation_from_quaternion(np.array(quat_xyzw)),
+            np.array([X_WB.translation() for X_WB in self._X_WBs]),
+        )
+        return X_WB @ self._X_BS.GetAsMatrix4()
+
+    @cached_property
+    def _X_WBs(self) -> list[RigidTransform]:
+        times = FRAME_PERIOD * np.arange(len(self))
+        moments = self._trajectory.at(times)
+        found = [pose_at(moments, frame) for frame in range(len(self))]
         # By way of quaternions, as a plant and a recording have it: to the
         # last bit, on which a voxel or a plane may depend.
-        R_WBs = [RotationMatrix(X.rotation().ToQuaternion()) for X in X_WBs]
-        quat_xyzw = np.array([to_quat_xyzw(R_WB) for R_WB in R_WBs])
-        X_WB = poses.make_pose(
-            poses.rotation_from_quaternion(quat_xyzw),
-            np.array([X.translation() for X in X_WBs]),
-        )
-        return X_WB @ self._X_BS
+        return [
+            RigidTransform(
+                RotationMatrix(X_WB.rotation().ToQuaternion()),
+                X_WB.translation(),
+            )
+            for X_WB in found
+        ]
 
     @property
     def scenario(self) -> Mapping:
         return self._scenario.model_dump(mode="json", exclude_none=True)
 
     def scan(self, index: int) -> np.ndarray:
+        context = self._lidar.GetMyMutableContextFromRoot(self._context)
         self._context.SetTime(index * FRAME_PERIOD)
-        return self._scan.Eval(self._context)
+        self._lidar.GetInputPort("sweep").FixValue(context, self._sweep(index))
+        return self._lidar.GetOutputPort("scan").Eval(context)
+
+    def _sweep(self, index: int) -> Sweep:
+        """Returns where the sensor is during a frame."""
+        if self._column_t is not None:
+            times = index * FRAME_PERIOD + self._column_t
+            return Sweep(*self._trajectory.poses(times)).of_frame(self._X_BS)
+        X_WS = self._X_WBs[index] @ self._X_BS
+        return Sweep(X_WS.rotation().matrix()[None], X_WS.translation()[None])

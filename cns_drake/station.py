@@ -86,7 +86,7 @@ def make_station(
                 X_BSs[name],
                 config.pattern(),
                 measurement=config.measurement(name, scenario.seed),
-                motion_distortion=config.motion_distortion,
+                with_sweep=config.motion_distortion,
                 structures=world.structures,
                 anchored_frames=world.anchored_frames(),
                 num_threads=num_threads,
