@@ -102,22 +102,16 @@ class Lidar(LeafSystem):
             self._sweep = self.DeclareAbstractInputPort(
                 "sweep", Value(object())
             )
-        # Nothing in a Context invalidates the scene: whether geometry came or
-        # went is checked when a scan is made, and poses are set then.
-        self._scene = self.DeclareCacheEntry(
+        self._new_geometry = lambda: _SeenGeometry(
+            parent_frame_id, structures, anchored_frames, num_threads
+        )
+        # Kept as long as nothing changes in the SceneGraph.
+        self._seen = self.DeclareCacheEntry(
             description="ray-casting scene",
             value_producer=ValueProducer(
-                allocate=lambda: Value(object()),
-                calc=lambda context, value: value.set_value(
-                    _SeenGeometry(
-                        parent_frame_id,
-                        structures,
-                        anchored_frames,
-                        num_threads,
-                    )
-                ),
+                allocate=lambda: Value(object()), calc=self._calc_seen
             ),
-            prerequisites_of_calc={self.nothing_ticket()},
+            prerequisites_of_calc={self._geometry_query.ticket()},
         )
         scan = self.DeclareAbstractOutputPort(
             "scan",
@@ -139,11 +133,16 @@ class Lidar(LeafSystem):
     def pattern(self) -> BeamPattern:
         return self._pattern
 
+    def _calc_seen(self, context: Context, value) -> None:
+        seen = value.get_value()
+        if not isinstance(seen, _SeenGeometry):
+            seen = self._new_geometry()
+        seen.update(self._geometry_query.Eval(context))
+        value.set_value(seen)
+
     def _calc_scan(self, context: Context, output) -> None:
-        query_object = self._geometry_query.Eval(context)
-        seen = self._scene.Eval(context)
-        seen.update(query_object)
-        p_WSset, R_WSset = self._calc_poses(context, query_object)
+        seen = self._seen.Eval(context)
+        p_WSset, R_WSset = self._calc_poses(context)
         hits = seen.scene.cast_rays(
             p_WSset,
             self._d_Sset_cast,
@@ -179,7 +178,7 @@ class Lidar(LeafSystem):
             prerequisites.add(self.time_ticket())
         return prerequisites
 
-    def _calc_poses(self, context, query_object):
+    def _calc_poses(self, context: Context):
         """Returns positions and orientations of S: one, or each column's.
 
         In packet order, which takes one column after the other for each
@@ -188,6 +187,7 @@ class Lidar(LeafSystem):
         if self._sweep is not None:
             sweep = self._sweep.Eval(context).of_frame(self._X_PS)
             return sweep.p_WPset, sweep.R_WPset
+        query_object = self._geometry_query.Eval(context)
         X_WP = query_object.GetPoseInWorld(self._parent_frame_id)
         X_WS = X_WP @ self._X_PS
         return X_WS.translation(), X_WS.rotation().matrix()

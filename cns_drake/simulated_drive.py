@@ -74,13 +74,15 @@ class SimulatedSequence(Sequence):
         self._column_t = None
         if config.motion_distortion:
             self._column_t = pattern.column_t_ns * 1e-9
+        measurement = config.measurement(name, scenario.seed)
+        self._is_random = measurement.is_random
         # No LiDAR sees the vehicle that carries it.
         world = load_world(scenario.world_file, without=scenario.without)
         self._lidar = Lidar(
             world.scene_graph.world_frame_id(),
             RigidTransform(),
             pattern,
-            measurement=config.measurement(name, scenario.seed),
+            measurement=measurement,
             with_sweep=True,
             structures=world.structures,
             anchored_frames=world.anchored_frames(),
@@ -126,7 +128,10 @@ class SimulatedSequence(Sequence):
 
     def scan(self, index: int) -> np.ndarray:
         context = self._lidar.GetMyMutableContextFromRoot(self._context)
-        self._context.SetTime(index * FRAME_PERIOD)
+        if self._is_random:
+            # Only noise depends on the time as such; at a new one, the
+            # SceneGraph computes everything anew.
+            self._context.SetTime(index * FRAME_PERIOD)
         self._lidar.GetInputPort("sweep").FixValue(context, self._sweep(index))
         return self._lidar.GetOutputPort("scan").Eval(context)
 
