@@ -142,6 +142,8 @@ class Lidar(LeafSystem):
 
     def _calc_scan(self, context: Context, output) -> None:
         seen = self._seen.Eval(context)
+        if seen.scene is None:
+            seen.update(self._geometry_query.Eval(context))
         p_WSset, R_WSset = self._calc_poses(context)
         hits = seen.scene.cast_rays(
             p_WSset,
@@ -203,8 +205,12 @@ class Lidar(LeafSystem):
 class _SeenGeometry:
     """What a LiDAR sees, as long as no geometry is added or removed.
 
+    Of a cloned Context it is empty at first: a scene in which something moves
+    cannot be shared.
+
     Attributes:
-        scene: casts rays; its geometry indices select from:
+        scene: casts rays, None before the first update; its geometry indices
+            select from:
         label: (num_geometries,) uint8 class of each geometry.
         instance: (num_geometries,) uint16 structure of each geometry.
     """
@@ -215,6 +221,15 @@ class _SeenGeometry:
         self._anchored_frames = frozenset(anchored_frames)
         self._num_threads = num_threads
         self._count = None
+        self.scene = None
+
+    def __deepcopy__(self, memo: dict) -> _SeenGeometry:
+        return _SeenGeometry(
+            self._own_frame_id,
+            self._structures,
+            self._anchored_frames,
+            self._num_threads,
+        )
 
     def update(self, query_object: QueryObject) -> None:
         """Rebuilds the scene if need be, and moves what moves."""

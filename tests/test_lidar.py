@@ -30,6 +30,7 @@ from cns_drake.errors import InputError
 from cns_drake.lidar import Lidar
 from cns_drake.measurement import MeasurementModel
 from cns_drake.structure_table import StructureEntry, StructureTable
+from cns_drake.sweep import Sweep
 
 X_WS = RigidTransform(RollPitchYaw(0.11, -0.07, 2.3), [1.5, -0.8, 0.4])
 FORWARD = BeamPattern((0.0,), 4, 0.8, 120.0, 0.05)  # Rear, left, ahead, right.
@@ -281,6 +282,47 @@ def test_new_geometry_is_noticed():
         instance,
     )
     assert ahead(stage.eval()) == pytest.approx(10.0, abs=1e-5)
+
+
+def test_a_cloned_context_sees_for_itself():
+    stage = Stage()
+    frame = stage.add_frame("site", 5, RigidTransform([10.5, 0.0, 0.0]))
+    stage.add("wall", Box(1.0, 9.0, 9.0), RigidTransform([20.5, 0.0, 0.0]))
+    stage.finish(X_PS=RigidTransform(), pattern=FORWARD)
+    assert ahead(stage.eval()) == pytest.approx(20.0, abs=1e-5)
+    original, stage.context = stage.context, stage.context.Clone()
+    assert ahead(stage.eval()) == pytest.approx(20.0, abs=1e-5)
+    instance = GeometryInstance(RigidTransform(), Box(1.0, 9.0, 9.0), "nearer")
+    instance.set_perception_properties(PerceptionProperties())
+    stage.scene_graph.RegisterGeometry(
+        stage.scene_graph.GetMyMutableContextFromRoot(stage.context),
+        stage.source,
+        frame,
+        instance,
+    )
+    assert ahead(stage.eval()) == pytest.approx(10.0, abs=1e-5)
+    stage.context = original
+    assert ahead(stage.eval()) == pytest.approx(20.0, abs=1e-5)
+
+
+def test_a_cloned_context_has_poses_of_its_own():
+    stage = Stage()
+    stage.add("wall", Box(1.0, 9.0, 9.0), RigidTransform([20.5, 0.0, 0.0]))
+    stage.finish(X_PS=RigidTransform(), pattern=FORWARD, with_sweep=True)
+
+    def ahead_from(x):
+        sweep = Sweep(np.eye(3)[None], np.array([[x, 0.0, 0.0]]))
+        port = stage.lidar.GetInputPort("sweep")
+        port.FixValue(
+            stage.lidar.GetMyMutableContextFromRoot(stage.context), sweep
+        )
+        return ahead(stage.eval())
+
+    assert ahead_from(1.0) == pytest.approx(19.0, abs=1e-5)
+    original, stage.context = stage.context, stage.context.Clone()
+    assert ahead_from(3.0) == pytest.approx(17.0, abs=1e-5)
+    stage.context = original
+    assert ahead(stage.eval()) == pytest.approx(19.0, abs=1e-5)
 
 
 def test_only_perception_geometry_is_seen():
