@@ -102,14 +102,19 @@ class Lidar(LeafSystem):
             self._sweep = self.DeclareAbstractInputPort(
                 "sweep", Value(object())
             )
-        self._new_geometry = lambda: _SeenGeometry(
-            parent_frame_id, structures, anchored_frames, num_threads
-        )
         # Kept as long as nothing changes in the SceneGraph.
         self._seen = self.DeclareCacheEntry(
             description="ray-casting scene",
             value_producer=ValueProducer(
-                allocate=lambda: Value(object()), calc=self._calc_seen
+                allocate=lambda: Value(
+                    _SeenGeometry(
+                        parent_frame_id,
+                        structures,
+                        anchored_frames,
+                        num_threads,
+                    )
+                ),
+                calc=self._calc_seen,
             ),
             prerequisites_of_calc={self._geometry_query.ticket()},
         )
@@ -134,11 +139,7 @@ class Lidar(LeafSystem):
         return self._pattern
 
     def _calc_seen(self, context: Context, value) -> None:
-        seen = value.get_value()
-        if not isinstance(seen, _SeenGeometry):
-            seen = self._new_geometry()
-        seen.update(self._geometry_query.Eval(context))
-        value.set_value(seen)
+        value.get_value().update(self._geometry_query.Eval(context))
 
     def _calc_scan(self, context: Context, output) -> None:
         seen = self._seen.Eval(context)

@@ -89,6 +89,16 @@ class Stage:
             AbstractValue.Make(vector),
         )
 
+    def add_to_context(self, frame, shape):
+        instance = GeometryInstance(RigidTransform(), shape, "new")
+        instance.set_perception_properties(PerceptionProperties())
+        self.scene_graph.RegisterGeometry(
+            self.scene_graph.GetMyMutableContextFromRoot(self.context),
+            self.source,
+            frame,
+            instance,
+        )
+
     def eval(self, port="scan"):
         context = self.lidar.GetMyContextFromRoot(self.context)
         return self.lidar.GetOutputPort(port).Eval(context)
@@ -273,14 +283,7 @@ def test_new_geometry_is_noticed():
     stage.add("wall", Box(1.0, 9.0, 9.0), RigidTransform([20.5, 0.0, 0.0]))
     stage.finish(X_PS=RigidTransform(), pattern=FORWARD)
     assert ahead(stage.eval()) == pytest.approx(20.0, abs=1e-5)
-    instance = GeometryInstance(RigidTransform(), Box(1.0, 9.0, 9.0), "nearer")
-    instance.set_perception_properties(PerceptionProperties())
-    stage.scene_graph.RegisterGeometry(
-        stage.scene_graph.GetMyMutableContextFromRoot(stage.context),
-        stage.source,
-        frame,
-        instance,
-    )
+    stage.add_to_context(frame, Box(1.0, 9.0, 9.0))
     assert ahead(stage.eval()) == pytest.approx(10.0, abs=1e-5)
 
 
@@ -292,14 +295,7 @@ def test_a_cloned_context_sees_for_itself():
     assert ahead(stage.eval()) == pytest.approx(20.0, abs=1e-5)
     original, stage.context = stage.context, stage.context.Clone()
     assert ahead(stage.eval()) == pytest.approx(20.0, abs=1e-5)
-    instance = GeometryInstance(RigidTransform(), Box(1.0, 9.0, 9.0), "nearer")
-    instance.set_perception_properties(PerceptionProperties())
-    stage.scene_graph.RegisterGeometry(
-        stage.scene_graph.GetMyMutableContextFromRoot(stage.context),
-        stage.source,
-        frame,
-        instance,
-    )
+    stage.add_to_context(frame, Box(1.0, 9.0, 9.0))
     assert ahead(stage.eval()) == pytest.approx(10.0, abs=1e-5)
     stage.context = original
     assert ahead(stage.eval()) == pytest.approx(20.0, abs=1e-5)
