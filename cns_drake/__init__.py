@@ -1,3 +1,116 @@
-"""Cities that change, driven and recorded by simulated LiDAR in Drake."""
+"""Cities that change, driven and recorded by simulated LiDAR in Drake.
+
+What is public is in `__all__`; each name loads what it needs when it is first
+asked for. `cns_drake.evaluation` is the package of that name, also where the
+user has another one.
+"""
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from cns_drake.isolation import isolate, our_evaluation
+
+if TYPE_CHECKING:
+    from cns_drake.command_line.sequence_script import (
+        run_script,
+        run_sequence,
+    )
+    from cns_drake.motion.vehicle_motion import VehicleMotion
+    from cns_drake.recording.bag_writer import BagWriter
+    from cns_drake.recording.mcap_recorder import (
+        McapRecorder,
+        recording_topics,
+    )
+    from cns_drake.scenarios.planning import plan_drive
+    from cns_drake.scenarios.scenario import (
+        Scenario,
+        load_scenario,
+        make_scenario,
+    )
+    from cns_drake.scene.world import World, load_world
+    from cns_drake.sensors.beam_pattern import (
+        LIDAR_PRESETS,
+        BeamPattern,
+        make_beam_pattern,
+    )
+    from cns_drake.sensors.imu import Imu, add_imu
+    from cns_drake.sensors.lidar import Lidar, add_lidar
+    from cns_drake.sensors.measurement import MeasurementModel
+    from cns_drake.sensors.odometry import Odometry, add_odometry
+    from cns_drake.simulation.simulation import Run, simulate
+    from cns_drake.simulation.station import make_station
+    import evaluation
+    from evaluation.support.errors import InputError
 
 __version__ = "0.1.0"
+
+__all__ = [
+    "LIDAR_PRESETS",
+    "BagWriter",
+    "BeamPattern",
+    "Imu",
+    "InputError",
+    "Lidar",
+    "McapRecorder",
+    "MeasurementModel",
+    "Odometry",
+    "Run",
+    "Scenario",
+    "VehicleMotion",
+    "World",
+    "__version__",
+    "add_imu",
+    "add_lidar",
+    "add_odometry",
+    "evaluation",
+    "load_scenario",
+    "load_world",
+    "make_beam_pattern",
+    "make_scenario",
+    "make_station",
+    "plan_drive",
+    "recording_topics",
+    "run_script",
+    "run_sequence",
+    "simulate",
+]
+
+# Module -> what it gives.
+_HOMES = {
+    "command_line.sequence_script": ("run_script", "run_sequence"),
+    "motion.vehicle_motion": ("VehicleMotion",),
+    "recording.bag_writer": ("BagWriter",),
+    "recording.mcap_recorder": ("McapRecorder", "recording_topics"),
+    "scenarios.planning": ("plan_drive",),
+    "scenarios.scenario": ("Scenario", "load_scenario", "make_scenario"),
+    "scene.world": ("World", "load_world"),
+    "sensors.beam_pattern": (
+        "LIDAR_PRESETS",
+        "BeamPattern",
+        "make_beam_pattern",
+    ),
+    "sensors.imu": ("Imu", "add_imu"),
+    "sensors.lidar": ("Lidar", "add_lidar"),
+    "sensors.measurement": ("MeasurementModel",),
+    "sensors.odometry": ("Odometry", "add_odometry"),
+    "simulation.simulation": ("Run", "simulate"),
+    "simulation.station": ("make_station",),
+}
+
+isolate()
+
+
+def __getattr__(name: str) -> Any:
+    if name == "evaluation":
+        return our_evaluation()
+    if name == "InputError":
+        return our_evaluation().InputError
+    for home, names in _HOMES.items():
+        if name in names:
+            module = importlib.import_module(f"{__name__}.{home}")
+            return getattr(module, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -2,7 +2,11 @@
 
 import sys
 
-from evaluation.interrupts import (
+from cns_drake.isolation import prefer_ours
+
+prefer_ours()  # Before anything of it is imported.
+
+from evaluation.support.interrupts import (  # noqa: E402
     end_interrupted,
     interrupt_on_termination,
     uninterrupted,
@@ -14,10 +18,10 @@ def main() -> None:
     try:
         interrupt_on_termination()
         with uninterrupted():
-            from cns_drake.cli import main as run
+            from cns_drake.command_line.cli import main as run
         run()
     except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
+        print("cns-drake: interrupted", file=sys.stderr)
         end_interrupted()
 
 

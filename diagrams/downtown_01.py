@@ -6,10 +6,10 @@ both avenues and round the south-western blocks; `diagrams/downtown_04.py`
 drives through the finished city.
 
 What is driven is data, `worlds/downtown/sequence_01.yaml`; how it is wired
-is `cns_drake.station.make_station`.
+is `cns_drake.make_station`.
 """
 
-from cns_drake.sequence_script import main
+from cns_drake import run_script
 
 if __name__ == "__main__":
-    main("downtown_01", __doc__)
+    run_script("downtown_01", __doc__)

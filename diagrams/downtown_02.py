@@ -5,10 +5,10 @@ office towers, the hotel and the car park not yet. A drive round the ring and
 over the plateau, through the roundabout and round the south-western blocks.
 
 What is driven is data, `worlds/downtown/sequence_02.yaml`; how it is wired
-is `cns_drake.station.make_station`.
+is `cns_drake.make_station`.
 """
 
-from cns_drake.sequence_script import main
+from cns_drake import run_script
 
 if __name__ == "__main__":
-    main("downtown_02", __doc__)
+    run_script("downtown_02", __doc__)

@@ -5,10 +5,10 @@ roundabout and beyond the ring are to come. A drive round the north-east the
 other way than that of `diagrams/downtown_04.py`, which overlaps with it.
 
 What is driven is data, `worlds/downtown/sequence_03.yaml`; how it is wired
-is `cns_drake.station.make_station`.
+is `cns_drake.make_station`.
 """
 
-from cns_drake.sequence_script import main
+from cns_drake import run_script
 
 if __name__ == "__main__":
-    main("downtown_03", __doc__)
+    run_script("downtown_03", __doc__)

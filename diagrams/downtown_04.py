@@ -6,10 +6,10 @@ plateau, round the ring and round the south-western blocks, against which those
 of the three earlier stages are compared.
 
 What is driven is data, `worlds/downtown/sequence_04.yaml`; how it is wired
-is `cns_drake.station.make_station`.
+is `cns_drake.make_station`.
 """
 
-from cns_drake.sequence_script import main
+from cns_drake import run_script
 
 if __name__ == "__main__":
-    main("downtown_04", __doc__)
+    run_script("downtown_04", __doc__)

@@ -5,10 +5,10 @@ avenues past cleared lots and young streets; `diagrams/metropolis_04.py`
 drives through the finished city on a route that overlaps with this one.
 
 What is driven is data, `worlds/metropolis/sequence_01.yaml`; how it is wired
-is `cns_drake.station.make_station`.
+is `cns_drake.make_station`.
 """
 
-from cns_drake.sequence_script import main
+from cns_drake import run_script
 
 if __name__ == "__main__":
-    main("metropolis_01", __doc__)
+    run_script("metropolis_01", __doc__)

@@ -6,10 +6,10 @@ once round the ring and twice along the boulevard, the other way round than
 most of `diagrams/metropolis_04.py`, which drives through the finished city.
 
 What is driven is data, `worlds/metropolis/sequence_02.yaml`; how it is wired
-is `cns_drake.station.make_station`.
+is `cns_drake.make_station`.
 """
 
-from cns_drake.sequence_script import main
+from cns_drake import run_script
 
 if __name__ == "__main__":
-    main("metropolis_02", __doc__)
+    run_script("metropolis_02", __doc__)

@@ -6,10 +6,10 @@ around the lots of the skyline. A drive round the middle and half the ring;
 is built.
 
 What is driven is data, `worlds/metropolis/sequence_03.yaml`; how it is wired
-is `cns_drake.station.make_station`.
+is `cns_drake.make_station`.
 """
 
-from cns_drake.sequence_script import main
+from cns_drake import run_script
 
 if __name__ == "__main__":
-    main("metropolis_03", __doc__)
+    run_script("metropolis_03", __doc__)

@@ -4,10 +4,10 @@ Row houses and shops, flats, a mill and a wharf at the river, gardens and
 woods around. `diagrams/riverside_01.py` drives through its older stage.
 
 What is driven is data, `worlds/riverside/sequence_02.yaml`; how it is wired is
-`cns_drake.station.make_station`.
+`cns_drake.simulation.station.make_station`.
 """
 
-from cns_drake.sequence_script import main
+from cns_drake import run_script
 
 if __name__ == "__main__":
-    main("riverside_02", __doc__)
+    run_script("riverside_02", __doc__)

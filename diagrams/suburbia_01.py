@@ -5,10 +5,10 @@ the south, the terraces in the north and the wood in the east.
 `diagrams/suburbia_02.py` drives through the same streets once they stand.
 
 What is driven is data, `worlds/suburbia/sequence_01.yaml`; how it is wired is
-`cns_drake.station.make_station`.
+`cns_drake.simulation.station.make_station`.
 """
 
-from cns_drake.sequence_script import main
+from cns_drake import run_script
 
 if __name__ == "__main__":
-    main("suburbia_01", __doc__)
+    run_script("suburbia_01", __doc__)

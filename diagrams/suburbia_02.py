@@ -5,10 +5,10 @@ ground, along a ring and the streets across it. `diagrams/suburbia_01.py`
 drives through the village that it grew from.
 
 What is driven is data, `worlds/suburbia/sequence_02.yaml`; how it is wired is
-`cns_drake.station.make_station`.
+`cns_drake.simulation.station.make_station`.
 """
 
-from cns_drake.sequence_script import main
+from cns_drake import run_script
 
 if __name__ == "__main__":
-    main("suburbia_02", __doc__)
+    run_script("suburbia_02", __doc__)

@@ -1,4 +1,92 @@
 """Structural change and place recognition on LiDAR sequences.
 
 Independent of the simulator: nothing in here imports Drake.
+
+What is public is in `__all__`; each name loads what it needs when it is first
+asked for. `evaluation.sequences` and `evaluation.methods` are public as well.
 """
+
+import importlib
+from pkgutil import extend_path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from evaluation.change.tcr import TemporalChange, covered, temporal_change
+    from evaluation.maps.voxel_maps import VoxelMap, map_sequence, voxelise
+    from evaluation.methods import (
+        Method,
+        MethodConfig,
+        known_methods,
+        make_method,
+        register,
+    )
+    from evaluation.recognition.metrics import (
+        PlaceRecognitionMetrics,
+        QueryOutcomes,
+        evaluate,
+        judge,
+    )
+    from evaluation.recognition.retrieval import Retrieval, retrieve
+    from evaluation.sequences import Sequence, open_sequence
+    from evaluation.support.errors import InputError
+
+__all__ = [
+    "InputError",
+    "Method",
+    "MethodConfig",
+    "PlaceRecognitionMetrics",
+    "QueryOutcomes",
+    "Retrieval",
+    "Sequence",
+    "TemporalChange",
+    "VoxelMap",
+    "covered",
+    "evaluate",
+    "judge",
+    "known_methods",
+    "make_method",
+    "map_sequence",
+    "open_sequence",
+    "register",
+    "retrieve",
+    "temporal_change",
+    "voxelise",
+]
+
+# Module -> what it gives.
+_HOMES = {
+    "change.tcr": ("TemporalChange", "covered", "temporal_change"),
+    "maps.voxel_maps": ("VoxelMap", "map_sequence", "voxelise"),
+    "methods": (
+        "Method",
+        "MethodConfig",
+        "known_methods",
+        "make_method",
+        "register",
+    ),
+    "recognition.metrics": (
+        "PlaceRecognitionMetrics",
+        "QueryOutcomes",
+        "evaluate",
+        "judge",
+    ),
+    "recognition.retrieval": ("Retrieval", "retrieve"),
+    "sequences": ("Sequence", "open_sequence"),
+    "support.errors": ("InputError",),
+}
+
+# Python prefers a package to a folder without `__init__`. One of the user's
+# that is called the same stays importable, behind ours.
+__path__ = extend_path(__path__, __name__)
+
+
+def __getattr__(name: str) -> Any:
+    for home, names in _HOMES.items():
+        if name in names:
+            module = importlib.import_module(f"{__name__}.{home}")
+            return getattr(module, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,6 +1,6 @@
 """`python -m evaluation` is `cns-eval`."""
 
-from evaluation.cli import main
+from evaluation.command_line.cli import main
 
 if __name__ == "__main__":
     main()

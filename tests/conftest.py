@@ -1,13 +1,12 @@
-"""Fixtures that several test modules use."""
+"""Fixtures that several test modules use.
+
+What is slow to import is imported where it is needed: the process that hands
+out the tests needs none of it.
+"""
 
 import signal
 
-from eval_program import write_towns
 import pytest
-from small_map import scenario_values, write_small_map
-
-from cns_drake.scenario import make_scenario
-from cns_drake.simulation import simulate
 
 # What is started in the background ignores Ctrl-C, and so does all that it
 # starts; the tests of interrupts need it.
@@ -18,7 +17,7 @@ def pytest_addoption(parser):
     parser.addoption(
         "--fuzz",
         type=int,
-        default=5200,
+        default=1300,
         help="how many files test_fuzz damages (default: %(default)s)",
     )
     parser.addoption(
@@ -26,15 +25,39 @@ def pytest_addoption(parser):
     )
 
 
+def pytest_collection_modifyitems(items):
+    """Puts files with slow tests first, so that none is left at the end."""
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+    items.sort(key=lambda item: item.path not in slow)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def cities_of_this_run(tmp_path_factory, pytestconfig):
+    """Lets all processes of a run share the cities, see `shipped_cities`."""
+    folder = tmp_path_factory.getbasetemp()
+    if hasattr(pytestconfig, "workerinput"):
+        folder = folder.parent
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("CNS_DRAKE_TEST_CITIES", str(folder))
+        yield
+
+
 @pytest.fixture(scope="session")
 def small_map(tmp_path_factory):
     """Folder of a map that loads at once, with stages 01 and 04."""
+    from small_map import write_small_map
+
     return write_small_map(tmp_path_factory.mktemp("maps") / "small")
 
 
 @pytest.fixture(scope="session")
 def short_recording(small_map, tmp_path_factory):
     """Folder of a recording of 40 frames with the default LiDAR."""
+    from small_map import scenario_values
+
+    from cns_drake.scenarios.scenario import make_scenario
+    from cns_drake.simulation.simulation import simulate
+
     output = tmp_path_factory.mktemp("recordings")
     values = scenario_values(small_map) | {"frames": 40}
     return simulate(make_scenario(values, "test"), output).folder
@@ -43,6 +66,8 @@ def short_recording(small_map, tmp_path_factory):
 @pytest.fixture(scope="session")
 def towns(tmp_path_factory):
     """Folder of two small drives, see `eval_program.write_towns`."""
+    from eval_program import write_towns
+
     folder = tmp_path_factory.mktemp("towns")
     write_towns(folder)
     return folder

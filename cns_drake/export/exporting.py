@@ -12,14 +12,19 @@ import os
 from pathlib import Path
 import shutil
 
-from cns_drake.errors import InputError
-from cns_drake.export.cns import CNS
-from cns_drake.export.kitti import KITTI
-from cns_drake.export.layout import Layout
-from cns_drake.files import complete_part, part_path, user_errors, write_part
-from cns_drake.rosbag2_metadata import to_yaml
-from cns_drake.yaml_files import read_yaml
+from cns_drake.export.cns_layout import CNS
+from cns_drake.export.drive_layout import Layout
+from cns_drake.export.kitti_layout import KITTI
+from cns_drake.recording.rosbag2_metadata import to_yaml
 from evaluation.sequences.mcap_sequence import McapSequence, holds_mcap
+from evaluation.support.errors import InputError
+from evaluation.support.files import (
+    complete_part,
+    part_path,
+    user_errors,
+    write_part,
+)
+from evaluation.support.yaml_files import read_yaml
 
 _LAYOUTS = {"cns": CNS, "kitti": KITTI}
 _MARKER = "export.yaml"

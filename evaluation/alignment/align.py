@@ -20,22 +20,33 @@ from typing import Literal
 
 import numpy as np
 
-from evaluation import poses
+from evaluation.alignment.alignment_report import AlignmentReport
 from evaluation.alignment.anchor_search import (
     find_candidates,
     find_guesses,
     upright,
 )
-from evaluation.alignment.anchoring import agreeing, fit_anchor, fit_bent
-from evaluation.alignment.loop_search import SAME_PLACE, LoopSearch, evenly
+from evaluation.alignment.anchoring import (
+    agreeing,
+    fit_anchor,
+    fit_bent,
+)
+from evaluation.alignment.loop_search import (
+    SAME_PLACE,
+    LoopSearch,
+    evenly,
+)
 from evaluation.alignment.loops import loop_errors
-from evaluation.alignment.report import AlignmentReport
-from evaluation.alignment.straightening import Straightened, make_consistent
+from evaluation.alignment.straightening import (
+    Straightened,
+    make_consistent,
+)
 from evaluation.alignment.submaps import Submaps
-from evaluation.errors import InputError
-from evaluation.progress import Track, silent
+from evaluation.geometry import poses
 from evaluation.sequences.moved import MovedSequence
 from evaluation.sequences.sequence import Sequence, check_same_map
+from evaluation.support.errors import InputError
+from evaluation.support.progress import Track, silent
 
 When = Literal["auto", "always", "never"]
 

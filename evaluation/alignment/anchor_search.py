@@ -14,8 +14,8 @@ import numpy as np
 
 from evaluation.alignment.submaps import Submaps
 from evaluation.methods.scan_context import ScanContext
-from evaluation.progress import Track
-from evaluation.retrieval import gather
+from evaluation.sequences.sampling import gather
+from evaluation.support.progress import Track
 
 # Candidates a query. LT-mapper takes 3, if they score 0.7 at least; here they
 # need not score, since in a changed city right ones score 0.3 to 0.5, and

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from evaluation import poses
 from evaluation.alignment.loops import Loop, close
 from evaluation.alignment.submaps import Submaps
-from evaluation.progress import Track
+from evaluation.geometry import poses
+from evaluation.support.progress import Track
 
 # Keyframes that see the same are this close, seen from above [m].
 SAME_PLACE = 10.0

@@ -14,9 +14,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from evaluation import poses
-from evaluation.compiled import compiled
-from evaluation.methods.neighbours import nearest_neighbours
+from evaluation.geometry import poses
+from evaluation.geometry.neighbours import nearest_neighbours
+from evaluation.support.compiled import compiled
 
 # Neighbours, the point among them, that a normal is fitted to.
 NUM_NEIGHBOURS = 10
@@ -201,7 +201,7 @@ def _part(is_counted: np.ndarray, of: np.ndarray) -> float:
 
 
 @compiled
-def _normals(points, neighbours):
+def _normals(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
     """Returns the directions (N, 3) in which neighbours (N, K) spread least.
 
     They are of unit length, or zero where the neighbours are on one line.

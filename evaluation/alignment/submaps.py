@@ -6,10 +6,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from evaluation import poses
 from evaluation.alignment.registration import Surface, make_surface
-from evaluation.maps import VoxelAccumulator
-from evaluation.retrieval import sample_frames
+from evaluation.geometry import poses
+from evaluation.maps.voxel_maps import VoxelAccumulator
+from evaluation.sequences.sampling import sample_frames
 from evaluation.sequences.sequence import Sequence
 
 # Between keyframes, along the path [m]; on very long drives more, on very

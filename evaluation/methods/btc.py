@@ -44,7 +44,11 @@ from evaluation.methods.btc_keypoints import (
     image_axes,
     suppress,
 )
-from evaluation.methods.btc_planes import Planes, base_plane, voxel_planes
+from evaluation.methods.btc_planes import (
+    Planes,
+    base_plane,
+    voxel_planes,
+)
 from evaluation.methods.btc_triangles import (
     Triangles,
     TriangleTable,
@@ -52,7 +56,10 @@ from evaluation.methods.btc_triangles import (
     make_triangles,
     match,
 )
-from evaluation.methods.btc_verification import find_motion, plane_overlap
+from evaluation.methods.btc_verification import (
+    find_motion,
+    plane_overlap,
+)
 from evaluation.methods.method import Method, MethodConfig, register
 
 # A bit of an int64 for each layer, and one for the sign.

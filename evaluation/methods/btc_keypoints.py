@@ -9,11 +9,12 @@ trunks, posts) are the keypoints, if they are not part of a line of such.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from evaluation.compiled import compiled
+from evaluation.support.compiled import compiled
 
 # Cells along the side of a square in which one keypoint may lie, the least
 # number of points of an image, and by how many heights a cell may have less
@@ -23,6 +24,8 @@ _MIN_POINTS = 6
 _LINE_MARGIN = 3
 
 _NEIGHBOURS = ((0, 1), (1, 0), (1, 1), (1, -1))
+
+_Words = TypeVar("_Words", int, np.ndarray)
 
 
 @dataclass(frozen=True)
@@ -214,7 +217,7 @@ def suppress(keypoints: Keypoints, radius: float, max_number: int) -> Keypoints:
 
 
 @compiled
-def count_bits(words):
+def count_bits(words: _Words) -> _Words:
     """Returns how many bits are set in numbers from 0 to 2^62 - 1.
 
     Args:
@@ -229,7 +232,13 @@ def count_bits(words):
 
 
 @compiled
-def _project(points, center, axes, low, high):
+def _project(
+    points: np.ndarray,
+    center: np.ndarray,
+    axes: np.ndarray,
+    low: float,
+    high: float,
+) -> np.ndarray:
     """Returns (M, 3) rows, columns and heights of points between limits."""
     near = np.empty((len(points), 3))
     num_near = 0
@@ -251,7 +260,15 @@ def _project(points, center, axes, low, high):
 
 
 @compiled
-def _draw(near, low, resolution, lowest, height_step, num_layers, shape):
+def _draw(
+    near: np.ndarray,
+    low: np.ndarray,
+    resolution: float,
+    lowest: float,
+    height_step: float,
+    num_layers: int,
+    shape: tuple[int, int],
+) -> tuple[np.ndarray, np.ndarray]:
     """Returns heights and means as of a `HeightImage`."""
     heights = np.zeros((shape[0], shape[1]), dtype=np.int64)
     counts = np.zeros((shape[0], shape[1]))

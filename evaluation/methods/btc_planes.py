@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from evaluation.compiled import compiled
+from evaluation.geometry.sorting import stable_order
 from evaluation.methods.btc_voxel_order import voxel_order
-from evaluation.sorting import stable_order
+from evaluation.support.compiled import compiled
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,12 @@ def merge(
 
 
 @compiled
-def group_alike(centers, normals, normal_limit, distance_limit):
+def group_alike(
+    centers: np.ndarray,
+    normals: np.ndarray,
+    normal_limit: float,
+    distance_limit: float,
+) -> np.ndarray:
     """Returns the group (P,) of each patch; -1 for one that is like no other.
 
     From the last patch to the first, each is compared with all before it, in
@@ -185,7 +190,9 @@ def group_alike(centers, normals, normal_limit, distance_limit):
 
 
 @compiled
-def _voxels(points, voxel_size):
+def _voxels(
+    points: np.ndarray, voxel_size: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Returns (N, 3) int64 indices of voxels, and (N,) numbers >= 0 of them.
 
     The numbers go by index along x, then y, then z.
@@ -214,7 +221,12 @@ def _voxels(points, voxel_size):
 
 
 @compiled
-def _moments(points, order, starts, counts):
+def _moments(
+    points: np.ndarray,
+    order: np.ndarray,
+    starts: np.ndarray,
+    counts: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
     """Returns the mean (V, 3) and covariance (V, 3, 3) of runs of points.
 
     Args:

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from evaluation.compiled import compiled
 from evaluation.methods.btc_keypoints import Keypoints, count_bits
+from evaluation.support.compiled import compiled
 
 # Fixed in the public program: how much longer the two short sides must be
 # than the long one [m], the sides' difference at which two triangles of one
@@ -197,14 +197,14 @@ def match(
 
 @compiled
 def _match(
-    query_sides,
-    query_heights,
-    keys,
-    table_sides,
-    table_heights,
-    side_tolerance,
-    min_similarity,
-):
+    query_sides: np.ndarray,
+    query_heights: np.ndarray,
+    keys: np.ndarray,
+    table_sides: np.ndarray,
+    table_heights: np.ndarray,
+    side_tolerance: float,
+    min_similarity: float,
+) -> tuple[np.ndarray, np.ndarray]:
     """See `match`; sides in units of the resolution."""
     found_query = np.empty(1024, dtype=np.int64)
     found_table = np.empty(1024, dtype=np.int64)

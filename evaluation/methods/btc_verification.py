@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from evaluation import poses
-from evaluation.compiled import compiled
+from evaluation.geometry import poses
 from evaluation.methods.btc_planes import Planes
+from evaluation.support.compiled import compiled
 
 # Fixed in the public program: how many pairs are tried at most (about), how
 # far from its partner a vertex may come to lie [m], and how many pairs must
@@ -108,7 +108,9 @@ def plane_overlap(
 
 
 @compiled
-def _count_agreeing(motions, query, place, limit):
+def _count_agreeing(
+    motions: np.ndarray, query: np.ndarray, place: np.ndarray, limit: float
+) -> np.ndarray:
     """Returns how many pairs (M, 3, 3) each motion (S, 4, 4) brings close."""
     counts = np.zeros(len(motions), dtype=np.int64)
     for s in range(len(motions)):

@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from evaluation.compiled import compiled
+from evaluation.support.compiled import compiled
 
 NUM_FEATURES = 6
 
@@ -88,7 +88,9 @@ def local_features(points: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
 
 
 @compiled
-def _eigenvalues(xx, yy, zz, xy, xz, yz):
+def _eigenvalues(
+    xx: float, yy: float, zz: float, xy: float, xz: float, yz: float
+) -> tuple[float, float, float]:
     """Returns the eigenvalues of a symmetric positive matrix, greatest first.
 
     In closed form (O. K. Smith, Comm. ACM 4 (4), 1961); what rounding makes
@@ -115,6 +117,6 @@ def _eigenvalues(xx, yy, zz, xy, xz, yz):
 
 
 @compiled
-def _x_ln_x(x):
+def _x_ln_x(x: float) -> float:
     """Returns x ln x, and its limit 0 at 0."""
     return x * math.log(x) if x > 0.0 else 0.0

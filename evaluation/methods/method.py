@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 import numpy as np
 from pydantic import BaseModel, ConfigDict, NonNegativeFloat, ValidationError
 
-from evaluation.errors import InputError
+from evaluation.support.errors import InputError
 
 Descriptor = TypeVar("Descriptor")
 Database = TypeVar("Database")
@@ -21,6 +21,12 @@ class MethodConfig(BaseModel):
     Attributes:
         sensor_height: of the LiDAR above the ground [m]. Default: the mount
             of the CNS vehicle.
+
+    Example:
+        from evaluation import MethodConfig
+
+        class HeightsConfig(MethodConfig):
+            rings: int = 40
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
@@ -37,6 +43,13 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         scans_per_place: how many consecutive scans are merged, in the frame
             of the first, into the cloud that is described.
         config: the parameters in use.
+
+    Example:
+        from evaluation import make_method
+
+        method = make_method("scan-context++", {})
+        database = method.build_database([method.describe_place(points)])
+        scores = method.score(method.describe(points), database)
     """
 
     name: ClassVar[str]
@@ -106,6 +119,13 @@ def register(name: str) -> Callable[[_MethodClass], _MethodClass]:
 
     Raises:
         ValueError: if another method has that name.
+
+    Example:
+        from evaluation import Method, register
+
+        @register("mine")
+        class Mine(Method):
+            ...
     """
 
     def enter(method: _MethodClass) -> _MethodClass:
@@ -124,7 +144,13 @@ def register(name: str) -> Callable[[_MethodClass], _MethodClass]:
 
 
 def known_methods() -> tuple[str, ...]:
-    """Returns the names of all registered methods."""
+    """Returns the names of all registered methods.
+
+    Example:
+        from evaluation import known_methods
+
+        print(known_methods())
+    """
     return tuple(sorted(_METHODS))
 
 
@@ -144,6 +170,11 @@ def make_method(name: str, parameters: Mapping[str, Any]) -> Method:
     Raises:
         InputError: if the method or a parameter is not known, or a value
             does not fit.
+
+    Example:
+        from evaluation import make_method
+
+        method = make_method("solid", {"sensor_height": 1.8})
     """
     if name not in _METHODS:
         raise InputError(

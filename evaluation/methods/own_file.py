@@ -6,8 +6,8 @@ import importlib.util
 from pathlib import Path
 import sys
 
-from evaluation.errors import InputError
 from evaluation.methods.method import Method
+from evaluation.support.errors import InputError
 
 
 def load_method(path: Path) -> type[Method]:

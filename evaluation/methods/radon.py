@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from evaluation.compiled import compiled
+from evaluation.support.compiled import compiled
 
 
 @compiled

@@ -19,12 +19,15 @@ import numpy as np
 from pydantic import Field, PositiveFloat, model_validator
 import scipy.fft
 
-from evaluation.compiled import compiled
-from evaluation.methods.local_features import NUM_FEATURES, local_features
+from evaluation.geometry.neighbours import nearest_neighbours
+from evaluation.geometry.poses import make_pose
+from evaluation.methods.local_features import (
+    NUM_FEATURES,
+    local_features,
+)
 from evaluation.methods.method import Method, MethodConfig, register
-from evaluation.methods.neighbours import nearest_neighbours
 from evaluation.methods.radon import radon
-from evaluation.poses import make_pose
+from evaluation.support.compiled import compiled
 
 # Keeps the spectrum of a channel that hardly varies from being blown up when
 # it is normalised: the default of PyTorch's InstanceNorm2d, with which the
@@ -284,7 +287,9 @@ def _without_duplicates(points: np.ndarray) -> np.ndarray:
 
 
 @compiled
-def _keep_greatest(image, cells, features):
+def _keep_greatest(
+    image: np.ndarray, cells: np.ndarray, features: np.ndarray
+) -> None:
     """Raises the cells (N, 2) of an image to the features (N, C) in them."""
     for index in range(len(cells)):
         cell = image[cells[index, 0], cells[index, 1]]

@@ -16,9 +16,9 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
-from evaluation.maps import Z_ORIGIN, thin
+from evaluation.geometry.poses import make_pose
+from evaluation.maps.voxel_maps import Z_ORIGIN, thin
 from evaluation.methods.method import Method, MethodConfig, register
-from evaluation.poses import make_pose
 
 
 class SolidConfig(MethodConfig):

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from evaluation.errors import InputError
 from evaluation.sequences.sequence import (
     Placed,
     PlacedDrive,
     Sequence,
     check_same_world,
 )
+from evaluation.support.errors import InputError
 
 __all__ = [
     "Placed",
@@ -35,6 +35,12 @@ def open_sequence(path: Path, lidar: str | None = None) -> Sequence:
     Raises:
         InputError: if nothing there can be read as a sequence, or it has no
             such LiDAR.
+
+    Example:
+        from evaluation import open_sequence
+
+        for scan in open_sequence("recordings/downtown_01"):
+            print(len(scan))
     """
     # Imported here: the readers' libraries are slow to load, and a map file
     # needs none of them.

@@ -21,18 +21,21 @@ from typing import Any
 import numpy as np
 import yaml
 
-from evaluation import poses
-from evaluation.errors import InputError
-from evaluation.sequences.clouds import read_cloud
+from evaluation.clouds.cloud_files import read_cloud
+from evaluation.geometry import poses
 from evaluation.sequences.motion import IMU_DTYPE
+from evaluation.sequences.pose_table import (
+    pose_matrices,
+    read_quaternions,
+)
 from evaluation.sequences.scan_files import (
     FileSequence,
     list_stamped,
     read_scenario,
 )
 from evaluation.sequences.text_tables import read_stamped_rows
-from evaluation.sequences.trajectory import pose_matrices, read_quaternions
-from evaluation.yaml_text import parse_yaml
+from evaluation.support.errors import InputError
+from evaluation.support.yaml_files import parse_yaml
 
 _POSES = "gt.csv"
 _IMU = "imu.csv"

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from evaluation.errors import InputError
 from evaluation.sequences import utm
+from evaluation.sequences.pose_table import read_quaternions
 from evaluation.sequences.scan_files import (
     FileSequence,
     check_below,
@@ -22,7 +22,7 @@ from evaluation.sequences.scan_files import (
     list_stamped,
     read_packed,
 )
-from evaluation.sequences.trajectory import read_quaternions
+from evaluation.support.errors import InputError
 
 _SCANS = "LiDAR"
 _POSES = "LiDAR_GT"

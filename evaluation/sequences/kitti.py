@@ -25,8 +25,8 @@ from pathlib import Path
 
 import numpy as np
 
-from evaluation import poses
-from evaluation.errors import InputError
+from evaluation.geometry import poses
+from evaluation.sequences.pose_table import pose_matrices
 from evaluation.sequences.scan_files import (
     FileSequence,
     read_packed,
@@ -38,7 +38,7 @@ from evaluation.sequences.text_tables import (
     parse_seconds,
     read_numbers,
 )
-from evaluation.sequences.trajectory import pose_matrices
+from evaluation.support.errors import InputError
 
 _SCANS = "velodyne"
 _LABELS = "labels"

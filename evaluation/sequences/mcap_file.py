@@ -17,7 +17,7 @@ import itertools
 import os
 from pathlib import Path
 import struct
-from typing import TypeVar
+from typing import BinaryIO, TypeVar
 
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
@@ -26,8 +26,6 @@ from mcap.records import Chunk, ChunkIndex
 import numpy as np
 import zstandard
 
-from evaluation.cluster import num_cores
-from evaluation.errors import InputError
 from evaluation.sequences.mcap_records import (
     MAGIC,
     RECORD_HEADER,
@@ -36,6 +34,8 @@ from evaluation.sequences.mcap_records import (
     read_attachment,
     uncompress,
 )
+from evaluation.support.errors import InputError
+from evaluation.support.processors import num_cores
 
 _Parsed = TypeVar("_Parsed")
 
@@ -83,11 +83,12 @@ class McapFile:
         with self._reading() as stream:
             self._check_ends(stream)
             check_summary(stream)
-            self._summary = SeekingReader(
+            summary = SeekingReader(
                 stream, record_size_limit=RECORD_LIMIT_BYTES
             ).get_summary()
-        if self._summary is None or not self._summary.chunk_indexes:
+        if summary is None or not summary.chunk_indexes:
             raise InputError(f"{self.path}: the MCAP file has no chunk index")
+        self._summary = summary
         self._chunk_indexes: list[ChunkIndex] = sorted(
             self._summary.chunk_indexes,
             key=lambda chunk: chunk.chunk_start_offset,
@@ -191,7 +192,7 @@ class McapFile:
 
     def _read_locations(self, topic: str) -> list[Location]:
         channel_id = self._channels[topic].id
-        locations = []
+        locations: list[Location] = []
         with self._reading() as stream:
             for number, chunk in enumerate(self._chunk_indexes):
                 offset = chunk.message_index_offsets.get(channel_id)
@@ -260,7 +261,7 @@ class McapFile:
                 f"the index has {found} of {counts[channel_id]} messages"
             )
 
-    def _check_ends(self, stream) -> None:
+    def _check_ends(self, stream: BinaryIO) -> None:
         if stream.read(len(MAGIC)) != MAGIC:
             raise InputError(f"{self.path}: not an MCAP file")
         size = stream.seek(0, os.SEEK_END)

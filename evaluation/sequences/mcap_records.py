@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import os
 import struct
+from typing import BinaryIO
 import zlib
 
 import lz4.frame
@@ -27,7 +28,7 @@ _CHUNK_LIMIT_BYTES = 1 << 28
 _FOOTER = struct.Struct("<BQQQI")
 
 
-def check_summary(stream) -> None:
+def check_summary(stream: BinaryIO) -> None:
     """Refuses a file whose summary is not what its checksum says.
 
     Raises:
@@ -47,7 +48,7 @@ def check_summary(stream) -> None:
     stream.seek(0)
 
 
-def read_attachment(stream) -> Attachment:
+def read_attachment(stream: BinaryIO) -> Attachment:
     """Reads the attachment at the stream's position.
 
     Raises:

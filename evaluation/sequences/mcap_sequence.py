@@ -7,16 +7,17 @@ from functools import cached_property
 import json
 from pathlib import Path
 import struct
+from typing import Any
 
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
-from evaluation import poses
-from evaluation.errors import InputError
+from evaluation.geometry import poses
 from evaluation.sequences.mcap_file import Location, McapFile
 from evaluation.sequences.motion import IMU_DTYPE, ODOMETRY_DTYPE
 from evaluation.sequences.point_cloud2 import to_points
 from evaluation.sequences.sequence import Sequence, index_instances
+from evaluation.support.errors import InputError
 
 _LIDAR_TOPIC = "/lidar/points"
 _ODOMETRY_TOPIC = "/odometry"
@@ -97,7 +98,7 @@ class McapSequence(Sequence):
             return ()
         return (
             f"{self._path}: taken while the LiDAR moved, and used as taken"
-            " (evaluation.deskewing takes the motion out)",
+            " (evaluation.sequences.deskewing takes the motion out)",
         )
 
     @property
@@ -204,7 +205,7 @@ class McapSequence(Sequence):
         first = self._file.locate(_IMU_TOPIC)[0]
         return self._mount(self._message(_IMU_TOPIC, first))
 
-    def _mount(self, message) -> np.ndarray:
+    def _mount(self, message: Any) -> np.ndarray:
         """Returns the pose of a sensor's frame, that of its message, in B."""
         first = self._file.locate(_ODOMETRY_TOPIC)[0]
         base = self._message(_ODOMETRY_TOPIC, first).child_frame_id
@@ -246,10 +247,10 @@ class McapSequence(Sequence):
             raise InputError(f"{self._path}: a pose has {error}") from error
         return poses.make_pose(R, p)
 
-    def _message(self, topic: str, place: Location):
+    def _message(self, topic: str, place: Location) -> Any:
         return self._decode(topic, self._file.read(place))
 
-    def _decode(self, topic: str, data: bytes | memoryview):
+    def _decode(self, topic: str, data: bytes | memoryview) -> Any:
         try:
             return _TYPESTORE.deserialize_cdr(data, self._message_types[topic])
         except Exception as error:
@@ -303,7 +304,7 @@ class McapSequence(Sequence):
         if not self._file.locate(topic):
             raise InputError(f"{self._path}: {topic}: no message")
 
-    def _json(self, name: str):
+    def _json(self, name: str) -> Any:
         data = self._file.attachment(name)
         if data is None:
             return None
@@ -339,11 +340,11 @@ def _sequence_name(path: Path) -> str:
     )
 
 
-def _stamp_ns(header) -> int:
+def _stamp_ns(header: Any) -> int:
     return header.stamp.sec * 1_000_000_000 + header.stamp.nanosec
 
 
-def _odometry_row(message) -> tuple:
+def _odometry_row(message: Any) -> tuple:
     pose, twist = message.pose.pose, message.twist.twist
     return (
         _stamp_ns(message.header),
@@ -354,7 +355,7 @@ def _odometry_row(message) -> tuple:
     )
 
 
-def _imu_row(message) -> tuple:
+def _imu_row(message: Any) -> tuple:
     return (
         _stamp_ns(message.header),
         _xyzw(message.orientation),
@@ -363,9 +364,9 @@ def _imu_row(message) -> tuple:
     )
 
 
-def _xyz(v) -> tuple[float, float, float]:
+def _xyz(v: Any) -> tuple[float, float, float]:
     return v.x, v.y, v.z
 
 
-def _xyzw(q) -> tuple[float, float, float, float]:
+def _xyzw(q: Any) -> tuple[float, float, float, float]:
     return q.x, q.y, q.z, q.w

@@ -14,16 +14,16 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from evaluation import poses
-from evaluation.errors import InputError
+from evaluation.geometry import poses
 from evaluation.sequences import utm
+from evaluation.sequences.pose_table import read_matrices
 from evaluation.sequences.scan_files import (
     FileSequence,
     keep_spanned,
     list_stamped,
     read_packed,
 )
-from evaluation.sequences.trajectory import read_matrices
+from evaluation.support.errors import InputError
 
 _POSES = "global_pose.csv"
 _FOLDERS = ("sensor_data/Ouster", "Ouster")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 # Datatype constant of sensor_msgs/msg/PointField -> NumPy type.
@@ -17,7 +19,7 @@ _DATATYPES = {
 }
 
 
-def to_points(message) -> np.ndarray:
+def to_points(message: Any) -> np.ndarray:
     """Returns the records of a cloud as they are, without copying them.
 
     Args:
@@ -32,8 +34,9 @@ def to_points(message) -> np.ndarray:
             floating-point `x`, `y` and `z`.
     """
     dtype = _record_type(message)
+    fields = dtype.fields or {}
     for name in "xyz":
-        if dtype.fields.get(name, (np.dtype("V1"),))[0].kind != "f":
+        if fields.get(name, (np.dtype("V1"),))[0].kind != "f":
             raise ValueError(f"the point cloud has no field {name} of floats")
     data = np.frombuffer(message.data, dtype=np.uint8)
     if message.row_step < message.width * message.point_step:
@@ -48,7 +51,7 @@ def to_points(message) -> np.ndarray:
     return np.ascontiguousarray(used).reshape(-1).view(dtype)
 
 
-def _record_type(message) -> np.dtype:
+def _record_type(message: Any) -> np.dtype:
     order = ">" if message.is_bigendian else "<"
     formats = []
     for field in message.fields:

@@ -9,10 +9,13 @@ import re
 
 import numpy as np
 
-from evaluation.errors import InputError
 from evaluation.sequences.sequence import Sequence
-from evaluation.sequences.text_tables import check_increasing, parse_stamps_ns
-from evaluation.yaml_text import parse_yaml
+from evaluation.sequences.text_tables import (
+    check_increasing,
+    parse_stamps_ns,
+)
+from evaluation.support.errors import InputError
+from evaluation.support.yaml_files import parse_yaml
 
 # A drive's name also names files.
 _NAME = re.compile(r"\w[\w.-]*")

@@ -6,11 +6,11 @@ import abc
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
-from evaluation.errors import InputError
+from evaluation.support.errors import InputError
 
 
 class Sequence(abc.ABC):
@@ -24,6 +24,12 @@ class Sequence(abc.ABC):
     Attributes:
         name: short name for tables and messages, e.g. `metropolis_04`.
         world_frame: name of W as the recording states it.
+
+    Example:
+        from evaluation import open_sequence
+
+        sequence = open_sequence("recordings/downtown_01")
+        print(len(sequence), sequence.X_WS[0], sequence.scan(0).dtype)
     """
 
     name: str
@@ -104,7 +110,7 @@ class Sequence(abc.ABC):
         return None
 
 
-def index_instances(table: object, source: str) -> dict[int, Mapping]:
+def index_instances(table: Any, source: str) -> dict[int, Mapping]:
     """Returns a recording's table of structures by instance id.
 
     Args:

@@ -8,7 +8,7 @@ import warnings
 
 import numpy as np
 
-from evaluation.errors import InputError
+from evaluation.support.errors import InputError
 
 _NS_PER_S = 1_000_000_000
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from evaluation.errors import InputError
+from evaluation.support.errors import InputError
 
 DATUM = "utm-52n"
 

@@ -6,29 +6,38 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from evaluation import page
-from evaluation.collection import City, RecordingInfo, group_cities
-from evaluation.curve_figures import draw_auc_over_change, draw_pr_curves
-from evaluation.files import completing, make_folder
-from evaluation.findings import Finding, findings
-from evaluation.page_data import Illustration, PageDrive
-from evaluation.results import (
+from evaluation.change.change_result import (
     ChangeResult,
-    RecognitionResult,
+    symmetric_changes,
+)
+from evaluation.recognition.recognition_result import RecognitionResult
+from evaluation.report import page
+from evaluation.report.curve_figures import (
+    draw_auc_over_change,
+    draw_pr_curves,
+)
+from evaluation.report.findings import Finding, findings
+from evaluation.report.page_data import Illustration, PageDrive
+from evaluation.report.result_tables import (
     audit_table,
     change_table,
     recognition_table,
-    symmetric_changes,
 )
+from evaluation.report.tables import Table
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
+from evaluation.study.collection import (
+    City,
+    RecordingInfo,
+    group_cities,
+)
 from evaluation.study.figure_files import (
     auc_illustration,
     curves_stem,
     illustrations,
 )
-from evaluation.study.layout import StudyFiles
 from evaluation.study.parts import read_part
-from evaluation.tables import Table
+from evaluation.study.study_layout import StudyFiles
+from evaluation.support.files import completing, make_folder
 
 
 @dataclass

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import hashlib
 from pathlib import Path
 
-from evaluation.errors import InputError
 from evaluation.methods import (
     Method,
     known_methods,
@@ -15,6 +14,7 @@ from evaluation.methods import (
     shipped_methods,
 )
 from evaluation.methods.own_file import load_method
+from evaluation.support.errors import InputError
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from evaluation.collection import City, RecordingInfo
-from evaluation.figures import CHANGE_LEGEND, SETS_LEGEND
-from evaluation.page_data import Illustration
+from evaluation.report.figures import CHANGE_LEGEND, SETS_LEGEND
+from evaluation.report.page_data import Illustration
+from evaluation.study.collection import City, RecordingInfo
 from evaluation.study.views import PAGE_KIND
 
 

@@ -4,23 +4,24 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from evaluation.change import Surveyed
-from evaluation.change import compare as compare_maps
-from evaluation.jobs import Tell
-from evaluation.place_recognition import judge_retrieval
-from evaluation.recording_survey import SurveyedDrive
-from evaluation.results import ChangeResult, RecognitionResult
-from evaluation.retrieval import compare as score
+from evaluation.change.change_result import ChangeResult
+from evaluation.change.drive_change import Surveyed
+from evaluation.change.drive_change import compare as compare_maps
+from evaluation.jobs.running import Tell
+from evaluation.recognition.place_recognition import judge_retrieval
+from evaluation.recognition.recognition_result import RecognitionResult
+from evaluation.recognition.retrieval import compare as score
 from evaluation.sequences import check_same_world
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.code_digest import measuring_code
-from evaluation.study.layout import SurveyFiles
 from evaluation.study.parts import (
     is_current,
     part_digest,
     read_part,
     write_part,
 )
+from evaluation.study.recording_survey import SurveyedDrive
+from evaluation.study.study_layout import SurveyFiles
 from evaluation.study.surveys import tracking
 
 

@@ -15,11 +15,12 @@ import hashlib
 import json
 from pathlib import Path
 import pickle
+from typing import Any, BinaryIO
 
 import zstandard
 
-from evaluation.errors import InputError
-from evaluation.files import completing, make_folder
+from evaluation.support.errors import InputError
+from evaluation.support.files import completing, make_folder
 
 _MAGIC = b"cns-eval part 1\n"
 _LEVEL = 1
@@ -74,7 +75,7 @@ def part_digest(path: Path) -> str:
         raise InputError(f"{path}: {error.strerror or error}") from error
 
 
-def read_part(path: Path):
+def read_part(path: Path) -> Any:
     """Returns the value of a part.
 
     Raises:
@@ -91,7 +92,7 @@ def read_part(path: Path):
         raise InputError(f"{path}: damaged ({error}); delete it") from error
 
 
-def _read_header(path: Path, stream) -> dict:
+def _read_header(path: Path, stream: BinaryIO) -> dict:
     """Reads up to the value, which must be there in its full length."""
     try:
         if stream.readline(len(_MAGIC)) != _MAGIC:

@@ -5,13 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from evaluation.collection import City, RecordingInfo, group_cities
-from evaluation.jobs import Job
-from evaluation.retrieval import Role
+from evaluation.jobs.running import Job
+from evaluation.recognition.retrieval import Role
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
+from evaluation.study.collection import (
+    City,
+    RecordingInfo,
+    group_cities,
+)
 from evaluation.study.figure_files import change_stems, routes_stem
-from evaluation.study.layout import StudyFiles
-from evaluation.study.measurements import are_recognised, recognise_places
+from evaluation.study.measurements import (
+    are_recognised,
+    recognise_places,
+)
+from evaluation.study.study_layout import StudyFiles
 from evaluation.study.surveys import START_COST, survey_job, survey_name
 from evaluation.study.views import (
     draw_city,

@@ -6,15 +6,15 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from evaluation.drive_source import DriveSource
-from evaluation.jobs import Job, Tell
-from evaluation.progress import Track
-from evaluation.recording_survey import survey_recording
-from evaluation.retrieval import Role
+from evaluation.jobs.running import Job, Tell
+from evaluation.recognition.retrieval import Role
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.code_digest import measuring_code
-from evaluation.study.layout import SurveyFiles
+from evaluation.study.drive_source import DriveSource
 from evaluation.study.parts import is_current, write_part
+from evaluation.study.recording_survey import survey_recording
+from evaluation.study.study_layout import SurveyFiles
+from evaluation.support.progress import Track
 
 # Expected seconds: for a process to start and import all that it needs; for
 # the maps of a drive of 3000 scans, with 250 places and 150 queries.

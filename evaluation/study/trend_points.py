@@ -9,25 +9,25 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from evaluation.cluster import Cluster
-from evaluation.drive_source import DriveSource, RecordedDrive
-from evaluation.errors import InputError
-from evaluation.files import make_folder
-from evaluation.jobs import Job, Tell, run_jobs
-from evaluation.place_recognition import judge_retrieval
-from evaluation.recording_survey import survey_recording
-from evaluation.retrieval import compare as score
+from evaluation.change.tcr import temporal_change
+from evaluation.jobs.cluster import Cluster
+from evaluation.jobs.running import Job, Tell, run_jobs
+from evaluation.recognition.place_recognition import judge_retrieval
+from evaluation.recognition.retrieval import compare as score
 from evaluation.sequences import check_same_world, open_sequence
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
-from evaluation.study.layout import StudyFiles, SurveyFiles
+from evaluation.study.drive_source import DriveSource, RecordedDrive
 from evaluation.study.parts import (
     is_current,
     part_digest,
     read_part,
     write_part,
 )
+from evaluation.study.recording_survey import survey_recording
+from evaluation.study.study_layout import StudyFiles, SurveyFiles
 from evaluation.study.surveys import survey_inputs, survey_job, tracking
-from evaluation.tcr import temporal_change
+from evaluation.support.errors import InputError
+from evaluation.support.files import make_folder
 
 # Expected seconds for a database.
 _COST = 30.0

@@ -5,19 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from evaluation.drawing import PRINTED
-from evaluation.figures import (
+from evaluation.jobs.running import Tell
+from evaluation.report.drawing import PRINTED
+from evaluation.report.figures import (
     SeenRoute,
     Stage,
     draw_change,
     draw_routes,
     top_view,
 )
-from evaluation.files import make_folder
-from evaluation.jobs import Tell
-from evaluation.page_data import make_drive
+from evaluation.report.page_data import make_drive
 from evaluation.study.code_digest import all_code
-from evaluation.study.layout import SurveyFiles
 from evaluation.study.measurements import is_measured, measure_change
 from evaluation.study.parts import (
     is_current,
@@ -25,6 +23,8 @@ from evaluation.study.parts import (
     read_part,
     write_part,
 )
+from evaluation.study.study_layout import SurveyFiles
+from evaluation.support.files import make_folder
 
 # Of a figure that consists of pixels, on the page.
 PAGE_KIND = "webp"

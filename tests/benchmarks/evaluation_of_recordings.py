@@ -12,12 +12,12 @@ from pathlib import Path
 import resource
 import time
 
-from evaluation.mapped_sequence import MappedSequence
-from evaluation.maps import map_sequence
+from evaluation.maps.mapped_sequence import MappedSequence
+from evaluation.maps.voxel_maps import map_sequence
 from evaluation.methods import make_method
-from evaluation.place_recognition import run
-from evaluation.retrieval import gather
+from evaluation.recognition.place_recognition import run
 from evaluation.sequences import open_sequence
+from evaluation.sequences.sampling import gather
 
 
 def measure(label: str, work: Callable, number: int = 1):

@@ -31,11 +31,14 @@ from stages import (
     still,
 )
 
-from cns_drake.beam_pattern import BeamPattern
-from cns_drake.perception_geometry import PerceptionGeometry, TriangleSurface
-from cns_drake.ray_casting import RayCastingScene
-from cns_drake.scenario import load_scenario
-from cns_drake.simulation import simulate
+from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
+from cns_drake.scenarios.scenario import load_scenario
+from cns_drake.scene.perception_geometry import (
+    PerceptionGeometry,
+    TriangleSurface,
+)
+from cns_drake.sensors.beam_pattern import BeamPattern
+from cns_drake.simulation.simulation import simulate
 
 POSES = 8
 REACH = 120.0

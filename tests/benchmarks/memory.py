@@ -28,7 +28,7 @@ SPEED = 20.0
 
 def print_peak(sequence: str, frames: int | None) -> None:
     """Prints the peak of memory of recording a sequence."""
-    from cns_drake.scenario import load_scenario
+    from cns_drake.scenarios.scenario import load_scenario
 
     scenario = load_scenario(sequence)
     _record(scenario.model_copy(update={"frames": frames}), lambda done: None)
@@ -39,10 +39,10 @@ def print_growth(sequence: str, frames: int) -> None:
     """Prints how the memory of a long recording grows."""
     import numpy as np
 
-    from cns_drake.city.roads.network import load_road_network
-    from cns_drake.frame_clock import FRAME_PERIOD
-    from cns_drake.route_drawing import draw_route
-    from cns_drake.scenario import load_scenario
+    from cns_drake.recording.frame_clock import FRAME_PERIOD
+    from cns_drake.roads.network import load_road_network
+    from cns_drake.roads.route_drawing import draw_route
+    from cns_drake.scenarios.scenario import load_scenario
 
     scenario = load_scenario(sequence)
     route = draw_route(
@@ -76,7 +76,7 @@ def print_growth(sequence: str, frames: int) -> None:
 
 
 def _record(scenario, on_frame) -> None:
-    from cns_drake.simulation import simulate
+    from cns_drake.simulation.simulation import simulate
 
     with tempfile.TemporaryDirectory() as folder:
         simulate(

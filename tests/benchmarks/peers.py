@@ -46,9 +46,12 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.sensors import CameraInfo
 from stages import interleaved, read_stage, sensor_poses, still
 
-from cns_drake.beam_pattern import make_beam_pattern
-from cns_drake.perception_geometry import PerceptionGeometry, TriangleSurface
-from cns_drake.ray_casting import RayCastingScene
+from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
+from cns_drake.scene.perception_geometry import (
+    PerceptionGeometry,
+    TriangleSurface,
+)
+from cns_drake.sensors.beam_pattern import make_beam_pattern
 
 REACH = 120.0
 # Errors beyond this are counted [m].

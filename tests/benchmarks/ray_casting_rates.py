@@ -31,11 +31,15 @@ from stages import (
     still,
 )
 
-from cns_drake.beam_pattern import make_beam_pattern
-from cns_drake.embree_hierarchy import EmbreeHierarchy
-from cns_drake.embree_primitives import SOLID, merge_curved, merge_flat
-from cns_drake.ray_casting import RayCastingScene
-from cns_drake.ray_groups import group_geometries
+from cns_drake.ray_casting.embree_hierarchy import EmbreeHierarchy
+from cns_drake.ray_casting.embree_primitives import (
+    SOLID,
+    merge_curved,
+    merge_flat,
+)
+from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
+from cns_drake.ray_casting.ray_groups import group_geometries
+from cns_drake.sensors.beam_pattern import make_beam_pattern
 
 SEQUENCES = ("metropolis_04", "downtown_04")
 POSES = 16

@@ -30,18 +30,18 @@ from processes import in_process
 from stages import Open3dStage, read_stage
 import zstandard
 
-from cns_drake import messages
-from cns_drake.bag_writer import BagWriter
-from cns_drake.frame_clock import FRAME_PERIOD
-from cns_drake.lidar import Lidar
-from cns_drake.odometry import OdometrySensor
-from cns_drake.part_file import PartFile
-from cns_drake.planning import plan_drive
-from cns_drake.ray_casting import RayCastingScene
-from cns_drake.scenario import Scenario, load_scenario
-from cns_drake.simulation import simulate
-from cns_drake.vehicle_motion import VehicleMotion
-from evaluation.cluster import num_cores
+from cns_drake.motion.vehicle_motion import VehicleMotion
+from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
+from cns_drake.recording import messages
+from cns_drake.recording.bag_writer import BagWriter
+from cns_drake.recording.frame_clock import FRAME_PERIOD
+from cns_drake.recording.part_file import PartFile
+from cns_drake.scenarios.planning import plan_drive
+from cns_drake.scenarios.scenario import Scenario, load_scenario
+from cns_drake.sensors.lidar import Lidar
+from cns_drake.sensors.odometry import OdometrySensor
+from cns_drake.simulation.simulation import simulate
+from evaluation.support.processors import num_cores
 
 SEQUENCES = ("metropolis_04", "downtown_04")
 # Step -> what does it; of calls within calls, the innermost counts.

@@ -13,17 +13,17 @@ import open3d
 from pydrake.geometry import FrameId, GeometryId
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from cns_drake.open3d_scene import Open3dScene
-from cns_drake.perception_geometry import (
+from cns_drake.ray_casting.open3d_scene import Open3dScene
+from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
+from cns_drake.ray_casting.ray_groups import group_geometries
+from cns_drake.scenarios.planning import plan_drive
+from cns_drake.scenarios.scenario import load_scenario
+from cns_drake.scene.perception_geometry import (
     PerceptionGeometry,
     TriangleSurface,
     read_perception_geometry,
 )
-from cns_drake.planning import plan_drive
-from cns_drake.ray_casting import RayCastingScene
-from cns_drake.ray_groups import group_geometries
-from cns_drake.scenario import load_scenario
-from cns_drake.world import load_world
+from cns_drake.scene.world import load_world
 
 
 def read_stage(sequence: str) -> list[PerceptionGeometry]:

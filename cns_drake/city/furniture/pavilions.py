@@ -286,14 +286,7 @@ def _cafe_set() -> Mesh:
 def _umbrella() -> Mesh:
     """Returns a thin eight-sided canopy; its top is the origin."""
     return lathe(
-        [
-            (1.38, -0.6),
-            (1.4, -0.58),
-            (1.42, -0.42),
-            (0.7, -0.2),
-            (0.06, 0.0),
-        ],
-        8,
+        [(1.38, -0.6), (1.4, -0.58), (1.42, -0.42), (0.7, -0.2), (0.06, 0.0)], 8
     )
 
 

@@ -24,10 +24,7 @@ _LAMP = (0.85, 0.84, 0.78)
 
 
 def straight_lamp(
-    rng: np.random.Generator,
-    *,
-    height: float | None = None,
-    arms: int = 1,
+    rng: np.random.Generator, *, height: float | None = None, arms: int = 1
 ) -> Model:
     """Returns a mast with one or two straight, slightly rising arms.
 
@@ -60,10 +57,7 @@ def straight_lamp(
 
 
 def curved_lamp(
-    rng: np.random.Generator,
-    *,
-    height: float | None = None,
-    arms: int = 1,
+    rng: np.random.Generator, *, height: float | None = None, arms: int = 1
 ) -> Model:
     """Returns a dark mast whose arm sweeps over in a quarter circle.
 

@@ -59,76 +59,50 @@ def mast_arm_light(
 def post_light(rng: np.random.Generator) -> Model:
     """Returns a traffic light on a post; the signals face +y."""
     height = float(rng.uniform(3.3, 3.6))
-    parts = (
-        post("mast", 0.06, height, rgb=_STEEL),
-        Part(
-            "signal",
-            MeshShape("signal_head_3"),
-            xyz=(0.0, 0.1, height - 0.5),
-            rgb=_BLACK,
-        ),
-    )
-    return assemble(parts, {"signal_head_3": _signal_head(3)})
+    return _light(post("mast", 0.06, height, rgb=_STEEL), 3, height - 0.5)
 
 
 def pedestrian_light(rng: np.random.Generator) -> Model:
     """Returns a pedestrian light: two lamps and a push button, face +y."""
     height = float(rng.uniform(2.7, 3.0))
-    parts = (
-        post("mast", 0.05, height, rgb=_STEEL),
-        Part(
-            "signal",
-            MeshShape("signal_head_2"),
-            xyz=(0.0, 0.1, height - 0.4),
-            rgb=_BLACK,
-        ),
-        block("button", (0.12, 0.1, 0.2), (0, 0.08, 1.1), rgb=(0.8, 0.7, 0.2)),
-    )
-    return assemble(parts, {"signal_head_2": _signal_head(2)})
+    mast = post("mast", 0.05, height, rgb=_STEEL)
+    size, center = (0.12, 0.1, 0.2), (0, 0.08, 1.1)
+    button = block("button", size, center, rgb=(0.8, 0.7, 0.2))
+    return _light(mast, 2, height - 0.4, button)
+
+
+def _light(mast: Part, lamps: int, z: float, *others: Part) -> Model:
+    """Returns a head of `lamps` at a mast, its middle at height z [m]."""
+    name = f"signal_head_{lamps}"
+    head = Part("signal", MeshShape(name), xyz=(0.0, 0.1, z), rgb=_BLACK)
+    return assemble((mast, head, *others), {name: _signal_head(lamps)})
 
 
 def round_sign(rng: np.random.Generator) -> Model:
     """Returns a round sign that faces +x."""
     height = float(rng.uniform(2.5, 2.9))
     rgb = (_RED, _BLUE)[int(rng.integers(2))]
-    plate = Part(
-        "plate",
-        CylinderShape(0.32, 0.03),
-        xyz=(0.05, 0.0, height - 0.32),
-        rpy=_TO_X,
-        rgb=rgb,
-    )
-    return assemble((post("mast", 0.035, height, rgb=_STEEL), plate))
+    return _sign(height, CylinderShape(0.32, 0.03), 0.32, rgb, rpy=_TO_X)
 
 
 def triangular_sign(rng: np.random.Generator) -> Model:
     """Returns a triangular sign that faces +x."""
     height = float(rng.uniform(2.6, 3.0))
-    plate = Part(
-        "plate",
-        MeshShape("sign_triangle"),
-        xyz=(0.05, 0.0, height - 0.45),
-        rgb=_RED,
-    )
-    return assemble(
-        (post("mast", 0.035, height, rgb=_STEEL), plate),
-        {"sign_triangle": _plate(3, 0.52)},
-    )
+    meshes = {"sign_triangle": _plate(3, 0.52)}
+    return _sign(height, MeshShape("sign_triangle"), 0.45, _RED, meshes)
 
 
 def stop_sign(rng: np.random.Generator) -> Model:
     """Returns an eight-cornered stop sign that faces +x."""
     height = float(rng.uniform(2.5, 2.9))
-    plate = Part(
-        "plate",
-        MeshShape("sign_octagon"),
-        xyz=(0.05, 0.0, height - 0.4),
-        rgb=_RED,
-    )
-    return assemble(
-        (post("mast", 0.035, height, rgb=_STEEL), plate),
-        {"sign_octagon": _plate(8, 0.4)},
-    )
+    meshes = {"sign_octagon": _plate(8, 0.4)}
+    return _sign(height, MeshShape("sign_octagon"), 0.4, _RED, meshes)
+
+
+def _sign(height, shape, drop, rgb, meshes=None, rpy=(0.0, 0.0, 0.0)) -> Model:
+    """Returns a plate on a mast, its middle `drop` below the top [m]."""
+    plate = Part("plate", shape, (0.05, 0.0, height - drop), rpy, rgb)
+    return assemble((post("mast", 0.035, height, rgb=_STEEL), plate), meshes)
 
 
 def rectangular_sign(rng: np.random.Generator) -> Model:

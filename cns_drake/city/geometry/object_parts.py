@@ -34,7 +34,7 @@ class Builder:
     """How to make objects of one kind.
 
     Attributes:
-        semantic_class: a key of `cns_drake.semantics.CLASS_IDS`.
+        semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
         build: `build(rng, **parameters) -> Model`; every parameter has a
             default, most are then drawn from `rng`. The same generator
             state gives the same model.
@@ -83,12 +83,7 @@ def block(name: str, size, center, yaw: float = 0.0, rgb=None) -> Part:
     )
 
 
-def single(
-    mesh_name: str,
-    mesh: Mesh,
-    rgb,
-    scale=(1.0, 1.0, 1.0),
-) -> Model:
+def single(mesh_name: str, mesh: Mesh, rgb, scale=(1.0, 1.0, 1.0)) -> Model:
     """Returns a model of one mesh."""
     part = Part("body", MeshShape(mesh_name, tuple(scale)), rgb=rgb)
     return assemble((part,), {mesh_name: mesh})

@@ -84,7 +84,7 @@ class Structure:
 
     Attributes:
         name: stable and unique in the city, e.g. `tower_017`.
-        semantic_class: a key of `cns_drake.semantics.CLASS_IDS`.
+        semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
         model: its geometry, in the structure frame S.
         xyz: position of S in the world [m].
         yaw: heading of S in the world [rad].

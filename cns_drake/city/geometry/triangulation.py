@@ -107,9 +107,7 @@ def _insert_touching(
 
 
 def _insert_apart(
-    ring: list[_Point],
-    hole: list[_Point],
-    walls: list[tuple[_Point, _Point]],
+    ring: list[_Point], hole: list[_Point], walls: list[tuple[_Point, _Point]]
 ) -> list[_Point]:
     """Runs to a hole along a line that crosses no wall, and back."""
     k = hole.index(max(hole))

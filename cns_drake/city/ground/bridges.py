@@ -18,8 +18,8 @@ from cns_drake.city.geometry.polygons import (
     wall_mesh,
 )
 from cns_drake.city.geometry.structures import Structure
+from cns_drake.city.ground.districts import District
 from cns_drake.city.ground.streets import as_structure
-from cns_drake.city.placement.districts import District
 
 # From the upper side of a bridge to its lower side [m].
 _DEPTH = 1.0
@@ -95,10 +95,7 @@ def _bridge(
     surface = {"surface": surface_mesh(deck, water_level)}
     pieces = {
         "sides": wall_mesh(
-            district.grounds["water"],
-            bottom,
-            shape,
-            along=deck.buffer(_NEAR),
+            district.grounds["water"], bottom, shape, along=deck.buffer(_NEAR)
         ),
         "underside": _turned(surface_mesh(deck, bottom)),
         "abutments": wall_mesh(deck, water_level, bottom, along=banks),

@@ -18,7 +18,7 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry.polygons import snap
 from cns_drake.city.geometry.structures import Structure
-from cns_drake.city.roads.surface import RoadSurface
+from cns_drake.roads.road_surface import RoadSurface
 
 # Distance of the nodes between which the field is interpolated [m].
 _NODES = 2.0
@@ -151,9 +151,7 @@ class SlopingGround:
             keep[np.flatnonzero(touching)[first]] = True
             np.add.at(weight, near[keep], gain[keep])
             np.add.at(
-                total,
-                near[keep],
-                gain[keep] * self._pad_heights[pad[keep]],
+                total, near[keep], gain[keep] * self._pad_heights[pad[keep]]
             )
         return total / weight
 

@@ -10,9 +10,9 @@ import numpy as np
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.ground.streets import as_structure
-from cns_drake.city.roads.centreline import sample_stations
-from cns_drake.city.roads.network import RoadNetwork
-from cns_drake.city.roads.road import Road
+from cns_drake.roads.centreline import sample_stations
+from cns_drake.roads.network import RoadNetwork
+from cns_drake.roads.road import Road
 
 _RGB = (0.80, 0.79, 0.74)
 # Paint lies this high, so that it is not in one plane with the road [m].

@@ -20,8 +20,8 @@ from cns_drake.city.geometry.polygons import (
     wall_mesh,
 )
 from cns_drake.city.geometry.structures import MeshShape, Model, Part, Structure
-from cns_drake.city.roads.network import RoadNetwork
-from cns_drake.city.roads.surface import RoadSurface
+from cns_drake.roads.network import RoadNetwork
+from cns_drake.roads.road_surface import RoadSurface
 
 # Marks the structures that are ground: no stage lacks them.
 GROUND_TAG = "ground"
@@ -78,11 +78,7 @@ def street_structures(network: RoadNetwork) -> list[Structure]:
             "sidewalks", "sidewalk", sidewalks, walk, _SIDEWALK_RGB, outer
         ),
         _surface(
-            "medians",
-            "terrain",
-            medians.difference(kerbs),
-            walk,
-            _MEDIAN_RGB,
+            "medians", "terrain", medians.difference(kerbs), walk, _MEDIAN_RGB
         ),
     ]
     return [structure for structure in structures if structure.model.parts]

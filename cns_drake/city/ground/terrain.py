@@ -20,9 +20,9 @@ from cns_drake.city.geometry.polygons import (
     wall_mesh,
 )
 from cns_drake.city.geometry.structures import Structure
+from cns_drake.city.ground.districts import District
 from cns_drake.city.ground.elevation import LevelGround, SlopingGround
 from cns_drake.city.ground.streets import TILE, as_structure, ground_structure
-from cns_drake.city.placement.districts import District
 
 # Kind of ground -> semantic class and colour.
 _LOOK = {
@@ -219,9 +219,5 @@ def _quay(
         if wall.faces:
             pieces[f"tile_{k:02d}"] = wall
     return as_structure(
-        f"quay_{district.plan.name}",
-        "other-structure",
-        pieces,
-        rim,
-        _QUAY_RGB,
+        f"quay_{district.plan.name}", "other-structure", pieces, rim, _QUAY_RGB
     )

@@ -18,7 +18,7 @@ from cns_drake.city.geometry.polygons import HeightMap, snap
 from cns_drake.city.geometry.structures import MeshShape, Model, Structure
 from cns_drake.city.ground.elevation import LevelGround
 from cns_drake.city.ground.streets import kerb_height
-from cns_drake.city.roads.network import RoadNetwork
+from cns_drake.roads.network import RoadNetwork
 
 # An object stands upright where the ground falls by at most this much below
 # it, half of it sunk in on the upper side [m].

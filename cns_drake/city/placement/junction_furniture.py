@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from cns_drake.city.objects import OBJECTS
 from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.naming import name_stem
-from cns_drake.city.roads.network import Arm, Junction
-from cns_drake.city.roads.road import Road
+from cns_drake.city.placement.objects import OBJECTS
+from cns_drake.roads.network import Arm, Junction
+from cns_drake.roads.road import Road
 
 # Distance of posts from the kerb [m].
 _FROM_KERB = 0.7

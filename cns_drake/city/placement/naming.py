@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from cns_drake.city.objects import OBJECTS
+from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plants.vegetation import SPECIES
 
 # Several objects of one class that a reader would call by one word.
-_WORDS = {
-    "car": "car",
-    "truck": "truck",
-    "traffic-sign": "sign",
-}
+_WORDS = {"car": "car", "truck": "truck", "traffic-sign": "sign"}
 
 
 def name_stem(object_name: str) -> str:

@@ -11,19 +11,19 @@ import shapely
 from shapely.geometry import LineString
 from shapely.ops import unary_union
 
-from cns_drake.city.objects import OBJECTS
-from cns_drake.city.placement.districts import District, corners_area
+from cns_drake.city.ground.districts import District, corners_area
 from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.frontage import Station, station_at
 from cns_drake.city.placement.naming import name_stem
-from cns_drake.city.placement.weighted import pick
-from cns_drake.city.plan import (
+from cns_drake.city.placement.objects import OBJECTS
+from cns_drake.city.plan.city_plan import (
     LinePlan,
     ObjectPlan,
     ParkingPlan,
     ScatterPlan,
 )
-from cns_drake.errors import InputError
+from cns_drake.city.plan.weighted import pick
+from evaluation.support.errors import InputError
 
 # Least distance between two objects [m].
 _CLEARANCE = 0.15

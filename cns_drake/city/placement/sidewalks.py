@@ -10,14 +10,14 @@ import shapely
 from shapely.geometry import LineString
 from shapely.ops import unary_union
 
-from cns_drake.city.objects import OBJECTS
-from cns_drake.city.placement.districts import District
+from cns_drake.city.ground.districts import District
 from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.frontage import Station, lines_along, station_at
 from cns_drake.city.placement.naming import name_stem
+from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.placement.open_ground import place_car
-from cns_drake.city.placement.weighted import pick
-from cns_drake.city.plan import CityPlan, StreetPlan
+from cns_drake.city.plan.city_plan import CityPlan, StreetPlan
+from cns_drake.city.plan.weighted import pick
 
 # How far from the kerb things stand: their nearest point, not their middle
 # [m].
@@ -168,10 +168,7 @@ def _place(
     xy, yaw = (at.x, at.y), at.yaw
     if facing_street:
         front = model.footprint.bounds[2]
-        xy = (
-            at.x - front * math.sin(at.yaw),
-            at.y + front * math.cos(at.yaw),
-        )
+        xy = (at.x - front * math.sin(at.yaw), at.y + front * math.cos(at.yaw))
         yaw = at.yaw - math.pi / 2
     draft.place(
         name_stem(name),

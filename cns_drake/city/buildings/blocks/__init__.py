@@ -1,0 +1,1 @@
+"""Blocks of flats and offices that stand wall to wall."""

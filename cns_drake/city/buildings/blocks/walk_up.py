@@ -1,0 +1,232 @@
+"""The walk-up: brick flats around a stair, bay fronts, a raised entrance."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from cns_drake.city.buildings.house_parts import family_house
+from cns_drake.city.buildings.parts import (
+    bays,
+    details,
+    massing,
+    outlines,
+    pitched_roofs,
+    tiers,
+)
+from cns_drake.city.buildings.parts.facades import Band, Facade
+from cns_drake.city.buildings.parts.roof_equipment import (
+    add_chimney,
+    equip_roof,
+)
+from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+from cns_drake.city.geometry.structures import Model
+
+_WALLS = (*family_house.BRICKS, (0.66, 0.50, 0.38), (0.72, 0.62, 0.50))
+
+# Room in front of the walls for steps, and behind for eaves [m].
+_FRONT_M, _BACK_M = 1.5, 0.5
+
+
+class WalkUp:
+    """Parameters of a walk-up; lengths in metres.
+
+    Attributes:
+        height: of the parapet or the ridge.
+        roof: `flat` or `hip`.
+        floor: height of the ground floor above the street.
+        storey: wanted height of a storey.
+        section: wanted length of front for each stair.
+        bay_reach: how far the bays of the front stand out; 0 for none.
+        pitch, window_width, recess: of the windows.
+        arched: whether the windows of the ground floor are arched.
+        ledge, hood: of the windows' sills and lintels.
+        cornice: how far it sticks out.
+    """
+
+    def __init__(self, d: Dice):
+        depth = d.depth - _FRONT_M - _BACK_M
+        blind = bool({1, 3} & d.site.blind_edges)
+        hipped = not blind and depth < 16.0 and d.chance(0.4)
+        rise = 0.3 * min(depth, d.width) if hipped else 0.0
+        if d.height - rise < 7.0:
+            rise = 0.0
+        self.height = d.height
+        self.roof = "hip" if rise > 0 else "flat"
+        self.rise = round(rise, 2)
+        self.floor = d.uniform(0.5, 1.1, 2)
+        self.storey = d.uniform(2.8, 3.1)
+        self.section = d.uniform(11.0, 15.0)
+        self.bay_reach = d.pick((0.0, 0.4, 0.6))
+        self.pitch = max(d.uniform(2.1, 2.8), (d.width + depth) / 17)
+        self.window_width = d.uniform(1.0, 1.5, 2)
+        self.recess = d.uniform(0.14, 0.26, 2)
+        self.arched = d.chance(0.3)
+        self.ledge = d.pick((0.0, 0.08))
+        self.hood = d.pick((0.0, 0.08))
+        self.cornice = d.uniform(0.15, 0.45, 2)
+        self.roof_items = d.some_of("stair_house vents tank skylight", 1, 5)
+        self.rgb = d.pick(_WALLS)
+        self.roof_rgb = d.pick(family_house.ROOFS)
+
+
+def build(p: WalkUp, site: Site, rng: np.random.Generator) -> Model:
+    """Builds the flats on a rectangle."""
+    assembly = Assembly(site.name, p.rgb)
+    x0, y0, x1, y1 = site.bounds
+    side = 0.5
+    body = massing.rectangle(
+        x0 + side * (3 not in site.blind_edges),
+        y0 + _FRONT_M,
+        x1 - side * (1 not in site.blind_edges),
+        y1 - _BACK_M,
+    )
+    plan, stairs = _bay_front(p, body)
+    site_outline = massing.rectangle(x0, y0, x1, y1)
+    blind = outlines.edges_on(plan, site_outline, site.blind_edges)
+    top = _add_ground(assembly, p, plan, stairs, blind)
+    goal = p.height - p.rise - (0.9 if p.roof == "flat" else 0.15)
+    groups, per_group, storey = tiers.divided(goal - top, p.storey, 6)
+    window = bays.window(
+        p.window_width, 0.8, min(2.3, storey - 0.4), p.recess,
+        ledge=p.ledge, hood=p.hood,
+    )  # fmt: skip
+    landing = bays.window(1.1, storey - 1.0, storey - 0.05, p.recess)
+    layouts = {
+        edge: bays.with_middle(bays.rhythm(p.pitch, [window], 0.45),
+                               landing, 2.2)
+        for edge in stairs
+    }  # fmt: skip
+    walls = Facade(
+        storey,
+        (),
+        bays.by_edge(layouts, bays.rhythm(p.pitch, [window], 0.45)),
+        (p.recess,),
+        plain=blind,
+    )
+    top = tiers.add_storeys(assembly, plan, walls, top, groups, per_group)
+    _add_top(assembly, p, body, plan, top, blind, rng)
+    return assembly.model(site)
+
+
+def _bay_front(p: WalkUp, body) -> tuple[np.ndarray, list[int]]:
+    """Returns the plan, its front with bays, and the walls with stairs."""
+    (x0, y0), (x1, y1) = body[0], body[2]
+    count = max(1, round((x1 - x0) / p.section))
+    bounds = np.linspace(x0, x1, count + 1)
+    if p.bay_reach == 0.0 or (x1 - x0) / count < 9.0:
+        return body, [0] if count == 1 else []
+    points: list[tuple[float, float]] = []
+    stairs = []
+    for a, b in itertools.pairwise(bounds):
+        # Bays left and right of the stair, clear of the party walls.
+        third = 0.3 * (b - a)
+        for start, end in ((a + 0.9, a + third), (b - third, b - 0.9)):
+            start, end = round(start, 2), round(end, 2)
+            points += [(start, y0), (start, y0 - p.bay_reach),
+                       (end, y0 - p.bay_reach), (end, y0)]  # fmt: skip
+        stairs.append(len(points) - 5 + 1)
+    plan = [(x0, y0), *points, (x1, y0), (x1, y1), (x0, y1)]
+    return np.array(plan), stairs
+
+
+def _add_ground(assembly, p: WalkUp, plan, stairs, blind) -> float:
+    """Adds the raised ground floor with its entrances and steps."""
+    h = round(p.floor + p.storey, 2)
+    sill, head = round(p.floor + 0.8, 2), round(p.floor + 2.25, 2)
+    if p.arched:
+        width = min(p.window_width, 1.2)
+        window = bays.arched(width, sill, head - width / 2, p.recess)
+    else:
+        window = bays.window(p.window_width, sill, head, p.recess)
+    rows = bays.rhythm(p.pitch, [window], 0.45)
+    door = bays.house_door(1.4, p.floor, round(p.floor + 2.35, 2), 0.4)
+    cellar = bays.rhythm(
+        2 * p.pitch, [bays.window(0.9, 0.1, p.floor - 0.15, 0.15)], 0.5
+    )
+    layouts = {0: rows, **dict.fromkeys(stairs, rows)}
+    doors = stairs or [0]
+    for edge in doors:
+        layouts[edge] = bays.with_middle(rows, door, 2.4)
+    facade = Facade(
+        h,
+        (Band(p.floor, p.floor + 0.12, -0.08), Band(h - 0.2, h, -0.08)),
+        bays.by_edge(layouts, _both(rows, cellar, p.floor > 0.7)),
+        glass=(p.recess,),
+        plain=blind,
+    )
+    pieces: list[Mesh] = []
+    for edge in doors:
+        wall = details.WallFrame(plan, edge)
+        x = wall.length / 2
+        room = _FRONT_M - p.bay_reach * (not stairs) - 0.05
+        count = max(2, round(p.floor / 0.17))
+        run = min(0.28 * count, room - 0.3)
+        slab = massing.box(
+            x - 1.1, x + 1.1, -0.05, room - run, -massing.FOUNDATION_M, p.floor
+        )
+        flight = details.steps(x - 0.8, x + 0.8, run, p.floor, count)
+        cheeks = [
+            massing.box(
+                u - 0.12, u + 0.12, -0.05, room, -massing.FOUNDATION_M, z
+            )
+            for u in (x - 0.98, x + 0.98)
+            for z in (p.floor + 0.35,)
+        ]
+        hood = massing.box(
+            x - 1.2, x + 1.2, -0.05, 0.9, p.floor + 2.5, p.floor + 2.7
+        )
+        flight = flight.moved((0.0, room - run, 0.0))
+        pieces += [wall.place(m) for m in (slab, flight, hood, *cheeks)]
+    assembly.add("steps", merge_meshes(pieces), rgb=family_house.BASE)
+    return tiers.add_ground(assembly, plan, facade)
+
+
+def _both(first, second, wanted: bool):
+    """Returns the layout of two layouts that do not meet."""
+
+    def layout(edge: int, length: float):
+        more = second(edge, length) if wanted else ()
+        return [*first(edge, length), *more]
+
+    return layout
+
+
+def _add_top(assembly, p: WalkUp, body, plan, z0, blind, rng) -> None:
+    if p.roof == "flat":
+        rim = round(p.height - z0, 3)
+        bands = tiers.cornice(
+            max(rim - 0.15, 0.5), p.cornice, thickness=0.4, steps=2
+        )
+        crown = Facade(rim, bands, plain=blind)
+        roof = tiers.add_crown(
+            assembly, plan, crown, z0, min(0.6, rim - 0.1), thickness=0.25
+        )
+        equip_roof(assembly, body, roof, p.roof_items, rng)
+        return
+    solid = pitched_roofs.hip(
+        body, z0 - 0.02, p.height, (max(p.bay_reach + 0.15, 0.45), 0.45, 0.45,
+                                    0.45), 0.3
+    )  # fmt: skip
+    assembly.add("roof", solid, rgb=p.roof_rgb)
+    (ax, ay), (bx, by) = body[0], body[2]
+    for k, share in enumerate((0.35, 0.65)):
+        x, y = ax + share * (bx - ax), ay + 0.5 * (by - ay)
+        if by - ay > bx - ax:
+            x, y = ax + 0.5 * (bx - ax), ay + share * (by - ay)
+        add_chimney(
+            assembly, f"chimney_{k}", (x, y, p.height - 1.4),
+            family_house.BRICKS[k], item="chimney_row",
+        )  # fmt: skip
+
+
+ARCHETYPE = Archetype(
+    WalkUp,
+    build,
+    heights=(8.0, 20.0),
+    widths=(9.0, 45.0),
+    overhang=0.35,
+    party_walls=True,
+)

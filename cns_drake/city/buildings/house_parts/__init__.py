@@ -1,0 +1,1 @@
+"""What houses are put together of: walls, porches, dormers, shop fronts."""

@@ -1,0 +1,1 @@
+"""Houses for one family or a few, and barns."""

@@ -1,0 +1,237 @@
+"""The barn or boat house: timber boards, wide doors, a lean-to."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cns_drake.city.buildings.house_parts import porches
+from cns_drake.city.buildings.house_parts.openings import (
+    Openings,
+    free_stretches,
+)
+from cns_drake.city.buildings.parts import bays, details, massing, wings
+from cns_drake.city.buildings.parts.facades import Band, Patch
+from cns_drake.city.buildings.parts.materials import Materials
+from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.wings import Roof, Wing
+from cns_drake.city.geometry.mesh import Mesh
+from cns_drake.city.geometry.structures import Model
+
+_BOARDS = (
+    (0.50, 0.22, 0.18),
+    (0.44, 0.36, 0.28),
+    (0.56, 0.52, 0.46),
+    (0.34, 0.40, 0.36),
+    (0.30, 0.36, 0.44),
+)
+_ROOFS = ((0.40, 0.40, 0.42), (0.36, 0.28, 0.24), (0.48, 0.50, 0.50))
+_TRIM = (0.88, 0.87, 0.84)
+_DOORS = (0.30, 0.24, 0.20)
+
+_MARGIN = 0.5
+_RECESS = 0.15
+
+
+class Barn:
+    """Parameters of a barn; lengths in metres.
+
+    Attributes:
+        height: of the ridge, the ventilator on it included.
+        roof: `gambrel`, `gable` or `barrel`.
+        wall: height of the walls, as a part of the ridge's.
+        deck: room in front, a jetty of a boat house; 0 for a barn.
+        door_width, door_height: of the doors in the gable.
+        aisle: width of the lean-to on one side; 0 for none.
+        aisle_left: on which.
+        batten: distance between battens.
+        ventilators: on the ridge.
+    """
+
+    def __init__(self, d: Dice):
+        width = min(d.width, d.depth)
+        aisle = d.uniform(0.2, 0.28) * width
+        self.height = d.height
+        self.roof = d.pick(("gambrel", "gable", "gable", "barrel"))
+        self.wall = d.uniform(0.42, 0.58)
+        self.deck = d.pick((0.0, 0.0, 2.0)) if d.depth > 10.0 else 0.0
+        self.door_width = d.uniform(2.6, 4.4, 2)
+        self.door_height = d.uniform(2.4, 3.4, 2)
+        self.aisle = round(aisle, 2) if d.chance(0.6) and width > 9 else 0.0
+        self.aisle_left = d.chance(0.5)
+        self.batten = d.uniform(1.0, 1.6)
+        self.ventilators = d.whole(0, 3)
+        self.rgb = d.pick(_BOARDS)
+        self.roof_rgb = d.pick(_ROOFS)
+
+
+def build(p: Barn, site: Site, rng: np.random.Generator) -> Model:
+    """Builds the barn along the longer side of a rectangle."""
+    assembly = Assembly(site.name, p.rgb)
+    materials = Materials(
+        walls=p.rgb,
+        glass=assembly.glass_rgb,
+        roof=p.roof_rgb,
+        trim=_TRIM,
+        doors=_DOORS,
+    )
+    x0, y0, x1, y1 = site.bounds
+    along_y = y1 - y0 >= x1 - x0
+    left, right = x0 + _MARGIN, x1 - _MARGIN
+    front, back = y0 + _MARGIN + p.deck, y1 - _MARGIN
+    a, b, low, high = left, right, front, back
+    if along_y:
+        a, b = a + p.aisle * p.aisle_left, b - p.aisle * (not p.aisle_left)
+    else:
+        high -= p.aisle
+    hood = 0.7 if p.ventilators else 0.0
+    top = p.height - hood
+    half = ((b - a) if along_y else (high - low)) / 2
+    wall_top = max(2.3, p.wall * top)
+    if p.roof == "barrel":
+        # A vault is at most half a circle.
+        wall_top = max(wall_top, top - 0.8 * half)
+    eaves = 0.0 if p.roof == "barrel" else 0.35
+    roof = Roof(p.roof, along_y, eaves, 0.35, 0.18)
+    main = Wing.at(a, low, b, high, wall_top, top, roof)
+    boxes = [main]
+    if p.aisle > 1.5:
+        boxes.append(_aisle(p, main, (left, right, back), along_y))
+    gable = 0 if along_y else 3
+    for wing in boxes:
+        openings = Openings(wing, boxes)
+        head = round(min(2.0, wing.wall_top - 0.3), 2)
+        window = bays.window(0.9, 1.1, head, _RECESS)
+        openings.row(range(4), 1.0, 3.2, [window], 0.8)
+        if wing is main:
+            _add_doors(materials, p, main, openings, gable)
+            if not along_y:
+                _add_doors(materials, p, main, openings, 0)
+        openings.add_walls(materials, (_RECESS,), (Band(0.0, 0.3, -0.06),))
+        low_z = wing.wall_top + 0.5
+        attic = wings.attic_window(1.0, low_z, low_z + 1.3, _RECESS)
+        wings.add_roof(materials, wing, attic)
+        for edge in range(4):
+            _add_battens(materials, p, wing, boxes, openings, edge)
+    _add_ridge(materials, p, main)
+    if p.deck > 0:
+        _add_jetty(materials, p, (left, right), y0, front)
+    materials.finish(assembly)
+    return assembly.model(site)
+
+
+def _aisle(p: Barn, main: Wing, limits, along_y: bool) -> Wing:
+    """Returns the lean-to against the long side of the barn."""
+    left, right, back = limits
+    high = main.wall_top + 0.1
+    low = max(1.9, high - 0.3 * p.aisle)
+    high = max(high, low + 0.25)
+    if not along_y:
+        # Behind: a shed roof that falls to the back.
+        area = (main.x0 + 1.0, main.y1 - 0.05, main.x1 - 1.0, back)
+        return _lean(area, low, high, along_y=False)
+    if p.aisle_left:
+        return _lean((left, main.y0 + 0.8, main.x0 + 0.05, main.y1 - 0.8),
+                     low, high, along_y=True, rising=True)  # fmt: skip
+    return _lean((main.x1 - 0.05, main.y0 + 0.8, right, main.y1 - 0.8),
+                 low, high, along_y=True)  # fmt: skip
+
+
+def _lean(area, low, high, *, along_y: bool, rising: bool = False) -> Wing:
+    """Returns a box under a roof that falls away from the barn."""
+    roof = Roof("shed", along_y, 0.3, 0.25, 0.15, falling=not rising)
+    return Wing.at(*area, low, high, roof)
+
+
+def _add_doors(materials, p: Barn, wing: Wing, openings, edge: int) -> None:
+    """Adds a pair of braced doors that slide along the wall."""
+    wall = wing.wall(edge)
+    width = min(p.door_width, 0.5 * wall.length)
+    height = min(p.door_height, wing.wall_top - 0.35)
+    x = wall.length / 2
+    openings.clear(edge, x - width - 0.2, x + width + 0.2, 0.0, height + 0.4)
+    if p.deck > 0 and edge == 0:
+        gap = Patch(x - width / 2, x + width / 2, 0.0, height, 2.0)
+        openings.put(edge, x, width + 0.4, lambda a, b: [gap])
+        spots = (x - width, x + width / 2 + 0.05)
+        half = width / 2 - 0.05
+    else:
+        spots, half = (x - width / 2, x + 0.03), width / 2 - 0.03
+    for a in spots:
+        b = a + half
+        panel = [
+            porches.board(a, b, 0.08, height, 0.1),
+            porches.board(a, a + 0.18, 0.08, height, 0.15),
+            porches.board(b - 0.18, b, 0.08, height, 0.15),
+            porches.board(a, b, height - 0.18, height, 0.15),
+            porches.board(a, b, 0.08, 0.26, 0.15),
+            details.beam(
+                (a + 0.1, 0.1, 0.2), (b - 0.1, 0.1, height - 0.1), 0.1
+            ),
+        ]
+        materials.add("doors", wall.place(panel[0]))
+        materials.add("trim", *(wall.place(m) for m in panel[1:]))
+    rail = massing.box(
+        x - width - 0.1,
+        x + width + 0.1,
+        0.0,
+        0.18,
+        height + 0.05,
+        height + 0.18,
+    )
+    materials.add("trim", wall.place(rail))
+
+
+def _brace(x0: float, x1: float, height: float) -> Mesh:
+    """The slanted board of a door, in wall coordinates."""
+    return details.beam((x0, 0.1, 0.2), (x1, 0.1, height - 0.1), 0.1)
+
+
+def _add_battens(materials, p: Barn, wing, boxes, openings, edge) -> None:
+    """Adds upright battens on the free parts of a wall between openings."""
+    wall = wing.wall(edge)
+    reliefs = openings.layout(edge, wall.length)
+    for a, b in free_stretches(wing, edge, boxes, 0.5):
+        for x, _ in bays.stretches(b - a, p.batten, 0.12):
+            u = a + x
+            if any(r.x0 - 0.15 < u < r.x1 + 0.15 for r in reliefs):
+                continue
+            strip = porches.board(u - 0.05, u + 0.05, 0.3, wing.wall_top, 0.05)
+            materials.add("walls", wall.place(strip))
+
+
+def _add_ridge(materials, p: Barn, main: Wing) -> None:
+    """Adds louvred ventilators on the ridge, and a hoist in the gable."""
+    middle = (main.x0 + main.x1) / 2, (main.y0 + main.y1) / 2
+    z = main.top
+    for k in range(p.ventilators):
+        share = (k + 0.5) / p.ventilators - 0.5
+        x, y = middle
+        if main.roof.along_y:
+            y += 0.8 * share * (main.y1 - main.y0)
+        else:
+            x += 0.8 * share * (main.x1 - main.x0)
+        materials.add("walls", massing.post(x, y, 0.45, z + 0.3, z - 0.6))
+        eaves = massing.rectangle(x - 0.65, y - 0.65, x + 0.65, y + 0.65)
+        materials.add(
+            "roof",
+            massing.flat(eaves, z + 0.3, up=False),
+            massing.spire(eaves, (x, y), z + 0.3, z + 0.7),
+        )
+
+
+def _add_jetty(materials, p: Barn, xs, y0: float, front: float) -> None:
+    """Adds a plank deck on posts in front of a boat house."""
+    a, b = xs
+    y0 += 0.1
+    pieces = [massing.box(a, b, y0, front, 0.05, 0.3)]
+    for x in np.linspace(a + 0.2, b - 0.2, 4).tolist():
+        spot = (x - 0.12, x + 0.12, y0 + 0.02, y0 + 0.26)
+        pieces.append(
+            massing.box(*spot, -massing.FOUNDATION_M, 1.1, bottom=False)
+        )
+    materials.add("doors", *pieces)
+
+
+ARCHETYPE = Archetype(
+    Barn, build, heights=(5.0, 14.0), widths=(7.0, 40.0), overhang=0.35
+)

@@ -1,0 +1,100 @@
+"""The row house: one narrow house between its neighbours, with a stoop."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cns_drake.city.buildings.house_parts import (
+    family_house,
+    house_walls,
+    row_unit,
+)
+from cns_drake.city.buildings.house_parts.openings import Openings
+from cns_drake.city.buildings.parts import wings
+from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.wings import Roof, Wing
+from cns_drake.city.geometry.structures import Model
+
+_WALLS = (
+    *family_house.BRICKS,
+    (0.80, 0.74, 0.62),
+    (0.70, 0.58, 0.46),
+    (0.66, 0.70, 0.68),
+    (0.78, 0.62, 0.50),
+)
+# A house deeper than this gets a lower wing at its back [m].
+_MOST_DEPTH = 10.5
+
+
+class RowHouse:
+    """Parameters of a row house; lengths in metres."""
+
+    def __init__(self, d: Dice):
+        roofs = ["gable", "gambrel", "flat"]
+        if d.width < 9.5:
+            roofs += ["front", "stepped"]
+        unit = row_unit.draw_unit(d.rng, d.width, roofs, family_house.BRICKS)
+        self.height = d.height
+        self.unit = unit
+        self.annex_height = d.uniform(2.8, 3.6, 2)
+        self.annex_width = d.uniform(0.45, 0.65)
+        self.annex_left = d.chance(0.5)
+        self.rgb = d.pick(_WALLS)
+        self.roof_rgb = d.pick(family_house.ROOFS)
+        self.accent_rgb = d.pick(family_house.ACCENTS)
+
+
+def build(p: RowHouse, site: Site, rng: np.random.Generator) -> Model:
+    """Builds the house on a rectangle."""
+    assembly = Assembly(site.name, p.rgb)
+    materials = family_house.house_materials(
+        assembly, p.rgb, p.roof_rgb, p.accent_rgb
+    )
+    x0, y0, x1, y1 = site.bounds
+    # Eaves and cornices stay on the lot, except towards the neighbours.
+    side = 0.3 * (p.unit.roof == "flat")
+    left = x0 + side * (3 not in site.blind_edges)
+    right = x1 - side * (1 not in site.blind_edges)
+    front, back = y0 + p.unit.stoop, y1 - 0.35
+    deep = min(back - front, _MOST_DEPTH)
+    if back - front - deep < 1.5:
+        deep = back - front
+    main = row_unit.add_unit(
+        assembly,
+        materials,
+        p.unit,
+        (left, front, right, front + deep),
+        p.height,
+        site.blind_edges & {1, 3},
+    )
+    if back - main.y1 > 1.0:
+        _add_annex(materials, p, main, back)
+    materials.finish(assembly)
+    return assembly.model(site)
+
+
+def _add_annex(materials, p: RowHouse, main: Wing, back: float) -> None:
+    """Adds a low wing behind the house, on one side."""
+    width = p.annex_width * (main.x1 - main.x0)
+    x0 = main.x0 if p.annex_left else main.x1 - width
+    blind = main.blind & {3 if p.annex_left else 1}
+    top = min(p.annex_height + 0.9, main.wall_top)
+    roof = Roof("shed", True, 0.0, 0.2, 0.18)
+    wall_top = min(p.annex_height, top - 0.4)
+    annex = Wing.at(
+        x0, main.y1 - 0.06, x0 + width, back, wall_top, top, roof, blind
+    )
+    openings = Openings(annex, (main,))
+    openings.row((1, 2, 3), 0.9, 2.6, [house_walls.sash(1.1, 0.1, 0.9, 2.1)])
+    openings.add_walls(materials, (house_walls.GLASS_M,))
+    wings.add_roof(materials, annex)
+
+
+ARCHETYPE = Archetype(
+    RowHouse,
+    build,
+    heights=(6.5, 16.0),
+    widths=(4.5, 16.0),
+    overhang=0.35,
+    party_walls=True,
+)

@@ -1,0 +1,185 @@
+"""The pair of semi-detached houses: mirrored halves under one roof."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cns_drake.city.buildings.house_parts import (
+    family_house,
+    house_walls,
+    porches,
+)
+from cns_drake.city.buildings.house_parts.family_house import ROOF_M, STOREY_M
+from cns_drake.city.buildings.house_parts.openings import Openings
+from cns_drake.city.buildings.parts import massing
+from cns_drake.city.buildings.parts.roof_equipment import add_chimney
+from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.wings import Roof, Wing
+from cns_drake.city.geometry.structures import Model
+
+# Kept free around the walls, for eaves [m].
+_MARGIN = 0.5
+
+
+class SemiDetached:
+    """Parameters of a pair of houses; lengths in metres.
+
+    Attributes:
+        height: of the ridge.
+        roof: `gable` or `hip`.
+        pitch_deg: wanted, of the roof.
+        floor: height of the ground floor.
+        bay: `gabled` (through all storeys, under a gable of its own),
+            `canted` or `none`.
+        bay_width, bay_reach: of the bays.
+        doors_inside: whether the doors lie side by side in the middle.
+        porch_reach: of the roofs above the doors.
+        garages: `none`, `flat`, `shed` or `hip`, one on either side.
+        chimneys: `middle` or `ends`.
+    """
+
+    def __init__(self, d: Dice):
+        self.height = d.height
+        self.roof = d.pick(("gable", "hip"))
+        self.pitch_deg = d.uniform(30.0, 45.0)
+        self.floor = d.uniform(0.15, 0.45, 2)
+        self.window_pitch = d.uniform(2.4, 3.2)
+        self.window_width = d.uniform(1.0, 1.4, 2)
+        self.casing = d.pick(("frame", "sill", "sill", "shutters"))
+        self.bay = d.pick(("gabled", "canted", "gabled", "none"))
+        self.bay_width = d.uniform(2.6, 3.2, 2)
+        self.bay_reach = d.uniform(0.6, 1.0, 2)
+        self.doors_inside = d.chance(0.5)
+        self.porch_reach = d.uniform(1.1, 1.5, 2)
+        self.garages = d.pick(("none", "flat", "shed", "hip"))
+        self.garage_width = d.uniform(2.9, 3.4, 2)
+        self.chimneys = d.pick(("middle", "ends"))
+        self.rgb = d.pick(family_house.WALLS)
+        self.roof_rgb = d.pick(family_house.ROOFS)
+        self.accent_rgb = d.pick(family_house.ACCENTS)
+
+
+def build(p: SemiDetached, site: Site, rng: np.random.Generator) -> Model:
+    """Builds the pair on a rectangle."""
+    assembly = Assembly(site.name, p.rgb)
+    materials = family_house.house_materials(
+        assembly, p.rgb, p.roof_rgb, p.accent_rgb
+    )
+    x0, y0, x1, y1 = site.bounds
+    left, right, back = x0 + _MARGIN, x1 - _MARGIN, y1 - _MARGIN
+    front = y0 + min(2.4, 0.25 * (y1 - y0))
+    deep = min(back - front, 10.0)
+    has_garages = p.garages != "none" and right - left > 17.0
+    side = p.garage_width * has_garages
+    n = family_house.storeys_for(p.height, p.floor, deep, p.pitch_deg)
+    wall_top = family_house.wall_top_for(p.height, p.floor, deep, n)
+    shape = Roof(p.roof, eaves=0.4, verge=0.3, thickness=ROOF_M)
+    main = Wing.at(
+        left + side, front, right - side, front + deep, wall_top, p.height,
+        shape,
+    )  # fmt: skip
+    bays = _gabled_bays(p, main) if p.bay == "gabled" else ()
+    garages = []
+    if has_garages:
+        for a, b in ((left, main.x0 + 0.06), (main.x1 - 0.06, right)):
+            area = (a, b, front + 1.5, main.y1 - 0.3)
+            garages.append(family_house.garage_wing(p.garages, *area, p.height))
+    boxes = (main, *bays, *garages)
+    openings = family_house.window_rows(
+        main, boxes, p.floor, n, p.window_pitch, p.window_width
+    )
+    _add_entrances(materials, p, main, openings, y0)
+    family_house.close_box(materials, main, openings, p.floor, p.casing)
+    for wing in bays:
+        rows = Openings(wing, boxes)
+        house_walls.add_rows(
+            rows, (0,), p.floor, STOREY_M, n, 2.4, 1.5, margin=0.2
+        )
+        family_house.close_box(materials, wing, rows, p.floor, p.casing)
+    for garage in garages:
+        family_house.add_garage(materials, garage, boxes)
+    _add_chimneys(assembly, p, main)
+    materials.finish(assembly)
+    return assembly.model(site)
+
+
+def _middles(p: SemiDetached, main: Wing) -> tuple[float, float]:
+    """Returns the x of the bays in the main wall's coordinates [m]."""
+    half = (main.x1 - main.x0) / 2
+    # Doors take the middle or the ends, bays what is left of each half.
+    u = 0.6 * half if p.doors_inside else 0.36 * half
+    offset = half - u if not p.doors_inside else u
+    return half - offset, half + offset
+
+
+def _gabled_bays(p: SemiDetached, main: Wing) -> tuple[Wing, ...]:
+    width = min(p.bay_width, 0.45 * (main.x1 - main.x0) / 2)
+    if width < 1.8:
+        return ()
+    rise = min(0.5 * width, main.top - main.wall_top - ROOF_M - 0.2)
+    top = main.wall_top + ROOF_M + rise
+    shape = Roof("gable", True, 0.2, 0.25, ROOF_M)
+    middle = (main.y0 + main.y1) / 2
+    return tuple(
+        Wing.at(
+            main.x0 + x - width / 2, main.y0 - p.bay_reach,
+            main.x0 + x + width / 2, middle, main.wall_top, top, shape,
+        )
+        for x in _middles(p, main)
+    )  # fmt: skip
+
+
+def _add_entrances(materials, p: SemiDetached, main, openings, y0) -> None:
+    """Adds the doors under one roof or two, and bays on the ground."""
+    wall = main.wall(0)
+    half = wall.length / 2
+    room = main.y0 - y0 - 0.1
+    reach = min(p.porch_reach, room - 0.3)
+    offset = 0.75 if p.doors_inside else half - 0.95
+    eaves = p.floor + 2.35
+    for x in (half - offset, half + offset):
+        house_walls.add_door(materials, main, openings, 0, x, p.floor)
+        if not p.doors_inside:
+            porches.add_porch(
+                materials, wall, x - 0.85, x + 0.85, reach, p.floor, eaves,
+                eaves + 0.4, roof="shed",
+            )  # fmt: skip
+    if p.doors_inside:
+        porches.add_porch(
+            materials, wall, half - 1.6, half + 1.6, reach, p.floor, eaves,
+            eaves + 0.4, roof="flat", posts=3,
+        )  # fmt: skip
+    if p.bay == "canted":
+        for x in _middles(p, main):
+            width = min(2.4, 0.5 * half)
+            openings.clear(
+                0, x - width / 2 - 0.1, x + width / 2 + 0.1, 0.0,
+                p.floor + STOREY_M - 0.2,
+            )  # fmt: skip
+            porches.add_bay_window(
+                materials, wall, x, width, min(0.7, room - 0.1), 0.0,
+                round(p.floor + 2.3, 2),
+            )  # fmt: skip
+    step = massing.box(half - 1.4, half + 1.4, reach, reach + 0.28, -0.5, 0.12)
+    if p.doors_inside:
+        materials.add("base", wall.place(step))
+
+
+def _add_chimneys(assembly, p: SemiDetached, main: Wing) -> None:
+    y = (main.y0 + main.y1) / 2
+    if p.chimneys == "middle":
+        spots = [(main.x0 + main.x1) / 2]
+    else:
+        side = 0.7 if p.roof == "gable" else 0.35 * (main.x1 - main.x0)
+        spots = [main.x0 + side, main.x1 - side]
+    for k, x in enumerate(spots):
+        add_chimney(
+            assembly, f"chimney_{k}", (x, y, main.top - 1.1),
+            family_house.BRICKS[0], item="chimney_row",
+            yaw=np.pi / 2, scale=(0.8, 1.0, 1.0),
+        )  # fmt: skip
+
+
+ARCHETYPE = Archetype(
+    SemiDetached, build, heights=(6.0, 12.0), widths=(9.0, 26.0), overhang=0.35
+)

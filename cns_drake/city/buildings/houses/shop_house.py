@@ -1,0 +1,181 @@
+"""The shop house: shops on the ground floor, flats above them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from cns_drake.city.buildings.house_parts import (
+    family_house,
+    house_walls,
+    porches,
+    row_unit,
+    shop_fronts,
+)
+from cns_drake.city.buildings.house_parts.openings import Openings
+from cns_drake.city.buildings.parts import bays
+from cns_drake.city.buildings.parts.facades import Band
+from cns_drake.city.buildings.parts.materials import Materials
+from cns_drake.city.buildings.parts.roof_equipment import equip_roof
+from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.geometry.structures import Model
+
+_WALLS = (
+    *family_house.BRICKS,
+    (0.84, 0.78, 0.66),
+    (0.74, 0.66, 0.54),
+    (0.70, 0.72, 0.66),
+    (0.82, 0.70, 0.60),
+)
+_AWNINGS = (
+    (0.55, 0.18, 0.16),
+    (0.20, 0.36, 0.28),
+    (0.85, 0.80, 0.68),
+    (0.22, 0.30, 0.45),
+    (0.72, 0.48, 0.18),
+)
+_SIGNS = ((0.24, 0.26, 0.30), (0.36, 0.20, 0.16), (0.20, 0.32, 0.30))
+
+
+class ShopHouse:
+    """Parameters of a shop house; lengths in metres.
+
+    Attributes:
+        height: of its top.
+        unit: of the flats; its floor is the top of the shops.
+        shop_width: wanted, of a shop.
+        awnings: part of the shops with an awning.
+        oriels: bay windows above the shops, at most.
+        course: how far the band above the shops sticks out.
+    """
+
+    def __init__(self, d: Dice):
+        x0, y0, x1, y1 = d.site.bounds
+        roofs = ["flat", "gable", "gambrel"]
+        if d.width < 10.0 and d.depth > d.width:
+            roofs += ["front", "stepped"]
+        if d.depth > 14.0:
+            roofs = ["flat"]
+        unit = row_unit.draw_unit(d.rng, d.width, roofs, family_house.BRICKS)
+        ground = d.uniform(3.5, 4.2, 2)
+        if d.height - ground < 3.2:
+            ground, unit = (
+                min(3.4, d.height - 1.6),
+                replace(unit, roof="flat"),
+            )
+        pitch = max(unit.window_pitch, (x1 - x0 + y1 - y0) / 22)
+        self.height = d.height
+        self.unit = replace(
+            unit, floor=round(ground, 2), stoop=0.35, window_pitch=pitch
+        )
+        self.shop_width = d.uniform(4.5, 7.5)
+        self.awnings = d.uniform(0.2, 0.9)
+        self.oriels = d.whole(0, 3)
+        self.course = d.uniform(0.08, 0.2, 2)
+        self.roof_items = d.some_of("stair_house vents ac_unit skylight", 1, 5)
+        self.rgb = d.pick(_WALLS)
+        self.roof_rgb = d.pick(family_house.ROOFS)
+        self.sign_rgb = d.pick(_SIGNS)
+        self.awning_rgb = d.pick(_AWNINGS)
+
+
+def build(p: ShopHouse, site: Site, rng: np.random.Generator) -> Model:
+    """Builds the house on a rectangle."""
+    assembly = Assembly(site.name, p.rgb)
+    materials = Materials(
+        walls=p.rgb,
+        glass=assembly.glass_rgb,
+        roof=p.roof_rgb,
+        trim=family_house.TRIM,
+        accent=family_house.ACCENTS[0],
+        sign=p.sign_rgb,
+        awning=p.awning_rgb,
+    )
+    x0, y0, x1, y1 = site.bounds
+    side = 0.3 * (p.unit.roof == "flat")
+    area = (
+        x0 + side * (3 not in site.blind_edges),
+        y0 + p.unit.stoop,
+        x1 - side * (1 not in site.blind_edges),
+        y1 - 0.35,
+    )
+    blind = site.blind_edges & {1, 3}
+    wing, storeys = row_unit.unit_box(p.unit, area, p.height, blind)
+    openings = Openings(wing)
+    ground = p.unit.floor
+    room = wing.wall_top - 0.25 - ground
+    upper = storeys if room > 2.4 else 0
+    step = room / max(upper, 1)
+    sides = [k for k in (1, 3) if k not in blind]
+    head = min(2.25, step - 0.4)
+    for edges, pitch in (((0, 2), p.unit.window_pitch), (sides, 4.0)):
+        house_walls.add_rows(
+            openings, edges, ground, step, upper, pitch,
+            p.unit.window_width, head=head,
+        )  # fmt: skip
+    _add_ground(materials, p, wing, openings, rng)
+    _add_oriels(materials, p, wing, openings, upper, step)
+    house_walls.add_casings(materials, wing, openings, (0,), p.unit.casing)
+    bands = [Band(round(ground - 0.3, 2), ground, -p.course)]
+    if p.unit.roof == "flat" and room > 0.8:
+        z = round(wing.wall_top - 0.45, 2)
+        bands.append(Band(z, wing.wall_top, -0.25))
+    glass = (house_walls.GLASS_M, *shop_fronts.SHOP_GLASS_M)
+    openings.add_walls(materials, glass, bands)
+    row_unit.add_roof(materials, p.unit, wing)
+    if p.unit.roof == "flat":
+        z = wing.top - wing.roof.parapet
+        equip_roof(assembly, wing.outline, z, p.roof_items, rng)
+    elif p.unit.chimney:
+        row_unit.add_stack(assembly, p.unit, wing, "chimney")
+    materials.finish(assembly)
+    return assembly.model(site)
+
+
+def _add_ground(materials, p: ShopHouse, wing, openings, rng) -> None:
+    """Adds the shops, the door to the flats, service doors at the back."""
+    wall = wing.wall(0)
+    door, length = 1.7 * (p.unit.floor < p.height - 3.0), wall.length
+    left = p.unit.door_left
+    start, end = (door, length) if left else (0.0, length - door)
+    shop_fronts.add_shops(
+        materials, wall, openings, 0, start, end, p.unit.floor, rng,
+        width=p.shop_width, awnings=p.awnings,
+    )  # fmt: skip
+    if door:
+        x = 0.9 if left else length - 0.9
+        house_walls.add_door(materials, wing, openings, 0, x, 0.0, height=2.3)
+    back = [house_walls.sash(1.2, 0.0, 1.4, 2.3), bays.gate(2.2, 2.3, 0.2)]
+    openings.row((2,), 0.5, 4.5, back, 0.8)
+
+
+def _add_oriels(materials, p: ShopHouse, wing, openings, upper, step) -> None:
+    if upper < 1 or step < 2.5 or p.oriels == 0:
+        return
+    wall = wing.wall(0)
+    low = round(p.unit.floor + 0.15, 2)
+    high = round(p.unit.floor + max(1, upper - 1) * step - 0.15, 2)
+    high = min(high, wing.wall_top - 0.7)
+    for a, b in bays.stretches(wall.length, wall.length / p.oriels, 0.4):
+        width = min(2.4, b - a - 1.2)
+        if width < 1.5:
+            continue
+        x = (a + b) / 2
+        openings.clear(
+            0, x - width / 2 - 0.15, x + width / 2 + 0.15, low, high + 0.4
+        )
+        porches.add_bay_window(
+            materials, wall, x, width, 0.6, low, high,
+            storeys=max(1, upper - 1), canted=p.unit.bay != "box",
+        )  # fmt: skip
+
+
+ARCHETYPE = Archetype(
+    ShopHouse,
+    build,
+    heights=(6.0, 18.0),
+    widths=(5.5, 30.0),
+    overhang=1.0,
+    party_walls=True,
+)

@@ -1,0 +1,1 @@
+"""What all buildings are put together of: masses, facades, roofs."""

@@ -1,0 +1,263 @@
+"""The vocabulary of facades: windows, shop fronts, doors, and their rhythm.
+
+A bay fills a stretch x0..x1 of a wall with relief; a layout repeats bays
+along the walls of a storey. All heights are above the storey's floor [m].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from cns_drake.city.buildings.parts.facades import Arch, Layout, Patch, Relief
+
+Bay = Callable[[float, float], list[Relief]]
+
+
+def _cm(value: float) -> float:
+    """Rounds to whole centimetres, which keeps the meshes' files small."""
+    return round(value, 2)
+
+
+def _centred(x0: float, x1: float, width: float) -> tuple[float, float]:
+    width = min(width, x1 - x0)
+    return _cm((x0 + x1 - width) / 2), _cm((x0 + x1 + width) / 2)
+
+
+def blank(x0: float, x1: float) -> list[Relief]:
+    """A bay of plain wall."""
+    return []
+
+
+def window(
+    width: float,
+    sill: float,
+    head: float,
+    depth: float,
+    *,
+    mullions: int = 0,
+    transom: float | None = None,
+    ledge: float = 0.0,
+    hood: float = 0.0,
+    pier: float = 0.35,
+) -> Bay:
+    """A recessed window.
+
+    Args:
+        width: at most this, less where the bay is narrow [m].
+        sill: bottom of the glass above the floor [m].
+        head: top of the glass [m].
+        depth: of the glass behind the wall [m].
+        mullions: upright bars that divide it.
+        transom: height of a horizontal bar [m].
+        ledge: how far the sill sticks out [m].
+        hood: how far the lintel sticks out [m].
+        pier: least wall left on either side [m].
+    """
+
+    def bay(x0: float, x1: float) -> list[Relief]:
+        a, b = _centred(x0, x1, min(width, x1 - x0 - 2 * pier))
+        if b - a < 0.3:
+            return []
+        relief: list[Relief] = [Patch(a, b, sill, head, depth)]
+        bar = max(0.05, depth - 0.12)
+        for k in range(1, mullions + 1):
+            x = _cm(a + (b - a) * k / (mullions + 1))
+            relief.append(Patch(x - 0.05, x + 0.05, sill, head, bar))
+        if transom is not None:
+            relief.append(Patch(a, b, transom - 0.04, transom + 0.04, bar))
+        if ledge > 0:
+            relief.append(Patch(a - 0.1, b + 0.1, sill - 0.15, sill, -ledge))
+        if hood > 0:
+            relief.append(Patch(a - 0.15, b + 0.15, head, head + 0.25, -hood))
+        return relief
+
+    return bay
+
+
+def ribbon(sill: float, head: float, depth: float, post: float) -> Bay:
+    """A band of glass with a post between one bay and the next."""
+    return window(1e3, sill, head, depth, pier=post / 2)
+
+
+def arched(
+    width: float,
+    bottom: float,
+    spring: float,
+    depth: float,
+    *,
+    rise: float | None = None,
+    pier: float = 0.3,
+) -> Bay:
+    """A round-headed recess; a half circle unless `rise` flattens it."""
+
+    def bay(x0: float, x1: float) -> list[Relief]:
+        a, b = _centred(x0, x1, min(width, x1 - x0 - 2 * pier))
+        if b - a < 0.4:
+            return []
+        top = spring + (_cm((b - a) / 2) if rise is None else rise)
+        return [Arch(a, b, bottom, spring, top, depth)]
+
+    return bay
+
+
+def shop_front(
+    head: float,
+    depth: float = 0.35,
+    *,
+    riser: float = 0.45,
+    pier: float = 0.3,
+    door: bool = True,
+) -> Bay:
+    """A shop: glass up to `head` over a low riser, and a recessed door."""
+
+    def bay(x0: float, x1: float) -> list[Relief]:
+        a, b = _centred(x0, x1, x1 - x0 - 2 * pier)
+        if b - a < 1.6:
+            return []
+        relief: list[Relief] = [
+            Patch(a, b, 0.0, riser, depth - 0.2),
+            Patch(a, b, riser, head, depth),
+        ]
+        if door:
+            x = _cm(a + 0.62 * (b - a))
+            relief.append(Patch(x, min(x + 1.1, b), 0.0, head, depth + 0.6))
+        else:
+            x = _cm((a + b) / 2)
+            relief.append(Patch(x - 0.06, x + 0.06, riser, head, depth - 0.15))
+        return relief
+
+    return bay
+
+
+def entrance(
+    width: float, height: float, depth: float = 0.9, *, surround: float = 0.2
+) -> Bay:
+    """A doorway deep in the wall inside a frame that stands out."""
+
+    def bay(x0: float, x1: float) -> list[Relief]:
+        a, b = _centred(x0, x1, min(width, x1 - x0 - 1.0))
+        middle = _cm((a + b) / 2)
+        return [
+            Patch(a - 0.4, b + 0.4, 0.0, height + 0.5, -surround),
+            Patch(a, b, 0.0, height, depth),
+            Patch(a, b, 2.5, 2.62, depth - 0.2),
+            Patch(middle - 0.06, middle + 0.06, 0.0, height, depth - 0.2),
+        ]
+
+    return bay
+
+
+def house_door(width: float, z0: float, z1: float, depth: float) -> Bay:
+    """A doorway above steps: two leaves, a fanlight, a flat surround."""
+
+    def bay(x0: float, x1: float) -> list[Relief]:
+        a, b = _centred(x0, x1, min(width, x1 - x0 - 0.6))
+        middle, light = _cm((a + b) / 2), _cm(z1 - 0.4)
+        return [
+            Patch(a - 0.25, b + 0.25, z0, _cm(z1 + 0.25), -0.1),
+            Patch(a, b, z0, z1, depth),
+            Patch(a, b, light, _cm(light + 0.08), depth - 0.12),
+            Patch(middle - 0.05, middle + 0.05, z0, light, depth - 0.06),
+        ]
+
+    return bay
+
+
+def bar(width: float, z0: float, z1: float, depth: float) -> Bay:
+    """An upright bar in the middle of the bay, at its own depth."""
+
+    def bay(x0: float, x1: float) -> list[Relief]:
+        a, b = _centred(x0, x1, width)
+        return [Patch(a, b, z0, z1, depth)]
+
+    return bay
+
+
+def gate(width: float, height: float, depth: float = 0.3) -> Bay:
+    """A roller shutter with its ribs."""
+
+    def bay(x0: float, x1: float) -> list[Relief]:
+        a, b = _centred(x0, x1, min(width, x1 - x0 - 0.6))
+        relief: list[Relief] = [Patch(a, b, 0.0, height, depth)]
+        for k in range(1, 4):
+            z = _cm(height * k / 4)
+            relief.append(Patch(a, b, z - 0.05, z + 0.05, depth - 0.1))
+        return relief
+
+    return bay
+
+
+def loggia(
+    width: float, depth: float, rail: float, head: float, *, pier: float = 0.15
+) -> Bay:
+    """A room-wide balcony inside the wall, behind a solid rail."""
+
+    def bay(x0: float, x1: float) -> list[Relief]:
+        a, b = _centred(x0, x1, min(width, x1 - x0 - 2 * pier))
+        x = _cm(a + 0.3 * (b - a))
+        return [
+            Patch(a, b, rail, head, depth),
+            Patch(x, b - 0.3, rail, head - 0.15, depth + 0.15),
+        ]
+
+    return bay
+
+
+def stretches(
+    length: float, pitch: float, margin: float
+) -> list[tuple[float, float]]:
+    """Divides a wall into equal bays of about `pitch`, clear of its ends.
+
+    A wall too short for that gets one narrower bay, or none.
+    """
+    room = length - 2 * margin
+    count = max(int(room / pitch + 0.4), int(room > 0.6 * pitch))
+    return [
+        (margin + k * room / count, margin + (k + 1) * room / count)
+        for k in range(count)
+    ]
+
+
+def plain(edge: int, length: float) -> list[Relief]:
+    """The layout of a wall without openings."""
+    return []
+
+
+def rhythm(pitch: float, bays: Sequence[Bay], margin: float = 0.5) -> Layout:
+    """Repeats the bays from both ends towards the middle of every wall."""
+
+    def layout(edge: int, length: float) -> list[Relief]:
+        cells = stretches(length, pitch, margin)
+        relief: list[Relief] = []
+        for k, (x0, x1) in enumerate(cells):
+            nth = min(k, len(cells) - 1 - k)
+            relief.extend(bays[nth % len(bays)](x0, x1))
+        return relief
+
+    return layout
+
+
+def with_middle(layout: Layout, bay: Bay, width: float) -> Layout:
+    """Puts a bay in the middle of a wall, in place of what it meets."""
+
+    def combined(edge: int, length: float) -> list[Relief]:
+        x0, x1 = (length - width) / 2, (length + width) / 2
+        if x0 < 0.3:
+            return list(layout(edge, length))
+        kept = [
+            r
+            for r in layout(edge, length)
+            if r.x1 < x0 + 0.05 or r.x0 > x1 - 0.05
+        ]
+        return [*kept, *bay(x0, x1)]
+
+    return combined
+
+
+def by_edge(layouts: dict[int, Layout], otherwise: Layout) -> Layout:
+    """Gives single walls a layout of their own."""
+
+    def layout(edge: int, length: float) -> Sequence[Relief]:
+        return layouts.get(edge, otherwise)(edge, length)
+
+    return layout

@@ -1,0 +1,297 @@
+"""Solid details of facades: canopies, awnings, balconies, steps, stairs.
+
+A detail is placed on a wall by a `WallFrame`, in whose coordinates x runs
+along the wall, y outwards and z up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+import functools
+import math
+
+import numpy as np
+
+from cns_drake.city.buildings.parts import bays, massing
+from cns_drake.city.geometry.mesh import Mesh, box_mesh, merge_meshes
+
+# Height that the shared flight of fire stairs climbs; parts scale it [m].
+FIRE_STAIRS_STOREY_M = 3.4
+
+
+class WallFrame:
+    """Carries geometry from a wall's own coordinates to the building's.
+
+    Attributes:
+        length: of the wall [m].
+    """
+
+    def __init__(self, outline, edge: int):
+        outline = np.asarray(outline, dtype=float)
+        edge %= len(outline)
+        start, end = outline[edge], outline[(edge + 1) % len(outline)]
+        self.length = float(np.hypot(*(end - start)))
+        self._start = start
+        self._along = (end - start) / self.length
+        self._outward = np.array([self._along[1], -self._along[0]])
+
+    def place(self, mesh: Mesh, z: float = 0.0) -> Mesh:
+        """Returns a mesh given in wall coordinates, in building's ones.
+
+        Wall coordinates (x along, y outwards, z up) are left-handed, so the
+        faces are turned round.
+        """
+        x, y, height = mesh.vertices.T
+        xy = self._start + np.outer(x, self._along) + np.outer(y, self._outward)
+        vertices = np.column_stack([xy, height + z])
+        return Mesh(vertices, tuple(face[::-1] for face in mesh.faces))
+
+    @property
+    def heading(self) -> float:
+        """Direction of the wall, left to right seen from outside [rad]."""
+        return math.atan2(self._along[1], self._along[0])
+
+    def point(self, x: float, y: float) -> np.ndarray:
+        """Returns a point given in wall coordinates."""
+        return self._start + x * self._along + y * self._outward
+
+
+def canopy(x0: float, x1: float, reach: float, z: float) -> Mesh:
+    """A flat canopy with a fascia, hung on two slanted rods."""
+    rods = [
+        beam((x, 0.05, z + 1.2), (x, reach - 0.3, z + 0.3), 0.08)
+        for x in (x0 + 0.4, x1 - 0.4)
+    ]
+    slab = box_mesh((x1 - x0, reach, 0.3), ((x0 + x1) / 2, reach / 2, z + 0.15))
+    return merge_meshes([slab, *rods])
+
+
+def awning(x0: float, x1: float, reach: float, z0: float, z1: float) -> Mesh:
+    """A sloped shop awning with a hanging front edge, z1 at the wall."""
+    lip = 0.25
+    profile = [(0.0, z1), (reach, z0 + lip), (reach, z0), (0.0, z1 - 0.12)]
+    vertices = [(x, y, z) for x in (x0, x1) for y, z in profile]
+    faces = [(k, (k + 1) % 4, 4 + (k + 1) % 4, 4 + k) for k in range(4)]
+    faces += [(3, 2, 0), (2, 1, 0), (4, 5, 6), (4, 6, 7)]
+    return Mesh(np.array(vertices), tuple(f[::-1] for f in faces))
+
+
+def balcony(
+    x0: float, x1: float, reach: float, z: float, rail: float = 1.05
+) -> Mesh:
+    """A slab with a solid balustrade on its three free sides."""
+    t, low, high = 0.12, z - 0.2, z + rail
+    outer = [(x0, 0.0), (x0, reach), (x1, reach), (x1, 0.0)]
+    inner = [(x0 + t, 0.0), (x0 + t, reach - t)]
+    inner += [(x1 - t, reach - t), (x1 - t, 0.0)]
+    rings = ((outer, low), (outer, high), (inner, high), (inner, z))
+    vertices = np.array([(x, y, h) for ring, h in rings for x, y in ring])
+    faces = [
+        (4 * ring + k, 4 * ring + 4 + k, 4 * ring + 5 + k, 4 * ring + 1 + k)
+        for ring in range(3)
+        for k in range(3)
+    ]
+    faces += [(0, 1, 2, 3), (12, 15, 14, 13)]
+    return Mesh(vertices, tuple(faces))
+
+
+def piers(
+    outline,
+    pitch: float,
+    width: float,
+    reach: float,
+    z0: float,
+    z1: float,
+    *,
+    depth: float = 0.05,
+    margin: float = 0.4,
+    entrance: float = 0.0,
+    skip: Collection[int] = (),
+) -> Mesh:
+    """Upright fins or pilasters along all walls of an outline.
+
+    Args:
+        outline: of the walls.
+        pitch: about the distance between them [m].
+        width: along the wall [m].
+        reach: out of the wall [m].
+        z0, z1: bottom and top [m].
+        depth: how far they go into the wall, past recessed glass [m].
+        margin: between the ends of a wall and the middle of a pier [m].
+        entrance: width in the middle of the front that stays free [m].
+        skip: edges without piers.
+    """
+    pieces = []
+    for edge in range(len(outline)):
+        wall = WallFrame(outline, edge)
+        if edge in skip or wall.length < 2 * width:
+            continue
+        room = wall.length - 2 * margin
+        count = round(room / pitch)
+        if count < 1:  # A chord of a curve: one pier in its middle.
+            places = [wall.length / 2]
+        else:
+            places = [margin + k * room / count for k in range(count + 1)]
+        if edge == 0 and entrance > 0:
+            half = (entrance + width) / 2
+            places = [x for x in places if abs(x - wall.length / 2) >= half]
+        for x in places:
+            pier = _pier(round(x, 2), width, depth, reach, z0, z1)
+            pieces.append(wall.place(pier))
+    return merge_meshes(pieces)
+
+
+def pilasters(
+    outline,
+    pitch: float,
+    margin: float,
+    every: int,
+    width: float,
+    reach: float,
+    z0: float,
+    z1: float,
+    skip: Collection[int] = (),
+) -> Mesh:
+    """Pilasters between the bays that `bays.rhythm` gives these walls.
+
+    Args:
+        outline: of the walls.
+        pitch, margin: of the bays [m].
+        every: one pilaster each so many bays.
+        width, reach: of a pilaster [m].
+        z0, z1: bottom and top [m].
+        skip: edges without pilasters.
+    """
+    pieces = []
+    for edge in range(len(outline)):
+        wall = WallFrame(outline, edge)
+        cells = bays.stretches(wall.length, pitch, margin)
+        if edge in skip or len(cells) < 3:
+            continue
+        for k, (x, _) in enumerate(cells):
+            if k % every == 0 and k > 0:
+                pier = _pier(round(x, 2), width, 0.02, reach, z0, z1)
+                pieces.append(wall.place(pier))
+    return merge_meshes(pieces)
+
+
+def corner_piers(
+    outline,
+    width: float,
+    reach: float,
+    depth: float,
+    z0: float,
+    z1: float,
+    skip: Collection[int] = (),
+) -> Mesh:
+    """Angled piers around the convex corners of an outline.
+
+    Args:
+        outline: of the walls.
+        width: of each flank along its wall [m].
+        reach: out of the walls [m].
+        depth: into the walls, past recessed glass [m].
+        z0, z1: bottom and top [m].
+        skip: edges whose corners get none.
+    """
+    outline = np.asarray(outline, dtype=float)
+    outer = massing.inset(outline, -reach)
+    inner = massing.inset(outline, depth)
+    pieces = []
+    for k, p in enumerate(outline):
+        before = WallFrame(outline, k - 1)
+        after = WallFrame(outline, k)
+        a, b = p - outline[k - 1], outline[(k + 1) % len(outline)] - p
+        if a[0] * b[1] - a[1] * b[0] < 0.1:
+            continue
+        if k in skip or (k - 1) % len(outline) in skip:
+            continue
+        low, high = before.length - width, width
+        plan = [
+            before.point(low, -depth),
+            before.point(low, reach),
+            outer[k],
+            after.point(high, reach),
+            after.point(high, -depth),
+            inner[k],
+        ]
+        pieces.append(massing.prism(plan, z0, z1, bottom=True))
+    return merge_meshes(pieces)
+
+
+def _pier(x, width, depth, reach, z0, z1) -> Mesh:
+    """A box in wall coordinates.
+
+    It has a back, too: piers outgrow walls, and near a corner their backs
+    come out of the recesses of the next wall.
+    """
+    a, b = x - width / 2, x + width / 2
+    plan = [(a, -depth), (b, -depth), (b, reach), (a, reach)]
+    vertices = np.array([(x, y, z) for z in (z0, z1) for x, y in plan])
+    sides = ((0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
+    return Mesh(vertices, (*sides, (4, 5, 6, 7), (0, 3, 2, 1)))
+
+
+def steps(x0: float, x1: float, reach: float, rise: float, count: int) -> Mesh:
+    """Entrance steps: `count` treads from y = reach up to the wall."""
+    pieces = []
+    for k in range(count):
+        y = reach * (count - k) / count
+        top = rise * (k + 1) / count
+        pieces.append(massing.box(x0, x1, 0.0, y, -massing.FOUNDATION_M, top))
+    return merge_meshes(pieces)
+
+
+@functools.cache
+def fire_stairs_flight() -> Mesh:
+    """One storey of iron fire stairs, a mesh that all buildings share.
+
+    In wall coordinates turned right-handed (x along the wall, y into it):
+    a landing 4 m long and 1.1 m deep at z = 0 with its railing, and a
+    flight up to the next one at z = `FIRE_STAIRS_STOREY_M`.
+    """
+    length, reach, high = 4.0, 1.1, FIRE_STAIRS_STOREY_M
+    bars = [
+        box_mesh((length, reach, 0.08), (0.0, -reach / 2, 0.0)),
+        *(box_mesh((length, 0.05, 0.06), (0.0, -reach, z)) for z in (0.5, 1.0)),
+        *(
+            box_mesh((0.05, reach, 0.06), (x, -reach / 2, 1.0))
+            for x in (-length / 2, length / 2)
+        ),
+        *(
+            box_mesh((0.06, 0.06, 1.0), (x, -reach, 0.5))
+            for x in (-length / 2, 0.0, length / 2)
+        ),
+    ]
+    bars += [
+        beam((-1.6, y, 0.0), (1.4, y, high), 0.12)
+        for y in (-0.35 * reach, -0.85 * reach)
+    ]
+    return merge_meshes(bars)
+
+
+def column(x: float, y: float, z0: float, z1: float, radius: float) -> Mesh:
+    """A round column with base and capital, in the building's frame."""
+    shaft = massing.regular_polygon(radius, 10, (x, y))
+    top = massing.regular_polygon(0.85 * radius, 10, (x, y))
+    r = 1.25 * radius
+    block = massing.rectangle(x - r, y - r, x + r, y + r)
+    return merge_meshes(
+        [
+            massing.prism(block, z0, z0 + 0.3),
+            massing.skirt(shaft, top, z0 + 0.3, z1 - 0.4),
+            massing.prism(block, z1 - 0.4, z1, bottom=True),
+        ]
+    )
+
+
+def beam(start, end, width: float) -> Mesh:
+    """A square bar between two points that lie on no common upright."""
+    start, end = np.asarray(start, float), np.asarray(end, float)
+    along = (end - start) / np.linalg.norm(end - start)
+    side = np.cross(along, (0.0, 0.0, 1.0))
+    side /= np.linalg.norm(side)
+    up = np.cross(side, along)
+    unit = box_mesh((np.linalg.norm(end - start), width, width))
+    R = np.column_stack([along, -side, up])
+    return Mesh(unit.vertices @ R.T + (start + end) / 2, unit.faces)

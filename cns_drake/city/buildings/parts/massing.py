@@ -1,0 +1,363 @@
+"""Outlines and solids that buildings are put together from.
+
+Outlines are (N, 2) corners, counter-clockwise; every solid is closed from
+the sides that can be seen and wound outwards.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+
+# Buildings reach below their own ground level, for the ground has relief.
+FOUNDATION_M = 0.5
+
+
+def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
+    """Returns the four corners; the first edge lies at y0."""
+    return np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)], dtype=float)
+
+
+def regular_polygon(
+    radius: float, count: int, center=(0.0, 0.0), phase: float = 0.0
+) -> np.ndarray:
+    """Returns `count` points on a circle."""
+    angles = phase + np.arange(count) * 2 * math.pi / count
+    return np.asarray(center) + radius * np.column_stack(
+        [np.cos(angles), np.sin(angles)]
+    )
+
+
+def inset(points, distance) -> np.ndarray:
+    """Moves each edge of an outline inwards and intersects them again.
+
+    Args:
+        points: outline.
+        distance: one distance for all edges or one per edge [m]; negative
+            ones move outwards.
+
+    Returns:
+        The outline of the moved edges, corner by corner. The caller keeps
+        the distances small against the lengths of the edges.
+    """
+    points = np.asarray(points, dtype=float)
+    distances = np.broadcast_to(np.asarray(distance, float), len(points))
+    along = np.roll(points, -1, axis=0) - points
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    moved = np.empty_like(points)
+    for k, p in enumerate(points):
+        (ax, ay), (bx, by) = a, b = along[k - 1], along[k]
+        sine = ax * by - ay * bx
+        if abs(sine) < 1e-9:  # The two edges are one line.
+            moved[k] = p + distances[k] * np.array([-by, bx])
+        else:
+            moved[k] = p + (b * distances[k - 1] - a * distances[k]) / sine
+    return moved
+
+
+def inset_limit(points) -> float:
+    """Returns how far `inset` may go until an edge has lost 70 %."""
+    points = np.asarray(points, dtype=float)
+    probe = 1e-3
+    length = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
+    moved = inset(points, probe)
+    after = np.linalg.norm(np.roll(moved, -1, axis=0) - moved, axis=1)
+    loss = np.maximum((length - after) / probe, 1e-9)
+    return float((0.7 * length / loss).min())
+
+
+def rounded(points, corners: dict[int, float], step: float) -> np.ndarray:
+    """Rounds convex corners of an outline.
+
+    Args:
+        points: outline.
+        corners: corner index -> radius [m].
+        step: longest chord of the arcs [m].
+
+    Returns:
+        The outline with each of these corners replaced by chords; its first
+        edge is what the arcs leave of the first edge given.
+    """
+    points = np.asarray(points, dtype=float)
+    result: list[np.ndarray] = []
+    front = 0
+    for k, p in enumerate(points):
+        if k not in corners:
+            result.append(p)
+            continue
+        radius = corners[k]
+        into = p - points[k - 1]
+        out = points[(k + 1) % len(points)] - p
+        into, out = into / np.hypot(*into), out / np.hypot(*out)
+        cross = into[0] * out[1] - into[1] * out[0]
+        turn = math.atan2(cross, float(into @ out))
+        center = (
+            p
+            - into * radius * math.tan(turn / 2)
+            + radius * np.array([-into[1], into[0]])
+        )
+        start = math.atan2(-into[0], into[1])
+        count = max(1, math.ceil(radius * turn / step))
+        for i in range(count + 1):
+            angle = start + turn * i / count
+            arm = np.array([math.cos(angle), math.sin(angle)])
+            result.append(center + radius * arm)
+        if k == 0:
+            front = len(result) - 1
+    return np.roll(np.array(result), -front, axis=0)
+
+
+def flat(points, z: float, *, up: bool = True) -> Mesh:
+    """Returns a horizontal surface that fills an outline.
+
+    Convex outlines become quads and at most one triangle, others triangles.
+    """
+    points = np.asarray(points, dtype=float)
+    if _is_convex(points):
+        n = len(points)
+        faces = [
+            tuple(i for i in (0, k, k + 1, k + 2) if i < n)
+            for k in range(1, n - 1, 2)
+        ]
+    else:
+        faces = _ears(points)
+    if not up:
+        faces = [face[::-1] for face in faces]
+    return Mesh(
+        np.column_stack([points, np.full(len(points), z)]), tuple(faces)
+    )
+
+
+def _turns(points: np.ndarray) -> np.ndarray:
+    """Returns twice the signed area of each corner's triangle."""
+    into = points - np.roll(points, 1, axis=0)
+    out = np.roll(points, -1, axis=0) - points
+    return into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0]
+
+
+def _is_convex(points: np.ndarray) -> bool:
+    return bool((_turns(points) > -1e-9).all())
+
+
+def _ears(points: np.ndarray) -> list[tuple[int, ...]]:
+    """Triangulates a simple outline by cutting ears off (O(N^3))."""
+    left = list(range(len(points)))
+    faces = []
+    while len(left) > 3:
+        for k in range(len(left)):
+            a, b, c = left[k - 1], left[k], left[(k + 1) % len(left)]
+            triangle = points[[a, b, c]]
+            others = [i for i in left if i not in (a, b, c)]
+            if _cross(*triangle) > 1e-9 and not any(
+                _inside(points[i], triangle) for i in others
+            ):
+                faces.append((a, b, c))
+                left.pop(k)
+                break
+        else:
+            raise ValueError("an outline crosses itself or runs clockwise")
+    return [*faces, tuple(left)]
+
+
+def _cross(a, b, c) -> float:
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def _inside(p, triangle) -> bool:
+    a, b, c = triangle
+    return (
+        _cross(a, b, p) > -1e-9
+        and _cross(b, c, p) > -1e-9
+        and _cross(c, a, p) > -1e-9
+    )
+
+
+def skirt(lower, upper, z0: float, z1: float) -> Mesh:
+    """Returns the faces from one outline up to another, seen from outside.
+
+    Both outlines have the same number of corners and pairwise parallel
+    edges, so that the faces are plane.
+    """
+    lower, upper = np.asarray(lower, float), np.asarray(upper, float)
+    n = len(lower)
+    vertices = np.vstack(
+        [
+            np.column_stack([lower, np.full(n, z0)]),
+            np.column_stack([upper, np.full(n, z1)]),
+        ]
+    )
+    faces = []
+    for k in range(n):
+        m = (k + 1) % n
+        face = (k, m, n + m, n + k)
+        # Edges of no length (a ridge, a spire's tip) leave triangles.
+        if np.allclose(upper[k], upper[m]):
+            face = (k, m, n + k)
+        elif np.allclose(lower[k], lower[m]):
+            face = (k, n + m, n + k)
+        faces.append(face)
+    return Mesh(vertices, tuple(faces))
+
+
+def prism(points, z0: float, z1: float, *, bottom: bool = False) -> Mesh:
+    """Returns an upright solid; its bottom is left open where none sees it."""
+    pieces = [skirt(points, points, z0, z1), flat(points, z1)]
+    if bottom:
+        pieces.append(flat(points, z0, up=False))
+    return merge_meshes(pieces)
+
+
+def frustum(lower, upper, z0: float, z1: float) -> Mesh:
+    """Returns a tapering solid without a bottom."""
+    return merge_meshes([skirt(lower, upper, z0, z1), flat(upper, z1)])
+
+
+def sloped_prism(points, z0: float, height: float, low: float) -> Mesh:
+    """Returns a solid under a plane that rises along y.
+
+    Its top is `height` above z0 at the outline's greatest y and the
+    fraction `low` of it at the least.
+    """
+    points = np.asarray(points, dtype=float)
+    n, y = len(points), points[:, 1]
+    share = (y - y.min()) / (y.max() - y.min())
+    top = flat(points, 0.0)
+    z1 = z0 + height * (low + (1.0 - low) * share)
+    vertices = np.vstack(
+        [
+            np.column_stack([points, np.full(n, z0)]),
+            np.column_stack([points, z1]),
+        ]
+    )
+    walls = tuple((k, (k + 1) % n, n + (k + 1) % n, n + k) for k in range(n))
+    roof = tuple(tuple(n + i for i in face) for face in top.faces)
+    return Mesh(vertices, (*walls, *roof))
+
+
+def spire(points, tip, z0: float, z1: float) -> Mesh:
+    """Returns a pyramid over an outline."""
+    points = np.asarray(points, dtype=float)
+    n = len(points)
+    vertices = np.vstack(
+        [np.column_stack([points, np.full(n, z0)]), [[tip[0], tip[1], z1]]]
+    )
+    return Mesh(vertices, tuple((k, (k + 1) % n, n) for k in range(n)))
+
+
+def revolved(profile, count: int, center=(0.0, 0.0)) -> Mesh:
+    """Returns the surface that a profile sweeps around an upright axis.
+
+    Args:
+        profile: (radius, z) pairs from the bottom up [m]; a last radius of
+            zero gives a tip, else the top is closed by a lid.
+        count: sides of the polygon that stands for the circle.
+        center: where the axis stands [m].
+    """
+
+    def ring(radius: float) -> np.ndarray:
+        return regular_polygon(radius, count, center)
+
+    pieces = []
+    for (r0, z0), (r1, z1) in itertools.pairwise(profile):
+        if r1 > 0:
+            pieces.append(skirt(ring(r0), ring(r1), z0, z1))
+        else:
+            pieces.append(spire(ring(r0), center, z0, z1))
+    radius, z = profile[-1]
+    if radius > 0:
+        pieces.append(flat(ring(radius), z))
+    return merge_meshes(pieces)
+
+
+def extruded(profile, x0: float, x1: float) -> Mesh:
+    """Returns a shed: a roof line drawn along x, with its end walls.
+
+    Args:
+        profile: (y, z) points of the roof line, y rising [m]; the ends
+            reach down to the height of its first point.
+        x0, x1: ends of the shed [m].
+    """
+    profile = np.asarray(profile, dtype=float)
+    base = profile[0, 1]
+    vertices, faces = [], []
+
+    def add(*corners) -> None:
+        faces.append(tuple(range(len(vertices), len(vertices) + len(corners))))
+        vertices.extend(corners)
+
+    for (ya, za), (yb, zb) in itertools.pairwise(profile):
+        add((x0, ya, za), (x1, ya, za), (x1, yb, zb), (x0, yb, zb))
+        if yb - ya < 1e-6:
+            continue
+        right = [(x1, ya, base), (x1, yb, base), (x1, yb, zb), (x1, ya, za)]
+        corners = [c for k, c in enumerate(right) if c != right[k - 1]]
+        if len(corners) > 2:
+            add(*corners)
+            add(*((x0, y, z) for _, y, z in reversed(corners)))
+    if profile[-1, 1] > base:
+        ya, za = profile[-1]
+        add((x0, ya, za), (x1, ya, za), (x1, ya, base), (x0, ya, base))
+    return Mesh(np.array(vertices), tuple(faces))
+
+
+def swapped(mesh: Mesh) -> Mesh:
+    """Returns the mesh with its x and y axes exchanged."""
+    faces = tuple(face[::-1] for face in mesh.faces)
+    return Mesh(mesh.vertices[:, [1, 0, 2]], faces)
+
+
+def shortest_side(points) -> float:
+    """Returns the shorter side of an outline's bounding box [m]."""
+    span = np.ptp(np.asarray(points, dtype=float), axis=0)
+    return float(min(span))
+
+
+def roof_pan(points, z_floor: float, z_top: float, thickness: float) -> Mesh:
+    """Returns a flat roof inside a parapet: coping, inner walls, floor."""
+    points = np.asarray(points, dtype=float)
+    inner = inset(points, thickness)
+    coping = skirt(points, inner, z_top, z_top)
+    # Seen from the roof the wall faces inwards: an outline run backwards.
+    wall = skirt(inner[::-1], inner[::-1], z_floor, z_top)
+    return merge_meshes([coping, wall, flat(inner, z_floor)])
+
+
+def gable_roof(
+    x0: float, y0: float, x1: float, y1: float, z0: float, rise: float
+) -> Mesh:
+    """Returns a pitched roof, ridge along x, with its gables and underside."""
+    y = (y0 + y1) / 2
+    z1 = z0 + rise
+    vertices = np.array(
+        [
+            (x0, y0, z0),
+            (x1, y0, z0),
+            (x1, y1, z0),
+            (x0, y1, z0),
+            (x0, y, z1),
+            (x1, y, z1),
+        ]
+    )
+    faces = ((0, 1, 5, 4), (2, 3, 4, 5), (1, 2, 5), (3, 0, 4), (0, 3, 2, 1))
+    return Mesh(vertices, faces)
+
+
+def box(x0, x1, y0, y1, z0, z1, *, bottom: bool = True) -> Mesh:
+    """Returns an upright box between the given limits [m]."""
+    return prism(rectangle(x0, y0, x1, y1), z0, z1, bottom=bottom)
+
+
+def post(
+    x: float, y: float, half: float, z1: float, z0: float = -FOUNDATION_M
+) -> Mesh:
+    """Returns a square post about (x, y), its foot out of sight [m]."""
+    return box(x - half, x + half, y - half, y + half, z0, z1, bottom=False)
+
+
+def foundation(points) -> Mesh:
+    """Returns the walls of an outline below the ground."""
+    return skirt(points, points, -FOUNDATION_M, 0.0)

@@ -1,0 +1,232 @@
+"""Pitched roofs: shells over a line, gable walls beneath them, hips.
+
+A roof line is the upper surface of a roof seen along its ridge: (across, z)
+points, `across` rising. The roof lies along x, its line in y, unless
+`along_y` turns it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import itertools
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from cns_drake.city.buildings.parts import massing
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+
+Line = Sequence[tuple[float, float]]
+
+# Gables reach this far into the roof above them, lest rays slip between [m].
+_INTO_ROOF = 0.03
+
+
+class Hole(NamedTuple):
+    """A window in a gable: in wall coordinates, `depth` inwards [m]."""
+
+    x0: float
+    x1: float
+    z0: float
+    z1: float
+    depth: float
+
+
+def gable_line(a: float, b: float, z: float, top: float, ridge: float = 0.5):
+    """Two slopes over a..b from z to the ridge at `top`.
+
+    `ridge` is its place between a and b, as a part of the span.
+    """
+    return [(a, z), (a + ridge * (b - a), top), (b, z)]
+
+
+def gambrel_line(a: float, b: float, z: float, top: float, knee=(0.24, 0.66)):
+    """Steep slopes up to a knee, flatter ones above.
+
+    `knee` gives its place as parts of the half span and of the rise.
+    """
+    half = (b - a) / 2
+    run, up = knee[0] * half, z + knee[1] * (top - z)
+    return [(a, z), (a + run, up), (a + half, top), (b - run, up), (b, z)]
+
+
+def barrel_line(a: float, b: float, z: float, top: float, count: int = 8):
+    """A circular vault over a..b in an even `count` of chords."""
+    half, middle, rise = (b - a) / 2, (a + b) / 2, top - z
+    radius = (half**2 + rise**2) / (2 * rise)
+    span = math.atan2(half, radius - rise)
+    return [
+        (middle + radius * math.sin(t), top - radius * (1.0 - math.cos(t)))
+        for t in np.linspace(-span, span, count + 1).tolist()
+    ]
+
+
+def with_eaves(line: Line, low: float, high: float) -> list:
+    """Extends the first and the last slope of a line by these runs [m]."""
+    (a, za), (b, zb) = line[0], line[1]
+    (c, zc), (d, zd) = line[-2], line[-1]
+    first = (a - low, za - low * (zb - za) / (b - a))
+    last = (d + high, zd - high * (zc - zd) / (d - c))
+    return [first, *line[1:-1], last]
+
+
+def line_height(line: Line, across: float) -> float:
+    """Returns the height of a roof line at one place [m]."""
+    us, zs = np.transpose(line)
+    return float(np.interp(across, us, zs))
+
+
+def shell(
+    line: Line,
+    start: float,
+    end: float,
+    thickness: float,
+    *,
+    along_y: bool = False,
+) -> Mesh:
+    """Returns a roof of even thickness, measured upright, over a line."""
+    n = len(line)
+    vertices = np.array(
+        [
+            (x, u, z - lower)
+            for x in (start, end)
+            for lower in (0.0, thickness)
+            for u, z in line
+        ]
+    )
+    faces = []
+    for k in range(n - 1):
+        top, far = k, 2 * n + k
+        under, far_under = n + k, 3 * n + k
+        faces += [
+            (top, far, far + 1, top + 1),
+            (under, under + 1, far_under + 1, far_under),
+            (top, top + 1, under + 1, under),
+            (far, far_under, far_under + 1, far + 1),
+        ]
+    faces.append((0, n, 3 * n, 2 * n))
+    faces.append((n - 1, 3 * n - 1, 4 * n - 1, 2 * n - 1))
+    mesh = Mesh(vertices, tuple(faces))
+    return massing.swapped(mesh) if along_y else mesh
+
+
+def gable_wall(
+    line: Line, a: float, b: float, z: float, holes: Sequence[Hole] = ()
+) -> Mesh:
+    """Returns the wall between z and a roof line, in wall coordinates.
+
+    Args:
+        line: the underside of the roof, across as the wall's x [m].
+        a, b: ends of the wall [m].
+        z: its bottom, at most the line's height within a..b [m].
+        holes: windows in it, beside one another; `gable_glass` closes them.
+    """
+    bounds = {a, b, *(u for u, _ in line if a < u < b)}
+    bounds.update(x for hole in holes for x in (hole.x0, hole.x1))
+    faces = _Faces()
+
+    def top(x: float) -> float:
+        height = line_height(line, x)
+        return z if height < z + 1e-6 else height + _INTO_ROOF
+
+    for x0, x1 in itertools.pairwise(sorted(bounds)):
+        rows = [z]
+        for hole in holes:
+            if hole.x0 <= x0 and x1 <= hole.x1:
+                rows += [hole.z0, hole.z1]
+        for k in range(0, len(rows), 2):
+            low, is_last = rows[k], k + 1 == len(rows)
+            z0, z1 = (top(x0), top(x1)) if is_last else (rows[k + 1],) * 2
+            faces.add((x0, 0, low), (x0, 0, z0), (x1, 0, z1), (x1, 0, low))
+    for h in holes:
+        rim = [(h.x0, h.z0), (h.x1, h.z0), (h.x1, h.z1), (h.x0, h.z1)]
+        for (xa, za), (xb, zb) in zip(rim, rim[1:] + rim[:1], strict=True):
+            inner = (xa, -h.depth, za), (xb, -h.depth, zb)
+            faces.add((xb, 0, zb), (xa, 0, za), *inner)
+    return faces.mesh()
+
+
+def gable_glass(holes: Sequence[Hole]) -> Mesh:
+    """Returns the panes of a gable wall's windows, in wall coordinates."""
+    faces = _Faces()
+    for h in holes:
+        low, high = (h.x0, -h.depth, h.z0), (h.x1, -h.depth, h.z1)
+        faces.add(low, (h.x0, -h.depth, h.z1), high, (h.x1, -h.depth, h.z0))
+    return faces.mesh()
+
+
+class _Faces:
+    """Collects faces by their corners and drops those without area."""
+
+    def __init__(self):
+        self._vertices: list = []
+        self._faces: list = []
+
+    def add(self, *corners) -> None:
+        kept = [c for k, c in enumerate(corners) if c != corners[k - 1]]
+        if len(kept) > 2:
+            first = len(self._vertices)
+            self._faces.append(tuple(range(first, first + len(kept))))
+            self._vertices.extend(kept)
+
+    def mesh(self) -> Mesh:
+        vertices = np.array(self._vertices, dtype=float).reshape(-1, 3)
+        return Mesh(vertices, tuple(self._faces))
+
+
+def hip(outline, z: float, top: float, eaves: float, fascia: float) -> Mesh:
+    """Returns a hipped roof over a rectangle, boxed in below its eaves.
+
+    Args:
+        outline: of the walls, four corners.
+        z: underside of the eaves [m].
+        top: height of the ridge [m].
+        eaves: overhang, one or one per edge [m].
+        fascia: height of the upright edge [m].
+    """
+    outer = massing.inset(outline, -np.asarray(eaves))
+    ridge = _ridge(outer)
+    return merge_meshes(
+        [
+            massing.flat(outer, z, up=False),
+            massing.skirt(outer, outer, z, z + fascia),
+            massing.skirt(outer, ridge, z + fascia, top),
+        ]
+    )
+
+
+def mansard(
+    outline, z: float, knee: float, top: float, run: float, eaves: float
+) -> Mesh:
+    """Returns a roof with steep sides up to a knee and a hip above.
+
+    Args:
+        outline: of the walls, four corners.
+        z: underside of the eaves [m].
+        knee, top: heights where the steep sides end and of the ridge [m].
+        run: how far the steep sides lean inwards from the walls [m].
+        eaves: overhang [m].
+    """
+    outer, fascia = massing.inset(outline, -eaves), 0.3
+    bend = massing.inset(outline, run)
+    ridge = _ridge(bend)
+    return merge_meshes(
+        [
+            massing.flat(outer, z, up=False),
+            massing.skirt(outer, outer, z, z + fascia),
+            massing.skirt(outer, bend, z + fascia, knee),
+            massing.skirt(bend, ridge, knee, top),
+        ]
+    )
+
+
+def _ridge(rectangle) -> np.ndarray:
+    """Returns the ridge of a hip as corners that meet in pairs.
+
+    Moving all sides in by half the shorter one leaves a line, on a square
+    a point.
+    """
+    ends = np.roll(rectangle, -1, axis=0)
+    sides = np.linalg.norm(ends - rectangle, axis=1)
+    return massing.inset(rectangle, float(sides.min()) / 2)

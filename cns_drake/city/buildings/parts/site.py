@@ -1,0 +1,261 @@
+"""What every building builder takes and how it returns its model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+import numpy as np
+from shapely.geometry import Polygon
+
+from cns_drake.city.buildings.parts import massing
+from cns_drake.city.geometry.mesh import Mesh
+from cns_drake.city.geometry.structures import MeshShape, Model, Part, Shape
+
+Rgb = tuple[float, float, float]
+T = TypeVar("T")
+
+
+def pick(rng: np.random.Generator, choices: Sequence[T]) -> T:
+    """Returns one of the choices, all equally likely."""
+    return choices[int(rng.integers(len(choices)))]
+
+
+@dataclass(frozen=True)
+class Site:
+    """The ground a building gets.
+
+    Attributes:
+        footprint: simple polygon in the building's frame S [m]. Its front
+            is the edge between its first two corners, a rectangle's its
+            edge of least y; edges count counter-clockwise from there.
+        name: the structure's name; its own meshes are called `<name>_...`.
+        blind_edges: edges built against a neighbour: plain walls.
+    """
+
+    footprint: Polygon
+    name: str
+    blind_edges: frozenset[int] = frozenset()
+
+    @property
+    def outline(self) -> np.ndarray:
+        """The (N, 2) corners, counter-clockwise, the front edge first."""
+        exterior = self.footprint.exterior
+        points = np.array(exterior.coords[:-1], dtype=float)
+        if not exterior.is_ccw:
+            # Turned round, the edge that was first runs from 1 to 0.
+            points = np.roll(points[::-1], 2, axis=0)
+        if self.is_rectangle:
+            # The corner from which the edge of least y starts.
+            start = int(np.lexsort((points[:, 0], points[:, 1]))[0])
+            points = np.roll(points, -start, axis=0)
+            # Whole centimetres, never outside, keep the meshes' text short.
+            low, high = points[0], points[2]
+            low = np.ceil(np.round(100.0 * low, 3)) / 100.0
+            high = np.floor(np.round(100.0 * high, 3)) / 100.0
+            points = massing.rectangle(*low, *high)
+        return points
+
+    @property
+    def open_length(self) -> float:
+        """Length of all walls that get windows [m]."""
+        outline = self.outline
+        ends = np.roll(outline, -1, axis=0)
+        lengths = np.linalg.norm(ends - outline, axis=1)
+        return float(
+            sum(
+                length
+                for k, length in enumerate(lengths)
+                if k not in self.blind_edges
+            )
+        )
+
+    @property
+    def free_corners(self) -> list[int]:
+        """The front corners, 0 left and 1 right, that no neighbour hides."""
+        flanks = {0: {3, 0}, 1: {0, 1}}
+        return [k for k, e in flanks.items() if not e & self.blind_edges]
+
+    def detached(self, gap: float) -> Site:
+        """Returns the site with its blind edges moved in by `gap`.
+
+        What is built there stands free, overhangs included.
+        """
+        outline = self.outline
+        gaps = [gap * (k in self.blind_edges) for k in range(len(outline))]
+        return Site(Polygon(massing.inset(outline, gaps)), self.name)
+
+    @property
+    def is_rectangle(self) -> bool:
+        """Whether the footprint is a rectangle along the axes of S."""
+        box = self.footprint.envelope
+        return bool(
+            len(self.footprint.exterior.coords) == 5
+            and self.footprint.area > 0.999 * box.area
+        )
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """x0, y0, x1, y1 of a rectangular footprint [m].
+
+        Raises:
+            ValueError: the footprint is no rectangle along the axes.
+        """
+        if not self.is_rectangle:
+            raise ValueError(f"{self.name} needs a rectangular footprint")
+        outline = self.outline
+        return (*outline[0].tolist(), *outline[2].tolist())
+
+
+@dataclass(frozen=True)
+class Dice:
+    """What the parameters of a building are drawn from.
+
+    Attributes:
+        site: the ground of the building.
+        height: of its parapet, ridge or spire; only roof equipment and
+            chimneys may rise above [m].
+        rng: the source of all variation.
+    """
+
+    site: Site
+    height: float
+    rng: np.random.Generator
+
+    @property
+    def width(self) -> float:
+        """Of a rectangular site, along its front [m]."""
+        x0, _, x1, _ = self.site.bounds
+        return x1 - x0
+
+    @property
+    def depth(self) -> float:
+        """Of a rectangular site, from its front to its back [m]."""
+        _, y0, _, y1 = self.site.bounds
+        return y1 - y0
+
+    def uniform(
+        self, low: float, high: float, digits: int | None = None
+    ) -> float:
+        """Draws a number, rounded to decimal digits if these are given."""
+        value = float(self.rng.uniform(low, high))
+        return value if digits is None else round(value, digits)
+
+    def whole(self, low: int, high: int) -> int:
+        """Draws a whole number from `low` to below `high`."""
+        return int(self.rng.integers(low, high))
+
+    def chance(self, share: float) -> bool:
+        """Draws whether something is so, as it is in this share."""
+        return bool(self.rng.random() < share)
+
+    def pick(self, choices: Sequence[T]) -> T:
+        """Draws one of the choices, all equally likely."""
+        return pick(self.rng, choices)
+
+    def some_of(self, words: str, low: int, high: int) -> list[str]:
+        """Returns the first `low` to below `high` words of a text."""
+        return words.split()[: self.whole(low, high)]
+
+
+@dataclass(frozen=True)
+class Archetype:
+    """A kind of building: its parameters and how to build it.
+
+    Attributes:
+        parameters: class whose instances draw themselves from a `Dice`.
+        build: (parameters, site, rng) -> model.
+        heights: least and greatest sensible height [m].
+        widths: least and greatest sensible side of the footprint [m].
+        overhang: how far eaves, balconies, canopies and pilasters reach
+            outside the footprint [m]; near the ground at most
+            `GROUND_OVERHANG_M`.
+        any_outline: whether it follows any polygon; else rectangles only.
+        party_walls: whether it can stand wall to wall with a neighbour;
+            else it keeps its overhang clear of blind edges.
+    """
+
+    parameters: Callable[[Dice], Any]
+    build: Callable[[Any, Site, np.random.Generator], Model]
+    heights: tuple[float, float]
+    widths: tuple[float, float]
+    overhang: float = 1.5
+    any_outline: bool = False
+    party_walls: bool = False
+
+    @property
+    def name(self) -> str:
+        """Its key in the registry, which its module has as name."""
+        return self.parameters.__module__.rsplit(".", 1)[1]
+
+    def draw(self, site: Site, height: float, rng: np.random.Generator) -> Any:
+        """Draws the parameters of one building."""
+        return self.parameters(Dice(site, height, rng))
+
+
+# Plinths and pilasters may stand this far outside the footprint; above
+# `HEAD_ROOM_M` the archetype's own overhang holds.
+GROUND_OVERHANG_M = 0.35
+HEAD_ROOM_M = 2.3
+
+
+@dataclass
+class Assembly:
+    """Collects the parts and meshes of one building."""
+
+    name: str
+    rgb: Rgb | None = None
+    glass_rgb: Rgb = (0.20, 0.26, 0.31)
+    parts: list[Part] = field(default_factory=list)
+    meshes: dict[str, Mesh] = field(default_factory=dict)
+
+    def add(self, part: str, mesh: Mesh, z: float = 0.0, rgb=None) -> None:
+        """Adds a mesh of this building's own and places it once.
+
+        A mesh without faces (pilasters on walls too short for any) is left
+        out.
+        """
+        if not mesh.faces:
+            return
+        key = self.define(part, mesh)
+        self.place(part, MeshShape(key), (0.0, 0.0, z), rgb=rgb)
+
+    def define(self, key: str, mesh: Mesh) -> str:
+        """Adds a mesh of this building's own; returns its full name."""
+        name = f"{self.name}_{key}"
+        if name in self.meshes:
+            raise ValueError(f"mesh {name} is defined twice")
+        self.meshes[name] = mesh
+        return name
+
+    def stack(
+        self,
+        part: str,
+        mesh: Mesh,
+        z0: float,
+        step: float,
+        count: int,
+        rgb: Rgb | None = None,
+    ) -> None:
+        """Adds a mesh and places it `count` times, one above another."""
+        shape = MeshShape(self.define(part, mesh))
+        for k in range(count):
+            z = z0 + k * step
+            self.place(f"{part}_{k:02d}", shape, (0.0, 0.0, z), rgb=rgb)
+
+    def share(self, mesh_name: str, mesh: Mesh) -> None:
+        """Adds a mesh that other buildings use too, by its common name."""
+        self.meshes[mesh_name] = mesh
+
+    def place(
+        self, part: str, shape: Shape, xyz, yaw: float = 0.0, rgb=None
+    ) -> None:
+        """Places a shape as one visual."""
+        x, y, z = (round(float(v), 3) for v in xyz)
+        rpy = (0.0, 0.0, round(float(yaw), 5))
+        self.parts.append(Part(part, shape, (x, y, z), rpy, rgb or self.rgb))
+
+    def model(self, site: Site) -> Model:
+        """Returns the finished building."""
+        return Model(tuple(self.parts), dict(self.meshes), site.footprint)

@@ -1,0 +1,267 @@
+"""Stacks storeys into a building: ground floor, storeys, crown, roof."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+
+import numpy as np
+
+from cns_drake.city.buildings.parts import details, massing
+from cns_drake.city.buildings.parts.facades import (
+    Band,
+    Facade,
+    facade_mesh,
+    glass_mesh,
+)
+from cns_drake.city.buildings.parts.site import Assembly
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+
+# A pane cuts this far into the reveals in front of it, lest rays slip
+# between the two [m].
+_PANE_OVERLAP = 0.004
+
+
+_AWNING_COLOURS = (
+    (0.55, 0.18, 0.16),
+    (0.20, 0.36, 0.28),
+    (0.85, 0.80, 0.68),
+    (0.22, 0.30, 0.45),
+    (0.72, 0.48, 0.18),
+)
+
+
+def add_awnings(
+    assembly: Assembly, pieces: Sequence[Mesh], rng: np.random.Generator
+) -> None:
+    """Adds the awnings of a building in a colour of their own."""
+    if pieces:
+        rgb = _AWNING_COLOURS[int(rng.integers(len(_AWNING_COLOURS)))]
+        assembly.add("awnings", merge_meshes(pieces), rgb=rgb)
+
+
+def divided(
+    height: float, storey: float, most: int = 10
+) -> tuple[int, int, float]:
+    """Divides a height into storeys, and these into equal groups.
+
+    Args:
+        height: to be filled, but for millimetres [m].
+        storey: wanted height of a storey [m].
+        most: greatest number of groups; a group becomes one visual.
+
+    Returns:
+        Number of groups, storeys in a group, height of a storey in whole
+        millimetres, so that storeys placed on one another leave no gap [m].
+    """
+    count = max(1, round(height / storey))
+    per_group = -(-count // most)
+    groups = max(1, round(count / per_group))
+    exact = height / (groups * per_group)
+    return groups, per_group, math.floor(1000.0 * exact) / 1000.0
+
+
+def add_ground(
+    assembly: Assembly,
+    outline,
+    facade: Facade,
+    extras: Sequence[Mesh] = (),
+    part: str = "ground",
+) -> float:
+    """Adds the ground floor on its foundation; returns its top [m]."""
+    base = massing.foundation(outline)
+    walls = facade_mesh(outline, facade)
+    assembly.add(part, merge_meshes([base, walls, *extras]))
+    _add_glass(assembly, outline, facade, 0.0, part)
+    return facade.height
+
+
+def add_storeys(
+    assembly: Assembly,
+    outline,
+    facade: Facade,
+    z0: float,
+    groups: int,
+    per_group: int,
+    extras: Sequence[Mesh] = (),
+    part: str = "storey",
+) -> float:
+    """Adds `groups` times `per_group` storeys; returns their top [m].
+
+    Where all glass lies at one depth, one pane behind the walls closes all
+    windows; nothing else may then be deeper. Glass of several depths is
+    repeated with the storeys. `extras` belong to one storey, in its own
+    height.
+    """
+    pieces = [facade_mesh(outline, facade.stacked(per_group))]
+    for k in range(per_group):
+        pieces += [e.moved((0.0, 0.0, k * facade.height)) for e in extras]
+    step = per_group * facade.height
+    assembly.stack(part, merge_meshes(pieces), z0, step, groups)
+    top = round(z0 + groups * step, 3)
+    if len(facade.glass) == 1:
+        glass = _pane(outline, facade, z0, top)
+        assembly.add(f"{part}_glass", glass, rgb=assembly.glass_rgb)
+    elif facade.glass:
+        glass = glass_mesh(outline, facade.stacked(per_group))
+        rgb = assembly.glass_rgb
+        assembly.stack(f"{part}_glass", glass, z0, step, groups, rgb)
+    return top
+
+
+def _pane(outline, facade: Facade, z0: float, z1: float) -> Mesh:
+    """Returns the pane behind all walls but plain ones."""
+    edges = range(len(outline))
+    depth = facade.glass[0] - _PANE_OVERLAP
+    plan = massing.inset(
+        outline, [0.0 if k in facade.plain else depth for k in edges]
+    )
+    pane = massing.skirt(plan, plan, z0, z1)
+    faces = tuple(pane.faces[k] for k in edges if k not in facade.plain)
+    return Mesh(pane.vertices, faces)
+
+
+@dataclass(frozen=True)
+class Grooves:
+    """A wall of upright piers with windows over spandrels between them.
+
+    Attributes:
+        storey_height: wanted, of a storey [m].
+        spandrel: height of the wall under the windows [m].
+        ledge: how far a lip under the windows sticks out [m].
+        glass_depth: of the windows behind the spandrels [m].
+        pitch, width, reach: of the piers [m]; none where width is 0.
+        corner: width of solid corners [m]; 0 for glass around the corner.
+    """
+
+    storey_height: float
+    spandrel: float
+    ledge: float
+    glass_depth: float
+    pitch: float
+    width: float
+    reach: float
+    corner: float
+
+
+def add_grooved(
+    assembly: Assembly,
+    outline,
+    wall: Grooves,
+    z0: float,
+    goal: float,
+    part: str,
+    rise: float = 0.0,
+    most: int = 4,
+    plain: frozenset[int] = frozenset(),
+) -> float:
+    """Adds storeys from z0 to about `goal`; their piers rise above them.
+
+    Returns their top [m], less than `goal` by millimetres.
+
+    Bands that run around the building and piers as tall as the tier cost a
+    fraction of single windows.
+    """
+    groups, per_group, storey = divided(goal - z0, wall.storey_height, most)
+    depth = wall.glass_depth
+    bands = [Band(0.0, wall.spandrel, 0.0), Band(wall.spandrel, storey, depth)]
+    if wall.ledge > 0:
+        bands.append(Band(0.0, 0.2, -wall.ledge))
+    facade = Facade(storey, tuple(bands), glass=(depth,), plain=plain)
+    top = add_storeys(
+        assembly, outline, facade, z0, groups, per_group, part=part
+    )
+    pieces, into = [], depth + 0.05
+    if wall.corner > 0:
+        pieces.append(
+            details.corner_piers(
+                outline,
+                wall.corner,
+                wall.reach,
+                into,
+                z0,
+                top + rise,
+                skip=plain,
+            )
+        )
+    if wall.width > 0:
+        margin = max(wall.corner + wall.pitch - wall.width, into + wall.width)
+        pieces.append(
+            details.piers(
+                outline,
+                wall.pitch,
+                wall.width,
+                wall.reach,
+                z0,
+                top + rise,
+                depth=into,
+                margin=margin,
+                skip=plain,
+            )
+        )
+    if pieces:
+        assembly.add(f"{part}_piers", merge_meshes(pieces))
+    return top
+
+
+def block(outline, facade: Facade, z0: float) -> Mesh:
+    """Returns walls with a flat lid, glass and all, as one mesh."""
+    pieces = [
+        facade_mesh(outline, facade, z0),
+        massing.flat(outline, z0 + facade.height),
+    ]
+    if facade.glass:
+        pieces.append(glass_mesh(outline, facade, z0))
+    return merge_meshes(pieces)
+
+
+def add_crown(
+    assembly: Assembly,
+    outline,
+    facade: Facade,
+    z0: float,
+    parapet: float,
+    extras: Sequence[Mesh] = (),
+    part: str = "crown",
+    thickness: float = 0.3,
+) -> float:
+    """Adds the top of the walls and the roof; returns the roof's height [m].
+
+    The roof lies `parapet` below the top of the facade; `extras` are given
+    in heights above z0.
+    """
+    roof = round(facade.height - parapet, 3)
+    mesh = merge_meshes(
+        [
+            facade_mesh(outline, facade),
+            massing.roof_pan(outline, roof, facade.height, thickness),
+            *extras,
+        ]
+    )
+    assembly.add(part, mesh, z0)
+    _add_glass(assembly, outline, facade, z0, part)
+    return round(z0 + roof, 3)
+
+
+def _add_glass(assembly, outline, facade: Facade, z0: float, part: str):
+    if facade.glass:
+        glass = glass_mesh(outline, facade)
+        if glass.faces:
+            rgb = assembly.glass_rgb
+            assembly.add(f"{part}_glass", glass, z0, rgb=rgb)
+
+
+def cornice(
+    height: float, reach: float, *, thickness: float = 0.9, steps: int = 3
+) -> tuple[Band, ...]:
+    """Returns bands that step out towards `reach` below `height`."""
+    step = thickness / steps
+    return tuple(
+        Band(
+            round(height - thickness + k * step, 3),
+            round(height - thickness + (k + 1) * step, 3),
+            -round(reach * (k + 1) / steps, 3),
+        )
+        for k in range(steps)
+    )

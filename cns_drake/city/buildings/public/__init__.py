@@ -1,0 +1,1 @@
+"""Buildings that stand alone: churches, schools, stations, car parks."""

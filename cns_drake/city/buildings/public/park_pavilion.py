@@ -1,0 +1,234 @@
+"""The park pavilion: a bandstand, a shelter with tables, or a tea house."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+
+from cns_drake.city.buildings.house_parts.porches import add_railing
+from cns_drake.city.buildings.parts import (
+    bays,
+    details,
+    massing,
+    pitched_roofs,
+    tiers,
+)
+from cns_drake.city.buildings.parts.facades import Band, Facade, glass_mesh
+from cns_drake.city.buildings.parts.materials import Materials
+from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.geometry.mesh import merge_meshes
+from cns_drake.city.geometry.structures import Model
+
+_TIMBERS = ((0.88, 0.87, 0.83), (0.44, 0.34, 0.26), (0.34, 0.42, 0.38))
+_ROOFS = ((0.34, 0.46, 0.42), (0.44, 0.28, 0.23), (0.36, 0.37, 0.40))
+_STONE = (0.66, 0.64, 0.60)
+_EAVES_M = 0.6
+
+
+class ParkPavilion:
+    """Parameters of a pavilion; lengths in metres.
+
+    Attributes:
+        height: of the finial.
+        kind: `bandstand` (open, round), `tea_house` (glazed, round) or
+            `shelter` (open, long).
+        sides: of a round one.
+        floor: height of the deck.
+        eaves: height of the posts above the deck.
+        lantern: whether a lantern sits on the roof.
+        bell: whether the roof is bent like a bell.
+    """
+
+    def __init__(self, d: Dice):
+        ratio = d.width / d.depth
+        long = not 0.67 < ratio < 1.5
+        floor = d.uniform(0.3, 0.9, 2)
+        self.height = d.height
+        self.kind = (
+            "shelter"
+            if long
+            else d.pick(("bandstand", "bandstand", "tea_house", "shelter"))
+        )
+        self.sides = d.pick((6, 8, 8))
+        self.floor = floor
+        self.eaves = round(max(2.2, 0.5 * (d.height - floor)), 2)
+        self.lantern = d.height > 5.0 and d.chance(0.5)
+        self.bell = d.chance(0.5)
+        self.rgb = d.pick(_TIMBERS)
+        self.roof_rgb = d.pick(_ROOFS)
+
+
+def build(p: ParkPavilion, site: Site, rng: np.random.Generator) -> Model:
+    """Builds the pavilion in the middle of a rectangle."""
+    assembly = Assembly(site.name, p.rgb)
+    materials = Materials(
+        timber=p.rgb, glass=assembly.glass_rgb, roof=p.roof_rgb, stone=_STONE
+    )
+    x0, y0, x1, y1 = site.bounds
+    if p.kind == "shelter":
+        _add_shelter(materials, p, (x0, y0, x1, y1))
+    else:
+        center = ((x0 + x1) / 2, (y0 + y1) / 2)
+        reach = min(x1 - x0, y1 - y0) / 2 - _EAVES_M
+        _add_round(assembly, materials, p, center, reach)
+    materials.finish(assembly)
+    return assembly.model(site)
+
+
+def _add_round(assembly, materials, p: ParkPavilion, center, reach) -> None:
+    """Adds a deck, posts or glazed walls, and a roof over a polygon."""
+    phase = -math.pi / 2 + math.pi / p.sides
+    steps_room = 0.3 * max(2, round(p.floor / 0.17))
+    radius = (reach - 0.45 * steps_room) / math.cos(math.pi / p.sides)
+    radius = min(radius, reach, 7.0)
+    plan = massing.regular_polygon(radius, p.sides, center, phase)
+    # The front edge is the one that looks to -y: it ends at `phase`.
+    plan = np.roll(plan, 1, axis=0)
+    materials.add("stone", massing.prism(plan, -massing.FOUNDATION_M, p.floor))
+    wall = details.WallFrame(plan, 0)
+    count = max(2, round(p.floor / 0.17))
+    x, half = wall.length / 2, min(0.9, 0.4 * wall.length)
+    flight = details.steps(x - half, x + half, 0.26 * count, p.floor, count)
+    materials.add("stone", wall.place(flight))
+    z = p.floor + p.eaves
+    posts = massing.inset(plan, 0.25)
+    if p.kind == "tea_house":
+        _add_glazing(materials, p, posts)
+    else:
+        for u, v in posts.tolist():
+            shaft = massing.regular_polygon(0.13, 6, (u, v))
+            materials.add("timber", massing.skirt(shaft, shaft, p.floor, z))
+        for edge in range(1, p.sides):
+            side = details.WallFrame(posts, edge)
+            ends = (0.1, 0.0), (side.length - 0.1, 0.0)
+            add_railing(
+                assembly, f"railing_{edge}", side, *ends, p.floor, p.rgb
+            )
+    beam = massing.inset(posts, -0.12)
+    materials.add(
+        "timber",
+        massing.skirt(beam, beam, z - 0.3, z + 0.02),
+        massing.flat(beam, z - 0.3, up=False),
+    )
+    _add_round_roof(materials, p, center, plan, z)
+
+
+def _add_glazing(materials, p: ParkPavilion, plan) -> None:
+    """Adds walls of glass over a parapet, a door in front."""
+    window = bays.ribbon(0.8, p.eaves - 0.5, 0.12, 0.3)
+    door = bays.window(1.5, 0.05, p.eaves - 0.5, 0.12, mullions=1)
+    layout = bays.by_edge(
+        {0: bays.with_middle(bays.plain, door, 1.9)},
+        bays.rhythm(2.0, [window], 0.1),
+    )
+    facade = Facade(
+        round(p.eaves - 0.2, 2), (Band(0.0, 0.15, -0.05),), layout, (0.12,)
+    )
+    mesh = tiers.facade_mesh(plan, facade, p.floor)
+    materials.add("timber", mesh)
+    materials.add("glass", glass_mesh(plan, facade, p.floor))
+
+
+def _add_round_roof(materials, p: ParkPavilion, center, plan, z) -> None:
+    """Adds a cone, straight or bent, with its lantern and finial."""
+    eaves = massing.inset(plan, -_EAVES_M * 0.8)
+    top = p.height - 0.5
+    neck = 0.24 if p.lantern else 0.0
+    head = top - 1.0 if p.lantern else top
+
+    def ring(share: float) -> np.ndarray:
+        return np.asarray(center) + share * (eaves - center)
+
+    pieces = [
+        massing.flat(eaves, z, up=False),
+        massing.skirt(eaves, eaves, z, z + 0.15),
+    ]
+    levels = [(1.0, z + 0.15)]
+    if p.bell:
+        rise = head - z - 0.15
+        levels += [(0.62, z + 0.15 + 0.28 * rise),
+                   (0.36, z + 0.15 + 0.58 * rise)]  # fmt: skip
+    if neck:
+        levels.append((neck, head))
+    for (a, za), (b, zb) in itertools.pairwise(levels):
+        pieces.append(massing.skirt(ring(a), ring(b), za, zb))
+    if p.lantern:
+        drum = ring(0.8 * neck)
+        pieces.append(massing.flat(ring(neck), head))
+        materials.add("timber", massing.skirt(drum, drum, head, top - 0.4))
+        hat = ring(1.15 * neck)
+        pieces.append(massing.flat(hat, top - 0.4, up=False))
+        pieces.append(massing.spire(hat, center, top - 0.4, top))
+    else:
+        share, low = levels[-1]
+        pieces.append(massing.spire(ring(share), center, low, top))
+    materials.add("roof", *pieces)
+    finial = massing.regular_polygon(0.07, 6, center)
+    materials.add("timber", massing.prism(finial, top - 0.3, p.height))
+
+
+def _add_shelter(materials, p: ParkPavilion, area) -> None:
+    """Adds a hipped or gabled roof on posts, tables and a hearth."""
+    x0, y0, x1, y1 = area
+    a, b = x0 + _EAVES_M + 0.1, x1 - _EAVES_M - 0.1
+    c, d = y0 + _EAVES_M + 0.1, y1 - _EAVES_M - 0.1
+    floor, z = 0.12, 0.12 + p.eaves
+    top = p.height
+    materials.add(
+        "stone", massing.box(a - 0.3, b + 0.3, c - 0.3, d + 0.3,
+                             -massing.FOUNDATION_M, floor)
+    )  # fmt: skip
+    plan = massing.rectangle(a, c, b, d)
+    across = max(2, round((b - a) / 3.5) + 1)
+    deep = max(2, round((d - c) / 3.5) + 1)
+    spots = {(round(u, 2), round(v, 2)) for u in np.linspace(a, b, across)
+             for v in (c, d)}  # fmt: skip
+    spots |= {(round(u, 2), round(v, 2)) for v in np.linspace(c, d, deep)
+              for u in (a, b)}  # fmt: skip
+    for u, v in sorted(spots):
+        materials.add("timber", massing.post(u, v, 0.11, z, floor))
+    frame = massing.inset(plan, -0.12)
+    ceiling = massing.prism(frame, z - 0.25, z + 0.02, bottom=True)
+    materials.add("timber", ceiling)
+    if p.bell:
+        materials.add("roof", pitched_roofs.hip(plan, z, top, 0.55, 0.15))
+    else:
+        along_y = d - c > b - a
+        low, high = (a, b) if along_y else (c, d)
+        start, end = (c, d) if along_y else (a, b)
+        line = pitched_roofs.gable_line(low, high, z + 0.15, top)
+        line = pitched_roofs.with_eaves(line, 0.5, 0.5)
+        materials.add(
+            "roof",
+            pitched_roofs.shell(
+                line, start - 0.5, end + 0.5, 0.15, along_y=along_y
+            ),
+        )
+    _add_tables(materials, (a, b, c, d), floor)
+
+
+def _add_tables(materials, area, floor: float) -> None:
+    """Adds tables with benches, and a hearth at one end."""
+    a, b, c, d = area
+    y = (c + d) / 2
+    for x, _ in bays.stretches(b - a, 3.0, 0.6)[1:]:
+        u = a + x
+        top = massing.box(u - 0.4, u + 0.4, y - 0.9, y + 0.9, floor + 0.7,
+                          floor + 0.78)  # fmt: skip
+        leg = massing.box(u - 0.1, u + 0.1, y - 0.6, y + 0.6, floor,
+                          floor + 0.72, bottom=False)  # fmt: skip
+        seats = [
+            massing.box(v - 0.15, v + 0.15, y - 0.9, y + 0.9, floor,
+                        floor + 0.45, bottom=False)
+            for v in (u - 0.75, u + 0.75)
+        ]  # fmt: skip
+        materials.add("timber", merge_meshes([top, leg, *seats]))
+    hearth = massing.box(a + 0.3, a + 1.0, y - 0.5, y + 0.5, floor, floor + 1.0)
+    materials.add("stone", hearth)
+
+
+ARCHETYPE = Archetype(
+    ParkPavilion, build, heights=(4.0, 10.0), widths=(5.0, 24.0), overhang=0.35
+)

@@ -1,0 +1,1 @@
+"""Shops, markets and filling stations."""

@@ -1,0 +1,178 @@
+"""The corner store: a cut-off corner with the door, flats above the shop."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cns_drake.city.buildings.parts import (
+    bays,
+    details,
+    massing,
+    outlines,
+    tiers,
+)
+from cns_drake.city.buildings.parts.facades import Band, Facade
+from cns_drake.city.buildings.parts.roof_equipment import equip_roof
+from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.geometry.mesh import merge_meshes
+from cns_drake.city.geometry.structures import Model
+
+_WALLS = (
+    (0.58, 0.36, 0.29),
+    (0.80, 0.72, 0.58),
+    (0.72, 0.70, 0.66),
+    (0.66, 0.52, 0.42),
+)
+_SIGNS = ((0.55, 0.18, 0.16), (0.20, 0.30, 0.44), (0.22, 0.36, 0.28))
+
+
+class CornerStore:
+    """Parameters of a corner store; lengths in metres.
+
+    Attributes:
+        height: of the parapet, its raised part above the corner included.
+        corner: 0 front left, 1 front right.
+        cut: taken off each edge at the corner.
+        ground: height of the shop.
+        storey: wanted height of a storey above.
+        raised: what the parapet rises above the corner.
+        cornice: how far it sticks out.
+        awnings: part of the shop windows with an awning.
+    """
+
+    def __init__(self, d: Dice):
+        x0, y0, x1, y1 = d.site.bounds
+        raised = d.uniform(0.3, 0.9, 2)
+        ground = min(d.uniform(3.5, 4.1), d.height - raised - 0.7)
+        self.height = d.height
+        self.corner = d.pick(d.site.free_corners or [0, 1])
+        self.cut = round(min(d.uniform(2.0, 3.0), 0.3 * d.depth), 2)
+        self.ground = round(ground, 2)
+        self.storey = d.uniform(2.9, 3.3)
+        self.pitch = max(d.uniform(2.2, 3.0), (x1 - x0 + y1 - y0) / 20)
+        self.window_width = d.uniform(1.0, 1.5, 2)
+        self.recess = d.uniform(0.12, 0.25, 2)
+        self.ledge = d.pick((0.0, 0.1))
+        self.raised = raised
+        self.cornice = d.uniform(0.15, 0.4, 2)
+        self.awnings = d.uniform(0.2, 0.9)
+        self.roof_items = d.some_of("stair_house ac_unit vents", 1, 4)
+        self.rgb = d.pick(_WALLS)
+        self.sign_rgb = d.pick(_SIGNS)
+
+
+def build(p: CornerStore, site: Site, rng: np.random.Generator) -> Model:
+    """Builds the store on a rectangle."""
+    if p.corner not in site.free_corners:
+        site = site.detached(ARCHETYPE.overhang)
+    assembly = Assembly(site.name, p.rgb)
+    rectangle = site.outline
+    plan, front = _plan(p, rectangle)
+    blind = outlines.edges_on(plan, rectangle, site.blind_edges)
+    side = (front - 1) % 5 if p.corner == 0 else (front + 1) % 5
+    streets = (0, front, side)
+    top = _add_shop(assembly, p, plan, streets, blind, rng)
+    rim = p.raised + 0.6
+    room = p.height - rim - top
+    if room > 2.4:
+        groups, per_group, storey = tiers.divided(room, p.storey, 4)
+        window = bays.window(
+            p.window_width, 0.85, min(2.3, storey - 0.35), p.recess,
+            ledge=p.ledge,
+        )  # fmt: skip
+        walls = Facade(
+            storey,
+            (),
+            bays.rhythm(p.pitch, [window], 0.5),
+            (p.recess,),
+            plain=blind,
+        )
+        top = tiers.add_storeys(assembly, plan, walls, top, groups, per_group)
+    _add_parapet(assembly, p, plan, front, top, blind, rng)
+    materials_sign = _corner_sign(p, plan, front)
+    assembly.add("sign", materials_sign, rgb=p.sign_rgb)
+    return assembly.model(site)
+
+
+def _plan(p: CornerStore, rectangle) -> tuple[np.ndarray, int]:
+    """Returns the five corners, and the edge across the cut-off one."""
+    (x0, y0), (x1, y1) = rectangle[0], rectangle[2]
+    c = p.cut
+    if p.corner == 1:
+        points = [(x0, y0), (x1 - c, y0), (x1, y0 + c), (x1, y1), (x0, y1)]
+        return np.array(points), 1
+    points = [(x0 + c, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0 + c)]
+    return np.array(points), 4
+
+
+def _add_shop(assembly, p: CornerStore, plan, streets, blind, rng) -> float:
+    h = p.ground
+    head, front = round(h - 1.0, 2), streets[1]
+    glazed = bays.rhythm(
+        2 * p.pitch, [bays.shop_front(head, 0.3, door=False)], margin=0.5
+    )
+    entry = bays.with_middle(
+        bays.plain, bays.entrance(1.6, 2.4, 0.7, surround=0.1), p.cut
+    )
+    service = bays.rhythm(
+        4.0, [bays.window(1.2, 1.3, 2.3, 0.3), bays.gate(1.8, 2.2)], 0.7
+    )
+    layouts = dict.fromkeys(streets, glazed) | {front: entry}
+    ground = Facade(
+        h,
+        (Band(0.0, 0.3, -0.05), Band(h - 0.25, h, -0.12)),
+        bays.by_edge(layouts, service),
+        glass=(0.3,),
+        plain=blind,
+    )
+    shades, boards = [], []
+    for edge in streets:
+        wall = details.WallFrame(plan, edge)
+        if edge == front or edge in blind:
+            continue
+        for a, b in bays.stretches(wall.length, 2 * p.pitch, 0.5):
+            board = massing.box(
+                a + 0.3, b - 0.3, -0.02, 0.1, head + 0.1, head + 0.7
+            )
+            boards.append(wall.place(board))
+            if rng.random() < p.awnings:
+                shade = details.awning(a + 0.2, b - 0.2, 0.95, 2.4, head + 0.05)
+                shades.append(wall.place(shade))
+    tiers.add_awnings(assembly, shades, rng)
+    if boards:
+        assembly.add("boards", merge_meshes(boards), rgb=p.sign_rgb)
+    return tiers.add_ground(assembly, plan, ground)
+
+
+def _add_parapet(assembly, p: CornerStore, plan, front, z0, blind, rng):
+    """Adds the cornice and the roof, higher above the corner."""
+    rim = round(p.height - p.raised - z0, 3)
+    bands = tiers.cornice(rim - 0.1, p.cornice, thickness=0.45, steps=2)
+    crown = Facade(rim, bands, plain=blind)
+    roof = tiers.add_crown(assembly, plan, crown, z0, 0.5, thickness=0.25)
+    low, high = z0 + rim - 0.3, p.height
+    wall = details.WallFrame(plan, front)
+    piece = massing.box(0.1, wall.length - 0.1, -0.25, 0.04, low, high)
+    assembly.add("pediment", wall.place(piece))
+    equip_roof(assembly, plan, roof, p.roof_items, rng)
+
+
+def _corner_sign(p: CornerStore, plan, front):
+    """A canopy above the door and an upright sign over it."""
+    wall = details.WallFrame(plan, front)
+    middle, z = wall.length / 2, p.ground - 0.55
+    half = 0.5 * wall.length - 0.25
+    lid = massing.box(middle - half, middle + half, -0.05, 0.9, z - 0.25, z)
+    top = min(p.height - 0.4, z + 2.6)
+    blade = massing.box(middle - 0.1, middle + 0.1, -0.05, 0.75, z - 0.05, top)
+    return wall.place(merge_meshes([lid, blade]))
+
+
+ARCHETYPE = Archetype(
+    CornerStore,
+    build,
+    heights=(5.0, 16.0),
+    widths=(8.0, 30.0),
+    overhang=1.0,
+    party_walls=True,
+)

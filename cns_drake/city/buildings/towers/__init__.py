@@ -1,0 +1,1 @@
+"""Towers and other tall buildings."""

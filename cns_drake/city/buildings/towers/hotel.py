@@ -1,0 +1,151 @@
+"""The hotel: balconies along rounded walls, a forecourt, a rooftop bar."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cns_drake.city.buildings.parts import (
+    bays,
+    details,
+    massing,
+    outlines,
+    tiers,
+)
+from cns_drake.city.buildings.parts.facades import Band, Facade
+from cns_drake.city.buildings.parts.roof_equipment import equip_roof
+from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.geometry.mesh import merge_meshes
+from cns_drake.city.geometry.structures import Model
+
+_PAINTS = ((0.86, 0.83, 0.77), (0.80, 0.72, 0.62), (0.72, 0.75, 0.76))
+_FORECOURT_M = 7.0
+
+
+_ROOF_ITEMS = ("cooling_tower", "air_handler", "mast", "vents", "ac_unit")
+
+
+class Hotel:
+    """Parameters of a hotel; lengths in metres."""
+
+    def __init__(self, d: Dice):
+        depth = d.depth - _FORECOURT_M
+        pitch = max(d.uniform(3.6, 4.6), d.width / 11)
+        self.height = d.height
+        self.ground_height = d.uniform(5.0, 6.2, 2)
+        self.storey_height = d.uniform(3.1, 3.4)
+        self.round_ends = bool(d.chance(0.5) and d.width > 1.5 * depth)
+        self.corner = round(d.uniform(0.2, 0.35) * min(depth, d.width), 1)
+        self.pitch = pitch
+        self.side_pitch = max(2.7, (d.width + 2 * depth) / 34)
+        self.recess = d.uniform(0.2, 0.35, 2)
+        self.balcony_reach = d.uniform(1.1, 1.45, 2)
+        self.balcony_width = round(d.uniform(0.6, 0.95) * pitch, 2)
+        self.rail = d.uniform(0.95, 1.1, 2)
+        self.bar_height = d.uniform(4.0, 5.0, 1)
+        self.bar_inset = d.uniform(1.8, 3.0, 1)
+        self.sign_left = d.chance(0.5)
+        self.rgb = d.pick(_PAINTS)
+
+
+def build(p: Hotel, site: Site, rng: np.random.Generator) -> Model:
+    """Builds the hotel on a rectangle, behind a forecourt."""
+    assembly = Assembly(site.name, p.rgb)
+    x0, y0, x1, y1 = site.bounds
+    front = y0 + _FORECOURT_M
+    if p.round_ends:
+        plan = outlines.stadium(x0, front, x1, y1, 3.2)
+    else:
+        block = massing.rectangle(x0, front, x1, y1)
+        corners = {0: p.corner, 1: p.corner}
+        plan = massing.rounded(block, corners, 2.8)
+    top = _add_lobby(assembly, p, plan, y0)
+    goal = p.height - p.bar_height - 1.2
+    top = _add_rooms(assembly, p, plan, top, goal)
+    edge = Facade(1.2, (Band(0.0, 0.3, -0.15), Band(0.9, 1.2, -0.2)))
+    roof = tiers.add_crown(assembly, plan, edge, top, 1.1)
+    bar = massing.inset(plan, p.bar_inset)
+    height = round(p.height - roof, 3)
+    walls = Facade(
+        height,
+        (Band(0.4, height - 1.2, 0.3), Band(height - 0.9, height - 0.5, -1.3)),
+        glass=(0.3,),
+    )
+    roof = tiers.add_crown(assembly, bar, walls, roof, 0.4, part="bar")
+    equip_roof(assembly, bar, roof, _ROOF_ITEMS, rng)
+    _add_sign(assembly, p, plan)
+    return assembly.model(site)
+
+
+def _add_lobby(assembly, p: Hotel, plan, y0) -> float:
+    h = p.ground_height
+    glazing = bays.rhythm(
+        p.pitch, [bays.ribbon(0.4, h - 1.2, 0.4, 0.5)], margin=0.5
+    )
+    door = bays.with_middle(glazing, bays.entrance(4.4, 3.4, 1.5), 6.4)
+    lobby = Facade(
+        h,
+        (Band(0.0, 0.4, -0.1), Band(h - 0.8, h - 0.3, -0.4)),
+        bays.by_edge({0: door}, glazing),
+        glass=(0.4,),
+    )
+    # The drive-in roof stands on four pillars in the forecourt.
+    middle = float(np.mean(plan[:2, 0]))
+    front = float(plan[0, 1])
+    left, right, z = middle - 6.0, middle + 6.0, 4.2
+    roof = massing.box(left, right, y0 + 0.3, front + 0.2, z, z + 0.7)
+    pillars = [
+        massing.box(
+            x, x + 0.7, y, y + 0.7, -massing.FOUNDATION_M, z, bottom=False
+        )
+        for x in (left + 0.6, right - 1.3)
+        for y in (y0 + 0.8, front - 2.0)
+    ]
+    drive = massing.prism(
+        massing.rectangle(middle - 2.8, front - 2.2, middle + 2.8, front),
+        -massing.FOUNDATION_M,
+        0.14,
+    )
+    return tiers.add_ground(assembly, plan, lobby, [roof, *pillars, drive])
+
+
+def _add_rooms(assembly, p: Hotel, plan, z0, goal) -> float:
+    groups, per_group, storey = tiers.divided(goal - z0, p.storey_height, 15)
+    head = round(storey - 0.45, 2)
+    french = bays.window(p.pitch - 1.2, 0.0, head, p.recess, mullions=1)
+    plain = bays.window(1.5, 0.8, head, p.recess)
+    layout = {0: bays.rhythm(p.pitch, [french], margin=0.4)}
+    others = bays.rhythm(p.side_pitch, [plain], margin=0.35)
+    walls = Facade(
+        storey,
+        (Band(storey - 0.12, storey, -0.08),),
+        bays.by_edge(layout, others),
+        glass=(p.recess,),
+    )
+    front = details.WallFrame(plan, 0)
+    balconies = []
+    for a, b in bays.stretches(front.length, p.pitch, 0.4):
+        half, x = p.balcony_width / 2, (a + b) / 2
+        rail = details.balcony(
+            round(x - half, 2), round(x + half, 2), p.balcony_reach, 0.0, p.rail
+        )
+        balconies.append(front.place(rail))
+    return tiers.add_storeys(
+        assembly, plan, walls, z0, groups, per_group, balconies
+    )
+
+
+def _add_sign(assembly, p: Hotel, plan) -> None:
+    """A blade sign up the front, at one end of the balconies."""
+    front = details.WallFrame(plan, 0)
+    x = 0.4 if p.sign_left else front.length - 0.4
+    low, high = p.ground_height + 3.0, 0.7 * p.height
+    blade = massing.box(x - 0.15, x + 0.15, 0.25, 1.3, low, high)
+    arms = [
+        massing.box(x - 0.08, x + 0.08, 0.0, 0.4, z, z + 0.15)
+        for z in (low + 0.5, high - 0.7)
+    ]
+    sign = front.place(merge_meshes([blade, *arms]))
+    assembly.add("sign", sign, rgb=(0.55, 0.16, 0.14))
+
+
+ARCHETYPE = Archetype(Hotel, build, heights=(25.0, 80.0), widths=(20.0, 70.0))

@@ -1,0 +1,173 @@
+"""The mid-rise office: shops and a lobby below, window bands, a penthouse."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cns_drake.city.buildings.parts import bays, details, massing, tiers
+from cns_drake.city.buildings.parts.facades import Band, Facade
+from cns_drake.city.buildings.parts.roof_equipment import equip_roof
+from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.geometry.structures import Model
+
+_PANELS = (
+    (0.78, 0.77, 0.74),
+    (0.66, 0.60, 0.52),
+    (0.50, 0.53, 0.56),
+    (0.73, 0.62, 0.50),
+)
+
+
+class Office:
+    """Parameters of an office; lengths in metres.
+
+    `style` is `ribbon` (bands of glass), `frame` (deep square frames) or
+    `grooves` (piers from the first floor to the top).
+    """
+
+    def __init__(self, d: Dice):
+        run = d.site.open_length
+        tall = d.height > 18.0
+        self.height = d.height
+        self.ground_height = d.uniform(4.4, 5.4, 2)
+        self.storey_height = d.uniform(3.4, 3.9)
+        self.style = d.pick(("ribbon", "frame", "grooves"))
+        self.pitch = max(d.uniform(3.0, 4.4), run / 42)
+        self.recess = d.uniform(0.25, 0.5, 2)
+        self.sill = d.uniform(0.75, 1.05, 2)
+        self.pier_reach = d.uniform(0.15, 0.32, 2)
+        self.penthouse_height = d.uniform(3.4, 4.4, 1) * tall
+        self.penthouse_inset = d.uniform(2.2, 4.0, 1)
+        self.parapet = d.uniform(0.6, 1.2, 2)
+        self.awnings = d.uniform(0.0, 0.7)
+        self.roof_items = d.some_of(
+            "air_handler lift_house ac_unit ac_unit vents dish", 3, 7
+        )
+        self.rgb = d.pick(_PANELS)
+
+
+def build(p: Office, site: Site, rng: np.random.Generator) -> Model:
+    """Builds the office on any outline."""
+    assembly = Assembly(site.name, p.rgb)
+    outline = site.outline
+    top = _add_ground(assembly, p, site, rng)
+    goal = p.height - p.penthouse_height - p.parapet - 0.5
+    if p.style == "grooves":
+        wall = tiers.Grooves(
+            p.storey_height,
+            p.sill,
+            0.0,
+            p.recess,
+            p.pitch,
+            0.5,
+            p.pier_reach,
+            0.8,
+        )
+        top = tiers.add_grooved(
+            assembly,
+            outline,
+            wall,
+            top,
+            goal,
+            "storey",
+            0.2,
+            8,
+            site.blind_edges,
+        )
+    else:
+        top = _add_windows(assembly, p, site, top, goal)
+    rim = round(p.height - p.penthouse_height - top, 3)
+    edge = Facade(
+        rim,
+        (
+            Band(0.1, 0.4, -0.2 if p.style == "ribbon" else 0.0),
+            Band(rim - 0.3, rim, -0.35),
+        ),
+        plain=site.blind_edges,
+    )
+    roof = tiers.add_crown(assembly, outline, edge, top, p.parapet)
+    if p.penthouse_height > 0:
+        inset = min(p.penthouse_inset, massing.inset_limit(outline))
+        outline = massing.inset(outline, inset)
+        roof = _add_penthouse(assembly, p, outline, roof)
+    equip_roof(assembly, outline, roof, p.roof_items, rng)
+    return assembly.model(site)
+
+
+def _add_ground(assembly, p: Office, site: Site, rng) -> float:
+    outline, h = site.outline, p.ground_height
+    front = details.WallFrame(outline, 0)
+    pitch = 1.6 * p.pitch
+    shops = bays.rhythm(
+        pitch, [bays.shop_front(h - 1.1, 0.5, door=False)], margin=0.7
+    )
+    lobby = bays.entrance(3.2, 3.2, 1.8)
+    sides = bays.rhythm(
+        1.5 * p.pitch, [bays.window(2.2, 1.2, h - 1.2, 0.5)], margin=0.9
+    )
+    ground = Facade(
+        h,
+        (Band(0.0, 0.35, -0.06), Band(h - 0.9, h - 0.1, -0.15)),
+        bays.by_edge(
+            {0: bays.with_middle(shops, lobby, 5.0)},
+            shops if len(outline) > 4 else sides,
+        ),
+        glass=(0.5,),
+        plain=site.blind_edges,
+    )
+    middle = front.length / 2
+    roof = details.canopy(middle - 2.6, middle + 2.6, 1.45, 3.4)
+    shades = []
+    for x0, x1 in bays.stretches(front.length, pitch, 0.7):
+        free = x1 < middle - 2.6 or x0 > middle + 2.6
+        if rng.random() < p.awnings and free:
+            shade = details.awning(x0 + 0.3, x1 - 0.3, 1.3, 2.7, h - 1.1)
+            shades.append(front.place(shade))
+    tiers.add_awnings(assembly, shades, rng)
+    return tiers.add_ground(assembly, outline, ground, [front.place(roof)])
+
+
+def _add_windows(assembly, p: Office, site: Site, z0, goal) -> float:
+    groups, per_group, storey = tiers.divided(goal - z0, p.storey_height)
+    head = round(storey - 0.4, 2)
+    if p.style == "ribbon":
+        cells = bays.rhythm(
+            p.pitch, [bays.ribbon(p.sill, head, p.recess, 0.12)], margin=0.8
+        )
+        bands = (Band(p.sill - 0.15, p.sill, -0.08),)
+    else:
+        frame = bays.window(
+            p.pitch - 0.5, 0.45, head, p.recess, pier=0.22, mullions=1
+        )
+        cells = bays.rhythm(p.pitch, [frame], margin=0.6)
+        bands = ()
+    walls = Facade(
+        storey, bands, cells, glass=(p.recess,), plain=site.blind_edges
+    )
+    return tiers.add_storeys(
+        assembly, site.outline, walls, z0, groups, per_group
+    )
+
+
+def _add_penthouse(assembly, p: Office, outline, roof) -> float:
+    # It starts on the roof; its own parapet ends at the full height.
+    height = round(p.height - roof, 3)
+    eaves = height - 0.9
+    walls = Facade(
+        height,
+        (Band(0.9, eaves - 0.3, 0.3), Band(eaves, eaves + 0.3, -0.7)),
+        glass=(0.3,),
+    )
+    return tiers.add_crown(
+        assembly, outline, walls, roof, 0.6, part="penthouse"
+    )
+
+
+ARCHETYPE = Archetype(
+    Office,
+    build,
+    heights=(12.0, 45.0),
+    widths=(14.0, 70.0),
+    any_outline=True,
+    party_walls=True,
+)

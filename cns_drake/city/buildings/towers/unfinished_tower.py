@@ -1,0 +1,291 @@
+"""The tower under construction: a concrete frame around its core, scaffolds,
+cladding on the lower storeys only."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from cns_drake.city.buildings.parts import bays, details, massing
+from cns_drake.city.buildings.parts.facades import (
+    Band,
+    Facade,
+    facade_mesh,
+    glass_mesh,
+)
+from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+from cns_drake.city.geometry.structures import Model
+
+_CONCRETE = (0.66, 0.65, 0.63)
+_STEEL = (0.52, 0.53, 0.55)
+_TIMBER = (0.72, 0.58, 0.38)
+_NETS = ((0.26, 0.42, 0.34), (0.24, 0.36, 0.54), (0.62, 0.60, 0.56))
+_CLADDINGS = ((0.78, 0.76, 0.72), (0.46, 0.50, 0.54), (0.66, 0.52, 0.42))
+_SLAB_M = 0.28
+# Room for scaffolds around the frame [m].
+_SCAFFOLD_M = 1.7
+# Cladding stands this far in front of the slabs [m].
+_CLADDING_M = 0.35
+_LIFT_M = 2.0
+
+
+class UnfinishedTower:
+    """Parameters of a building site's tower; lengths in metres.
+
+    Attributes:
+        height: of the core.
+        storeys: slabs above the ground.
+        storey: height of a storey.
+        group: storeys that are placed as one.
+        pitch: of the columns.
+        core: extent of the core, as parts of the plan.
+        clad: storeys whose walls are finished.
+        scaffolds: edges with a scaffold.
+        scaffold_top: storeys it covers.
+        nets: part of the scaffold's bays behind a net.
+        props: whether the top slab is still propped.
+        hoist: whether a hoist climbs the right side.
+    """
+
+    def __init__(self, d: Dice):
+        rise = d.height - d.uniform(3.5, 5.5)
+        storeys = max(3, round(rise / d.uniform(3.4, 4.0)))
+        group = -(-storeys // 8)
+        storeys = group * max(2, round(storeys / group))
+        self.height = d.height
+        self.storeys = storeys
+        self.storey = round(rise / storeys, 3)
+        self.pitch = d.uniform(6.0, 8.0)
+        self.core = (d.uniform(0.28, 0.4), d.uniform(0.28, 0.4))
+        self.group = group
+        self.clad = group * d.whole(0, max(1, storeys // group // 2))
+        self.scaffolds = d.pick(((0,), (0, 1), (0, 3), (1, 3)))
+        self.scaffold_top = min(d.whole(storeys // 2, storeys), 8)
+        self.nets = d.uniform(0.2, 0.7)
+        self.props = d.chance(0.7)
+        self.hoist = d.chance(0.6)
+        self.rgb = d.pick(_CLADDINGS)
+        self.net_rgb = d.pick(_NETS)
+
+
+def build(p: UnfinishedTower, site: Site, rng: np.random.Generator) -> Model:
+    """Builds the tower on a rectangle."""
+    assembly = Assembly(site.name, _CONCRETE)
+    x0, y0, x1, y1 = site.bounds
+    gap = _SCAFFOLD_M + 0.2
+    plan = np.round(
+        massing.rectangle(x0 + gap, y0 + gap, x1 - gap, y1 - gap), 2
+    )
+    _add_frame(assembly, p, plan)
+    _add_core(assembly, p, plan)
+    if p.clad:
+        _add_cladding(assembly, p, plan)
+    if p.props:
+        _add_props(assembly, p, plan)
+    _add_scaffolds(assembly, p, plan, rng)
+    if p.hoist:
+        _add_hoist(assembly, p, plan)
+    return assembly.model(site)
+
+
+def _repeated(pieces, p: UnfinishedTower) -> Mesh:
+    """Returns a storey's meshes for each storey of a group."""
+    storey = merge_meshes(pieces)
+    return merge_meshes(
+        storey.moved((0.0, 0.0, k * p.storey)) for k in range(p.group)
+    )
+
+
+def _columns(p: UnfinishedTower, plan) -> list[tuple[float, float]]:
+    """Returns where the columns stand."""
+    (x0, y0), (x1, y1) = plan[0], plan[2]
+    places = []
+    for a, b in ((x0, x1), (y0, y1)):
+        count = min(6, max(2, round((b - a) / p.pitch) + 1))
+        places.append(np.round(np.linspace(a + 0.5, b - 0.5, count), 2))
+    xs, ys = (place.tolist() for place in places)
+    return [(x, y) for x in xs for y in ys]
+
+
+def _add_frame(assembly, p: UnfinishedTower, plan) -> None:
+    """Adds a storey's columns and the slab on them, over and over."""
+    pieces = [
+        massing.post(x, y, 0.25, p.storey - _SLAB_M + 0.02, 0.0)
+        for x, y in _columns(p, plan)
+    ]  # fmt: skip
+    low = p.storey - _SLAB_M
+    pieces.append(massing.prism(plan, low, p.storey, bottom=True))
+    for edge in range(4):
+        wall = details.WallFrame(plan, edge)
+        for h in (0.5, 1.0):
+            rail = (0.05, wall.length - 0.05, -0.08, -0.03)
+            z = p.storey + h
+            pieces.append(wall.place(massing.box(*rail, z, z + 0.06)))
+    groups, step = p.storeys // p.group, p.group * p.storey
+    assembly.stack("frame", _repeated(pieces, p), 0.0, step, groups)
+    base = massing.prism(plan, -massing.FOUNDATION_M, 0.05)
+    top = p.storeys * p.storey
+    # Columns of the storey to come, and their bars.
+    stubs = [base]
+    for x, y in _columns(p, plan):
+        stubs.append(
+            massing.box(x - 0.25, x + 0.25, y - 0.25, y + 0.25, top - 0.05,
+                        top + 0.5)
+        )  # fmt: skip
+        bar = massing.regular_polygon(0.05, 3, (x + 0.12, y))
+        stubs.append(massing.prism(bar, top + 0.45, top + 1.5))
+    for edge in range(4):
+        wall = details.WallFrame(plan, edge)
+        for u in np.linspace(0.1, wall.length - 0.1, 6).tolist():
+            post = (u - 0.03, u + 0.03, -0.09, -0.03)
+            stubs.append(wall.place(massing.box(*post, top, top + 1.1)))
+    assembly.add("stubs", merge_meshes(stubs))
+
+
+def _add_core(assembly, p: UnfinishedTower, plan) -> None:
+    """Adds the core with its doorways and the form that climbs on it."""
+    (x0, y0), (x1, y1) = plan[0], plan[2]
+    x, y = (x0 + x1) / 2, (y0 + y1) / 2
+    a, b = p.core[0] * (x1 - x0) / 2, p.core[1] * (y1 - y0) / 2
+    core = np.round(massing.rectangle(x - a, y - b, x + a, y + b), 2)
+    door = bays.window(1.2, 0.05, 2.2, 0.35)
+    facade = Facade(
+        p.storey, (), bays.by_edge({0: bays.with_middle(bays.plain, door, 2.0),
+                                    2: bays.with_middle(bays.plain, door, 2.0)},
+                                   bays.plain),
+    ).stacked(p.storeys)  # fmt: skip
+    top = round(p.storeys * p.storey, 3)
+    pieces = [
+        facade_mesh(core, facade),
+        massing.skirt(core, core, top, p.height - 0.4),
+        massing.roof_pan(core, p.height - 2.0, p.height - 0.4, 0.3),
+    ]
+    assembly.add("core", merge_meshes(pieces))
+    form = massing.inset(core, -0.3)
+    low = p.height - 2.6
+    panels = [
+        massing.skirt(form, form, low, p.height),
+        massing.flat(form, low, up=False),
+        massing.roof_pan(form, p.height - 0.6, p.height, 0.3),
+    ]
+    assembly.add("form", merge_meshes(panels), rgb=_TIMBER)
+
+
+def _add_cladding(assembly, p: UnfinishedTower, plan) -> None:
+    """Adds the finished walls of the lower storeys."""
+    outer = massing.inset(plan, -_CLADDING_M)
+    head = round(p.storey - 0.5, 2)
+    length = max(np.ptp(plan, axis=0))
+    pitch = max(p.pitch / 2, length / 8)
+    facade = Facade(
+        p.storey,
+        (Band(0.0, 0.2, -0.08),),
+        bays.rhythm(pitch, [bays.window(pitch - 0.5, 0.7, head, 0.2)], 0.5),
+        (0.2,),
+    )
+    walls = [facade_mesh(outer, facade), _rim(plan, outer, 0.0, p.storey)]
+    groups, step = p.clad // p.group, p.group * p.storey
+    assembly.stack(
+        "cladding", _repeated(walls, p), 0.0, step, groups, rgb=p.rgb
+    )
+    panes = [glass_mesh(outer, facade)]
+    assembly.stack(
+        "cladding_glass", _repeated(panes, p), 0.0, step, groups,
+        rgb=assembly.glass_rgb,
+    )  # fmt: skip
+    foot = massing.foundation(outer)
+    assembly.add("foot", foot, rgb=p.rgb)
+
+
+def _rim(inner, outer, z0: float, z1: float) -> Mesh:
+    """The top edge of cladding panels, and their backs, seen from within."""
+    backs = massing.skirt(inner[::-1], inner[::-1], z0, z1)
+    return merge_meshes([backs, massing.skirt(outer, inner, z1, z1)])
+
+
+def _add_props(assembly, p: UnfinishedTower, plan) -> None:
+    """Adds props below the top slab, along the front and the back."""
+    (x0, y0), (x1, y1) = plan[0], plan[2]
+    low = (p.storeys - 1) * p.storey
+    high = p.storeys * p.storey - _SLAB_M + 0.02
+    props = []
+    for x in np.linspace(x0 + 1.5, x1 - 1.5, max(3, round((x1 - x0) / 3.0))):
+        for y in (y0 + 1.2, y1 - 1.2):
+            shaft = massing.regular_polygon(0.06, 4, (float(x), y))
+            props.append(massing.skirt(shaft, shaft, low - 0.02, high))
+    assembly.add("props", merge_meshes(props), rgb=_STEEL)
+
+
+def _add_scaffolds(assembly, p: UnfinishedTower, plan, rng) -> None:
+    """Adds scaffolds: standards of full height, and lifts between them."""
+    lifts = max(2, int(p.scaffold_top * p.storey / _LIFT_M))
+    per_group = -(-lifts // 6)
+    groups = -(-lifts // per_group)
+    top = per_group * groups * _LIFT_M
+    levels, standards, nets = [], [], []
+    for edge in p.scaffolds:
+        wall = details.WallFrame(plan, edge)
+        count = max(2, round((wall.length - 0.4) / max(2.8, wall.length / 11)))
+        xs = np.round(np.linspace(0.2, wall.length - 0.2, count + 1), 2)
+        levels.append(wall.place(_scaffold_level(xs.tolist())))
+        for x in xs.tolist():
+            for y in (0.6, 1.45):
+                pole = massing.rectangle(x - 0.04, y - 0.04, x + 0.04, y + 0.04)
+                mesh = massing.prism(pole, -massing.FOUNDATION_M, top + 0.9)
+                standards.append(wall.place(mesh))
+        for a, b in itertools.pairwise(xs.tolist()):
+            if rng.random() < p.nets:
+                first = int(rng.integers(0, groups * per_group - 1))
+                last = int(rng.integers(first + 1, groups * per_group + 1))
+                low, high = first * _LIFT_M + 0.2, last * _LIFT_M - 0.2
+                spot = (round(a + 0.05, 2), round(b - 0.05, 2), 1.56, 1.6)
+                nets.append(wall.place(massing.box(*spot, low, high)))
+    level = merge_meshes(levels)
+    stack = merge_meshes(
+        level.moved((0.0, 0.0, k * _LIFT_M)) for k in range(per_group)
+    )
+    assembly.stack(
+        "scaffold", stack, 0.0, per_group * _LIFT_M, groups, rgb=_STEEL
+    )
+    assembly.add("standards", merge_meshes(standards), rgb=_STEEL)
+    if nets:
+        assembly.add("nets", merge_meshes(nets), rgb=p.net_rgb)
+
+
+def _scaffold_level(xs: list[float]) -> Mesh:
+    """One lift of a scaffold: boards, a guard rail, braces."""
+    a, b, top = xs[0], xs[-1], _LIFT_M
+    pieces = [massing.box(a, b, 0.55, 1.5, top - 0.12, top - 0.05)]
+    for z in (0.5, 1.0):
+        pieces.append(massing.box(a, b, 1.5, 1.54, z, z + 0.06))
+    for x0, x1 in itertools.pairwise(xs[::3]):
+        start, stop = (x0, 1.54, 0.05), (x1, 1.54, top - 0.15)
+        pieces.append(details.beam(start, stop, 0.07))
+    return merge_meshes(pieces)
+
+
+def _add_hoist(assembly, p: UnfinishedTower, plan) -> None:
+    """Adds a hoist's mast and cage at the back."""
+    wall = details.WallFrame(plan, 2)
+    x, top = 0.5 * wall.length, p.storeys * p.storey - 1.0
+    pieces = []
+    for u in (x - 0.3, x + 0.3):
+        for v in (0.3, 0.9):
+            pieces.append(massing.post(u, v, 0.05, top))
+    for z in np.arange(1.0, top, 4.5).tolist():
+        pieces.append(massing.box(x - 0.3, x + 0.3, -0.05, 0.92, z, z + 0.08))
+    z = round(0.55 * top, 1)
+    cage = massing.box(x + 0.4, x + 1.9, 0.15, 1.35, z, z + 2.4)
+    mesh = merge_meshes([wall.place(piece) for piece in (*pieces, cage)])
+    assembly.add("hoist", mesh, rgb=(0.80, 0.62, 0.16))
+
+
+ARCHETYPE = Archetype(
+    UnfinishedTower,
+    build,
+    heights=(15.0, 60.0),
+    widths=(16.0, 50.0),
+    overhang=0.35,
+)

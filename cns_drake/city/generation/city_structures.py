@@ -1,0 +1,166 @@
+"""From a road network and a plan to all structures of a city."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from shapely import GEOSException
+from shapely.ops import unary_union
+
+from cns_drake.city.buildings import ARCHETYPES
+from cns_drake.city.geometry.mesh import Mesh
+from cns_drake.city.geometry.structures import Structure
+from cns_drake.city.ground.bridges import bridge_structures
+from cns_drake.city.ground.districts import share_out
+from cns_drake.city.ground.elevation import apron, make_ground
+from cns_drake.city.ground.markings import marking_structure
+from cns_drake.city.ground.streets import kerb_height, street_structures
+from cns_drake.city.ground.terrain import GroundShape, ground_structures
+from cns_drake.city.placement.building_rows import place_buildings
+from cns_drake.city.placement.draft import Draft
+from cns_drake.city.placement.junction_furniture import furnish_junctions
+from cns_drake.city.placement.objects import OBJECTS
+from cns_drake.city.placement.open_ground import furnish
+from cns_drake.city.placement.sidewalks import (
+    furnish_sidewalks,
+    park_along_streets,
+    plant_medians,
+)
+from cns_drake.city.plan.city_plan import CityPlan, DistrictPlan, load_plan
+from cns_drake.roads.network import RoadNetwork, load_road_network
+from cns_drake.roads.road_surface import RoadSurface
+from evaluation.support.errors import InputError
+
+
+@dataclass(frozen=True)
+class City:
+    """A whole city.
+
+    Attributes:
+        structures: the ground first, then what stands on it; a structure's
+            instance id is its place in this order, counted from 1.
+    """
+
+    structures: tuple[Structure, ...]
+
+    def meshes(self) -> dict[str, Mesh]:
+        """Returns all meshes by name.
+
+        Raises:
+            ValueError: if two different meshes have the same name, or one
+                has no faces.
+        """
+        meshes: dict[str, Mesh] = {}
+        for structure in self.structures:
+            for name, mesh in structure.model.meshes.items():
+                if not mesh.faces:
+                    raise ValueError(f"mesh {name} has no faces")
+                known = meshes.setdefault(name, mesh)
+                if known is not mesh and known.to_obj() != mesh.to_obj():
+                    raise ValueError(f"two different meshes are called {name}")
+        return meshes
+
+
+def make_city(world: Path) -> City:
+    """Makes the city of a world folder from `roads.yaml` and `city.yaml`.
+
+    Raises:
+        InputError: if one of the files cannot be used.
+    """
+    roads = world / "roads.yaml"
+    network = load_road_network(roads)
+    try:
+        network.carriageway()
+    except ValueError as error:
+        raise InputError(f"{roads}: {error}") from error
+    source = world / "city.yaml"
+    plan = load_plan(source)
+    try:
+        return lay_out(network, plan, str(source))
+    except GEOSException as error:
+        raise InputError(
+            f"{source}: a shape cannot be used: {error}"
+        ) from error
+
+
+def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
+    """Makes a city.
+
+    What needs most room, or has the least choice of place, comes first.
+
+    Args:
+        network: the roads.
+        plan: of the districts.
+        source: the plan's file name, for messages.
+
+    Raises:
+        InputError: if the plan asks for something unknown or impossible.
+    """
+    _check_names(plan, source)
+    draft = Draft(network, plan.seed)
+    districts = share_out(plan, draft.streets, source)
+    surface, kerb = RoadSurface(network), kerb_height(network)
+    place = surface, kerb, draft.streets, plan.bounds
+    terraces = [pad for district in districts for pad in district.terraces]
+    draft.base = make_ground(*place, terraces)
+    for district in districts:
+        place_buildings(draft, district, source)
+    aprons = [apron(s, draft.streets) for s in draft.structures]
+    draft.base = make_ground(*place, [*aprons, *terraces])
+    shape = GroundShape(
+        draft.base,
+        districts,
+        unary_union(
+            [s.footprint_W for s in draft.structures]
+            + [pad.area for pad in draft.base.pads]
+        ),
+        lambda name: draft.rng(name, "relief"),
+    )
+    draft.ground_height = shape
+    furnish_junctions(draft)
+    for district in districts:
+        furnish(draft, district, plan.cars, source)
+    furnish_sidewalks(draft, plan, districts)
+    park_along_streets(draft, plan.cars)
+    plant_medians(draft, plan.medians or plan.street)
+    ground = [
+        *street_structures(network),
+        marking_structure(network),
+        *ground_structures(districts, shape, plan.water_level),
+        *bridge_structures(districts, draft.streets, shape, plan.water_level),
+    ]
+    return City((*ground, *draft.structures))
+
+
+def _check_names(plan: CityPlan, source: str) -> None:
+    """Raises InputError for names that are in no registry."""
+    streets = [("street", plan.street), ("medians", plan.medians)]
+    for district in plan.districts:
+        field = f"districts.{district.name}"
+        streets.append((f"{field}.street", district.street))
+        for name, used in _used_names(district):
+            registry = ARCHETYPES if name == "rows" else OBJECTS
+            _require(used, registry, f"{source}: {field}.{name}")
+    _require(plan.cars, OBJECTS, f"{source}: cars")
+    for field, street in streets:
+        if street is not None:
+            used = [*street.trees, street.lamp, *street.furniture]
+            _require(used, OBJECTS, f"{source}: {field}")
+
+
+def _used_names(district: DistrictPlan):
+    for row in district.rows:
+        yield "rows", row.archetypes
+    for line in district.lines:
+        yield "lines", line.objects
+    for scatter in district.scatter:
+        yield "scatter", scatter.objects
+    yield "objects", [entry.object for entry in district.objects]
+
+
+def _require(names: Iterable[str], registry, field: str) -> None:
+    for name in names:
+        if name not in registry:
+            raise InputError(f"{field}: unknown name {name}")

@@ -1,0 +1,181 @@
+"""Everything that a city needs besides its roads, to begin with.
+
+A user who has drawn `roads.yaml` gets a plan of districts, two stages and two
+sequences, as files to be changed at will.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+import shapely
+from shapely.geometry import box
+from shapely.ops import unary_union
+import yaml
+
+from cns_drake.city.generation.city_structures import City, lay_out
+from cns_drake.city.geometry.polygons import polygons_of, snap
+from cns_drake.city.plan.city_plan import CityPlan, load_plan
+from cns_drake.roads.network import RoadNetwork, load_road_network
+from cns_drake.roads.route_drawing import draw_route
+from evaluation.support.files import complete_part, write_part
+
+# The world reaches this far beyond the roads [m].
+_MARGIN = 45.0
+# Blocks with less ground than this are squares [m^2].
+_SQUARE = 900.0
+# Slivers between carriageways with less than this belong to the outskirts.
+_LEAST_BLOCK = 60.0
+# Part of the buildings that stand in the first stage.
+_STANDING = 0.65
+_ROUTE_LENGTH = 1200.0
+_SPEEDS = {
+    "cruise": 12.0,
+    "longitudinal_acceleration": 2.5,
+    "lateral_acceleration": 3.0,
+}
+
+
+def start_city(
+    world: Path,
+    seed: int = 0,
+    progress: Callable[[str], None] = lambda line: None,
+) -> list[Path]:
+    """Writes what is missing of a city's inputs.
+
+    `city.yaml` gets a district for each block between the roads, `stages.yaml`
+    a stage 01 without the buildings and trees in the east and a whole stage
+    02, and each stage a sequence on a route drawn by lot.
+
+    Args:
+        world: folder with `roads.yaml`.
+        seed: of the draws.
+        progress: takes a line for each file that is written.
+
+    Returns:
+        The files written; what was there is left alone.
+
+    Raises:
+        InputError: if the roads cannot be used, or a file not be written.
+    """
+    network = load_road_network(world / "roads.yaml")
+    written = []
+
+    def write(name: str, comment: str, values: Callable[[], dict]) -> None:
+        path = world / name
+        if path.exists():
+            return
+        progress(f"writing {path}")
+        text = yaml.safe_dump(
+            values(), sort_keys=False, default_flow_style=None, width=79
+        )
+        write_part(path, f"# {comment}\n\n{text}")
+        complete_part(path)
+        written.append(path)
+
+    plan_file = world / "city.yaml"
+    write(
+        plan_file.name,
+        "The districts: what stands on the ground that the roads leave.",
+        lambda: _plan(network, seed),
+    )
+
+    def stages() -> dict:
+        plan: CityPlan = load_plan(plan_file)
+        return _stages(lay_out(network, plan, str(plan_file)))
+
+    write("stages.yaml", "What each stage lacks, by name.", stages)
+    for k, stage in enumerate(("01", "02")):
+        rng = np.random.default_rng([seed, k])
+        write(
+            f"sequence_{stage}.yaml",
+            f"A drive through stage {stage}, on a route drawn by lot.",
+            lambda stage=stage, rng=rng: {
+                "map": ".",
+                "stage": stage,
+                "route": draw_route(network, _ROUTE_LENGTH, rng).model_dump(
+                    mode="json", exclude_none=True
+                ),
+                "speeds": _SPEEDS,
+            },
+        )
+    return written
+
+
+def _plan(network: RoadNetwork, seed: int) -> dict:
+    """Returns a plan in which every block has a character of its own."""
+    text = resources.files("cns_drake.city.generation").joinpath(
+        "characters.yaml"
+    )
+    templates = yaml.safe_load(text.read_text(encoding="utf-8"))
+    streets = unary_union(
+        [network.carriageway(), network.sidewalks(), network.medians()]
+    )
+    x0, y0, x1, y1 = streets.bounds
+    bounds = [
+        int(np.floor(x0 - _MARGIN)),
+        int(np.floor(y0 - _MARGIN)),
+        int(np.ceil(x1 + _MARGIN)),
+        int(np.ceil(y1 + _MARGIN)),
+    ]
+    rng = np.random.default_rng(seed)
+    characters: list[str] = []
+    districts = []
+    for piece in polygons_of(snap(box(*bounds).difference(streets))):
+        is_outside = piece.intersects(box(*bounds).exterior)
+        if is_outside or piece.area < _LEAST_BLOCK:
+            continue
+        if not characters:
+            # Every character once, before one comes again.
+            characters = list(rng.permutation(list(templates["blocks"])))
+        is_square = piece.area < _SQUARE
+        district = (
+            templates["square"]
+            if is_square
+            else templates["blocks"][characters.pop()]
+        )
+        inside = shapely.point_on_surface(piece)
+        place = [round(inside.x, 2), round(inside.y, 2)]
+        name = f"block_{len(districts) + 1:02d}"
+        districts.append({"name": name, "block": place, **district})
+    districts.append({"name": "outskirts", **templates["outskirts"]})
+    return {
+        "seed": seed,
+        "bounds": bounds,
+        "cars": templates["cars"],
+        "street": templates["street"],
+        "districts": districts,
+    }
+
+
+def _stages(city: City) -> dict:
+    """Returns two stages; the first one lacks what stands in the east."""
+    standing = [
+        structure
+        for structure in city.structures
+        if structure.semantic_class in ("building", "vegetation")
+    ]
+    x = [
+        structure.xyz[0]
+        for structure in standing
+        if structure.semantic_class == "building"
+    ] or [structure.xyz[0] for structure in standing]
+    absent = defaultdict(list)
+    if x:
+        limit = float(np.quantile(x, _STANDING))
+        for structure in standing:
+            if structure.xyz[0] > limit:
+                absent[" ".join(structure.tags[:1])].append(structure.name)
+        story = f"What lies east of x = {limit:.0f} m is not there yet."
+    else:
+        story = "There is nothing that could be missing."
+    return {
+        "stages": {
+            "01": {"story": story, "absent": dict(absent)},
+            "02": {"story": "The whole city."},
+        }
+    }

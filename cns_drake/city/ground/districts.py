@@ -1,0 +1,128 @@
+"""The areas of a plan's districts: what the streets leave, shared out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import shapely
+from shapely.geometry import MultiPolygon, Point, Polygon, box
+from shapely.geometry.base import BaseGeometry
+from shapely.ops import unary_union
+
+from cns_drake.city.geometry.polygons import polygons_of, snap
+from cns_drake.city.ground.elevation import Pad
+from cns_drake.city.plan.city_plan import CityPlan, DistrictPlan, PatchPlan
+from evaluation.support.errors import InputError
+
+
+@dataclass(frozen=True)
+class District:
+    """A district with its ground.
+
+    Attributes:
+        plan: what it should become.
+        area: all of its ground in W [m].
+        grounds: kind of ground -> area; together they are `area`.
+        terraces: patches that are held level.
+    """
+
+    plan: DistrictPlan
+    area: MultiPolygon
+    grounds: dict[str, MultiPolygon]
+    terraces: tuple[Pad, ...] = ()
+
+
+def share_out(
+    plan: CityPlan, streets: BaseGeometry, source: str
+) -> list[District]:
+    """Gives each district its ground, in the order of the plan.
+
+    Args:
+        plan: the city's plan.
+        streets: the area of carriageways, sidewalks and medians in W [m].
+        source: the plan's file name, for messages.
+
+    Raises:
+        InputError: if a block or area lies outside the city or on ground
+            that is taken, or if ground is left over.
+    """
+    free = snap(box(*plan.bounds)).difference(streets)
+    districts = []
+    for district in plan.districts:
+        field = f"{source}: districts.{district.name}"
+        if district.block is not None:
+            area = _block_at(free, Point(district.block))
+            fault = f"block: no free ground at {district.block}"
+        elif district.area is not None:
+            area = _polygon(district.area, f"{field}.area").intersection(free)
+            fault = "area: lies on ground that is taken"
+        else:
+            area, fault = free, "no ground is left for it"
+        pieces = MultiPolygon(polygons_of(snap(area)))
+        if pieces.is_empty:
+            raise InputError(f"{field}.{fault}")
+        districts.append(
+            District(
+                district,
+                pieces,
+                _grounds(district, pieces),
+                _terraces(district, pieces),
+            )
+        )
+        free = snap(free.difference(pieces))
+    left = sum(piece.area for piece in polygons_of(free))
+    if left > 1.0:
+        raise InputError(
+            f"{source}: districts: {left:.0f} m^2 belong to no district"
+        )
+    return districts
+
+
+def corners_area(corners: list[tuple[float, float]] | None) -> Polygon | None:
+    """Returns the polygon of a plan's corners, or None without corners."""
+    return None if corners is None else Polygon(corners)
+
+
+def _block_at(free: BaseGeometry, point: Point) -> BaseGeometry:
+    for piece in polygons_of(free):
+        if piece.contains(point):
+            return piece
+    return Polygon()
+
+
+def _polygon(corners, field: str) -> Polygon:
+    polygon = Polygon(corners) if len(corners) >= 3 else Polygon()
+    if polygon.is_empty or not polygon.is_valid:
+        raise InputError(f"{field}: the corners make no simple polygon")
+    return polygon
+
+
+def _grounds(plan: DistrictPlan, area: MultiPolygon) -> dict[str, MultiPolygon]:
+    """Returns the kinds of ground; of patches that overlap the first wins."""
+    pieces: dict[str, list[BaseGeometry]] = {}
+    rest: BaseGeometry = area
+    for patch in plan.patches:
+        shape = snap(_patch_shape(patch))
+        pieces.setdefault(patch.ground, []).append(shape.intersection(rest))
+        rest = rest.difference(shape)
+    pieces.setdefault(plan.ground, []).append(rest)
+    return {
+        ground: MultiPolygon(polygons_of(snap(unary_union(shapes))))
+        for ground, shapes in pieces.items()
+    }
+
+
+def _terraces(plan: DistrictPlan, area: MultiPolygon) -> tuple[Pad, ...]:
+    return tuple(
+        Pad(snap(_patch_shape(patch).intersection(area)), patch.level)
+        for patch in plan.patches
+        if patch.level is not None
+    )
+
+
+def _patch_shape(patch: PatchPlan) -> BaseGeometry:
+    if patch.area is not None:
+        return Polygon(patch.area)
+    return shapely.LineString(patch.line).buffer(
+        patch.width / 2, cap_style="flat", join_style="mitre"
+    )

@@ -1,0 +1,295 @@
+"""The plan of a city: what `city.yaml` says about its districts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    model_validator,
+)
+
+from evaluation.support.errors import InputError, describe_validation_error
+from evaluation.support.yaml_files import read_yaml
+
+Point = tuple[float, float]
+Line = Annotated[list[Point], Field(min_length=2)]
+Area = Annotated[list[Point], Field(min_length=3)]
+
+
+def _in_order(values: tuple[float, float]) -> tuple[float, float]:
+    if values[0] > values[1]:
+        raise ValueError(f"{values[0]:g} is greater than {values[1]:g}")
+    return values
+
+
+# Least and greatest value of something that is drawn.
+Range = Annotated[
+    tuple[float, float],
+    AfterValidator(_in_order),
+    Field(description="least and greatest value"),
+]
+Weights = dict[str, Annotated[float, Field(gt=0)]]
+Ground = Literal["paved", "lawn", "gravel", "parking", "water"]
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class BuildingPlan(_Model):
+    """One building at a given place.
+
+    Attributes:
+        archetype: a key of the registry of buildings.
+        at: position of the middle of the footprint in W [m].
+        size: width along the front and depth [m]; or
+        outline: corners of the footprint about `at`, before turning [m].
+        yaw_deg: heading of the front's direction; at 0 the front faces -y.
+        height: of the walls [m].
+        kind: stem of the structure's name; default: the archetype.
+    """
+
+    archetype: str
+    at: Point
+    size: Point | None = None
+    outline: Area | None = None
+    yaw_deg: float = 0.0
+    height: float = Field(gt=0)
+    kind: str | None = None
+
+    @model_validator(mode="after")
+    def _has_one_footprint(self) -> BuildingPlan:
+        if (self.size is None) == (self.outline is None):
+            raise ValueError("give either size or outline")
+        return self
+
+
+class RowPlan(_Model):
+    """A row of buildings along the streets of a district.
+
+    Attributes:
+        setback: from the inner edge of the sidewalk to the fronts [m].
+        archetypes: archetype -> weight.
+        width, depth, height: ranges of the lots and of the walls [m].
+        gap: range of the distance between neighbours [m].
+        fill: part of the lots that are built on.
+        kind: stem of the structures' names; default: the archetype.
+        within: corners of an area that the row is limited to [m].
+    """
+
+    setback: float = Field(default=2.0, ge=0)
+    archetypes: Weights = Field(min_length=1)
+    width: Range
+    depth: Range
+    height: Range
+    gap: Range = (0.0, 3.0)
+    fill: float = Field(default=1.0, gt=0, le=1)
+    kind: str | None = None
+    within: Area | None = None
+
+
+class PatchPlan(_Model):
+    """Ground of another kind within a district, e.g. a path in a lawn.
+
+    Attributes:
+        ground: kind of ground.
+        area: corners of the patch in W [m]; or
+        line: points of a path's middle line in W [m] and its
+        width: [m].
+        level: height at which the patch is held level; default: it follows
+            the ground around it [m].
+    """
+
+    ground: Ground
+    area: Area | None = None
+    line: Line | None = None
+    width: float = Field(default=3.0, gt=0)
+    level: float | None = None
+
+    @model_validator(mode="after")
+    def _has_one_shape(self) -> PatchPlan:
+        if (self.area is None) == (self.line is None):
+            raise ValueError("give either area or line")
+        return self
+
+
+class ParkingPlan(_Model):
+    """Rows of bays with parked cars.
+
+    Attributes:
+        start, end: ends of the line along the open side of the bays [m];
+            the bays lie on its left, seen from start.
+        bay: width and depth of a bay [m].
+        fill: part of the bays that are taken.
+    """
+
+    start: Point
+    end: Point
+    bay: Point = (2.6, 5.2)
+    fill: float = Field(default=0.7, ge=0, le=1)
+
+
+class ScatterPlan(_Model):
+    """Plants or objects spread over a district's open ground.
+
+    Attributes:
+        objects: object -> weight.
+        spacing: least distance between two of them [m].
+        fill: part of the places that are used.
+        within: corners of an area that they are limited to [m].
+        clearance: to buildings and streets [m].
+        ground: kinds of ground they may stand on.
+        kind: stem of the structures' names; default: the object.
+    """
+
+    objects: Weights = Field(min_length=1)
+    spacing: float = Field(gt=0.2)
+    fill: float = Field(default=1.0, gt=0, le=1)
+    within: Area | None = None
+    clearance: float = Field(default=1.5, ge=0)
+    ground: tuple[Ground, ...] = ("lawn",)
+    kind: str | None = None
+
+
+class LinePlan(_Model):
+    """Objects along a line, e.g. an avenue's trees, a fence, benches.
+
+    Attributes:
+        objects: object -> weight.
+        points: the line in W [m]; its right is the objects' front.
+        spacing: range of the distance between two objects [m]; None: each
+            piece is as long as the line is straight (fences, hedges).
+        yaw_deg: turn of each object against the line.
+        kind: stem of the structures' names; default: the object.
+        parameters: passed on to the object's builder.
+    """
+
+    objects: Weights = Field(min_length=1)
+    points: Line
+    spacing: Range | None = None
+    yaw_deg: float = 0.0
+    kind: str | None = None
+    parameters: dict[str, Any] = Field(default_factory=dict)
+
+
+class ObjectPlan(_Model):
+    """One object at a given place.
+
+    Attributes:
+        object: a key of the registry of objects.
+        at: position in W [m].
+        yaw_deg: heading.
+        kind: stem of the structure's name; default: the object.
+        parameters: passed on to the object's builder.
+    """
+
+    object: str
+    at: Point
+    yaw_deg: float = 0.0
+    kind: str | None = None
+    parameters: dict[str, Any] = Field(default_factory=dict)
+
+
+class StreetPlan(_Model):
+    """What stands on the sidewalks in front of a district.
+
+    Attributes:
+        trees: species -> weight; none: a street without trees.
+        tree_spacing: range of the distance between trees [m].
+        tree_gaps: part of the trees left out.
+        lamp: object used as street lamp.
+        lamp_spacing: distance between lamps [m].
+        furniture: object -> weight.
+        furniture_spacing: range of the distance between objects [m].
+    """
+
+    trees: Weights = Field(default_factory=dict)
+    tree_spacing: Range = (7.0, 11.0)
+    tree_gaps: float = Field(default=0.15, ge=0, lt=1)
+    lamp: str
+    lamp_spacing: float = Field(default=26.0, gt=2)
+    furniture: Weights = Field(default_factory=dict)
+    furniture_spacing: Range = (5.0, 13.0)
+
+
+class DistrictPlan(_Model):
+    """One block, or an area of the surroundings.
+
+    Attributes:
+        name: unique; also seeds the district's own random draws.
+        block: a point in the block that the streets leave [m]; or
+        area: corners [m]; without both, all that no other district takes.
+        ground: kind of ground.
+        relief: height of the swells of its lawns [m].
+        relief_margin: width of their slope at paths and buildings [m].
+    """
+
+    name: str = Field(pattern=r"^[a-z][a-z0-9_]*$")
+    block: Point | None = None
+    area: Area | None = None
+    ground: Ground = "lawn"
+    relief: float = Field(default=0.0, ge=0)
+    relief_margin: float = Field(default=12.0, gt=0)
+    patches: list[PatchPlan] = Field(default_factory=list)
+    buildings: list[BuildingPlan] = Field(default_factory=list)
+    rows: list[RowPlan] = Field(default_factory=list)
+    parking: list[ParkingPlan] = Field(default_factory=list)
+    objects: list[ObjectPlan] = Field(default_factory=list)
+    lines: list[LinePlan] = Field(default_factory=list)
+    scatter: list[ScatterPlan] = Field(default_factory=list)
+    street: StreetPlan | None = None
+
+    @model_validator(mode="after")
+    def _has_at_most_one_place(self) -> DistrictPlan:
+        if self.block is not None and self.area is not None:
+            raise ValueError("give block or area, not both")
+        return self
+
+
+class CityPlan(_Model):
+    """A whole city, from `city.yaml`.
+
+    Attributes:
+        seed: of all random draws.
+        bounds: x0, y0, x1, y1 of the generated world [m].
+        water_level: height of the water's surface [m].
+        street: what stands on sidewalks unless the district says otherwise.
+        cars: object -> weight of parked cars.
+        medians: what is planted between the directions; default: `street`.
+        districts: in the order in which they take ground.
+    """
+
+    seed: int = Field(ge=0)
+    bounds: tuple[float, float, float, float]
+    water_level: float = -2.8
+    cars: Weights = Field(min_length=1)
+    street: StreetPlan
+    medians: StreetPlan | None = None
+    districts: list[DistrictPlan] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _names_are_unique(self) -> CityPlan:
+        names = [district.name for district in self.districts]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"district {name} is there twice")
+        return self
+
+
+def load_plan(path: Path) -> CityPlan:
+    """Reads `city.yaml`.
+
+    Raises:
+        InputError: if it cannot be read or has a wrong key or type.
+    """
+    content = read_yaml(path)
+    try:
+        return CityPlan.model_validate(content)
+    except ValidationError as error:
+        raise InputError(describe_validation_error(path, error)) from error

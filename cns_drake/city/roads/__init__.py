@@ -1,1 +1,0 @@
-"""Road networks: centrelines, lanes, junctions, surfaces."""

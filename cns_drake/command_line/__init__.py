@@ -1,0 +1,1 @@
+"""The command `cns-drake` and the diagram scripts."""

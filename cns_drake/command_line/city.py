@@ -1,0 +1,102 @@
+"""The command `cns-drake city`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from evaluation.support.errors import InputError
+from evaluation.support.interrupts import uninterrupted
+from evaluation.support.terminal import note
+
+
+def city(
+    folder: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FOLDER",
+            help="Folder with roads.yaml, city.yaml and stages.yaml, and the "
+            "sequences of the city, whose figures are brought up to date.",
+        ),
+    ],
+    start: Annotated[
+        bool,
+        typer.Option(
+            "--start",
+            help="First write what is missing besides roads.yaml: a plan with "
+            "a district for each block, two stages, a sequence for each.",
+        ),
+    ] = False,
+    seed: Annotated[
+        int,
+        typer.Option(min=0, metavar="N", help="Of what --start draws by lot."),
+    ] = 0,
+    check: Annotated[
+        bool,
+        typer.Option(
+            "--check",
+            help="Write nothing; exit with 1 if a file would change.",
+        ),
+    ] = False,
+    calibrate: Annotated[
+        tuple[str, str] | None,
+        typer.Option(
+            metavar="EARLIER LATER",
+            help="Generate nothing; estimate TCR_sym between the sequences of "
+            "two stages of the generated city, such as 01 04, and what each "
+            "group of stages.yaml contributes to it.",
+        ),
+    ] = None,
+    target: Annotated[
+        float | None,
+        typer.Option(
+            metavar="TCR_SYM",
+            help="With --calibrate: propose what to change in the earlier "
+            "stage to reach this TCR_sym.",
+        ),
+    ] = None,
+) -> None:
+    """Build a city from its roads and plan."""
+    if target is not None and calibrate is None:
+        raise InputError("--target: only with --calibrate")
+    if calibrate is not None:
+        _calibrate(folder, *calibrate, target)
+        return
+    with uninterrupted():
+        from cns_drake.city.generation.generate import (
+            differing_files,
+            generate_city,
+        )
+        from cns_drake.city.generation.starter import start_city
+        from cns_drake.scenarios.sequence_table import write_table
+
+    if check:
+        changed = differing_files(folder, note)
+        for path in changed:
+            print(path)
+        if changed:
+            raise typer.Exit(1)
+        return
+    if start:
+        start_city(folder, seed, note)
+    files = generate_city(folder, note)
+    write_table(folder, note)
+    note(f"{len(files)} files")
+
+
+def _calibrate(
+    folder: Path, earlier: str, later: str, target: float | None
+) -> None:
+    with uninterrupted():  # Only who calibrates needs the evaluation.
+        from cns_drake.scenarios.scenario import load_scenario
+        from cns_drake.studies.calibration import Calibration
+        from cns_drake.studies.calibration_report import report_lines
+
+    scenarios = [
+        load_scenario(folder / f"sequence_{stage}.yaml")
+        for stage in (earlier, later)
+    ]
+    for line in report_lines(Calibration(*scenarios, progress=note), target):
+        print(line)

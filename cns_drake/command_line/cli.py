@@ -1,0 +1,68 @@
+"""The command `cns-drake`: its commands, each with an example.
+
+Everything slow to import is imported by the command that needs it, so that
+`--help` and `list` answer at once; interrupts wait meanwhile.
+"""
+
+from __future__ import annotations
+
+from cns_drake.command_line.city import city
+from cns_drake.command_line.listing import list_sequences
+from cns_drake.command_line.recorded import export, repair
+from cns_drake.command_line.simulating import (
+    generate,
+    reproduce,
+    scan,
+    simulate,
+)
+from evaluation.support import terminal
+from evaluation.support.terminal import example
+
+app = terminal.make_program(
+    "cns-drake",
+    "Cities that change, driven and recorded by simulated LiDAR.",
+    example("cns-drake simulate metropolis_01 --output drives"),
+)
+app.command("list", epilog=example("cns-drake list"))(list_sequences)
+app.command(epilog=example("cns-drake simulate metropolis_01 --output drives"))(
+    simulate
+)
+app.command(
+    epilog=example(
+        "cns-drake scan worlds/metropolis/stage_01.sdf \\",
+        "    --pose 0 0 1.6 0 0 1.57 --output scan.pcd",
+    )
+)(scan)
+app.command(
+    epilog=example(
+        "cns-drake export drives/metropolis_01 \\",
+        "    --format kitti --output kitti",
+    )
+)(export)
+app.command(
+    epilog=example(
+        "cns-drake generate metropolis_01 metropolis_04 \\",
+        "    --output drives --jobs 2",
+    )
+)(generate)
+app.command(
+    epilog=example("cns-drake repair damaged.mcap --output whole.mcap")
+)(repair)
+app.command(
+    epilog=example("cns-drake reproduce metropolis --output study --quick")
+)(reproduce)
+app.command(
+    epilog=example(
+        "cns-drake city town --start",
+        "cns-drake city town --calibrate 01 02 --target 0.15",
+    )
+)(city)
+
+
+def main() -> None:
+    """Runs the command line."""
+    terminal.run(app, "cns-drake")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,26 @@
+"""Progress of a simulation, in frames and simulated time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from rich.progress import Progress, TaskID
+
+from cns_drake.recording.frame_clock import FRAME_PERIOD
+from evaluation.support.progress_bars import count_progress
+
+
+def frame_progress(
+    progress: Progress, task: TaskID
+) -> Callable[[int, int], None]:
+    """Returns a callback that shows the frames of a simulation.
+
+    It is `count_progress` with simulated time and real-time factor.
+    """
+
+    def note(done: int, new: int, elapsed: float) -> str:
+        factor = new * FRAME_PERIOD / max(elapsed, 1e-9)
+        simulated = done * FRAME_PERIOD
+        return f"{simulated:.1f} s simulated, {factor:.1f} x real time"
+
+    return count_progress(progress, task, note)

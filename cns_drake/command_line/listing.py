@@ -1,0 +1,110 @@
+"""The command `cns-drake list`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+import shutil
+import sys
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from evaluation.support.errors import InputError
+from evaluation.support.interrupts import uninterrupted
+from evaluation.support.terminal import note
+
+if TYPE_CHECKING:
+    from cns_drake.scenarios.sequence_table import SequenceRow
+
+_HEADINGS = (
+    "sequence",
+    "map",
+    "stage",
+    "length",
+    "time",
+    "frames",
+    "structures",
+    "triangles",
+)
+# Of columns that find no room the first of these goes first.
+_GIVE_WAY = (
+    "map",
+    "structures",
+    "triangles",
+    "stage",
+    "frames",
+    "time",
+    "length",
+)
+_GAP = "  "
+
+
+def list_sequences(
+    folders: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar="FOLDER",
+            help="Folders of maps of your own; the shipped ones if none.",
+        ),
+    ] = None,
+) -> None:
+    """List sequences and their figures.
+
+    Length and time of the drive, the frames recorded of it, and the
+    structures and triangles of its stage. A narrow terminal shows fewer
+    columns; where the output is no terminal, all of them are there.
+    """
+    with uninterrupted():
+        from cns_drake.scenarios.sequence_table import sequence_rows
+        from cns_drake.scenarios.shipped import shipped_maps
+
+    rows = []
+    for folder in folders or shipped_maps().values():
+        of_map = sequence_rows(folder, note)
+        if folders and not of_map:
+            raise InputError(
+                f"{folder}: no sequence_NN.yaml whose stage_NN.sdf is there"
+            )
+        rows += of_map
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    for line in table_lines(rows, width):
+        print(line)
+
+
+def table_lines(rows: list[SequenceRow], width: int | None) -> Iterator[str]:
+    """Yields the lines of a table of sequences.
+
+    Args:
+        rows: the sequences.
+        width: the most characters that a line may have, for which columns
+            give way, but never the names; None to keep all columns.
+    """
+    lines = [_HEADINGS] + [
+        (
+            row.sequence,
+            row.map,
+            row.stage,
+            f"{row.length:.0f} m",
+            f"{row.duration:.1f} s",
+            str(row.frames),
+            str(row.structures),
+            str(row.triangles),
+        )
+        for row in rows
+    ]
+    columns = dict(zip(_HEADINGS, zip(*lines, strict=True), strict=True))
+    widths = {name: max(map(len, cells)) for name, cells in columns.items()}
+    for name in _GIVE_WAY:
+        total = sum(widths.values()) + len(_GAP) * (len(widths) - 1)
+        if width is None or total <= width:
+            break
+        del widths[name]
+    for line in lines:
+        cells = dict(zip(_HEADINGS, line, strict=True))
+        yield _GAP.join(
+            cells[name].ljust(widths[name])
+            if name in ("sequence", "map", "stage")
+            else cells[name].rjust(widths[name])
+            for name in widths
+        ).rstrip()

@@ -1,0 +1,55 @@
+"""Options that several commands and the diagram scripts share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+Output = Annotated[
+    Path, typer.Option(help="Folder for recordings; created if need be.")
+]
+Frames = Annotated[
+    int | None,
+    typer.Option(
+        min=1,
+        metavar="N",
+        help="Record only the first N frames (20 a second).",
+    ),
+]
+LidarPreset = Annotated[
+    str | None,
+    typer.Option(
+        metavar="PRESET",
+        help="Replace the LiDAR: cns, os1-32, os1-64, os1-128, vlp-16, "
+        "hdl-64e.",
+    ),
+]
+Recording = Annotated[
+    Path | None,
+    typer.Option(help="Also save a web page of the drive, FILE.html."),
+]
+Graphviz = Annotated[
+    Path | None,
+    typer.Option(help="Also save the Diagram as Graphviz text."),
+]
+Overwrite = Annotated[
+    bool, typer.Option("--overwrite", help="Replace an existing recording.")
+]
+Jobs = Annotated[
+    int | None,
+    typer.Option(
+        metavar="N",
+        help="Work on this machine, on N jobs side by side; as many as it has "
+        "cores by default.",
+    ),
+]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ADDRESS",
+        help="Work on the cluster of this Dask scheduler; by default that of "
+        "DASK_SCHEDULER_ADDRESS, if that is set.",
+    ),
+]

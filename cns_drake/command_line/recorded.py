@@ -1,0 +1,94 @@
+"""Commands on recordings: other layouts, and what is left of damaged ones."""
+
+from __future__ import annotations
+
+from enum import Enum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from evaluation.support.interrupts import uninterrupted
+from evaluation.support.progress_bars import count_progress, show_progress
+
+
+class ExportFormat(str, Enum):
+    """Layouts to which sequences are exported."""
+
+    CNS = "cns"
+    KITTI = "kitti"
+
+
+def export(
+    sequence: Annotated[
+        Path,
+        typer.Argument(
+            metavar="SEQUENCE", help="A recorded folder, or its .mcap file."
+        ),
+    ],
+    layout: Annotated[
+        ExportFormat,
+        typer.Option(
+            "--format", help="Layout of the CNS data set, or KITTI odometry."
+        ),
+    ],
+    output: Annotated[
+        Path,
+        typer.Option(
+            help="Folder of drives: new, empty, or of earlier exports."
+        ),
+    ],
+    sensor: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Which LiDAR, if there are several."),
+    ] = None,
+) -> None:
+    """Export a recording to a common layout."""
+    with uninterrupted():
+        from cns_drake.export.exporting import export_sequence
+
+    with show_progress() as progress:
+        task = progress.add_task(sequence.name, total=None, note="reading")
+        drive = export_sequence(
+            sequence,
+            layout.value,
+            output,
+            lidar=sensor,
+            on_frame=count_progress(progress, task),
+        )
+    typer.echo(drive)
+
+
+def repair(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE", help="Any MCAP file, or what is left of one."
+        ),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(help="The new file; <name>_repaired.mcap by default."),
+    ] = None,
+) -> None:
+    """Save what is readable of an MCAP file."""
+    with uninterrupted():
+        from cns_drake.recording.repair import repair_mcap
+
+    with show_progress() as progress:
+        task = progress.add_task(file.name, total=None, note="")
+        result = repair_mcap(
+            file,
+            output,
+            count_progress(progress, task, unit="bytes"),
+        )
+    typer.echo(
+        f"{result.output}: {result.num_messages} messages over "
+        f"{result.seconds:.2f} s recovered; "
+        + (
+            f"damaged places: {result.num_faults}, the first at "
+            f"{result.first_fault}"
+            if result.num_faults
+            else "the file was whole"
+        )
+    )

@@ -1,0 +1,197 @@
+"""Commands that simulate: one sequence, one scan, many sequences, a study."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cns_drake.command_line.options import (
+    Frames,
+    Graphviz,
+    Jobs,
+    LidarPreset,
+    Output,
+    Overwrite,
+    Recording,
+    Scheduler,
+)
+from evaluation.support.errors import InputError
+from evaluation.support.interrupts import uninterrupted
+
+
+def simulate(
+    scenario: Annotated[
+        str,
+        typer.Argument(
+            metavar="NAME|SCENARIO.yaml",
+            help="A shipped sequence, or a scenario file of your own.",
+        ),
+    ],
+    output: Output,
+    frames: Frames = None,
+    lidar: LidarPreset = None,
+    recording: Recording = None,
+    graphviz: Graphviz = None,
+    overwrite: Overwrite = False,
+) -> None:
+    """Drive a sequence and record it.
+
+    The recording is a rosbag2 folder of MCAP.
+    """
+    with uninterrupted():
+        from cns_drake.command_line.sequence_script import run_sequence
+
+    run_sequence(
+        scenario,
+        output,
+        frames=frames,
+        lidar=lidar,
+        recording=recording,
+        graphviz=graphviz,
+        overwrite=overwrite,
+    )
+
+
+def scan(
+    world: Annotated[
+        Path, typer.Argument(metavar="WORLD.sdf", help="Any SDF world.")
+    ],
+    pose: Annotated[
+        tuple[float, float, float, float, float, float],
+        typer.Option(
+            metavar="X Y Z ROLL PITCH YAW",
+            help="The sensor's pose in the world [m, rad].",
+        ),
+    ],
+    output: Annotated[
+        Path, typer.Option(help="Where to save: .pcd, .bin or .npy.")
+    ],
+    lidar: LidarPreset = "cns",
+) -> None:
+    """Take one scan of any SDF world."""
+    with uninterrupted():
+        import numpy as np
+        from pydrake.math import RigidTransform, RollPitchYaw
+
+        from cns_drake.scenarios.scenario import make_lidar_config
+        from cns_drake.scene.world import load_world
+        from cns_drake.simulation.scanning import (
+            check_ending,
+            save_scan,
+            scan_world,
+        )
+
+    if not np.isfinite(pose).all():
+        raise InputError("--pose: not finite")
+    check_ending(output)
+    pattern = make_lidar_config(lidar).pattern()
+    X_WS = RigidTransform(RollPitchYaw(*pose[3:]), pose[:3])
+    points = scan_world(load_world(world), X_WS, pattern)
+    save_scan(points, output)
+    typer.echo(f"{output}: {len(points)} points")
+
+
+def generate(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="NAME",
+            help="Shipped sequences or scenario files; all shipped ones by "
+            "default.",
+        ),
+    ] = None,
+    *,
+    output: Output,
+    frames: Frames = None,
+    jobs: Jobs = None,
+    scheduler: Scheduler = None,
+    overwrite: Overwrite = False,
+    vary: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FAMILY.yaml",
+            help="Record the members of a family, whose scenario files go to "
+            "<output>/scenarios and whose own cities to <output>/cities, and "
+            "whatever is named.",
+        ),
+    ] = None,
+) -> None:
+    """Record many sequences.
+
+    Finished ones are skipped, interrupted ones go on where they were.
+    """
+    with uninterrupted():
+        from cns_drake.scenarios.scenario import load_scenario
+        from cns_drake.scenarios.shipped import recordable_sequences
+        from cns_drake.studies.recording_jobs import record_all
+        from evaluation.jobs.cluster import choose_cluster
+
+    cluster = choose_cluster(jobs, scheduler)
+    if not names and vary is None:
+        names = list(recordable_sequences())
+    scenarios = [load_scenario(name) for name in names or ()]
+    if vary is not None:
+        from cns_drake.scenarios.variation import load_family, write_scenarios
+        from cns_drake.studies.redrawing import redraw_cities
+
+        def redraw(
+            map_folder: Path, stage: str, seeds: Sequence[int]
+        ) -> dict[int, Path]:
+            return redraw_cities(
+                map_folder, stage, seeds, output / "cities", cluster
+            )
+
+        members = load_family(vary, redraw)
+        write_scenarios(members, output / "scenarios")
+        scenarios += members
+    if frames is not None:
+        scenarios = [s.model_copy(update={"frames": frames}) for s in scenarios]
+    record_all(scenarios, output, cluster, overwrite=overwrite)
+    for scenario in scenarios:
+        typer.echo(output / scenario.name)
+
+
+def reproduce(
+    maps: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="MAP",
+            help="Which maps, by name or folder; all shipped ones by default.",
+        ),
+    ] = None,
+    *,
+    output: Output,
+    jobs: Jobs = None,
+    scheduler: Scheduler = None,
+    pages: Annotated[
+        bool | None,
+        typer.Option(
+            "--pages/--no-pages",
+            help="Also make a web page of each drive; by default, unless "
+            "--quick is given.",
+        ),
+    ] = None,
+    quick: Annotated[
+        bool,
+        typer.Option(
+            "--quick",
+            help="The report alone: simulate without recording, and leave out "
+            "same-stage controls.",
+        ),
+    ] = False,
+) -> None:
+    """Simulate a map, evaluate it and report."""
+    with uninterrupted():
+        from cns_drake.studies.reproduction import reproduce_maps
+        from evaluation.jobs.cluster import choose_cluster
+
+    cluster = choose_cluster(jobs, scheduler)
+    if quick and pages:
+        raise InputError("--quick and --pages: give one of them")
+    report = reproduce_maps(
+        maps, output, cluster, with_pages=pages is not False, quick=quick
+    )
+    typer.echo(report)

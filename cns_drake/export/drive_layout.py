@@ -1,0 +1,77 @@
+"""What the exporters of all layouts have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+import json
+from pathlib import PurePosixPath
+import re
+
+import numpy as np
+
+from cns_drake.recording.rosbag2_metadata import to_yaml
+from evaluation.sequences.mcap_sequence import McapSequence
+from evaluation.support.errors import InputError
+
+# What may become the name of a folder: nothing that leads out of it.
+_NAME = re.compile(r"\w[\w.-]*")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How one format lays out a drive.
+
+    Paths are relative to the folder of all drives.
+
+    Attributes:
+        files: path (with `<place holders>`) -> what is there, for people.
+        drive_folder: of a sequence -> the folder that is its drive alone.
+        outer_files: of a sequence -> path -> text of what lies outside of
+            that folder.
+        inner_files: likewise within that folder, relative to it; without
+            the scans.
+        scan_files: of a frame's number, its stamp [ns] and its scan -> what
+            is stored of it: path in the drive's folder -> content.
+        shared_outer_files: whether those outside the folder are one for all
+            drives, so that they must agree.
+    """
+
+    files: dict[str, str]
+    drive_folder: Callable[[McapSequence], PurePosixPath]
+    outer_files: Callable[[McapSequence], dict[str, str]]
+    inner_files: Callable[[McapSequence], dict[str, str]]
+    scan_files: Callable[[int, int, np.ndarray], dict[str, bytes]]
+    shared_outer_files: bool
+
+
+def checked_name(sequence: McapSequence, text: str) -> str:
+    """Returns a part of a path that a recording names.
+
+    Raises:
+        InputError: if it could lead elsewhere.
+    """
+    if not _NAME.fullmatch(text):
+        raise InputError(f"{sequence.name}: {text!r} is no name of a folder")
+    return text
+
+
+def scenario_files(sequence: McapSequence) -> dict[str, str]:
+    """Returns `scenario.yaml`, with the sequence's name, if it is known."""
+    if sequence.scenario is None:
+        return {}
+    scenario = {**sequence.scenario, "name": sequence.name}
+    return {"scenario.yaml": to_yaml(scenario)}
+
+
+def structure_files(sequence: McapSequence) -> dict[str, str]:
+    """Returns `structures.json`, what the instances are, if it is known."""
+    if sequence.instances is None:
+        return {}
+    table = list(sequence.instances.values())
+    return {"structures.json": json.dumps(table, indent=1) + "\n"}
+
+
+def join_rows(rows: Iterable[Iterable[object]], separator: str) -> str:
+    """Returns a table as text; floats lose nothing."""
+    return "".join(f"{separator.join(map(repr, row))}\n" for row in rows)

@@ -1,0 +1,107 @@
+"""The layout of KITTI odometry, with labels as SemanticKITTI adds them.
+
+Frames: world W, LiDAR S (S0 at the first scan), camera C. There is no camera;
+C is the LiDAR's frame with a camera's axes (x right, y down, z forward), as
+tools for KITTI expect.
+"""
+
+from __future__ import annotations
+
+from pathlib import PurePosixPath
+import re
+
+import numpy as np
+
+from cns_drake.export.drive_layout import (
+    Layout,
+    join_rows,
+    scenario_files,
+    structure_files,
+)
+from evaluation.clouds.cloud_writing import encode_bin, encode_labels
+from evaluation.geometry import poses
+from evaluation.sequences.mcap_sequence import McapSequence
+
+_X_CS = np.array(
+    [
+        [0.0, -1.0, 0.0, 0.0],
+        [0.0, 0.0, -1.0, 0.0],
+        [1.0, 0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0, 1.0],
+    ]
+)
+_PROJECTION = np.eye(4)
+
+
+def _number(sequence: McapSequence) -> str:
+    """Returns the drive's two digits: those its name ends with, or 00."""
+    digits = re.search(r"\d*$", sequence.name)[0]
+    return f"{int(digits or 0):02d}"
+
+
+def _drive_folder(sequence: McapSequence) -> PurePosixPath:
+    return PurePosixPath("sequences", _number(sequence))
+
+
+def _outer_files(sequence: McapSequence) -> dict[str, str]:
+    X_S0S = poses.inverse(sequence.X_WS[0]) @ sequence.X_WS
+    X_C0C = _X_CS @ X_S0S @ poses.inverse(_X_CS)
+    return {f"poses/{_number(sequence)}.txt": _rows(X_C0C)}
+
+
+def _inner_files(sequence: McapSequence) -> dict[str, str]:
+    elapsed_ns = sequence.stamps_ns - sequence.stamps_ns[0]
+    calibration = {f"P{camera}": _PROJECTION for camera in range(4)}
+    calibration["Tr"] = _X_CS
+    return {
+        "times.txt": "".join(
+            f"{ns // 10**9}.{ns % 10**9:09d}\n" for ns in elapsed_ns.tolist()
+        ),
+        "calib.txt": "".join(
+            f"{name}: {_rows(X[None])}" for name, X in calibration.items()
+        ),
+        "first_pose.txt": _rows(sequence.X_WS[:1]),
+        **structure_files(sequence),
+        **scenario_files(sequence),
+    }
+
+
+def _scan_files(
+    frame: int, stamp_ns: int, scan: np.ndarray
+) -> dict[str, bytes]:
+    del stamp_ns
+    files = {f"velodyne/{frame:06d}.bin": encode_bin(scan)}
+    if {"label", "instance"} <= set(scan.dtype.names):
+        files[f"labels/{frame:06d}.label"] = encode_labels(scan)
+    return files
+
+
+def _rows(X: np.ndarray) -> str:
+    """Returns the upper 3 x 4 of each pose (N, 4, 4) as a row of text."""
+    return join_rows(X[:, :3].reshape(-1, 12).tolist(), " ")
+
+
+KITTI = Layout(
+    files={
+        "poses/<NN>.txt": "upper 3 x 4 of the camera's pose in its frame at"
+        " the first scan, a row a scan",
+        "sequences/<NN>/calib.txt": "Tr: upper 3 x 4 of the LiDAR's pose in"
+        " the camera's frame. There is no camera: its axes (right, down,"
+        " forward) are put into the LiDAR, and P0 to P3 are the identity",
+        "sequences/<NN>/times.txt": "seconds since the first scan",
+        "sequences/<NN>/velodyne/<frame>.bin": "x, y, z [m] and intensity,"
+        " float32, in the LiDAR's frame",
+        "sequences/<NN>/labels/<frame>.label": "uint32 a point: class (id of"
+        " SemanticKITTI) + 65536 * instance",
+        "sequences/<NN>/first_pose.txt": "upper 3 x 4 of the LiDAR's pose in"
+        " the world at the first scan, the same world for all drives of a"
+        " map",
+        "sequences/<NN>/structures.json": "what the instances are",
+        "sequences/<NN>/scenario.yaml": "what was simulated",
+    },
+    drive_folder=_drive_folder,
+    outer_files=_outer_files,
+    inner_files=_inner_files,
+    scan_files=_scan_files,
+    shared_outer_files=False,
+)

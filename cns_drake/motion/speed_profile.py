@@ -1,0 +1,136 @@
+"""How fast to follow a path: bounded speed, continuous acceleration."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+from pydrake.trajectories import BsplineTrajectory
+
+from cns_drake.motion.path_geometry import SmoothPath
+from cns_drake.motion.uniform_spline import REACH, make_uniform_spline
+
+# Distance of the knots of the time scaling [s]; acceleration changes within
+# about two of them, so the jerk stays near (acceleration / knot period).
+_KNOT_PERIOD = 0.3
+# Grid on which the limits are evaluated [m].
+_STEP = 0.1
+# Covers what happens between grid points: the limits are smooth over several
+# metres.
+_MARGIN = 0.998
+# The smoothed drive runs ahead of the unsmoothed by less than this [m].
+_SMOOTHING_SLACK = 0.2
+
+Acceleration = Annotated[float, Field(ge=0.05, le=9.81, allow_inf_nan=False)]
+
+
+class Speeds(BaseModel):
+    """How a sequence is driven; the bounds hold at every instant.
+
+    Attributes:
+        cruise: the highest speed; the roads' limits hold besides [m/s].
+        longitudinal_acceleration: bound along the path, both signs [m/s^2].
+        lateral_acceleration: bound of the centripetal acceleration [m/s^2].
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    cruise: float = Field(13.5, ge=0.5, le=60, allow_inf_nan=False)
+    longitudinal_acceleration: Acceleration = 2.0
+    lateral_acceleration: Acceleration = 3.0
+
+
+def make_time_scaling(
+    path: SmoothPath, speed_limits: np.ndarray, speeds: Speeds
+) -> BsplineTrajectory:
+    """Returns the path parameter u(t), from rest to rest.
+
+    First the fastest drive under the limits is found with stepwise constant
+    acceleration (a forward and a backward pass over v^2). Its positions at
+    even times are then the control points of a quintic B-spline: its u' is a
+    weighted mean of the drive's speed, and its u'' of the acceleration, over
+    at most REACH + 1 knot periods before and after. Bounds of acceleration
+    therefore carry over as they are, and bounds of speed if the drive
+    observes each of them that much earlier and later; `_early_and_late` sees
+    to that. Path parameter and arc length differ by less than a percent;
+    |p'| <= 1 makes speed bounds of u' bounds of the speed, and the rest is
+    taken off the acceleration bound.
+
+    Args:
+        path: the path.
+        speed_limits: (N,) limits at the path's control points [m/s].
+        speeds: the bounds.
+    """
+    count = max(2, int(np.ceil(path.end / _STEP)) + 1)
+    u = np.linspace(0.0, path.end, count)
+    jet = path.evaluate(u)
+    bending = np.linalg.norm(np.cross(jet.dp, jet.ddp), axis=1) / jet.speed
+    lateral = np.sqrt(
+        _MARGIN * speeds.lateral_acceleration / np.maximum(bending, 1e-9)
+    )
+    limit = np.minimum(lateral, speeds.cruise)
+    limit = np.minimum(limit, _at_knots(path, speed_limits, u))
+    limit = _early_and_late(limit, u[1])
+    # Along the path v = |p'| u', so v' = |p'| u'' + |p'|' u'^2.
+    parametric = np.max(np.abs(jet.dspeed) * limit**2)
+    acceleration = _MARGIN * speeds.longitudinal_acceleration - parametric
+    speed = np.sqrt(_reachable(limit**2, acceleration, u[1]))
+    times = np.concatenate(
+        [[0.0], np.cumsum(2 * np.diff(u) / (speed[1:] + speed[:-1]))]
+    )
+    # With REACH knots of rest at both ends the spline too is at rest there.
+    knots = int(np.ceil(times[-1] / _KNOT_PERIOD)) + 2 * REACH
+    drive_times = (np.arange(knots + 1) - REACH) * _KNOT_PERIOD
+    positions = _drive(drive_times, times, u, speed)
+    return make_uniform_spline(positions[:, None], _KNOT_PERIOD)
+
+
+def _at_knots(
+    path: SmoothPath, speed_limits: np.ndarray, u: np.ndarray
+) -> np.ndarray:
+    """Returns the lower one of the limits at both ends of the interval."""
+    index = (u / path.spacing).astype(int).clip(0, len(speed_limits) - 2)
+    return np.minimum(speed_limits[index], speed_limits[index + 1])
+
+
+def _early_and_late(limit: np.ndarray, step: float) -> np.ndarray:
+    """Returns limits that anticipate, and outlast, each limit in time.
+
+    A drive that keeps to limit v within T * v of a place passes the place
+    with at most v during at least T before and after.
+    """
+    period = (REACH + 1) * _KNOT_PERIOD
+    reach = np.ceil((period * limit + _SMOOTHING_SLACK) / step).astype(int)
+    result = limit.copy()
+    for shift in range(1, int(reach.max()) + 1):
+        spread = np.where(reach >= shift, limit, np.inf)
+        result[:-shift] = np.minimum(result[:-shift], spread[shift:])
+        result[shift:] = np.minimum(result[shift:], spread[:-shift])
+    return result
+
+
+def _reachable(
+    squared_limit: np.ndarray, acceleration: float, step: float
+) -> np.ndarray:
+    """Returns the greatest v^2 under a limit, from rest to rest."""
+    gain = 2 * acceleration * step
+    squared = squared_limit.copy()
+    squared[0] = squared[-1] = 0.0
+    for k in range(1, len(squared)):
+        squared[k] = min(squared[k], squared[k - 1] + gain)
+    for k in range(len(squared) - 2, -1, -1):
+        squared[k] = min(squared[k], squared[k + 1] + gain)
+    return squared
+
+
+def _drive(
+    wanted: np.ndarray, times: np.ndarray, u: np.ndarray, speed: np.ndarray
+) -> np.ndarray:
+    """Returns positions at wanted times, at rest before and after."""
+    wanted = np.clip(wanted, 0.0, times[-1])
+    k = np.searchsorted(times, wanted, side="right") - 1
+    k = k.clip(0, len(times) - 2)
+    elapsed = wanted - times[k]
+    acceleration = (speed[k + 1] - speed[k]) / (times[k + 1] - times[k])
+    return u[k] + speed[k] * elapsed + acceleration * elapsed**2 / 2

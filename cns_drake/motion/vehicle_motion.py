@@ -1,0 +1,204 @@
+"""A system that moves a vehicle along a trajectory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from pydrake.common.value import AbstractValue, Value
+from pydrake.math import RigidTransform
+from pydrake.multibody.math import SpatialAcceleration, SpatialVelocity
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Joint, ModelInstanceIndex, RevoluteJoint
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    LeafSystem,
+    ValueProducer,
+)
+
+from cns_drake.motion.trajectory import (
+    AngleMotion,
+    Moments,
+    Trajectory,
+    WheelMotion,
+    pose_at,
+    spatial_acceleration_at,
+    spatial_velocity_at,
+)
+
+
+class _State(NamedTuple):
+    """Positions, velocities and accelerations of the whole plant."""
+
+    q: np.ndarray
+    v: np.ndarray
+    vdot: np.ndarray
+
+
+class VehicleMotion(LeafSystem):
+    """Prescribes the motion of a vehicle, wheels included.
+
+    It has the kinematic output ports of a MultibodyPlant, so that the
+    sensors and the SceneGraph that a plant feeds can be fed by it; no port
+    of a plant takes a prescribed motion. The vehicle's floating base B
+    follows the trajectory; each revolute joint about B's y rolls, each about
+    B's z steers, so that no wheel slips. All else keeps its default position.
+
+    .. pydrake_system::
+
+        name: VehicleMotion
+        output_ports:
+        - position
+        - body_poses
+        - body_spatial_velocities
+        - body_spatial_accelerations
+
+    `position` is the plant's q; the others are lists over its bodies of
+    X_WB, V_WB and A_WB, expressed in the world. They depend on time only.
+
+    Example:
+        from cns_drake import VehicleMotion
+
+        motion = VehicleMotion(world.plant, world.vehicle, trajectory)
+    """
+
+    def __init__(
+        self,
+        plant: MultibodyPlant,
+        vehicle: ModelInstanceIndex,
+        trajectory: Trajectory,
+    ):
+        """Prepares the motion.
+
+        Args:
+            plant: a finalized plant; only its model is used.
+            vehicle: the model instance that moves.
+            trajectory: where its base is at every time.
+
+        Raises:
+            ValueError: a joint of the vehicle is neither a rolling nor a
+                steering one.
+        """
+        super().__init__()
+        self._plant = plant
+        self._trajectory = trajectory
+        self._base = plant.GetUniqueFloatingBaseBodyOrThrow(vehicle)
+        # Scratch, to turn q and v into what the bodies do; every use sets
+        # all that it reads.
+        self._plant_context = plant.CreateDefaultContext()
+        self._default_q = plant.GetPositions(self._plant_context).copy()
+        self._joints = [
+            (joint, *self._describe(joint))
+            for joint in map(plant.get_joint, plant.GetJointIndices(vehicle))
+            if joint.num_velocities() > 0
+            and joint.child_body().index() != self._base.index()
+        ]
+        self._state = self.DeclareCacheEntry(
+            "state",
+            ValueProducer(
+                allocate=lambda: Value(object()), calc=self._calc_state
+            ),
+            {self.time_ticket()},
+        )
+        prerequisites = {self.cache_entry_ticket(self._state.cache_index())}
+        self.DeclareVectorOutputPort(
+            "position",
+            plant.num_positions(),
+            self._calc_position,
+            prerequisites,
+        )
+        for name, element, calc in (
+            ("body_poses", RigidTransform(), self._calc_poses),
+            (
+                "body_spatial_velocities",
+                SpatialVelocity(),
+                self._calc_velocities,
+            ),
+            (
+                "body_spatial_accelerations",
+                SpatialAcceleration(),
+                self._calc_accelerations,
+            ),
+        ):
+            self.DeclareAbstractOutputPort(
+                name,
+                lambda element=element: AbstractValue.Make([element]),
+                calc,
+                prerequisites,
+            )
+
+    def _describe(
+        self, joint: Joint
+    ) -> tuple[Callable[[Moments], AngleMotion], float]:
+        """Returns how a joint turns, and its sign."""
+        context = self._plant_context
+        frame = joint.frame_on_child()
+        X_BJ = frame.CalcPose(context, self._base.body_frame())
+        if isinstance(joint, RevoluteJoint):
+            axis_B = X_BJ.rotation().matrix() @ joint.revolute_axis()
+            wheel = WheelMotion(self._trajectory, X_BJ.translation())
+            for turn, direction in (
+                (wheel.rolling, axis_B[1]),
+                (wheel.steering, axis_B[2]),
+            ):
+                if abs(direction) > 1 - 1e-9:
+                    return turn, float(np.sign(direction))
+        raise ValueError(
+            f"joint {joint.name()} does not turn about the vehicle's y (a "
+            "wheel) or z (its steering)"
+        )
+
+    def _calc_state(self, context: Context, value: AbstractValue) -> None:
+        plant, plant_context, base = (
+            self._plant,
+            self._plant_context,
+            self._base,
+        )
+        plant.SetPositions(plant_context, self._default_q)
+        moment = self._trajectory.at(context.get_time())
+        plant.SetFreeBodyPose(plant_context, base, pose_at(moment))
+        v = np.zeros(plant.num_velocities())
+        vdot = np.zeros_like(v)
+        # A floating base's velocities are V_WB, expressed in the world.
+        start = base.floating_velocities_start_in_v()
+        rows = slice(start, start + 6)
+        v[rows] = spatial_velocity_at(moment).get_coeffs()
+        vdot[rows] = spatial_acceleration_at(moment).get_coeffs()
+        for joint, turn, sign in self._joints:
+            motion = turn(moment)
+            joint.set_angle(plant_context, sign * motion.angle[0])
+            v[joint.velocity_start()] = sign * motion.rate[0]
+            vdot[joint.velocity_start()] = sign * motion.acceleration[0]
+        q = plant.GetPositions(plant_context).copy()
+        value.set_value(_State(q, v, vdot))
+
+    def _set_plant_context(self, context: Context) -> _State:
+        state = self._state.Eval(context)
+        self._plant.SetPositions(self._plant_context, state.q)
+        self._plant.SetVelocities(self._plant_context, state.v)
+        return state
+
+    def _calc_position(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(self._state.Eval(context).q)
+
+    def _calc_poses(self, context: Context, output: AbstractValue) -> None:
+        self._set_plant_context(context)
+        port = self._plant.get_body_poses_output_port()
+        output.set_value(port.Eval(self._plant_context))
+
+    def _calc_velocities(self, context: Context, output: AbstractValue) -> None:
+        self._set_plant_context(context)
+        port = self._plant.get_body_spatial_velocities_output_port()
+        output.set_value(port.Eval(self._plant_context))
+
+    def _calc_accelerations(
+        self, context: Context, output: AbstractValue
+    ) -> None:
+        state = self._set_plant_context(context)
+        output.set_value(
+            self._plant.CalcSpatialAccelerationsFromVdot(
+                self._plant_context, state.vdot
+            )
+        )

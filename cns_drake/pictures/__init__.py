@@ -1,0 +1,1 @@
+"""What one looks at: pictures of stages, and pages of drives."""

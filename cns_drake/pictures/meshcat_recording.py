@@ -1,0 +1,155 @@
+"""Following a drive, to show it as a web page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.geometry import QueryObject
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context, EventStatus, LeafSystem
+
+from cns_drake.pictures.drive_page import (
+    Drive,
+    make_drive_page,
+    moving_frames,
+)
+from cns_drake.scene.world import World
+from evaluation.support.files import complete_part, write_part
+
+# Together they keep a page well below 40 MB, however long the drive.
+_MAX_SCANS = 160
+_MAX_POINTS_PER_SCAN = 3000
+# One point for each cube of this size [m]: without that, nearly all points
+# would lie on the rings of ground around the vehicle.
+_THINNING_SIZE = 0.5
+
+
+class MeshcatRecorder(LeafSystem):
+    """Follows a drive and saves it as a page (see `make_drive_page`).
+
+    .. pydrake_system::
+
+        name: MeshcatRecorder
+        input_ports:
+        - geometry_query
+        - odometry
+        - <lidar>_scan (one for each LiDAR)
+
+    Frames: world W, vehicle B (`base_link`), LiDAR S. `odometry` is an
+    object with `X_WB`; `<lidar>_scan` a structured array of points expressed
+    in S.
+
+    At every frame the poses of all moving frames are taken down, and the
+    scans wherever the vehicle has gone another `scan_spacing` meters; on a
+    long drive the spacing is doubled as often as needed.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        *,
+        X_BSs: Mapping[str, RigidTransform],
+        period: float,
+        other_stage: World | None = None,
+        scan_spacing: float = 15.0,
+    ):
+        """Declares the ports and the schedule.
+
+        Args:
+            world: the stage, with the vehicle.
+            X_BSs: LiDAR name -> pose of its frame S in B.
+            period: time between frames [s].
+            other_stage: the stage to show the difference to.
+            scan_spacing: way between two scans that are shown [m].
+        """
+        super().__init__()
+        self._world = world
+        self._other_stage = other_stage
+        self._X_BSs = dict(X_BSs)
+        self._scan_spacing = scan_spacing
+        self._way_to_scan = 0.0
+        self.drive = Drive(
+            period, X_WFs={frame_id: [] for frame_id in moving_frames(world)}
+        )
+
+        self._geometry_query = self.DeclareAbstractInputPort(
+            "geometry_query", Value(QueryObject())
+        )
+        self._odometry = self.DeclareAbstractInputPort(
+            "odometry", Value(object())
+        )
+        self._scans = {
+            name: self.DeclareAbstractInputPort(f"{name}_scan", Value(object()))
+            for name in self._X_BSs
+        }
+        self.DeclarePeriodicPublishEvent(
+            period_sec=period, offset_sec=0.0, publish=self._publish
+        )
+        self.DeclareForcedPublishEvent(self._publish)
+
+    def save(self, path: Path, *, title: str = "cns-drake") -> None:
+        """Writes the page of the drive up to now.
+
+        Args:
+            path: the HTML file; an older one is replaced.
+            title: the title of the page.
+
+        Raises:
+            InputError: if the file cannot be written.
+        """
+        html = make_drive_page(
+            self.drive,
+            self._world,
+            other_stage=self._other_stage,
+            title=title,
+        )
+        write_part(path, html)
+        complete_part(path)
+
+    def _publish(self, context: Context) -> EventStatus:
+        query_object = self._geometry_query.Eval(context)
+        for frame_id, X_WFs in self.drive.X_WFs.items():
+            # Copies: what the ports give may be overwritten at the next step.
+            X_WFs.append(RigidTransform(query_object.GetPoseInWorld(frame_id)))
+        X_WB = RigidTransform(self._odometry.Eval(context).X_WB)
+        X_WBs = self.drive.X_WBs
+        if X_WBs:
+            step = X_WB.translation() - X_WBs[-1].translation()
+            self._way_to_scan -= float(np.linalg.norm(step))
+        X_WBs.append(X_WB)
+        if self._way_to_scan <= 0.0:
+            self._take_scan(context, X_WB)
+        return EventStatus.Succeeded()
+
+    def _take_scan(self, context: Context, X_WB: RigidTransform) -> None:
+        p_WRset = np.concatenate(
+            [
+                _positions(X_WB @ self._X_BSs[name], scan.Eval(context))
+                for name, scan in self._scans.items()
+            ]
+        )
+        frame = len(self.drive.X_WBs) - 1
+        self.drive.scans.append((frame, _thinned(p_WRset)))
+        if len(self.drive.scans) > _MAX_SCANS:
+            del self.drive.scans[1::2]
+            self._scan_spacing *= 2.0
+        self._way_to_scan = self._scan_spacing
+
+
+def _positions(X_WS: RigidTransform, scan: np.ndarray) -> np.ndarray:
+    """Returns the (N, 3) positions of a scan in the world [m]."""
+    p_SRset = np.column_stack([scan["x"], scan["y"], scan["z"]])
+    return p_SRset @ X_WS.rotation().matrix().T + X_WS.translation()
+
+
+def _thinned(p_WRset: np.ndarray) -> np.ndarray:
+    """Returns an evenly spread part of a point set."""
+    cubes = np.floor(p_WRset / _THINNING_SIZE).astype(np.int64)
+    _, first = np.unique(cubes, axis=0, return_index=True)
+    count = min(len(first), _MAX_POINTS_PER_SCAN)
+    # Spread over the sorted cubes, so that all sides lose alike.
+    kept = first[np.linspace(0, len(first) - 1, count).astype(int)]
+    return p_WRset[np.sort(kept)]

@@ -1,0 +1,78 @@
+"""The part of Embree's C interface that casting rays needs.
+
+Embree comes as the shared object inside the `embreex` wheel.
+
+Formats and values of the C interface: Embree 4 manual,
+https://github.com/RenderKit/embree, headers `rtcore_*.h`.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from functools import lru_cache
+import importlib
+import importlib.util
+from pathlib import Path
+
+TRIANGLE, CONE, ROUND_SEGMENT, SPHERE, DISC, INSTANCE = (
+    0, 15, 16, 50, 52, 121,
+)  # fmt: skip
+INDEX_BUFFER, VERTEX_BUFFER, NORMAL_BUFFER = 0, 1, 3
+UINT, UINT3, FLOAT3, FLOAT4 = 0x5001, 0x5003, 0x9003, 0x9004
+FLOAT3X4_ROW_MAJOR = 0x9134
+ROBUST_SCENE = 1 << 2
+COHERENT_RAYS = 1 << 16
+INVALID_ID = 0xFFFFFFFF
+
+
+class IntersectArguments(ctypes.Structure):
+    """RTCIntersectArguments."""
+
+    _fields_ = (
+        ("flags", ctypes.c_uint),
+        ("feature_mask", ctypes.c_uint),
+        ("context", ctypes.c_void_p),
+        ("filter", ctypes.c_void_p),
+        ("intersect", ctypes.c_void_p),
+    )
+
+
+@lru_cache(maxsize=1)
+def load() -> ctypes.CDLL:
+    """Returns Embree's C interface with typed signatures."""
+    package = importlib.util.find_spec("embreex")
+    assert package is not None
+    assert package.origin is not None
+    folder = Path(package.origin).parent
+    places = [folder, folder.parent / "embreex.libs", folder / ".dylibs"]
+    files = [f for place in places for f in sorted(place.glob("*embree4*"))]
+    # The wheel keeps Embree's own dependencies beside it and finds them
+    # through its extension module, which therefore is loaded first.
+    importlib.import_module("embreex.rtcore_scene")
+    embree = ctypes.CDLL(str(files[0]))
+    pointer, integer, uint = ctypes.c_void_p, ctypes.c_int, ctypes.c_uint
+    size = ctypes.c_size_t
+    for name, result, arguments in [
+        ("rtcNewDevice", pointer, [ctypes.c_char_p]),
+        ("rtcReleaseDevice", None, [pointer]),
+        ("rtcGetDeviceError", integer, [pointer]),
+        ("rtcNewScene", pointer, [pointer]),
+        ("rtcSetSceneFlags", None, [pointer, integer]),
+        ("rtcCommitScene", None, [pointer]),
+        ("rtcReleaseScene", None, [pointer]),
+        ("rtcNewGeometry", pointer, [pointer, integer]),
+        ("rtcCommitGeometry", None, [pointer]),
+        ("rtcReleaseGeometry", None, [pointer]),
+        ("rtcAttachGeometry", uint, [pointer, pointer]),
+        ("rtcSetGeometryMask", None, [pointer, uint]),
+        ("rtcSetGeometryInstancedScene", None, [pointer, pointer]),
+        ("rtcSetGeometryTransform", None, [pointer, uint, integer, pointer]),
+        (
+            "rtcSetNewGeometryBuffer",
+            pointer,
+            [pointer, integer, uint, integer, size, size],
+        ),
+    ]:
+        function = getattr(embree, name)
+        function.restype, function.argtypes = result, arguments
+    return embree

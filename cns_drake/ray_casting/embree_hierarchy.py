@@ -1,0 +1,178 @@
+"""Groups of primitives as one Embree scene."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+import ctypes
+import weakref
+
+import numpy as np
+
+from cns_drake.ray_casting import embree
+from cns_drake.ray_casting.embree_packets import (
+    BLOCK,
+    Tree,
+    cast_packets,
+)
+from cns_drake.ray_casting.embree_primitives import ALL, Primitives
+from cns_drake.ray_casting.ray_groups import RayGroup
+from cns_drake.ray_casting.rays import Hits, Rays
+
+
+class EmbreeHierarchy:
+    """A bounding volume hierarchy over the primitives of groups.
+
+    Rays are cast in packets that Embree takes as coherent, which is what
+    makes a LiDAR's neighbouring beams cheap, and scenes are built robust, so
+    that no ray slips through an edge that two triangles share.
+    """
+
+    def __init__(
+        self,
+        groups: Sequence[RayGroup],
+        primitives: Mapping[int, Sequence[Primitives]],
+        num_threads: int = 1,
+    ):
+        """Builds the hierarchy.
+
+        Args:
+            groups: all groups, placed.
+            primitives: row of a group -> what it holds, for those that hold
+                something.
+            num_threads: how many threads share the rays of a cast.
+
+        Raises:
+            MemoryError: Embree cannot build it.
+        """
+        self._groups = groups
+        self._num_threads = num_threads
+        # Threads start when they are first needed.
+        self._helpers = ThreadPoolExecutor(max(1, num_threads - 1))
+        self._lib = embree.load()
+        self._device = self._lib.rtcNewDevice(None)
+        self._scenes: list[int] = []
+        weakref.finalize(self, _release, self._lib, self._device, self._scenes)
+        fixed = [row for row in primitives if groups[row].is_merged_world]
+        moving = [row for row in primitives if row not in fixed]
+        scenes = {
+            row: self._build_scene(parts) for row, parts in primitives.items()
+        }
+        self._top, self._instances = 0, {}
+        if moving:
+            self._top = self._new_scene()
+            self._instances = {
+                row: self._new_instance(scenes[row]) for row in moving
+            }
+            self.place(moving)
+        error = self._lib.rtcGetDeviceError(self._device)
+        if error:
+            raise MemoryError(f"Embree cannot build the scene: error {error}")
+        # Rows of groups in the order of `Tree.first_primitive`; the last
+        # entry is what a miss, -1, finds.
+        rows = [fixed[0] if fixed else -1, *moving]
+        self._rows = np.array([*rows, -1], np.int32)
+        self._arguments = embree.IntersectArguments(
+            embree.COHERENT_RAYS, embree.INVALID_ID
+        )
+        self._tree = Tree(
+            ctypes.cast(self._lib.rtcIntersect16, ctypes.c_void_p).value,
+            scenes[fixed[0]] if fixed else 0,
+            self._top,
+            ctypes.addressof(self._arguments),
+            *_list_owners([primitives.get(row, ()) for row in rows]),
+        )
+
+    def place(self, rows: Collection[int]) -> None:
+        """Moves groups to where their `X_OL` says."""
+        moved = [row for row in rows if row in self._instances]
+        for row in moved:
+            handle = self._instances[row]
+            matrix = np.ascontiguousarray(self._groups[row].X_OL, np.float32)
+            self._lib.rtcSetGeometryTransform(
+                handle, 0, embree.FLOAT3X4_ROW_MAJOR, matrix.ctypes.data
+            )
+            self._lib.rtcCommitGeometry(handle)
+        if moved:
+            self._lib.rtcCommitScene(self._top)
+
+    def cast(
+        self,
+        rays: Rays,
+        *,
+        mask: int = ALL,
+        with_normals: bool = False,
+    ) -> Hits:
+        """Casts rays.
+
+        Args:
+            rays: N of them.
+            mask: which geometries they hit.
+            with_normals: whether to tell normals.
+        """
+        num_rays = len(rays.d_Sset)
+        hits = Hits.misses(num_rays, with_normals)
+        parts = min(self._num_threads, -(-num_rays // BLOCK))
+
+        def cast(part: int) -> None:
+            cast_packets(self._tree, mask, rays, hits, part, parts)
+
+        others = [self._helpers.submit(cast, part) for part in range(1, parts)]
+        if parts > 0:
+            cast(0)
+        for other in others:
+            other.result()
+        return hits._replace(group=self._rows.take(hits.group))
+
+    def _new_scene(self) -> int:
+        scene = self._lib.rtcNewScene(self._device)
+        self._lib.rtcSetSceneFlags(scene, embree.ROBUST_SCENE)
+        self._scenes.append(scene)
+        return scene
+
+    def _build_scene(self, parts: Sequence[Primitives]) -> int:
+        scene = self._new_scene()
+        for part in parts:
+            handle = self._lib.rtcNewGeometry(self._device, part.kind)
+            for slot, form, array in part.buffers:
+                address = self._lib.rtcSetNewGeometryBuffer(
+                    handle, slot, 0, form, array.strides[0], len(array)
+                )
+                if address is None:
+                    raise MemoryError("Embree has no room for the scene")
+                ctypes.memmove(address, array.ctypes.data, array.nbytes)
+            self._lib.rtcSetGeometryMask(handle, part.mask)
+            self._lib.rtcCommitGeometry(handle)
+            self._lib.rtcAttachGeometry(scene, handle)
+            self._lib.rtcReleaseGeometry(handle)
+        self._lib.rtcCommitScene(scene)
+        return scene
+
+    def _new_instance(self, scene: int) -> int:
+        handle = self._lib.rtcNewGeometry(self._device, embree.INSTANCE)
+        self._lib.rtcSetGeometryInstancedScene(handle, scene)
+        self._lib.rtcSetGeometryMask(handle, ALL)
+        self._lib.rtcAttachGeometry(self._top, handle)
+        self._lib.rtcReleaseGeometry(handle)  # The scene keeps it.
+        return handle
+
+
+def _list_owners(
+    scenes: Collection[Sequence[Primitives]],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns `Tree.first_primitive` and `Tree.owner_of_primitive`."""
+    first = np.zeros((len(scenes), max(1, *map(len, scenes))), np.int64)
+    owners = [np.zeros(0, np.int32)]
+    count = 0
+    for row, parts in enumerate(scenes):
+        for k, part in enumerate(parts):
+            first[row, k] = count
+            owners.append(part.owners)
+            count += len(part.owners)
+    return first, np.concatenate(owners)
+
+
+def _release(lib: ctypes.CDLL, device: int, scenes: Sequence[int]) -> None:
+    for scene in reversed(scenes):
+        lib.rtcReleaseScene(scene)
+    lib.rtcReleaseDevice(device)

@@ -1,0 +1,179 @@
+"""Rays through Embree in packets of 16.
+
+numba supplies the loop that fills the packets, because one Python call per
+packet would cost more than its rays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+import numpy as np
+
+from cns_drake.ray_casting.embree import INVALID_ID
+from evaluation.support.compiled import compiled
+
+if TYPE_CHECKING:
+    from cns_drake.ray_casting.rays import Hits, Rays
+
+
+class Tree(NamedTuple):
+    """Scenes of Embree's, with what tells whose their primitives are.
+
+    Attributes:
+        intersect16: address of the C function.
+        fixed: address of the RTCScene of what never moves, or 0.
+        instances: address of the RTCScene of I instances, or 0.
+        arguments: address of the RTCIntersectArguments.
+        first_primitive: (1 + I, G) int64, where in `owner_of_primitive` the
+            primitives of geometry g in the fixed scene (first row) or in
+            each instance begin.
+        owner_of_primitive: (P,) int32.
+    """
+
+    intersect16: int
+    fixed: int
+    instances: int
+    arguments: int
+    first_primitive: np.ndarray
+    owner_of_primitive: np.ndarray
+
+
+@intrinsic
+def _call_intersect16(
+    typing_context: Any,
+    function: types.Type,
+    valid: types.Type,
+    scene: types.Type,
+    rays: types.Type,
+    arguments: types.Type,
+) -> tuple[Any, Callable[..., Any]]:
+    """Calls the C function at an address, from compiled code.
+
+    An address that is a value, unlike a ctypes function, lets numba keep the
+    compiled loop on disk, which saves a second at every start.
+    """
+    signature = types.void(function, valid, scene, rays, arguments)
+
+    def generate(
+        context: Any,
+        builder: ir.IRBuilder,
+        signature: Any,
+        values: Sequence[ir.Value],
+    ) -> Any:
+        pointer = ir.IntType(8).as_pointer()
+        function_type = ir.FunctionType(ir.VoidType(), [pointer] * 4)
+        builder.call(
+            builder.inttoptr(values[0], function_type.as_pointer()),
+            [builder.inttoptr(value, pointer) for value in values[1:]],
+        )
+        return context.get_dummy_value()
+
+    return signature, generate
+
+
+LANES = 16
+# Rays that one thread casts before it leaves as many to the others: whole
+# packets, and few enough that all meet the same mixture of geometry.
+BLOCK = 1024
+
+
+@compiled
+def cast_packets(
+    tree: Tree, mask: int, rays: Rays, hits: Hits, part: int, num_parts: int
+) -> None:
+    """Casts every `num_parts`-th block of rays, beginning with the `part`-th.
+
+    Args:
+        tree: a `Tree`.
+        mask: which geometries can be hit.
+        rays: `Rays`.
+        hits: `Hits`, so far misses, to fill; the group is 0 in the fixed
+            scene and otherwise 1 + the number of the instance.
+        part, num_parts: which blocks.
+    """
+    # A packet is an RTCRayHit16: 12 ray fields and 9 hit fields (10 with
+    # room for the primitive of an instance array) of 16 lanes. It and the
+    # mask of lanes are aligned to 64 bytes, as Embree's vector loads demand.
+    storage = np.zeros((12 + 10 + 1 + 1) * LANES, np.float32)
+    start = (-storage.ctypes.data % 64) // 4
+    aligned = storage[start : start + 23 * LANES].reshape(23, LANES)
+    packet, valid = aligned[:22], aligned[22].view(np.int32)
+    num_rays = len(rays.d_Sset)
+    for first in range(part * BLOCK, num_rays, num_parts * BLOCK):
+        last = min(first + BLOCK, num_rays)
+        _cast_block(tree, mask, rays, hits, first, last, packet, valid)
+
+
+@compiled
+def _cast_block(
+    tree: Tree,
+    mask: int,
+    rays: Rays,
+    hits: Hits,
+    first: int,
+    last: int,
+    packet: np.ndarray,
+    valid: np.ndarray,
+) -> None:
+    """Casts the rays from `first` to before `last`.
+
+    Directions are rotated here, in double precision and in a fixed order:
+    what a library for matrices does depends on the processor.
+    """
+    packet_id = packet.view(np.uint32)
+    num_origins, num_rotations = len(rays.p_OSset), len(rays.R_OSset)
+    num_ranges = len(rays.max_ranges)
+    # Counted along: remainders would cost a tenth of the casting.
+    origin, rotation = first % num_origins, first % num_rotations
+    reach = first % num_ranges
+    for begin in range(first, last, LANES):
+        count = min(LANES, last - begin)
+        valid[:] = 0
+        for lane in range(count):
+            p = rays.p_OSset[origin]
+            R = rays.R_OSset[rotation]
+            d = rays.d_Sset[begin + lane]
+            valid[lane] = -1
+            for axis in range(3):
+                packet[axis, lane] = p[axis]
+                packet[4 + axis, lane] = (
+                    R[axis, 0] * d[0] + R[axis, 1] * d[1] + R[axis, 2] * d[2]
+                )
+            packet[8, lane] = rays.max_ranges[reach]
+            origin = origin + 1 if origin + 1 < num_origins else 0
+            rotation = rotation + 1 if rotation + 1 < num_rotations else 0
+            reach = reach + 1 if reach + 1 < num_ranges else 0
+        packet[3] = 0.0
+        packet[7] = 0.0
+        packet_id[9] = mask
+        packet_id[10:12] = 0
+        packet_id[18:20] = INVALID_ID
+        # One after the other, which is faster than one scene of two levels:
+        # the second call keeps a hit unless it finds a nearer one.
+        for scene in (tree.fixed, tree.instances):
+            if scene != 0:
+                _call_intersect16(
+                    tree.intersect16,
+                    valid.ctypes.data,
+                    scene,
+                    packet.ctypes.data,
+                    tree.arguments,
+                )
+        for lane in range(count):
+            ray = begin + lane
+            hit = packet_id[18, lane]
+            if hit == INVALID_ID:
+                continue
+            hits.ranges[ray] = packet[8, lane]
+            instance = packet_id[19, lane]
+            row = 0 if instance == INVALID_ID else 1 + np.int64(instance)
+            primitive = tree.first_primitive[row, hit] + packet_id[17, lane]
+            hits.owner[ray] = tree.owner_of_primitive[primitive]
+            hits.group[ray] = row
+            for axis in range(hits.normals.shape[1]):
+                hits.normals[ray, axis] = packet[12 + axis, lane]

@@ -1,0 +1,164 @@
+"""Surfaces as buffers of Embree's primitives."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cns_drake.ray_casting import embree
+from cns_drake.ray_casting.curved_proxies import circumscribe
+from cns_drake.ray_casting.ray_groups import Member
+from cns_drake.scene.perception_geometry import (
+    CapsuleSurface,
+    CylinderSurface,
+    EllipsoidSurface,
+    TriangleSurface,
+)
+from cns_drake.scene.surface_merging import merge_triangles
+
+# Which rays hit a geometry: all do hit solids, some also hit proxies.
+SOLID, PROXY = 1, 2
+ALL = SOLID | PROXY
+# Owns the primitives of proxies.
+PROXY_OWNER = -2
+# Longer than so many radii, cones and rounded segments lose hits to single
+# precision: one of 40 at 3000 (measured). Longer ones are cut, but for what
+# nobody needs into no more pieces than that.
+_SLENDEREST = 700.0
+_MOST_PIECES = 1000
+
+
+class Primitives(NamedTuple):
+    """One Embree geometry.
+
+    Attributes:
+        kind: of its primitives.
+        buffers: (slot, format, array) each.
+        owners: (P,) int32, the index of the geometry that each primitive
+            belongs to.
+        mask: `SOLID` or `PROXY`.
+    """
+
+    kind: int
+    buffers: list[tuple[int, int, np.ndarray]]
+    owners: np.ndarray
+    mask: int = SOLID
+
+
+def merge_flat(members: Sequence[Member]) -> Iterator[Primitives]:
+    """Yields the triangles of surfaces, and those about curved ones."""
+    flat = [m for m in members if isinstance(m[2], TriangleSurface)]
+    curved = [
+        (PROXY_OWNER, X_LG, circumscribe(surface))
+        for _, X_LG, surface in members
+        if not isinstance(surface, TriangleSurface)
+    ]
+    for surfaces, mask in ((flat, SOLID), (curved, PROXY)):
+        if surfaces:
+            yield _as_primitives(surfaces, mask)
+
+
+def _as_primitives(surfaces: Sequence[Member], mask: int) -> Primitives:
+    merged, owners = merge_triangles(surfaces)
+    return Primitives(
+        embree.TRIANGLE,
+        [
+            (
+                embree.VERTEX_BUFFER,
+                embree.FLOAT3,
+                merged.p_GVset.astype(np.float32),
+            ),
+            (
+                embree.INDEX_BUFFER,
+                embree.UINT3,
+                merged.triangles.astype(np.uint32),
+            ),
+        ],
+        owners,
+        mask,
+    )
+
+
+def merge_curved(members: Sequence[Member]) -> Iterator[Primitives]:
+    """Yields one geometry for each kind of curved primitive.
+
+    Embree intersects spheres, cones, discs and rounded segments exactly (in
+    single precision).
+    """
+    cones, capsules, discs, spheres = [], [], [], []
+    for index, X_LG, surface in members:
+        if isinstance(surface, TriangleSurface):
+            continue
+        if isinstance(surface, EllipsoidSurface):
+            radius = surface.semi_axes[0]
+            spheres.append((index, [[*X_LG.translation(), radius]]))
+            continue
+        axis = X_LG.rotation().matrix()[:, 2]
+        ends = [
+            [*(X_LG.translation() + side * axis), surface.radius]
+            for side in (-surface.length / 2.0, surface.length / 2.0)
+        ]
+        is_cone = isinstance(surface, CylinderSurface)
+        segments = cones if is_cone else capsules
+        segments += [(index, piece) for piece in _cut(ends, surface)]
+        if is_cone:
+            # Embree closes cones as well, but rounding of the axis tilts the
+            # ends of flat ones; discs do not tilt.
+            discs.append((index, ends, [-axis, axis]))
+
+    for kind, segments in [
+        (embree.CONE, cones),
+        (embree.ROUND_SEGMENT, capsules),
+    ]:
+        if segments:
+            first_ends = 2 * np.arange(len(segments), dtype=np.uint32)
+            yield Primitives(
+                kind,
+                [
+                    _vertices(segments),
+                    (embree.INDEX_BUFFER, embree.UINT, first_ends),
+                ],
+                np.array([s[0] for s in segments], np.int32),
+            )
+    if discs:
+        normals = _float32(d[2] for d in discs)
+        yield Primitives(
+            embree.DISC,
+            [
+                _vertices(discs),
+                (embree.NORMAL_BUFFER, embree.FLOAT3, normals),
+            ],
+            np.repeat([d[0] for d in discs], 2).astype(np.int32),
+        )
+    if spheres:
+        yield Primitives(
+            embree.SPHERE,
+            [_vertices(spheres)],
+            np.array([s[0] for s in spheres], np.int32),
+        )
+
+
+def _cut(
+    ends: Sequence, surface: CylinderSurface | CapsuleSurface
+) -> list[np.ndarray]:
+    """Returns the (2, 4) ends of pieces that are not too slender.
+
+    Joints show to rays from inside.
+    """
+    slenderness = surface.length / surface.radius
+    num = math.ceil(min(slenderness / _SLENDEREST, _MOST_PIECES))
+    joints = np.linspace(*ends, max(num, 1) + 1)
+    return [joints[k : k + 2] for k in range(len(joints) - 1)]
+
+
+def _vertices(shapes: Iterable[tuple]) -> tuple[int, int, np.ndarray]:
+    places = _float32(shape[1] for shape in shapes)
+    return embree.VERTEX_BUFFER, embree.FLOAT4, places
+
+
+def _float32(arrays: Iterable[ArrayLike]) -> np.ndarray:
+    return np.concatenate([np.asarray(a) for a in arrays]).astype(np.float32)

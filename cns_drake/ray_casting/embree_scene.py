@@ -1,0 +1,81 @@
+"""Groups of geometry as Embree scenes.
+
+Curved shapes are not tessellated: Embree intersects spheres, cones, discs
+and rounded segments exactly (in float32), and an ellipsoid is an instance of
+the unit sphere. Any of them in a scene would slow down all its rays by a
+third, though (measured), also those that meet triangles only. They have a
+hierarchy of their own, therefore, and polyhedra about them in that of the
+triangles tell which few rays have to be cast on it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from cns_drake.ray_casting.curved_proxies import NearCurvedShapes
+from cns_drake.ray_casting.embree_hierarchy import EmbreeHierarchy
+from cns_drake.ray_casting.embree_primitives import (
+    PROXY_OWNER,
+    SOLID,
+    merge_curved,
+    merge_flat,
+)
+from cns_drake.ray_casting.ray_groups import RayGroup
+from cns_drake.ray_casting.rays import Hits, Rays
+
+
+class EmbreeScene:
+    """A bounding volume hierarchy over groups; see `RayCastingScene`."""
+
+    def __init__(self, groups: Sequence[RayGroup], num_threads: int):
+        """Builds the scene of groups that are placed.
+
+        Raises:
+            MemoryError: Embree cannot build it.
+        """
+        flat, curved = (
+            {
+                row: parts
+                for row, group in enumerate(groups)
+                if (parts := list(merge(group.members)))
+            }
+            for merge in (merge_flat, merge_curved)
+        )
+        self._flat = EmbreeHierarchy(groups, flat, num_threads)
+        self._curved = EmbreeHierarchy(groups, curved) if curved else None
+        self._near = [NearCurvedShapes(groups[row]) for row in curved]
+
+    def place(self, rows: Collection[int]) -> None:
+        """Moves groups to where their `X_OL` says."""
+        self._flat.place(rows)
+        if self._curved is not None:
+            self._curved.place(rows)
+
+    def cast_rays(self, rays: Rays, with_normals: bool) -> Hits:
+        """Casts rays."""
+        hits = self._flat.cast(rays, with_normals=with_normals)
+        if self._curved is None:
+            return hits
+        if any(shapes.contain(rays.p_OSset) for shapes in self._near):
+            again = np.arange(len(rays.d_Sset))
+        else:
+            again = np.flatnonzero(hits.owner == PROXY_OWNER)
+        if len(again):
+            rest = rays.select(again, rays.max_ranges_of(again))
+            on_curved = self._curved.cast(rest, with_normals=with_normals)
+            # What is nearer than that can only be in the other hierarchy.
+            reach = np.minimum(on_curved.ranges, rest.max_ranges)
+            on_flat = self._flat.cast(
+                rest._replace(max_ranges=reach),
+                mask=SOLID,
+                with_normals=with_normals,
+            )
+            is_flat = on_flat.owner >= 0
+            for result, flat, curved in zip(
+                hits, on_flat, on_curved, strict=True
+            ):
+                curved[is_flat] = flat[is_flat]
+                result[again] = curved
+        return hits

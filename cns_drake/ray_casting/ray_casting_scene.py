@@ -1,0 +1,161 @@
+"""Casting rays on perception geometry.
+
+The only module that knows the ray-casting library: Embree, or Open3D on
+platforms for which there is no wheel of Embree's C library.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+import importlib.util
+from typing import TYPE_CHECKING
+
+import numpy as np
+from pydrake.geometry import FrameId
+from pydrake.math import RigidTransform
+
+from cns_drake.ray_casting.ray_groups import RayGroup, group_geometries
+from cns_drake.ray_casting.rays import Hits, Rays
+from cns_drake.scene.perception_geometry import PerceptionGeometry
+
+if TYPE_CHECKING:
+    from cns_drake.ray_casting.embree_scene import EmbreeScene
+    from cns_drake.ray_casting.open3d_scene import Open3dScene
+
+# The package whose wheel holds Embree's C library.
+_EMBREE_PACKAGE = "embreex"
+_IDENTITY = np.eye(3)
+
+
+@dataclass(frozen=True)
+class RayHits:
+    """What N rays met first.
+
+    Attributes:
+        ranges: (N,) float32 distance along the ray [m], inf for a miss.
+        geometry: (N,) int32 index into the scene's geometries, -1 for a miss.
+        normals_W: (N, 3) float32 unit normal in the world, facing the ray's
+            origin, zero for a miss; None unless asked for.
+    """
+
+    ranges: np.ndarray
+    geometry: np.ndarray
+    normals_W: np.ndarray | None = None
+
+
+class RayCastingScene:
+    """A bounding volume hierarchy over perception geometry.
+
+    Geometry on frames that never move is merged, in world coordinates; the
+    geometry of every other frame is an instance that `set_frame_poses`
+    places. Coordinates are kept relative to a point O in the middle of the
+    merged geometry, so that float32 resolves 1e-5 m within 200 m of it
+    wherever the world's origin may be.
+    """
+
+    def __init__(
+        self,
+        geometries: Sequence[PerceptionGeometry],
+        anchored_frames: Collection[FrameId],
+        calc_X_WF: Callable[[FrameId], RigidTransform],
+        *,
+        num_threads: int = 1,
+    ):
+        """Builds the scene.
+
+        Args:
+            geometries: what rays can hit; hits give indices into it.
+            anchored_frames: the frames that never move.
+            calc_X_WF: gives the pose of a frame in the world.
+            num_threads: how many threads share the rays of a cast; hits do
+                not depend on it.
+        """
+        self._p_WO, self._groups = group_geometries(
+            geometries, anchored_frames, calc_X_WF
+        )
+        for group in self._groups:
+            group.place(self._p_WO, calc_X_WF)
+        self._scene = _make_scene(self._groups, num_threads)
+        self._moving = [
+            row
+            for row, group in enumerate(self._groups)
+            if group.frame_id is not None
+        ]
+
+    def set_frame_poses(
+        self, calc_X_WF: Callable[[FrameId], RigidTransform]
+    ) -> None:
+        """Moves the geometry of the frames that are not anchored."""
+        for row in self._moving:
+            self._groups[row].place(self._p_WO, calc_X_WF)
+        if self._moving:
+            self._scene.place(self._moving)
+
+    def cast_rays(
+        self,
+        p_WSset: np.ndarray,
+        d_Sset: np.ndarray,
+        max_range: float,
+        *,
+        R_WSset: np.ndarray = _IDENTITY,
+        with_normals: bool = False,
+    ) -> RayHits:
+        """Casts N rays, from one pose of a sensor S or from several.
+
+        Args:
+            p_WSset: (3,) or (K, 3) origins in the world [m]; ray i starts at
+                origin i mod K.
+            d_Sset: (N, 3) unit directions, expressed in S.
+            max_range: how far to look [m].
+            R_WSset: (3, 3) or (L, 3, 3) orientations of S in the world, taken
+                in turn likewise.
+            with_normals: also return the normals of the surfaces.
+
+        Raises:
+            ValueError: N is not a multiple of K or of L.
+        """
+        p_OSset = np.atleast_2d(p_WSset) - self._p_WO
+        R_WSset = np.reshape(R_WSset, (-1, 3, 3))
+        for count, what in (
+            (len(p_OSset), "origins"),
+            (len(R_WSset), "frames"),
+        ):
+            if len(d_Sset) % max(count, 1) or (count == 0 and len(d_Sset)):
+                raise ValueError(f"{count} {what} for {len(d_Sset)} rays")
+        rays = Rays(
+            p_OSset.astype(np.float32),
+            np.ascontiguousarray(R_WSset, dtype=float),
+            np.array([max_range], np.float32),
+            np.ascontiguousarray(d_Sset, dtype=float),
+        )
+        hits = self._scene.cast_rays(rays, with_normals)
+        if not with_normals:
+            return RayHits(hits.ranges, hits.owner)
+        return RayHits(hits.ranges, hits.owner, self._face_rays(hits, rays))
+
+    def _face_rays(self, hits: Hits, rays: Rays) -> np.ndarray:
+        """Returns unit world normals, turned towards the rays' origins."""
+        normals = hits.normals
+        for row, placed in enumerate(self._groups):
+            if not placed.is_merged_world:
+                of_group = hits.group == row
+                # Normals transform by the inverse transpose.
+                normals[of_group] @= np.linalg.inv(placed.X_OL[:, :3])
+        length = np.linalg.norm(normals, axis=1, keepdims=True)
+        normals /= np.where(length > 0.0, length, 1.0)
+        away = np.einsum("ij,ij->i", normals, rays.d_Oset()) > 0.0
+        normals[away] *= -1.0
+        return normals
+
+
+def _make_scene(
+    groups: Sequence[RayGroup], num_threads: int
+) -> EmbreeScene | Open3dScene:
+    if importlib.util.find_spec(_EMBREE_PACKAGE) is not None:
+        from cns_drake.ray_casting.embree_scene import EmbreeScene
+
+        return EmbreeScene(groups, num_threads)
+    from cns_drake.ray_casting.open3d_scene import Open3dScene
+
+    return Open3dScene(groups, num_threads)

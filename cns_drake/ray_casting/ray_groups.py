@@ -1,0 +1,104 @@
+"""Perception geometry in groups that move as one, for the ray casters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.geometry import FrameId
+from pydrake.math import RigidTransform
+
+from cns_drake.scene.perception_geometry import (
+    EllipsoidSurface,
+    PerceptionGeometry,
+    Surface,
+)
+
+# What is built into one scene: index of a geometry, its pose, its surface.
+Member = tuple[int, RigidTransform, Surface]
+
+
+@dataclass
+class RayGroup:
+    """Geometry that moves as one, in a local frame L.
+
+    Attributes:
+        frame_id: the frame F it is fixed to; None for the world.
+        X_FL: (4, 4) affine map from L to F; not rigid for an ellipsoid,
+            which in L is the unit sphere.
+        members: what the group holds, posed in L.
+        is_merged_world: whether L is the world, moved to O.
+        X_OL: (3, 4) affine map from L to the scene's origin, once placed.
+    """
+
+    frame_id: FrameId | None
+    X_FL: np.ndarray
+    members: list[Member]
+    is_merged_world: bool = False
+    X_OL: np.ndarray | None = None
+
+    def place(
+        self,
+        p_WO: np.ndarray,
+        calc_X_WF: Callable[[FrameId], RigidTransform],
+    ) -> None:
+        """Sets `X_OL` by the pose of the group's frame."""
+        X_WL = self.X_FL
+        if self.frame_id is not None:
+            X_WL = calc_X_WF(self.frame_id).GetAsMatrix4() @ X_WL
+        self.X_OL = X_WL[:3].copy()
+        self.X_OL[:, 3] -= p_WO
+
+
+def group_geometries(
+    geometries: Sequence[PerceptionGeometry],
+    anchored_frames: Collection[FrameId],
+    calc_X_WF: Callable[[FrameId], RigidTransform],
+) -> tuple[np.ndarray, list[RayGroup]]:
+    """Returns p_WO and the groups, the world's first if there is one.
+
+    Args:
+        geometries: what rays can hit; members give indices into it.
+        anchored_frames: the frames that never move.
+        calc_X_WF: gives the pose of a frame in the world.
+    """
+    by_frame: dict[FrameId | None, list[Member]] = {}
+    for index, geometry in enumerate(geometries):
+        frame_id, X_FG = geometry.frame_id, geometry.X_FG
+        if frame_id in anchored_frames:
+            frame_id, X_FG = None, calc_X_WF(frame_id) @ X_FG
+        member = (index, X_FG, geometry.surface)
+        by_frame.setdefault(frame_id, []).append(member)
+
+    p_WO = np.zeros(3)
+    world = by_frame.pop(None, [])
+    if world:
+        places = np.array([X_WG.translation() for _, X_WG, _ in world])
+        p_WO = np.round((places.min(axis=0) + places.max(axis=0)) / 2.0)
+
+    groups, ellipsoids = [], []
+    for frame_id, members in [(None, world), *by_frame.items()]:
+        # Coordinates are relative to O before they are rounded to float32,
+        # and relative to F where F moves.
+        shift = p_WO if frame_id is None else np.zeros(3)
+        X_FL, X_LF = RigidTransform(shift), RigidTransform(-shift)
+        rest = []
+        for index, X_FG, surface in members:
+            if isinstance(surface, EllipsoidSurface) and not surface.is_sphere:
+                stretch = np.diag([*surface.semi_axes, 1.0])
+                unit_sphere = EllipsoidSurface((1.0, 1.0, 1.0))
+                ellipsoids.append(
+                    RayGroup(
+                        frame_id,
+                        X_FG.GetAsMatrix4() @ stretch,
+                        [(index, RigidTransform(), unit_sphere)],
+                    )
+                )
+            else:
+                rest.append((index, X_LF @ X_FG, surface))
+        if rest:
+            groups.append(
+                RayGroup(frame_id, X_FL.GetAsMatrix4(), rest, frame_id is None)
+            )
+    return p_WO, groups + ellipsoids

@@ -1,0 +1,76 @@
+"""Writing messages in a thread, while the next frame is computed.
+
+Compression is half of what a frame costs, and it lets other Python code run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import queue
+import threading
+from types import TracebackType
+from typing import Any
+
+# How many messages may wait. What waits is lost when the process is killed,
+# so these are two frames with one LiDAR; a longer queue gained nothing.
+_WAITING = 8
+
+
+class BackgroundWriter:
+    """A context manager that passes messages on, in order, in a thread.
+
+    Leaving it waits until everything is written; leaving it by an exception
+    lets go of what still waits. An error of the thread is raised by the next
+    `write`, or on leaving.
+    """
+
+    def __init__(self, write: Callable[..., None]):
+        """Starts nothing yet.
+
+        Args:
+            write: takes each message, in a thread of its own.
+        """
+        self._write = write
+        self._messages: queue.Queue = queue.Queue(_WAITING)
+        self._error: BaseException | None = None
+        self._dropping = False
+        self._thread = threading.Thread(target=self._run, daemon=True)
+
+    def __enter__(self) -> BackgroundWriter:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self,
+        exception_type: type[BaseException] | None,
+        exception: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._dropping = exception_type is not None
+        self._messages.put(None)
+        self._thread.join()
+        if exception_type is None:
+            self._raise_error()
+
+    def write(self, *message: Any) -> None:
+        """Hands a message over; waits while too many are waiting.
+
+        Raises:
+            Whatever writing an earlier message raised.
+        """
+        self._raise_error()
+        self._messages.put(message)
+
+    def _raise_error(self) -> None:
+        if self._error is not None:
+            raise self._error
+
+    def _run(self) -> None:
+        # After an error messages are still taken, so that nobody waits for
+        # room in the queue for ever.
+        while (message := self._messages.get()) is not None:
+            if self._error is None and not self._dropping:
+                try:
+                    self._write(*message)
+                except BaseException as error:
+                    self._error = error

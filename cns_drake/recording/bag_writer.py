@@ -1,0 +1,385 @@
+"""Writing a rosbag2 folder with one MCAP file, so that it can be trusted.
+
+The recording grows in `<folder>/<name>_0.mcap.part`. Only when it is whole
+does it get its final name, and `metadata.yaml` comes last: where that file
+is, the folder is complete and consistent.
+
+What an interrupted run leaves is a part file, whose messages a later run of
+the same recording takes over by writing them again; see PartFile.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+import contextlib
+import io
+import json
+import os
+from pathlib import Path
+from types import TracebackType
+from typing import Any, BinaryIO, NamedTuple
+
+from mcap.records import Channel, Message
+from mcap.writer import CompressionType, Writer
+
+from cns_drake import __version__
+from cns_drake.recording import messages
+from cns_drake.recording.mcap_recovery import Fault, read_records
+from cns_drake.recording.part_file import PartFile
+from cns_drake.recording.recording_folder import RecordingFolder
+from cns_drake.recording.rosbag2_metadata import (
+    Topic,
+    make_bag_information,
+    make_qos_yaml,
+    make_topic_metadata,
+    to_yaml,
+)
+from evaluation.support.errors import InputError
+from evaluation.support.files import (
+    complete_part,
+    part_path,
+    user_errors,
+    write_part,
+)
+
+_CHUNK_BYTES = 1024 * 1024
+# A chunk that is not closed is lost when the process is killed. Without a
+# LiDAR a chunk of 1 MiB lasts for many seconds, hence the flush by time. A
+# kill may cost a second; some of that is left for frames that are still on
+# their way to the file.
+_FLUSH_PERIOD_NS = 800_000_000
+
+
+class RecordedMessage(NamedTuple):
+    """A message as `BagWriter.write` takes it.
+
+    Attributes:
+        topic: its name.
+        stamp_ns: the message's time [ns].
+        data: the serialised message.
+        sequence: the message's number on its topic.
+    """
+
+    topic: str
+    stamp_ns: int
+    data: bytes
+    sequence: int
+
+
+class BagWriter:
+    """A context manager that writes one recording.
+
+    Leaving the context normally completes the recording. Leaving it by an
+    exception closes what was recorded as a shorter but valid MCAP file that
+    keeps its `.part` name. The same calls give the same bytes, whatever an
+    interrupted run had left.
+
+    Example:
+        from cns_drake import BagWriter, recording_topics
+
+        topics = recording_topics(["lidar"])
+        with BagWriter(
+            folder, topics, start_ns=0, attachments={}, scenario={}
+        ) as bag:
+            simulate_with(bag)
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        topics: Sequence[Topic],
+        *,
+        start_ns: int,
+        attachments: Mapping[str, object],
+        scenario: Mapping[str, object],
+        custom_data: Mapping[str, str] | None = None,
+        overwrite: bool = False,
+    ):
+        """Checks the target; nothing is written before the context opens.
+
+        Args:
+            folder: the rosbag2 folder; its last part names the recording.
+            topics: every topic, in the order of the file's channels.
+            start_ns: time of the first message, also the nominal time of
+                the attachments [ns].
+            attachments: file name -> JSON value, put before all messages.
+                They tell whether an interrupted recording is of the same
+                kind, so that its messages can be taken over.
+            scenario: what `scenario.yaml` beside the MCAP shall hold.
+            custom_data: key -> text for `ros2 bag info`.
+            overwrite: whether an existing recording may be replaced. A
+                finished one is kept until the new one is complete.
+
+        Raises:
+            InputError: if the folder must not be used, see
+                `RecordingFolder.check`.
+        """
+        self._files = RecordingFolder(folder)
+        self._overwrite = overwrite
+        self._files.check(overwrite)
+        self._topics = tuple(topics)
+        self._start_ns = start_ns
+        self._attachments = dict(attachments)
+        self._scenario = scenario
+        self._custom_data = dict(custom_data or {})
+        self._part = part_path(self._files.mcap)
+        self._counts = {topic.name: 0 for topic in self._topics}
+        self._first_ns: int | None = None
+        self._last_ns: int | None = None
+        self._flushed_ns = start_ns
+        # False while a record is being written: if that is interrupted, the
+        # writer's index no longer describes the file and must not be used.
+        self._intact = False
+
+    def __enter__(self) -> BagWriter:
+        """Creates the folder, the MCAP and what precedes the messages.
+
+        Raises:
+            InputError: if the folder or the file cannot be written, another
+                process is writing it, or what an interrupted run left is no
+                part of this recording.
+        """
+        with user_errors(self._files.path):
+            self._files.path.mkdir(parents=True, exist_ok=True)
+        self._files.check(self._overwrite)
+        with user_errors(self._part):
+            self._stream = self._open_part()
+        try:
+            with self._writing():
+                self._writer, self._channel_ids = self._begin(self._stream)
+        except BaseException:
+            self._close_part()
+            raise
+        return self
+
+    def __exit__(
+        self,
+        exception_type: type[BaseException] | None,
+        exception: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Completes the recording, or closes the part of it that exists.
+
+        Raises:
+            InputError: if the files cannot be completed, e.g. on a full
+                disk; nothing has got a final name then.
+        """
+        if exception_type is not None:
+            self._close_part()
+            return
+        try:
+            with self._writing():
+                self._end()
+                self._stream.finish()
+            self._publish()
+        finally:
+            self._close_stream()
+
+    def follows_interruption(self) -> bool:
+        """Tells whether an interrupted run has left anything to take over.
+
+        It does so as long as nothing but that has been written.
+        """
+        return self._stream.replaying
+
+    def interrupted(self) -> Iterator[RecordedMessage]:
+        """Yields the messages that an interrupted run recorded.
+
+        They must be written before any other message, in this order and
+        while this iterator goes on, to be taken over; it ends where the file
+        is damaged.
+
+        Raises:
+            InputError: if the file cannot be read.
+        """
+        topics: dict[int, str] = {}
+        with user_errors(self._part), open(self._part, "rb") as stream:
+            for record in read_records(stream):
+                if isinstance(record, Fault):
+                    return
+                if isinstance(record, Channel):
+                    topics[record.id] = record.topic
+                elif isinstance(record, Message):
+                    if record.channel_id not in topics:
+                        return
+                    yield RecordedMessage(
+                        topics[record.channel_id],
+                        record.log_time,
+                        record.data,
+                        record.sequence,
+                    )
+
+    def write(
+        self, topic: str, stamp_ns: int, data: bytes, sequence: int
+    ) -> None:
+        """Appends one message; messages must come in the order of time.
+
+        Args:
+            topic: name of one of the topics.
+            stamp_ns: the message's time [ns].
+            data: the serialised message.
+            sequence: the message's number on its topic.
+
+        Raises:
+            InputError: if the file cannot be written, e.g. on a full disk.
+        """
+        channel_id = self._channel_ids[topic]
+        with self._writing():
+            if stamp_ns - self._flushed_ns >= _FLUSH_PERIOD_NS:
+                self._writer.flush()
+                self._flushed_ns = stamp_ns
+            self._writer.add_message(
+                channel_id, stamp_ns, data, stamp_ns, sequence
+            )
+        self._counts[topic] += 1
+        if self._first_ns is None:
+            self._first_ns = stamp_ns
+        self._last_ns = stamp_ns
+
+    def _open_part(self) -> PartFile:
+        """Opens the part file, empty or with what can be taken over."""
+        preamble = io.BytesIO()
+        self._begin(preamble)
+        if (
+            self._files.mcap.is_file()
+            and not self._files.is_finished()
+            and not self._part.exists()
+        ):
+            # Interrupted between the final names of the files.
+            stream = PartFile(self._files.mcap)
+            if stream.starts_like(preamble.getvalue()):
+                os.replace(self._files.mcap, self._part)
+                return stream
+            stream.close()
+            self._refuse_other_recording()
+        stream = PartFile(self._part)
+        if not stream.starts_like(preamble.getvalue()):
+            try:
+                self._refuse_other_recording()
+                stream.clear()
+            except BaseException:
+                stream.close()
+                raise
+        return stream
+
+    def _refuse_other_recording(self) -> None:
+        if not self._overwrite:
+            raise InputError(
+                f"{self._files.path}: the folder already exists and holds an "
+                "interrupted recording of another scenario, world or version "
+                "(--overwrite discards it)"
+            )
+
+    def _begin(self, stream: BinaryIO) -> tuple[Writer, dict[str, int]]:
+        """Writes what precedes the messages.
+
+        Returns:
+            The writer, and topic -> channel id.
+        """
+        writer = Writer(
+            stream,
+            chunk_size=_CHUNK_BYTES,
+            compression=CompressionType.ZSTD,
+        )
+        writer.start(profile="ros2", library=f"cns-drake {__version__}")
+        for name, value in self._attachments.items():
+            writer.add_attachment(
+                self._start_ns,
+                self._start_ns,
+                name,
+                "application/json",
+                _to_json(value),
+            )
+        schema_ids = {
+            message_type: writer.register_schema(
+                message_type,
+                "ros2msg",
+                messages.message_definition(message_type).encode(),
+            )
+            for message_type in dict.fromkeys(
+                topic.message_type for topic in self._topics
+            )
+        }
+        channel_ids = {
+            topic.name: writer.register_channel(
+                topic.name,
+                "cdr",
+                schema_ids[topic.message_type],
+                {
+                    "offered_qos_profiles": make_qos_yaml(topic),
+                    "topic_type_hash": messages.message_hash(
+                        topic.message_type
+                    ),
+                },
+            )
+            for topic in self._topics
+        }
+        writer.flush()
+        return writer, channel_ids
+
+    def _end(self) -> None:
+        self._writer.add_metadata(
+            "rosbag2", {"serialized_metadata": to_yaml(self._information())}
+        )
+        self._writer.finish()
+        self._stream.flush()
+
+    def _publish(self) -> None:
+        """Gives the finished files their final names, `metadata.yaml` last.
+
+        All files are whole under their `.part` names before the first is
+        renamed. An old `metadata.yaml` goes first: it must never describe
+        the new MCAP.
+        """
+        files = self._files
+        metadata = {"rosbag2_bagfile_information": self._information()}
+        write_part(files.scenario, to_yaml(self._scenario))
+        write_part(files.metadata, to_yaml(metadata))
+        with user_errors(files.metadata):
+            files.metadata.unlink(missing_ok=True)
+        for path in (files.mcap, files.scenario, files.metadata):
+            complete_part(path)
+
+    def _close_part(self) -> None:
+        """Ends an incomplete file as well as its state allows."""
+        # The exception on its way is the fault to report, not a second one
+        # that comes of it. As long as nothing new was written, the file is
+        # better than what could be written.
+        with contextlib.suppress(InputError):
+            if self._intact and not self._stream.replaying:
+                with self._writing():
+                    self._end()
+        self._close_stream()
+
+    def _close_stream(self) -> None:
+        # Whatever mattered has been flushed or has failed already; closing
+        # flushes again and, on a full disk, would only repeat the error.
+        with contextlib.suppress(OSError):
+            self._stream.close()
+
+    @contextlib.contextmanager
+    def _writing(self) -> Iterator[None]:
+        self._intact = False
+        with user_errors(self._part):
+            yield
+        self._intact = True
+
+    def _information(self) -> dict:
+        """Returns rosbag2's description of the file."""
+        first_ns = self._start_ns if self._first_ns is None else self._first_ns
+        last_ns = first_ns if self._last_ns is None else self._last_ns
+        return make_bag_information(
+            self._files.mcap.name,
+            {
+                make_topic_metadata(topic): self._counts[topic.name]
+                for topic in self._topics
+            },
+            start_ns=first_ns,
+            end_ns=last_ns,
+            custom_data=self._custom_data,
+        )
+
+
+def _to_json(value: Any) -> bytes:
+    text = json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False)
+    return text.encode()

@@ -1,0 +1,225 @@
+"""ROS 2 messages of a recording: building and serialising them.
+
+Definitions, serialisation (CDR) and type hashes come from rosbags' table of
+ROS 2 Humble types; this file only fills in the values. Poses go in as Drake
+types; stamps are whole nanoseconds, so that no rounding happens here.
+Quaternions leave in ROS order (x, y, z, w).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.math import SpatialVelocity
+from rosbags.typesys import Stores, get_typestore
+
+MAP_FRAME = "map"
+BASE_FRAME = "base_link"
+IMU_FRAME = "imu"
+
+POINT_CLOUD = "sensor_msgs/msg/PointCloud2"
+IMU = "sensor_msgs/msg/Imu"
+ODOMETRY = "nav_msgs/msg/Odometry"
+TF = "tf2_msgs/msg/TFMessage"
+
+_TYPESTORE = get_typestore(Stores.ROS2_HUMBLE)
+
+# NumPy type -> datatype constant of sensor_msgs/msg/PointField.
+_POINT_FIELD_DATATYPES = {
+    np.dtype("<i1"): 1,
+    np.dtype("<u1"): 2,
+    np.dtype("<i2"): 3,
+    np.dtype("<u2"): 4,
+    np.dtype("<i4"): 5,
+    np.dtype("<u4"): 6,
+    np.dtype("<f4"): 7,
+    np.dtype("<f8"): 8,
+}
+
+
+def message_definition(message_type: str) -> str:
+    """Returns the .msg text of a type with the types it depends on."""
+    text, _ = _TYPESTORE.generate_msgdef(message_type, ros_version=2)
+    return text
+
+
+def message_hash(message_type: str) -> str:
+    """Returns the type's hash in REP-2011 form (`RIHS01_...`)."""
+    return _TYPESTORE.hash_rihs01(message_type)
+
+
+def serialize(message: Any) -> bytes:
+    """Returns the CDR form of a message made by this module."""
+    return bytes(_TYPESTORE.serialize_cdr(message, message.__msgtype__))
+
+
+def make_point_cloud(points: np.ndarray, frame_id: str, stamp_ns: int) -> Any:
+    """Returns a PointCloud2 whose records are those of `points`.
+
+    Args:
+        points: structured array of shape (N,), little-endian scalar fields;
+            each becomes a point field under its own name and offset.
+            Padding is written as zeros, so that equal points give equal
+            bytes.
+        frame_id: the frame in which the points are expressed.
+        stamp_ns: the time of the scan [ns].
+
+    Returns:
+        An unordered (height 1) and dense cloud: there is no record for a
+        ray without a return.
+    """
+    packed = np.zeros(len(points), dtype=points.dtype)
+    for name in points.dtype.names:
+        packed[name] = points[name]
+    point_field = _message_class("sensor_msgs/msg/PointField")
+    fields = [
+        point_field(
+            name=name,
+            offset=packed.dtype.fields[name][1],
+            datatype=_POINT_FIELD_DATATYPES[packed.dtype.fields[name][0]],
+            count=1,
+        )
+        for name in packed.dtype.names
+    ]
+    return _message_class(POINT_CLOUD)(
+        header=_make_header(frame_id, stamp_ns),
+        height=1,
+        width=len(packed),
+        fields=fields,
+        is_bigendian=False,
+        point_step=packed.itemsize,
+        row_step=packed.nbytes,
+        data=packed.view(np.uint8),
+        is_dense=True,
+    )
+
+
+def make_imu(
+    R_WI: RotationMatrix,
+    angular_velocity: np.ndarray,
+    specific_force: np.ndarray,
+    stamp_ns: int,
+) -> Any:
+    """Returns an Imu message of an ideal sensor.
+
+    Args:
+        R_WI: orientation of the imu frame I in the map W.
+        angular_velocity: w_WI_I, shape (3,) [rad/s].
+        specific_force: what an accelerometer feels, expressed in I, shape
+            (3,) [m/s^2]; at rest on level ground +9.81 along z.
+        stamp_ns: the time of the measurement [ns].
+
+    Returns:
+        The message; its covariances are zero, since nothing is uncertain.
+    """
+    return _message_class(IMU)(
+        header=_make_header(IMU_FRAME, stamp_ns),
+        orientation=_make_quaternion(R_WI),
+        orientation_covariance=np.zeros(9),
+        angular_velocity=_make_vector(angular_velocity),
+        angular_velocity_covariance=np.zeros(9),
+        linear_acceleration=_make_vector(specific_force),
+        linear_acceleration_covariance=np.zeros(9),
+    )
+
+
+def make_odometry(
+    X_WB: RigidTransform, V_WB_B: SpatialVelocity, stamp_ns: int
+) -> Any:
+    """Returns an Odometry message: pose in the map, twist in the vehicle.
+
+    Args:
+        X_WB: exact pose of the vehicle B in the map W.
+        V_WB_B: its spatial velocity, expressed in B [rad/s, m/s].
+        stamp_ns: the time of both [ns].
+
+    Returns:
+        The message; its covariances are zero, since nothing is uncertain.
+    """
+    pose = _message_class("geometry_msgs/msg/Pose")(
+        position=_make_point(X_WB.translation()),
+        orientation=_make_quaternion(X_WB.rotation()),
+    )
+    twist = _message_class("geometry_msgs/msg/Twist")(
+        linear=_make_vector(V_WB_B.translational()),
+        angular=_make_vector(V_WB_B.rotational()),
+    )
+    return _message_class(ODOMETRY)(
+        header=_make_header(MAP_FRAME, stamp_ns),
+        child_frame_id=BASE_FRAME,
+        pose=_message_class("geometry_msgs/msg/PoseWithCovariance")(
+            pose=pose, covariance=np.zeros(36)
+        ),
+        twist=_message_class("geometry_msgs/msg/TwistWithCovariance")(
+            twist=twist, covariance=np.zeros(36)
+        ),
+    )
+
+
+def make_tf(
+    parent: str, X_PCs: dict[str, RigidTransform], stamp_ns: int
+) -> Any:
+    """Returns a TFMessage with the poses of child frames in one parent.
+
+    Args:
+        parent: name of the parent frame P.
+        X_PCs: name of each child frame C -> its pose in P.
+        stamp_ns: the time of all of them [ns].
+    """
+    transform = _message_class("geometry_msgs/msg/Transform")
+    transform_stamped = _message_class("geometry_msgs/msg/TransformStamped")
+    return _message_class(TF)(
+        transforms=[
+            transform_stamped(
+                header=_make_header(parent, stamp_ns),
+                child_frame_id=child,
+                transform=transform(
+                    translation=_make_vector(X_PC.translation()),
+                    rotation=_make_quaternion(X_PC.rotation()),
+                ),
+            )
+            for child, X_PC in X_PCs.items()
+        ]
+    )
+
+
+def to_quat_xyzw(R: RotationMatrix) -> tuple[float, float, float, float]:
+    """Returns the unit quaternion of a rotation in ROS order."""
+    quaternion = R.ToQuaternion()
+    return (
+        quaternion.x(),
+        quaternion.y(),
+        quaternion.z(),
+        quaternion.w(),
+    )
+
+
+def _message_class(message_type: str) -> type:
+    return _TYPESTORE.types[message_type]
+
+
+def _make_header(frame_id: str, stamp_ns: int) -> Any:
+    sec, nanosec = divmod(stamp_ns, 1_000_000_000)
+    time = _message_class("builtin_interfaces/msg/Time")
+    return _message_class("std_msgs/msg/Header")(
+        stamp=time(sec=sec, nanosec=nanosec), frame_id=frame_id
+    )
+
+
+def _make_quaternion(R: RotationMatrix) -> Any:
+    x, y, z, w = to_quat_xyzw(R)
+    return _message_class("geometry_msgs/msg/Quaternion")(x=x, y=y, z=z, w=w)
+
+
+def _make_vector(xyz: np.ndarray) -> Any:
+    return _message_class("geometry_msgs/msg/Vector3")(
+        x=float(xyz[0]), y=float(xyz[1]), z=float(xyz[2])
+    )
+
+
+def _make_point(xyz: np.ndarray) -> Any:
+    return _message_class("geometry_msgs/msg/Point")(
+        x=float(xyz[0]), y=float(xyz[1]), z=float(xyz[2])
+    )

@@ -1,0 +1,302 @@
+"""Making a whole MCAP file of whatever is readable of a damaged one."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+import contextlib
+from dataclasses import dataclass
+import itertools
+import os
+from pathlib import Path
+from typing import BinaryIO
+
+from mcap.records import (
+    Attachment,
+    Channel,
+    Header,
+    McapRecord,
+    Message,
+    Metadata,
+    Schema,
+)
+from mcap.writer import CompressionType, Writer
+
+from cns_drake import __version__
+from cns_drake.recording.mcap_recovery import Fault, read_records
+from cns_drake.recording.rosbag2_metadata import (
+    TopicMetadata,
+    make_bag_information,
+    to_yaml,
+)
+from evaluation.support.errors import InputError
+from evaluation.support.files import (
+    check_writable,
+    complete_part,
+    part_path,
+    user_errors,
+)
+
+# Schemas and channels are kept in memory; more of them is no recording.
+_DEFINITIONS_LIMIT = 64 * 1024 * 1024
+_ROSBAG2 = "rosbag2"
+
+# Reports that so many bytes of so many are done.
+BytesCallback = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Repair:
+    """What came out of a repair.
+
+    Attributes:
+        output: the new file.
+        num_messages: messages recovered.
+        seconds: time from the earliest of them to the latest [s].
+        num_faults: places that could not be read; 0 if the file was whole.
+        first_fault: the first of them, in words.
+    """
+
+    output: Path
+    num_messages: int
+    seconds: float
+    num_faults: int
+    first_fault: str
+
+
+def repair_mcap(
+    path: Path,
+    output: Path | None = None,
+    on_bytes: BytesCallback = lambda done, total: None,
+) -> Repair:
+    """Writes the readable part of an MCAP file as a whole, indexed file.
+
+    Messages keep their order, times, numbers and bytes; attachments and
+    metadata are kept as well. A file of ROS 2 gets a `rosbag2` record that
+    counts what is there, so that it opens without a folder around it.
+
+    Args:
+        path: any MCAP file, or what is left of one; it is only read.
+        output: the new file; by default `<name>_repaired.mcap` beside it.
+        on_bytes: is told about progress.
+
+    Raises:
+        InputError: nothing can be read, or the new file exists already or
+            cannot be written.
+    """
+    output = output or _default_output(path)
+    with user_errors(path):
+        if not path.is_file():
+            raise InputError(f"{path}: no such file")
+        size = path.stat().st_size
+    with user_errors(output):
+        if output.exists():
+            raise InputError(f"{output}: the file already exists")
+    # Definitions may come behind messages that need them.
+    definitions = _Definitions()
+    for record in _read(path, lambda done: on_bytes(done, 2 * size)):
+        definitions.take(record, path)
+    if definitions.header is None and not definitions.channels:
+        raise InputError(f"{path}: nothing of an MCAP file can be read")
+    check_writable(output)
+    part = part_path(output)
+    try:
+        with user_errors(part), open(part, "wb") as stream:
+            copy = _Copy(stream, definitions)
+            for record in _read(
+                path, lambda done: on_bytes(size + done, 2 * size)
+            ):
+                copy.take(record)
+            copy.finish(output.name)
+            stream.flush()
+            os.fsync(stream.fileno())
+        complete_part(output)
+        on_bytes(2 * size, 2 * size)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            part.unlink()
+        raise
+    return Repair(
+        output=output,
+        num_messages=sum(copy.counts.values()),
+        seconds=(copy.end_ns - copy.start_ns) / 1e9,
+        num_faults=copy.num_faults,
+        first_fault=copy.first_fault,
+    )
+
+
+def _default_output(path: Path) -> Path:
+    stem = path.name.removesuffix(".part").removesuffix(".mcap")
+    return path.with_name(f"{stem}_repaired.mcap")
+
+
+def _read(
+    path: Path, on_position: Callable[[int], None]
+) -> Iterator[McapRecord | Fault]:
+    with user_errors(path), open(path, "rb") as stream:
+        for record in read_records(stream):
+            on_position(stream.tell())
+            yield record
+
+
+class _Definitions:
+    """What messages refer to.
+
+    Attributes:
+        header: the file's, if it is readable.
+        schemas: by id; the first one of an id counts.
+        channels: likewise, but only those whose schema is known.
+    """
+
+    def __init__(self) -> None:
+        self.header: Header | None = None
+        self.schemas: dict[int, Schema] = {}
+        self._all_channels: dict[int, Channel] = {}
+        self._kept_bytes = 0
+
+    @property
+    def channels(self) -> dict[int, Channel]:
+        return {
+            number: channel
+            for number, channel in self._all_channels.items()
+            if channel.schema_id == 0 or channel.schema_id in self.schemas
+        }
+
+    def take(self, record: McapRecord | Fault, path: Path) -> None:
+        """Keeps what a record defines.
+
+        Raises:
+            InputError: the file defines more than any recording does.
+        """
+        if isinstance(record, Header) and self.header is None:
+            self.header = record
+            kept: tuple = (record.profile,)
+        elif isinstance(record, Schema) and record.id not in self.schemas:
+            self.schemas[record.id] = record
+            kept = (record.name, record.encoding, record.data)
+        elif (
+            isinstance(record, Channel) and record.id not in self._all_channels
+        ):
+            self._all_channels[record.id] = record
+            kept = (record.topic, *itertools.chain(*record.metadata.items()))
+        elif isinstance(record, Attachment):  # Its names go into an index.
+            kept = (record.name, record.media_type)
+        elif isinstance(record, Metadata):
+            kept = (record.name,)
+        else:
+            return
+        self._kept_bytes += 100 + sum(map(len, kept))
+        if self._kept_bytes > _DEFINITIONS_LIMIT:
+            raise InputError(
+                f"{path}: more topics, types and attachments than any "
+                "recording has"
+            )
+
+
+class _Copy:
+    """A whole MCAP file in the making.
+
+    Attributes:
+        counts: messages by the channel id of the source.
+        start_ns: time of the earliest message [ns].
+        end_ns: time of the latest message [ns].
+        num_faults: places that could not be read.
+        first_fault: the first of them, in words.
+    """
+
+    def __init__(self, stream: BinaryIO, definitions: _Definitions):
+        self.counts: Counter[int] = Counter()
+        self.start_ns = 0
+        self.end_ns = 0
+        self.num_faults = 0
+        self.first_fault = ""
+        self._channels = definitions.channels
+        self._schemas = definitions.schemas
+        self._profile = ""
+        if definitions.header is not None:
+            self._profile = definitions.header.profile
+        self._writer = Writer(stream, compression=CompressionType.ZSTD)
+        self._writer.start(
+            profile=self._profile, library=f"cns-drake {__version__} repair"
+        )
+        schema_ids = {0: 0} | {
+            number: self._writer.register_schema(
+                schema.name, schema.encoding, schema.data
+            )
+            for number, schema in self._schemas.items()
+        }
+        self._channel_ids = {
+            number: self._writer.register_channel(
+                channel.topic,
+                channel.message_encoding,
+                schema_ids[channel.schema_id],
+                channel.metadata,
+            )
+            for number, channel in self._channels.items()
+        }
+
+    def take(self, record: McapRecord | Fault) -> None:
+        """Writes a record."""
+        if isinstance(record, Message):
+            self._take_message(record)
+        elif isinstance(record, Attachment):
+            self._writer.add_attachment(
+                record.create_time,
+                record.log_time,
+                record.name,
+                record.media_type,
+                record.data,
+            )
+        elif isinstance(record, Metadata) and record.name != _ROSBAG2:
+            self._writer.add_metadata(record.name, record.metadata)
+        elif isinstance(record, Fault):
+            self._fault(str(record))
+
+    def finish(self, file_name: str) -> None:
+        """Writes what follows the messages."""
+        if self._profile == "ros2":
+            information = make_bag_information(
+                file_name,
+                {
+                    self._topic_metadata(channel): self.counts[number]
+                    for number, channel in self._channels.items()
+                },
+                start_ns=self.start_ns,
+                end_ns=self.end_ns,
+                custom_data={},
+            )
+            self._writer.add_metadata(
+                _ROSBAG2, {"serialized_metadata": to_yaml(information)}
+            )
+        self._writer.finish()
+
+    def _take_message(self, message: Message) -> None:
+        if message.channel_id not in self._channel_ids:
+            self._fault("messages of an unknown topic")
+            return
+        if not self.counts:
+            self.start_ns = self.end_ns = message.log_time
+        self.start_ns = min(self.start_ns, message.log_time)
+        self.end_ns = max(self.end_ns, message.log_time)
+        self.counts[message.channel_id] += 1
+        self._writer.add_message(
+            self._channel_ids[message.channel_id],
+            message.log_time,
+            message.data,
+            message.publish_time,
+            message.sequence,
+        )
+
+    def _fault(self, text: str) -> None:
+        self.num_faults += 1
+        self.first_fault = self.first_fault or text
+
+    def _topic_metadata(self, channel: Channel) -> TopicMetadata:
+        schema = self._schemas.get(channel.schema_id)
+        return TopicMetadata(
+            name=channel.topic,
+            message_type=schema.name if schema else "",
+            serialization_format=channel.message_encoding,
+            qos_yaml=channel.metadata.get("offered_qos_profiles", ""),
+            message_hash=channel.metadata.get("topic_type_hash", ""),
+        )

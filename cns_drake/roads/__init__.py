@@ -1,0 +1,1 @@
+"""Road networks, and the ways along their lanes."""

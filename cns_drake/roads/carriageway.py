@@ -1,0 +1,231 @@
+"""Areas of a road network: carriageway, sidewalks, medians, bays, lanes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+import itertools
+from typing import TYPE_CHECKING
+
+import numpy as np
+from shapely import GEOSException, set_precision, unary_union
+from shapely.geometry import LineString, MultiPolygon, Point, Polygon
+from shapely.geometry.base import BaseGeometry
+
+if TYPE_CHECKING:
+    from cns_drake.roads.network import Arm, Junction
+    from cns_drake.roads.road import Road
+
+# Segments of a quarter circle in rounded outlines: a kerb of 13 m radius is
+# then true to 6 cm.
+_QUADRANT_SEGMENTS = 8
+# Outlines have their vertices on a grid of this width [m].
+_GRID = 0.001
+# Vertices closer to the outline than this are dropped [m].
+_SIMPLIFY = 0.01
+# Areas that meet are joined over slits up to twice this width, as they stay
+# open where roads end beside one another at a slant [m].
+_SEAM = 0.25
+# Junctions are drawn so far into their roads, then cut off at the roads'
+# ends; what is left beside them is at most as thick, and dropped [m].
+_OVERLAP = 0.5
+# A parking bay keeps clear of the junction at each end of its road [m].
+_BAY_CLEARANCE = 3.0
+
+
+@dataclass(frozen=True)
+class Areas:
+    """What `RoadNetwork` exposes by the same names."""
+
+    carriageway: MultiPolygon
+    lane_area: MultiPolygon
+    sidewalks: MultiPolygon
+    medians: MultiPolygon
+    parking_bays: dict[tuple[str, str], Polygon]
+
+
+def corner_setback(
+    half_width: float, other_half_width: float, angle: float, kerb_radius: float
+) -> float:
+    """Returns how far from a junction's position a road must end [m].
+
+    There the kerb of the given radius between two neighbouring roads
+    touches the road's edge. The edges meet at (b + a cos(angle)) /
+    sin(angle) along the road, and the arc begins r / tan(angle / 2) behind.
+
+    Args:
+        half_width, other_half_width: a of the road, b of its neighbour [m].
+        angle: between the two roads [rad].
+        kerb_radius: r [m].
+    """
+    # Roads that lie upon one another never part.
+    if angle < 1e-6:
+        return np.inf
+    # Towards a straight angle the corner, and with it the need, vanishes.
+    if angle > np.radians(150.0):
+        return kerb_radius
+    edge = (other_half_width + half_width * np.cos(angle)) / np.sin(angle)
+    return max(kerb_radius, edge + kerb_radius / np.tan(angle / 2))
+
+
+def road_strip(road: Road) -> Polygon:
+    """Returns a road's carriageway between its junctions, without bays."""
+    return _band(road, -road.half_width, road.half_width)
+
+
+def _band(
+    road: Road, right: float, left: float, clearance: float = 0.0
+) -> Polygon:
+    """Returns the area between two lateral offsets of the centreline."""
+    stations = road.stations(clearance=clearance)
+    outline = [
+        road.evaluate(stations, left)[:, :2],
+        road.evaluate(stations, right)[::-1, :2],
+    ]
+    return _simplified(Polygon(np.concatenate(outline)))
+
+
+def junction_area(roads: Mapping[str, Road], junction: Junction) -> Polygon:
+    """Returns the area between the ends of a junction's roads.
+
+    The continuations of the roads to the junction's position are united, the
+    corners between them filled up to a kerb of the junction's radius, and
+    the roads themselves cut away. At a dead end a disc takes the place of
+    the other roads.
+    """
+    stubs = [_stub(roads[arm.road], arm) for arm in junction.arms]
+    parts = [
+        line.buffer(arm.half_width, cap_style="flat")
+        for line, arm in zip(stubs, junction.arms, strict=True)
+    ]
+    if len(stubs) == 1:
+        parts.append(
+            Point(junction.position).buffer(
+                junction.kerb_radius, quad_segs=_QUADRANT_SEGMENTS
+            )
+        )
+    # Bends of a through road leave a wedge at the outside; close it.
+    for (a, line_a), (b, line_b) in itertools.combinations(
+        zip(junction.arms, stubs, strict=True), 2
+    ):
+        through = LineString([*line_a.coords[::-1], *line_b.coords[1:]])
+        width = min(a.half_width, b.half_width)
+        parts.append(through.buffer(width, cap_style="flat"))
+    area = unary_union(parts)
+    radius = junction.kerb_radius
+    area = area.buffer(radius, quad_segs=4 * _QUADRANT_SEGMENTS).buffer(
+        -radius, quad_segs=_QUADRANT_SEGMENTS
+    )
+    for arm in junction.arms:
+        area = area.difference(road_strip(roads[arm.road]))
+    # Cutting can leave splinters and crumbs beside a road's end.
+    area = area.buffer(-_OVERLAP, join_style="mitre").buffer(
+        _OVERLAP, join_style="mitre"
+    )
+    pieces = getattr(area, "geoms", [area])
+    centre = Point(junction.position)
+    return _simplified(min(pieces, key=lambda piece: piece.distance(centre)))
+
+
+def _stub(road: Road, arm: Arm) -> LineString:
+    """Returns an arm's centreline, from the junction past its setback."""
+    reach = arm.setback + _OVERLAP
+    stations = np.linspace(0.0, reach, int(np.ceil(reach)) + 1)
+    if arm.end == "end":
+        stations = road.full_length - stations
+    return LineString(road.evaluate(stations)[:, :2])
+
+
+def make_areas(
+    roads: Mapping[str, Road], junction_areas: Mapping[str, Polygon]
+) -> Areas:
+    """Returns the areas of a whole network.
+
+    Args:
+        roads: the roads by name.
+        junction_areas: the area of each junction by name.
+    """
+    lanes = {name: road_strip(road) for name, road in roads.items()}
+    bays = {}
+    for name, road in roads.items():
+        if road.parking > 0 and road.length > 2 * _BAY_CLEARANCE:
+            edge, far = road.half_width, road.half_width + road.parking
+            for side, offsets in (
+                ("right", (-far, -edge)),
+                ("left", (edge, far)),
+            ):
+                bays[name, side] = _band(road, *offsets, _BAY_CLEARANCE)
+    medians = [
+        _median(road)
+        for road in roads.values()
+        if 0 < road.median < road.length
+    ]
+    without_bays = _join([*lanes.values(), *junction_areas.values()])
+    carriageway = _join([without_bays, *bays.values()])
+    walks = [
+        lanes[name].buffer(road.sidewalk, quad_segs=_QUADRANT_SEGMENTS)
+        for name, road in roads.items()
+    ]
+    for name, area in junction_areas.items():
+        width = min(
+            road.sidewalk
+            for road in roads.values()
+            if name in (road.start, road.end)
+        )
+        walks.append(area.buffer(width, quad_segs=_QUADRANT_SEGMENTS))
+    medians = unary_union(medians)
+    outline = _simplified(_join(walks))
+    return Areas(
+        carriageway=_multi(carriageway.difference(medians)),
+        lane_area=_multi(without_bays.difference(medians)),
+        sidewalks=_multi(outline.difference(carriageway)),
+        medians=_multi(medians),
+        parking_bays=bays,
+    )
+
+
+def _median(road: Road) -> Polygon:
+    """Returns a median with round noses, between the ends of its road."""
+    half = road.median / 2
+    shift = (
+        road.lane_width * (road.lanes["forward"] - road.lanes["backward"]) / 2
+    )
+    stations = road.stations(clearance=half)
+    line = LineString(road.evaluate(stations, shift)[:, :2])
+    return _simplified(line.buffer(half, quad_segs=_QUADRANT_SEGMENTS))
+
+
+def _simplified(area: Polygon) -> Polygon:
+    """Returns an area without the vertices that its outline can do without.
+
+    On an evenly sampled arc many vertices are equally dispensable. Rounding
+    before, not after, makes the choice independent of the last bits, which
+    differ from one version of the numerical libraries to the next.
+
+    Raises:
+        ValueError: if the outline crosses itself.
+    """
+    try:
+        return set_precision(area, _GRID).simplify(_SIMPLIFY)
+    except GEOSException as error:
+        raise ValueError(
+            f"the outline crosses itself, as in too tight a bend ({error})"
+        ) from error
+
+
+def _join(parts: Iterable[BaseGeometry]) -> BaseGeometry:
+    """Returns the union, with the slits between neighbours closed."""
+    grown = unary_union(
+        [part.buffer(_SEAM, join_style="mitre") for part in parts]
+    )
+    return grown.buffer(-_SEAM, join_style="mitre")
+
+
+def _multi(area: BaseGeometry) -> MultiPolygon:
+    """Returns an area as a MultiPolygon, whatever shapely made of it."""
+    pieces = [
+        piece
+        for piece in getattr(area, "geoms", [area])
+        if isinstance(piece, Polygon) and not piece.is_empty
+    ]
+    return MultiPolygon(pieces)

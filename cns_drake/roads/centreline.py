@@ -1,0 +1,167 @@
+"""Plane curves of straight lines and arcs: the centrelines of roads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+# A fillet may overrun its segment by this much, so that two arcs can meet in
+# one point although corners are written down in centimetres [m].
+_FIT_TOLERANCE = 0.02
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """A line (zero curvature) or an arc from `start` with `heading`."""
+
+    start: np.ndarray
+    heading: float
+    curvature: float
+    length: float
+
+    def evaluate(self, s: np.ndarray) -> np.ndarray:
+        """Returns (N, 3) x, y [m] and heading [rad] at arc lengths s."""
+        heading = self.heading + self.curvature * s
+        # A chord of an arc is as long as sin(x)/x makes it and points to the
+        # mean heading; this form also holds for a line.
+        half = self.curvature * s / 2
+        chord = s * np.sinc(half / np.pi)
+        x = self.start[0] + chord * np.cos(self.heading + half)
+        y = self.start[1] + chord * np.sin(self.heading + half)
+        return np.stack([x, y, heading], axis=1)
+
+
+class Centreline:
+    """A polyline whose corners are rounded by arcs."""
+
+    def __init__(self, points: ArrayLike, radii: Sequence[float]) -> None:
+        """Rounds each inner corner by the arc of the given radius.
+
+        Args:
+            points: (N, 2) corners, first and last included [m].
+            radii: N - 2 radii of the inner corners [m].
+
+        Raises:
+            ValueError: a corner's arc does not fit between its neighbours,
+                or two consecutive points coincide.
+        """
+        points = np.asarray(points, dtype=float)
+        edges = np.diff(points, axis=0)
+        lengths = np.hypot(edges[:, 0], edges[:, 1])
+        if np.any(lengths < 1e-6):
+            raise ValueError("two consecutive points coincide")
+        headings = np.arctan2(edges[:, 1], edges[:, 0])
+        turns = (np.diff(headings) + np.pi) % (2 * np.pi) - np.pi
+        tangents = np.concatenate(
+            [[0.0], np.asarray(radii, float) * np.abs(np.tan(turns / 2)), [0.0]]
+        )
+        spare = lengths - tangents[:-1] - tangents[1:]
+        for segment in np.flatnonzero(spare < -_FIT_TOLERANCE):
+            raise ValueError(
+                f"the rounded corners at both ends of segment {segment} need "
+                f"{lengths[segment] - spare[segment]:.2f} m, it is "
+                f"{lengths[segment]:.2f} m long"
+            )
+        self._pieces: list[_Piece] = []
+        position, heading = points[0], headings[0]
+        for k, straight in enumerate(np.maximum(spare, 0.0)):
+            self._append(position, heading, 0.0, straight)
+            if k < len(turns):
+                direction = np.array([np.cos(headings[k]), np.sin(headings[k])])
+                position = points[k + 1] - tangents[k + 1] * direction
+                if tangents[k + 1] > 0:
+                    curvature = np.sign(turns[k]) / radii[k]
+                    length = abs(turns[k]) * radii[k]
+                    self._append(position, headings[k], curvature, length)
+                heading = headings[k + 1]
+                direction = np.array([np.cos(heading), np.sin(heading)])
+                position = points[k + 1] + tangents[k + 1] * direction
+        self._ends = np.cumsum([piece.length for piece in self._pieces])
+
+    def _append(
+        self, start: np.ndarray, heading: float, curvature: float, length: float
+    ) -> None:
+        if length > 0:
+            self._pieces.append(_Piece(start, heading, curvature, length))
+
+    @property
+    def length(self) -> float:
+        """The length [m]."""
+        return float(self._ends[-1])
+
+    def evaluate(self, s: ArrayLike) -> np.ndarray:
+        """Returns (N, 3) x, y [m] and heading [rad] at arc lengths s."""
+        s = np.asarray(s, dtype=float).clip(0.0, self.length)
+        index = np.searchsorted(self._ends, s, side="left")
+        index = np.minimum(index, len(self._pieces) - 1)
+        result = np.empty((len(s), 3))
+        for k, piece in enumerate(self._pieces):
+            chosen = index == k
+            local = s[chosen] - (self._ends[k] - piece.length)
+            result[chosen] = piece.evaluate(local)
+        return result
+
+
+def sample_stations(start: float, end: float, spacing: float) -> np.ndarray:
+    """Returns evenly spaced arc lengths from start to end, both included.
+
+    Args:
+        start, end: arc lengths [m], start < end.
+        spacing: upper bound of the distance between samples [m].
+    """
+    count = max(2, int(np.ceil((end - start) / spacing - 1e-9)) + 1)
+    return np.linspace(start, end, count)
+
+
+def blend(
+    p_start: ArrayLike,
+    heading_start: float,
+    p_end: ArrayLike,
+    heading_end: float,
+    spacing: float = 1.0,
+    max_radius: float = np.inf,
+) -> np.ndarray:
+    """Returns a smooth curve between two directed points.
+
+    Where the straight continuations meet ahead of the start and behind the
+    end, the curve is the widest allowed arc that touches both, with lines in
+    front of and behind it: what a driver does on a turn. Otherwise (parallel
+    lanes that are offset, S-bends) it is a cubic Hermite curve.
+
+    Args:
+        p_start, p_end: (2,) points [m].
+        heading_start, heading_end: directions of travel [rad].
+        spacing: about the distance between the returned points [m].
+        max_radius: of the arc [m].
+
+    Returns:
+        (N, 2) points [m], both ends included.
+    """
+    p_start, p_end = np.asarray(p_start, float), np.asarray(p_end, float)
+    d_start = np.array([np.cos(heading_start), np.sin(heading_start)])
+    d_end = np.array([np.cos(heading_end), np.sin(heading_end)])
+    sine = d_start[0] * d_end[1] - d_start[1] * d_end[0]
+    gap = p_end - p_start
+    if abs(sine) > 0.2:
+        ahead = (gap[0] * d_end[1] - gap[1] * d_end[0]) / sine
+        behind = (d_start[0] * gap[1] - d_start[1] * gap[0]) / sine
+        tangent = min(ahead, behind)
+        if tangent > 0.5:
+            cosine = float(d_start @ d_end)
+            widest = tangent / np.tan(np.arctan2(abs(sine), cosine) / 2)
+            corner = p_start + ahead * d_start
+            radius = min(widest, max_radius)
+            curve = Centreline([p_start, corner, p_end], [radius])
+            stations = sample_stations(0.0, curve.length, spacing)
+            return curve.evaluate(stations)[:, :2]
+    distance = float(np.hypot(*gap))
+    u = sample_stations(0.0, 1.0, spacing / max(distance, spacing))[:, None]
+    return (
+        (2 * u**3 - 3 * u**2 + 1) * p_start
+        + (u**3 - 2 * u**2 + u) * distance * d_start
+        + (3 * u**2 - 2 * u**3) * p_end
+        + (u**3 - u**2) * distance * d_end
+    )

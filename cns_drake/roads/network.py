@@ -1,0 +1,370 @@
+"""Roads and junctions of a town, with their lanes and areas."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+import itertools
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from shapely import STRtree
+from shapely.geometry import MultiPolygon, Polygon
+
+from cns_drake.roads import carriageway
+from cns_drake.roads.centreline import Centreline, blend
+from cns_drake.roads.road import DIRECTIONS, LaneRef, Road
+from cns_drake.roads.road_schema import (
+    RoadEntry,
+    RoadsFile,
+    read_roads_file,
+)
+from evaluation.support.errors import InputError
+
+Turn = Literal["left", "straight", "right"]
+
+# Beyond this change of heading a way through a junction is a turn.
+_STRAIGHT_LIMIT_DEG = 35.0
+# Beyond this one it is a U-turn, which is no way at all.
+_U_TURN_LIMIT_DEG = 150.0
+# Roads may touch by this much before they count as crossing [m^2].
+_CROSSING_TOLERANCE = 1.0
+
+
+@dataclass(frozen=True)
+class Arm:
+    """One road end at a junction.
+
+    Attributes:
+        road: name of the road.
+        end: which end of the road it is.
+        heading: direction of the centreline away from the junction [rad].
+        half_width: of the road's carriageway [m].
+        setback: distance from the junction's position to the road [m].
+    """
+
+    road: str
+    end: Literal["start", "end"]
+    heading: float
+    half_width: float
+    setback: float
+
+
+@dataclass(frozen=True)
+class Junction:
+    """Where roads meet; `arms` are ordered counter-clockwise."""
+
+    name: str
+    position: tuple[float, float]
+    height: float
+    kerb_radius: float
+    arms: tuple[Arm, ...]
+
+
+@dataclass(frozen=True)
+class Connection:
+    """A way through a junction from one lane to another.
+
+    Attributes:
+        junction: name of the junction.
+        incoming, outgoing: the lanes that it joins.
+        turn: whether it bends left, right or neither.
+        points: (N, 3) positions, both lane ends included [m].
+    """
+
+    junction: str
+    incoming: LaneRef
+    outgoing: LaneRef
+    turn: Turn
+    points: np.ndarray
+
+
+class RoadNetwork:
+    """Roads by name, junctions by name, and what follows from them."""
+
+    def __init__(self, roads: dict[str, Road], junctions: dict[str, Junction]):
+        self.roads = roads
+        self.junctions = junctions
+
+    def exit_junction(self, lane: LaneRef) -> str:
+        """Returns the name of the junction that a lane leads to."""
+        road = self.roads[lane.road]
+        return road.end if lane.direction == "forward" else road.start
+
+    def entry_junction(self, lane: LaneRef) -> str:
+        """Returns the name of the junction that a lane comes from."""
+        road = self.roads[lane.road]
+        return road.start if lane.direction == "forward" else road.end
+
+    def connection(
+        self, incoming: LaneRef, outgoing: LaneRef, spacing: float = 1.0
+    ) -> Connection:
+        """Returns the way from one lane to another, legal or not.
+
+        Args:
+            incoming, outgoing: the lanes to join.
+            spacing: about the distance between its points [m].
+
+        Raises:
+            ValueError: a lane does not exist, the lanes do not meet in a
+                junction, or the way would be a U-turn.
+        """
+        junction = self.exit_junction(incoming)
+        if junction != self.entry_junction(outgoing):
+            raise ValueError(
+                f"road {incoming.road} {incoming.direction} ends at "
+                f"{junction}, road {outgoing.road} {outgoing.direction} "
+                f"starts at {self.entry_junction(outgoing)}"
+            )
+        if self._is_u_turn(incoming, outgoing):
+            raise ValueError(
+                f"U-turn from road {incoming.road} to road {outgoing.road}"
+            )
+        a = self.roads[incoming.road].lane_end(*incoming[1:], "exit")
+        b = self.roads[outgoing.road].lane_end(*outgoing[1:], "entry")
+        place = self.junctions[junction]
+        turn = _classify(_turn_deg(a, b), len(place.arms))
+        # To the right, the outermost lane follows the kerb.
+        width = self.roads[outgoing.road].lane_width
+        radius = place.kerb_radius + width / 2 if turn == "right" else np.inf
+        xy = blend(a[:2], a[3], b[:2], b[3], spacing, radius)
+        z = np.full((len(xy), 1), place.height)
+        return Connection(
+            junction, incoming, outgoing, turn, np.hstack([xy, z])
+        )
+
+    def _is_u_turn(self, incoming: LaneRef, outgoing: LaneRef) -> bool:
+        """Tells whether two lanes that meet lead back where one came from.
+
+        That is so on one road, and where its directions part, for a
+        roundabout, say.
+        """
+        if incoming.road == outgoing.road:
+            return incoming.direction != outgoing.direction
+        a = self.roads[incoming.road].lane_end(*incoming[1:], "exit")
+        b = self.roads[outgoing.road].lane_end(*outgoing[1:], "entry")
+        return abs(_turn_deg(a, b)) > _U_TURN_LIMIT_DEG
+
+    def lanes(self) -> Iterator[LaneRef]:
+        """Yields every lane of every road."""
+        for road in self.roads.values():
+            for direction in DIRECTIONS:
+                for lane in range(1, road.lanes[direction] + 1):
+                    yield LaneRef(road.name, direction, lane)
+
+    def is_legal(self, connection: Connection) -> bool:
+        """Tells whether traffic may take a way through a junction.
+
+        A left turn leads from the innermost lane to the innermost lane, a
+        right turn from the outermost to the outermost; straight on, the lane
+        keeps its number, counted from the middle of the road. Between
+        one-way roads, those of a roundabout for example, the lane keeps its
+        number counted from the kerb on the right, whatever the turn.
+        """
+        incoming, outgoing = connection.incoming, connection.outgoing
+        if all(self._is_one_way(lane) for lane in (incoming, outgoing)):
+            return self._from_kerb(incoming) == self._from_kerb(outgoing)
+        if connection.turn == "left":
+            return incoming.lane == outgoing.lane == 1
+        if connection.turn == "straight":
+            return incoming.lane == outgoing.lane
+        return self._from_kerb(incoming) == self._from_kerb(outgoing) == 0
+
+    def _is_one_way(self, lane: LaneRef) -> bool:
+        return not all(self.roads[lane.road].lanes.values())
+
+    def _from_kerb(self, lane: LaneRef) -> int:
+        """Returns how many lanes lie between a lane and its kerb."""
+        return self.roads[lane.road].lanes[lane.direction] - lane.lane
+
+    def connections(self, junction: str) -> list[Connection]:
+        """Returns every legal way through a junction."""
+        lanes = list(self.lanes())
+        incoming = [a for a in lanes if self.exit_junction(a) == junction]
+        outgoing = [b for b in lanes if self.entry_junction(b) == junction]
+        ways = [
+            self.connection(a, b)
+            for a, b in itertools.product(incoming, outgoing)
+            if not self._is_u_turn(a, b)
+        ]
+        return [way for way in ways if self.is_legal(way)]
+
+    @cached_property
+    def _junction_areas(self) -> dict[str, Polygon]:
+        return {
+            junction.name: carriageway.junction_area(self.roads, junction)
+            for junction in self.junctions.values()
+        }
+
+    @cached_property
+    def _areas(self) -> carriageway.Areas:
+        return carriageway.make_areas(self.roads, self._junction_areas)
+
+    def junction_area(self, junction: str) -> Polygon:
+        """Returns a junction's area between the roads' ends and the kerbs."""
+        return self._junction_areas[junction]
+
+    def carriageway(self) -> MultiPolygon:
+        """Returns what lies between the kerbs, parking bays included."""
+        return self._areas.carriageway
+
+    def sidewalks(self) -> MultiPolygon:
+        """Returns the sidewalks along all roads and round all corners."""
+        return self._areas.sidewalks
+
+    def medians(self) -> MultiPolygon:
+        """Returns the kerbed strips between the directions."""
+        return self._areas.medians
+
+    def parking_bays(self) -> dict[tuple[str, str], Polygon]:
+        """Returns the bays by (road, "left" or "right" of `forward`)."""
+        return self._areas.parking_bays
+
+    def lane_area(self) -> MultiPolygon:
+        """Returns where vehicles drive: the carriageway without the bays."""
+        return self._areas.lane_area
+
+
+def _turn_deg(a: Sequence[float], b: Sequence[float]) -> float:
+    """Returns how far b's heading lies left of a's, both (x, y, z, heading)."""
+    return float(np.degrees((b[3] - a[3] + np.pi) % (2 * np.pi) - np.pi))
+
+
+def _classify(angle_deg: float, num_arms: int) -> Turn:
+    """Returns the kind of turn; where two roads merely join it is none."""
+    if num_arms == 2 or abs(angle_deg) <= _STRAIGHT_LIMIT_DEG:
+        return "straight"
+    return "left" if angle_deg > 0 else "right"
+
+
+def load_road_network(path: Path | str) -> RoadNetwork:
+    """Reads a `roads.yaml` and checks that it is a network.
+
+    Raises:
+        InputError: naming the file, the field and the fault; besides faults
+            of form these are a road to an unknown junction, a junction with
+            fewer than two roads, a road without lanes, a corner or junction
+            that does not fit, and roads that cross without a junction.
+    """
+    path = Path(path)
+    file = read_roads_file(path)
+    curves = {}
+    for name, entry in file.roads.items():
+        curves[name] = _make_curve(path, file, name, entry)
+    junctions = {
+        name: _make_junction(path, file, name, curves)
+        for name in file.junctions
+    }
+    roads = {}
+    for name, entry in file.roads.items():
+        setbacks = [
+            arm.setback
+            for junction, end in ((entry.start, "start"), (entry.end, "end"))
+            for arm in junctions[junction].arms
+            if (arm.road, arm.end) == (name, end)
+        ]
+        heights = [
+            file.junctions[junction].height
+            for junction in (entry.start, entry.end)
+        ]
+        try:
+            roads[name] = Road(name, entry, curves[name], setbacks, heights)
+        except ValueError as error:
+            raise InputError(f"{path}: roads.{name}: {error}") from error
+    network = RoadNetwork(roads, junctions)
+    _check_crossings(path, network)
+    return network
+
+
+def _make_curve(
+    path: Path, file: RoadsFile, name: str, entry: RoadEntry
+) -> Centreline:
+    for field in ("start", "end"):
+        junction = getattr(entry, field)
+        if junction not in file.junctions:
+            raise InputError(
+                f"{path}: roads.{name}.{field}: no junction {junction!r}"
+            )
+    if not any(entry.lanes):
+        raise InputError(f"{path}: roads.{name}.lanes: the road has no lane")
+    points = [
+        file.junctions[entry.start].position,
+        *((x, y) for x, y, _ in entry.via),
+        file.junctions[entry.end].position,
+    ]
+    try:
+        return Centreline(points, [radius for _, _, radius in entry.via])
+    except ValueError as error:
+        raise InputError(f"{path}: roads.{name}.via: {error}") from error
+
+
+def _make_junction(
+    path: Path, file: RoadsFile, name: str, curves: Mapping[str, Centreline]
+) -> Junction:
+    entry = file.junctions[name]
+    ends = []
+    for road_name, road in file.roads.items():
+        if name not in (road.start, road.end):
+            continue
+        width = road.lane_width * sum(road.lanes) + road.median
+        first, last = curves[road_name].evaluate([0, curves[road_name].length])
+        if road.start == name:
+            ends.append((first[2], road_name, "start", width / 2))
+        if road.end == name:
+            ends.append((last[2] + np.pi, road_name, "end", width / 2))
+    if (len(ends) == 1) != entry.dead_end or not ends:
+        wanted = "exactly 1 at a dead end" if entry.dead_end else "at least 2"
+        raise InputError(
+            f"{path}: junctions.{name}: {len(ends)} road(s) end here, "
+            f"{wanted} must"
+        )
+    ends = sorted((h % (2 * np.pi), *rest) for h, *rest in ends)
+    arms = []
+    for k, (heading, road_name, end, half_width) in enumerate(ends):
+        setback = getattr(file.roads[road_name], f"{end}_setback")
+        if setback is None:
+            setback = _derived_setback(ends, k, entry.kerb_radius)
+        arms.append(Arm(road_name, end, heading, half_width, setback))
+    return Junction(
+        name, entry.position, entry.height, entry.kerb_radius, tuple(arms)
+    )
+
+
+def _derived_setback(
+    ends: Sequence[tuple[float, str, str, float]], k: int, kerb_radius: float
+) -> float:
+    """Returns the setback that the neighbours of the k-th arm call for."""
+    if len(ends) == 1:
+        return kerb_radius
+    heading, _, _, half_width = ends[k]
+    before, after = ends[k - 1], ends[(k + 1) % len(ends)]
+    return max(
+        carriageway.corner_setback(
+            half_width, other[3], angle % (2 * np.pi), kerb_radius
+        )
+        for other, angle in (
+            (before, heading - before[0]),
+            (after, after[0] - heading),
+        )
+    )
+
+
+def _check_crossings(path: Path, network: RoadNetwork) -> None:
+    names = list(network.roads)
+    strips = []
+    for name in names:
+        try:
+            strips.append(carriageway.road_strip(network.roads[name]))
+        except ValueError as error:
+            raise InputError(f"{path}: roads.{name}: {error}") from error
+    pairs = STRtree(strips).query(strips, predicate="intersects")
+    for a, b in sorted(pairs.T.tolist()):
+        if a < b and strips[a].intersection(strips[b]).area > (
+            _CROSSING_TOLERANCE
+        ):
+            raise InputError(
+                f"{path}: roads.{names[a]}: meets road {names[b]} outside a "
+                "junction"
+            )

@@ -1,0 +1,177 @@
+"""One road: its centreline, its lanes, and where it meets its junctions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import PchipInterpolator
+
+from cns_drake.roads.centreline import Centreline, sample_stations
+from cns_drake.roads.road_schema import RoadEntry
+
+Direction = Literal["forward", "backward"]
+DIRECTIONS: tuple[Direction, Direction] = ("forward", "backward")
+
+
+class LaneRef(NamedTuple):
+    """A lane of a road; lane 1 is next to the middle of the road."""
+
+    road: str
+    direction: Direction
+    lane: int
+
+
+class Road:
+    """A road between two junctions, cut back where their areas begin.
+
+    The centreline is the middle of the carriageway, also of a one-way road
+    and where one direction has more lanes than the other. Arc lengths
+    ("stations") are measured along the whole centreline, from the position
+    of the start junction; the road itself reaches from `first_station` to
+    `last_station`. Lateral offsets are positive to the left of `forward`.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        entry: RoadEntry,
+        curve: Centreline,
+        setbacks: Sequence[float],
+        heights: Sequence[float],
+    ):
+        """Makes a road.
+
+        Args:
+            name: its name in the file.
+            entry: its description.
+            curve: the whole centreline, junction to junction.
+            setbacks: distance of both ends from their junctions [m].
+            heights: heights of the start and end junctions [m].
+
+        Raises:
+            ValueError: the setbacks leave nothing of the road, or its heights
+                lie outside it or out of order.
+        """
+        self.name = name
+        self.start = entry.start
+        self.end = entry.end
+        self.lanes = dict(zip(DIRECTIONS, entry.lanes, strict=True))
+        self.lane_width = entry.lane_width
+        self.median = entry.median
+        self.parking = entry.parking
+        self.sidewalk = entry.sidewalk
+        self.kerb_height = entry.kerb_height
+        self.speed_limit = entry.speed_limit
+        self._curve = curve
+        self.first_station = setbacks[0]
+        self.last_station = curve.length - setbacks[1]
+        if self.length < 1.0:
+            raise ValueError(
+                f"its junctions need {sum(setbacks):.1f} m of its "
+                f"{curve.length:.1f} m"
+            )
+        stations = [0.0, self.first_station]
+        z = [heights[0], heights[0]]
+        for station, height in entry.heights:
+            stations.append(station)
+            z.append(height)
+        stations += [self.last_station, curve.length]
+        z += [heights[1], heights[1]]
+        if np.any(np.diff(stations) <= 0):
+            raise ValueError("heights must lie between the junctions, in order")
+        self._height = PchipInterpolator(stations, z)
+
+    @property
+    def length(self) -> float:
+        """Length between the junction areas [m]."""
+        return self.last_station - self.first_station
+
+    @property
+    def full_length(self) -> float:
+        """Length of the whole centreline, junction to junction [m]."""
+        return self._curve.length
+
+    @property
+    def half_width(self) -> float:
+        """Half the width of the carriageway, without parking bays [m]."""
+        return (self.lane_width * sum(self.lanes.values()) + self.median) / 2
+
+    def evaluate(
+        self, stations: ArrayLike, offset: ArrayLike = 0.0
+    ) -> np.ndarray:
+        """Returns (N, 4): x, y, z [m] and heading of `forward` [rad].
+
+        Args:
+            stations: (N,) arc lengths along the whole centreline [m].
+            offset: lateral offset to the left, a number or (N,) [m].
+        """
+        stations = np.asarray(stations, dtype=float)
+        x, y, heading = self._curve.evaluate(stations).T
+        x = x - offset * np.sin(heading)
+        y = y + offset * np.cos(heading)
+        return np.stack([x, y, self._height(stations), heading], axis=1)
+
+    def height(self, stations: ArrayLike) -> np.ndarray:
+        """Returns the (N,) heights at arc lengths of the centreline [m]."""
+        return self._height(np.asarray(stations, dtype=float))
+
+    def stations(
+        self, spacing: float = 1.0, clearance: float = 0.0
+    ) -> np.ndarray:
+        """Returns the (N,) evenly spaced stations of the road itself.
+
+        Args:
+            spacing: upper bound of their distance [m].
+            clearance: distance to keep from both ends of the road [m].
+        """
+        first = self.first_station + clearance
+        last = self.last_station - clearance
+        return sample_stations(first, last, spacing)
+
+    def centreline(self, spacing: float = 1.0) -> np.ndarray:
+        """Returns the (N, 3) centreline between the junction areas [m]."""
+        return self.evaluate(self.stations(spacing))[:, :3]
+
+    def lane_offset(self, direction: Direction, lane: int) -> float:
+        """Returns the offset of a lane's middle to the left of `forward` [m].
+
+        Raises:
+            ValueError: the road has no such lane.
+        """
+        count = self.lanes[direction]
+        if not 1 <= lane <= count:
+            raise ValueError(
+                f"road {self.name} has {count} lane(s) {direction}, "
+                f"no lane {lane}"
+            )
+        # From the kerb inwards: forward lanes lie on the right.
+        from_kerb = (count - lane + 0.5) * self.lane_width
+        right = self.half_width - from_kerb
+        return -right if direction == "forward" else right
+
+    def lane_centreline(
+        self, direction: Direction, lane: int, spacing: float = 1.0
+    ) -> np.ndarray:
+        """Returns the (N, 3) middle of a lane in driving direction [m]."""
+        points = self.evaluate(
+            self.stations(spacing), self.lane_offset(direction, lane)
+        )[:, :3]
+        return points if direction == "forward" else points[::-1]
+
+    def lane_end(
+        self, direction: Direction, lane: int, end: str
+    ) -> tuple[float, float, float, float]:
+        """Returns x, y, z [m] and the driving heading at a lane's end.
+
+        Args:
+            direction, lane: the lane.
+            end: "entry" where its traffic comes in, "exit" where it leaves.
+        """
+        at_first = (direction == "forward") == (end == "entry")
+        station = self.first_station if at_first else self.last_station
+        offset = self.lane_offset(direction, lane)
+        x, y, z, heading = self.evaluate([station], offset)[0]
+        return x, y, z, heading if direction == "forward" else heading + np.pi

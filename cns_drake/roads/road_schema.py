@@ -1,0 +1,129 @@
+"""What a `roads.yaml` may hold, and how it is read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError
+
+from evaluation.support.errors import (
+    InputError,
+    describe_validation_error,
+)
+from evaluation.support.yaml_files import read_yaml
+
+# A town is not larger, nor anything in it wider [m].
+_LARGEST = 100_000.0
+Finite = Annotated[float, Field(ge=-_LARGEST, le=_LARGEST, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, le=_LARGEST, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0, le=_LARGEST, allow_inf_nan=False)]
+LaneCount = Annotated[int, Field(ge=0, le=4)]
+# YAML has lists where the models have tuples; numbers stay strict.
+Corner = Annotated[tuple[Finite, Finite, NonNegative], Strict(False)]
+ProfilePoint = Annotated[tuple[Positive, Finite], Strict(False)]
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class RoadStyle(_Model):
+    """What roads of a town share; every road may override it.
+
+    Attributes:
+        lanes: lanes along the centreline and against it; a zero makes the
+            road one-way. Traffic keeps right.
+        lane_width: [m].
+        median: width of the kerbed strip between the directions [m].
+        parking: width of the bays cut into both sidewalks, 0 for none [m].
+        sidewalk: width of the sidewalk on each side [m].
+        kerb_height: height of sidewalks and medians above the lanes [m].
+        speed_limit: [m/s].
+    """
+
+    lanes: tuple[LaneCount, LaneCount] = Field((1, 1), strict=False)
+    lane_width: Positive = 3.5
+    median: NonNegative = 0.0
+    parking: NonNegative = 0.0
+    sidewalk: NonNegative = 2.0
+    kerb_height: NonNegative = 0.15
+    speed_limit: Positive = 13.9
+
+
+class RoadEntry(RoadStyle):
+    """One road between two junctions.
+
+    Attributes:
+        start, end: names of its junctions; the centreline runs from the
+            position of `start` to that of `end`.
+        via: corners on the way, each x, y and the radius of its arc [m].
+        heights: distance along the centreline and height, for points
+            between the junctions [m]; in between the height follows a
+            monotone cubic, and it is level where the road meets a junction.
+        start_setback, end_setback: how far from the junction's position the
+            road ends; derived from the kerb radius where absent [m].
+    """
+
+    start: str
+    end: str
+    via: tuple[Corner, ...] = Field((), strict=False)
+    heights: tuple[ProfilePoint, ...] = Field((), strict=False)
+    start_setback: Positive | None = None
+    end_setback: Positive | None = None
+
+
+class JunctionEntry(_Model):
+    """Where roads meet; also the joint of two different roads.
+
+    Attributes:
+        position: x, y of the point where the centrelines meet [m].
+        height: the junction's area is level at this z [m].
+        kerb_radius: radius of the kerb round each corner [m]; of a dead end
+            radius of the disc in which its road ends.
+        dead_end: only one road comes here, and traffic cannot go on.
+    """
+
+    position: tuple[Finite, Finite] = Field(strict=False)
+    height: Finite = 0.0
+    kerb_radius: Positive = 8.0
+    dead_end: bool = False
+
+
+class RoadsFile(_Model):
+    """The whole file: styles, junctions by name and roads by name."""
+
+    defaults: RoadStyle = RoadStyle()
+    junctions: dict[str, JunctionEntry] = Field(min_length=1)
+    roads: dict[str, RoadEntry] = Field(min_length=1)
+
+
+def read_roads_file(path: Path | str) -> RoadsFile:
+    """Reads and validates a `roads.yaml`.
+
+    Raises:
+        InputError: the file cannot be read, is not YAML, or has an unknown
+            key, a missing one or a value of the wrong type.
+    """
+    path = Path(path)
+    content = read_yaml(path)
+    try:
+        return RoadsFile.model_validate(_with_defaults(content))
+    except ValidationError as error:
+        raise InputError(describe_validation_error(path, error)) from error
+
+
+def _with_defaults(content: Any) -> Any:
+    """Gives each road the file's defaults, leaving faults to validation."""
+    if not isinstance(content, dict):
+        return content
+    defaults, roads = content.get("defaults"), content.get("roads")
+    if not isinstance(defaults, dict) or not isinstance(roads, dict):
+        return content
+    known = defaults.keys() & RoadStyle.model_fields.keys()
+    shared = {key: defaults[key] for key in known}
+    merged = {
+        name: {**shared, **road} if isinstance(road, dict) else road
+        for name, road in roads.items()
+    }
+    return {**content, "roads": merged}

@@ -1,0 +1,190 @@
+"""A lane-level route over a road network, and the path that it describes."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, RootModel, Strict
+
+from cns_drake.roads.lane_path import LanePath, sample_lane_path
+from cns_drake.roads.network import RoadNetwork
+from cns_drake.roads.road import LaneRef
+from evaluation.support.errors import InputError
+
+# Distance between the points from which the path is interpolated [m].
+_DENSE_SPACING = 0.25
+# A lane change takes this much of its road where there is as much [m]; on
+# less than the second length there is none.
+_LANE_CHANGE_LENGTH = 50.0
+MIN_LANE_CHANGE_LENGTH = 20.0
+
+LaneNumber = Annotated[int, Field(ge=1)]
+LaneChange = Annotated[tuple[LaneNumber, LaneNumber], Strict(False)]
+
+
+class RouteLeg(BaseModel):
+    """One road of a route.
+
+    Attributes:
+        road: name of the road.
+        direction: along its centreline or against it.
+        lane: lane number, 1 next to the middle of the road; two numbers for
+            a change from the first to the second on this road.
+        start: only in the first leg: where the drive begins, measured from
+            the entry of the road [m].
+        end: only in the last leg: where it ends, measured likewise [m].
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    road: str
+    direction: Literal["forward", "backward"]
+    lane: LaneNumber | LaneChange
+    start: float | None = Field(None, ge=0, allow_inf_nan=False)
+    end: float | None = Field(None, gt=0, allow_inf_nan=False)
+
+    @property
+    def entry_lane(self) -> LaneRef:
+        """The lane on which the leg begins."""
+        lane = self.lane if isinstance(self.lane, int) else self.lane[0]
+        return LaneRef(self.road, self.direction, lane)
+
+    @property
+    def exit_lane(self) -> LaneRef:
+        """The lane on which the leg ends."""
+        lane = self.lane if isinstance(self.lane, int) else self.lane[1]
+        return LaneRef(self.road, self.direction, lane)
+
+
+class Route(RootModel[list[RouteLeg]]):
+    """The roads of a drive, in order."""
+
+    root: list[RouteLeg] = Field(min_length=1)
+
+
+def make_lane_path(
+    network: RoadNetwork, route: Route, spacing: float, source: object = "route"
+) -> LanePath:
+    """Strings the lanes of a route and the ways between them together.
+
+    Consecutive legs must meet in a junction, and the way through it must be
+    legal: a left turn from the innermost lane to the innermost, a right turn
+    from the outermost lane to the outermost, straight on without a change of
+    lane (`RoadNetwork.is_legal`). Lanes change only along a leg. Within a
+    junction the lower one of the two roads' speed limits holds.
+
+    Args:
+        network: the roads.
+        route: the legs.
+        spacing: the distance of the points, rounded so that it divides the
+            length of the route [m].
+        source: the file that errors name.
+
+    Raises:
+        InputError: a leg names no lane of the network, does not follow from
+            the one before it, or is too short for its lane change; or the
+            whole route is too short.
+    """
+    pieces, limits = [], []
+    for k, leg in enumerate(route.root):
+        try:
+            _check_ends(leg, k == 0, k == len(route.root) - 1)
+            points = _leg_points(network, leg)
+            limit = network.roads[leg.road].speed_limit
+            if k > 0:
+                way = _way(network, route.root[k - 1], leg)
+                pieces.append(way)
+                limits.append(np.full(len(way), min(limit, limits[-1][0])))
+        except ValueError as error:
+            raise InputError(
+                f"{source}: route.{k} ({leg.road} {leg.direction}): {error}"
+            ) from error
+        pieces.append(points)
+        limits.append(np.full(len(points), limit))
+    return sample_lane_path(
+        np.concatenate(pieces),
+        np.concatenate(limits),
+        spacing,
+        f"{source}: route",
+    )
+
+
+def _check_ends(leg: RouteLeg, is_first: bool, is_last: bool) -> None:
+    if leg.start is not None and not is_first:
+        raise ValueError("start is for the first leg only")
+    if leg.end is not None and not is_last:
+        raise ValueError("end is for the last leg only")
+
+
+def _leg_points(network: RoadNetwork, leg: RouteLeg) -> np.ndarray:
+    """Returns the (N, 3) points of a leg on its road.
+
+    Raises:
+        ValueError: the leg does not suit its road.
+    """
+    if leg.road not in network.roads:
+        raise ValueError(f"no road {leg.road!r}")
+    road = network.roads[leg.road]
+    offsets = [
+        road.lane_offset(leg.direction, lane.lane)
+        for lane in (leg.entry_lane, leg.exit_lane)
+    ]
+    start = 0.0 if leg.start is None else leg.start
+    end = road.length if leg.end is None else leg.end
+    if not start < end <= road.length:
+        raise ValueError(
+            f"from {start:g} m to {end:g} m does not lie within the road's "
+            f"{road.length:.1f} m"
+        )
+    count = int(np.ceil((end - start) / _DENSE_SPACING)) + 1
+    travelled = np.linspace(start, end, count)
+    offset = offsets[0] + (offsets[1] - offsets[0]) * _lane_change(
+        travelled, offsets[0] != offsets[1]
+    )
+    if leg.direction == "forward":
+        stations = road.first_station + travelled
+    else:
+        stations = road.last_station - travelled
+    return road.evaluate(stations, offset)[:, :3]
+
+
+def _lane_change(travelled: np.ndarray, wanted: bool) -> np.ndarray:
+    """Returns the share of a lane change that is done, from 0 to 1.
+
+    The change lies in the middle of the leg and follows the quintic whose
+    first and second derivatives vanish at both ends.
+    """
+    if not wanted:
+        return np.zeros_like(travelled)
+    available = travelled[-1] - travelled[0]
+    if available < MIN_LANE_CHANGE_LENGTH:
+        raise ValueError(
+            f"{available:.1f} m are too short for a lane change, it needs "
+            f"{MIN_LANE_CHANGE_LENGTH:.0f} m"
+        )
+    length = min(available, _LANE_CHANGE_LENGTH)
+    middle = (travelled[0] + travelled[-1]) / 2
+    u = np.clip((travelled - middle) / length + 0.5, 0.0, 1.0)
+    return u**3 * (10 - 15 * u + 6 * u**2)
+
+
+def _way(network: RoadNetwork, previous: RouteLeg, leg: RouteLeg) -> np.ndarray:
+    """Returns the (N, 3) points between two legs, without the lane ends.
+
+    Raises:
+        ValueError: there is no legal way.
+    """
+    way = network.connection(previous.exit_lane, leg.entry_lane, _DENSE_SPACING)
+    if not network.is_legal(way):
+        rule = {
+            "left": "a left turn leads from lane 1 to lane 1",
+            "right": "a right turn leads from the outermost lane to the "
+            "outermost",
+            "straight": "straight on keeps the lane",
+        }[way.turn]
+        raise ValueError(
+            f"from lane {way.incoming.lane} of {previous.road} to lane "
+            f"{way.outgoing.lane}: {rule}"
+        )
+    return way.points[1:-1]

@@ -1,0 +1,97 @@
+"""Draws a route over a road network by lot."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+
+import numpy as np
+
+from cns_drake.roads.network import RoadNetwork
+from cns_drake.roads.road import LaneRef
+from cns_drake.roads.route import (
+    MIN_LANE_CHANGE_LENGTH,
+    Route,
+    RouteLeg,
+)
+from evaluation.support.errors import InputError
+
+# How strongly roads that were driven before are avoided.
+_WEIGHT_OF_NEW = 6.0
+
+
+def draw_route(
+    network: RoadNetwork, length: float, rng: np.random.Generator
+) -> Route:
+    """Draws a legal route that prefers roads that it has not seen yet.
+
+    Args:
+        network: the roads.
+        length: least length of the roads of the route [m].
+        rng: decides.
+
+    Raises:
+        InputError: there is no way of going on and on over the network.
+    """
+    successors = _successors(network)
+    if not successors:
+        raise InputError(
+            "roads: every lane ends somewhere: no route of any length"
+        )
+    lanes = sorted(successors)
+    lane = lanes[int(rng.integers(len(lanes)))]
+    visits: Counter[str] = Counter()
+    legs: list[tuple[LaneRef, int]] = []
+    driven = 0.0
+    while driven < length:
+        visits[lane.road] += 1
+        driven += network.roads[lane.road].length
+        choices = successors[lane]
+        weights = np.array(
+            [_WEIGHT_OF_NEW ** -visits[after.road] for _, after in choices]
+        )
+        chosen = int(rng.choice(len(choices), p=weights / weights.sum()))
+        exit_lane, after = choices[chosen]
+        legs.append((lane, exit_lane))
+        lane = after
+    # Behind the last road nothing follows, so there is no reason to leave
+    # its lane.
+    legs[-1] = (legs[-1][0], legs[-1][0].lane)
+    return Route([_leg(entry, exit_lane) for entry, exit_lane in legs])
+
+
+def _leg(entry: LaneRef, exit_lane: int) -> RouteLeg:
+    lane = entry.lane if exit_lane == entry.lane else (entry.lane, exit_lane)
+    return RouteLeg(road=entry.road, direction=entry.direction, lane=lane)
+
+
+def _successors(
+    network: RoadNetwork,
+) -> dict[LaneRef, list[tuple[int, LaneRef]]]:
+    """Returns for each lane how it can go on: exit lane, lane behind it.
+
+    Lanes from which every way ends somewhere are left out.
+    """
+    ways = defaultdict(list)
+    for junction in network.junctions:
+        for way in network.connections(junction):
+            ways[way.incoming].append(way.outgoing)
+    successors = {}
+    for lane in network.lanes():
+        road = network.roads[lane.road]
+        exits = [lane.lane]
+        if road.length > MIN_LANE_CHANGE_LENGTH:
+            exits = range(1, road.lanes[lane.direction] + 1)
+        successors[lane] = [
+            (number, after)
+            for number in exits
+            for after in sorted(ways[lane._replace(lane=number)])
+        ]
+    while True:
+        alive = {
+            lane: [way for way in choices if way[1] in successors]
+            for lane, choices in successors.items()
+            if any(way[1] in successors for way in choices)
+        }
+        if alive == successors:
+            return alive
+        successors = alive

@@ -1,0 +1,1 @@
+"""What a drive is made of: scenario files, and families of them."""

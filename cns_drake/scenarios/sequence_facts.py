@@ -1,0 +1,40 @@
+"""How long a sequence is, without recording it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from cns_drake.recording.frame_clock import frames_within
+from cns_drake.scenarios.planning import plan_drive
+from cns_drake.scenarios.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class SequenceFacts:
+    """Figures of a drive.
+
+    Attributes:
+        length: of the path [m].
+        duration: from rest to rest [s].
+        frames: recorded at most: one at the start and one after each frame
+            period, up to the end of the drive or to `scenario.frames`.
+    """
+
+    length: float
+    duration: float
+    frames: int
+
+
+def sequence_facts(scenario: Scenario) -> SequenceFacts:
+    """Plans the drive of a scenario and measures it.
+
+    Raises:
+        InputError: the drive cannot be planned; see `plan_drive`.
+    """
+    trajectory = plan_drive(scenario)
+    frames = frames_within(trajectory.duration)
+    return SequenceFacts(
+        length=trajectory.length,
+        duration=trajectory.duration,
+        frames=min(frames, scenario.frames or frames),
+    )

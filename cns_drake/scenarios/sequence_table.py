@@ -1,0 +1,177 @@
+"""The figures of a folder's sequences, kept beside them in a table.
+
+Planning a drive and reading a stage take seconds; a listing should not. Each
+row of `sequences.csv` therefore carries a checksum of the files that it was
+measured from, and is measured anew when they have changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+import csv
+from dataclasses import astuple, dataclass, fields
+import io
+from pathlib import Path
+import zlib
+
+from cns_drake.scenarios.shipped import sequence_name
+from evaluation.support.csv_files import read_records
+from evaluation.support.errors import InputError
+from evaluation.support.files import (
+    complete_part,
+    user_errors,
+    write_part,
+)
+from evaluation.support.yaml_files import read_yaml
+
+TABLE_NAME = "sequences.csv"
+
+
+@dataclass(frozen=True)
+class SequenceRow:
+    """A sequence and its figures.
+
+    Attributes:
+        sequence: its name.
+        map: the map's name.
+        stage: the city's stage.
+        title: what it shows, in a few words.
+        checksum: of the files that the figures were measured from.
+        length: of the path [m].
+        duration: of the drive [s].
+        frames: how many are recorded.
+        structures: in the stage.
+        triangles: in the stage.
+    """
+
+    sequence: str
+    map: str
+    stage: str
+    title: str
+    checksum: str
+    length: float
+    duration: float
+    frames: int
+    structures: int
+    triangles: int
+
+
+def sequence_rows(
+    folder: Path, progress: Callable[[str], None] = lambda line: None
+) -> list[SequenceRow]:
+    """Returns the rows of a map's sequences whose stage is there.
+
+    Args:
+        folder: of the map, with `sequence_NN.yaml` and `stage_NN.sdf`.
+        progress: takes a line for each row that has to be measured.
+
+    Raises:
+        InputError: if a sequence cannot be read or planned, or its stage not
+            be parsed.
+    """
+    known = {row.checksum: row for row in _read(folder / TABLE_NAME)}
+    # Of the meshes, names and sizes have to do: reading them all would take
+    # longer than a listing may.
+    meshes = "".join(
+        f"{mesh.name} {mesh.stat().st_size}"
+        for mesh in sorted((folder / "meshes").glob("*"))
+    ).encode()
+    rows = []
+    for path in sorted(folder.glob("sequence_*.yaml")):
+        entries = _entries(path)
+        stage = folder / f"stage_{entries.get('stage')}.sdf"
+        if not stage.is_file():
+            continue
+        checksum = _checksum((path, folder / "roads.yaml", stage), meshes)
+        row = known.get(checksum)
+        if row is None:
+            progress(f"measuring {sequence_name(path)}")
+            row = _measure(path, checksum)
+        rows.append(row)
+    return rows
+
+
+def write_table(
+    folder: Path, progress: Callable[[str], None] = lambda line: None
+) -> None:
+    """Brings the table of a folder up to date.
+
+    A folder without sequences gets none.
+
+    Raises:
+        InputError: as `sequence_rows`, or if the table cannot be written.
+    """
+    rows = sequence_rows(folder, progress)
+    if not rows:
+        return
+    out = io.StringIO()
+    table = csv.writer(out, lineterminator="\n")
+    table.writerow(field.name for field in fields(SequenceRow))
+    table.writerows(astuple(row) for row in rows)
+    write_part(folder / TABLE_NAME, out.getvalue())
+    complete_part(folder / TABLE_NAME)
+
+
+def _entries(path: Path) -> dict:
+    entries = read_yaml(path)
+    if not isinstance(entries, dict):
+        raise InputError(f"{path}: not a mapping of scenario fields")
+    return entries
+
+
+def _checksum(paths: Iterable[Path], more: bytes) -> str:
+    """Returns the checksum of what files hold, and of more."""
+    total = 0
+    for path in paths:
+        with user_errors(path):
+            total = zlib.crc32(path.read_bytes(), total)
+    return f"{zlib.crc32(more, total):08x}"
+
+
+def _read(path: Path) -> list[SequenceRow]:
+    """Returns the rows of a table; of one that cannot be used, none.
+
+    Nothing is lost: its rows are measured anew.
+    """
+    types = {"length": float, "duration": float}
+    types |= dict.fromkeys(("frames", "structures", "triangles"), int)
+    names = [field.name for field in fields(SequenceRow)]
+    try:
+        return [
+            SequenceRow(*(types.get(n, str)(row[n]) for n in names))
+            for _, row in read_records(path, names)
+        ]
+    except (InputError, ValueError):
+        return []
+
+
+def _measure(path: Path, checksum: str) -> SequenceRow:
+    # Slow to import, and rarely needed.
+    from cns_drake.scenarios.scenario import load_scenario
+    from cns_drake.scenarios.sequence_facts import sequence_facts
+    from cns_drake.scene.perception_geometry import (
+        TriangleSurface,
+        read_perception_geometry,
+    )
+    from cns_drake.scene.world import load_world
+
+    scenario = load_scenario(path)
+    facts = sequence_facts(scenario)
+    world = load_world(scenario.world_file, without=scenario.without)
+    geometries = read_perception_geometry(world.scene_graph.model_inspector())
+    return SequenceRow(
+        sequence=scenario.name,
+        map=path.resolve().parent.name,
+        stage=scenario.stage,
+        title=scenario.title,
+        checksum=checksum,
+        length=round(facts.length, 1),
+        duration=round(facts.duration, 2),
+        frames=facts.frames,
+        structures=len({geometry.structure for geometry in geometries}),
+        triangles=sum(
+            len(geometry.surface.triangles)
+            for geometry in geometries
+            if isinstance(geometry.surface, TriangleSurface)
+        ),
+    )

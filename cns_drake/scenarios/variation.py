@@ -1,0 +1,367 @@
+"""Families of scenarios that one small file describes.
+
+A city that decays from a place outwards: each member of a family lacks the
+buildings and plants nearest to that place, a given part of them all; or of
+what an earlier stage lacks, which makes stages between the two. Members with
+more missing lack all that those with less lack. Other draws of the city,
+routes by lot and other LiDARs multiply the family. Every member is a scenario
+of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence, Set
+from itertools import product
+import os
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+)
+import yaml
+
+from cns_drake.roads.network import load_road_network
+from cns_drake.roads.route import Route
+from cns_drake.roads.route_drawing import draw_route
+from cns_drake.scenarios.scenario import Scenario, load_scenario
+from cns_drake.scenarios.shipped import shipped_sequences
+from cns_drake.scene.world import load_world, structures_in
+from evaluation.support.csv_files import read_records
+from evaluation.support.errors import (
+    InputError,
+    describe_validation_error,
+)
+from evaluation.support.files import (
+    complete_part,
+    user_errors,
+    write_part,
+)
+from evaluation.support.yaml_files import read_yaml
+
+# What can be missing; streets, ground and street furniture stay.
+_REMOVABLE = ("building", "vegetation")
+# No city reaches farther [m].
+_FARTHEST = 1e6
+
+_Part = Annotated[float, Field(ge=0.0, le=1.0)]
+_Seed = Annotated[int, Field(ge=0)]
+# Draws the city of a map anew: the map's folder, what to call the stage, which
+# is the whole city, and seeds -> seed -> map folder of that city.
+Redraw = Callable[[Path, str, Sequence[int]], Mapping[int, Path]]
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def _spread(value: Any) -> Any:
+    """Turns {from, to, count} into the numbers themselves."""
+    if not isinstance(value, dict):
+        return value
+    steps = _Steps.model_validate(value)
+    numbers = np.linspace(steps.first, steps.last, steps.count)
+    return tuple(float(number) for number in numbers.round(4))
+
+
+def _without_doubles(seeds: tuple[int, ...]) -> tuple[int, ...]:
+    for seed in seeds:
+        if seeds.count(seed) > 1:
+            raise ValueError(f"{seed} is there twice")
+    return seeds
+
+
+class _Steps(_Model):
+    first: _Part = Field(alias="from")
+    last: _Part = Field(alias="to")
+    count: int = Field(ge=1, le=10_000)
+
+
+class DrawnRoutes(_Model):
+    """Routes by lot.
+
+    Attributes:
+        count: how many.
+        length: least length of each [m].
+        seed: of the draws.
+    """
+
+    count: int = Field(ge=1, le=10_000)
+    length: float = Field(gt=0.0, le=100_000.0)
+    seed: _Seed = 0
+
+
+class Family(_Model):
+    """What a family of scenarios has in common, and what varies.
+
+    Attributes:
+        base: sequence or scenario file that gives map, route, speeds and
+            sensors.
+        stage: of which something is missing; the map's last one by default.
+        towards: another stage; only what it lacks can be missing.
+        missing: parts of the buildings and plants, or of what `towards`
+            lacks, that are missing, each from 0 to 1; or {from, to, count}
+            for evenly spread ones.
+        seeds: for each of these, another place from which the city decays.
+        city_seeds: for each of these, another draw of the city along the
+            same streets, in place of the map as it is.
+        routes: routes by lot in place of the base's.
+        lidars: presets in place of the base's LiDARs.
+    """
+
+    base: str
+    stage: str | None = None
+    towards: str | None = None
+    missing: Annotated[tuple[_Part, ...], BeforeValidator(_spread)] = Field(
+        (0.0,), min_length=1
+    )
+    seeds: tuple[_Seed, ...] = Field((0,), min_length=1)
+    city_seeds: Annotated[
+        tuple[_Seed, ...], AfterValidator(_without_doubles)
+    ] = Field((), min_length=1)
+    routes: DrawnRoutes | None = None
+    lidars: tuple[str, ...] = ()
+
+
+def load_family(path: Path, redraw: Redraw | None = None) -> list[Scenario]:
+    """Reads a family's file and returns its members.
+
+    A member's name tells what it is: base, seed of the city where that
+    varies, part missing in per mille, seed, and where they vary route and
+    LiDAR.
+
+    Args:
+        path: the file.
+        redraw: see `vary`.
+
+    Raises:
+        InputError: the file or what it refers to cannot be used.
+    """
+    values = read_yaml(path)
+    try:
+        family = Family.model_validate(values)
+    except ValidationError as error:
+        raise InputError(describe_validation_error(path, error)) from None
+    base = family.base
+    if base not in shipped_sequences():
+        base = path.parent / base
+    return vary(load_scenario(base), family, path, redraw)
+
+
+def vary(
+    base: Scenario, family: Family, source: object, redraw: Redraw | None = None
+) -> list[Scenario]:
+    """Returns the members of a family.
+
+    Args:
+        base: what they all start from.
+        family: what varies.
+        source: the file that errors name.
+        redraw: draws cities; only a family with `city_seeds` needs it. It is
+            called once nothing else can be wrong with the family.
+
+    Raises:
+        InputError: the base has no map, or something the family asks for is
+            not there.
+    """
+    if base.map is None:
+        raise InputError(f"{source}: base: {base.name} has no map to vary")
+    last = max(
+        path.stem.removeprefix("stage_")
+        for path in base.map_folder.glob("stage_*.sdf")
+    )
+    stage = family.stage or last
+    if family.city_seeds:
+        _check_redrawable(base, family, last, source)
+    what = "buildings and plants"
+    removable = None
+    if family.towards is not None:
+        what = f"what stage {family.towards} lacks"
+        removable = _difference(base, stage, family.towards, source)
+    routes = _routes(base, family)
+    units = [(None, base.lidars)]
+    if family.lidars:
+        units = [
+            (preset, base.with_lidar_preset(preset).lidars)
+            for preset in family.lidars
+        ]
+    cities = {None: base}
+    if family.city_seeds:
+        folders = redraw(base.map_folder, stage, family.city_seeds)
+        cities = {
+            seed: base.model_copy(update={"map": str(folder)})
+            for seed, folder in folders.items()
+        }
+    orders = {
+        (city_seed, seed): _decay_order(
+            city.map_folder / "structures.csv", seed, removable
+        )
+        for city_seed, city in cities.items()
+        for seed in family.seeds
+    }
+    members = []
+    for (city_seed, city), part, seed, (route_label, route), unit in product(
+        cities.items(), family.missing, family.seeds, routes, units
+    ):
+        preset, lidars = unit
+        labels = [base.name, f"m{round(1000 * part):03d}", f"s{seed}"]
+        labels += [label for label in (route_label, preset) if label]
+        title = f"{100 * part:.1f} % of {what} missing"
+        if city_seed is not None:
+            labels.insert(1, f"c{city_seed}")
+            title += f", in the city as seed {city_seed} draws it"
+        order = orders[city_seed, seed]
+        update = {
+            "name": "_".join(labels).replace("-", "_"),
+            "stage": stage,
+            "without": tuple(sorted(order[: round(part * len(order))])),
+            "title": title,
+            "lidars": lidars,
+        }
+        if route is not None:
+            update |= {"route": route, "waypoints": None}
+        member = city.model_copy(update=update)
+        member.check_files(source)
+        members.append(member)
+    return members
+
+
+def write_scenarios(scenarios: Sequence[Scenario], folder: Path) -> list[Path]:
+    """Writes scenarios as `<folder>/<name>.yaml`.
+
+    A map that lies where the folder does is told by its way from there, so
+    that both can be moved together.
+
+    Raises:
+        InputError: if that fails.
+    """
+    with user_errors(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        here = folder.resolve()
+    paths = []
+    for scenario in scenarios:
+        path = folder / f"{scenario.name}.yaml"
+        values = scenario.model_dump(mode="json", exclude_none=True)
+        if Path(values.get("map", "")).is_relative_to(here.parent):
+            values["map"] = os.path.relpath(values["map"], here)
+        write_part(path, yaml.safe_dump(values, sort_keys=False))
+        complete_part(path)
+        paths.append(path)
+    return paths
+
+
+def _check_redrawable(
+    base: Scenario, family: Family, last: str, source: object
+) -> None:
+    """Checks that the city can be drawn anew.
+
+    Args:
+        base: of the family.
+        family: what varies.
+        last: the map's last stage.
+        source: the file that errors name.
+
+    Raises:
+        InputError: it cannot.
+    """
+    why = (
+        f"not with city_seeds: what stages before the last one, {last}, lack "
+        "has names that another draw of the city need not have"
+    )
+    if family.towards is not None:
+        raise InputError(f"{source}: towards: {why}")
+    if family.stage not in (None, last):
+        raise InputError(f"{source}: stage: {why}")
+    for file in (base.map_folder / "city.yaml", base.roads_file):
+        if not os.path.isfile(file):
+            raise InputError(
+                f"{source}: city_seeds: no {file}, so that the city of base "
+                f"{base.name} cannot be drawn anew"
+            )
+
+
+def _routes(
+    base: Scenario, family: Family
+) -> list[tuple[str | None, Route | None]]:
+    """Returns the routes with their labels; None for the base's own."""
+    if family.routes is None:
+        return [(None, None)]
+    network = load_road_network(base.roads_file)
+    return [
+        (
+            f"r{k}",
+            draw_route(
+                network,
+                family.routes.length,
+                np.random.default_rng([family.routes.seed, k]),
+            ),
+        )
+        for k in range(family.routes.count)
+    ]
+
+
+def _difference(
+    base: Scenario, stage: str, other: str, source: object
+) -> frozenset[str]:
+    """Returns the structures of a stage that another one lacks.
+
+    Raises:
+        InputError: a stage cannot be read, or the other lacks nothing.
+    """
+    names = []
+    for one in (stage, other):
+        scenario = base.model_copy(update={"stage": one})
+        scenario.check_files(source)
+        names.append(structures_in(load_world(scenario.world_file)))
+    difference = names[0] - names[1]
+    if not difference:
+        raise InputError(
+            f"{source}: towards: stage {other} lacks nothing of stage {stage}"
+        )
+    return frozenset(difference)
+
+
+def _decay_order(
+    table: Path, seed: int, removable: Set[str] | None
+) -> list[str]:
+    """Returns what can be missing, what goes first at the head.
+
+    Args:
+        table: of all structures.
+        seed: of the place from which the city decays.
+        removable: names of what can be missing; all buildings and plants if
+            None.
+
+    Raises:
+        InputError: the table cannot be read or does not say where things
+            are.
+    """
+    rows = [
+        row
+        for _, row in read_records(table, ("name", "class"))
+        if (
+            row["class"] in _REMOVABLE
+            if removable is None
+            else row["name"] in removable
+        )
+    ]
+    if not rows:
+        raise InputError(f"{table}: nothing in it that could be missing")
+    try:
+        xy = np.array([(float(row["x"]), float(row["y"])) for row in rows])
+        if not (np.abs(xy) <= _FARTHEST).all():  # Nor is NaN a place.
+            raise ValueError
+    except (KeyError, ValueError):
+        raise InputError(
+            f"{table}: x, y: not the place of every structure"
+        ) from None
+    rng = np.random.default_rng(seed)
+    low, high = xy.min(axis=0), xy.max(axis=0)
+    distance = np.linalg.norm(xy - rng.uniform(low, high), axis=1)
+    return [rows[k]["name"] for k in np.argsort(distance, kind="stable")]

@@ -1,0 +1,85 @@
+"""Meshes in formats that Drake does not read, read by Open3D.
+
+Some of Open3D's parsers crash on damaged files and print what they think of
+them. Therefore they work in a process of their own, which costs its start
+only where a world has such meshes.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+import pickle
+import subprocess
+import sys
+
+import numpy as np
+
+
+class ForeignMeshes:
+    """Reads mesh files by Open3D; a context manager."""
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen | None = None
+
+    def __enter__(self) -> ForeignMeshes:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._end()
+
+    def read(self, path: Path) -> tuple[np.ndarray, np.ndarray]:
+        """Reads a mesh.
+
+        Returns:
+            (N, 3) float64 vertices [m]; (M, 3) int32 triangles, none if the
+            file is no mesh.
+
+        Raises:
+            ValueError: if Open3D crashes on it.
+        """
+        if self._process is None:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", __name__],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+            )
+        # Both are pipes.
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        try:
+            pickle.dump(str(path), self._process.stdin)
+            self._process.stdin.flush()
+            return pickle.load(self._process.stdout)
+        except (OSError, EOFError, pickle.UnpicklingError) as error:
+            self._end()
+            raise ValueError("Open3D cannot read it") from error
+
+    def _end(self) -> None:
+        if self._process is not None:
+            self._process.kill()
+            self._process.communicate()
+            self._process = None
+
+
+def _serve() -> None:
+    """Reads the meshes that are asked for, until there are no more."""
+    import open3d
+
+    # What a parser prints must not come between the answers.
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    while True:
+        try:
+            path = pickle.load(sys.stdin.buffer)
+        except EOFError:
+            return
+        mesh = open3d.io.read_triangle_mesh(path)
+        triangles = np.asarray(mesh.triangles, np.int32)
+        pickle.dump((np.asarray(mesh.vertices), triangles), answers)
+        answers.flush()
+
+
+if __name__ == "__main__":
+    _serve()

@@ -1,0 +1,100 @@
+"""Which class and instance id each structure of a world has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from cns_drake.scene.semantics import CLASS_IDS
+from evaluation.support.csv_files import read_records
+from evaluation.support.errors import InputError
+
+_MAX_INSTANCE = 2**16 - 1
+
+
+@dataclass(frozen=True)
+class StructureEntry:
+    """A structure as a LiDAR return refers to it.
+
+    Attributes:
+        instance: id from 1 to 65535; 0 stands for no structure.
+        name: the structure's name.
+        semantic_class: a key of `CLASS_IDS`.
+    """
+
+    instance: int
+    name: str
+    semantic_class: str
+
+    @property
+    def label(self) -> int:
+        return CLASS_IDS[self.semantic_class]
+
+
+class StructureTable:
+    """Structures by name.
+
+    Names that the table does not list get the ids that are still free, in
+    alphabetical order, and the class `unlabeled`; so a world without a table
+    still has its structures told apart.
+    """
+
+    def __init__(self, entries: Iterable[StructureEntry]):
+        self._by_name = {entry.name: entry for entry in entries}
+
+    def __iter__(self) -> Iterator[StructureEntry]:
+        return iter(
+            sorted(self._by_name.values(), key=lambda entry: entry.instance)
+        )
+
+    def __getitem__(self, name: str) -> StructureEntry:
+        return self._by_name[name]
+
+    def completed(self, names: Iterable[str]) -> StructureTable:
+        """Returns the table with an entry for each of the names."""
+        entries = list(self)
+        free = max((entry.instance for entry in entries), default=0) + 1
+        for name in sorted(set(names) - self._by_name.keys()):
+            entries.append(StructureEntry(free, name, "unlabeled"))
+            free += 1
+        if free - 1 > _MAX_INSTANCE:
+            raise InputError(
+                f"the world has {free - 1} structures, but an instance id "
+                f"has room for {_MAX_INSTANCE}"
+            )
+        return StructureTable(entries)
+
+
+def load_structure_table(path: Path) -> StructureTable:
+    """Reads a CSV file with columns `instance`, `name` and `class`.
+
+    Raises:
+        InputError: the file lacks a column or a row is not usable.
+    """
+    entries: dict[str, StructureEntry] = {}
+    instances: set[int] = set()
+    for line, row in read_records(path, ("instance", "name", "class")):
+        where = f"{path}: line {line}"
+        name, semantic_class = row["name"], row["class"]
+        try:
+            instance = int(row["instance"])
+        except ValueError:
+            raise InputError(
+                f"{where}: instance: {row['instance']!r} is not a number"
+            ) from None
+        if not 1 <= instance <= _MAX_INSTANCE or instance in instances:
+            raise InputError(
+                f"{where}: instance: {instance} is not a new number from "
+                f"1 to {_MAX_INSTANCE}"
+            )
+        if semantic_class not in CLASS_IDS:
+            raise InputError(
+                f"{where}: class: '{semantic_class}' is none of "
+                f"{', '.join(CLASS_IDS)}"
+            )
+        if not name or name in entries:
+            raise InputError(f"{where}: name: '{name}' is not a new name")
+        instances.add(instance)
+        entries[name] = StructureEntry(instance, name, semantic_class)
+    return StructureTable(entries.values())

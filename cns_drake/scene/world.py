@@ -1,0 +1,197 @@
+"""Loading an SDF world, and the vehicle in it, into a SceneGraph."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from pathlib import Path
+import re
+
+from pydrake.geometry import FrameId, Role, SceneGraph, SourceId
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import ModelInstanceIndex
+
+from cns_drake.scene.drake_errors import PARSER_ERRORS, told_by_drake
+from cns_drake.scene.perception_geometry import (
+    check_shape,
+    structure_name,
+)
+from cns_drake.scene.structure_table import (
+    StructureTable,
+    load_structure_table,
+)
+from evaluation.support.errors import InputError
+from evaluation.support.files import user_errors
+
+
+@dataclass(frozen=True)
+class World:
+    """Parsed models, ready to be wired.
+
+    Attributes:
+        scene_graph: holds the geometry; add it to a DiagramBuilder.
+        plant: owns bodies and frames; finalized, not meant for a Diagram.
+        vehicle: the vehicle's model instance, None where there is none.
+        structures: class and instance id of every structure in the world,
+            also of those that no table lists.
+
+    Example:
+        from cns_drake import load_world
+
+        world = load_world(sdf)
+        print(world.plant.num_bodies(), len(world.anchored_frames()))
+    """
+
+    scene_graph: SceneGraph
+    plant: MultibodyPlant
+    vehicle: ModelInstanceIndex | None
+    structures: StructureTable
+
+    def anchored_frames(self) -> frozenset[FrameId]:
+        """Returns the geometry frames that can never move."""
+        bodies = self.plant.GetBodiesWeldedTo(self.plant.world_body())
+        frames = (
+            self.plant.GetBodyFrameIdIfExists(body.index()) for body in bodies
+        )
+        return frozenset(frame for frame in frames if frame is not None)
+
+
+def load_world(
+    sdf: Path,
+    *,
+    vehicle: Path | None = None,
+    structures: Path | None = None,
+    without: Collection[str] = (),
+) -> World:
+    """Parses a world and, in it, a vehicle.
+
+    Args:
+        sdf: the world or model file.
+        vehicle: the vehicle's model file.
+        structures: table of structures; by default `structures.csv` beside
+            the world, if there is one.
+        without: names of structures to leave out.
+
+    Raises:
+        InputError: a file is missing or cannot be parsed, a structure to
+            leave out is not there, or the world has nothing to see.
+
+    Example:
+        from pathlib import Path
+
+        from cns_drake import load_world
+
+        world = load_world(Path("my_world.sdf"))
+    """
+    scene_graph = SceneGraph()
+    # The plant parses models and knows their frames. It stays out of the
+    # Diagram: motion is prescribed, for which a plant has no port, and a
+    # plant of many models makes Build() slow.
+    plant = MultibodyPlant(time_step=0.0)
+    plant.RegisterAsSourceForSceneGraph(scene_graph)
+    parser = Parser(plant)
+    _parse(parser, sdf)
+    _check_names(scene_graph, sdf)
+    if without:
+        _remove(scene_graph, plant.get_source_id(), set(without), sdf)
+    inspector = scene_graph.model_inspector()
+    if not inspector.GetAllGeometryIds(Role.kPerception):
+        raise InputError(
+            f"{sdf}: no visual: the world has no perception geometry that a "
+            "LiDAR can see"
+        )
+    names = []
+    for geometry_id in inspector.GetAllGeometryIds(Role.kPerception):
+        names.append(inspector.GetName(geometry_id))
+        try:
+            check_shape(names[-1], inspector.GetShape(geometry_id))
+        except InputError as error:
+            raise InputError(f"{sdf}: {error}") from None
+    vehicle_model = None
+    if vehicle is not None:
+        vehicle_model = _parse(parser, vehicle)[0]
+    plant.Finalize()
+
+    table = structures or sdf.parent / "structures.csv"
+    if structures is not None or table.is_file():
+        entries = load_structure_table(table)
+    else:
+        entries = StructureTable(())
+    try:
+        entries = entries.completed(map(structure_name, names))
+    except InputError as error:
+        raise InputError(f"{sdf}: {error}") from None
+    return World(scene_graph, plant, vehicle_model, entries)
+
+
+def _check_names(scene_graph: SceneGraph, sdf: Path) -> None:
+    inspector = scene_graph.model_inspector()
+    for geometry_id in inspector.GetAllGeometryIds():
+        try:
+            inspector.GetName(geometry_id)
+        except UnicodeDecodeError:
+            raise InputError(f"{sdf}: a name is not UTF-8 text") from None
+
+
+def structures_in(world: World) -> set[str]:
+    """Returns the names of the structures that stand in a world."""
+    inspector = world.scene_graph.model_inspector()
+    return {
+        structure_name(inspector.GetName(geometry_id))
+        for geometry_id in inspector.GetAllGeometryIds()
+    }
+
+
+def _remove(
+    scene_graph: SceneGraph, source_id: SourceId, names: set[str], sdf: Path
+) -> None:
+    """Removes the geometry of structures."""
+    inspector = scene_graph.model_inspector()
+    found = set()
+    for geometry_id in inspector.GetAllGeometryIds():
+        structure = structure_name(inspector.GetName(geometry_id))
+        if structure in names:
+            found.add(structure)
+            scene_graph.RemoveGeometry(source_id, geometry_id)
+    missing = sorted(names - found)
+    if missing:
+        raise InputError(f"{sdf}: no structure {missing[0]} to leave out")
+
+
+def _parse(parser: Parser, path: Path) -> list[ModelInstanceIndex]:
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    # Drake itself stumbles over what it would quote of it.
+    with user_errors(path):
+        content = path.read_bytes()
+    try:
+        content.decode("utf-8")
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not UTF-8 text") from None
+    with told_by_drake() as errors:
+        try:
+            models = parser.AddModels(str(path))
+        except PARSER_ERRORS as error:
+            raise _parse_fault(path, str(error), *errors) from error
+        if errors:
+            raise _parse_fault(path, *errors)
+    if not models:
+        raise InputError(f"{path}: holds no model")
+    return models
+
+
+def _parse_fault(path: Path, *texts: str) -> InputError:
+    """Returns the error that tells the first two of what Drake told."""
+    # Drake and libsdformat begin with the path, a severity and a code.
+    faults = [" ".join(text.split()) for text in texts[:2]]
+    faults = [re.sub(r"^SDFormat Error .*?Msg: ", "", f) for f in faults]
+    faults = [
+        re.sub(
+            rf"/*{re.escape(str(path))}:(?:(\d+):)? error: ",
+            lambda match: f"line {match[1]}: " if match[1] else "",
+            fault,
+        )
+        for fault in faults
+    ]
+    return InputError(f"{path}: cannot be parsed: {': '.join(faults)}")

@@ -1,0 +1,1 @@
+"""The LiDAR, the IMU and the odometry as Drake systems."""

@@ -1,0 +1,131 @@
+"""What a LiDAR makes of true ranges: noise, losses, rounding."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+# Intensity falls with distance as in CARLA's ray-cast LiDAR with its default
+# atmosphere: exp(-a d), a = 0.004 / m (docs/ref_sensors of CARLA).
+_ATTENUATION_PER_M = 0.004
+# Step of the intensities of a LiDAR with finite resolution: 12 bits.
+_INTENSITY_STEP = 2.0**-12
+# Beams look this many standard deviations farther than the maximum range,
+# since noise can bring a surface there into reach. A million frames of noise
+# hold no such draw.
+_FARTHEST_NOISE = 8.0
+# What random numbers are for; each purpose has a stream of its own, so that
+# turning one option on or off leaves the other's draws as they were.
+_RANGE_NOISE, _DROPOUT = range(2)
+
+
+class Returns(NamedTuple):
+    """What N of the beams return, in firing order.
+
+    Attributes:
+        beams: (N,) int index of each beam.
+        ranges: (N,) float32 measured [m].
+        intensity: (N,) float32, of at most 1.
+    """
+
+    beams: np.ndarray
+    ranges: np.ndarray
+    intensity: np.ndarray
+
+
+@dataclass(frozen=True)
+class MeasurementModel:
+    """How a LiDAR measures; ideal unless told otherwise.
+
+    Random numbers depend on `seed`, `sensor_name` and the number of the
+    frame alone, and are drawn for every beam, whatever it meets: neither
+    what was computed before nor other geometry changes a beam's noise.
+
+    Attributes:
+        resolution: coordinates are rounded to multiples of this [m], and
+            intensities to 12 bits; 0: neither is rounded. Steps that are
+            powers of two stay exact in float32 and compress well.
+        range_noise: standard deviation of the Gaussian error of a range,
+            along the beam and before rounding [m].
+        dropout: probability that a return is lost.
+        faint_dropout: probability that a return of no intensity is lost on
+            top of that. It falls linearly with intensity, to none for a
+            return of full intensity.
+        seed: of the noise.
+        sensor_name: makes the noise of one LiDAR differ from another's.
+
+    Example:
+        from cns_drake import MeasurementModel
+
+        noisy = MeasurementModel(range_noise=0.02, dropout=0.01, seed=7)
+    """
+
+    resolution: float = 0.0
+    range_noise: float = 0.0
+    dropout: float = 0.0
+    faint_dropout: float = 0.0
+    seed: int = 0
+    sensor_name: str = ""
+
+    @property
+    def is_random(self) -> bool:
+        """Whether two frames of the same geometry differ."""
+        return max(self.range_noise, self.dropout, self.faint_dropout) > 0.0
+
+    def reach(self, max_range: float) -> float:
+        """Returns how far to look for what may be measured [m].
+
+        Beyond the maximum by a hair even without noise, so that the limit
+        itself is decided by `measure` and not by a ray caster's rounding.
+        """
+        return max_range * (1.0 + 1e-5) + _FARTHEST_NOISE * self.range_noise
+
+    def measure(
+        self,
+        true_ranges: np.ndarray,
+        min_range: float,
+        max_range: float,
+        frame: int,
+    ) -> Returns:
+        """Returns what is measured of true ranges.
+
+        Args:
+            true_ranges: (num_beams,) float32 distance to the nearest surface
+                along each beam in firing order [m], inf if there is none.
+            min_range: a nearer measured range is no return [m].
+            max_range: nor is a farther one [m].
+            frame: number of the frame.
+        """
+        ranges = true_ranges
+        num_beams = len(true_ranges)
+        if self.range_noise > 0.0:
+            error = self._generator(_RANGE_NOISE, frame).standard_normal(
+                num_beams, np.float32
+            )
+            ranges = ranges + np.float32(self.range_noise) * error
+        beams = np.flatnonzero((ranges >= min_range) & (ranges <= max_range))
+        # How bright a surface appears depends on where it is.
+        intensity = np.exp(-_ATTENUATION_PER_M * true_ranges[beams])
+        if self.dropout > 0.0 or self.faint_dropout > 0.0:
+            draw = self._generator(_DROPOUT, frame).random(num_beams)[beams]
+            survival = (1.0 - self.dropout) * (
+                1.0 - self.faint_dropout * (1.0 - intensity.astype(float))
+            )
+            kept = draw < survival
+            beams, intensity = beams[kept], intensity[kept]
+        if self.resolution > 0.0:
+            step = np.float32(_INTENSITY_STEP)
+            intensity = np.rint(intensity / step) * step
+        return Returns(beams, ranges[beams], intensity)
+
+    def _generator(self, purpose: int, frame: int) -> np.random.Generator:
+        key = (purpose, frame, *self.sensor_name.encode())
+        return np.random.default_rng(
+            np.random.SeedSequence(self.seed, spawn_key=key)
+        )
+
+
+# Measures exactly.
+IDEAL = MeasurementModel()

@@ -1,0 +1,76 @@
+"""The points of a scan, from what its beams measured.
+
+Compiled: a dozen passes of numpy over all points take four times as long.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from evaluation.support.compiled import compiled
+
+
+class BeamTable(NamedTuple):
+    """What is the same in every scan, for all beams in firing order.
+
+    Attributes:
+        d_Sset: (num_beams, 3) float32 unit directions, expressed in S.
+        ring: (num_beams,) uint16.
+        t_ns: (num_beams,) uint32 firing time since the start of the turn.
+        place: (num_beams,) where each beam is in the order of casting.
+    """
+
+    d_Sset: np.ndarray
+    ring: np.ndarray
+    t_ns: np.ndarray
+    place: np.ndarray
+
+
+@compiled
+def assemble_points(
+    scan: np.recarray,
+    table: BeamTable,
+    beams: np.ndarray,
+    ranges: np.ndarray,
+    intensity: np.ndarray,
+    geometry: np.ndarray,
+    label: np.ndarray,
+    instance: np.ndarray,
+    step: float,
+) -> None:
+    """Fills a scan, one point for each return.
+
+    Args:
+        scan: (N,) `POINT_DTYPE` to fill.
+        table: a `BeamTable`.
+        beams: (N,) the beams that returned something.
+        ranges: (N,) float32 measured along them [m].
+        intensity: (N,) float32.
+        geometry: (num_beams,) int32 what the beams met, in the order of
+            casting: an index into
+        label: uint8 classes, and
+        instance: uint16 structures.
+        step: float32, coordinates are rounded to multiples of it [m]; not
+            rounded if 0.
+    """
+    for k in range(len(beams)):
+        beam = beams[k]
+        x = table.d_Sset[beam, 0] * ranges[k]
+        y = table.d_Sset[beam, 1] * ranges[k]
+        z = table.d_Sset[beam, 2] * ranges[k]
+        if step > 0:
+            x = np.rint(x / step) * step
+            y = np.rint(y / step) * step
+            z = np.rint(z / step) * step
+        met = geometry[table.place[beam]]
+        point = scan[k]
+        point.x = x
+        point.y = y
+        point.z = z
+        point.intensity = intensity[k]
+        point.ring = table.ring[beam]
+        point.t = table.t_ns[beam]
+        point.label = label[met]
+        point.instance = instance[met]

@@ -1,0 +1,88 @@
+"""A single scan of any SDF world from any pose."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cns_drake.scene.world import World
+from cns_drake.sensors.beam_pattern import BeamPattern
+from cns_drake.sensors.lidar import Lidar
+from cns_drake.simulation.still_world import make_still_world
+from evaluation.clouds.cloud_writing import (
+    encode_bin,
+    encode_pcd,
+    to_xyzi,
+)
+from evaluation.support.errors import InputError
+from evaluation.support.files import (
+    complete_part,
+    part_path,
+    user_errors,
+)
+
+
+def scan_world(
+    world: World, X_WS: RigidTransform, pattern: BeamPattern
+) -> np.ndarray:
+    """Returns one scan, taken with the world's models as they start.
+
+    Args:
+        world: what to scan.
+        X_WS: the sensor's pose in the world.
+        pattern: the beams.
+
+    Returns:
+        Structured array of `POINT_DTYPE`, in the sensor frame.
+    """
+    lidar = Lidar(
+        world.scene_graph.world_frame_id(),
+        X_WS,
+        pattern,
+        structures=world.structures,
+        anchored_frames=world.anchored_frames(),
+    )
+    context = make_still_world(world, lidar).CreateDefaultContext()
+    return lidar.GetOutputPort("scan").Eval(lidar.GetMyContextFromRoot(context))
+
+
+def check_ending(path: Path) -> None:
+    """Checks that `save_scan` knows the format of a file.
+
+    Raises:
+        InputError: it does not.
+    """
+    if path.suffix not in _ENCODERS:
+        raise InputError(
+            f"{path}: unknown ending '{path.suffix}'; known: "
+            f"{', '.join(_ENCODERS)}"
+        )
+
+
+def save_scan(scan: np.ndarray, path: Path) -> None:
+    """Saves a scan's x, y, z and intensity; the ending tells the format.
+
+    `.bin` is KITTI's float32 x y z intensity, `.npy` the same numbers as an
+    N x 4 array, `.pcd` a binary PCD file.
+
+    Raises:
+        InputError: the ending is none of these, or the file cannot be
+            written.
+    """
+    check_ending(path)
+    with user_errors(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part_path(path).write_bytes(_ENCODERS[path.suffix](scan))
+    complete_part(path)
+
+
+def _encode_npy(scan: np.ndarray) -> bytes:
+    stream = io.BytesIO()
+    np.save(stream, to_xyzi(scan))
+    return stream.getvalue()
+
+
+_ENCODERS = {".bin": encode_bin, ".npy": _encode_npy, ".pcd": encode_pcd}

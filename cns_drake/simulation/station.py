@@ -1,0 +1,155 @@
+"""The Diagram: the one place where systems are wired."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
+from pydrake.systems.rendering import MultibodyPositionToGeometryPose
+
+from cns_drake.motion.sweep import VehicleSweep
+from cns_drake.motion.trajectory import Trajectory
+from cns_drake.motion.vehicle_motion import VehicleMotion
+from cns_drake.pictures.meshcat_recording import MeshcatRecorder
+from cns_drake.recording.background_writer import BackgroundWriter
+from cns_drake.recording.bag_writer import BagWriter
+from cns_drake.recording.frame_clock import FRAME_PERIOD, START_NS
+from cns_drake.recording.mcap_recorder import McapRecorder
+from cns_drake.scenarios.planning import plan_drive
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.shipped import vehicle_file
+from cns_drake.scene.world import World, load_world
+from cns_drake.sensors.imu import add_imu
+from cns_drake.sensors.lidar import add_lidar
+from cns_drake.sensors.odometry import add_odometry
+
+
+def make_station(
+    scenario: Scenario,
+    *,
+    world: World | None = None,
+    trajectory: Trajectory | None = None,
+    bag: BagWriter | BackgroundWriter | None = None,
+    page: MeshcatRecorder | None = None,
+    num_threads: int = 1,
+) -> Diagram:
+    """Makes the Diagram of a scenario.
+
+    Systems: `scene_graph` holds the stage and the vehicle, `vehicle_motion`
+    prescribes where the vehicle is, `geometry_pose` passes that on to the
+    SceneGraph; a `Lidar` for each entry of `scenario.lidars` under its name
+    (with a `<lidar>_sweep` if it moves while it turns), an accelerometer and
+    a gyroscope, and `odometry` measure; `mcap_recorder` and
+    `meshcat_recorder` take down what they measure.
+
+    Exported output ports: `<lidar>_scan`, `specific_force`,
+    `angular_velocity`, `odometry`, `geometry_query`.
+
+    Args:
+        scenario: what to build.
+        world: the stage with the vehicle, if already loaded; its SceneGraph
+            passes to the Diagram.
+        trajectory: the drive, if already planned.
+        bag: an open recording of the scenario's topics.
+        page: a recorder of the same world for a web page.
+        num_threads: how many threads cast the rays of a LiDAR.
+
+    Raises:
+        InputError: the scenario's files cannot be used.
+
+    Example:
+        from cns_drake import load_scenario, make_station
+
+        diagram = make_station(load_scenario("downtown_01"))
+        context = diagram.CreateDefaultContext()
+        scan = diagram.GetOutputPort("lidar_scan").Eval(context)
+    """
+    world = world or load_stage(scenario)
+    trajectory = trajectory or plan_drive(scenario)
+    X_BSs = {name: lidar.pose() for name, lidar in scenario.lidars.items()}
+    X_BI = scenario.imu.pose()
+    plant = world.plant
+    base = plant.GetBodyByName("base_link", world.vehicle)
+
+    builder = DiagramBuilder()
+    scene_graph = builder.AddNamedSystem("scene_graph", world.scene_graph)
+    motion = builder.AddNamedSystem(
+        "vehicle_motion", VehicleMotion(plant, world.vehicle, trajectory)
+    )
+    to_pose = builder.AddNamedSystem(
+        "geometry_pose", MultibodyPositionToGeometryPose(plant)
+    )
+    builder.Connect(motion.GetOutputPort("position"), to_pose.get_input_port())
+    builder.Connect(
+        to_pose.get_output_port(),
+        scene_graph.get_source_pose_port(plant.get_source_id()),
+    )
+
+    # What is measured, by name: also the names of the exported ports.
+    measured = {"geometry_query": scene_graph.get_query_output_port()}
+    for name, config in scenario.lidars.items():
+        lidar = add_lidar(
+            builder,
+            scene_graph,
+            base,
+            X_BSs[name],
+            config.pattern(),
+            name=name,
+            measurement=config.measurement(name, scenario.seed),
+            with_sweep=config.motion_distortion,
+            structures=world.structures,
+            anchored_frames=world.anchored_frames(),
+            num_threads=num_threads,
+        )
+        if config.motion_distortion:
+            sweep = builder.AddNamedSystem(
+                f"{name}_sweep",
+                VehicleSweep(trajectory, config.pattern().column_t_ns * 1e-9),
+            )
+            builder.Connect(
+                sweep.GetOutputPort("sweep"), lidar.GetInputPort("sweep")
+            )
+        measured[f"{name}_scan"] = lidar.GetOutputPort("scan")
+    accelerometer, gyroscope = add_imu(builder, plant, motion, base, X_BI)
+    measured["specific_force"] = accelerometer.get_measurement_output_port()
+    measured["angular_velocity"] = gyroscope.get_measurement_output_port()
+    odometry = add_odometry(builder, motion, base)
+    measured["odometry"] = odometry.GetOutputPort("odometry")
+
+    recorders = {"meshcat_recorder": page}
+    if bag is not None:
+        recorders["mcap_recorder"] = McapRecorder(
+            bag,
+            X_BSs=X_BSs,
+            X_BI=X_BI,
+            period=FRAME_PERIOD,
+            start_ns=START_NS,
+        )
+    for name, recorder in recorders.items():
+        if recorder is not None:
+            _connect(builder, name, recorder, measured)
+    for name, port in measured.items():
+        builder.ExportOutput(port, name)
+    diagram = builder.Build()
+    diagram.set_name(scenario.name)
+    return diagram
+
+
+def load_stage(scenario: Scenario) -> World:
+    """Loads the stage of a scenario with the vehicle in it."""
+    return load_world(
+        scenario.world_file, vehicle=vehicle_file(), without=scenario.without
+    )
+
+
+def _connect(
+    builder: DiagramBuilder,
+    name: str,
+    recorder: McapRecorder | MeshcatRecorder,
+    measured: Mapping[str, OutputPort],
+) -> None:
+    """Adds a recorder and connects its inputs to the ports of their names."""
+    builder.AddNamedSystem(name, recorder)
+    for k in range(recorder.num_input_ports()):
+        port = recorder.get_input_port(k)
+        builder.Connect(measured[port.get_name()], port)

@@ -1,0 +1,1 @@
+"""What needs many drives: the benchmark, families, calibration."""

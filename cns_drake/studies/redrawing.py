@@ -1,0 +1,196 @@
+"""A map's city drawn anew: the same streets, another draw of all the rest.
+
+Roads and plan stay, only the plan's seed is another one: buildings, plants,
+cars and furniture are drawn anew. Each such city is a map folder of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import os
+from pathlib import Path
+import shutil
+
+import yaml
+
+from cns_drake import __version__
+from cns_drake.city.plan.city_plan import load_plan
+from evaluation.jobs.cluster import Cluster
+from evaluation.jobs.running import Job, Tell, run_jobs
+from evaluation.support.errors import InputError
+from evaluation.support.files import make_folder, part_path, user_errors
+from evaluation.support.interrupts import uninterrupted
+from evaluation.support.yaml_files import read_yaml
+
+# How each input that is written here begins.
+_MARK = b"# Of a city drawn anew by cns-drake"
+# Expected time to draw a city [s].
+_COST = 7.0
+
+
+def redraw_cities(
+    map_folder: Path,
+    stage: str,
+    seeds: Sequence[int],
+    output: Path,
+    cluster: Cluster,
+) -> dict[int, Path]:
+    """Draws the city of a map anew, with progress on stderr.
+
+    A city that is there already, of the same inputs and by the same version,
+    is left as it is.
+
+    Args:
+        map_folder: the map, with `roads.yaml` and `city.yaml`.
+        stage: what to call the only stage, the whole city.
+        seeds: of the cities.
+        output: the folder of cities; created if need be.
+        cluster: where.
+
+    Returns:
+        Seed -> map folder of that city, `<output>/<map>_c<seed>`, absolute.
+
+    Raises:
+        InputError: the map cannot be used, something else has the name of
+            a city, or some could not be drawn; all are named.
+    """
+    map_folder, output = map_folder.resolve(), output.resolve()
+    folders = {seed: output / f"{map_folder.name}_c{seed}" for seed in seeds}
+    # What can be found wrong at once is found before anything slow.
+    load_plan(map_folder / "city.yaml")
+    for folder in folders.values():
+        _is_replaced(folder)
+    make_folder(output)
+    jobs = [
+        Job(
+            name=f"city {folder.name}",
+            function=redraw_city,
+            arguments=(map_folder, stage, seed, folder),
+            cost=_COST,
+            output=folder,
+            is_done=is_redrawn,
+        )
+        for seed, folder in folders.items()
+    ]
+    run_jobs(jobs, cluster)
+    return folders
+
+
+def redraw_city(
+    map_folder: Path, stage: str, seed: int, folder: Path, tell: Tell
+) -> None:
+    """Draws the city of a map anew: a job.
+
+    Args:
+        map_folder: the map, with `roads.yaml` and `city.yaml`.
+        stage: what to call the only stage, the whole city.
+        seed: of the city.
+        folder: the map folder to write; an older city drawn anew that has
+            this name is replaced.
+        tell: is told of that.
+
+    Raises:
+        InputError: the city cannot be drawn with this seed, the folder is
+            something else, or it cannot be written.
+    """
+    with uninterrupted():
+        from cns_drake.city.generation.generate import generate_city
+
+    inputs = redrawn_inputs(map_folder, stage, seed)
+    part = part_path(folder)
+    # It has its final name already, which its files tell.
+    draft = part / folder.name
+    try:
+        with user_errors(folder):
+            # What a run left that was killed.
+            shutil.rmtree(part, ignore_errors=True)
+            draft.mkdir(parents=True)
+            for name, content in inputs.items():
+                (draft / name).write_bytes(content)
+        try:
+            generate_city(draft)
+        except InputError as error:
+            fault = str(error).removeprefix(f"{draft}{os.sep}")
+            raise InputError(f"{map_folder}: seed {seed}: {fault}") from error
+        if _is_replaced(folder):
+            tell.note(f"{folder}: replaced, as it was of other inputs")
+        with user_errors(folder):
+            if os.path.lexists(folder):
+                os.replace(folder, part / "replaced")
+            os.replace(draft, folder)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def is_redrawn(map_folder: Path, stage: str, seed: int, folder: Path) -> bool:
+    """Tells whether there is nothing to do; see `redraw_city`.
+
+    A folder that has its final name is complete, so that its inputs, which
+    name the version, tell what it is.
+    """
+    inputs = redrawn_inputs(map_folder, stage, seed)
+    with user_errors(folder):
+        return all(
+            (folder / name).is_file()
+            and (folder / name).read_bytes() == content
+            for name, content in inputs.items()
+        )
+
+
+def redrawn_inputs(map_folder: Path, stage: str, seed: int) -> dict[str, bytes]:
+    """Returns the inputs of a map's city drawn anew.
+
+    Args:
+        map_folder: the map, with `roads.yaml` and `city.yaml`.
+        stage: what to call the only stage, the whole city. The map's own
+            stages name structures that another draw need not have.
+        seed: of the city.
+
+    Returns:
+        Name -> content of `roads.yaml`, which is the map's own, `city.yaml`
+        and `stages.yaml`.
+
+    Raises:
+        InputError: a file of the map cannot be read, or is no plan.
+    """
+    roads, plan = map_folder / "roads.yaml", map_folder / "city.yaml"
+    load_plan(plan)
+    with user_errors(roads):
+        network = roads.read_bytes()
+    stages = {stage: {"story": f"The whole city, as seed {seed} draws it."}}
+    return {
+        roads.name: network,
+        plan.name: _to_yaml(
+            "the map's plan with another seed",
+            read_yaml(plan) | {"seed": seed},
+        ),
+        "stages.yaml": _to_yaml("its only stage", {"stages": stages}),
+    }
+
+
+def _to_yaml(what: str, values: dict) -> bytes:
+    comment = (
+        f"{_MARK.decode()} {__version__}: {what}.\n"
+        "# `cns-drake generate --vary` writes it anew when the map changes.\n"
+    )
+    text = yaml.safe_dump(
+        values, sort_keys=False, default_flow_style=None, width=79
+    )
+    return f"{comment}\n{text}".encode()
+
+
+def _is_replaced(folder: Path) -> bool:
+    """Tells whether there is an older city drawn anew of this name.
+
+    Raises:
+        InputError: something else has the name.
+    """
+    plan = folder / "city.yaml"
+    with user_errors(folder):
+        if not os.path.lexists(folder):
+            return False
+        if not (plan.is_file() and plan.read_bytes().startswith(_MARK)):
+            raise InputError(
+                f"{folder}: is there already, and no city that was drawn anew"
+            )
+    return True

@@ -1,0 +1,173 @@
+"""The paper's experiments on a map, from simulation to report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from cns_drake.scenarios.scenario import Scenario, load_scenario
+from cns_drake.scenarios.shipped import sequences_of_map, shipped_maps
+from cns_drake.simulation.simulated_drive import SimulatedDrive
+from cns_drake.studies.map_pictures import plan_pictures
+from cns_drake.studies.recording_jobs import (
+    is_recorded,
+    plan_recordings,
+)
+from evaluation.jobs.cluster import Cluster
+from evaluation.jobs.running import run_jobs
+from evaluation.study.assembly import assemble
+from evaluation.study.collection import RecordingInfo
+from evaluation.study.plan import plan_study
+from evaluation.support.errors import InputError
+from evaluation.support.files import make_folder
+
+
+def reproduce_maps(
+    maps: Sequence[str] | None,
+    output: Path,
+    cluster: Cluster,
+    *,
+    with_pages: bool = True,
+    quick: bool = False,
+) -> Path:
+    """Records the sequences of maps, evaluates them and reports.
+
+    `<output>/<name>/` gets each recording, `<output>/pages/<name>.html` a
+    web page of each sequence's drive, `<output>/pictures` the drives of each
+    map from above and a street in its first and last stage,
+    `<output>/report` the tables and figures. What is done already is not
+    done again.
+
+    Args:
+        maps: which maps, by name or folder; all shipped ones if empty.
+        output: the folder for everything.
+        cluster: where the work is done.
+        with_pages: whether the web pages are made.
+        quick: make the report alone, of the same frames, and without
+            same-stage controls: what is not recorded yet is evaluated while
+            it is simulated, and not recorded.
+
+    Returns:
+        The path of the report.
+
+    Raises:
+        InputError: a map is not known, the folder cannot be made, or a step
+            failed.
+    """
+    folders = [_map_folder(name) for name in maps or _recordable_maps()]
+    sequences, controls, pictures = [], [], []
+    for folder in folders:
+        of_map = _sequences(folder)
+        sequences += of_map
+        if not quick:
+            controls += control_drives(of_map)
+            pictures += plan_pictures(folder, output / "pictures")
+    pages = {s.name: output / "pages" / f"{s.name}.html" for s in sequences}
+    jobs = []
+    if not quick:
+        jobs = plan_recordings(
+            [*sequences, *controls], output, pages=pages if with_pages else {}
+        )
+    waiting = {job.name for job in jobs}
+    recordings = [
+        recording_info(scenario, output, is_waiting=scenario.name in waiting)
+        for scenario in (*sequences, *controls)
+    ]
+    if quick:
+        recordings = [
+            recording
+            if is_recorded(scenario, output)
+            else replace(recording, made_by=SimulatedDrive(scenario))
+            for scenario, recording in zip(sequences, recordings, strict=True)
+        ]
+    # In the order in which `cns-eval report` finds them.
+    recordings.sort(key=lambda recording: recording.name)
+    report = output / "report"
+    make_folder(output)
+    run_jobs([*jobs, *plan_study(recordings, report), *pictures], cluster)
+    addresses = {
+        name: f"../pages/{page.name}"
+        for name, page in pages.items()
+        if page.is_file()
+    }
+    return assemble(recordings, report, pages=addresses)
+
+
+def _sequences(folder: Path) -> list[Scenario]:
+    sequences = [load_scenario(path) for path in sequences_of_map(folder)]
+    for sequence in sequences:
+        if sequence.map is None:
+            raise InputError(
+                f"{sequence.source}: map: needed to compare stages"
+            )
+    return sequences
+
+
+def control_drives(sequences: Sequence[Scenario]) -> list[Scenario]:
+    """Returns the control drives of a map's sequences.
+
+    A control drive is the route of an earlier stage through the last one:
+    compared with the last stage's own sequence, whatever it shows as change
+    is due to the routes and not to the city.
+    """
+    last = max(sequences, key=lambda sequence: sequence.stage)
+    return [
+        sequence.model_copy(
+            update={
+                "name": f"{sequence.name}_stage_{last.stage}",
+                "stage": last.stage,
+                "title": f"Control: the route of {sequence.name} "
+                f"in stage {last.stage}",
+            }
+        )
+        for sequence in sequences
+        if sequence is not last
+    ]
+
+
+def recording_info(
+    scenario: Scenario, output: Path, is_waiting: bool
+) -> RecordingInfo:
+    """Returns what the evaluation knows of a recording before it is made.
+
+    Args:
+        scenario: of a map.
+        output: the folder of recordings.
+        is_waiting: whether the job of its name has to be done first.
+    """
+    return RecordingInfo(
+        name=scenario.name,
+        path=output.absolute() / scenario.name,
+        map_name=Path(scenario.map).name,
+        stage=scenario.stage,
+        route=scenario.route or scenario.waypoints,
+        needs=(scenario.name,) if is_waiting else (),
+    )
+
+
+def _recordable_maps() -> list[str]:
+    return [
+        name
+        for name, folder in shipped_maps().items()
+        if sequences_of_map(folder)
+    ]
+
+
+def _map_folder(name: str) -> Path:
+    """Returns the folder of a map that can be recorded.
+
+    Raises:
+        InputError: there is no such map.
+    """
+    folder = shipped_maps().get(name, Path(name))
+    if not folder.is_dir():
+        known = ", ".join(_recordable_maps())
+        raise InputError(
+            f"unknown map '{name}'; known: {known}; or give a folder"
+        )
+    if not sequences_of_map(folder):
+        raise InputError(
+            f"{folder}: no sequence_NN.yaml whose stage_NN.sdf is there"
+        )
+    return folder

@@ -1,0 +1,1 @@
+"""Structural change between two drives or maps."""

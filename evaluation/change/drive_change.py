@@ -1,0 +1,300 @@
+"""The structural change between two drives, with what puts it in context.
+
+A published TCR_sym needs company: the part of it that comes from the two
+routes alone (the control), and the value where both routes saw the city
+(the coverage-masked one).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from evaluation.change.tcr import (
+    COVERAGE_RADIUS,
+    TAU,
+    TemporalChange,
+    covered,
+    temporal_change,
+)
+from evaluation.clouds.cloud_files import is_cloud, read_cloud
+from evaluation.maps.voxel_maps import (
+    VOXEL_SIZE,
+    VoxelMap,
+    map_sequence,
+    voxelise,
+)
+from evaluation.sequences import (
+    Placed,
+    Sequence,
+    check_same_world,
+    open_sequence,
+)
+from evaluation.support.errors import InputError
+from evaluation.support.progress import Track, silent
+
+if TYPE_CHECKING:
+    from evaluation.alignment import AlignmentReport, When
+
+# Two drives on one route are this close to each other [m]; lanes are 3.5 m.
+_SAME_ROUTE = 1.0
+
+
+@dataclass(frozen=True)
+class Surveyed:
+    """A map with what is known about the drive that made it.
+
+    Attributes:
+        name: of the sequence or file.
+        voxels: the map on the grid of the TCR.
+        positions: (N, 3) of the sensor [m]; None for a map file.
+        sequence: the drive, or where it lay; None for a map file.
+    """
+
+    name: str
+    voxels: VoxelMap
+    positions: np.ndarray | None = None
+    sequence: Placed | None = None
+
+
+@dataclass(frozen=True)
+class ChangeReport:
+    """The change between two maps A and B.
+
+    Attributes:
+        source: name of A.
+        target: name of B.
+        change: over the whole maps.
+        masked: over what both drives passed within the coverage radius;
+            None if a map comes without its drive.
+        control: between two drives on the two routes in one stage; None if
+            none was given.
+        control_names: the two that `control` compares.
+        alignment: how the two were put into one world; None if they came
+            in one.
+    """
+
+    source: str
+    target: str
+    change: TemporalChange
+    masked: TemporalChange | None
+    control: TemporalChange | None
+    control_names: tuple[str, str] | None
+    alignment: AlignmentReport | None = None
+
+    def to_json(self) -> dict:
+        """Returns all numbers; NaN becomes None, with a reason beside."""
+        change = self.change
+        values = {
+            "source": self.source,
+            "target": self.target,
+            "tcr_sym": _number(change.symmetric),
+            "tcr_source_to_target": _number(change.source_to_target.ratio),
+            "tcr_target_to_source": _number(change.target_to_source.ratio),
+            "in_hull": change.num_in_hull,
+            "unchanged": change.num_unchanged,
+            "voxels": _both(
+                len(change.source_to_target.in_hull),
+                len(change.target_to_source.in_hull),
+            ),
+            "in_hull_of": _both(
+                change.source_to_target.num_in_hull,
+                change.target_to_source.num_in_hull,
+            ),
+            "unchanged_of": _both(
+                change.source_to_target.num_unchanged,
+                change.target_to_source.num_unchanged,
+            ),
+            "voxel_size": VOXEL_SIZE,
+            "tau": TAU,
+            "coverage_masked": None,
+            "control": None,
+            "alignment": None,
+        }
+        if change.undefined_because:
+            values["reason"] = change.undefined_because
+        if self.masked is not None:
+            values["coverage_masked"] = _summary(self.masked) | {
+                "radius": COVERAGE_RADIUS
+            }
+        if self.control is not None:
+            values["control"] = _summary(self.control) | {
+                "between": list(self.control_names)
+            }
+        if self.alignment is not None:
+            values["alignment"] = self.alignment.to_json()
+        return values
+
+
+def survey(path: Path, track: Track = silent) -> Surveyed:
+    """Maps what lies at a path: a sequence, or a map file.
+
+    Raises:
+        InputError: if it cannot be read as either.
+    """
+    return _survey(_open(path), track)
+
+
+def survey_in_one_world(
+    paths: list[Path], when: When, track: Track = silent
+) -> tuple[list[Surveyed], list[AlignmentReport]]:
+    """Maps what lies at some paths, all in one world.
+
+    Args:
+        paths: of sequences or map files; what is not a sequence is in that
+            world already.
+        when: whether later sequences are aligned with the first.
+        track: reports progress.
+
+    Returns:
+        The maps, in the order of the paths; what was aligned, and how.
+
+    Raises:
+        InputError: if something cannot be read, or not be aligned.
+    """
+    opened = [_open(path) for path in paths]
+    drives = [i for i, one in enumerate(opened) if isinstance(one, Sequence)]
+    if when == "always" and len(drives) < len(opened):
+        raise InputError("--align always: a map file cannot be aligned")
+    reports = []
+    if len(drives) > 1:
+        # Imported here: slow to load, and maps as files do without it.
+        from evaluation.alignment import in_one_world
+
+        first, *others = drives
+        for number, other in enumerate(others):
+            alignment = in_one_world(
+                opened[first],
+                opened[other],
+                when,
+                track,
+                hold_first=number > 0,
+            )
+            if alignment is not None:
+                opened[first], opened[other] = alignment.first, alignment.second
+                reports.append(alignment.report)
+    return [_survey(one, track) for one in opened], reports
+
+
+def survey_sequence(sequence: Sequence, voxels: VoxelMap) -> Surveyed:
+    """Returns a sequence with its map on the grid of the TCR."""
+    return Surveyed(sequence.name, voxels, sequence.X_WS[:, :3, 3], sequence)
+
+
+def compare(
+    source: Surveyed,
+    target: Surveyed,
+    control: Surveyed | None = None,
+    alignment: AlignmentReport | None = None,
+) -> ChangeReport:
+    """Measures the change between two maps.
+
+    Args:
+        source: A.
+        target: B.
+        control: a drive on A's route in B's stage, or on B's route in A's
+            stage. Which of them it is shows in its route. It is compared
+            with the one whose stage it shares, so that the same two routes
+            are compared as in A and B, but one stage.
+        alignment: how the two were put into one world, for the report.
+
+    Raises:
+        InputError: if the three are not of one world, or the control is on
+            neither route.
+    """
+    if source.sequence is not None and target.sequence is not None:
+        check_same_world(source.sequence, target.sequence)
+    change = temporal_change(
+        source.voxels.centroids_W, target.voxels.centroids_W
+    )
+    masked = None
+    if source.positions is not None and target.positions is not None:
+        both = (source.positions, target.positions)
+        masked = change.restricted(
+            covered(source.voxels.centroids_W, both),
+            covered(target.voxels.centroids_W, both),
+        )
+    control_change = control_names = None
+    if control is not None:
+        partner = _same_stage_partner(source, target, control)
+        control_change = temporal_change(
+            control.voxels.centroids_W, partner.voxels.centroids_W
+        )
+        control_names = (control.name, partner.name)
+    return ChangeReport(
+        source.name,
+        target.name,
+        change,
+        masked,
+        control_change,
+        control_names,
+        alignment,
+    )
+
+
+def _open(path: Path) -> Sequence | Path:
+    """Returns the sequence at a path, or the path if it is a map file."""
+    path = Path(path)
+    if path.is_file() and is_cloud(path):
+        return path
+    return open_sequence(path)
+
+
+def _survey(source: Sequence | Path, track: Track) -> Surveyed:
+    if isinstance(source, Sequence):
+        voxels = map_sequence(source, VOXEL_SIZE, track)
+        return survey_sequence(source, voxels)
+    voxels, _ = voxelise(read_cloud(source))
+    return Surveyed(source.name, voxels)
+
+
+def _same_stage_partner(
+    source: Surveyed, target: Surveyed, control: Surveyed
+) -> Surveyed:
+    """Returns the one whose route the control does not share."""
+    if any(one.positions is None for one in (source, target, control)):
+        raise InputError(
+            f"{control.name}: a control needs three recorded sequences, not"
+            " map files"
+        )
+    check_same_world(source.sequence, control.sequence)
+    on_source = _route_distance(control, source)
+    on_target = _route_distance(control, target)
+    if min(on_source, on_target) > _SAME_ROUTE:
+        raise InputError(
+            f"{control.name}: as control on neither route: {on_source:.1f} m"
+            f" from that of {source.name}, {on_target:.1f} m from that of"
+            f" {target.name}"
+        )
+    return target if on_source <= on_target else source
+
+
+def _route_distance(first: Surveyed, second: Surveyed) -> float:
+    """Returns the mean distance between two routes, seen from either [m]."""
+    there, _ = cKDTree(second.positions).query(first.positions)
+    back, _ = cKDTree(first.positions).query(second.positions)
+    return float(max(there.mean(), back.mean()))
+
+
+def _summary(change: TemporalChange) -> dict:
+    values = {
+        "tcr_sym": _number(change.symmetric),
+        "in_hull": change.num_in_hull,
+        "unchanged": change.num_unchanged,
+    }
+    if change.undefined_because:
+        values["reason"] = change.undefined_because
+    return values
+
+
+def _both(source: int, target: int) -> dict:
+    return {"source": source, "target": target}
+
+
+def _number(value: float) -> float | None:
+    return None if math.isnan(value) else value

@@ -1,0 +1,218 @@
+"""Temporal change ratio (TCR) of two maps, directed and symmetric.
+
+Of the paper "The City that Never Settles": equations 1 to 3. What it leaves
+open is fixed as follows.
+
+- X is the map of a whole sequence in world coordinates, as the centroids of
+  the voxels of a grid that is fixed in the world (see `evaluation.maps`).
+- O, the unchanged points, is counted inside H, the points in the other map's
+  convex hull; otherwise the ratio could become negative.
+- The two sets that are united belong to different clouds. The union is a
+  concatenation, so TCR_sym is the mean of the directed ratios, weighted by
+  the sizes of H.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from evaluation.geometry.hull import in_convex_hull
+
+# Distance up to which a point has a counterpart in the other map [m].
+TAU = 4.5
+# Range of a trajectory within which a map counts as covered by it [m].
+COVERAGE_RADIUS = 40.0
+
+
+@dataclass(frozen=True)
+class DirectedChange:
+    """What of one map (the source) is not found in another (the target).
+
+    Attributes:
+        in_hull: (N,) bool, the set H: source points in the target's hull.
+        unchanged: (N,) bool, the set O: those of them that have a target
+            point within tau.
+        distances: (N,) distance to the nearest target point [m]; infinite
+            if there is none.
+    """
+
+    in_hull: np.ndarray
+    unchanged: np.ndarray
+    distances: np.ndarray
+
+    @property
+    def num_in_hull(self) -> int:
+        return int(np.count_nonzero(self.in_hull))
+
+    @property
+    def num_unchanged(self) -> int:
+        return int(np.count_nonzero(self.unchanged))
+
+    @property
+    def ratio(self) -> float:
+        """1 - |O| / |H|, the TCR of the NSS benchmark; NaN if H is empty."""
+        return _ratio(self.num_unchanged, self.num_in_hull)
+
+
+@dataclass(frozen=True)
+class TemporalChange:
+    """The change between two maps, seen from either.
+
+    Attributes:
+        source_to_target: labels of the source's points.
+        target_to_source: labels of the target's points.
+
+    Example:
+        from evaluation import temporal_change
+
+        print(temporal_change(source, target).source_to_target.ratio)
+    """
+
+    source_to_target: DirectedChange
+    target_to_source: DirectedChange
+
+    @property
+    def num_in_hull(self) -> int:
+        """|H(S, T) u H(T, S)|."""
+        return (
+            self.source_to_target.num_in_hull
+            + self.target_to_source.num_in_hull
+        )
+
+    @property
+    def num_unchanged(self) -> int:
+        """|O(S, T) u O(T, S)|."""
+        return (
+            self.source_to_target.num_unchanged
+            + self.target_to_source.num_unchanged
+        )
+
+    @property
+    def symmetric(self) -> float:
+        """TCR_sym, equation 1; NaN if nothing lies in the hulls."""
+        return _ratio(self.num_unchanged, self.num_in_hull)
+
+    @property
+    def undefined_because(self) -> str | None:
+        """Why TCR_sym is NaN; None where it is a number."""
+        if self.num_in_hull:
+            return None
+        sides = (self.source_to_target, self.target_to_source)
+        if any(len(side.in_hull) == 0 for side in sides):
+            return "a map holds no point"
+        return "no point of either map lies in the hull of the other"
+
+    def restricted(
+        self, source_kept: np.ndarray, target_kept: np.ndarray
+    ) -> TemporalChange:
+        """Returns the change with only some of the points counted.
+
+        Hulls and nearest neighbours stay those of the whole maps: a mask
+        says which points are judged, not what there is to see.
+
+        Args:
+            source_kept: (N,) bool.
+            target_kept: (M,) bool.
+        """
+        return TemporalChange(
+            _restrict(self.source_to_target, source_kept),
+            _restrict(self.target_to_source, target_kept),
+        )
+
+
+def temporal_change(
+    source: np.ndarray,
+    target: np.ndarray,
+    *,
+    tau: float = TAU,
+    restrict_to_hull: bool = True,
+) -> TemporalChange:
+    """Compares two maps.
+
+    Args:
+        source: (N, 3) float64 voxel centroids, in the frame of both [m].
+        target: (M, 3) float64.
+        tau: distance up to which a point is unchanged, inclusive [m].
+        restrict_to_hull: whether O is counted inside H. Off is the literal
+            equation 2, under which values may be negative.
+
+    Returns:
+        Labels of all points, and the ratios.
+
+    Raises:
+        ValueError: if a coordinate is not finite.
+
+    Example:
+        from evaluation import temporal_change
+
+        print(temporal_change(source, target).symmetric)
+    """
+    for points in (source, target):
+        if not np.isfinite(points).all():
+            raise ValueError("a coordinate of the map is not finite")
+    return TemporalChange(
+        _directed(source, target, tau, restrict_to_hull),
+        _directed(target, source, tau, restrict_to_hull),
+    )
+
+
+def covered(
+    points: np.ndarray,
+    trajectories: tuple[np.ndarray, ...],
+    radius: float = COVERAGE_RADIUS,
+) -> np.ndarray:
+    """Returns which points lie near every one of some trajectories.
+
+    Two routes see different parts of a city even if nothing changed. Where
+    both passed near, most of that difference is gone.
+
+    Args:
+        points: (N, 3) [m].
+        trajectories: positions (K, 3) of the sensor on each drive [m].
+        radius: horizontal distance to the nearest position [m]. Height is
+            left out, as a tall facade is seen from its foot.
+
+    Returns:
+        (N,) bool.
+
+    Example:
+        from evaluation import covered
+
+        near_both = points[covered(points, (positions_a, positions_b))]
+    """
+    kept = np.ones(len(points), dtype=bool)
+    for positions in trajectories:
+        distances, _ = cKDTree(positions[:, :2]).query(points[:, :2])
+        kept &= distances <= radius
+    return kept
+
+
+def _directed(
+    source: np.ndarray, target: np.ndarray, tau: float, restrict: bool
+) -> DirectedChange:
+    in_hull = in_convex_hull(source, target)
+    if len(source) and len(target):
+        centre = target.mean(axis=0)
+        distances, _ = cKDTree(target - centre).query(source - centre)
+    else:
+        distances = np.full(len(source), np.inf)
+    unchanged = distances <= tau
+    if restrict:
+        unchanged &= in_hull
+    return DirectedChange(in_hull, unchanged, distances)
+
+
+def _restrict(change: DirectedChange, kept: np.ndarray) -> DirectedChange:
+    return DirectedChange(
+        change.in_hull & kept, change.unchanged & kept, change.distances
+    )
+
+
+def _ratio(num_unchanged: int, num_in_hull: int) -> float:
+    if num_in_hull == 0:
+        return math.nan
+    return 1.0 - num_unchanged / num_in_hull

@@ -1,0 +1,1 @@
+"""Files of single point clouds: PCD, PLY, NumPy and KITTI's."""

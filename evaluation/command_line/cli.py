@@ -1,0 +1,365 @@
+"""The command line `cns-eval`.
+
+What takes time to import is imported inside the commands, so that the help
+comes at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from evaluation.support import terminal
+from evaluation.support.terminal import example
+
+if TYPE_CHECKING:
+    from evaluation.change.drive_change import ChangeReport
+    from evaluation.methods.method import Method
+    from evaluation.recognition.metrics import Interval
+    from evaluation.recognition.recognition_result import RecognitionResult
+    from evaluation.sequences.sequence import Sequence
+
+app = terminal.make_program(
+    "cns-eval",
+    "Structural change and place recognition on LiDAR sequences.",
+    example("cns-eval tcr before.pcd after.pcd"),
+)
+
+
+class ModeName(str, Enum):
+    """Which queries a precision-recall curve counts."""
+
+    ALL = "all"
+    FILTERED = "filtered"
+
+
+class AlignName(str, Enum):
+    """When sequences are put into one world."""
+
+    AUTO = "auto"
+    ALWAYS = "always"
+    NEVER = "never"
+
+
+_Align = Annotated[
+    AlignName,
+    typer.Option(
+        help="Align sequences: those whose world frames differ, all, or none."
+    ),
+]
+_Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+_MethodName = Annotated[
+    str,
+    typer.Option(
+        "--method",
+        help="Place-recognition method, or a Python file that registers one.",
+    ),
+]
+_Parameters = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help="A parameter of the method; may be repeated. Several numbers"
+        " are separated by commas.",
+    ),
+]
+_SensorHeight = Annotated[
+    float, typer.Option(help="Height of the LiDAR above the ground [m].")
+]
+_OwnMethods = Annotated[
+    list[Path] | None,
+    typer.Option(
+        help="Python file that registers a method, to run besides the four;"
+        " may be repeated."
+    ),
+]
+_Jobs = Annotated[
+    int | None,
+    typer.Option(
+        metavar="N",
+        help="Processes that work at the same time; as many as there are"
+        " cores if left out.",
+    ),
+]
+_Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ADDRESS",
+        help="Scheduler of a Dask cluster that shares the file system, such"
+        " as tcp://10.0.0.1:8786. Also DASK_SCHEDULER_ADDRESS.",
+    ),
+]
+
+
+@app.command(
+    epilog=example("cns-eval tcr drives/metropolis_01 drives/metropolis_04")
+)
+def tcr(
+    source: Annotated[Path, typer.Argument(metavar="A")],
+    target: Annotated[Path, typer.Argument(metavar="B")],
+    control: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="C",
+            help="A recording of A's route in B's stage, or of B's route in"
+            " A's stage: what TCR_sym the routes alone cause.",
+        ),
+    ] = None,
+    align: _Align = AlignName.AUTO,
+    json: _Json = False,
+) -> None:
+    """Temporal change ratio of two drives or maps.
+
+    A and B are recorded sequences (MCAP, MulRan, HeLiPR, KITTI odometry,
+    CNS) or maps (.pcd .ply .npy .bin). A is the source and B the target of
+    the directed ratios. Sequences of different world frames are aligned.
+    """
+    from evaluation.change import drive_change as change
+
+    paths = [path for path in (source, target, control) if path is not None]
+    surveys, alignments = change.survey_in_one_world(
+        paths, align.value, terminal.track
+    )
+    report = change.compare(
+        *surveys[:2],
+        control=None if control is None else surveys[2],
+        alignment=alignments[0] if alignments else None,
+    )
+    for one in surveys:
+        _tell_notes(one.sequence)
+        ignored = one.voxels.num_ignored
+        if ignored:
+            terminal.note(f"{one.name}: {ignored} points not finite")
+    for alignment in alignments:
+        terminal.note(alignment.to_text())
+    if json:
+        terminal.print_json(report.to_json())
+    else:
+        terminal.print_rows(_change_rows(report))
+
+
+@app.command(
+    epilog=example(
+        "cns-eval pr drives/metropolis_01 drives/metropolis_04 \\",
+        "    --method scan-context++",
+    )
+)
+def pr(
+    database: Annotated[Path, typer.Argument(metavar="DATABASE")],
+    query: Annotated[Path, typer.Argument(metavar="QUERY")],
+    method: _MethodName,
+    mode: Annotated[
+        ModeName,
+        typer.Option(help="Count all queries, or those that have a match."),
+    ] = ModeName.ALL,
+    parameter: _Parameters = None,
+    sensor_height: _SensorHeight = 1.6,
+    align: _Align = AlignName.AUTO,
+    json: _Json = False,
+) -> None:
+    """Place recognition of one drive in another.
+
+    How well the scans of QUERY find their place in DATABASE. Both are
+    recorded sequences (MCAP, MulRan, HeLiPR, KITTI odometry, CNS). Those of
+    different world frames are aligned.
+    """
+    from evaluation.alignment import in_one_world
+    from evaluation.recognition import place_recognition
+    from evaluation.sequences import open_sequence
+
+    chosen = _make_method(method, parameter, sensor_height)
+    drives = [open_sequence(path) for path in (database, query)]
+    for drive in drives:
+        _tell_notes(drive)
+    alignment = in_one_world(*drives, align.value, terminal.track)
+    if alignment is not None:
+        drives = [alignment.first, alignment.second]
+        terminal.note(alignment.report.to_text())
+    result = place_recognition.run(*drives, chosen, mode.value, terminal.track)
+    if json:
+        terminal.print_json(result.to_json())
+    else:
+        terminal.print_rows(_recognition_rows(result))
+
+
+@app.command(
+    epilog=example(
+        "cns-eval scores --method solid --output scores.csv \\",
+        "    --database kitti/sequences/01/velodyne \\",
+        "    --query kitti/sequences/04/velodyne",
+    )
+)
+def scores(
+    method: _MethodName,
+    database: Annotated[Path, typer.Option(help="Folder of single scans.")],
+    query: Annotated[Path, typer.Option(help="Folder of single scans.")],
+    output: Annotated[Path, typer.Option(help="CSV file to write.")],
+    parameter: _Parameters = None,
+    sensor_height: _SensorHeight = 1.6,
+) -> None:
+    """Scores of all pairs of scans of two folders.
+
+    Scans are .bin, .pcd, .npy or .ply files. Every query is compared with
+    every place; a search that only saves time is left out. An empty score
+    means that there is no candidate.
+    """
+    from evaluation.recognition import scan_folders
+
+    chosen = _make_method(method, parameter, sensor_height)
+    num_ignored = scan_folders.write_scores(
+        chosen, database, query, output, terminal.track
+    )
+    if num_ignored:
+        terminal.note(f"{num_ignored} points not finite")
+    terminal.note(f"wrote {output}")
+
+
+@app.command(epilog=example("cns-eval report drives --output report"))
+def report(
+    recordings: Annotated[Path, typer.Argument(metavar="DIR")],
+    output: Annotated[Path, typer.Option(help="Folder to write.")],
+    method: _OwnMethods = None,
+    jobs: _Jobs = None,
+    scheduler: _Scheduler = None,
+) -> None:
+    """Report on all recordings in a folder.
+
+    Writes tables, figures and report.html. Interrupted, the same command
+    goes on where it was.
+    """
+    from evaluation.jobs.cluster import choose_cluster
+    from evaluation.study import benchmark as reporting
+
+    cluster = choose_cluster(jobs, scheduler)
+    path = reporting.write_report(
+        recordings, output, cluster, method or (), on_note=terminal.note
+    )
+    print(path)
+
+
+@app.command(
+    epilog=example(
+        "cns-eval trend family/riverside_01_m* \\",
+        "    --query family/riverside_02 --output trend",
+    )
+)
+def trend(
+    databases: Annotated[list[Path], typer.Argument(metavar="DATABASE")],
+    query: Annotated[Path, typer.Option(help="The drive that asks.")],
+    output: Annotated[Path, typer.Option(help="Folder to write.")],
+    method: _OwnMethods = None,
+    jobs: _Jobs = None,
+    scheduler: _Scheduler = None,
+) -> None:
+    """AUC over TCR_sym, of many databases.
+
+    One drive asks them all, by every method. Writes trend.csv and a figure
+    with 95 % bands. Interrupted, the same command goes on where it was.
+    """
+    from evaluation.jobs.cluster import choose_cluster
+    from evaluation.study.trend import write_trend
+    from evaluation.study.trend_points import measure_trend
+
+    cluster = choose_cluster(jobs, scheduler)
+    points = measure_trend(query, databases, output, cluster, method or ())
+    print(write_trend(points, output))
+
+
+def main() -> None:
+    """Runs the command line and exits with its status."""
+    terminal.run(app, "cns-eval")
+
+
+def _tell_notes(sequence: Sequence | None) -> None:
+    for note in () if sequence is None else sequence.notes:
+        terminal.note(note)
+
+
+def _make_method(
+    name: str, assignments: list[str] | None, height: float
+) -> Method:
+    from evaluation.methods import make_method
+    from evaluation.methods.own_file import load_method
+    from evaluation.support.errors import InputError
+
+    parameters: dict[str, object] = {"sensor_height": height}
+    for assignment in assignments or []:
+        key, equals, value = assignment.partition("=")
+        if not (key and equals):
+            raise InputError(f"--set: {assignment!r} is not NAME=VALUE")
+        parameters[key] = value.split(",") if "," in value else value
+    if name.endswith(".py"):
+        name = load_method(Path(name)).name
+    return make_method(name, parameters)
+
+
+def _change_rows(report: ChangeReport) -> Iterator[tuple[str, str]]:
+    change = report.change
+    pair = f"{report.source} <-> {report.target}"
+    yield "pair", pair
+    yield "TCR_sym", terminal.number(change.symmetric)
+    if change.undefined_because:
+        yield "  because", change.undefined_because
+    for label, names, side in (
+        ("TCR", (report.source, report.target), change.source_to_target),
+        ("TCR", (report.target, report.source), change.target_to_source),
+    ):
+        counts = f"({side.num_unchanged} of {side.num_in_hull} unchanged)"
+        yield (
+            f"{label} {names[0]} -> {names[1]}",
+            f"{terminal.number(side.ratio)}  {counts}",
+        )
+    if report.masked is not None:
+        yield (
+            "TCR_sym where both drove",
+            terminal.number(report.masked.symmetric),
+        )
+    if report.control is not None:
+        names = " <-> ".join(report.control_names)
+        yield (
+            "TCR_sym of the routes alone",
+            f"{terminal.number(report.control.symmetric)}  ({names})",
+        )
+
+
+def _recognition_rows(result: RecognitionResult) -> Iterator[tuple[str, str]]:
+    metrics = result.metrics
+    yield "method", result.method
+    yield "database -> query", f"{result.database} -> {result.query}"
+    yield "mode", metrics.mode
+    yield (
+        "queries, with a match (N)",
+        f"{metrics.num_queries}, {metrics.num_with_match}",
+    )
+    yield (
+        "R@1",
+        f"{terminal.number(metrics.recall_at_1)}"
+        f"  {_interval_text(metrics.recall_at_1_interval)}"
+        f"  (TP {metrics.num_right} of N {metrics.num_with_match})",
+    )
+    for rank in (5, 10, 25):
+        yield f"R@{rank}", terminal.number(metrics.recall_at_n[rank - 1])
+    yield "R@1%", terminal.number(metrics.recall_at_1_percent)
+    yield (
+        "AUC",
+        f"{terminal.number(metrics.auc)}"
+        f"  {_interval_text(metrics.auc_interval)}",
+    )
+    f1 = terminal.number(metrics.f1_max)
+    if metrics.f1_max_index is not None:
+        index = metrics.f1_max_index
+        f1 += (
+            f"  (TP {metrics.curve.true_positives[index]},"
+            f" T {metrics.curve.counted[index]})"
+        )
+    yield "F1max", f1
+
+
+def _interval_text(interval: Interval) -> str:
+    low, high = terminal.number(interval.low), terminal.number(interval.high)
+    return f"[{low}, {high}]"

@@ -1,0 +1,1 @@
+"""Arrays of poses and points."""

@@ -1,0 +1,60 @@
+"""Point clouds as structured arrays: one record per point.
+
+A cloud has at least the scalar fields `x`, `y` and `z` [m]; what else a file
+holds (intensity, ring, label) keeps its name and type. This is the one form
+in which scans and maps travel between readers and what uses them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import DTypeLike
+
+
+def xyz(points: np.ndarray, dtype: DTypeLike = np.float64) -> np.ndarray:
+    """Returns the coordinates of a cloud as a new (N, 3) array.
+
+    Args:
+        points: structured array of shape (N,) with fields `x`, `y`, `z`.
+        dtype: type of the result.
+    """
+    coordinates = np.empty((len(points), 3), dtype=dtype)
+    for axis, name in enumerate("xyz"):
+        coordinates[:, axis] = points[name]
+    return coordinates
+
+
+def from_xyz(coordinates: np.ndarray) -> np.ndarray:
+    """Returns a cloud of the given coordinates.
+
+    Args:
+        coordinates: (N, 3) or (N, 4) floating point; a fourth column is
+            the intensity.
+
+    Returns:
+        Structured array of shape (N,), a view where memory order allows.
+    """
+    names = ("x", "y", "z", "intensity")[: coordinates.shape[1]]
+    contiguous = np.ascontiguousarray(coordinates)
+    dtype = np.dtype([(name, contiguous.dtype) for name in names])
+    return contiguous.view(dtype).reshape(len(coordinates))
+
+
+def store(points: np.ndarray, name: str, values: np.ndarray) -> None:
+    """Stores numbers that were written as text in a field of points.
+
+    Args:
+        points: (N,) structured array.
+        name: of the field.
+        values: (N,) or (N, K) float64.
+
+    Raises:
+        ValueError: if a number does not fit the field's type.
+    """
+    with np.errstate(over="raise", invalid="raise"):
+        try:
+            points[name] = values
+        except FloatingPointError as error:
+            raise ValueError(
+                f"{name}: a number does not fit {points.dtype[name].base}"
+            ) from error

@@ -1,0 +1,1 @@
+"""Work cut into jobs, side by side, on one machine or many."""

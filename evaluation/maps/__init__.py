@@ -1,0 +1,1 @@
+"""Scans and poses as voxel maps."""

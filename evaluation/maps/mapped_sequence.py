@@ -1,0 +1,92 @@
+"""A drive that is mapped while its scans are read for another purpose."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Mapping
+
+import numpy as np
+
+from evaluation.maps.voxel_maps import (
+    VOXEL_SIZE,
+    VoxelAccumulator,
+    VoxelMap,
+)
+from evaluation.sequences.sequence import Sequence
+from evaluation.support.progress import Track, silent
+
+# Of a voxel's side, for pictures: they show a point in each cube of 0.5 m.
+PICTURE_DIVISIONS = 10
+
+
+class MappedSequence(Sequence):
+    """A sequence whose scans enter a map as they are read for the first time.
+
+    Reading and unpacking scans takes longer than mapping them. Who asks for
+    scans in increasing order, give or take a few, has each read once.
+    """
+
+    def __init__(self, sequence: Sequence, kept: int):
+        """Starts an empty map.
+
+        Args:
+            sequence: the drive.
+            kept: how many of the last scans stay in memory; older ones are
+                read again.
+        """
+        self.name = sequence.name
+        self._sequence = sequence
+        self._accumulator = VoxelAccumulator(VOXEL_SIZE, PICTURE_DIVISIONS)
+        self._kept = kept
+        self._recent: OrderedDict[int, np.ndarray] = OrderedDict()
+        self._num_mapped = 0
+
+    def __len__(self) -> int:
+        return len(self._sequence)
+
+    @property
+    def world_frame(self) -> str:
+        return self._sequence.world_frame
+
+    @property
+    def stamps_ns(self) -> np.ndarray:
+        return self._sequence.stamps_ns
+
+    @property
+    def X_WS(self) -> np.ndarray:
+        return self._sequence.X_WS
+
+    @property
+    def scenario(self) -> Mapping | None:
+        return self._sequence.scenario
+
+    def scan(self, index: int) -> np.ndarray:
+        while self._num_mapped <= index:
+            self._map_next()
+        if index in self._recent:
+            return self._recent[index]
+        return self._sequence.scan(index)
+
+    def finish(self, track: Track = silent) -> tuple[VoxelMap, np.ndarray]:
+        """Reads what nobody asked for.
+
+        Args:
+            track: reports progress.
+
+        Returns:
+            The map of all scans on the grid of the TCR, as `map_sequence`
+            makes it; a finer cloud of them for pictures (K, 3) in W [m].
+        """
+        left = range(self._num_mapped, len(self))
+        for _ in track(left, f"mapping {self.name}", len(left)):
+            self._map_next()
+        return self._accumulator.to_map(), self._accumulator.samples()
+
+    def _map_next(self) -> None:
+        index = self._num_mapped
+        scan = self._sequence.scan(index)
+        self._accumulator.add(scan, self.X_WS[index])
+        self._recent[index] = scan
+        if len(self._recent) > self._kept:
+            self._recent.popitem(last=False)
+        self._num_mapped += 1

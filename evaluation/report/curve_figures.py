@@ -1,0 +1,174 @@
+"""Figures of numbers: precision over recall, AUC over change."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+import numpy as np
+
+from evaluation.recognition.metrics import (
+    MODES,
+    PlaceRecognitionMetrics,
+)
+from evaluation.recognition.recognition_result import RecognitionResult
+from evaluation.report import paper
+from evaluation.report.drawing import method_style, save
+from evaluation.report.result_tables import in_paper_order, title
+
+
+def draw_pr_curves(
+    map_name: str, results: Sequence[RecognitionResult], stem: Path
+) -> None:
+    """Draws precision over recall: a column for each pair, a row a mode.
+
+    Args:
+        map_name: of the city.
+        results: of its pairs and methods.
+        stem: path to write, without ending.
+    """
+    pairs = list(dict.fromkeys(result.pair for result in results))
+    figure = Figure(figsize=(0.4 + 2.7 * len(pairs), 5.4), layout="constrained")
+    grid = figure.subplots(
+        len(MODES), len(pairs), sharex=True, sharey=True, squeeze=False
+    )
+    for row, mode in zip(grid, MODES, strict=True):
+        for axes, pair in zip(row, pairs, strict=True):
+            of_method = {r.method: r for r in results if r.pair == pair}
+            for method in in_paper_order(of_method):
+                _draw_curve(axes, method, of_method[method].metrics[mode])
+            axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.02))
+            # A phone shows one panel at a time.
+            axes.tick_params(labelleft=True)
+            axes.set_title(
+                f"{map_name} {' → '.join(pair[1:])}, {mode} queries", fontsize=9
+            )
+            axes.grid(alpha=0.3)
+            axes.legend(fontsize=7, framealpha=0.8)
+        row[0].set_ylabel("precision")
+    for axes in grid[-1]:
+        axes.set_xlabel("recall")
+    save(figure, stem, "svg")
+
+
+def draw_auc_over_change(
+    results: Sequence[RecognitionResult],
+    changes: Mapping[tuple[str, str, str], float],
+    stem: Path,
+) -> None:
+    """Draws AUC against TCR_sym, ours with 95 % intervals and the paper's.
+
+    Left all queries are counted, in the middle those with a match; right is
+    the paper's Table II.
+
+    Args:
+        results: of all pairs and methods.
+        changes: TCR_sym of each pair.
+        stem: path to write, without ending.
+    """
+    figure = Figure(figsize=(10.2, 3.7), layout="constrained")
+    panels = figure.subplots(1, 3, sharex=True, sharey=True)
+    methods = in_paper_order(result.method for result in results)
+    for axes, mode in zip(panels, MODES, strict=False):
+        for index, method in enumerate(methods):
+            points = [
+                (changes[r.pair], r.metrics[mode])
+                for r in results
+                if r.method == method and r.pair in changes
+            ]
+            # Side by side, so that intervals of one pair do not hide.
+            shift = 0.0008 * (index - 0.5 * (len(methods) - 1))
+            _draw_points(axes, method, points, shift)
+        axes.set_title(f"this report, {mode} queries", fontsize=9)
+    for method in methods:
+        _draw_paper(panels[2], method)
+    panels[2].set_title("the paper (RING++ filtered, others all)", fontsize=9)
+    for axes in panels:
+        axes.tick_params(labelleft=True)
+        axes.set(xlabel=r"TCR$_\mathrm{sym}$", ylim=(0.0, 1.02))
+        axes.grid(alpha=0.3)
+    panels[0].set_ylabel("AUC")
+    panels[0].legend(fontsize=7, framealpha=0.8)
+    save(figure, stem, "svg")
+
+
+def _draw_curve(
+    axes: Axes, method: str, metrics: PlaceRecognitionMetrics
+) -> None:
+    colour, style, marker = method_style(method)
+    curve = metrics.curve
+    # From recall 0 on with the precision of the first point: the area that
+    # is drawn is the AUC.
+    recall = np.concatenate([[0.0], curve.recall])
+    precision = np.concatenate([curve.precision[:1], curve.precision])
+    axes.plot(
+        recall[: len(precision)],
+        precision,
+        color=colour,
+        linestyle=style,
+        linewidth=1.5,
+        marker=marker,
+        markersize=4,
+        markevery=0.2,
+        label=f"{title(method)} {metrics.auc:.3f}",
+    )
+
+
+def _draw_points(
+    axes: Axes,
+    method: str,
+    points: Sequence[tuple[float, PlaceRecognitionMetrics]],
+    shift: float,
+) -> None:
+    if not points:
+        return
+    colour, style, marker = method_style(method)
+    points = sorted(points, key=lambda point: point[0])
+    x = np.array([change for change, _ in points]) + shift
+    y = np.array([metrics.auc for _, metrics in points])
+    below = [m.auc - m.auc_interval.low for _, m in points]
+    above = [m.auc_interval.high - m.auc for _, m in points]
+    # A percentile interval may, rarely, leave out the value itself.
+    lengths = np.maximum([below, above], 0.0)
+    axes.errorbar(
+        x,
+        y,
+        yerr=lengths,
+        color=colour,
+        marker=marker,
+        markersize=5,
+        linestyle="none",
+        capsize=2,
+        linewidth=1.0,
+        label=title(method),
+    )
+    _draw_line(axes, x, y, colour, style)
+
+
+def _draw_paper(axes: Axes, method: str) -> None:
+    values = [
+        (paper.tcr_values()[(key[0], *sorted(key[1:3]))], value.auc)
+        for key, value in paper.recognition_values().items()
+        if key[3] == method
+    ]
+    if not values:
+        return
+    colour, style, marker = method_style(method)
+    x, y = np.array(sorted(values)).T
+    axes.plot(x, y, marker, color=colour, markersize=5, fillstyle="none")
+    _draw_line(axes, x, y, colour, style)
+
+
+def _draw_line(
+    axes: Axes, x: np.ndarray, y: np.ndarray, colour: str, style: str
+) -> None:
+    """Draws the least-squares line, where there are enough points."""
+    if len(x) < 3 or np.ptp(x) == 0.0:
+        return
+    slope, offset = np.polyfit(x, y, 1)
+    ends = np.array([x.min(), x.max()])
+    axes.plot(
+        ends, slope * ends + offset, color=colour, linestyle=style, alpha=0.7
+    )

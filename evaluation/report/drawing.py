@@ -1,0 +1,93 @@
+"""What all figures share: colours, sizes, and how they are written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from evaluation.support.files import completing
+
+# Okabe and Ito's colours, told apart by all kinds of colour vision; line
+# styles and markers for prints without colour.
+METHOD_STYLES = {
+    "ring++": ("#0072B2", "-", "o"),
+    "btc": ("#D55E00", "--", "s"),
+    "scan-context++": ("#009E73", "-.", "^"),
+    "solid": ("#CC79A7", ":", "D"),
+}
+_OTHER_STYLES = (
+    ("#E69F00", "-", "v"),
+    ("#56B4E9", "--", "P"),
+    ("#000000", "-.", "X"),
+)
+
+# Colours (red, green, blue) and what they mean.
+Legend = tuple[tuple[tuple[int, int, int], str], ...]
+
+# What figures are written as. On the page they are SVG where they consist of
+# lines, WebP where they consist of pixels.
+PRINTED = ("pdf", "png")
+_DPI = 200
+_PAGE_DPI = 130
+_WEBP_QUALITY = 82
+
+
+def method_style(method: str) -> tuple[str, str, str]:
+    """Returns colour, line style and marker of a method."""
+    if method in METHOD_STYLES:
+        return METHOD_STYLES[method]
+    return _OTHER_STYLES[sum(method.encode()) % len(_OTHER_STYLES)]
+
+
+def unit(rgb: tuple[int, int, int]) -> tuple[float, ...]:
+    """Returns a colour as matplotlib takes it."""
+    return tuple(value / 255.0 for value in rgb)
+
+
+def save(figure: Figure, stem: Path, page_kind: str) -> None:
+    """Writes a figure as PDF, as PNG, and for the page.
+
+    Equal figures give equal bytes: no time of creation, no random ids. The
+    page's has no legend of the whole figure: the page writes it below, in
+    letters that can be read on a phone.
+
+    Args:
+        figure: to write.
+        stem: path without ending.
+        page_kind: "svg" or "webp".
+
+    Raises:
+        InputError: if a file cannot be written.
+    """
+    FigureCanvasAgg(figure)
+    # Arranged once, not for each format again.
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    for kind in (*PRINTED, page_kind):
+        path = stem.with_name(f"{stem.name}.{kind}")
+        for legend in figure.legends:
+            legend.set_visible(kind in PRINTED)
+        options: dict = {"dpi": _DPI}
+        if kind in ("pdf", "svg"):
+            dated = "CreationDate" if kind == "pdf" else "Date"
+            options["metadata"] = {dated: None}
+        if kind == "webp":
+            options = {
+                "dpi": _PAGE_DPI,
+                "pil_kwargs": {"quality": _WEBP_QUALITY},
+            }
+        with (
+            completing(path) as part,
+            # TrueType fonts stay text in PDF; ids of SVG follow the salt.
+            matplotlib.rc_context(
+                {
+                    "pdf.fonttype": 42,
+                    "svg.hashsalt": "cns",
+                    "svg.fonttype": "path",
+                }
+            ),
+        ):
+            figure.savefig(part, format=kind, **options)

@@ -1,0 +1,243 @@
+"""What the page knows of drives and pairs, in the form its script reads."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+import io
+from pathlib import Path
+from typing import Literal
+import zlib
+
+from matplotlib import image
+import numpy as np
+
+from evaluation.maps.thumbnails import CELL, HEIGHT_STEP, MAX_POINTS
+from evaluation.recognition.metrics import MODES
+from evaluation.recognition.recognition_result import RecognitionResult
+from evaluation.recognition.retrieval import MATCH_RADIUS
+from evaluation.report.drawing import Legend
+from evaluation.report.point_rendering import Picture
+from evaluation.report.result_tables import in_paper_order, title
+
+# Points in all scans of a page; at some 3 bytes each they leave room for the
+# figures in 25 MB.
+_POINTS_OF_A_PAGE = 5_000_000
+# Best places that are kept of each query.
+_NUM_BEST = 5
+# Between the points of a drawn route [m].
+_ROUTE_STEP = 2.0
+_WEBP_QUALITY = 75
+
+Section = Literal["change", "recognition", "figures", "print"]
+
+
+@dataclass(frozen=True)
+class Illustration:
+    """A figure of the report.
+
+    Attributes:
+        stem: its path without ending.
+        title: what it shows.
+        page_kind: "svg" or "webp", the form in which the page holds it.
+        section: of the page that shows it; "print" for none.
+        num_panels: that lie side by side; a phone shows one at a time.
+        legend: red, green, blue and meaning of colours, told again below
+            the figure, where a phone shows it legibly.
+    """
+
+    stem: Path
+    title: str
+    page_kind: str
+    section: Section = "figures"
+    num_panels: int = 1
+    legend: Legend = ()
+
+
+@dataclass(frozen=True)
+class PageDrive:
+    """A drive as the page shows it.
+
+    Attributes:
+        name: of the recording.
+        frames: (K,) frames that are places or queries, increasing.
+        X_WS: (K, 4, 4) poses of the sensor there.
+        route: (M, 2) the path of the sensor from above [m].
+        thumbnails: K reduced scans (see `evaluation.maps.thumbnails`).
+        view: the map from above, as a WebP file.
+        extent: left, right, bottom and top of the view [m].
+    """
+
+    name: str
+    frames: np.ndarray
+    X_WS: np.ndarray
+    route: np.ndarray
+    thumbnails: list[np.ndarray]
+    view: bytes
+    extent: tuple[float, float, float, float]
+
+
+def make_drive(
+    name: str,
+    view: Picture,
+    X_WS: np.ndarray,
+    frames: Sequence[int],
+    thumbnails: list[np.ndarray],
+) -> PageDrive:
+    """Returns a drive as the page shows it.
+
+    Args:
+        name: of the recording.
+        view: its surroundings from above.
+        X_WS: (N, 4, 4) poses of the sensor at all frames.
+        frames: K of these that are places or queries.
+        thumbnails: K reduced scans.
+    """
+    positions = X_WS[:, :3, 3]
+    stream = io.BytesIO()
+    image.imsave(
+        stream,
+        view.image,
+        format="webp",
+        pil_kwargs={"quality": _WEBP_QUALITY},
+    )
+    chosen = np.array(frames, dtype=np.int64)
+    steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+    passed = np.floor(np.concatenate([[0.0], np.cumsum(steps)]) / _ROUTE_STEP)
+    return PageDrive(
+        name=name,
+        frames=chosen,
+        X_WS=X_WS[chosen],
+        route=positions[np.flatnonzero(np.diff(passed, prepend=-1.0)), :2],
+        thumbnails=thumbnails,
+        view=stream.getvalue(),
+        extent=view.extent,
+    )
+
+
+def browser_data(
+    recognitions: Sequence[RecognitionResult],
+    drives: Mapping[str, PageDrive],
+    changes: Mapping[tuple[str, str, str], float],
+    pages: Mapping[str, str],
+) -> dict:
+    """Returns what the query browser reads, ready for JSON.
+
+    The maps from above are not in it: it takes them from
+    `evaluation.report.page_routes.route_picture`.
+
+    Args:
+        recognitions: of all pairs and methods.
+        drives: name -> drive, all that occur in a pair.
+        changes: TCR_sym of each pair.
+        pages: drive -> address of its recording to look around in; drives
+            without one may be left out.
+    """
+    pairs: dict[tuple, list[RecognitionResult]] = {}
+    for result in recognitions:
+        pairs.setdefault(result.pair, []).append(result)
+    used = {
+        name
+        for result in recognitions
+        for name in (result.outcome.database, result.outcome.query)
+    }
+    num_scans = sum(len(drives[name].frames) for name in used)
+    num_points = min(MAX_POINTS, _POINTS_OF_A_PAGE // max(num_scans, 1))
+    return {
+        "radius": MATCH_RADIUS,
+        "cell": CELL,
+        "heightStep": HEIGHT_STEP,
+        "drives": {
+            name: _drive_data(drives[name], num_points)
+            | {"page": pages.get(name)}
+            for name in sorted(used)
+        },
+        "pairs": [
+            _pair_data(pair, results, drives, changes.get(pair))
+            for pair, results in pairs.items()
+        ],
+    }
+
+
+def _drive_data(drive: PageDrive, num_points: int) -> dict:
+    # Sorted, so that neighbours are alike and compress well.
+    scans = [
+        points[np.lexsort(points.T[::-1])]
+        for points in (whole[:num_points] for whole in drive.thumbnails)
+    ]
+    planes = np.concatenate(scans).T.tobytes() if scans else b""
+    yaws = np.arctan2(drive.X_WS[:, 1, 0], drive.X_WS[:, 0, 0])
+    return {
+        "x": np.round(drive.X_WS[:, 0, 3], 2).tolist(),
+        "y": np.round(drive.X_WS[:, 1, 3], 2).tolist(),
+        "z": np.round(drive.X_WS[:, 2, 3], 2).tolist(),
+        "yaw": np.round(yaws, 3).tolist(),
+        "frames": drive.frames.tolist(),
+        "route": np.round(drive.route, 1).tolist(),
+        "extent": np.round(drive.extent, 3).tolist(),
+        "counts": [len(points) for points in scans],
+        "points": base64.b64encode(zlib.compress(planes, 9)).decode("ascii"),
+    }
+
+
+def _pair_data(
+    pair: tuple[str, str, str],
+    results: Sequence[RecognitionResult],
+    drives: Mapping[str, PageDrive],
+    change: float | None,
+) -> dict:
+    by_method = {result.method: result for result in results}
+    first = results[0].outcome
+    retrieval = first.retrieval
+    database, query = drives[first.database], drives[first.query]
+    known = change is not None and not np.isnan(change)
+    return {
+        "map": pair[0],
+        "label": f"{pair[0]} {pair[1]} → {pair[2]}",
+        "database": first.database,
+        "query": first.query,
+        "change": round(change, 4) if known else None,
+        "places": np.searchsorted(
+            database.frames, retrieval.database_frames
+        ).tolist(),
+        "queries": np.searchsorted(
+            query.frames, retrieval.query_frames
+        ).tolist(),
+        "matches": [np.flatnonzero(row).tolist() for row in retrieval.matches],
+        "methods": [
+            _method_data(by_method[method])
+            for method in in_paper_order(by_method)
+        ],
+    }
+
+
+def _method_data(result: RecognitionResult) -> dict:
+    scores = result.outcome.retrieval.scores
+    outcomes = result.outcome.outcomes
+    best, values = [], []
+    order = np.argsort(
+        np.where(np.isnan(scores), np.inf, -scores), axis=1, kind="stable"
+    )
+    for row, places in zip(scores, order[:, :_NUM_BEST], strict=True):
+        places = places[~np.isnan(row[places])]
+        best.append(places.tolist())
+        values.append(np.round(row[places], 4).tolist())
+    ranks = outcomes.first_right_ranks
+    metrics = {
+        mode: {
+            "auc": round(result.metrics[mode].auc, 4),
+            "f1": round(result.metrics[mode].f1_max, 4),
+        }
+        for mode in MODES
+    }
+    recall = result.metrics[MODES[0]].recall_at_1
+    return {
+        "name": result.method,
+        "title": title(result.method),
+        "best": best,
+        "scores": values,
+        "ranks": [int(r) if np.isfinite(r) else None for r in ranks],
+        "metrics": metrics,
+        "recall": None if np.isnan(recall) else round(recall, 4),
+    }

@@ -1,0 +1,71 @@
+"""Undoing the distortion of scans that a moving LiDAR takes."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation, RotationSpline
+
+from evaluation.geometry import poses
+from evaluation.sequences.sequence import Sequence
+from evaluation.support.errors import InputError
+
+# Poses on either side of a scan that tell how the LiDAR moved. The ends of
+# the splines through them are free, so that an error there fades by about a
+# quarter from pose to pose.
+_REACH = 4
+
+
+def deskew(sequence: Sequence, index: int) -> np.ndarray:
+    """Returns a scan as if it had been taken at once, at its stamp.
+
+    A point is where its beam left the LiDAR `t` ns after the stamp, in the
+    frame S that the LiDAR had then. The pose at that time comes from cubic
+    splines through the poses of the sequence around the scan (positions, and
+    rotations as angular rates that are smooth; scipy's RotationSpline); it
+    takes the point into the world, and the pose at the stamp back into S.
+
+    At the end of the sequence the motion is extrapolated over one scan.
+
+    Args:
+        sequence: its scans have a field `t` [ns].
+        index: which scan.
+
+    Returns:
+        A copy of the scan with other `x`, `y`, `z`.
+
+    Raises:
+        InputError: if the scan cannot be read or does not tell when its
+            points were measured, or there are too few poses.
+    """
+    points = sequence.scan(index).copy()
+    if "t" not in points.dtype.names:
+        raise InputError(
+            f"{sequence.name}: scan {index}: no field t, the time of each point"
+        )
+    first = max(0, index - _REACH)
+    around = slice(first, index + _REACH + 2)
+    X_WS = sequence.X_WS[around]
+    if len(X_WS) < 2:
+        raise InputError(f"{sequence.name}: one pose tells no motion")
+    # Differences of int64 are exact; stamps as doubles would not be.
+    stamps_ns = sequence.stamps_ns[around] - sequence.stamps_ns[index]
+    # Most points share their firing time with a whole column.
+    t_ns, column = np.unique(points["t"], return_inverse=True)
+    X_WT = _evaluate(stamps_ns * 1e-9, X_WS, t_ns * 1e-9)
+    X_ST = poses.inverse(X_WS[index - first]) @ X_WT
+    p_T = np.stack([points[axis] for axis in "xyz"], axis=1).astype(float)
+    R_ST, p_ST = X_ST[column, :3, :3], X_ST[column, :3, 3]
+    p_S = np.einsum("nij,nj->ni", R_ST, p_T) + p_ST
+    for axis, values in zip("xyz", p_S.T, strict=True):
+        points[axis] = values
+    return points
+
+
+def _evaluate(
+    times: np.ndarray, X_WS: np.ndarray, wanted: np.ndarray
+) -> np.ndarray:
+    """Returns (M, 4, 4) poses at (M,) times, from N at (N,) [s]."""
+    p = CubicSpline(times, X_WS[:, :3, 3])(wanted)
+    R = RotationSpline(times, Rotation.from_matrix(X_WS[:, :3, :3]))(wanted)
+    return poses.make_pose(R.as_matrix(), p)

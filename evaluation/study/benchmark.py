@@ -1,0 +1,50 @@
+"""The whole benchmark on a folder of recordings: tables, figures, a page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from evaluation.jobs.cluster import Cluster
+from evaluation.jobs.running import run_jobs
+from evaluation.study.assembly import assemble
+from evaluation.study.chosen_methods import choose_methods
+from evaluation.study.collection import find_recordings
+from evaluation.study.plan import plan_study
+from evaluation.support.files import make_folder
+
+
+def write_report(
+    recordings: Path,
+    output: Path,
+    cluster: Cluster,
+    own_methods: Iterable[Path] = (),
+    on_note: Callable[[str], None] = lambda text: None,
+) -> Path:
+    """Measures all recordings in a folder; writes tables, figures, a page.
+
+    See `evaluation.study` for the files. What an earlier run left, finished
+    or not, is used as far as it belongs to the same recordings and methods.
+
+    Args:
+        recordings: folder of recordings; drives of one map that share stage
+            and route with others serve as same-stage controls.
+        output: folder to write, made if needed.
+        cluster: where the work is done.
+        own_methods: Python files with one method each, to run besides those
+            of this package.
+        on_note: is told which recordings are left out.
+
+    Returns:
+        The path of `report.md`.
+
+    Raises:
+        InputError: if a recording cannot be read, or the output not be
+            written.
+    """
+    methods = choose_methods(own_methods)
+    found = find_recordings(recordings, on_note)
+    jobs = plan_study(found, output, methods)
+    make_folder(output)
+    run_jobs(jobs, cluster)
+    return assemble(found, output, methods)

@@ -1,0 +1,209 @@
+"""The recordings in a folder: which belong together, and in which role."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+import re
+
+from evaluation.report import paper
+from evaluation.sequences import open_sequence
+from evaluation.study.drive_source import DriveSource, RecordedDrive
+from evaluation.support.errors import InputError
+
+_NAME = re.compile(r"(?P<map>.+)_(?P<stage>[^_]+)")
+_UNPLACED = "neither a scenario nor a name <map>_<stage> tells map and stage"
+
+
+@dataclass(frozen=True)
+class RecordingInfo:
+    """A recording, or one that is going to be made, and what it is of.
+
+    Attributes:
+        name: of the recording.
+        path: where it lies, or will lie.
+        map_name: of the city.
+        stage: of the city's life; stages sort by name.
+        route: what the scenario says about it; None if it is unknown. Only
+            compared with those of other recordings.
+        needs: names of the jobs that make the recording.
+        made_by: opens the drive where it is not read from `path`.
+    """
+
+    name: str
+    path: Path
+    map_name: str
+    stage: str
+    route: object | None
+    needs: tuple[str, ...] = ()
+    made_by: DriveSource | None = None
+
+    @property
+    def source(self) -> DriveSource:
+        """What opens the drive."""
+        return self.made_by or RecordedDrive(self.path.absolute())
+
+
+@dataclass(frozen=True)
+class City:
+    """The drives through one map.
+
+    Attributes:
+        name: of the map.
+        stages: one recording a stage, by stage: `<map>_<stage>`.
+        others: further drives through one of the stages, which may serve as
+            controls.
+    """
+
+    name: str
+    stages: dict[str, RecordingInfo]
+    others: tuple[RecordingInfo, ...]
+
+    def change_pairs(self) -> list[tuple[RecordingInfo, RecordingInfo]]:
+        """Returns every stage with the last one, as the paper compares."""
+        *earlier, last = (self.stages[key] for key in sorted(self.stages))
+        return [(recording, last) for recording in earlier]
+
+    def recognition_pairs(self) -> list[tuple[RecordingInfo, RecordingInfo]]:
+        """Returns pairs of database and query.
+
+        Every earlier stage is a database for the last one; the other way
+        round where the paper has it.
+        """
+        pairs = []
+        for earlier, last in self.change_pairs():
+            pairs.append((earlier, last))
+            if any(
+                key[:3] == (self.name, last.stage, earlier.stage)
+                for key in paper.recognition_values()
+            ):
+                pairs.append((last, earlier))
+        return pairs
+
+    def control(
+        self, first: RecordingInfo, second: RecordingInfo
+    ) -> RecordingInfo | None:
+        """Returns a drive on the route of one in the stage of the other."""
+        for other in self.others:
+            for stage, route in ((second, first), (first, second)):
+                if (
+                    other.stage == stage.stage
+                    and other.route is not None
+                    and other.route == route.route
+                ):
+                    return other
+        return None
+
+
+def find_recordings(
+    folder: Path, on_note: Callable[[str], None] = lambda text: None
+) -> list[RecordingInfo]:
+    """Opens all recordings in a folder and its direct subfolders.
+
+    Drives in the layout of CNS, and in that of KITTI if a `scenario.yaml`
+    lies in them, are found up to three levels down, where exports put them.
+    A recording states its map and stage in its scenario; without one they
+    are taken from its name, `<map>_<stage>`. Where neither tells them, it is
+    left out.
+
+    Args:
+        folder: that holds them.
+        on_note: is told what is left out.
+
+    Raises:
+        InputError: if there is no recording of which map and stage are
+            known, or one cannot be read.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise InputError(f"{folder}: no such folder")
+    paths = _find_drives(folder)
+    if not paths:
+        raise InputError(f"{folder}: no recorded sequence in it")
+    placed = {path: _place(path) for path in paths}
+    found = [one for one in placed.values() if one is not None]
+    if not found:
+        raise InputError(f"{paths[0]}: {_UNPLACED}")
+    for path, one in placed.items():
+        if one is None:
+            on_note(f"{path}: left out: {_UNPLACED}")
+    return found
+
+
+def group_cities(recordings: Iterable[RecordingInfo]) -> list[City]:
+    """Returns the cities that recordings are of, by name.
+
+    Raises:
+        InputError: if two have one name, or claim the same place.
+    """
+    recordings = list(recordings)
+    paths: dict[str, Path] = {}
+    for one in recordings:
+        if one.name in paths:
+            raise InputError(
+                f"{one.path}: {one.name} is there twice (also"
+                f" {paths[one.name]})"
+            )
+        paths[one.name] = one.path
+    return [
+        _make_city(name, [r for r in recordings if r.map_name == name])
+        for name in sorted({recording.map_name for recording in recordings})
+    ]
+
+
+def _find_drives(folder: Path) -> list[Path]:
+    """Returns the paths of the drives in a folder, in order."""
+    paths = []
+    for child in sorted(folder.iterdir()):
+        if child.suffix == ".mcap" or (
+            child.is_dir() and any(child.glob("*.mcap"))
+        ):
+            paths.append(child)
+        elif child.is_dir():
+            below = [*child.glob("*"), *child.glob("*/*")]
+            paths.extend(sorted(filter(_is_exported_drive, below)))
+    return paths
+
+
+def _is_exported_drive(path: Path) -> bool:
+    if path.suffix == ".part":
+        return False
+    return (path / "gt.csv").is_file() or (
+        (path / "velodyne").is_dir() and (path / "scenario.yaml").is_file()
+    )
+
+
+def _place(path: Path) -> RecordingInfo | None:
+    """Returns a recording; None if nothing tells its map and stage."""
+    sequence = open_sequence(path)
+    scenario = sequence.scenario or {}
+    # A city has lanes to follow, any other world has waypoints.
+    route = scenario.get("route") or scenario.get("waypoints")
+    if {"map", "stage"} <= set(scenario):
+        map_name = Path(str(scenario["map"])).name
+        stage = str(scenario["stage"])
+        return RecordingInfo(sequence.name, path, map_name, stage, route)
+    match = _NAME.fullmatch(sequence.name)
+    if match is None:
+        return None
+    return RecordingInfo(
+        sequence.name, path, match["map"], match["stage"], route
+    )
+
+
+def _make_city(name: str, recordings: list[RecordingInfo]) -> City:
+    stages = {}
+    for stage in sorted({recording.stage for recording in recordings}):
+        candidates = [r for r in recordings if r.stage == stage]
+        named = [r for r in candidates if r.name == f"{name}_{stage}"]
+        if len(candidates) > 1 and len(named) != 1:
+            raise InputError(
+                f"{candidates[0].path}: one of {len(candidates)} recordings of"
+                f" {name} at stage {stage}, and not one of them named"
+                f" {name}_{stage}"
+            )
+        stages[stage] = (named or candidates)[0]
+    chosen = {recording.name for recording in stages.values()}
+    others = tuple(r for r in recordings if r.name not in chosen)
+    return City(name, stages, others)

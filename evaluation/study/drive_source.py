@@ -1,0 +1,80 @@
+"""Where a drive comes from: opened, and identified, by whoever needs it.
+
+A job that works on a drive may run in another process, or on another
+machine, before or after the drive is recorded. So it is handed not the drive
+but what opens it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import os
+from pathlib import Path
+from typing import Protocol
+
+from evaluation.sequences import Sequence, open_sequence
+from evaluation.support.errors import InputError
+
+
+class DriveSource(Protocol):
+    """Opens a drive; can be pickled."""
+
+    def __call__(self) -> Sequence:
+        """Opens the drive.
+
+        Its scans are asked for in increasing order, each once; a drive may
+        thus be made while it is read.
+
+        Raises:
+            InputError: if it cannot be opened.
+        """
+
+    def identity(self) -> object:
+        """Returns what tells the drive from all others, ready for JSON.
+
+        Results that were found from a drive with an equal identity are not
+        found again.
+
+        Raises:
+            InputError: if there is no drive.
+        """
+
+
+@dataclass(frozen=True)
+class RecordedDrive:
+    """A drive on disk, in any format that can be read.
+
+    Attributes:
+        path: where it lies.
+    """
+
+    path: Path
+
+    def __call__(self) -> Sequence:
+        return open_sequence(self.path)
+
+    def identity(self) -> list[list]:
+        """Returns name, size and time of change of each of its files.
+
+        Their content would be as good as the only thing to go by, but takes
+        as long to read as to evaluate.
+        """
+        try:
+            path = self.path.resolve(strict=True)
+            files = [path]
+            if path.is_dir():
+                files = sorted(p for p in path.rglob("*") if p.is_file())
+            stats = [os.stat(file) for file in files]
+        except OSError as error:
+            raise InputError(
+                f"{self.path}: {error.strerror or error}"
+            ) from error
+        return [
+            [
+                path.name,
+                file.relative_to(path).as_posix(),
+                stat.st_size,
+                stat.st_mtime_ns,
+            ]
+            for file, stat in zip(files, stats, strict=True)
+        ]

@@ -1,0 +1,119 @@
+"""All that a report needs of one recording, found in one go."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Several
+from collections.abc import Set
+from dataclasses import dataclass
+
+import numpy as np
+
+from evaluation.maps.mapped_sequence import MappedSequence
+from evaluation.maps.thumbnails import thumbnail
+from evaluation.maps.voxel_maps import VoxelMap
+from evaluation.methods import Method, MethodConfig
+from evaluation.recognition.retrieval import (
+    DescribedDrive,
+    Role,
+    describe_drive,
+)
+from evaluation.sequences import PlacedDrive, Sequence
+from evaluation.support.errors import InputError
+from evaluation.support.progress import Track, silent
+
+
+@dataclass(frozen=True)
+class SurveyedDrive:
+    """A drive with its map on the grid of the TCR.
+
+    Attributes:
+        placed: its name, and the world that it lies in.
+        X_WS: (N, 4, 4) poses of the sensor along the drive.
+        coarse: the map.
+        frames: (K,) frames that are places or queries, increasing; none if
+            the drive has no role.
+        thumbnails: K reduced scans (see `evaluation.maps.thumbnails`).
+    """
+
+    placed: PlacedDrive
+    X_WS: np.ndarray
+    coarse: VoxelMap
+    frames: np.ndarray
+    thumbnails: list[np.ndarray]
+
+    @property
+    def name(self) -> str:
+        return self.placed.name
+
+    @property
+    def positions(self) -> np.ndarray:
+        """(N, 3) of the sensor [m]."""
+        return self.X_WS[:, :3, 3]
+
+
+@dataclass(frozen=True)
+class RecordingSurvey:
+    """A recording's maps, places and queries; no scan is needed any more.
+
+    Attributes:
+        drive: with its map on the grid of the TCR.
+        fine: (K, 3) cloud for pictures, in W [m].
+        described: method -> what it keeps of the drive; empty if the
+            recording has no role.
+    """
+
+    drive: SurveyedDrive
+    fine: np.ndarray
+    described: dict[str, DescribedDrive]
+
+
+def survey_recording(
+    recording: Sequence,
+    roles: Set[Role],
+    methods: Several[Method],
+    track: Track = silent,
+) -> RecordingSurvey:
+    """Maps a recording and describes its places and queries.
+
+    Each scan is asked for once, in order.
+
+    Args:
+        recording: the drive.
+        roles: what it serves as in place recognition; may be empty.
+        methods: that describe it; may be none.
+        track: reports progress.
+
+    Raises:
+        InputError: if it cannot be read, or holds no point.
+    """
+    frames, thumbnails = [], []
+    sequence = MappedSequence(
+        recording,
+        kept=max((method.scans_per_place for method in methods), default=1),
+    )
+
+    def keep_thumbnail(frame: int, cloud: np.ndarray) -> None:
+        frames.append(frame)
+        height = MethodConfig().sensor_height
+        thumbnails.append(thumbnail(cloud, height, seed=frame))
+
+    described = {}
+    if roles:
+        drives = describe_drive(
+            sequence, methods, roles, track, visit=keep_thumbnail
+        )
+        described = {
+            method.name: drive
+            for method, drive in zip(methods, drives, strict=True)
+        }
+    coarse, fine = sequence.finish(track)
+    if len(coarse) == 0:
+        raise InputError(f"{sequence.name}: no scan holds a point")
+    drive = SurveyedDrive(
+        placed=PlacedDrive.of(recording),
+        X_WS=sequence.X_WS,
+        coarse=coarse,
+        frames=np.array(frames, dtype=np.int64),
+        thumbnails=thumbnails,
+    )
+    return RecordingSurvey(drive, fine, described)

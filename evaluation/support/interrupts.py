@@ -1,0 +1,121 @@
+"""Ctrl-C and SIGTERM: when they may strike, and how they end a process."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import contextlib
+import os
+import signal
+import sys
+import threading
+from types import FrameType
+from typing import NoReturn
+
+# Exit status of a process that was interrupted, as shells have it.
+INTERRUPTED = 130
+# What interrupts.
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+def interrupt_on_termination(once: bool = False) -> None:
+    """Makes SIGTERM an exception, so that open files are closed.
+
+    Args:
+        once: ignore the signal from then on, so that it cannot interrupt the
+            closing; for a process that somebody else can still kill.
+    """
+
+    def interrupt(signal_number: int, frame: FrameType | None) -> None:
+        if once:
+            signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, interrupt)
+
+
+@contextlib.contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Makes interrupts wait; for imports.
+
+    An extension module that is interrupted while it is initialised fails
+    with another error, or brings the process down later. Blocking the
+    signals would not do: a library's threads can take them as well.
+    """
+    waiting: list[int] = []
+    before = {}
+    # Only there can handlers be set, and only there they run.
+    if threading.current_thread() is threading.main_thread():
+        before = {
+            number: signal.signal(number, lambda n, frame: waiting.append(n))
+            for number in SIGNALS
+        }
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        if waiting:
+            signal.raise_signal(waiting[0])
+
+
+@contextlib.contextmanager
+def interrupts_wait() -> Iterator[Callable[[], None]]:
+    """Makes an interrupt wait for the next call of what is yielded.
+
+    Raised anywhere, its exception can come up inside the conversion of
+    arguments for a C++ function, which takes it for a type that does not fit
+    and goes on with another error. A second one, before the first has
+    struck, strikes at once; later ones do not disturb the closing. Signals
+    that are ignored, or that end the process, stay so.
+    """
+    handlers: dict[int, Callable[[int, FrameType | None], object]] = {}
+    # Only there can handlers be set, and only there they run.
+    if threading.current_thread() is threading.main_thread():
+        handlers = {
+            number: handler
+            for number in SIGNALS
+            if callable(handler := signal.getsignal(number))
+        }
+    waiting: list[int] = []
+    struck: list[int] = []
+
+    def wait(number: int, frame: FrameType | None) -> None:
+        waiting.append(number)
+        if len(waiting) > 1 and not struck:
+            struck.append(number)
+            handlers[number](number, frame)
+
+    def strike() -> None:
+        if waiting and not struck:
+            struck.append(waiting[0])
+            raise KeyboardInterrupt
+
+    for number in handlers:
+        signal.signal(number, wait)
+    try:
+        yield strike
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        if waiting and not struck:
+            signal.raise_signal(waiting[0])
+
+
+def ignore_interrupts() -> None:
+    """Ignores interrupts from now on; for a process that is done."""
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
+
+
+def end_interrupted() -> NoReturn:
+    """Ends a process that was interrupted, at once.
+
+    All that was open has been closed by the exception on its way. What else
+    an interpreter does at its end is left out: an interrupted computation in
+    a library can leave it in a state in which that fails.
+    """
+    with contextlib.suppress(OSError, ValueError):
+        sys.stdout.flush()
+    with contextlib.suppress(OSError, ValueError):
+        sys.stderr.flush()
+    os._exit(INTERRUPTED)

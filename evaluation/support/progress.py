@@ -1,0 +1,17 @@
+"""How long work reports on itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+# Where there is no terminal, a line of progress this often [s].
+LINE_INTERVAL = 5.0
+# Wraps the items of a long loop: (items, what is being done, how many).
+Track = Callable[[Iterable[Any], str, int], Iterable[Any]]
+
+
+def silent(items: Iterable[Any], description: str, total: int) -> Iterable[Any]:
+    """The `Track` that reports nothing."""
+    del description, total
+    return items

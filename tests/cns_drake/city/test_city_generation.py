@@ -1,0 +1,157 @@
+"""The committed files of the cities: what the generator makes, and fit."""
+
+import csv
+import xml.etree.ElementTree as ElementTree
+
+from pydrake.geometry import Role
+import pytest
+from shipped_cities import (
+    PLANS,
+    city,
+    parse_strictly,
+    stage_files,
+    structure_of,
+    visuals,
+    world_of,
+)
+import yaml
+
+from cns_drake.city.generation.generate import TABLE_NAME, render_city
+from cns_drake.city.ground.streets import GROUND_TAG
+from cns_drake.city.plan.stages import load_stages
+from cns_drake.scene.semantics import CLASS_IDS
+
+pytestmark = pytest.mark.slow
+
+MEGABYTE = 1_000_000
+
+
+def files(world) -> dict[str, bytes]:
+    """Returns all generated files of a world folder by relative path."""
+    found = [
+        *world.glob("stage_*.sdf"),
+        *world.glob("meshes/*"),
+        world / TABLE_NAME,
+    ]
+    return {str(p.relative_to(world)): p.read_bytes() for p in found}
+
+
+@pytest.fixture(scope="module", params=PLANS)
+def name(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def stages(name):
+    return load_stages(
+        world_of(name) / "stages.yaml",
+        [s.name for s in city(name).structures],
+    )
+
+
+def test_generating_anew_gives_the_committed_bytes(name):
+    new, old = render_city(world_of(name), city(name)), files(world_of(name))
+    assert sorted(new) == sorted(old)
+    changed = [name for name in new if new[name].encode() != old[name]]
+    assert changed == []
+
+
+def test_stages_differ_by_the_listed_names_only(name, stages):
+    whole = visuals(stage_files(name)[-1])
+    names = {s.name for s in city(name).structures}
+    assert {structure_of(v) for v in whole} == names
+    previous = set()
+    for path in stage_files(name):
+        stage = path.stem.removeprefix("stage_")
+        present = visuals(path)
+        absent = stages.absent(stage)
+        assert {structure_of(v) for v in present} == names - absent
+        expected = {
+            k: v for k, v in whole.items() if structure_of(k) not in absent
+        }
+        assert present == expected
+        assert previous <= {structure_of(v) for v in present}
+        previous = {structure_of(v) for v in present}
+
+
+def test_the_list_of_stages_is_complete(name, stages):
+    assert [p.stem for p in stage_files(name)] == [
+        f"stage_{stage}" for stage in stages.stages
+    ]
+    names = list(stages.stages)
+    assert (names[0], names[-1]) == ("01", PLANS[name].last_stage)
+    assert len(stages.absent("01")) > 50
+    buildings = {
+        s.name for s in city(name).structures if s.semantic_class == "building"
+    }
+    assert buildings & stages.absent("01")
+    assert stages.candidates
+
+
+def test_the_ground_is_there_at_all_stages(name, stages):
+    ground = {s.name for s in city(name).structures if GROUND_TAG in s.tags}
+    assert len(ground) > 10
+    assert not ground & (stages.absent("01") | set(stages.candidates))
+
+
+def test_the_table_names_every_structure_once(name):
+    with (world_of(name) / TABLE_NAME).open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    structures = city(name).structures
+    assert [int(row["instance"]) for row in rows] == list(
+        range(1, len(structures) + 1)
+    )
+    assert [row["name"] for row in rows] == [s.name for s in structures]
+    for row, structure in zip(rows, structures, strict=True):
+        assert row["class"] == structure.semantic_class
+        assert int(row["label"]) == CLASS_IDS[row["class"]]
+        for axis, value in zip("xyz", structure.xyz, strict=True):
+            assert float(row[axis]) == pytest.approx(value, abs=5.1e-4)
+        assert float(row["yaw"]) == pytest.approx(structure.yaw, abs=5.1e-6)
+
+
+def test_meshes_are_neither_missing_nor_orphaned(name):
+    world = world_of(name)
+    used = set()
+    for path in stage_files(name):
+        for uri in ElementTree.parse(path).iter("uri"):
+            assert (world / uri.text).is_file(), uri.text
+            used.add(uri.text)
+    there = {f"meshes/{p.name}" for p in (world / "meshes").iterdir()}
+    assert used == there
+
+
+def test_a_stage_is_one_static_link_without_collision(name):
+    for path in stage_files(name):
+        root = ElementTree.parse(path).getroot()
+        assert [m.findtext("static") for m in root.iter("model")] == ["true"]
+        assert len(list(root.iter("link"))) == 1
+        assert not list(root.iter("collision"))
+
+
+def test_budgets(name):
+    world = world_of(name)
+    size = sum(map(len, files(world).values()))
+    assert size <= 20 * MEGABYTE
+    triangles = {
+        p.name: _count_triangles(p) for p in (world / "meshes").iterdir()
+    }
+    for path in stage_files(name):
+        inspector = parse_strictly(path).model_inspector()
+        count = len(inspector.GetAllGeometryIds(Role.kPerception))
+        assert 1000 < count < 7000
+        uris = ElementTree.parse(path).iter("uri")
+        names = [uri.text.removeprefix("meshes/") for uri in uris]
+        assert sum(triangles[name] for name in names) <= 1_500_000
+
+
+def _count_triangles(path) -> int:
+    lines = path.read_text().splitlines()
+    return sum(len(x.split()) - 3 for x in lines if x.startswith("f "))
+
+
+def test_stories_are_told(name):
+    path = world_of(name) / "stages.yaml"
+    raw = yaml.safe_load(path.read_text())
+    for stage in raw["stages"].values():
+        assert len(stage["story"].split()) > 10

@@ -1,0 +1,74 @@
+"""Stages: nesting, and faults named in one line."""
+
+import pytest
+
+from cns_drake.city.plan.stages import load_stages
+from evaluation.support.errors import InputError
+
+NAMES = ["tower_001", "tower_002", "tree_001", "tree_002", "car_001"]
+GOOD = """
+stages:
+  "01":
+    story: nothing yet
+    absent:
+      a tower: [tower_001]
+  "02":
+    story: a tower
+    absent:
+      trees: [tree_001, tree_002]
+      another tower: [tower_002]
+  "04":
+    story: all of it
+candidates: [car_001]
+"""
+
+
+def load(tmp_path, text):
+    path = tmp_path / "stages.yaml"
+    path.write_text(text)
+    return load_stages(path, NAMES)
+
+
+def test_a_stage_lacks_what_it_and_all_later_ones_list(tmp_path):
+    stages = load(tmp_path, GOOD)
+    assert stages.absent("04") == set()
+    assert stages.absent("02") == {"tree_001", "tree_002", "tower_002"}
+    assert stages.absent("01") == stages.absent("02") | {"tower_001"}
+    assert stages.candidates == ["car_001"]
+
+
+def test_there_is_no_stage_03(tmp_path):
+    with pytest.raises(KeyError, match="03"):
+        load(tmp_path, GOOD).absent("03")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        ("[tower_001]", "[tower_009]", "01.absent.a tower: unknown structure "),
+        ("[car_001]", "[car_7]", "candidates: unknown structure car_7"),
+        ("[tower_002]", "[tower_001]", "tower_001 is already in stages.01"),
+        ("[car_001]", "[tree_002]", "tree_002 is already in stages.02"),
+        ("all of it", "all\n    absent: {x: [car_001]}", "the last stage"),
+        ('"01"', '"05"', "rising order"),
+        ('"01"', '"one"', "stages.one"),
+        ("story: a tower", "tale: a tower", "stages.02.story"),
+        ("candidates", "candidate", "candidate: Extra inputs"),
+        ("stages:", "stages: [", "not readable as YAML"),
+        (GOOD, "stages: {}", "at least one stage"),
+        (GOOD, "", "(top level)"),
+    ],
+)
+def test_faults_are_named_in_one_line(tmp_path, old, new, fault):
+    assert old in GOOD
+    with pytest.raises(InputError) as caught:
+        load(tmp_path, GOOD.replace(old, new))
+    message = str(caught.value)
+    assert fault in message
+    assert message.startswith(str(tmp_path / "stages.yaml"))
+    assert "\n" not in message
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(InputError, match=r"stages\.yaml: No such file"):
+        load_stages(tmp_path / "stages.yaml", NAMES)

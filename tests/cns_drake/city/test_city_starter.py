@@ -1,0 +1,140 @@
+"""A city of one's own from nothing but its roads."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from shapely import Point
+import yaml
+
+from cns_drake.city.generation.city_structures import make_city
+from cns_drake.city.generation.starter import start_city
+from cns_drake.city.plan.city_plan import load_plan
+from cns_drake.city.plan.stages import load_stages
+from cns_drake.roads.network import load_road_network
+from cns_drake.scenarios.planning import plan_drive
+from cns_drake.scenarios.scenario import load_scenario
+from evaluation.sequences import open_sequence
+
+pytestmark = pytest.mark.slow
+
+ROADS = """
+defaults: {lanes: [1, 1], lane_width: 3.5, sidewalk: 2.5, kerb_height: 0.15,
+           speed_limit: 13.9}
+junctions:
+  a: {position: [0, 0], kerb_radius: 6}
+  b: {position: [70, 0], kerb_radius: 6}
+  c: {position: [70, 60], kerb_radius: 6}
+  d: {position: [0, 60], kerb_radius: 6}
+roads:
+  south: {start: a, end: b}
+  east: {start: b, end: c}
+  north: {start: c, end: d}
+  west: {start: d, end: a}
+  loop: {start: b, end: c, via: [[130, 0, 22], [130, 60, 22]], parking: 2.2}
+"""
+INPUTS = ["city.yaml", "sequence_01.yaml", "sequence_02.yaml", "stages.yaml"]
+
+
+def run(*words, cwd):
+    return subprocess.run(
+        [sys.executable, "-m", *map(str, words)],
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+@pytest.fixture(scope="module")
+def town(tmp_path_factory):
+    """A folder with roads, brought to a city by the command."""
+    folder = tmp_path_factory.mktemp("own") / "town"
+    folder.mkdir()
+    (folder / "roads.yaml").write_text(ROADS)
+    done = run("cns_drake", "city", "town", "--start", cwd=folder.parent)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == ""
+    return folder
+
+
+def test_the_plan_has_a_district_for_each_block(town):
+    plan = load_plan(town / "city.yaml")
+    network = load_road_network(town / "roads.yaml")
+    blocks = [d for d in plan.districts if d.block is not None]
+    assert len(blocks) == 2
+    for district in blocks:
+        assert not network.carriageway().contains(Point(district.block))
+    assert plan.districts[-1].name == "outskirts"
+
+
+def test_the_first_stage_lacks_the_east(town):
+    city = make_city(town)
+    stages = load_stages(
+        town / "stages.yaml", [structure.name for structure in city.structures]
+    )
+    absent = stages.absent("01")
+    tall = [
+        s
+        for s in city.structures
+        if s.semantic_class in ("building", "vegetation")
+    ]
+    missing = [s.xyz[0] for s in tall if s.name in absent]
+    standing = [s.xyz[0] for s in tall if s.name not in absent]
+    assert len(missing) > 10
+    assert max(standing) <= min(missing)
+
+
+def test_what_is_there_is_left_alone(tmp_path):
+    (tmp_path / "roads.yaml").write_text(ROADS)
+    assert [path.name for path in sorted(start_city(tmp_path))] == INPUTS
+    before = {name: (tmp_path / name).read_bytes() for name in INPUTS}
+    (tmp_path / "sequence_02.yaml").unlink()
+    (path,) = start_city(tmp_path)
+    assert path.name == "sequence_02.yaml"
+    after = {name: (tmp_path / name).read_bytes() for name in INPUTS}
+    assert after == before
+
+
+def test_other_seeds_draw_other_towns(tmp_path, town):
+    (tmp_path / "roads.yaml").write_text(ROADS)
+    start_city(tmp_path, seed=1)
+    for name in ("city.yaml", "sequence_01.yaml"):
+        assert (tmp_path / name).read_text() != (town / name).read_text()
+
+
+def test_it_is_listed_and_driven(town, tmp_path):
+    listed = run("cns_drake", "list", "town", cwd=town.parent)
+    assert listed.returncode == 0
+    assert [line.split()[0] for line in listed.stdout.splitlines()[1:]] == [
+        "town_01",
+        "town_02",
+    ]
+    assert listed.stderr == ""
+    done = run(
+        *("cns_drake", "simulate", town / "sequence_02.yaml"),
+        *("--frames", 2, "--output", tmp_path),
+        cwd=tmp_path,
+    )
+    assert done.returncode == 0, done.stderr
+    sequence = open_sequence(tmp_path / "town_02")
+    # The LiDAR of the vehicle stands straight above its path's first point.
+    start = plan_drive(load_scenario(town / "sequence_02.yaml")).pose(0.0)
+    np.testing.assert_allclose(
+        sequence.X_WS[0][:3, 3],
+        np.add(start.translation(), [0, 0, 1.6]),
+        atol=1e-9,
+    )
+    assert len(sequence.scan(1)) > 10_000
+
+
+def test_roads_that_cannot_be_used_are_named(tmp_path):
+    roads = yaml.safe_load(ROADS)
+    roads["roads"]["east"]["end"] = "nowhere"
+    (tmp_path / "roads.yaml").write_text(yaml.safe_dump(roads))
+    done = run("cns_drake.city", ".", "--start", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "roads.yaml: roads.east.end: no junction 'nowhere'" in done.stderr
+    assert not (tmp_path / "city.yaml").exists()

@@ -1,0 +1,212 @@
+"""The command line: results, exit status, and one line for every fault."""
+
+import re
+import subprocess
+import sys
+
+from documents import ROOT
+from eval_program import run_program
+import numpy as np
+import pytest
+from small_map import box_visual, scenario_values, world_text
+import yaml
+
+from cns_drake.__main__ import main
+from cns_drake.scenarios.shipped import recordable_sequences
+
+pytestmark = pytest.mark.slow
+
+DIAGRAMS = ROOT / "diagrams"
+POSE = ["--pose", "0", "0", "1.6", "0", "0", "-0.5"]
+
+
+def run(*arguments, script=None):
+    command = [sys.executable, *(["-m", "cns_drake"] if not script else [])]
+    command += [str(script)] if script else []
+    return subprocess.run(
+        [*command, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def run_here(capfd, *arguments):
+    """As `run`, in this process, which has loaded everything already."""
+    result = run_program(capfd, "cns-drake", main, *arguments)
+    return subprocess.CompletedProcess(arguments, *result)
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory, small_map):
+    """Input of all kinds, good and bad."""
+    folder = tmp_path_factory.mktemp("files")
+    wall = box_visual("wall", (8, 0, 2, 0, 0, 0), (1, 40, 4))
+    (folder / "good.sdf").write_text(world_text([wall]))
+    mesh = "<mesh><uri>gone.obj</uri></mesh>"
+    for name, geometry in [
+        ("gone", mesh),
+        ("plane", "<plane><normal>0 0 1</normal></plane>"),
+    ]:
+        visual = f'<visual name="v"><geometry>{geometry}</geometry></visual>'
+        (folder / f"{name}.sdf").write_text(world_text([visual]))
+    (folder / "torn.sdf").write_text("<sdf><world>")
+    (folder / "bare.sdf").write_text(world_text([]))
+    values = scenario_values(small_map) | {"frames": 3}
+    for name, change in [
+        ("drive", {}),
+        ("typo", {"stge": "04"}),
+        ("stage", {"stage": "77"}),
+        ("map", {"map": "nowhere"}),
+        ("type", {"frames": "all"}),
+        ("long", {"frames": 10**7}),
+        ("road", {"route": [dict(values["route"][0], road="milky_way")]}),
+    ]:
+        text = yaml.safe_dump(values | {"name": name} | change)
+        (folder / f"{name}.yaml").write_text(text)
+    (folder / "file").write_text("")
+    return folder
+
+
+def test_list_names_the_sequences():
+    result = run("list")
+    assert result.returncode == 0
+    assert "metropolis_01" in result.stdout
+    assert result.stderr == ""
+
+
+def test_no_arguments_show_the_help():
+    result = run()
+    assert result.returncode == 0
+    for command in ("list", "simulate", "generate", "repair", "scan"):
+        assert command in result.stdout
+
+
+def test_simulate_and_overwrite(files, tmp_path):
+    arguments = ("simulate", files / "drive.yaml", "--output", tmp_path)
+    result = run(*arguments)
+    assert result.returncode == 0
+    assert "3 frames" in result.stdout
+    assert (tmp_path / "drive" / "metadata.yaml").is_file()
+    assert "real time" in result.stderr
+    again = run(*arguments)
+    assert again.returncode == 2
+    assert_one_line(again, "drive")
+    assert run(*arguments, "--overwrite", "--frames", 2).returncode == 0
+
+
+def test_scan(files, tmp_path):
+    output = tmp_path / "scan.npy"
+    result = run(
+        "scan",
+        files / "good.sdf",
+        *POSE,
+        "--output",
+        output,
+        "--lidar",
+        "vlp-16",
+    )
+    assert result.returncode == 0
+    points = np.load(output)
+    assert f"{len(points)} points" in result.stdout
+    # The wall's face at x = 7.5, seen from a sensor turned by -0.5 rad.
+    x_W = np.cos(-0.5) * points[:, 0] - np.sin(-0.5) * points[:, 1]
+    assert np.abs(x_W - 7.5).min() < 1e-5
+
+
+def test_diagram_script(tmp_path):
+    script = DIAGRAMS / "metropolis_04.py"
+    result = run("--output", tmp_path, "--frames", 2, script=script)
+    assert result.returncode == 0, result.stderr
+    assert (tmp_path / "metropolis_04" / "metropolis_04_0.mcap").is_file()
+    shown = run("--help", script=script)
+    assert shown.returncode == 0
+    for option in ("frames", "output", "lidar", "recording", "graphviz"):
+        assert f"--{option}" in shown.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "fault"),
+    [
+        (["simulate", "atlantis_01"], "unknown sequence 'atlantis_01'"),
+        (["simulate", "{files}/none.yaml"], "none.yaml: no such"),
+        (["simulate", "{files}/typo.yaml"], "typo.yaml: stge: "),
+        (["simulate", "{files}/type.yaml"], "type.yaml: frames: "),
+        (["simulate", "{files}/stage.yaml"], "stage.yaml: stage: .*'77'"),
+        (["simulate", "{files}/map.yaml"], "map.yaml: map: .*nowhere"),
+        (["simulate", "{files}/road.yaml"], "road.*milky_way"),
+        (["simulate", "{files}/long.yaml"], "frames: 10000000"),
+        (["simulate", "{files}/file"], "file: not a mapping"),
+        (["simulate", "{files}/drive.yaml", "--lidar", "x"], "--lidar: .*'x'"),
+        (["simulate", "{files}/drive.yaml", "--frames", "0"], "--frames"),
+        (["simulate", "{files}/drive.yaml", "--bogus"], "--bogus"),
+        (["scan", "{files}/gone.sdf", *POSE], "gone.sdf: .*gone.obj"),
+        (["scan", "{files}/plane.sdf", *POSE], "plane.sdf: .*HalfSpace"),
+        (["scan", "{files}/torn.sdf", *POSE], "torn.sdf: "),
+        (["scan", "{files}/bare.sdf", *POSE], "bare.sdf: no visual"),
+        (["scan", "{files}/no.sdf", *POSE], "no.sdf: no such file"),
+        (["scan", "{files}/good.sdf", "--pose", "1"], "--pose"),
+        (
+            ["scan", "{files}/good.sdf", "--pose", *"00000", "nan"],
+            "--pose: not finite",
+        ),
+        (["reproduce", "atlantis"], "unknown map 'atlantis'"),
+        (["reproduce", "--quick", "--pages"], "--quick and --pages: give one"),
+        (["teleport"], "teleport"),
+    ],
+)
+def test_faults_are_one_line(files, tmp_path, capfd, arguments, fault):
+    output = tmp_path / "output"
+    if arguments[0] == "scan":
+        output = tmp_path / "scan.bin"
+    arguments = [a.format(files=files) for a in arguments]
+    result = run_here(capfd, *arguments, "--output", output)
+    assert_one_line(result, fault)
+    assert not output.exists()
+
+
+@pytest.mark.parametrize("command", ["simulate", "scan", "generate"])
+def test_output_that_cannot_be_written(files, capfd, command):
+    arguments = {
+        "simulate": ["simulate", files / "drive.yaml"],
+        "scan": ["scan", files / "good.sdf", *POSE],
+        "generate": ["generate", files / "drive.yaml"],
+    }[command]
+    output = files / "file" / "below.bin"
+    result = run_here(capfd, *arguments, "--output", output)
+    assert_one_line(result, "file")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "fault"),
+    [
+        (["{files}/none"], "none/roads.yaml: "),
+        (["{files}", "--seed", "-1"], "--seed"),
+        (["{files}", "--target", "0.2"], "--target: only with --calibrate"),
+        (["{files}", "--calibrate", "01", "77"], "sequence_01.yaml: no such"),
+    ],
+)
+def test_faults_of_city_are_one_line(files, arguments, fault):
+    before = sorted(files.iterdir())
+    result = run("city", *(a.format(files=files) for a in arguments))
+    assert_one_line(result, fault)
+    assert sorted(files.iterdir()) == before
+
+
+def assert_one_line(result, fault):
+    assert result.returncode == 2, result.stderr
+    assert result.stdout == ""
+    last = result.stderr.strip().splitlines()[-1]
+    assert last.startswith("cns-drake: error: ")
+    assert re.search(fault, last), last
+    assert "Traceback" not in result.stderr
+    # Nothing but progress may come before.
+    errors = [line for line in result.stderr.splitlines() if "error" in line]
+    assert errors == [last]
+
+
+def test_every_sequence_has_a_script_that_names_it():
+    scripts = {path.stem: path.read_text() for path in DIAGRAMS.glob("*.py")}
+    assert scripts.keys() == recordable_sequences().keys()
+    for name, text in scripts.items():
+        assert f'main("{name}", __doc__)' in text

@@ -1,0 +1,404 @@
+"""Exports, read back by our readers and by those of others."""
+
+import json
+import shutil
+import subprocess
+import sys
+
+from bent_drive import NUM_SCANS, P_BS, QUAT_BS, write_drive
+from drive_files import make_scan
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+import yaml
+
+from cns_drake.export.exporting import export_sequence
+from evaluation import sequences
+from evaluation.clouds.cloud_writing import encode_labels
+from evaluation.study.collection import find_recordings, group_cities
+from evaluation.support.errors import InputError
+from evaluation.support.errors import InputError as ReadingError
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory):
+    return write_drive(tmp_path_factory.mktemp("recordings") / "town_07")
+
+
+@pytest.fixture(scope="module")
+def kitti(drive, tmp_path_factory):
+    output = tmp_path_factory.mktemp("exports") / "kitti"
+    assert export_sequence(drive, "kitti", output) == output / "sequences/07"
+    return output
+
+
+@pytest.fixture(scope="module")
+def cns(drive, tmp_path_factory):
+    output = tmp_path_factory.mktemp("exports") / "cns"
+    assert export_sequence(drive, "cns", output) == output / "Town/07"
+    return output
+
+
+def assert_same_drive(read, recorded, fields):
+    assert read.name == recorded.name
+    assert read.world_frame == recorded.world_frame
+    assert read.scenario == dict(recorded.scenario)
+    np.testing.assert_allclose(read.X_WS, recorded.X_WS, rtol=0, atol=1e-9)
+    assert len(read) == len(recorded)
+    for ours, original in zip(read, recorded, strict=True):
+        assert set(ours.dtype.names) == set(fields)
+        for name in fields:
+            np.testing.assert_array_equal(ours[name], original[name])
+
+
+XYZI = ("x", "y", "z", "intensity")
+
+
+def test_kitti_reads_back(drive, kitti):
+    recorded = sequences.open(drive)
+    read = sequences.open(kitti / "sequences/07")
+    assert_same_drive(read, recorded, (*XYZI, "label", "instance"))
+    since_start = recorded.stamps_ns - recorded.stamps_ns[0]
+    np.testing.assert_array_equal(read.stamps_ns, since_start)
+    assert read.instances == recorded.instances
+
+
+@pytest.mark.slow
+def test_kitti_by_the_loader_of_kiss_icp(drive, kitti):
+    from kiss_icp.datasets.kitti import KITTIOdometryDataset
+
+    recorded = sequences.open(drive)
+    dataset = KITTIOdometryDataset(kitti, "07")
+    # It bends the scans of KITTI's own sensor, which errs.
+    dataset.correct_kitti_scan = lambda points: points
+    X_S0W = np.linalg.inv(recorded.X_WS[0])
+    np.testing.assert_allclose(
+        dataset.gt_poses, X_S0W @ recorded.X_WS, rtol=0, atol=1e-9
+    )
+    np.testing.assert_allclose(
+        np.ravel(dataset.get_frames_timestamps()),
+        (recorded.stamps_ns - recorded.stamps_ns[0]) * 1e-9,
+        rtol=0,
+        atol=1e-9,
+    )
+    assert len(dataset) == NUM_SCANS
+    for i, scan in enumerate(recorded):
+        points, _ = dataset[i]
+        expected = np.stack([scan[name] for name in "xyz"], axis=1)
+        np.testing.assert_array_equal(points, expected)
+
+
+def test_labels_as_semantic_kitti_has_them(drive, kitti):
+    for i, scan in enumerate(sequences.open(drive)):
+        stored = np.fromfile(
+            kitti / f"sequences/07/labels/{i:06d}.label", dtype=np.uint32
+        )
+        np.testing.assert_array_equal(stored & 0xFFFF, scan["label"])
+        np.testing.assert_array_equal(stored >> 16, scan["instance"])
+
+
+def test_largest_label_and_instance():
+    scan = make_scan(np.zeros((1, 3)))
+    scan["label"], scan["instance"] = 255, 65535
+    assert encode_labels(scan) == bytes([255, 0, 255, 255])
+
+
+def test_camera_axes_are_right_down_forward(kitti):
+    # The drive goes forward: along z of the camera. It bends to the left.
+    rows = np.loadtxt(kitti / "poses/07.txt")
+    np.testing.assert_allclose(rows[0].reshape(3, 4), np.eye(4)[:3], atol=1e-12)
+    Tr = next(
+        line.split()[1:]
+        for line in (kitti / "sequences/07/calib.txt").read_text().splitlines()
+        if line.startswith("Tr:")
+    )
+    X_CS = np.array(Tr, dtype=float).reshape(3, 4)
+    forward, left, up = np.eye(3)
+    np.testing.assert_array_equal(X_CS[:, :3] @ forward, [0, 0, 1])
+    np.testing.assert_array_equal(X_CS[:, :3] @ left, [-1, 0, 0])
+    np.testing.assert_array_equal(X_CS[:, :3] @ up, [0, -1, 0])
+    np.testing.assert_array_equal(X_CS[:, 3], 0.0)
+
+
+def test_cns_reads_back(drive, cns):
+    recorded = sequences.open(drive)
+    read = sequences.open(cns / "Town/07")
+    assert_same_drive(read, recorded, XYZI)
+    np.testing.assert_array_equal(read.stamps_ns, recorded.stamps_ns)
+
+
+def test_cns_by_plain_means(drive, cns):
+    """gt.csv holds the vehicle, transformation_lidar.yaml the LiDAR on it."""
+    recorded = sequences.open(drive)
+    rows = np.loadtxt(cns / "Town/07/gt.csv", delimiter=",")
+    mount = yaml.safe_load((cns / "transformation_lidar.yaml").read_text())
+    np.testing.assert_allclose(mount["translation"], P_BS, atol=1e-12)
+    np.testing.assert_allclose(mount["rotation"], QUAT_BS, atol=1e-12)
+    R_WB = Rotation.from_quat(rows[:, 4:])
+    p_WS = rows[:, 1:4] + R_WB.apply(mount["translation"])
+    R_WS = R_WB * Rotation.from_quat(mount["rotation"])
+    np.testing.assert_allclose(p_WS, recorded.X_WS[:, :3, 3], atol=1e-9)
+    np.testing.assert_allclose(
+        R_WS.as_matrix(), recorded.X_WS[:, :3, :3], atol=1e-9
+    )
+    first = (cns / "Town/07/gt.csv").read_text().split(",")[0]
+    assert int(first) == recorded.stamps_ns[0]
+
+
+@pytest.mark.slow
+def test_pcd_by_open3d(drive, cns):
+    import open3d
+
+    recorded = sequences.open(drive)
+    for stamp_ns, scan in zip(recorded.stamps_ns, recorded, strict=True):
+        if len(scan) == 0:
+            continue
+        cloud = open3d.t.io.read_point_cloud(
+            str(cns / f"Town/07/pcd/{stamp_ns}.pcd")
+        )
+        points = np.stack([scan[name] for name in "xyz"], axis=1)
+        np.testing.assert_array_equal(cloud.point.positions.numpy(), points)
+        np.testing.assert_array_equal(
+            cloud.point["intensity"].numpy()[:, 0], scan["intensity"]
+        )
+
+
+def test_imu_of_a_simulated_drive(short_recording, tmp_path):
+    drive = export_sequence(short_recording, "cns", tmp_path / "cns")
+    recorded = sequences.open(short_recording)
+    read = sequences.open(drive)
+    np.testing.assert_array_equal(read.imu, recorded.imu)
+    assert len(read.imu) == 40
+    np.testing.assert_allclose(read.X_WS, recorded.X_WS, atol=1e-9)
+    np.testing.assert_array_equal(read.scan(39)["x"], recorded.scan(39)["x"])
+    mount = yaml.safe_load(
+        (tmp_path / "cns/transformation_imu.yaml").read_text()
+    )
+    assert mount["translation"] == [-1.0, 0.0, 1.6]
+
+
+def test_same_recording_gives_same_bytes(drive, kitti, tmp_path):
+    export_sequence(drive, "kitti", tmp_path / "again")
+    files = [path for path in kitti.rglob("*") if path.is_file()]
+    assert len(files) == 1 + 1 + 5 + 2 * NUM_SCANS
+    for path in files:
+        again = tmp_path / "again" / path.relative_to(kitti)
+        assert again.read_bytes() == path.read_bytes()
+
+
+@pytest.mark.slow
+def test_command(drive, tmp_path):
+    def run(*arguments):
+        return subprocess.run(
+            [sys.executable, "-m", "cns_drake", "export", *arguments],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+
+    arguments = (drive, "--format", "kitti", "--output", tmp_path / "out")
+    done = run(*arguments)
+    assert done.returncode == 0
+    assert done.stdout == f"{tmp_path / 'out/sequences/07'}\n"
+    assert f"{NUM_SCANS}/{NUM_SCANS} frames" in done.stderr
+    again = run(*arguments)
+    assert again.returncode == 2
+    assert again.stdout == ""
+    assert again.stderr.splitlines()[-1] == (
+        f"cns-drake: error: {tmp_path / 'out/sequences/07'}: is there already"
+    )
+
+
+def test_several_drives_share_a_folder(drive, tmp_path):
+    other = write_drive(tmp_path / "recordings" / "town_08")
+    output = tmp_path / "output"
+    for recording in (drive, other):
+        export_sequence(recording, "cns", output)
+    assert sorted(p.name for p in (output / "Town").iterdir()) == ["07", "08"]
+    moved = write_drive(tmp_path / "recordings" / "town_09", p_BS=(0, 0, 2))
+    with pytest.raises(InputError, match=r"lidar\.yaml: differs.*mount"):
+        export_sequence(moved, "cns", output)
+    assert not (output / "Town/09").exists()
+
+
+def test_a_drive_is_not_replaced(drive, tmp_path):
+    drive_folder = export_sequence(drive, "kitti", tmp_path / "output")
+    (drive_folder / "times.txt").write_text("mine")
+    with pytest.raises(InputError, match="sequences/07: is there already"):
+        export_sequence(drive, "kitti", tmp_path / "output")
+    assert (drive_folder / "times.txt").read_text() == "mine"
+
+
+@pytest.mark.parametrize("format_name", ["cns", "kitti"])
+def test_foreign_folders_are_left_alone(drive, tmp_path, format_name):
+    (tmp_path / "file").write_text("")
+    (tmp_path / "photos").mkdir()
+    (tmp_path / "photos/one.jpg").write_text("")
+    (tmp_path / "marked").mkdir()
+    (tmp_path / "marked/export.yaml").write_text("format: [")
+    (tmp_path / "foreign").mkdir()
+    (tmp_path / "foreign/export.yaml").write_text("format: [cns]")
+    export_sequence(
+        drive, "kitti" if format_name == "cns" else "cns", tmp_path / "other"
+    )
+    before = sorted(tmp_path.rglob("*"))
+    for folder, fault in (
+        ("file", "holds something else"),
+        ("photos", "holds something else"),
+        ("marked", "export.yaml: not readable as YAML"),
+        ("foreign", "export.yaml: not of an export"),
+        ("other", "the folder holds"),
+    ):
+        with pytest.raises(InputError, match=fault):
+            export_sequence(drive, format_name, tmp_path / folder)
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+class StopError(Exception):
+    pass
+
+
+@pytest.mark.parametrize("format_name", ["cns", "kitti"])
+def test_an_interrupted_export_has_no_final_name(drive, tmp_path, format_name):
+    def stop(done, total):
+        assert total == NUM_SCANS
+        if done == 2:
+            raise StopError
+
+    with pytest.raises(StopError):
+        export_sequence(drive, format_name, tmp_path / "out", on_frame=stop)
+    left = [p.name for p in (tmp_path / "out").rglob("*") if p.is_file()]
+    assert left == ["export.yaml"]
+    # Killed outright, it leaves its part behind, which is of no use to others.
+    final = tmp_path / "out" / ("Town" if format_name == "cns" else "sequences")
+    part = final / "07.part"
+    part.mkdir(parents=True)
+    (part / "scrap").write_text("")
+    drive_folder = export_sequence(drive, format_name, tmp_path / "out")
+    assert drive_folder.parent == final
+    assert not part.exists()
+    assert not (drive_folder / "scrap").exists()
+
+
+@pytest.mark.parametrize("format_name", ["cns", "kitti"])
+def test_a_full_disk_leaves_nothing_half(
+    drive, tmp_path, monkeypatch, format_name
+):
+    written = 0
+    original = type(tmp_path).write_bytes
+
+    def write_bytes(path, data):
+        nonlocal written
+        written += 1
+        if written == 4:
+            raise OSError(28, "No space left on device")
+        return original(path, data)
+
+    monkeypatch.setattr(type(tmp_path), "write_bytes", write_bytes)
+    with pytest.raises(InputError, match=r"07\.part: No space left"):
+        export_sequence(drive, format_name, tmp_path / "out")
+    left = [p.name for p in (tmp_path / "out").rglob("*") if p.is_file()]
+    assert left == ["export.yaml"]
+
+
+@pytest.mark.parametrize("format_name", ["cns", "kitti"])
+@pytest.mark.parametrize("depth", [".", "exports"])
+def test_a_report_finds_exports(tmp_path, format_name, depth):
+    """As it finds recordings, by the map and stage that they tell."""
+    for number in ("1", "2"):
+        name = f"town_0{number}"
+        recording = write_drive(
+            tmp_path / "recordings" / name,
+            attachments={
+                "scenario.json": {"map": "town", "stage": f"s{number}"}
+            },
+        )
+        export_sequence(recording, format_name, tmp_path / "in" / depth)
+    (tmp_path / "in" / "notes").mkdir()
+    (city,) = group_cities(find_recordings(tmp_path / "in"))
+    assert city.name == "town"
+    assert {stage: one.name for stage, one in city.stages.items()} == {
+        "s1": "town_01",
+        "s2": "town_02",
+    }
+
+
+def test_one_of_several_lidars(drive, tmp_path):
+    rear = write_drive(
+        tmp_path / "recordings" / "town_01", lidar_topic="/rear/points"
+    )
+    export_sequence(rear, "kitti", tmp_path / "rear", lidar="rear")
+    with pytest.raises(
+        InputError, match=r"no topic /side/points .*/rear/points"
+    ):
+        export_sequence(rear, "kitti", tmp_path / "side", lidar="side")
+    assert not (tmp_path / "side").exists()
+
+
+def test_names_that_lead_elsewhere_are_refused(tmp_path):
+    for place in ("..", "a b", "x/.."):
+        drive = write_drive(
+            tmp_path / "recordings" / "town_01",
+            attachments={"scenario.json": {"map": place}},
+        )
+        with pytest.raises(InputError, match="no name of a folder"):
+            export_sequence(drive, "cns", tmp_path / "out" / "deep")
+        shutil.rmtree(tmp_path / "recordings")
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_is_no_recording(kitti, tmp_path):
+    for path in (tmp_path, tmp_path / "missing", kitti / "sequences/07"):
+        with pytest.raises(InputError, match=f"{path}: no recording"):
+            export_sequence(path, "cns", tmp_path / "out")
+    (tmp_path / "broken.mcap").write_text("no mcap")
+    with pytest.raises(InputError, match=r"broken\.mcap: not an MCAP file"):
+        export_sequence(tmp_path / "broken.mcap", "cns", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+class TestReadingKittiExports:
+    """Files beside KITTI's own that do not fit."""
+
+    @pytest.fixture
+    def folder(self, kitti, tmp_path):
+        shutil.copytree(kitti, tmp_path / "copy")
+        return tmp_path / "copy/sequences/07"
+
+    def test_without_them_it_is_plain_kitti(self, folder):
+        for name in ("first_pose.txt", "scenario.yaml", "structures.json"):
+            (folder / name).unlink()
+        shutil.rmtree(folder / "labels")
+        sequence = sequences.open(folder)
+        assert sequence.name == "07"
+        assert sequence.world_frame == "kitti/07"
+        assert sequence.scenario is None
+        assert sequence.instances is None
+        assert sequence.scan(0).dtype.names == XYZI
+        np.testing.assert_allclose(sequence.X_WS[0], np.eye(4), atol=1e-12)
+
+    def test_labels_that_are_too_few(self, folder):
+        path = folder / "labels/000001.label"
+        path.write_bytes(path.read_bytes()[:-4])
+        with pytest.raises(ReadingError, match=r"60 points, but 59 in .*label"):
+            sequences.open(folder).scan(1)
+
+    @pytest.mark.parametrize(
+        "text", ["[1]", "a: [", "name: ../../x", "name: 'a b'", "\0"]
+    )
+    def test_scenario(self, folder, text):
+        (folder / "scenario.yaml").write_text(text)
+        with pytest.raises(ReadingError, match=r"scenario\.yaml: [^\n]*$"):
+            sequences.open(folder)
+
+    @pytest.mark.parametrize("text", ["{}x", "7", json.dumps([{"name": "a"}])])
+    def test_structures(self, folder, text):
+        (folder / "structures.json").write_text(text)
+        with pytest.raises(ReadingError, match=r"structures\.json: [^\n]*$"):
+            _ = sequences.open(folder).instances
+
+    @pytest.mark.parametrize("text", ["1 2 3", "", "1 " * 12])
+    def test_first_pose(self, folder, text):
+        (folder / "first_pose.txt").write_text(text)
+        with pytest.raises(ReadingError, match=r"first_pose\.txt: "):
+            sequences.open(folder)

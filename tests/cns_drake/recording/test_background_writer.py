@@ -1,0 +1,87 @@
+"""The thread keeps the order, and its errors come out."""
+
+import threading
+
+import pytest
+
+from cns_drake.recording.background_writer import BackgroundWriter
+
+
+def feed(write, count):
+    """Hands over the numbers up to `count`; returns how many were taken."""
+    taken = 0
+    try:
+        with BackgroundWriter(write) as writer:
+            for k in range(count):
+                writer.write(k)
+                taken = k + 1
+    except OSError:
+        pass
+    return taken
+
+
+def test_everything_is_written_in_order_and_elsewhere():
+    written, threads = [], set()
+
+    def write(*message):
+        written.append(message)
+        threads.add(threading.current_thread())
+
+    with BackgroundWriter(write) as writer:
+        for k in range(500):
+            writer.write("topic", k)
+    assert written == [("topic", k) for k in range(500)]
+    assert threading.current_thread() not in threads
+
+
+def test_few_messages_wait():
+    handed, lags = 0, []
+
+    def write(k):
+        lags.append(handed - k)
+
+    with BackgroundWriter(write) as writer:
+        for k in range(3000):
+            writer.write(k)
+            handed = k + 1
+    assert max(lags) <= 10
+
+
+def test_an_error_is_raised_at_the_latest_on_leaving():
+    def write(k):
+        raise OSError(f"disk full at {k}")
+
+    with (
+        pytest.raises(OSError, match="disk full at 0"),
+        BackgroundWriter(write) as writer,
+    ):
+        writer.write(0)
+
+
+def test_after_an_error_nothing_more_is_written_or_taken():
+    written = []
+
+    def write(k):
+        if k == 3:
+            raise OSError("disk full")
+        written.append(k)
+
+    taken = feed(write, 1_000_000)
+    assert written == [0, 1, 2]
+    # A few were on their way when it happened.
+    assert 3 <= taken < 1_000_000
+
+
+def test_an_error_outside_ends_the_thread():
+    threads = threading.active_count()
+    written = []
+
+    def fail():
+        with BackgroundWriter(written.append) as writer:
+            writer.write(0)
+            raise KeyError
+
+    with pytest.raises(KeyError):
+        fail()
+    assert threading.active_count() == threads
+    assert written in ([], [0])

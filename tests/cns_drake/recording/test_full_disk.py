@@ -1,0 +1,140 @@
+"""Disks that fill up: one line, no final name, and room makes it go on.
+
+Where the tests run as root the disk is real, a tmpfs of a few kilobytes.
+Elsewhere, and in any case, a limit on the size of files makes writes fail.
+"""
+
+import resource
+import subprocess
+import sys
+
+from bag_recordings import FRAMES as BAG_FRAMES
+from bag_recordings import contents, record
+from mcap.reader import make_reader
+import pytest
+from tiny_drive import FRAMES, tiny_scenario
+import yaml
+
+from cns_drake.simulation.simulation import simulate
+from evaluation.support.errors import InputError
+
+pytestmark = pytest.mark.slow
+
+PAGE = 4096
+COMMAND = (sys.executable, "-m", "cns_drake", "simulate")
+FAULTS = {"tmpfs": "No space left on device", "limit": "File too large"}
+
+
+class Tmpfs:
+    """A small file system with a file that takes up the rest of it."""
+
+    def __init__(self, folder, pages):
+        self.folder = folder
+        self._pages = pages
+        self.filler = folder / "filler"
+
+    def leave(self, pages):
+        self.filler.write_bytes(bytes(PAGE * (self._pages - pages)))
+
+
+@pytest.fixture(scope="module")
+def tmpfs(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("tmpfs")
+    pages = 64
+    mount = ["mount", "-t", "tmpfs", "-o", f"size={pages * PAGE}", "tmpfs"]
+    try:
+        subprocess.run([*mount, folder], check=True, capture_output=True)
+    except (OSError, subprocess.CalledProcessError):
+        pytest.skip("only root can mount a file system")
+    yield Tmpfs(folder, pages)
+    subprocess.run(["umount", folder], check=True)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("whole") / "drive_01"
+    record(folder)
+    return contents(folder)
+
+
+def test_disks_of_any_size(tmpfs, whole):
+    needed = sum(-(-len(content) // PAGE) for content in whole.values())
+    folder = tmpfs.folder / "drive_01"
+    for pages in range(1, needed):
+        tmpfs.leave(pages)
+        with pytest.raises(InputError, match=FAULTS["tmpfs"]) as error:
+            record(folder)
+        assert "\n" not in str(error.value)
+        assert all(path.suffix == ".part" for path in folder.iterdir())
+        tmpfs.filler.unlink()
+        record(folder)
+        assert contents(folder) == whole
+        for path in folder.iterdir():
+            path.unlink()
+        folder.rmdir()
+
+
+def test_limits_of_any_size(tmp_path, whole):
+    size = len(whole["drive_01_0.mcap"])
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    for limit in range(10, size, size // 17):
+        folder = tmp_path / str(limit) / "drive_01"
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limits[1]))
+        try:
+            with pytest.raises(InputError, match=FAULTS["limit"]):
+                record(folder)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        assert [path.suffix for path in folder.iterdir()] == [".part"]
+        assert record(folder) in {0, 16, 32, 48, BAG_FRAMES}
+        assert contents(folder) == whole
+    assert record(folder, BAG_FRAMES, overwrite=True) == 0
+
+
+@pytest.mark.parametrize("disk", FAULTS)
+def test_a_real_run_ends_in_one_line_and_goes_on(tmp_path, request, disk):
+    scenario = tiny_scenario(tmp_path)
+    file = tmp_path / "tiny_01.yaml"
+    file.write_text(yaml.safe_dump(scenario.model_dump(exclude_none=True)))
+    simulate(scenario, tmp_path / "whole")
+    whole = contents(tmp_path / "whole" / "tiny_01")
+    with (tmp_path / "whole/tiny_01/tiny_01_0.mcap").open("rb") as stream:
+        chunks = make_reader(stream).get_summary().chunk_indexes
+    half = chunks[2].chunk_start_offset + 100  # Two chunks of four.
+    output, preexec = tmp_path, None
+    if disk == "tmpfs":
+        small = request.getfixturevalue("tmpfs")
+        small.leave(half // PAGE)
+        output = small.folder
+    else:
+
+        def preexec():
+            resource.setrlimit(resource.RLIMIT_FSIZE, (half, half))
+
+    result = subprocess.run(
+        [*COMMAND, file, "--output", output],
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=preexec,
+    )
+    folder = output / "tiny_01"
+    part = folder / "tiny_01_0.mcap.part"
+    assert result.returncode == 2
+    assert result.stdout == ""
+    assert "Traceback" not in result.stderr
+    told = result.stderr.splitlines()[-1]
+    assert told == f"cns-drake: error: {part}: {FAULTS[disk]}"
+    assert list(folder.iterdir()) == [part]
+    if disk == "tmpfs":
+        small.filler.unlink()
+    told = []
+    run = simulate(scenario, output, on_note=told.append)
+    # A tmpfs has room for whole pages only.
+    assert run.resumed_frames in ({16, 32} if disk == "tmpfs" else {32})
+    assert told == [
+        "tiny_01: found an interrupted run, reading it",
+        f"tiny_01: {run.resumed_frames} of {FRAMES} frames are there, going "
+        "on with the next",
+    ]
+    assert contents(folder) == whole

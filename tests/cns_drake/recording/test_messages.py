@@ -1,0 +1,176 @@
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.multibody.math import SpatialVelocity
+import pytest
+from rosbags.typesys import Stores, get_typestore
+from scipy.spatial.transform import Rotation
+
+from cns_drake.recording import messages
+from cns_drake.sensors.beam_pattern import POINT_DTYPE
+
+STAMP_NS = 1_700_000_000_150_000_001
+
+
+def decode(message):
+    """Reads a message back from its bytes with a typestore of its own."""
+    return get_typestore(Stores.ROS2_HUMBLE).deserialize_cdr(
+        messages.serialize(message), message.__msgtype__
+    )
+
+
+def random_points(num_points, seed=0):
+    rng = np.random.default_rng(seed)
+    points = np.zeros(num_points, POINT_DTYPE)
+    for name in ("x", "y", "z", "intensity"):
+        points[name] = rng.normal(size=num_points)
+    for name in ("ring", "t", "label", "instance"):
+        largest = np.iinfo(POINT_DTYPE[name]).max
+        points[name] = rng.integers(0, largest, num_points, endpoint=True)
+    return points
+
+
+def random_pose(seed):
+    rng = np.random.default_rng(seed)
+    return RigidTransform(
+        RollPitchYaw(rng.uniform(-1.5, 1.5, 3)), rng.uniform(-300, 300, 3)
+    )
+
+
+def assert_quaternion_is(quaternion, R):
+    matrix = Rotation.from_quat(
+        [quaternion.x, quaternion.y, quaternion.z, quaternion.w]
+    ).as_matrix()
+    np.testing.assert_allclose(matrix, R.matrix(), atol=1e-14)
+
+
+def test_point_cloud_holds_the_records_under_their_names_and_offsets():
+    points = random_points(1000)
+    cloud = decode(messages.make_point_cloud(points, "roof", STAMP_NS))
+
+    assert cloud.header.frame_id == "roof"
+    assert cloud.header.stamp.sec == 1_700_000_000
+    assert cloud.header.stamp.nanosec == 150_000_001
+    assert (cloud.height, cloud.width) == (1, 1000)
+    assert cloud.point_step == 28
+    assert cloud.row_step == 28_000
+    assert cloud.is_dense
+    assert not cloud.is_bigendian
+    # Name, offset and datatype as in sensor_msgs/msg/PointField.
+    assert [(f.name, f.offset, f.datatype, f.count) for f in cloud.fields] == [
+        ("x", 0, 7, 1),
+        ("y", 4, 7, 1),
+        ("z", 8, 7, 1),
+        ("intensity", 12, 7, 1),
+        ("ring", 16, 4, 1),
+        ("t", 20, 6, 1),
+        ("label", 24, 2, 1),
+        ("instance", 26, 4, 1),
+    ]
+    np.testing.assert_array_equal(cloud.data.view(POINT_DTYPE), points)
+
+
+def test_point_cloud_bytes_do_not_depend_on_padding():
+    points = random_points(10)
+    littered = np.frombuffer(
+        np.full(points.nbytes, 0xAB, np.uint8), POINT_DTYPE
+    ).copy()
+    littered.view(np.uint8)[:] = 0xAB
+    for name in POINT_DTYPE.names:
+        littered[name] = points[name]
+    assert littered.tobytes() != points.tobytes()
+
+    clean = messages.make_point_cloud(points, "lidar", STAMP_NS)
+    dirty = messages.make_point_cloud(littered, "lidar", STAMP_NS)
+    assert messages.serialize(dirty) == messages.serialize(clean)
+
+
+def test_point_cloud_may_be_empty():
+    cloud = decode(
+        messages.make_point_cloud(random_points(0), "lidar", STAMP_NS)
+    )
+    assert (cloud.height, cloud.width, cloud.row_step) == (1, 0, 0)
+    assert len(cloud.data) == 0
+    assert cloud.point_step == 28
+
+
+def test_point_cloud_takes_a_view_and_leaves_it_unchanged():
+    points = random_points(20)
+    points.flags.writeable = False
+    cloud = decode(messages.make_point_cloud(points[::2], "lidar", STAMP_NS))
+    np.testing.assert_array_equal(cloud.data.view(POINT_DTYPE), points[::2])
+
+
+def test_imu_puts_each_vector_in_its_place():
+    R_WI = random_pose(1).rotation()
+    imu = decode(
+        messages.make_imu(
+            R_WI,
+            angular_velocity=np.array([0.1, 0.2, 0.3]),
+            specific_force=np.array([1.0, 2.0, 9.81]),
+            stamp_ns=STAMP_NS,
+        )
+    )
+    assert imu.header.frame_id == "imu"
+    assert_quaternion_is(imu.orientation, R_WI)
+    rate = imu.angular_velocity
+    assert (rate.x, rate.y, rate.z) == (0.1, 0.2, 0.3)
+    force = imu.linear_acceleration
+    assert (force.x, force.y, force.z) == (1.0, 2.0, 9.81)
+    for covariance in (
+        imu.orientation_covariance,
+        imu.angular_velocity_covariance,
+        imu.linear_acceleration_covariance,
+    ):
+        assert (np.asarray(covariance) == 0.0).all()
+
+
+def test_odometry_is_exact():
+    X_WB = random_pose(2)
+    V_WB_B = SpatialVelocity(w=[0.1, 0.2, 0.3], v=[7.0, 8.0, 9.0])
+    odometry = decode(messages.make_odometry(X_WB, V_WB_B, STAMP_NS))
+
+    assert odometry.header.frame_id == "map"
+    assert odometry.child_frame_id == "base_link"
+    pose = odometry.pose.pose
+    p = pose.position
+    assert [p.x, p.y, p.z] == list(X_WB.translation())
+    assert_quaternion_is(pose.orientation, X_WB.rotation())
+    linear = odometry.twist.twist.linear
+    assert (linear.x, linear.y, linear.z) == (7.0, 8.0, 9.0)
+    angular = odometry.twist.twist.angular
+    assert (angular.x, angular.y, angular.z) == (0.1, 0.2, 0.3)
+
+
+def test_tf_lists_every_child_in_order():
+    X_BS, X_BI = random_pose(3), random_pose(4)
+    tf = decode(
+        messages.make_tf("base_link", {"roof": X_BS, "imu": X_BI}, STAMP_NS)
+    )
+    assert [t.child_frame_id for t in tf.transforms] == ["roof", "imu"]
+    for transform, X in zip(tf.transforms, (X_BS, X_BI), strict=True):
+        assert transform.header.frame_id == "base_link"
+        assert transform.header.stamp.nanosec == 150_000_001
+        p = transform.transform.translation
+        assert [p.x, p.y, p.z] == list(X.translation())
+        assert_quaternion_is(transform.transform.rotation, X.rotation())
+
+
+@pytest.mark.parametrize("yaw", [0.0, 3.0, -3.0, np.pi])
+def test_quaternion_comes_in_ros_order(yaw):
+    x, y, z, w = messages.to_quat_xyzw(
+        RigidTransform(RollPitchYaw(0, 0, yaw), [0, 0, 0]).rotation()
+    )
+    assert x == pytest.approx(0.0, abs=1e-15)
+    assert y == pytest.approx(0.0, abs=1e-15)
+    assert np.hypot(z, w) == pytest.approx(1.0, abs=1e-15)
+    assert 2 * np.arctan2(z, w) == pytest.approx(yaw, abs=1e-14)
+
+
+def test_definition_and_hash_are_the_published_ones():
+    assert "sensor_msgs/PointField" in messages.message_definition(
+        messages.POINT_CLOUD
+    )
+    # As published with sensor_msgs of ROS 2 Iron and later.
+    assert messages.message_hash(messages.POINT_CLOUD) == (
+        "RIHS01_9198cabf7da3796ae6fe19c4cb3bdd3525492988c70522628af5daa124bae2b5"
+    )

@@ -1,0 +1,172 @@
+"""Scenarios: what is accepted, what is refused, what comes back."""
+
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw
+import pytest
+from small_map import scenario_values
+import yaml
+
+from cns_drake.scenarios.planning import plan_drive
+from cns_drake.scenarios.scenario import (
+    LidarConfig,
+    Mount,
+    load_scenario,
+    make_scenario,
+)
+from cns_drake.scenarios.shipped import recordable_sequences
+from evaluation.support.errors import InputError
+
+
+def test_shipped_sequences_load():
+    names = recordable_sequences().keys()
+    assert {"metropolis_01", "metropolis_04"} <= names
+    for name in names:
+        scenario = load_scenario(name)
+        assert scenario.name == name
+        assert scenario.world_file.is_file()
+        assert scenario.title
+
+
+def test_defaults_are_the_sensor_contract():
+    scenario = load_scenario("metropolis_04")
+    (name, lidar), *others = scenario.lidars.items()
+    assert (name, others) == ("lidar", [])
+    np.testing.assert_array_equal(lidar.pose().translation(), [0, 0, 1.6])
+    pattern = lidar.pattern()
+    assert (pattern.num_rings, pattern.num_columns) == (32, 1024)
+    assert (pattern.min_range, pattern.max_range) == (0.8, 120.0)
+    imu = scenario.imu.pose()
+    np.testing.assert_array_equal(imu.translation(), [-1.0, 0, 1.6])
+    assert imu.rotation().IsNearlyIdentity(0.0)
+
+
+def test_what_is_recorded_loads_again(small_map, tmp_path):
+    values = scenario_values(small_map)
+    values["lidars"] = {"roof": {"preset": "vlp-16", "rpy_deg": [0, 10, 0]}}
+    scenario = make_scenario(values, "test")
+    text = yaml.safe_dump(scenario.model_dump(mode="json"))
+    path = tmp_path / "scenario.yaml"
+    path.write_text(text)
+    assert load_scenario(path) == scenario
+
+
+def test_map_folder_is_relative_to_the_scenario_file(small_map):
+    values = scenario_values(small_map) | {"map": small_map.name}
+    path = small_map.parent / "own_drive.yaml"
+    del values["name"]
+    path.write_text(yaml.safe_dump(values))
+    scenario = load_scenario(path)
+    assert scenario.name == "own_drive"
+    assert scenario.map_folder == small_map
+
+
+def test_mount_angles_are_roll_pitch_yaw_in_degrees():
+    mount = Mount(xyz=(1, 2, 3), rpy_deg=(10, 20, 30))
+    expected = RigidTransform(
+        RollPitchYaw(np.deg2rad([10.0, 20.0, 30.0])), [1, 2, 3]
+    )
+    assert mount.pose().IsNearlyEqualTo(expected, 1e-15)
+
+
+def test_preset_replaces_the_lidar_where_it_is():
+    scenario = load_scenario("metropolis_01").with_lidar_preset("os1-128")
+    config = scenario.lidars["lidar"]
+    assert config.pattern().num_rings == 128
+    assert config.xyz == (0.0, 0.0, 1.6)
+    own = {"lidars": {"a": {"columns": 64, "range_noise": 0.02}}}
+    values = scenario.model_dump() | own
+    config = make_scenario(values, "test").with_lidar_preset("vlp-16")
+    assert config.lidars["a"] == LidarConfig(preset="vlp-16", range_noise=0.02)
+    with pytest.raises(InputError, match=r"--lidar: preset: .*os2-128.*vlp-16"):
+        scenario.with_lidar_preset("os2-128")
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        ({"colour": "red"}, r"scenario.yaml: colour: .*not permitted"),
+        ({"stage": 4}, r"scenario.yaml: stage: .*valid string"),
+        ({"stage": "../x"}, r"scenario.yaml: stage: "),
+        ({"frames": 0}, r"scenario.yaml: frames: .*greater"),
+        ({"frames": "many"}, r"scenario.yaml: frames: .*integer"),
+        ({"seed": -1}, r"scenario.yaml: seed: .*greater"),
+        ({"lidars": {}}, r"scenario.yaml: lidars: "),
+        ({"lidars": {"imu": {}}}, r"lidars: 'imu' is the name of another"),
+        ({"lidars": {"a": {"preset": "x"}}}, r"lidars.a.preset: unknown"),
+        ({"lidars": {"a b": {}}}, r"scenario.yaml: lidars.a b"),
+        ({"lidars": {"a": {"range_noise": -0.1}}}, r"a.range_noise: .*greater"),
+        ({"lidars": {"a": {"range_noise": float("nan")}}}, r"a.range_noise: "),
+        ({"lidars": {"a": {"dropout": 1.1}}}, r"a.dropout: .*less"),
+        ({"lidars": {"a": {"faint_dropout": -1}}}, r"a.faint_dropout: "),
+        ({"lidars": {"a": {"motion_distortion": "x"}}}, r"motion_distortion"),
+        (
+            {"lidars": {"a": {"max_range": 0.5}}},
+            r"lidars.a: min_range 0.8 is not below max_range 0.5",
+        ),
+        (
+            {"lidars": {"a": {"xyz": [0, float("inf"), 0]}}},
+            r"a.xyz.1: .*finite",
+        ),
+        ({"imu": {"xyz": [0, 0]}}, r"scenario.yaml: imu.xyz"),
+        ({"route": []}, r"scenario.yaml: route: "),
+        ({"route": [{"road": "x"}]}, r"scenario.yaml: route.0.direction"),
+        ({"speeds": {"cruise": -1}}, r"scenario.yaml: speeds.cruise"),
+        ({"stage": "07"}, r"stage: .*no stage '07'; it has: 01, 04"),
+        ({"map": "atlantis"}, r"map: .*atlantis' is neither"),
+    ],
+)
+def test_bad_fields_are_named(small_map, tmp_path, change, fault):
+    path = tmp_path / "scenario.yaml"
+    path.write_text(yaml.safe_dump(scenario_values(small_map) | change))
+    with pytest.raises(InputError, match=fault) as caught:
+        load_scenario(path)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("a: [1, 2", "not readable as YAML"),
+        ("- 1\n- 2\n", "not a mapping"),
+        ("", "not a mapping"),
+        ("\x00\x01", "not readable as YAML"),
+    ],
+)
+def test_files_that_are_no_scenario(tmp_path, text, fault):
+    path = tmp_path / "broken.yaml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=rf"broken.yaml: {fault}") as caught:
+        load_scenario(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_unknown_sequence_names_the_known_ones():
+    with pytest.raises(InputError, match=r"'metropolis_99'; .*metropolis_04"):
+        load_scenario("metropolis_99")
+
+
+def test_errors_of_the_route_name_the_file(small_map, tmp_path):
+    values = scenario_values(small_map) | {"name": "drive"}
+    path = tmp_path / "drive.yaml"
+    path.write_text(
+        yaml.safe_dump(
+            values | {"route": [dict(values["route"][0], road="milky_way")]}
+        )
+    )
+    for scenario in (
+        load_scenario(path),
+        load_scenario(path).with_lidar_preset("vlp-16"),
+    ):
+        with pytest.raises(InputError, match=r"drive\.yaml: route\.0 \(milky"):
+            plan_drive(scenario)
+
+
+def test_where_it_was_read_from_makes_no_other_scenario(small_map, tmp_path):
+    values = scenario_values(small_map)
+    path = tmp_path / "drive.yaml"
+    path.write_text(yaml.safe_dump(values))
+    loaded = load_scenario(path)
+    assert loaded == make_scenario(values, "test")
+    assert loaded != make_scenario(values | {"seed": 1}, "test")
+    assert loaded.source == str(path)
+    assert make_scenario(values, "test").source == values["name"]

@@ -1,0 +1,158 @@
+"""Loading SDF worlds, and the faults they may have."""
+
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw
+import pytest
+from small_map import box_visual, world_text
+
+from cns_drake.scenarios.shipped import vehicle_file
+from cns_drake.scene.perception_geometry import read_perception_geometry
+from cns_drake.scene.structure_table import StructureEntry
+from cns_drake.scene.world import load_world
+from cns_drake.sensors.beam_pattern import make_beam_pattern
+from cns_drake.simulation.scanning import scan_world
+from evaluation.support.errors import InputError
+
+MESH = "<mesh><uri>{}</uri></mesh>"
+
+
+def write_world(tmp_path, geometry):
+    visual = f'<visual name="thing"><geometry>{geometry}</geometry></visual>'
+    path = tmp_path / "world.sdf"
+    path.write_text(world_text([visual]))
+    return path
+
+
+def test_static_models_are_anchored_and_the_vehicle_is_not(small_map):
+    world = load_world(small_map / "stage_04.sdf", vehicle=vehicle_file())
+    plant = world.plant
+    city = plant.GetBodyFrameIdOrThrow(plant.GetBodyByName("city").index())
+    base = plant.GetBodyByName("base_link", world.vehicle)
+    assert city in world.anchored_frames()
+    base_frame = plant.GetBodyFrameIdOrThrow(base.index())
+    assert base_frame not in world.anchored_frames()
+    assert world.structures["tower_003"].label == 50
+
+
+@pytest.mark.parametrize(
+    ("geometry", "fault"),
+    [
+        ("<plane><normal>0 0 1</normal></plane>", "'city::thing'.*HalfSpace"),
+        (MESH.format("missing.obj"), r"missing\.obj"),
+        ("<sphere><radius>1e8</radius></sphere>", "larger than 1e"),
+        ("<box><size>1 1 2e7</size></box>", "larger than 1e"),
+    ],
+)
+def test_geometry_that_no_ray_can_hit(tmp_path, geometry, fault):
+    path = write_world(tmp_path, geometry)
+    with pytest.raises(InputError, match=rf"world\.sdf: .*{fault}") as caught:
+        load_world(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_world_with_nothing_to_see(tmp_path):
+    path = tmp_path / "empty.sdf"
+    path.write_text(world_text([]))
+    with pytest.raises(InputError, match=r"empty\.sdf: no visual"):
+        load_world(path)
+
+
+@pytest.mark.parametrize("text", ["", "<sdf><world>", "hello", "<sdf/>"])
+def test_files_that_are_no_world(tmp_path, text):
+    path = tmp_path / "broken.sdf"
+    path.write_text(text)
+    with pytest.raises(InputError, match=r"broken\.sdf: ") as caught:
+        load_world(path)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        ('version="1.9"', 'version="#"', "cannot be parsed"),
+        ("<pose>1", "<pose>one", "Unable to set value"),
+        ("body", "b\udca5dy", "not UTF-8"),
+    ],
+)
+def test_faults_that_drake_tells_in_several_ways(
+    tmp_path, capfd, old, new, fault
+):
+    text = world_text([box_visual("body", (1, 2, 3, 0, 0, 0), (4, 5, 6))])
+    path = tmp_path / "broken.sdf"
+    path.write_text(text.replace(old, new), errors="surrogateescape")
+    with pytest.raises(InputError, match=rf"broken\.sdf: .*{fault}"):
+        load_world(path)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_mesh_that_is_no_mesh(tmp_path, capfd):
+    (tmp_path / "wedge.obj").touch()
+    world = load_world(write_world(tmp_path, MESH.format("wedge.obj")))
+    inspector = world.scene_graph.model_inspector()
+    for text, fault in [
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "a vertex that is not there"),
+        ("v 0 0 0\nv 1e9 0 0\nv 0 1 0\nf 1 2 3\n", "larger than"),
+    ]:
+        (tmp_path / "wedge.obj").write_text(text)
+        with pytest.raises(InputError, match=rf"wedge\.obj: .*({fault})"):
+            read_perception_geometry(inspector)
+    assert capfd.readouterr().err == ""
+
+
+def test_missing_file(tmp_path):
+    with pytest.raises(InputError, match=r"no\.sdf: no such file"):
+        load_world(tmp_path / "no.sdf")
+
+
+def test_table_beside_the_world_is_optional(tmp_path):
+    path = tmp_path / "world.sdf"
+    path.write_text(
+        world_text([box_visual("hut/wall", (0, 0, 1, 0, 0, 0), (1, 1, 2))])
+    )
+    assert list(load_world(path).structures) == [
+        StructureEntry(1, "hut", "unlabeled")
+    ]
+
+
+def test_what_is_left_out_is_neither_seen_nor_in_the_way(small_map):
+    """The last stage without what it adds is the first stage."""
+    added = [f"tower_{k:03d}" for k in range(19, 40)]
+    later = load_world(small_map / "stage_04.sdf", without=added)
+    earlier = load_world(small_map / "stage_01.sdf")
+    names = [
+        {
+            inspector.GetName(geometry_id)
+            for geometry_id in inspector.GetAllGeometryIds()
+        }
+        for inspector in (
+            world.scene_graph.model_inspector() for world in (later, earlier)
+        )
+    ]
+    assert names[0] == names[1]
+    X_WS = RigidTransform(RollPitchYaw(0.02, -0.01, 0.7), [3.0, -40.0, 1.6])
+    pattern = make_beam_pattern("vlp-16", 0.05)
+    scans = [scan_world(world, X_WS, pattern) for world in (later, earlier)]
+    assert len(scans[0]) > 5000
+    np.testing.assert_array_equal(scans[0], scans[1])
+
+
+def test_leaving_out_what_is_not_there_is_an_error(small_map):
+    with pytest.raises(InputError, match=r"stage_01\.sdf: no structure spire"):
+        load_world(small_map / "stage_01.sdf", without=["tower_001", "spire"])
+
+
+def test_structures_that_the_table_lacks_follow_behind(tmp_path):
+    visuals = [
+        box_visual(f"{name}/wall", (0, 0, 1, 0, 0, 0), (1, 1, 2))
+        for name in ("shed", "barn", "hut")
+    ]
+    (tmp_path / "world.sdf").write_text(world_text(visuals))
+    (tmp_path / "structures.csv").write_text(
+        "instance,name,class\n7,hut,building\n"
+    )
+    world = load_world(tmp_path / "world.sdf", vehicle=vehicle_file())
+    assert list(world.structures) == [
+        StructureEntry(7, "hut", "building"),
+        StructureEntry(8, "barn", "unlabeled"),
+        StructureEntry(9, "shed", "unlabeled"),
+    ]

@@ -1,0 +1,443 @@
+"""The Lidar system in a Diagram with a SceneGraph, against closed forms."""
+
+from closed_forms import box, cylinder, ellipsoid
+import numpy as np
+from pydrake.common.value import AbstractValue
+from pydrake.geometry import (
+    Box,
+    Cylinder,
+    FramePoseVector,
+    GeometryFrame,
+    GeometryInstance,
+    HalfSpace,
+    PerceptionProperties,
+    Role,
+    SceneGraph,
+    Sphere,
+)
+from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+from pydrake.multibody.tree import FixedOffsetFrame, SpatialInertia
+from pydrake.perception import PointCloud
+from pydrake.systems.framework import DiagramBuilder
+import pytest
+
+from cns_drake.motion.sweep import Sweep
+from cns_drake.scene.structure_table import (
+    StructureEntry,
+    StructureTable,
+)
+from cns_drake.sensors.beam_pattern import (
+    LIDAR_PRESETS,
+    POINT_DTYPE,
+    BeamPattern,
+    make_beam_pattern,
+)
+from cns_drake.sensors.lidar import Lidar, add_lidar
+from cns_drake.sensors.measurement import MeasurementModel
+from evaluation.support.errors import InputError
+
+X_WS = RigidTransform(RollPitchYaw(0.11, -0.07, 2.3), [1.5, -0.8, 0.4])
+FORWARD = BeamPattern((0.0,), 4, 0.8, 120.0, 0.05)  # Rear, left, ahead, right.
+
+
+class Stage:
+    """A SceneGraph with world geometry and bodies that can be posed."""
+
+    def __init__(self):
+        self.builder = DiagramBuilder()
+        self.scene_graph = self.builder.AddNamedSystem(
+            "scene_graph", SceneGraph()
+        )
+        self.source = self.scene_graph.RegisterSource("stage")
+        self.poses = {}
+
+    def add(self, name, shape, X_FG=None, frame=None, color=None):
+        instance = GeometryInstance(X_FG or RigidTransform(), shape, name)
+        instance.set_perception_properties(PerceptionProperties())
+        if frame is None:
+            return self.scene_graph.RegisterAnchoredGeometry(
+                self.source, instance
+            )
+        return self.scene_graph.RegisterGeometry(self.source, frame, instance)
+
+    def add_frame(self, name, group, X_WF):
+        frame = self.scene_graph.RegisterFrame(
+            self.source, GeometryFrame(name, group)
+        )
+        self.poses[frame] = X_WF
+        return frame
+
+    def finish(self, parent=None, X_PS=X_WS, pattern=None, **kwargs):
+        parent = parent or self.scene_graph.world_frame_id()
+        pattern = pattern or make_beam_pattern("cns", 0.05)
+        self.lidar = self.builder.AddNamedSystem(
+            "lidar", Lidar(parent, X_PS, pattern, **kwargs)
+        )
+        self.builder.Connect(
+            self.scene_graph.get_query_output_port(),
+            self.lidar.GetInputPort("geometry_query"),
+        )
+        self.diagram = self.builder.Build()
+        self.context = self.diagram.CreateDefaultContext()
+        self.set_poses()
+        return self
+
+    def set_poses(self):
+        if not self.poses:
+            return
+        vector = FramePoseVector()
+        for frame, X_WF in self.poses.items():
+            vector.set_value(frame, X_WF)
+        self.scene_graph.get_source_pose_port(self.source).FixValue(
+            self.scene_graph.GetMyMutableContextFromRoot(self.context),
+            AbstractValue.Make(vector),
+        )
+
+    def add_to_context(self, frame, shape):
+        instance = GeometryInstance(RigidTransform(), shape, "new")
+        instance.set_perception_properties(PerceptionProperties())
+        self.scene_graph.RegisterGeometry(
+            self.scene_graph.GetMyMutableContextFromRoot(self.context),
+            self.source,
+            frame,
+            instance,
+        )
+
+    def eval(self, port="scan"):
+        context = self.lidar.GetMyContextFromRoot(self.context)
+        return self.lidar.GetOutputPort(port).Eval(context)
+
+
+def positions(scan):
+    return np.stack([scan["x"], scan["y"], scan["z"]], axis=1).astype(float)
+
+
+def beam_index(scan, pattern):
+    column = np.round(
+        scan["t"] / (pattern.period * 1e9 / pattern.num_columns)
+    ).astype(int)
+    return column * pattern.num_rings + scan["ring"]
+
+
+def ahead(scan):
+    """The range of the beam that points along x, None if it missed."""
+    record = scan[scan["x"] > np.abs(scan["y"])]
+    return float(record["x"][0]) if len(record) else None
+
+
+def test_box_room():
+    """A room's inner walls, seen from a tilted sensor off its middle."""
+    size, center = (10.0, 8.0, 3.0), np.array([0.7, 0.2, 1.0])
+    stage = Stage()
+    for axis in range(3):
+        for side in (-1, 1):
+            wall = np.full(3, 30.0)
+            wall[axis] = 1.0
+            p = center.copy()
+            p[axis] += side * (size[axis] / 2 + 0.5)
+            name = f"room::wall_{axis}_{side}"
+            stage.add(name, Box(*wall), RigidTransform(p))
+    scan = stage.finish().eval()
+
+    pattern = stage.lidar.pattern
+    d_W = pattern.d_Sset @ X_WS.rotation().matrix().T
+    expected = box(X_WS.translation() - center, d_W, size)
+    beams = beam_index(scan, pattern)
+    outside = expected < pattern.min_range
+    np.testing.assert_array_equal(beams, np.flatnonzero(~outside))
+    p_S = positions(scan)
+    np.testing.assert_allclose(
+        p_S, expected[beams, None] * pattern.d_Sset[beams], atol=3e-6
+    )
+    np.testing.assert_allclose(
+        scan["intensity"], np.exp(-0.004 * expected[beams]), atol=1e-6
+    )
+    assert np.unique(scan["instance"]).tolist() == [1]
+
+
+@pytest.mark.parametrize(
+    ("shape", "closed_form"),
+    [
+        (Sphere(3.0), lambda p, d: ellipsoid(p, d, (3.0, 3.0, 3.0))),
+        (Cylinder(2.0, 5.0), lambda p, d: cylinder(p, d, 2.0, 5.0)),
+    ],
+)
+def test_curved_shape(shape, closed_form):
+    X_WG = RigidTransform(RollPitchYaw(0.4, 0.9, -0.2), [12.0, 9.0, 1.0])
+    stage = Stage()
+    stage.add("thing", shape, X_WG)
+    scan = stage.finish().eval()
+    pattern = stage.lidar.pattern
+    X_GS = X_WG.inverse() @ X_WS
+    d_G = pattern.d_Sset @ X_GS.rotation().matrix().T
+    expected = closed_form(X_GS.translation(), d_G)
+    beams = beam_index(scan, pattern)
+    hit = np.flatnonzero(np.isfinite(expected))
+    assert len(hit) > 300
+    assert len(np.setxor1d(beams, hit)) <= 1  # A beam along the very edge.
+    common = np.intersect1d(beams, hit)
+    measured = np.linalg.norm(positions(scan), axis=1)
+    error = np.abs(measured[np.isin(beams, common)] - expected[common])
+    assert error.max() < 1e-3
+    assert np.median(error) < 5e-6
+
+
+@pytest.mark.parametrize(
+    ("distance", "seen"),
+    [
+        (0.8 - 1e-4, False),
+        (0.8 + 1e-4, True),
+        (120.0 - 1e-3, True),
+        (120.0 + 1e-3, False),
+    ],
+)
+def test_range_limits(distance, seen):
+    stage = Stage()
+    X_WG = RigidTransform([distance + 0.5, 0.0, 0.0])
+    stage.add("wall", Box(1.0, 0.2, 0.2), X_WG)
+    stage.finish(X_PS=RigidTransform(), pattern=FORWARD)
+    measured = ahead(stage.eval())
+    assert (measured is not None) == seen
+    if seen:
+        assert measured == pytest.approx(distance, abs=1e-5)
+
+
+def test_what_is_too_near_hides_what_is_behind():
+    stage = Stage()
+    stage.add("film", Box(0.01, 1.0, 1.0), RigidTransform([0.5, 0.0, 0.0]))
+    stage.add("wall", Box(1.0, 9.0, 9.0), RigidTransform([8.0, 0.0, 0.0]))
+    stage.finish(X_PS=RigidTransform(), pattern=FORWARD)
+    assert ahead(stage.eval()) is None
+
+
+@pytest.mark.parametrize(("offset", "seen"), [(-1e-4, True), (1e-4, False)])
+def test_grazing_an_edge(offset, seen):
+    stage = Stage()
+    stage.add(
+        "box", Box(2.0, 2.0, 2.0), RigidTransform([6.0, 1.0 + offset, 0.0])
+    )
+    stage.finish(X_PS=RigidTransform(), pattern=FORWARD)
+    assert (ahead(stage.eval()) is not None) == seen
+
+
+def test_follows_moving_geometry():
+    stage = Stage()
+    frame = stage.add_frame("car", 7, RigidTransform([10.0, 0.0, 0.0]))
+    stage.add("body", Sphere(1.0), frame=frame)
+    stage.finish(X_PS=RigidTransform(), pattern=FORWARD)
+    assert ahead(stage.eval()) == pytest.approx(9.0, abs=1e-5)
+    stage.poses[frame] = RigidTransform([30.0, 0.6, 0.0])
+    stage.set_poses()
+    assert ahead(stage.eval()) == pytest.approx(30.0 - 0.8, abs=1e-5)
+    stage.poses[frame] = RigidTransform([30.0, 1.2, 0.0])
+    stage.set_poses()
+    assert ahead(stage.eval()) is None
+
+
+def test_never_sees_its_own_vehicle():
+    X_WB = RigidTransform(RollPitchYaw(0.0, 0.0, 0.8), [3.0, 4.0, 0.0])
+    stage = Stage()
+    base = stage.add_frame("base_link", 3, X_WB)
+    wheel = stage.add_frame("wheel", 3, X_WB)
+    stage.add("roof", Box(3.0, 3.0, 1.0), frame=base)
+    stage.add("rim", Sphere(2.5), frame=wheel)
+    other = stage.add_frame("other", 4, X_WB @ RigidTransform([9.0, 0, 0]))
+    stage.add("bumper", Sphere(1.0), frame=other)
+    stage.finish(base, RigidTransform(), FORWARD)
+    assert ahead(stage.eval()) == pytest.approx(8.0, abs=1e-5)
+
+
+def test_labels_and_instances_come_from_the_structure_table():
+    stage = Stage()
+    stage.add("city::tower_2/door", Box(1, 1, 9), RigidTransform([5, 0, 0]))
+    stage.add("city::oak_1/crown", Sphere(1.0), RigidTransform([-5, 0, 0]))
+    stage.add("city::new_9/top", Sphere(1.0), RigidTransform([0, 5, 0]))
+    table = StructureTable(
+        [
+            StructureEntry(41, "tower_2", "building"),
+            StructureEntry(7, "oak_1", "vegetation"),
+        ]
+    )
+    stage.finish(X_PS=RigidTransform(), pattern=FORWARD, structures=table)
+    scan = stage.eval()
+    found = {
+        (round(float(r["x"])), round(float(r["y"]))): (
+            r["label"],
+            r["instance"],
+        )
+        for r in scan
+    }
+    assert found == {(4, 0): (50, 41), (-4, 0): (70, 7), (0, 4): (0, 42)}
+
+
+def test_point_cloud_has_the_points_of_the_scan():
+    stage = Stage()
+    stage.add("ball", Sphere(1.0), RigidTransform([5, 2, 1]))
+    stage.finish()
+    cloud = stage.eval("point_cloud_S")
+    assert isinstance(cloud, PointCloud)
+    np.testing.assert_array_equal(
+        cloud.xyzs(), positions(stage.eval()).T.astype(np.float32)
+    )
+
+
+def test_new_geometry_is_noticed():
+    stage = Stage()
+    frame = stage.add_frame("site", 5, RigidTransform([10.5, 0.0, 0.0]))
+    stage.add("wall", Box(1.0, 9.0, 9.0), RigidTransform([20.5, 0.0, 0.0]))
+    stage.finish(X_PS=RigidTransform(), pattern=FORWARD)
+    assert ahead(stage.eval()) == pytest.approx(20.0, abs=1e-5)
+    stage.add_to_context(frame, Box(1.0, 9.0, 9.0))
+    assert ahead(stage.eval()) == pytest.approx(10.0, abs=1e-5)
+
+
+def test_a_cloned_context_sees_for_itself():
+    stage = Stage()
+    frame = stage.add_frame("site", 5, RigidTransform([10.5, 0.0, 0.0]))
+    stage.add("wall", Box(1.0, 9.0, 9.0), RigidTransform([20.5, 0.0, 0.0]))
+    stage.finish(X_PS=RigidTransform(), pattern=FORWARD)
+    assert ahead(stage.eval()) == pytest.approx(20.0, abs=1e-5)
+    original, stage.context = stage.context, stage.context.Clone()
+    assert ahead(stage.eval()) == pytest.approx(20.0, abs=1e-5)
+    stage.add_to_context(frame, Box(1.0, 9.0, 9.0))
+    assert ahead(stage.eval()) == pytest.approx(10.0, abs=1e-5)
+    stage.context = original
+    assert ahead(stage.eval()) == pytest.approx(20.0, abs=1e-5)
+
+
+def test_a_cloned_context_has_poses_of_its_own():
+    stage = Stage()
+    stage.add("wall", Box(1.0, 9.0, 9.0), RigidTransform([20.5, 0.0, 0.0]))
+    stage.finish(X_PS=RigidTransform(), pattern=FORWARD, with_sweep=True)
+
+    def ahead_from(x):
+        sweep = Sweep(np.eye(3)[None], np.array([[x, 0.0, 0.0]]))
+        port = stage.lidar.GetInputPort("sweep")
+        port.FixValue(
+            stage.lidar.GetMyMutableContextFromRoot(stage.context), sweep
+        )
+        return ahead(stage.eval())
+
+    assert ahead_from(1.0) == pytest.approx(19.0, abs=1e-5)
+    original, stage.context = stage.context, stage.context.Clone()
+    assert ahead_from(3.0) == pytest.approx(17.0, abs=1e-5)
+    stage.context = original
+    assert ahead(stage.eval()) == pytest.approx(19.0, abs=1e-5)
+
+
+def test_only_perception_geometry_is_seen():
+    stage = Stage()
+    stage.add("wall", Box(1.0, 9.0, 9.0), RigidTransform([20.5, 0.0, 0.0]))
+    hidden = stage.add("hidden", Sphere(1.0), RigidTransform([5.0, 0.0, 0.0]))
+    stage.scene_graph.RemoveRole(stage.source, hidden, Role.kPerception)
+    stage.finish(X_PS=RigidTransform(), pattern=FORWARD)
+    assert ahead(stage.eval()) == pytest.approx(20.0, abs=1e-5)
+
+
+def test_shape_without_rays_is_named():
+    stage = Stage()
+    stage.add("city::endless_plane", HalfSpace())
+    stage.finish()
+    with pytest.raises(InputError, match=r"city::endless_plane.*HalfSpace"):
+        stage.eval()
+
+
+def test_world_without_geometry_is_refused():
+    stage = Stage().finish()
+    with pytest.raises(InputError, match="no perception geometry"):
+        stage.eval()
+
+
+def test_cns_pattern():
+    pattern = make_beam_pattern("cns", 0.05)
+    assert pattern.num_beams == 32 * 1024
+    d = pattern.d_Sset.reshape(1024, 32, 3)
+    np.testing.assert_allclose(np.linalg.norm(d, axis=2), 1.0, atol=1e-15)
+    elevation = np.rad2deg(np.arcsin(d[..., 2]))
+    np.testing.assert_allclose(
+        elevation, np.broadcast_to(np.linspace(22.5, -22.5, 32), (1024, 32))
+    )
+    # The turn starts at the rear and goes clockwise: left comes first.
+    np.testing.assert_allclose(d[0, 0, 1], 0.0, atol=1e-12)
+    assert d[0, 0, 0] < 0
+    assert d[256, 0, 1] > 0.9
+    assert pattern.t_ns[0] == 0
+    assert pattern.t_ns[-1] == round(1023 * 0.05e9 / 1024)
+    assert (np.diff(pattern.t_ns.astype(int)) >= 0).all()
+
+
+@pytest.mark.parametrize("preset", LIDAR_PRESETS)
+def test_presets_make_usable_patterns(preset):
+    pattern = make_beam_pattern(preset, 0.05)
+    rings = {"cns": 32, "os1-32": 32, "os1-64": 64, "os1-128": 128}
+    rings |= {"vlp-16": 16, "hdl-64e": 64}
+    assert pattern.num_rings == rings[preset]
+    assert (np.diff(pattern.elevations_rad) < 0).all()
+    assert len(pattern.d_Sset) == len(pattern.ring) == len(pattern.t_ns)
+
+
+def test_point_layout_is_that_of_a_c_struct():
+    offsets = [POINT_DTYPE.fields[n][1] for n in POINT_DTYPE.names]
+    assert offsets == [0, 4, 8, 12, 16, 20, 24, 26]
+    assert POINT_DTYPE.itemsize == 28
+
+
+def test_resolution_rounds_coordinates_and_intensity():
+    rng = np.random.default_rng(7)
+    exact, rounded = (Stage() for _ in range(2))
+    for stage in (exact, rounded):
+        stage.add("room::ball", Sphere(6.0), RigidTransform([9.0, 1.0, 2.0]))
+        stage.add("room::floor", Box(200, 200, 0.2))
+    step = 2.0 ** -int(rng.integers(8, 11))
+    exact = exact.finish().eval()
+    rounded = rounded.finish(
+        measurement=MeasurementModel(resolution=step)
+    ).eval()
+    steps = positions(rounded) / step
+    np.testing.assert_array_equal(steps, np.rint(steps))
+    error = np.abs(positions(rounded) - positions(exact))
+    assert 0.4 * step < error.max() <= 0.5 * step + 1e-5
+    error = np.abs(rounded["intensity"] - exact["intensity"])
+    assert 0 < error.max() <= 2.0**-13 + 1e-7
+    for name in ("ring", "t", "label", "instance"):
+        np.testing.assert_array_equal(rounded[name], exact[name])
+
+
+def test_it_is_added_to_a_body_or_a_frame():
+    builder = DiagramBuilder()
+    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
+    body = plant.AddRigidBody(
+        "robot",
+        plant.AddModelInstance("robot"),
+        SpatialInertia.SolidBoxWithDensity(1000.0, 1.0, 1.0, 1.0),
+    )
+    mast = plant.AddFrame(
+        FixedOffsetFrame("mast", body, RigidTransform([1.0, 0.0, 0.0]))
+    )
+    plant.RegisterVisualGeometry(
+        plant.world_body(),
+        RigidTransform([8.0, 0.0, 0.0]),
+        Box(2.0, 4.0, 4.0),
+        "wall",
+        [1.0, 1.0, 1.0, 1.0],
+    )
+    plant.Finalize()
+    X_PS = RigidTransform([0.5, 0.0, 0.0])
+    lidars = [
+        add_lidar(builder, scene_graph, place, X_PS, pattern, name=name)
+        for place, pattern, name in (
+            (body, FORWARD, "on_body"),
+            (mast, FORWARD, "on_mast"),
+            (body, "vlp-16", "preset"),
+        )
+    ]
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    scans = [
+        lidar.GetOutputPort("scan").Eval(lidar.GetMyContextFromRoot(context))
+        for lidar in lidars
+    ]
+    assert [scan["x"].tolist() for scan in scans[:2]] == [[6.5], [5.5]]
+    assert lidars[2].pattern == make_beam_pattern("vlp-16", 0.05)
+    np.testing.assert_allclose(scans[2]["x"], 6.5, rtol=1e-6)

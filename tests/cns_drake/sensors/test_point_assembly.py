@@ -1,0 +1,46 @@
+"""Points from what beams measured, against numpy's arithmetic."""
+
+import numpy as np
+import pytest
+
+from cns_drake.sensors.beam_pattern import (
+    POINT_DTYPE,
+    make_beam_pattern,
+)
+from cns_drake.sensors.point_assembly import BeamTable, assemble_points
+
+
+@pytest.mark.parametrize("step", [0.0, 2.0**-10, 0.003])
+def test_points_are_what_numpy_makes_of_the_beams(step):
+    rng = np.random.default_rng(8)
+    pattern = make_beam_pattern("vlp-16", 0.05)
+    num = pattern.num_beams
+    table = BeamTable(
+        pattern.d_Sset.astype(np.float32),
+        pattern.ring,
+        pattern.t_ns,
+        rng.permutation(num),
+    )
+    beams = np.flatnonzero(rng.random(num) < 0.7)
+    ranges = rng.uniform(1.0, 90.0, len(beams)).astype(np.float32)
+    intensity = rng.random(len(beams), np.float32)
+    geometry = rng.integers(0, 9, num).astype(np.int32)
+    label = rng.integers(0, 255, 9).astype(np.uint8)
+    instance = rng.integers(0, 60_000, 9).astype(np.uint16)
+    scan = np.zeros(len(beams), POINT_DTYPE)
+    assemble_points(
+        scan, table, beams, ranges, intensity, geometry, label, instance,
+        np.float32(step),
+    )  # fmt: skip
+    expected = table.d_Sset[beams] * ranges[:, None]
+    assert expected.dtype == np.float32
+    if step:
+        expected = np.rint(expected / np.float32(step)) * np.float32(step)
+    for axis, name in enumerate("xyz"):
+        np.testing.assert_array_equal(scan[name], expected[:, axis])
+    met = geometry[table.place[beams]]
+    np.testing.assert_array_equal(scan["intensity"], intensity)
+    np.testing.assert_array_equal(scan["ring"], pattern.ring[beams])
+    np.testing.assert_array_equal(scan["t"], pattern.t_ns[beams])
+    np.testing.assert_array_equal(scan["label"], label[met])
+    np.testing.assert_array_equal(scan["instance"], instance[met])

@@ -1,0 +1,144 @@
+"""Runs that are killed, and what the next one makes of what they leave.
+
+The runs are real processes, forked from a server that has imported the
+simulator once. Each is killed when it has told of a random number of frames;
+it does not wait for that, so that the blow falls anywhere: while a world is
+loaded, frames are taken over, a chunk is compressed or files get their names.
+"""
+
+from concurrent.futures import ThreadPoolExecutor
+import contextlib
+import multiprocessing
+import os
+import signal
+
+from bag_recordings import contents
+from mcap.exceptions import McapError
+from mcap.reader import NonSeekingReader
+import numpy as np
+import pytest
+from tiny_drive import FRAMES, run_and_tell, tiny_scenario
+
+from evaluation.support.interrupts import INTERRUPTED
+
+pytestmark = pytest.mark.slow
+
+KILLS = 20
+KILLS_EACH = 5
+TOPICS = {"/lidar/points", "/imu/data", "/odometry", "/tf"}
+FRAMES_A_SECOND = 20
+
+
+class Runner:
+    """Starts runs of one scenario."""
+
+    def __init__(self, scenario):
+        self._scenario = scenario
+        self._context = multiprocessing.get_context("forkserver")
+        self._context.set_forkserver_preload(
+            ["cns_drake.simulation.simulation"]
+        )
+
+    def run(self, output, kill_signal=None, kill_frame=0):
+        """Runs to the end, or till so many frames are told and a kill.
+
+        Returns:
+            The last frame told, and whether the kill came before the end.
+        """
+        receiver, sender = self._context.Pipe(duplex=False)
+        process = self._context.Process(
+            target=run_and_tell, args=(self._scenario, output, sender)
+        )
+        process.start()
+        sender.close()
+        told = 0
+        with contextlib.suppress(EOFError):
+            while True:
+                told = receiver.recv()
+                if kill_signal is not None and told >= kill_frame:
+                    with contextlib.suppress(ProcessLookupError):
+                        os.kill(process.pid, kill_signal)
+                    kill_signal = None
+        process.join()
+        assert process.exitcode in (
+            0,
+            INTERRUPTED,
+            -signal.SIGKILL,
+            -signal.SIGTERM,
+        )
+        return told, process.exitcode != 0
+
+
+def readable_frames(folder):
+    """Counts complete frames with a reader that did not write them."""
+    topics = {}
+    for path in folder.glob("*.mcap*"):
+        with path.open("rb") as stream, contextlib.suppress(McapError):
+            reader = NonSeekingReader(stream)
+            for _, channel, message in reader.iter_messages(
+                log_time_order=False
+            ):
+                topics.setdefault(message.log_time, set()).add(channel.topic)
+    stamps = sorted(stamp for stamp in topics if topics[stamp] >= TOPICS)
+    assert (np.diff(stamps) == 50_000_000).all()
+    return len(stamps)
+
+
+@pytest.fixture(scope="module")
+def runner(tmp_path_factory):
+    return Runner(tiny_scenario(tmp_path_factory.mktemp("tiny")))
+
+
+@pytest.fixture(scope="module")
+def uninterrupted(runner, tmp_path_factory):
+    output = tmp_path_factory.mktemp("uninterrupted")
+    assert runner.run(output) == (FRAMES, False)
+    return contents(output / "tiny_01")
+
+
+def kill_often(runner, output, seed, uninterrupted):
+    """Kills runs of one recording after the other, then lets the last end.
+
+    Returns:
+        The most frames that a kill lost.
+    """
+    rng = np.random.default_rng(seed)
+    kills = recordings = most_lost = 0
+    while True:
+        folder = output / str(recordings) / "tiny_01"
+        readable, killed = 0, True
+        while killed:
+            kill_signal = None
+            if kills < KILLS_EACH:
+                kill_signal = (signal.SIGKILL, signal.SIGTERM)[rng.integers(2)]
+            told, killed = runner.run(
+                folder.parent, kill_signal, rng.integers(FRAMES + 1)
+            )
+            kills += killed
+            # A kill may come when all is done but the end of the process.
+            killed = not (folder / "metadata.yaml").exists()
+            if killed:
+                recorded = max(told, readable)
+                readable = readable_frames(folder)
+                most_lost = max(most_lost, recorded - readable)
+        assert contents(folder) == uninterrupted
+        recordings += 1
+        if kills == KILLS_EACH:
+            return most_lost
+
+
+def test_twenty_kills_lose_a_second_at_most_and_change_no_byte(
+    runner, uninterrupted, tmp_path
+):
+    with ThreadPoolExecutor(2) as pool:
+        most_lost = list(
+            pool.map(
+                lambda k: kill_often(
+                    runner, tmp_path / str(k), k, uninterrupted
+                ),
+                range(KILLS // KILLS_EACH),
+            )
+        )
+    assert max(most_lost) <= FRAMES_A_SECOND
+    # If nothing was ever lost, the blows fell where nothing can be.
+    assert max(most_lost) > 0

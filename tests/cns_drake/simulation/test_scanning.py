@@ -1,0 +1,86 @@
+"""Single scans of worlds, and the files they are saved in."""
+
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw
+import pytest
+from small_map import box_visual, world_text
+
+from cns_drake.scene.world import load_world
+from cns_drake.sensors.beam_pattern import make_beam_pattern
+from cns_drake.simulation.scanning import save_scan, scan_world
+from evaluation.support.errors import InputError
+
+X_WS = RigidTransform(RollPitchYaw(0.05, -0.1, 2.0), [3.0, -2.0, 1.7])
+
+
+@pytest.fixture
+def scan(tmp_path):
+    path = tmp_path / "world.sdf"
+    path.write_text(
+        world_text(
+            [
+                box_visual("ground", (0, 0, -1, 0, 0, 0), (200, 200, 2)),
+                box_visual("wall", (0, 21, 5, 0, 0, 0), (60, 2, 10)),
+            ]
+        )
+    )
+    return scan_world(load_world(path), X_WS, make_beam_pattern("cns", 0.05))
+
+
+def test_points_lie_on_the_world(scan):
+    p_W = (X_WS @ np.stack([scan["x"], scan["y"], scan["z"]])).T
+    on_ground = np.abs(p_W[:, 2]) < 1e-4
+    on_wall = np.abs(p_W[:, 1] - 20.0) < 1e-4
+    assert (on_ground | on_wall).all()
+    assert on_ground.sum() > 5000
+    assert on_wall.sum() > 2000
+
+
+def expected(scan):
+    return np.stack([scan[n] for n in ("x", "y", "z", "intensity")], axis=1)
+
+
+def test_bin_is_kittis(scan, tmp_path):
+    save_scan(scan, tmp_path / "new" / "scan.bin")
+    read = np.fromfile(tmp_path / "new" / "scan.bin", "<f4").reshape(-1, 4)
+    np.testing.assert_array_equal(read, expected(scan))
+
+
+def test_npy(scan, tmp_path):
+    save_scan(scan, tmp_path / "scan.npy")
+    np.testing.assert_array_equal(
+        np.load(tmp_path / "scan.npy"), expected(scan)
+    )
+
+
+@pytest.mark.slow
+def test_pcd_is_read_by_open3d(scan, tmp_path):
+    import open3d
+
+    save_scan(scan, tmp_path / "scan.pcd")
+    cloud = open3d.t.io.read_point_cloud(str(tmp_path / "scan.pcd"))
+    np.testing.assert_array_equal(
+        cloud.point.positions.numpy(), expected(scan)[:, :3]
+    )
+    np.testing.assert_array_equal(
+        cloud.point.intensity.numpy().ravel(), scan["intensity"]
+    )
+
+
+def test_empty_scans_can_be_saved(scan, tmp_path):
+    for ending in ("bin", "npy", "pcd"):
+        save_scan(scan[:0], tmp_path / f"scan.{ending}")
+    assert (tmp_path / "scan.bin").stat().st_size == 0
+    assert np.load(tmp_path / "scan.npy").shape == (0, 4)
+
+
+def test_unknown_ending(scan, tmp_path):
+    with pytest.raises(InputError, match=r"scan\.txt: unknown ending '.txt'"):
+        save_scan(scan, tmp_path / "scan.txt")
+
+
+def test_nothing_is_left_where_it_cannot_be_written(scan, tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match=r"file"):
+        save_scan(scan, tmp_path / "file" / "scan.npy")
+    assert [path.name for path in tmp_path.glob("*scan*")] == []

@@ -1,0 +1,75 @@
+"""A drive simulated for the evaluation is the drive that is recorded."""
+
+import pickle
+
+import numpy as np
+import pytest
+from tiny_drive import FRAMES, tiny_scenario
+import yaml
+
+from cns_drake.scenarios.scenario import make_scenario
+from cns_drake.simulation.simulated_drive import SimulatedDrive
+from cns_drake.simulation.simulation import simulate
+from evaluation.sequences import open_sequence
+from evaluation.study.recording_survey import survey_recording
+from evaluation.support.errors import InputError
+
+
+def check_same(simulated, recorded, frames):
+    assert len(simulated) == len(recorded)
+    assert simulated.name == recorded.name
+    assert simulated.world_frame == recorded.world_frame
+    np.testing.assert_array_equal(simulated.stamps_ns, recorded.stamps_ns)
+    np.testing.assert_array_equal(simulated.X_WS, recorded.X_WS)
+    for frame in frames:
+        a, b = simulated.scan(frame), recorded.scan(frame)
+        for name in b.dtype.names:
+            np.testing.assert_array_equal(a[name], b[name])
+        assert len(a) > 0
+
+
+def test_scans_and_poses_are_those_of_a_recording(short_recording):
+    recorded = open_sequence(short_recording)
+    values = yaml.safe_load((short_recording / "scenario.yaml").read_text())
+    source = SimulatedDrive(make_scenario(values, "test"))
+    simulated = pickle.loads(pickle.dumps(source))()
+    check_same(simulated, recorded, [0, 1, 2, 17, 39])
+    keys = ("map", "stage", "route")
+    assert [simulated.scenario[k] for k in keys] == [
+        recorded.scenario[k] for k in keys
+    ]
+    # So are all maps that are made of them.
+    ours, theirs = (
+        survey_recording(s, set(), []) for s in (source(), recorded)
+    )
+    np.testing.assert_array_equal(ours.fine, theirs.fine)
+    np.testing.assert_array_equal(
+        ours.drive.coarse.centroids_W, theirs.drive.coarse.centroids_W
+    )
+
+
+def test_noise_and_motion_distortion_too(tmp_path):
+    """Also where a frame's noise depends on its number, in any order."""
+    scenario = tiny_scenario(tmp_path)
+    recorded = open_sequence(simulate(scenario, tmp_path / "out").folder)
+    simulated = SimulatedDrive(scenario)()
+    assert len(simulated) == FRAMES
+    check_same(simulated, recorded, [40, 0, 41, FRAMES - 1, 40])
+
+
+def test_identity_tells_scenarios_and_worlds_apart(tmp_path):
+    scenario = tiny_scenario(tmp_path)
+    source = SimulatedDrive(scenario)
+    other = SimulatedDrive(scenario.model_copy(update={"seed": 5}))
+    assert source.identity() == SimulatedDrive(scenario).identity()
+    assert source.identity() != other.identity()
+    before = source.identity()
+    sdf = tmp_path / "tiny.sdf"
+    sdf.write_text(sdf.read_text().replace("20 12 10", "20 12 11"))
+    assert source.identity() != before
+
+
+def test_too_many_frames_are_refused(tmp_path):
+    scenario = tiny_scenario(tmp_path, frames=100_000)
+    with pytest.raises(InputError, match="frames: 100000 asked for, but"):
+        SimulatedDrive(scenario)()

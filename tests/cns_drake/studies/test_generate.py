@@ -1,0 +1,215 @@
+"""`cns-drake generate`: what it skips, resumes, refuses and leaves behind."""
+
+import json
+import os
+from pathlib import Path
+import signal
+
+from bag_recordings import contents
+from generation import Generation
+from mcap.reader import make_reader
+import numpy as np
+import pytest
+from small_city import write_small_city
+import studies
+from tiny_drive import FRAMES, tiny_scenario, write_scenario
+import yaml
+
+from cns_drake.city.generation.generate import generate_city
+from cns_drake.scenarios.scenario import load_scenario
+from cns_drake.simulation.simulation import simulate
+from cns_drake.studies.recording_jobs import is_recorded, record_all
+from evaluation.change.drive_change import compare, survey
+from evaluation.jobs.cluster import Cluster
+from evaluation.sequences import open_sequence
+from evaluation.study import trend_points
+from evaluation.support.errors import InputError
+
+pytestmark = pytest.mark.slow
+
+LONG = 300
+ONE = Cluster(num_workers=1)
+
+
+@pytest.fixture(scope="module")
+def scenarios(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("scenarios")
+    return [
+        tiny_scenario(folder, name="short"),
+        tiny_scenario(folder, name="long", frames=LONG),
+    ]
+
+
+@pytest.fixture(scope="module")
+def files(scenarios, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("files")
+    return [write_scenario(scenario, folder) for scenario in scenarios]
+
+
+def test_interrupted_killed_and_run_again(scenarios, files, tmp_path):
+    # Ctrl-C reaches every process of the terminal.
+    output = tmp_path / "output"
+    run = Generation(files, output, "--jobs", "2")
+    run.wait_for("left; ")
+    os.killpg(run.process.pid, signal.SIGINT)
+    status, results = run.end()
+    assert (status, results) == (130, [])
+    assert run.told[-1] == "interrupted\n"
+    assert not [line for line in run.told if "Traceback" in line]
+    assert not (output / "long" / "metadata.yaml").exists()
+
+    # A parent that is killed cannot end its processes; they do so themselves.
+    run = Generation(files, output, "--jobs", "2")
+    run.wait_for("left; ")
+    run.process.kill()
+    status, _ = run.end()
+    assert status == -signal.SIGKILL
+    assert not [line for line in run.told if "Traceback" in line]
+
+    run = Generation(files, output, "--jobs", "2")
+    status, results = run.end()
+    assert status == 0, run.told
+    assert results == [str(output / "short"), str(output / "long")]
+    for scenario in scenarios:
+        folder = simulate(scenario, tmp_path / "whole").folder
+        assert contents(output / scenario.name) == contents(folder)
+
+
+def test_what_is_finished_and_what_is_another(scenarios, tmp_path, capsys):
+    short, _ = scenarios
+    folder = simulate(short, tmp_path).folder
+    before = contents(folder)
+    record_all([short], tmp_path, ONE, overwrite=False)
+    assert "short: finished already" in capsys.readouterr().err
+    for other in (
+        short.model_copy(update={"frames": FRAMES - 1}),
+        short.model_copy(update={"frames": None}),
+        short.model_copy(update={"seed": 5}),
+    ):
+        assert not is_recorded(other, tmp_path)
+        with pytest.raises(
+            InputError, match=r"another scenario.*: short \(--overwrite"
+        ):
+            record_all([other], tmp_path, ONE, overwrite=False)
+    assert contents(folder) == before
+
+
+def test_a_recording_of_the_whole_drive_is_no_prefix_of_it(scenarios, tmp_path):
+    whole = scenarios[0].model_copy(update={"frames": None})
+    frames = simulate(whole, tmp_path).num_frames
+    assert is_recorded(whole, tmp_path)
+    assert is_recorded(whole.model_copy(update={"frames": frames}), tmp_path)
+
+
+@pytest.mark.parametrize("name", ["tiny.sdf", "tiny.csv"])
+def test_a_world_or_a_route_that_has_changed(tmp_path, name):
+    scenario = tiny_scenario(tmp_path, frames=3)
+    simulate(scenario, tmp_path / "output")
+    assert is_recorded(scenario, tmp_path / "output")
+    file = tmp_path / name
+    file.write_text(file.read_text() + "\n")
+    assert not is_recorded(scenario, tmp_path / "output")
+
+
+@pytest.mark.parametrize("damage", ["", "{", "a: 1", "- 1"])
+@pytest.mark.parametrize("name", ["metadata.yaml", "scenario.yaml"])
+def test_damaged_files_are_no_recording(tmp_path, name, damage):
+    scenario = tiny_scenario(tmp_path, frames=3)
+    folder = tmp_path / "output" / "tiny_01"
+    folder.mkdir(parents=True)
+    (folder / "tiny_01_0.mcap").touch()
+    (folder / "metadata.yaml").touch()
+    (folder / name).write_text(damage)
+    assert not is_recorded(scenario, tmp_path / "output")
+
+
+def test_two_sequences_of_one_name(scenarios, tmp_path):
+    with pytest.raises(InputError, match="short: 2 sequences"):
+        record_all([scenarios[0]] * 2, tmp_path, ONE)
+
+
+def test_what_it_was_made_of_is_in_the_file(tmp_path):
+    scenario = tiny_scenario(tmp_path, frames=2)
+    folder = simulate(scenario, tmp_path / "output").folder
+    with (folder / "tiny_01_0.mcap").open("rb") as stream:
+        attachments = {
+            attachment.name: json.loads(attachment.data)
+            for attachment in make_reader(stream).iter_attachments()
+        }
+    assert attachments["scenario.json"]["name"] == "tiny_01"
+    versions = attachments["provenance.json"]["versions"]
+    assert {"cns-drake", "python", "drake", "numpy", "mcap"} <= versions.keys()
+    inputs = attachments["provenance.json"]["inputs_sha256"]
+    assert inputs.keys() == {"world", "vehicle", "waypoints"}
+    names = [entry["name"] for entry in attachments["structures.json"]]
+    assert names == ["ground", "hall"]
+
+
+@pytest.fixture(scope="module")
+def town(tmp_path_factory):
+    """Folder of a generated town, with a drive through each of its stages."""
+    folder = write_small_city(tmp_path_factory.mktemp("maps") / "town")
+    generate_city(folder)
+    for stage in ("01", "02"):
+        drive = {
+            "map": ".",
+            "stage": stage,
+            "route": [
+                {"road": name, "direction": "forward", "lane": 1}
+                for name in ("north", "south")
+            ],
+            "speeds": {"cruise": 14.0, "longitudinal_acceleration": 8.0},
+            "lidars": {"lidar": {"columns": 128}},
+            "frames": FRAMES,
+        }
+        (folder / f"sequence_{stage}.yaml").write_text(yaml.safe_dump(drive))
+    return folder
+
+
+def test_families_on_other_cities_share_them(town, tmp_path, monkeypatch):
+    output = tmp_path / "output"
+
+    def generate(stage, **values):
+        family = tmp_path / f"family_{stage}.yaml"
+        base = {"base": str(town / f"sequence_{stage}.yaml")}
+        family.write_text(yaml.safe_dump(base | values))
+        run = Generation([], output, "--vary", family, "--jobs", "2")
+        status, results = run.end()
+        assert status == 0, run.told
+        return [Path(result) for result in results], "".join(run.told)
+
+    databases, told = generate("01", city_seeds=[7], missing=[0.0, 0.6])
+    names = [path.name for path in databases]
+    assert names == ["town_01_c7_m000_s0", "town_01_c7_m600_s0"]
+    assert "city town_c7: done" in told
+    stage = output / "cities" / "town_c7" / "stage_02.sdf"
+    drawn = stage.stat()
+
+    (other, query), told = generate("02", city_seeds=[8, 7])
+    assert query == output / "town_02_c7_m000_s0"
+    assert "city town_c8: done" in told
+    assert "city town_c7" not in told
+    assert stage.stat() == drawn
+
+    # Other cities are other places.
+    with pytest.raises(InputError, match=r"through town_c8, .* town_c7"):
+        compare(survey(query), survey(other))
+    monkeypatch.setattr(
+        trend_points, "run_jobs", lambda jobs, cluster: studies.do(jobs)
+    )
+    trend = tmp_path / "trend"
+    points = trend_points.measure_trend(query, databases, trend, ONE)
+    changes = {p.database: p.tcr_sym for p in points}
+    assert changes[names[0]] == 0.0  # The very same drive.
+    assert changes[names[1]] > 0.1
+
+    # Each member stands on its own, also at another place.
+    moved = tmp_path / "moved"
+    output.rename(moved)
+    member = load_scenario(moved / "scenarios" / f"{names[1]}.yaml")
+    assert is_recorded(member.model_copy(update={"frames": FRAMES}), moved)
+    again = open_sequence(simulate(member, tmp_path).folder)
+    before = open_sequence(moved / names[1])
+    assert len(again) == len(before) == FRAMES
+    for scan, scan_before in zip(again, before, strict=True):
+        np.testing.assert_array_equal(scan, scan_before)

@@ -1,0 +1,181 @@
+"""`cns-drake reproduce`: one graph of jobs from recordings to figures."""
+
+import csv
+
+import pytest
+from small_map import scenario_values, write_small_map
+import yaml
+
+from cns_drake.scenarios.scenario import load_scenario
+from cns_drake.simulation.simulated_drive import SimulatedDrive
+from cns_drake.simulation.simulation import simulate
+from cns_drake.studies import reproduction
+from cns_drake.studies.reproduction import (
+    control_drives,
+    recording_info,
+)
+from evaluation.jobs.cluster import Cluster
+from evaluation.study.collection import find_recordings, group_cities
+from evaluation.support.errors import InputError
+
+pytestmark = pytest.mark.slow
+
+
+def write_town(folder, routes, frames):
+    """Writes a map with a sequence for each stage, on a given route."""
+    write_small_map(folder)
+    for stage, route in routes.items():
+        values = scenario_values(folder, route) | {
+            "map": ".",
+            "stage": stage,
+            "frames": frames,
+            "lidars": {"lidar": {"columns": 16}},
+        }
+        del values["name"]
+        file = folder / f"sequence_{stage}.yaml"
+        file.write_text(yaml.safe_dump(values))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def town(tmp_path_factory):
+    """Folder of a map with two sequences of a few frames."""
+    routes = {"01": "metropolis_01", "04": "metropolis_04"}
+    return write_town(tmp_path_factory.mktemp("maps") / "town", routes, 3)
+
+
+@pytest.fixture(scope="module")
+def sequences(town):
+    return [load_scenario(town / f"sequence_{k}.yaml") for k in ("01", "04")]
+
+
+@pytest.fixture
+def planned(monkeypatch):
+    """The jobs and recordings of runs; none of them is done."""
+    runs = []
+    monkeypatch.setattr(
+        reproduction,
+        "run_jobs",
+        lambda jobs, cluster: runs.append({job.name: job for job in jobs}),
+    )
+
+    def assemble(recordings, output, pages):
+        runs[-1]["recordings"] = {one.name: one for one in recordings}
+        runs[-1]["pages"] = pages
+        return output / "report.md"
+
+    monkeypatch.setattr(reproduction, "assemble", assemble)
+    return runs
+
+
+def test_what_is_known_before_is_what_is_found_after(sequences, tmp_path):
+    scenarios = [*sequences, *control_drives(sequences)]
+    for scenario in scenarios:
+        simulate(scenario, tmp_path)
+    expected = [recording_info(one, tmp_path, False) for one in scenarios]
+    found = {one.name: one for one in find_recordings(tmp_path)}
+    assert found.keys() == {one.name for one in expected}
+    for one in expected:
+        other = found[one.name]
+        assert (one.path, one.map_name, one.stage, one.needs) == (
+            other.path,
+            other.map_name,
+            other.stage,
+            other.needs,
+        )
+        assert one.source == other.source
+    for recordings in (expected, found.values()):
+        (city,) = group_cities(recordings)
+        (pair,) = city.change_pairs()
+        assert [one.name for one in pair] == ["town_01", "town_04"]
+        assert city.control(*pair).name == "town_01_stage_04"
+
+
+def test_everything_is_planned_before_anything_runs(
+    town, sequences, planned, tmp_path, capsys
+):
+    cluster = Cluster(3)
+    arguments = ([str(town)], tmp_path, cluster)
+    path = reproduction.reproduce_maps(*arguments)
+    assert path == tmp_path / "report" / "report.md"
+    (jobs,) = planned
+    recordings = jobs.pop("recordings")
+    assert jobs.pop("pages") == {}
+    names = {"town_01", "town_04", "town_01_stage_04"}
+    assert recordings.keys() == names
+    for name in names:
+        assert jobs[name].needs == ()
+        assert jobs[f"survey {name}"].needs == (name,)
+    assert "picture town drives" in jobs
+    assert "town 01 > 04, solid" in jobs
+    for job in jobs.values():
+        assert jobs.keys() >= set(job.needs)
+    # Each writes a place of its own, which workers anywhere find.
+    outputs = [job.output for job in jobs.values()]
+    assert len(set(outputs)) == len(outputs)
+    assert all(output.is_absolute() for output in outputs)
+    # What is recorded is not recorded again; sequences want their pages.
+    for scenario in (*sequences, *control_drives(sequences)):
+        simulate(scenario, tmp_path)
+    (tmp_path / "pages").mkdir()
+    (tmp_path / "pages" / "town_01.html").touch()
+    reproduction.reproduce_maps(*arguments)
+    assert names & planned[1].keys() == {"town_04"}
+    assert planned[1]["pages"] == {"town_01": "../pages/town_01.html"}
+    assert planned[1]["survey town_04"].needs == ("town_04",)
+    assert planned[1]["survey town_01"].needs == ()
+    reproduction.reproduce_maps(*arguments, with_pages=False)
+    assert names & planned[2].keys() == set()
+    assert "town_04: finished already" in capsys.readouterr().err
+
+
+def test_a_world_is_no_stage(tmp_path):
+    folder = write_small_map(tmp_path / "town")
+    world = {
+        "world": "stage_04.sdf",
+        "waypoints": "way.csv",
+        "speeds": {
+            "cruise": 6.0,
+            "longitudinal_acceleration": 1.5,
+            "lateral_acceleration": 2.0,
+        },
+    }
+    (folder / "way.csv").write_text("x,y\n0,0\n9,0\n")
+    (folder / "sequence_04.yaml").write_text(yaml.safe_dump(world))
+    with pytest.raises(InputError, match=r"sequence_04.yaml: map: needed"):
+        reproduction.reproduce_maps([str(folder)], tmp_path, Cluster())
+
+
+def test_quick_gives_the_same_tables(tmp_path):
+    """But the column of controls, from simulation alone."""
+    routes = {"01": "metropolis_04", "04": "metropolis_04"}
+    town = write_town(tmp_path / "town", routes, 60)
+    cluster = Cluster(2)
+    quick = reproduction.reproduce_maps(
+        [str(town)], tmp_path / "quick", cluster, quick=True
+    )
+    assert {path.name for path in (tmp_path / "quick").iterdir()} == {"report"}
+    full = reproduction.reproduce_maps(
+        [str(town)], tmp_path / "full", cluster, with_pages=False
+    )
+    assert (tmp_path / "full" / "town_01_stage_04" / "metadata.yaml").is_file()
+    name = "place_recognition.csv"
+    assert (quick.parent / name).read_text() == (full.parent / name).read_text()
+    ours, theirs = (_rows(path.parent / "tcr.csv") for path in (quick, full))
+    assert [r["TCR_sym"] for r in ours] == [r["TCR_sym"] for r in theirs]
+
+
+def test_quick_reads_what_is_recorded(town, sequences, planned, tmp_path):
+    simulate(sequences[0], tmp_path)
+    reproduction.reproduce_maps([str(town)], tmp_path, Cluster(), quick=True)
+    (jobs,) = planned
+    recordings = jobs.pop("recordings")
+    assert recordings.keys() == {"town_01", "town_04"}
+    assert recordings["town_01"].made_by is None
+    assert recordings["town_04"].made_by == SimulatedDrive(sequences[1])
+    assert not {"town_01", "town_04"} & jobs.keys()
+
+
+def _rows(path):
+    with open(path, newline="") as stream:
+        return list(csv.DictReader(stream))

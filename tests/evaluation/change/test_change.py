@@ -1,0 +1,164 @@
+from drive_files import make_scan, write_recording, yaw_pose
+import numpy as np
+import pytest
+
+from evaluation.change.drive_change import compare, survey
+from evaluation.support.errors import InputError
+
+
+def make_town(blocks):
+    """Returns the points of a street with some of its blocks, in the world."""
+    rng = np.random.default_rng(12)
+    ground = rng.uniform([-60, -60], [160, 60], (9000, 2))
+    parts = [np.c_[ground, np.zeros(9000)]]
+    for block in range(8):
+        corner = [-50.0 + 25.0 * block, 20.0 if block % 2 else -35.0, 0.0]
+        box = rng.uniform(size=(900, 3)) * [15.0, 15.0, 25.0] + corner
+        if block in blocks:
+            parts.append(box)
+    return np.concatenate(parts)
+
+
+TOWN = {"early": make_town({0, 2, 3, 6, 7}), "late": make_town(range(8))}
+ROUTE = {"south": -4.0, "north": 4.0}
+
+
+def drive(folder, stage, route, reach=70.0, **options):
+    """Records a drive along a straight route, seeing up to `reach`."""
+    scans, X_WBs = [], []
+    for x in np.arange(0.0, 100.0, 10.0):
+        X_WB = yaw_pose(x, ROUTE[route], 0.0, 0.1)
+        p = (TOWN[stage] - X_WB[:3, 3]) @ X_WB[:3, :3]
+        p = p[np.linalg.norm(p, axis=1) < reach]
+        scans.append(make_scan(p - [0.0, 0.0, 1.6]))
+        X_WBs.append(X_WB)
+    write_recording(folder, scans, X_WBs, **options)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def drives(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("drives")
+    return {
+        (stage, route): survey(drive(folder / f"{stage}_{route}", stage, route))
+        for stage in TOWN
+        for route in ROUTE
+    }
+
+
+def test_a_recording_maps_like_its_points(tmp_path, drives):
+    np.save(tmp_path / "late.npy", TOWN["late"])
+    from_file = survey(tmp_path / "late.npy")
+    assert from_file.name == "late.npy"
+    assert from_file.sequence is None
+    recorded = drives["late", "south"].voxels
+    # The drive sees whole only what is near; that must agree.
+    near = np.abs(from_file.voxels.centroids_W[:, 0] - 50.0) < 30.0
+    near &= np.abs(from_file.voxels.centroids_W[:, 1]) < 25.0
+    expected = {tuple(i) for i in from_file.voxels.indices[near]}
+    assert len(expected) > 100
+    assert expected <= {tuple(i) for i in recorded.indices}
+
+
+def test_what_is_built_shows_and_routes_alone_do_not(drives):
+    report = compare(drives["early", "south"], drives["late", "north"])
+    assert report.change.symmetric > 0.03
+    same_stage = compare(drives["late", "south"], drives["late", "north"])
+    assert same_stage.change.symmetric < 0.01
+
+
+@pytest.mark.parametrize(
+    ("control", "partner"),
+    [
+        # A's route in B's stage, then B's route in A's stage.
+        (("late", "south"), ("late", "north")),
+        (("early", "north"), ("early", "south")),
+    ],
+)
+def test_control_is_compared_within_its_stage(drives, control, partner):
+    a, b = drives["early", "south"], drives["late", "north"]
+    report = compare(a, b, drives[control])
+    expected = compare(drives[control], drives[partner]).change.symmetric
+    assert report.control.symmetric == expected
+    assert report.control_names == ("_".join(control), "_".join(partner))
+    values = report.to_json()
+    assert values["control"]["tcr_sym"] == expected
+    assert values["control"]["between"] == list(report.control_names)
+
+
+def test_mask_keeps_what_both_drives_passed(drives):
+    report = compare(drives["early", "south"], drives["late", "north"])
+    values = report.to_json()
+    masked = values["coverage_masked"]
+    assert masked["radius"] == 40.0
+    assert 0 < masked["in_hull"] < values["in_hull"]
+    assert masked["tcr_sym"] == pytest.approx(
+        1.0 - masked["unchanged"] / masked["in_hull"]
+    )
+
+
+def test_json_adds_up(drives):
+    values = compare(
+        drives["early", "south"], drives["late", "north"]
+    ).to_json()
+    for total, parts in (
+        ("in_hull", "in_hull_of"),
+        ("unchanged", "unchanged_of"),
+    ):
+        assert values[total] == sum(values[parts].values())
+    assert values["tcr_sym"] == 1.0 - values["unchanged"] / values["in_hull"]
+    assert values["tcr_source_to_target"] == (
+        1.0 - values["unchanged_of"]["source"] / values["in_hull_of"]["source"]
+    )
+    assert (values["source"], values["target"]) == ("early_south", "late_north")
+
+
+def test_map_files_have_no_coverage_and_no_control(tmp_path, drives):
+    for stage, points in TOWN.items():
+        np.save(tmp_path / f"{stage}.npy", points)
+    early, late = (survey(tmp_path / f"{stage}.npy") for stage in TOWN)
+    values = compare(early, late).to_json()
+    assert values["tcr_sym"] > 0.03
+    assert values["coverage_masked"] is None
+    with pytest.raises(InputError, match="not map files"):
+        compare(early, late, drives["late", "south"])
+
+
+def test_control_on_a_third_route(tmp_path, drives):
+    other = drive(tmp_path / "other", "late", "south", reach=50.0)
+    shifted = survey(other)
+    # The same drive, but 3 m aside.
+    aside = type(shifted)(
+        shifted.name,
+        shifted.voxels,
+        shifted.positions + np.array([0.0, 3.0, 0.0]),
+        shifted.sequence,
+    )
+    a, b = drives["early", "south"], drives["late", "north"]
+    compare(a, b, shifted)
+    with pytest.raises(InputError, match=r"other: .* neither route: 3\.0 m"):
+        compare(a, b, aside)
+
+
+def test_disjoint_maps_are_undefined_with_a_reason(tmp_path):
+    np.save(tmp_path / "a.npy", TOWN["late"])
+    np.save(tmp_path / "b.npy", TOWN["late"] + np.array([5000.0, 0.0, 0.0]))
+    values = compare(
+        survey(tmp_path / "a.npy"), survey(tmp_path / "b.npy")
+    ).to_json()
+    assert values["tcr_sym"] is None
+    assert values["tcr_source_to_target"] is None
+    assert "no point of either map" in values["reason"]
+
+
+def test_points_that_are_not_finite_are_counted(tmp_path):
+    points = TOWN["late"].copy()
+    points[[5, 900], 1] = np.nan, np.inf
+    np.save(tmp_path / "a.npy", points)
+    assert survey(tmp_path / "a.npy").voxels.num_ignored == 2
+
+
+def test_other_worlds_are_refused(tmp_path, drives):
+    other = survey(drive(tmp_path / "utm", "late", "south", world_frame="utm"))
+    with pytest.raises(InputError, match="frame 'utm'"):
+        compare(drives["early", "south"], other)

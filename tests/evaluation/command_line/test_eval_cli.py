@@ -1,0 +1,210 @@
+import csv
+import json
+import subprocess
+import sys
+
+from eval_program import assert_refused, run
+import numpy as np
+import pytest
+
+
+def test_tcr_json(capsys, towns):
+    status, out, err = run(
+        capsys, "tcr", towns / "town_01", towns / "town_02", "--json"
+    )
+    values = json.loads(out)
+    assert status == 0
+    assert err == ""
+    assert {
+        "tcr_sym",
+        "tcr_source_to_target",
+        "tcr_target_to_source",
+        "in_hull",
+        "unchanged",
+    } <= values.keys()
+    assert 0.0 <= values["tcr_sym"] < 0.05
+    assert values["in_hull"] > 100
+
+
+def test_tcr_of_itself_by_any_path(capsys, towns):
+    for path in (
+        towns / "town_01",
+        towns / "town_01" / "town_01_0.mcap",
+        towns / "town_01.npy",
+    ):
+        _, out, _ = run(capsys, "tcr", path, path, "--json")
+        assert json.loads(out)["tcr_sym"] == 0.0
+
+
+def test_tcr_table(capsys, towns):
+    a, b = towns / "town_01", towns / "town_02"
+    status, out, _ = run(capsys, "tcr", a, b, "--control", a)
+    assert status == 0
+    for text in (
+        "town_01 <-> town_02",
+        "TCR_sym ",
+        "TCR town_02 -> town_01",
+        "where both drove",
+        "routes alone",
+    ):
+        assert text in out
+
+
+def test_tcr_undefined_is_null_with_a_reason(capsys, towns, tmp_path):
+    np.save(tmp_path / "empty.npy", np.empty((0, 3)))
+    arguments = ("tcr", towns / "town_01.npy", tmp_path / "empty.npy")
+    status, out, _ = run(capsys, *arguments, "--json")
+    assert status == 0
+    values = json.loads(out)
+    assert values["tcr_sym"] is None
+    assert values["reason"]
+    status, out, _ = run(capsys, *arguments)
+    assert status == 0
+    assert "undefined" in out
+
+
+def test_tcr_tells_of_points_that_are_not_finite(capsys, towns, tmp_path):
+    points = np.load(towns / "town_01.npy")
+    points[3] = np.nan
+    np.save(tmp_path / "a.npy", points)
+    status, _, err = run(capsys, "tcr", tmp_path / "a.npy", tmp_path / "a.npy")
+    assert status == 0
+    assert "a.npy: 1 points not finite" in err
+
+
+def test_pr_json(capsys, towns):
+    status, out, err = run(
+        capsys,
+        "pr",
+        towns / "town_01",
+        towns / "town_02",
+        "--method",
+        "scan-context++",
+        "--json",
+    )
+    assert status == 0
+    assert err == ""
+    values = json.loads(out)
+    assert {
+        "method",
+        "mode",
+        "auc",
+        "recall_at_1",
+        "recall_at_n",
+        "f1_max",
+        "queries",
+        "queries_with_match",
+        "true_positives",
+    } <= values.keys()
+    assert values["method"] == "scan-context++"
+    assert values["mode"] == "all"
+    # Every scene is another; the side step of 1 m hides none of them.
+    assert values["recall_at_1"] == values["auc"] == 1.0
+    assert values["true_positives"] == values["queries"] == 8
+
+
+def test_pr_table_modes_and_parameters(capsys, towns):
+    arguments = (
+        "pr",
+        towns / "town_01",
+        towns / "town_02",
+        "--method",
+        "scan-context++",
+        "--mode",
+        "filtered",
+        "--set",
+        "variant=polar",
+        "--set",
+        "candidates=3",
+        "--sensor-height",
+        "1.8",
+    )
+    status, out, _ = run(capsys, *arguments)
+    assert status == 0
+    for text in ("filtered", "R@1 ", "TP 8 of N 8", "AUC", "F1max", "R@1%"):
+        assert text in out
+    _, out, _ = run(capsys, *arguments, "--json")
+    parameters = json.loads(out)["parameters"]
+    assert parameters["variant"] == "polar"
+    assert parameters["candidates"] == 3
+    assert parameters["sensor_height"] == 1.8
+
+
+def test_scores_of_all_pairs(capsys, towns, tmp_path):
+    output = tmp_path / "scores.csv"
+    status, out, err = run(
+        capsys,
+        "scores",
+        "--method",
+        "scan-context++",
+        "--database",
+        towns / "town_01_scans",
+        "--query",
+        towns / "town_02_scans",
+        "--output",
+        output,
+    )
+    assert (status, out) == (0, "")
+    assert str(output) in err
+    with output.open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    names = [f"{i:06d}" for i in range(4)]
+    assert [(r["query"], r["database"]) for r in rows] == [
+        (q, d) for q in names for d in names
+    ]
+    scores = np.array([float(r["score"]) for r in rows]).reshape(4, 4)
+    assert scores.argmax(axis=1).tolist() == [0, 1, 2, 3]
+    assert not list(tmp_path.glob("*.part"))
+
+
+@pytest.mark.slow
+def test_help_is_instant_and_modules_stay_apart():
+    # A time is no test; what is imported is.
+    code = (
+        "import sys; sys.argv = ['cns-eval', '--help']\n"
+        "from evaluation.command_line import cli\n"
+        "try: cli.main()\n"
+        "except SystemExit as e: assert not e.code, e.code\n"
+        "heavy = {'numpy', 'scipy', 'numba', 'matplotlib', 'mcap', 'rosbags',"
+        " 'pydrake', 'cns_drake', 'open3d'}\n"
+        "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    for command in ("tcr", "pr", "scores", "report"):
+        assert command in done.stdout
+
+
+@pytest.mark.slow
+def test_nothing_imports_the_simulator():
+    code = (
+        "import pkgutil, importlib, sys, evaluation\n"
+        "for m in pkgutil.walk_packages(evaluation.__path__, 'evaluation.'):\n"
+        "    if not m.name.endswith('__main__'):\n"
+        "        importlib.import_module(m.name)\n"
+        "assert not {'pydrake', 'cns_drake', 'open3d'} & set(sys.modules)\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.slow
+def test_the_module_is_the_program(towns):
+    done = subprocess.run(
+        [sys.executable, "-m", "evaluation", "tcr", "nowhere", "nowhere"],
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 2
+    assert done.stderr == ("cns-eval: error: nowhere: no such file or folder\n")
+
+
+def test_parameters_of_several_numbers(capsys, towns):
+    both = ["pr", towns / "town_01", towns / "town_02", "--json"]
+    both += ["--method", "scan-context++", "--set", "variant=cart"]
+    status, out, _ = run(capsys, *both, "--set", "cart_cell=10,4")
+    assert status == 0
+    assert json.loads(out)["parameters"]["cart_cell"] == [10.0, 4.0]
+    for value in ("10", "10,4,2", "10,x", ","):
+        assert_refused(capsys, [*both, "--set", f"cart_cell={value}"], "cart")

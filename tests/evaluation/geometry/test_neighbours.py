@@ -1,0 +1,110 @@
+import numpy as np
+import pytest
+
+from evaluation.geometry.neighbours import _select, nearest_neighbours
+
+
+def rings(seed):
+    """Returns what a LiDAR sees of uneven ground: dense near by, (N, 3)."""
+    rng = np.random.default_rng([seed, 3])
+    r = np.repeat(3.0 * 1.25 ** np.arange(14), 150)
+    a = np.tile(np.linspace(0.0, 2.0 * np.pi, 150, endpoint=False), 14)
+    z = rng.normal(0.0, 0.02, len(r)) + 0.3 * np.sin(5.0 * a)
+    return np.stack([r * np.cos(a), r * np.sin(a), z], axis=1)
+
+
+def clusters(seed):
+    """Returns clumps of points of very different sizes, (N, 3)."""
+    rng = np.random.default_rng([seed, 4])
+    centres = rng.uniform(-50.0, 50.0, (25, 3))
+    sizes = 10.0 ** rng.uniform(-3.0, 1.0, 25)
+    counts = rng.integers(1, 90, 25)
+    return np.concatenate(
+        [
+            centre + size * rng.normal(size=(count, 3))
+            for centre, size, count in zip(centres, sizes, counts, strict=True)
+        ]
+    )
+
+
+def lattice(seed):
+    rng = np.random.default_rng([seed, 6])
+    steps = np.arange(9.0)
+    points = np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(-1, 3)
+    return rng.permutation(points)
+
+
+def line(seed):
+    rng = np.random.default_rng([seed, 8])
+    return np.outer(rng.uniform(-9.0, 9.0, 300), [0.0, 1.0, 0.0])
+
+
+def all_distances(points):
+    return np.linalg.norm(points[:, None] - points[None], axis=2)
+
+
+@pytest.mark.parametrize("make", [rings, clusters, lattice, line])
+@pytest.mark.parametrize("k", [1, 2, 30])
+def test_against_all_distances(make, k):
+    points = make(1)
+    neighbours = nearest_neighbours(points, k)
+    assert neighbours.shape == (len(points), k)
+    distances = all_distances(points)
+    expected = np.sort(distances, axis=1)[:, :k]
+    chosen = np.take_along_axis(distances, neighbours.astype(int), axis=1)
+    # Of equally far points any may be chosen, but none of them twice.
+    np.testing.assert_array_equal(np.sort(chosen, axis=1), expected)
+    ordered = np.sort(neighbours, axis=1)
+    assert (np.diff(ordered, axis=1) > 0).all()
+
+
+def test_a_point_is_its_own_neighbour():
+    points = clusters(2)
+    neighbours = nearest_neighbours(points, 5)
+    assert (neighbours == np.arange(len(points))[:, None]).any(axis=1).all()
+
+
+@pytest.mark.parametrize("number", [1, 2, 15, 16, 31, 32, 33, 64])
+def test_all_points_are_neighbours(number):
+    points = np.random.default_rng([number]).normal(size=(number, 3))
+    neighbours = np.sort(nearest_neighbours(points, number), axis=1)
+    np.testing.assert_array_equal(
+        neighbours, np.tile(np.arange(number), (number, 1))
+    )
+
+
+def test_points_in_one_place():
+    neighbours = nearest_neighbours(np.ones((500, 3)), 30)
+    assert (np.diff(np.sort(neighbours, axis=1), axis=1) > 0).all()
+
+
+def test_too_few_points():
+    with pytest.raises(ValueError, match="30 neighbours wanted of 29 points"):
+        nearest_neighbours(np.zeros((29, 3)), 30)
+
+
+def test_same_cloud_same_neighbours():
+    one, two = (nearest_neighbours(lattice(5), 30) for _ in range(2))
+    np.testing.assert_array_equal(one, two)
+
+
+@pytest.mark.parametrize("num_values", [1, 2, 5, 1000])
+def test_select(num_values):
+    rng = np.random.default_rng([num_values, 9])
+    for _ in range(200):
+        length = int(rng.integers(1, 60))
+        original = rng.integers(0, num_values, length).astype(np.float64)
+        start, stop = np.sort(rng.integers(0, length + 1, 2))
+        if start == stop:
+            continue
+        k = int(rng.integers(1, stop - start + 1))
+        keys, items = original.copy(), np.arange(length, dtype=np.int32)
+        _select(keys, items, start, stop, k)
+        np.testing.assert_array_equal(keys, original[items])
+        np.testing.assert_array_equal(np.sort(items), np.arange(length))
+        inside = np.sort(original[start:stop])
+        np.testing.assert_array_equal(
+            np.sort(keys[start : start + k]), inside[:k]
+        )
+        np.testing.assert_array_equal(keys[:start], original[:start])
+        np.testing.assert_array_equal(keys[stop:], original[stop:])

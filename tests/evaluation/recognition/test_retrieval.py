@@ -1,0 +1,176 @@
+from drive_files import make_scan, write_recording, yaw_pose
+import numpy as np
+import pytest
+
+from evaluation.methods import Method, MethodConfig, make_method
+from evaluation.recognition.place_recognition import run
+from evaluation.recognition.retrieval import retrieve
+from evaluation.sequences import open_sequence
+from evaluation.sequences.sampling import crop, gather, sample_frames
+from evaluation.support.errors import InputError
+
+
+def line(xs):
+    return np.array([[x, 0.0, 0.0] for x in xs])
+
+
+def test_frames_along_a_line():
+    positions = line(np.arange(0.0, 40.0, 2.0))
+    assert sample_frames(positions, 10.0).tolist() == [0, 5, 10, 15]
+    assert sample_frames(positions, 5.0).tolist() == [
+        0,
+        3,
+        5,
+        8,
+        10,
+        13,
+        15,
+        18,
+    ]
+
+
+def test_length_counts_along_the_path_not_across():
+    # Round a square of 10 m: the second time a corner is near, 40 m are
+    # behind.
+    corners = np.array([[0, 0, 0], [10, 0, 0], [10, 10, 0], [0, 10, 0]])
+    positions = np.concatenate([corners, corners]).astype(float)
+    assert sample_frames(positions, 20.0).tolist() == [0, 2, 4, 6]
+    # In three dimensions.
+    steep = np.array([[0, 0, 3.0 * i] for i in range(8)])
+    assert sample_frames(steep, 10.0).tolist() == [0, 4, 7]
+
+
+def test_standing_and_jumping():
+    positions = line([0.0, 0.0, 0.0, 9.0, 9.0, 35.0, 36.0, 41.0])
+    assert sample_frames(positions, 10.0).tolist() == [0, 5, 7]
+    assert sample_frames(positions[:1], 10.0).tolist() == [0]
+
+
+def test_crop_is_a_box_with_its_faces():
+    points = np.array(
+        [
+            [100.0, -100.0, 100.0],
+            [100.001, 0.0, 0.0],
+            [0.0, -100.001, 0.0],
+            [0.0, 0.0, 100.001],
+            [np.nan, 0.0, 0.0],
+            [1.0, 2.0, 3.0],
+        ]
+    )
+    np.testing.assert_array_equal(crop(points), points[[0, 5]])
+
+
+class OddOneOut(Method):
+    """Compares the mean of clouds; leaves the last place out."""
+
+    name = "odd"
+    Config = MethodConfig
+
+    def describe(self, points):
+        return points.mean(axis=0)
+
+    def build_database(self, places):
+        return np.array(places)
+
+    def score(self, query, database, *, exhaustive=False):
+        scores = -np.linalg.norm(database - query, axis=1)
+        if not exhaustive:
+            scores[-1] = np.nan
+        return scores
+
+
+def record_line(folder, xs, **options):
+    """Drives along x; the scan at x shows one point, x high."""
+    scans = [make_scan(np.array([[5.0, 0.0, float(x)]])) for x in xs]
+    X_WBs = [yaw_pose(x, 0.0, 0.0, 0.0) for x in xs]
+    return open_sequence(write_recording(folder, scans, X_WBs, **options))
+
+
+def test_retrieval_from_two_drives(tmp_path):
+    database = record_line(tmp_path / "a", np.arange(0.0, 31.0, 2.5))
+    query = record_line(tmp_path / "b", np.arange(3.0, 44.0, 5.0))
+    result = retrieve(database, query, OddOneOut())
+    assert result.database_frames.tolist() == [0, 2, 4, 6, 8, 10, 12]
+    assert result.query_frames.tolist() == [0, 2, 4, 6, 8]
+    places = np.arange(0.0, 31.0, 5.0)
+    queries = np.arange(3.0, 44.0, 10.0)
+    np.testing.assert_allclose(
+        result.distances, np.abs(queries[:, None] - places)
+    )
+    # The limit of 7.5 m: 33 m is 8 m from the last but one place.
+    assert result.matches.sum(axis=1).tolist() == [3, 3, 3, 1, 0]
+    np.testing.assert_allclose(
+        result.scores[:, :-1],
+        -np.abs(queries[:, None] - places[:-1]),
+        atol=1e-5,
+    )
+    assert np.isnan(result.scores[:, -1]).all()
+
+
+def test_match_radius_is_inclusive(tmp_path):
+    database = record_line(tmp_path / "a", [0.0])
+    for x, is_match in ((7.5, True), (7.5 + 1e-6, False)):
+        query = record_line(tmp_path / f"q{x}", [x])
+        result = retrieve(database, query, OddOneOut())
+        assert result.matches.tolist() == [[is_match]]
+
+
+def test_merged_scans_are_in_the_frame_of_the_first(tmp_path):
+    # A post at (20, 4, 1) in the world, seen from a turning car.
+    post = np.array([20.0, 4.0, 1.0])
+    X_WBs = [yaw_pose(2.0 * i, 0.5 * i, 0.0, 0.4 * i) for i in range(5)]
+    scans = [
+        make_scan(((post - X[:3, 3]) @ X[:3, :3])[None] - [[0.0, 0.0, 1.6]])
+        for X in X_WBs
+    ]
+    sequence = open_sequence(write_recording(tmp_path / "s", scans, X_WBs))
+    for frame, number in ((0, 1), (1, 3), (3, 2), (3, 9)):
+        cloud = gather(sequence, frame, number)
+        assert len(cloud) == min(number, 5 - frame)
+        expected = (post - X_WBs[frame][:3, 3]) @ X_WBs[frame][:3, :3]
+        expected -= [0.0, 0.0, 1.6]
+        np.testing.assert_allclose(
+            cloud, np.tile(expected, (len(cloud), 1)), atol=1e-5
+        )
+
+
+def test_metrics_of_a_pair(tmp_path):
+    database = record_line(tmp_path / "a", np.arange(0.0, 31.0, 2.5))
+    query = record_line(tmp_path / "b", np.arange(3.0, 44.0, 5.0))
+    result = run(database, query, OddOneOut())
+    values = result.to_json()
+    # Query at 43 m has no match, that at 33 m only the place left out.
+    assert values["queries"] == 5
+    assert values["queries_with_match"] == 4
+    assert values["true_positives"] == 3
+    assert values["recall_at_1"] == pytest.approx(3 / 4)
+    assert values["places"] == 7
+    assert (values["database"], values["query"]) == ("a", "b")
+    assert values["parameters"] == {"sensor_height": 1.6}
+    filtered = result.counting("filtered").to_json()
+    assert filtered["mode"] == "filtered"
+    assert filtered["f1_max"] == pytest.approx(2 * 0.75 / 1.75)
+    assert len(values["recall_at_n"]) == 25
+
+
+def test_database_far_from_every_query(tmp_path):
+    database = record_line(tmp_path / "a", [0.0, 5.0])
+    query = record_line(tmp_path / "b", [60.0, 70.0])
+    with pytest.raises(InputError, match=r"b: no query lies within 7.5 m .*55"):
+        run(database, query, OddOneOut())
+
+
+def test_a_drive_that_saw_nothing(tmp_path):
+    poses = [yaw_pose(20.0 * i, 0.0, 0.0, 0.0) for i in range(3)]
+    far = np.array([[300.0, 0.0, 0.0]])
+    write_recording(tmp_path / "blind", [make_scan(far)] * 3, poses)
+    blind = open_sequence(tmp_path / "blind")
+    with pytest.raises(InputError, match=r"blind: no finite point .* 3 scans"):
+        retrieve(blind, blind, make_method("solid", {}))
+
+
+def test_different_worlds(tmp_path):
+    database = record_line(tmp_path / "a", [0.0, 5.0])
+    query = record_line(tmp_path / "b", [0.0, 5.0], world_frame="utm")
+    with pytest.raises(InputError, match="frame 'utm'"):
+        retrieve(database, query, OddOneOut())

@@ -1,0 +1,111 @@
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from evaluation.report.findings import findings, paper_trend, trend
+
+MODES = ("all", "filtered")
+
+
+def metrics(auc):
+    return SimpleNamespace(auc=auc, recall_at_1=auc)
+
+
+def make_results(**aucs):
+    """Returns one result a method and pair; pairs are 01, 02, ... -> 09."""
+    return [
+        SimpleNamespace(
+            pair=("town", f"{i + 1:02d}", "09"),
+            method=method.replace("ring", "ring++"),
+            metrics={mode: metrics(value) for mode in MODES},
+        )
+        for method, values in aucs.items()
+        for i, value in enumerate(values)
+    ]
+
+
+def make_changes(values):
+    return [
+        SimpleNamespace(
+            map_name="town",
+            stages=(f"{i + 1:02d}", "09"),
+            report=SimpleNamespace(change=SimpleNamespace(symmetric=value)),
+        )
+        for i, value in enumerate(values)
+    ]
+
+
+def verdicts(results, changes):
+    return [one.verdict for one in findings(results, changes)]
+
+
+def test_all_as_in_the_paper():
+    changes = [0.30, 0.25, 0.20, 0.15, 0.10]
+    results = make_results(
+        ring=[0.6, 0.7, 0.8, 0.85, 0.9], btc=[0.50, 0.51, 0.49, 0.50, 0.51]
+    )
+    assert verdicts(results, make_changes(changes)) == ["holds"] * 4
+
+
+def test_none_as_in_the_paper():
+    changes = [0.10, 0.12, 0.15, 0.20, 0.25]
+    results = make_results(
+        ring=[0.30, 0.31, 0.32, 0.33, 0.34], btc=[0.9, 0.8, 0.7, 0.6, 0.5]
+    )
+    found = findings(results, make_changes(changes))
+    assert [one.verdict for one in found] == ["does not hold"] * 4
+    assert "0 of 5 by AUC (mode all)" in found[1].evidence
+    assert "BTC 5" in found[1].evidence
+    assert "RING++ +1.00" in found[2].evidence
+    assert "BTC -1.00" in found[2].evidence
+
+
+def test_in_part():
+    changes = [0.30, 0.25, 0.20, 0.15, 0.10]
+    results = make_results(
+        ring=[0.4, 0.7, 0.8, 0.85, 0.9],
+        solid=[0.10, 0.10, 0.11, 0.10, 0.10],
+        btc=[0.5, 0.3, 0.6, 0.2, 0.5],
+    )
+    assert verdicts(results, make_changes(changes)) == [
+        "holds",
+        *["holds in part"] * 3,
+    ]
+
+
+def test_too_few_pairs_are_said_to_be_too_few():
+    results = make_results(ring=[0.6], btc=[0.5])
+    found = findings(results, make_changes([0.1]))
+    assert [one.verdict for one in found] == [
+        "does not hold",
+        "holds",
+        "cannot be judged",
+        "cannot be judged",
+    ]
+    assert "1 pair of drives" in found[-1].evidence
+
+
+def test_nothing_is_said_of_what_is_not_there():
+    assert findings([], []) == []
+    assert verdicts(make_results(solid=[0.5]), []) == []
+    undefined = make_changes([float("nan")])
+    assert len(findings(make_results(solid=[0.5]), undefined)) == 1
+
+
+def test_trend():
+    straight = trend([0.1, 0.2, 0.3], [0.9, 0.7, 0.5])
+    assert straight.rho == pytest.approx(-1.0)
+    assert straight.slope == pytest.approx(-0.2)
+    assert straight.spread == pytest.approx(0.4)
+    level = trend([0.1, 0.2, 0.3], [0.5, 0.5, 0.5])
+    assert np.isnan(level.rho)
+    assert not level.falls
+
+
+def test_trends_of_the_paper():
+    # Of its Table II, computed by hand of ranks: only RING++ gets worse.
+    assert paper_trend("ring++").rho < 0
+    assert paper_trend("btc").rho > 0.5
+    assert paper_trend("scan-context++").rho > 0
+    assert paper_trend("solid").num_pairs == 10

@@ -1,0 +1,145 @@
+import base64
+import itertools
+import re
+
+import pytest
+from small_page import make_content
+
+from evaluation.report.page import write_page
+from evaluation.report.page_data import browser_data
+from evaluation.report.page_routes import route_picture
+from evaluation.report.result_tables import audit_table
+
+PAIR = ("metropolis", "01", "04")
+PAGES = {"metropolis_04": "../pages/metropolis_04.html?a=1&b"}
+
+
+@pytest.fixture(scope="module")
+def content(tmp_path_factory):
+    return make_content(tmp_path_factory.mktemp("figures"))
+
+
+@pytest.fixture(scope="module")
+def text(content, tmp_path_factory):
+    path = tmp_path_factory.mktemp("page") / "report.html"
+    write_page(path, content)
+    return path.read_text()
+
+
+def test_page_stands_alone(text):
+    assert "{{" not in text
+    # No address but those within the page and of XML's names.
+    sources = re.findall(r'(?:src|href)="([^"]*)"', text)
+    assert sources
+    assert all(s.startswith(("data:", "#")) for s in sources)
+    assert not re.findall(r"https?://", text)
+
+
+def test_links_lead_to_sections(text):
+    links = re.findall(r'<a href="#(\w+)">', text)
+    assert links == [
+        "summary", "maps", "change", "recognition", "figures", "browser"
+    ]  # fmt: skip
+    assert re.findall(r'<section id="(\w+)">', text) == links
+
+
+def test_text_is_escaped(text):
+    assert "A &lt; B &amp; C." in text
+    assert "curves &quot;P&quot; &lt; R" in text
+    assert "gone &lt; new" in text
+    assert 'class="verdict does-not-hold"' in text
+
+
+def test_figures_stand_in_their_sections(text):
+    change = text[text.index('<section id="change">') :]
+    change = change[: change.index("</section>")]
+    assert "before and after" in change
+    assert "--panels:2" in change
+    assert "background:rgb(200, 0, 0)" in change
+    assert "curves" not in change
+    assert "curves" in text[text.index('<section id="figures">') :]
+    assert "not for the page" not in text
+
+
+def test_recordings_are_linked(tmp_path):
+    content = make_content(tmp_path, pages=PAGES)
+    write_page(tmp_path / "report.html", content)
+    text = (tmp_path / "report.html").read_text()
+    # In the summary and with the map; the browser makes its own.
+    address = "../pages/metropolis_04.html?a=1&amp;b"
+    assert text.count(f'<a href="{address}">') == 2
+    data = browser_data(content.recognitions, content.drives, {}, PAGES)
+    assert data["drives"]["metropolis_04"]["page"] == PAGES["metropolis_04"]
+    assert data["drives"]["metropolis_01"]["page"] is None
+
+
+def test_browser_data(content):
+    data = browser_data(content.recognitions, content.drives, {PAIR: 0.25}, {})
+    pair, back = data["pairs"]
+    assert pair["change"] == 0.25
+    assert back["change"] is None
+    assert pair["matches"] == [[0, 1], [1, 2, 3], [3, 4, 5], [5, 6, 7], []]
+    scan_context, ring = pair["methods"]
+    assert scan_context["best"][1] == [9, 0, 1, 2, 3]
+    assert scan_context["scores"][1][:2] == [0.9, 0.2]
+    assert scan_context["best"][2] == []
+    # At (10, 2) places 1, 2, 3 are true, and second to fourth are 0, 1, 2.
+    assert scan_context["ranks"] == [1, 3, None, 1, None]
+    assert ring["ranks"] == [1, 1, 1, 6, None]
+    assert data["drives"]["metropolis_04"]["yaw"] == [1.571] * 5
+
+
+def test_many_scans_are_thinned(content, monkeypatch):
+    monkeypatch.setattr("evaluation.report.page_data._POINTS_OF_A_PAGE", 150)
+    data = browser_data(content.recognitions, content.drives, {}, {})
+    assert data["drives"]["metropolis_01"]["counts"] == [10] * 10
+
+
+def test_maps_are_held_once(content, text):
+    for drive in content.drives.values():
+        view = base64.b64encode(drive.view).decode()
+        assert text.count(view) == 1
+
+
+def test_route_from_red_to_blue(content):
+    drive = content.drives["metropolis_04"]
+    picture = route_picture(drive)
+    pieces = re.findall(
+        r'<polyline stroke="#(..)(..)(..)" points="([^"]*)"', picture
+    )
+    lines = [
+        [tuple(map(float, p.split(","))) for p in points.split()]
+        for *_, points in pieces
+    ]
+    # Each begins where the one before ended; y points down.
+    assert all(a[-1] == b[0] for a, b in itertools.pairwise(lines))
+    assert lines[0][0] == (0.0, -2.0)
+    assert lines[-1][-1] == (100.0, -2.0)
+    first, last = (
+        [int(value, 16) for value in piece[:3]]
+        for piece in (pieces[0], pieces[-1])
+    )
+    assert first[0] > 2 * first[2]
+    assert last[2] > 1.1 * last[0]
+    left, right, bottom, top = drive.extent
+    box = re.search(r'viewBox="([^"]*)"', picture)[1]
+    assert [float(value) for value in box.split()] == pytest.approx(
+        [left, -top, right - left, top - bottom], abs=0.06
+    )
+
+
+def test_page_without_recognition_has_no_browser(content, tmp_path):
+    empty = make_content(
+        tmp_path,
+        recognition=[],
+        audit=audit_table([]),
+        recognitions=[],
+        illustrations=[],
+    )
+    write_page(tmp_path / "report.html", empty)
+    text = (tmp_path / "report.html").read_text()
+    assert "Queries, one by one" not in text
+    assert '<script type="application/json" id="data">null</script>' in text
+    # Drives are shown all the same, each under its own name.
+    assert "<h3>metropolis_01</h3>" in text
+    assert re.findall(r'<a href="#(\w+)">', text) == ["summary", "maps"]

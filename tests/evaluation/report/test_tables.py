@@ -1,0 +1,102 @@
+import csv
+import io
+
+import pytest
+
+from evaluation.report.tables import Cell, Table, ranked
+
+PLAIN = Table(
+    ("name", "value", "count"),
+    (("a", 0.123456, 3), ("b", None, 4), ("c", float("nan"), 5)),
+)
+GROUPED = Table(
+    ("pair_of", "AUC", "AUC"),
+    (
+        ("01 → 04", Cell(0.75, 0.5, 1), Cell(0.25, None, 2)),
+        ("x & y", Cell(None, 0.125), Cell(0.5)),
+    ),
+    groups=(("", 1), ("RING++", 1), ("BTC", 1)),
+    caption="A 95 % caption",
+)
+
+
+def test_plain():
+    assert PLAIN.to_csv() == "name,value,count\na,0.123456,3\nb,,4\nc,,5\n"
+    assert PLAIN.to_markdown() == (
+        "| name | value | count |\n| --- | --- | --- |\n"
+        "| a | 0.1235 | 3 |\n| b | – | 4 |\n| c | – | 5 |\n"
+    )
+
+
+def test_cells_become_two_columns_of_csv():
+    rows = list(csv.reader(io.StringIO(GROUPED.to_csv())))
+    assert rows == [
+        [
+            "pair_of",
+            "RING++ AUC",
+            "paper's RING++ AUC",
+            "BTC AUC",
+            "paper's BTC AUC",
+        ],
+        ["01 → 04", "0.75", "0.5", "0.25", ""],
+        ["x & y", "", "0.125", "0.5", ""],
+    ]
+
+
+def test_markdown_marks_best_and_second():
+    assert GROUPED.to_markdown().splitlines() == [
+        "| pair_of | RING++ AUC | BTC AUC |",
+        "| --- | --- | --- |",
+        "| 01 → 04 | **0.7500** (0.5000) | <u>0.2500</u> |",
+        "| x & y | – (0.1250) | 0.5000 |",
+    ]
+
+
+def test_latex_is_escaped_booktabs():
+    lines = GROUPED.to_latex().splitlines()
+    assert r"\caption{A 95 \% caption}" in lines
+    assert (
+        r"\multicolumn{1}{c}{} & \multicolumn{1}{c}{RING++} &"
+        r" \multicolumn{1}{c}{BTC} \\" in lines
+    )
+    assert r"\cmidrule(lr){2-2}\cmidrule(lr){3-3}" in lines
+    assert r"pair\_of & AUC & AUC \\" in lines
+    assert (
+        r"01 $\rightarrow$ 04 &"
+        r" \shortstack{\textbf{0.7500}\\{\scriptsize 0.5000}} &"
+        r" \underline{0.2500} \\" in lines
+    )
+    assert (
+        r"x \& y & \shortstack{--\\{\scriptsize 0.1250}} & 0.5000 \\" in lines
+    )
+    text = "\n".join(lines)
+    assert text.count("{") == text.count("}")
+    assert text.isascii()
+
+
+def test_html_is_escaped():
+    text = GROUPED.to_html()
+    assert '<th colspan="1" class="group">RING++</th>' in text
+    assert "<td><b>0.7500</b><small>0.5000</small></td>" in text
+    assert "<td>x &amp; y</td>" in text
+
+
+@pytest.mark.parametrize(
+    ("values", "ranks"),
+    [
+        ([0.2, 0.9, 0.5], [None, 1, 2]),
+        # Equal as printed is equal.
+        ([0.90001, 0.90002, 0.5], [1, 1, 2]),
+        ([None, 0.9, float("nan")], [None, None, None]),
+        ([None, 0.9, 0.1], [None, 1, 2]),
+        ([], []),
+    ],
+)
+def test_ranks(values, ranks):
+    cells = ranked(values, [0.5] * len(values))
+    assert [cell.rank for cell in cells] == ranks
+    assert [cell.printed for cell in cells] == [0.5] * len(values)
+
+
+def test_empty_table_has_its_header():
+    assert Table(("a", "b"), ()).to_csv() == "a,b\n"

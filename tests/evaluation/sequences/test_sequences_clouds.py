@@ -1,0 +1,303 @@
+import numpy as np
+import pytest
+
+from evaluation.clouds.cloud_files import is_cloud, read_cloud
+from evaluation.clouds.pcd import _decompress_lzf
+from evaluation.geometry.points import from_xyz, xyz
+from evaluation.support.errors import InputError
+
+RNG = np.random.default_rng(11)
+POINTS = RNG.normal(scale=40.0, size=(500, 3)).astype(np.float32)
+
+
+def write_pcd(path, header, data):
+    lines = "".join(f"{key} {value}\n" for key, value in header.items())
+    path.write_bytes(b"# .PCD v0.7\n" + lines.encode() + data)
+
+
+HEADER = {
+    "VERSION": "0.7",
+    "FIELDS": "x y z",
+    "SIZE": "4 4 4",
+    "TYPE": "F F F",
+    "COUNT": "1 1 1",
+    "WIDTH": 500,
+    "HEIGHT": 1,
+    "VIEWPOINT": "0 0 0 1 0 0 0",
+    "POINTS": 500,
+}
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+@pytest.mark.parametrize("ascii_", [False, True])
+@pytest.mark.parametrize("kind", ["pcd", "ply"])
+def test_files_of_open3d(tmp_path, kind, ascii_, compressed):
+    o3d = pytest.importorskip("open3d")
+    # Repeated coordinates, so that compression finds something to copy.
+    points = np.repeat(POINTS.astype(np.float64), 3, axis=0)
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
+    cloud.colors = o3d.utility.Vector3dVector(np.full((1500, 3), 0.5))
+    path = tmp_path / f"map.{kind}"
+    assert o3d.io.write_point_cloud(
+        str(path), cloud, write_ascii=ascii_, compressed=compressed
+    )
+    # Open3D writes six digits as text.
+    np.testing.assert_allclose(xyz(read_cloud(path)), points, rtol=1e-5)
+
+
+def test_pcd_with_padding_doubles_and_arrays(tmp_path):
+    dtype = np.dtype(
+        [
+            ("intensity", "<u2"),
+            ("pad", "u1", 3),
+            ("x", "<f8"),
+            ("y", "<f8"),
+            ("z", "<f4"),
+            ("normal", "<f4", 3),
+        ]
+    )
+    records = np.zeros(3, dtype=dtype)
+    records["x"] = [1e6 + 0.125, -2.0, np.nan]
+    records["z"] = [1.5, 2.5, 3.5]
+    records["normal"] = [[1, 2, 3], [4, 5, 6], [7, 8, 9]]
+    header = HEADER | {
+        "FIELDS": "intensity _ x y z normal",
+        "SIZE": "2 1 8 8 4 4",
+        "TYPE": "U U F F F F",
+        "COUNT": "1 3 1 1 1 3",
+        "POINTS": 3,
+        "WIDTH": 3,
+    }
+    path = tmp_path / "a.pcd"
+    write_pcd(path, header | {"DATA": "binary"}, records.tobytes())
+    cloud = read_cloud(path)
+    np.testing.assert_array_equal(cloud["x"], records["x"])
+    np.testing.assert_array_equal(cloud["z"], records["z"])
+    text = b"7 0 0 0 1000000.125 0 1.5 1 2 3\n8 0 0 0 -2 0 2.5 4 5 6\n"
+    text += b"9 0 0 0 nan 0 3.5 7 8 9\n"
+    write_pcd(path, header | {"DATA": "ascii"}, text)
+    cloud = read_cloud(path)
+    np.testing.assert_array_equal(cloud["x"], records["x"])
+    np.testing.assert_array_equal(cloud["normal"], records["normal"])
+    np.testing.assert_array_equal(cloud["intensity"], [7, 8, 9])
+
+
+@pytest.mark.parametrize(
+    ("packed", "plain"),
+    [
+        (b"\x02abc", b"abc"),
+        # A copy of 3 from 3 back; one that overlaps what it writes.
+        (b"\x02abc\x20\x02", b"abcabc"),
+        (b"\x00a\x80\x00", b"a" + b"a" * 6),
+        # A long copy: 7 + 200 + 2 bytes from 1 back.
+        (b"\x00a\xe0\xc8\x00", b"a" + b"a" * 209),
+    ],
+)
+def test_lzf(packed, plain):
+    out = np.zeros(len(plain), dtype=np.uint8)
+    data = np.frombuffer(packed, dtype=np.uint8)
+    assert _decompress_lzf(data, out)
+    assert out.tobytes() == plain
+    # Too short, too long, and reaching back behind the beginning.
+    assert not _decompress_lzf(data[:-1], out)
+    assert not _decompress_lzf(data, np.zeros(len(plain) + 1, dtype=np.uint8))
+    assert not _decompress_lzf(data, np.zeros(len(plain) - 1, dtype=np.uint8))
+    assert not _decompress_lzf(
+        np.frombuffer(b"\x00a\x20\x01", dtype=np.uint8),
+        np.zeros(4, dtype=np.uint8),
+    )
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_binary_ply_with_doubles_and_faces(tmp_path, order):
+    dtype = np.dtype([("x", "f8"), ("y", "f8"), ("z", "f8"), ("red", "u1")])
+    records = np.zeros(3, dtype=dtype.newbyteorder(order))
+    records["y"] = [1e6 + 0.125, 2.0, -3.0]
+    name = "little" if order == "<" else "big"
+    header = (
+        f"ply\nformat binary_{name}_endian 1.0\ncomment hello\n"
+        "element vertex 3\nproperty double x\nproperty double y\n"
+        "property double z\nproperty uchar red\nelement face 1\n"
+        "property list uchar int vertex_indices\nend_header\n"
+    )
+    path = tmp_path / "a.ply"
+    path.write_bytes(header.encode() + records.tobytes() + bytes(13))
+    np.testing.assert_array_equal(read_cloud(path)["y"], records["y"])
+
+
+@pytest.mark.parametrize("dtype", ["<f4", "<f8", ">f4", "<i4"])
+@pytest.mark.parametrize("columns", [3, 4])
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_npy(tmp_path, dtype, columns, order):
+    values = np.arange(20.0 * columns).reshape(20, columns)
+    np.save(tmp_path / "a.npy", np.asarray(values, dtype=dtype, order=order))
+    cloud = read_cloud(tmp_path / "a.npy")
+    np.testing.assert_array_equal(xyz(cloud), values[:, :3])
+    assert ("intensity" in cloud.dtype.names) == (columns == 4)
+
+
+def test_structured_npy(tmp_path):
+    cloud = from_xyz(POINTS)
+    np.save(tmp_path / "a.npy", cloud)
+    np.testing.assert_array_equal(xyz(read_cloud(tmp_path / "a.npy")), POINTS)
+
+
+def test_bin(tmp_path):
+    values = np.c_[POINTS, np.full(500, 0.5, dtype=np.float32)]
+    values.tofile(tmp_path / "a.bin")
+    cloud = read_cloud(tmp_path / "a.bin")
+    np.testing.assert_array_equal(xyz(cloud), POINTS)
+    assert (cloud["intensity"] == 0.5).all()
+
+
+def test_empty_clouds(tmp_path):
+    np.save(tmp_path / "a.npy", np.empty((0, 3)))
+    (tmp_path / "a.bin").write_bytes(b"")
+    empty = HEADER | {"POINTS": 0, "WIDTH": 0}
+    write_pcd(tmp_path / "a.pcd", empty | {"DATA": "binary"}, b"")
+    write_pcd(tmp_path / "b.pcd", empty | {"DATA": "ascii"}, b"")
+    (tmp_path / "a.ply").write_text(
+        "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\n"
+        "property float y\nproperty float z\nend_header\n"
+    )
+    for name in ("a.npy", "a.bin", "a.pcd", "b.pcd", "a.ply"):
+        assert xyz(read_cloud(tmp_path / name)).shape == (0, 3)
+
+
+def faulty_files(folder):
+    """Yields name, content, and what the error must say."""
+    yield "short.bin", bytes(17), "17 bytes is no whole number"
+    yield "text.npy", b"hello", "npy|pickle|magic"
+    yield "text.pcd", b"hello\n", "no DATA line"
+    yield "text.ply", b"hello\n", "not a PLY file"
+    yield "open.ply", b"ply\nformat ascii 1.0\n", "no end_header"
+    np.save(folder / "flat.npy", np.zeros(9))
+    yield "flat.npy", None, "instead of N x 3"
+    np.save(folder / "wide.npy", np.zeros((3, 7)))
+    yield "wide.npy", None, "instead of N x 3"
+    np.save(folder / "words.npy", np.full((3, 3), "a"))
+    yield "words.npy", None, "no type of coordinates"
+    np.save(folder / "cut.npy", np.zeros((100, 3)))
+    yield "cut.npy", (folder / "cut.npy").read_bytes()[:-8], "."
+    pcds = {
+        "cut.pcd": ({"DATA": "binary"}, bytes(5999), "cut off"),
+        "cut_ascii.pcd": ({"DATA": "ascii"}, b"1 2 3\n" * 499, "499 x 3 num"),
+        "large.pcd": ({"POINTS": 1, "DATA": "ascii"}, b"1 2 1e39", "z: a num"),
+        "huge.pcd": ({"POINTS": 10**15, "DATA": "ascii"}, b"1 2 3", "cut off"),
+        "words.pcd": ({"DATA": "ascii"}, b"a b c\n" * 500, "convert"),
+        "odd.pcd": ({"DATA": "zip"}, b"", "unknown PCD encoding"),
+        "fields.pcd": ({"SIZE": "4 4", "DATA": "binary"}, b"", "differ"),
+        "no_z.pcd": ({"FIELDS": "x y w", "DATA": "binary"}, b"", "field z"),
+        "ints.pcd": ({"TYPE": "I F F", "DATA": "binary"}, b"", "field x"),
+        "packed.pcd": (
+            {"DATA": "binary_compressed"},
+            np.array([4, 6000], dtype="<u4").tobytes() + b"\xff\xff\xff\xff",
+            "damaged",
+        ),
+        "packed_cut.pcd": (
+            {"DATA": "binary_compressed"},
+            np.array([4, 6000], dtype="<u4").tobytes(),
+            "cut off",
+        ),
+        "packed_size.pcd": (
+            {"DATA": "binary_compressed"},
+            np.array([1, 7], dtype="<u4").tobytes() + b"a",
+            "does not fit",
+        ),
+    }
+    for name, (changes, data, fault) in pcds.items():
+        write_pcd(folder / name, HEADER | changes, data)
+        yield name, None, fault
+    header = b"ply\nformat %b 1.0\nelement vertex 2\nproperty float x\n"
+    header += b"property float y\nproperty %b z\nend_header\n"
+    yield (
+        "cut.ply",
+        header % (b"binary_little_endian", b"float") + bytes(23),
+        "cut off",
+    )
+    yield (
+        "huge.ply",
+        (header % (b"ascii", b"float")).replace(b"2", b"9" * 15),
+        "cut off",
+    )
+    yield (
+        "negative.ply",
+        (header % (b"ascii", b"float")).replace(b"2", b"-2"),
+        "negative number",
+    )
+    yield "cut_ascii.ply", header % (b"ascii", b"float") + b"1 2 3", "1 x 3"
+    yield "odd.ply", header % (b"binary", b"float"), "unknown format"
+    yield "type.ply", header % (b"ascii", b"quad"), "'quad'"
+    yield "ints.ply", header % (b"ascii", b"int"), "property z"
+
+
+def test_faults_are_one_line_that_names_the_file(tmp_path):
+    for name, content, fault in faulty_files(tmp_path):
+        path = tmp_path / name
+        if content is not None:
+            path.write_bytes(content)
+        with pytest.raises(InputError, match=f"^{path}: .*({fault})") as info:
+            read_cloud(path)
+        assert "\n" not in str(info.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        (b"'descr': '<f4'", b"'descr': '<f4"),
+        (b"(500, 3)", b"(500, -3)"),
+        (b"(500, 3)", b"(500, 3"),
+        (b"(500, 3)", b"('a', 3)"),
+        (b"(500, 3)", b"(500.)"),
+        (b"'shape'", b"7      "),
+    ],
+)
+def test_damaged_npy_headers(tmp_path, old, new):
+    path = tmp_path / "map.npy"
+    np.save(path, POINTS)
+    data = path.read_bytes()
+    assert old in data
+    path.write_bytes(data.replace(old, new.ljust(len(old))))
+    with pytest.raises(InputError, match=r"map.npy: "):
+        read_cloud(path)
+
+
+def test_archives_and_records_of_no_numbers(tmp_path):
+    np.savez(tmp_path / "a.npz", POINTS)
+    (tmp_path / "a.npz").rename(tmp_path / "a.npy")
+    with pytest.raises(InputError, match="an archive"):
+        read_cloud(tmp_path / "a.npy")
+    np.save(tmp_path / "b.npy", np.zeros(3, [(n, "S4") for n in "xyz"]))
+    with pytest.raises(InputError, match="no number x"):
+        read_cloud(tmp_path / "b.npy")
+
+
+def test_pcd_field_of_no_size(tmp_path):
+    write_pcd(
+        tmp_path / "map.pcd",
+        HEADER | {"SIZE": "4 4 5", "DATA": "ascii"},
+        b"1 2 3\n" * 500,
+    )
+    with pytest.raises(InputError, match=r"map.pcd: PCD header: "):
+        read_cloud(tmp_path / "map.pcd")
+
+
+@pytest.mark.parametrize(("z", "fine"), [(9.9e7, True), (1.01e8, False)])
+def test_coordinates_out_of_this_world(tmp_path, z, fine):
+    points = np.zeros((3, 3))
+    points[1] = np.nan, np.inf, z
+    np.save(tmp_path / "map.npy", points)
+    if fine:
+        assert len(read_cloud(tmp_path / "map.npy")) == 3
+        return
+    with pytest.raises(InputError, match=r"z: point 1 of 3 is at 1.01e\+08 m"):
+        read_cloud(tmp_path / "map.npy")
+
+
+def test_unknown_or_missing_files(tmp_path):
+    with pytest.raises(InputError, match="unknown kind of point cloud"):
+        read_cloud(tmp_path / "a.las")
+    with pytest.raises(InputError, match="No such file"):
+        read_cloud(tmp_path / "a.pcd")
+    assert is_cloud(tmp_path / "A.PCD")
+    assert not is_cloud(tmp_path / "a.txt")

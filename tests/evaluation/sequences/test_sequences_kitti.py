@@ -1,0 +1,196 @@
+from dataset_folders import (
+    make_points,
+    make_poses,
+    stored,
+    write_bytes,
+    write_matrices,
+    xyzi,
+)
+import numpy as np
+import pytest
+
+from evaluation.sequences import open_sequence
+from evaluation.support.errors import InputError
+
+NUM_SCANS = 6
+# Forward, left, up of the LiDAR are -z... of the camera: roughly KITTI's.
+X_CS = np.array(
+    [
+        [4.276802e-04, -9.999672e-01, -8.084491e-03, -1.198459e-02],
+        [-7.210626e-03, 8.081198e-03, -9.999413e-01, -5.403984e-02],
+        [9.999738e-01, 4.859485e-04, -7.206933e-03, -2.921968e-01],
+        [0.0, 0.0, 0.0, 1.0],
+    ]
+)
+
+
+def write_drive(root, *, name="07", beside=False):
+    """Writes a drive; returns its folder and the poses of the LiDAR."""
+    folder = root / "sequences" / name
+    # The LiDAR's own poses, in its frame at the first scan.
+    X_0S = make_poses(NUM_SCANS, step=0.5)
+    X_0S = np.linalg.inv(X_0S[0]) @ X_0S
+    for i in range(NUM_SCANS):
+        write_bytes(
+            folder / "velodyne" / f"{i:06d}.bin", xyzi(make_points(80, seed=i))
+        )
+    times = [f"{0.1036224 * i:e}" for i in range(NUM_SCANS)]
+    (folder / "times.txt").write_text("\n".join(times) + "\n")
+    row = " ".join(f"{value:.12e}" for value in X_CS[:3].ravel())
+    projection = " ".join(["7.188560e+02"] * 12)
+    (folder / "calib.txt").write_text(
+        "".join(f"P{i}: {projection}\n" for i in range(4)) + f"Tr: {row}\n"
+    )
+    X_C0C = X_CS @ X_0S @ np.linalg.inv(X_CS)
+    poses = folder / "poses.txt" if beside else root / "poses" / f"{name}.txt"
+    write_matrices(poses, None, X_C0C, " ")
+    return folder, X_0S
+
+
+@pytest.mark.parametrize("beside", [False, True])
+def test_reads_what_was_written(tmp_path, beside):
+    folder, X_0S = write_drive(tmp_path, beside=beside)
+    sequence = open_sequence(folder)
+    assert sequence.name == "07"
+    assert sequence.world_frame == "kitti/07"
+    assert len(sequence) == NUM_SCANS
+    # Tr has six digits only: it is no exact rotation.
+    np.testing.assert_allclose(sequence.X_WS, X_0S, atol=1e-5)
+    assert sequence.stamps_ns.tolist() == [
+        103_622_400 * i for i in range(NUM_SCANS)
+    ]
+    for i in (5, 2):
+        scan = sequence.scan(i)
+        np.testing.assert_array_equal(
+            stored(scan, "x", "y", "z"), make_points(80, seed=i)
+        )
+        np.testing.assert_array_equal(scan["intensity"], np.arange(80))
+
+
+def test_the_world_is_upright(tmp_path):
+    """A drive ahead on the flat is along x of the LiDAR, not z."""
+    folder, _ = write_drive(tmp_path)
+    ahead = np.tile(np.eye(4), (NUM_SCANS, 1, 1))
+    ahead[:, 2, 3] = 3.0 * np.arange(NUM_SCANS)  # z of the camera
+    write_matrices(tmp_path / "poses" / "07.txt", None, ahead, " ")
+    p_WS = open_sequence(folder).X_WS[:, :3, 3]
+    np.testing.assert_allclose(
+        p_WS[:, 0], 3.0 * np.arange(NUM_SCANS), rtol=1e-3
+    )
+    assert np.abs(p_WS[:, 1:]).max() < 0.15
+
+
+def test_poses_of_the_benchmark_come_first(tmp_path):
+    folder, X_0S = write_drive(tmp_path)
+    write_matrices(folder / "poses.txt", None, make_poses(NUM_SCANS), " ")
+    np.testing.assert_allclose(open_sequence(folder).X_WS, X_0S, atol=1e-5)
+
+
+def test_an_identity_for_calibration(tmp_path):
+    folder, X_0S = write_drive(tmp_path)
+    (folder / "calib.txt").write_text("Tr: 1 0 0 0 0 1 0 0 0 0 1 0\n")
+    write_matrices(tmp_path / "poses" / "07.txt", None, X_0S, " ")
+    np.testing.assert_allclose(open_sequence(folder).X_WS, X_0S, atol=1e-15)
+
+
+def test_a_drive_without_poses(tmp_path):
+    folder, _ = write_drive(tmp_path, name="11")
+    (tmp_path / "poses" / "11.txt").unlink()
+    with pytest.raises(InputError, match=f"^{folder}: KITTI: no poses, .*11"):
+        open_sequence(folder)
+
+
+def remove_scan(root, folder):
+    (folder / "velodyne" / "000002.bin").unlink()
+    return folder / "velodyne" / "000002.bin"
+
+
+def shorten(name):
+    def change(root, folder):
+        path = root / "poses" / "07.txt" if name == "poses" else folder / name
+        path.write_text("".join(path.read_text().splitlines(True)[:-1]))
+        return path
+
+    return change
+
+
+def repeat_time(root, folder):
+    path = folder / "times.txt"
+    lines = path.read_text().splitlines()
+    lines[3] = lines[2]
+    path.write_text("\n".join(lines))
+    return path
+
+
+def replace(name, old, new):
+    def change(root, folder):
+        path = root / "poses" / "07.txt" if name == "poses" else folder / name
+        text = path.read_text()
+        assert old in text
+        path.write_text(text.replace(old, new, 1))
+        return path
+
+    return change
+
+
+def eleven_columns(root, folder):
+    path = root / "poses" / "07.txt"
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join(line.rsplit(" ", 1)[0] for line in lines))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        (remove_scan, "missing"),
+        (shorten("poses"), "5 rows for 6 scans"),
+        (shorten("times.txt"), "5 rows for 6 scans"),
+        (repeat_time, "time: row 4 at .* is not later"),
+        (replace("times.txt", "0.000000e+00", "start"), "rows for 6"),
+        (replace("times.txt", "1.036224e-01", "1.03e-0-1"), "no time"),
+        (replace("poses", "1.0", "5.0"), "row 1: no rotation"),
+        (replace("poses", "1.0", "nan"), "row 1: a number is not finite"),
+        (eleven_columns, "rows of 11 numbers instead of 12"),
+        (replace("calib.txt", "Tr:", "Tr_velo_to_cam:"), "Tr: missing"),
+        (replace("calib.txt", "Tr: ", "Tr: 0 "), "Tr: 13 numbers"),
+        (replace("calib.txt", "Tr: ", "Tr: x"), "Tr: could not convert"),
+    ],
+)
+def test_files_that_do_not_fit(tmp_path, change, fault):
+    folder, _ = write_drive(tmp_path)
+    path = change(tmp_path, folder)
+    with pytest.raises(InputError, match=f"^{path}: .*{fault}") as info:
+        open_sequence(folder)
+    assert "\n" not in str(info.value)
+
+
+def test_missing_files(tmp_path):
+    for name in ("times.txt", "calib.txt"):
+        folder, _ = write_drive(tmp_path / name)
+        (folder / name).unlink()
+        with pytest.raises(InputError, match=f"{name}: No such file"):
+            open_sequence(folder)
+    folder, _ = write_drive(tmp_path)
+    for path in (folder / "velodyne").iterdir():
+        path.unlink()
+    with pytest.raises(InputError, match=r"velodyne: no scan \(\*\.bin\)"):
+        open_sequence(folder)
+
+
+def test_a_scan_that_cannot_be_used(tmp_path):
+    folder, _ = write_drive(tmp_path)
+    path = folder / "velodyne" / "000001.bin"
+    whole = path.read_bytes()
+    write_bytes(path, whole[:-4])
+    with pytest.raises(InputError, match=f"^{path}: .*cut off"):
+        open_sequence(folder).scan(1)
+    points = make_points(4)
+    points[3, 0] = np.inf
+    write_bytes(path, xyzi(points))
+    with pytest.raises(InputError, match=f"^{path}: x: point 3 of 4"):
+        open_sequence(folder).scan(1)
+    sequence = open_sequence(folder)
+    path.unlink()
+    with pytest.raises(InputError, match=f"^{path}: No such file"):
+        sequence.scan(1)

@@ -1,0 +1,267 @@
+import csv
+
+from drive_files import make_scan, write_recording, yaw_pose
+import numpy as np
+import pytest
+from small_towns import drive
+import studies
+
+from evaluation.jobs.cluster import Cluster
+from evaluation.jobs.running import run_jobs
+from evaluation.methods import method
+from evaluation.report import paper
+from evaluation.study.benchmark import write_report
+from evaluation.study.chosen_methods import choose_methods
+from evaluation.study.collection import find_recordings, group_cities
+from evaluation.study.plan import plan_study
+from evaluation.support.errors import InputError
+
+pytestmark = pytest.mark.slow
+
+# Describes a scan by how many points it has.
+OWN_METHOD = """
+from dataclasses import dataclass
+
+import numpy as np
+
+from evaluation.methods import Method, register
+
+
+@dataclass
+class Count:
+    points: int
+
+
+@register("counting")
+class Counting(Method):
+    def describe(self, points):
+        return Count(len(points))
+
+    def build_database(self, places):
+        return np.array([place.points for place in places])
+
+    def score(self, query, database, *, exhaustive=False):
+        return -np.abs(database - query.points).astype(float)
+"""
+
+
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("recordings")
+    drive(folder / "metropolis_01", "01", "a")
+    drive(folder / "metropolis_04", "04", "b")
+    drive(folder / "metropolis_04_control", "04", "a")
+    (folder / "notes.txt").write_text("no recording")
+    return folder
+
+
+def find_cities(folder):
+    return group_cities(find_recordings(folder))
+
+
+def test_recordings_find_their_roles(recordings):
+    (city,) = find_cities(recordings)
+    assert city.name == "metropolis"
+    assert list(city.stages) == ["01", "04"]
+    assert city.stages["04"].name == "metropolis_04"
+    (pair,) = city.change_pairs()
+    assert [one.stage for one in pair] == ["01", "04"]
+    assert city.control(*pair).name == "metropolis_04_control"
+
+
+def test_both_directions_where_the_paper_has_them(tmp_path):
+    for stage in ("01", "02"):
+        drive(tmp_path / f"riverside_{stage}", stage, "a", city="riverside")
+    (city,) = find_cities(tmp_path)
+    assert [
+        (database.stage, query.stage)
+        for database, query in city.recognition_pairs()
+    ] == [("01", "02"), ("02", "01")]
+
+
+def test_names_serve_without_scenarios(tmp_path):
+    for name in ("old_town_1", "old_town_2"):
+        drive(tmp_path / name, name[-1:], "a", scenario=False)
+    (city,) = find_cities(tmp_path)
+    assert city.name == "old_town"
+    assert list(city.stages) == ["1", "2"]
+    assert city.control(*city.change_pairs()[0]) is None
+
+
+def test_what_cannot_be_placed_is_left_out(tmp_path):
+    drive(tmp_path / "unnamed", "01", "a", scenario=False)
+    with pytest.raises(InputError, match="unnamed: neither a scenario nor"):
+        find_cities(tmp_path)
+    drive(tmp_path / "town_1", "01", "a", scenario=False)
+    told = []
+    (found,) = find_recordings(tmp_path, told.append)
+    assert found.name == "town_1"
+    (note,) = told
+    assert note.startswith(f"{tmp_path / 'unnamed'}: left out: neither a")
+
+
+def test_no_recordings_or_too_many(tmp_path):
+    with pytest.raises(InputError, match="no such folder"):
+        find_cities(tmp_path / "none")
+    with pytest.raises(InputError, match="no recorded sequence"):
+        find_cities(tmp_path)
+    drive(tmp_path / "first", "01", "a")
+    drive(tmp_path / "second", "01", "a")
+    with pytest.raises(InputError, match="2 recordings of metropolis at"):
+        find_cities(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def report(recordings, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("report")
+    studies.report(recordings, folder)
+    return folder
+
+
+def read_csv(path):
+    with path.open(newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def test_change_beside_the_paper(report):
+    change, real = read_csv(report / "tcr.csv")
+    assert change["map"] == "metropolis"
+    assert change["stages"] == "01 ↔ 04"
+    assert float(change["paper"]) == 0.2920
+    assert 0.03 < float(change["TCR_sym"]) < 0.5
+    assert float(change["same stage, both routes"]) < 0.02
+    assert float(real["paper"]) == 0.1819
+    assert real["TCR_sym"] == ""
+    shown = f"{float(change['TCR_sym']):.4f}"
+    for name in ("report.md", "tcr.md", "tcr.tex", "report.html"):
+        assert shown in (report / name).read_text(), name
+
+
+def test_recognition_beside_the_paper(report):
+    every, filtered = (
+        row
+        for row in read_csv(report / "place_recognition.csv")
+        if row["method"] == "scan-context++"
+    )
+    assert [every["mode"], filtered["mode"]] == ["all", "filtered"]
+    # The paper's Scan Context++ counts all queries.
+    assert float(every["paper's R@1"]) == 0.2993
+    assert filtered["paper's R@1"] == ""
+    assert every["N (with a match)"] == "9"
+    assert float(every["AUC low"]) <= float(every["AUC"])
+    assert float(every["AUC"]) <= float(every["AUC high"])
+    shown = f"{float(every['AUC']):.4f}"
+    for name in ("place_recognition.md", "place_recognition.tex"):
+        text = (report / name).read_text()
+        assert shown in text
+        assert "0.2993" in text
+
+
+def test_figures_for_print_and_page(report):
+    stems = {
+        "auc_over_tcr": "svg",
+        "change_metropolis_01_04": "webp",
+        "pr_metropolis": "svg",
+        "routes_metropolis": "webp",
+        "sets_metropolis_01_04": "webp",
+    }
+    names = {path.name for path in (report / "figures").iterdir()}
+    assert names == {
+        f"{stem}.{kind}"
+        for stem, page_kind in stems.items()
+        for kind in ("pdf", "png", page_kind)
+    }
+    text = (report / "report.md").read_text()
+    for stem in stems:
+        assert f"](figures/{stem}.png)" in text
+
+
+def test_report_is_the_same_whoever_works(recordings, report, tmp_path):
+    write_report(recordings, tmp_path, Cluster(num_workers=2))
+    files = studies.report_files(tmp_path)
+    assert len(files) == 8 + 15
+    assert files == studies.report_files(report)
+
+
+def test_what_is_done_needs_no_process(recordings, report, monkeypatch):
+    jobs = plan_study(find_recordings(recordings), report)
+    monkeypatch.setattr(Cluster, "connect", None)
+    run_jobs(jobs, Cluster())
+    (report / "figures" / "routes_metropolis.webp").rename(report / "aside")
+    try:
+        assert [j.name for j in jobs if not j.is_done(*j.arguments)] == [
+            "draw metropolis"
+        ]
+    finally:
+        (report / "aside").rename(report / "figures/routes_metropolis.webp")
+
+
+def test_own_method_beside_the_others(recordings, tmp_path, monkeypatch):
+    # Others need not know of it.
+    monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
+    path = tmp_path / "counting.py"
+    path.write_text(OWN_METHOD)
+    choices = choose_methods([path])
+    studies.report(recordings, tmp_path / "out", choices)
+    rows = read_csv(tmp_path / "out" / "place_recognition.csv")
+    methods = list(dict.fromkeys(row["method"] for row in rows))
+    assert methods == ["btc", "ring++", "scan-context++", "solid", "counting"]
+    for name in ("report.md", "report.html"):
+        assert "counting" in (tmp_path / "out" / name).read_text()
+
+
+def test_report_of_a_single_stage(tmp_path):
+    drive(tmp_path / "in" / "metropolis_01", "01", "a")
+    text = studies.report(tmp_path / "in", tmp_path / "out").read_text()
+    assert "routes_metropolis.png" in text
+    assert "Temporal change ratio" not in text
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "Queries, one by one" not in page
+
+
+def test_several_cities(tmp_path):
+    for stage in ("01", "02"):
+        drive(
+            tmp_path / "in" / f"riverside_{stage}", stage, "a", city="riverside"
+        )
+    drive(tmp_path / "in" / "metropolis_04", "04", "b")
+    studies.report(tmp_path / "in", tmp_path / "out")
+    rows = read_csv(tmp_path / "out" / "place_recognition.csv")
+    pairs = dict.fromkeys((row["map"], row["DB → query"]) for row in rows)
+    assert list(pairs) == [("riverside", "01 → 02"), ("riverside", "02 → 01")]
+    change, _ = read_csv(tmp_path / "out" / "tcr.csv")
+    assert change["map"] == "riverside"
+    figures = {path.stem for path in (tmp_path / "out" / "figures").iterdir()}
+    assert {"routes_metropolis", "routes_riverside"} <= figures
+
+
+def test_scans_without_points_are_refused(tmp_path):
+    nothing = [make_scan(np.empty((0, 3)))] * 2
+    write_recording(
+        tmp_path / "town_01", nothing, [yaw_pose(x, 0, 0, 0) for x in (0, 1)]
+    )
+    with pytest.raises(InputError, match="town_01: no scan holds a point"):
+        studies.report(tmp_path, tmp_path / "out")
+
+
+def test_output_that_cannot_be_written(recordings, tmp_path):
+    (tmp_path / "out").write_text("a file")
+    with pytest.raises(InputError, match=f"^{tmp_path / 'out'}"):
+        write_report(recordings, tmp_path / "out", Cluster())
+
+
+def test_paper_values():
+    change = paper.tcr_values()
+    assert len(change) == 9
+    # The first misprint: Table I prints 0.1120 here.
+    assert change["downtown", "01", "04"] == 0.1674
+    recognition = paper.recognition_values()
+    assert len(recognition) == 40
+    # The second: R@1 is printed as 0.9626.
+    value = recognition["riverside", "02", "01", "ring++", "filtered"]
+    assert value.recall_at_1 == 0.7626
+    # All of RING++ then obeys F1 = 2 R / (1 + R), to the printed digits.
+    for key, value in recognition.items():
+        if key[3] == "ring++":
+            r = value.recall_at_1
+            assert value.f1_max == pytest.approx(2 * r / (1 + r), abs=1.1e-4)

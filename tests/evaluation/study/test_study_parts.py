@@ -1,0 +1,97 @@
+from dataclasses import dataclass
+import pickle
+
+import numpy as np
+import pytest
+
+from evaluation.study.parts import (
+    digest,
+    is_current,
+    part_digest,
+    read_part,
+    write_part,
+)
+from evaluation.support.errors import InputError
+
+INPUTS = {"drive": ["a", 3], "roles": ("places",), "z": {"b": 1.5, "a": None}}
+
+
+@dataclass(frozen=True)
+class Description:
+    spectrum: np.ndarray
+    filled: np.ndarray
+    empty: np.ndarray
+
+
+@pytest.fixture
+def part(tmp_path):
+    path = tmp_path / "new" / "folder" / "values.data"
+    write_part(path, INPUTS, list(range(1000)))
+    return path
+
+
+def test_arrays_come_back_bit_by_bit(tmp_path):
+    rng = np.random.default_rng(5)
+    spectrum = (rng.normal(size=(40, 7)) * 1j).astype(np.complex64)
+    spectrum[3, 3] = complex(np.nan, -0.0)
+    value = Description(
+        np.asfortranarray(spectrum),
+        np.flatnonzero(rng.integers(2, size=50)),
+        np.empty((0, 3)),
+    )
+    write_part(tmp_path / "one.data", INPUTS, value)
+    again = read_part(tmp_path / "one.data")
+    for name in ("spectrum", "filled", "empty"):
+        old, new = getattr(value, name), getattr(again, name)
+        assert (old.dtype, old.shape) == (new.dtype, new.shape)
+        assert old.flags.f_contiguous == new.flags.f_contiguous
+        assert old.tobytes("A") == new.tobytes("A")
+
+
+def test_equal_inputs_and_values_give_equal_bytes(part, tmp_path):
+    turned = {key: INPUTS[key] for key in reversed(INPUTS)}
+    write_part(tmp_path / "again.data", turned, list(range(1000)))
+    assert (tmp_path / "again.data").read_bytes() == part.read_bytes()
+
+
+def test_a_part_belongs_to_its_inputs(part):
+    assert is_current(part, INPUTS)
+    assert part_digest(part) == digest(INPUTS)
+    assert is_current(part, {**INPUTS, "roles": ["places"]})
+    for other in (
+        {**INPUTS, "roles": []},
+        {**INPUTS, "more": 1},
+        {**INPUTS, "z": {"b": 1.5000001, "a": None}},
+    ):
+        assert not is_current(part, other)
+
+
+def test_only_a_whole_part_is_one(part, tmp_path):
+    whole = part.read_bytes()
+    assert not is_current(tmp_path / "none.data", INPUTS)
+    with pytest.raises(InputError, match=r"none.data: No such file"):
+        read_part(tmp_path / "none.data")
+    for length in (0, 10, 16, 60, len(whole) - 1):
+        part.write_bytes(whole[:length])
+        assert not is_current(part, INPUTS)
+        with pytest.raises(InputError, match=r"values.data: damaged"):
+            read_part(part)
+    part.write_bytes(whole + b"x")
+    assert not is_current(part, INPUTS)
+
+
+@pytest.mark.parametrize("place", [-1, -5, -200])
+def test_damage_is_noticed_before_it_is_used(part, place):
+    data = bytearray(part.read_bytes())
+    data[place] ^= 1
+    part.write_bytes(bytes(data))
+    with pytest.raises(InputError, match=r"values.data: damaged .* delete it"):
+        read_part(part)
+
+
+def test_what_cannot_be_pickled_leaves_the_part_as_it_was(part):
+    whole = part.read_bytes()
+    with pytest.raises((AttributeError, pickle.PicklingError), match="lambda"):
+        write_part(part, INPUTS, lambda: None)
+    assert [path.name for path in part.parent.iterdir()] == ["values.data"]
+    assert part.read_bytes() == whole

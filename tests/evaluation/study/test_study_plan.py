@@ -1,0 +1,107 @@
+"""Studies are planned of recordings that nobody has made yet."""
+
+from pathlib import Path
+import pickle
+
+import pytest
+
+from evaluation.study.collection import RecordingInfo
+from evaluation.study.plan import plan_study
+from evaluation.support.errors import InputError
+
+
+def info(name, stage, route="a", city="metropolis", needs=()):
+    path = Path("nowhere") / name
+    return RecordingInfo(name, path, city, stage, {"lanes": route}, needs)
+
+
+FAMILY = [
+    info("metropolis_01", "01", "a", needs=("metropolis_01",)),
+    info("metropolis_02", "02", "b", needs=("metropolis_02",)),
+    info("metropolis_04", "04", "c", needs=("metropolis_04",)),
+    info("metropolis_01_stage_04", "04", "a"),
+    # Through a stage, but on a route that serves nobody.
+    info("metropolis_walk", "02", "d"),
+]
+
+
+def test_every_recording_is_surveyed_when_it_is_made(tmp_path):
+    jobs = {job.name: job for job in plan_study(FAMILY, tmp_path)}
+    surveys = {n: j for n, j in jobs.items() if n.startswith("survey ")}
+    assert {name: job.needs for name, job in surveys.items()} == {
+        "survey metropolis_01": ("metropolis_01",),
+        "survey metropolis_02": ("metropolis_02",),
+        "survey metropolis_04": ("metropolis_04",),
+        "survey metropolis_01_stage_04": (),
+    }
+    roles = {name: sorted(job.arguments[1]) for name, job in surveys.items()}
+    assert roles == {
+        "survey metropolis_01": ["places"],
+        "survey metropolis_02": ["places"],
+        "survey metropolis_04": ["queries"],
+        "survey metropolis_01_stage_04": [],
+    }
+    assert not any(tmp_path.iterdir())
+
+
+def test_pairs_wait_for_their_surveys(tmp_path):
+    jobs = {job.name: job for job in plan_study(FAMILY, tmp_path)}
+    assert jobs["metropolis 01 > 04, btc"].needs == (
+        "survey metropolis_01",
+        "survey metropolis_04",
+    )
+    assert jobs["change metropolis 01 > 04"].needs == (
+        "survey metropolis_01",
+        "survey metropolis_04",
+        "survey metropolis_01_stage_04",
+    )
+    assert jobs["change metropolis 02 > 04"].needs == (
+        "survey metropolis_02",
+        "survey metropolis_04",
+    )
+    assert jobs["draw metropolis"].needs == (
+        "survey metropolis_01",
+        "survey metropolis_02",
+        "survey metropolis_04",
+    )
+    # Four surveys, one city, two changes, two pairs with four methods.
+    assert len(jobs) == 4 + 1 + 2 + 8
+
+
+def test_jobs_can_go_anywhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    river = [info(f"riverside_{s}", s, s, "riverside") for s in ("01", "02")]
+    jobs = plan_study(FAMILY + river, Path("out"))
+    names = [job.name for job in jobs]
+    assert len(set(names)) == len(names)
+    outputs = [job.output for job in jobs]
+    assert len(set(outputs)) == len(outputs)
+    for job in jobs:
+        assert tmp_path / "out" / "parts" in job.output.parents
+        assert job.cost > 0
+        function, arguments = pickle.loads(
+            pickle.dumps((job.function, job.arguments))
+        )
+        assert (function, arguments) == (job.function, job.arguments)
+    # The paper has this map in both directions.
+    assert {"riverside 01 > 02, solid", "riverside 02 > 01, solid"} <= set(
+        names
+    )
+
+
+def test_names_of_files_stay_apart(tmp_path):
+    odd = [
+        info("a/b", "1", city="x"),
+        info("a,b", "2", city="x"),
+        info("a%2Cb", "3", city="x"),
+    ]
+    outputs = [job.output for job in plan_study(odd, tmp_path)]
+    assert len({str(path).lower() for path in outputs}) == len(outputs)
+    depths = {len(path.relative_to(tmp_path).parts) for path in outputs}
+    assert depths == {3}
+
+
+def test_one_name_for_two_recordings(tmp_path):
+    twice = [info("town_01", "01", city="a"), info("town_01", "01", city="b")]
+    with pytest.raises(InputError, match=r"town_01 is there twice"):
+        plan_study(twice, tmp_path)

@@ -1,0 +1,190 @@
+"""Surveys of drives that are made while they are read, and what is kept."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+from small_towns import drive
+
+from evaluation.change.drive_change import survey
+from evaluation.jobs.running import Tell
+from evaluation.recognition.retrieval import describe_drive
+from evaluation.sequences import Sequence, open_sequence
+from evaluation.study.chosen_methods import choose_methods
+from evaluation.study.drive_source import RecordedDrive
+from evaluation.study.measurements import recognise_places
+from evaluation.study.parts import read_part
+from evaluation.study.recording_survey import survey_recording
+from evaluation.study.study_layout import SurveyFiles
+from evaluation.study.surveys import survey_drive
+from evaluation.support.errors import InputError
+
+pytestmark = pytest.mark.slow
+
+BOTH = frozenset({"places", "queries"})
+
+
+class OnTheFly(Sequence):
+    """A drive whose scans exist once, in order, and are gone."""
+
+    def __init__(self, recorded):
+        self.name = recorded.name
+        self.world_frame = recorded.world_frame
+        self._recorded = recorded
+        self._next = 0
+
+    def __len__(self):
+        return len(self._recorded)
+
+    @property
+    def stamps_ns(self):
+        return self._recorded.stamps_ns
+
+    @property
+    def X_WS(self):
+        return self._recorded.X_WS
+
+    @property
+    def scenario(self):
+        return self._recorded.scenario
+
+    def scan(self, index):
+        assert index == self._next
+        self._next += 1
+        return self._recorded.scan(index)
+
+
+@dataclass
+class Source:
+    """Opens a drive on the fly, and counts how often."""
+
+    recorded: Sequence
+    seed: int = 0
+    opened: list = field(default_factory=list)
+
+    def __call__(self):
+        self.opened.append(OnTheFly(self.recorded))
+        return self.opened[-1]
+
+    def identity(self):
+        return {"seed": self.seed}
+
+
+def assert_equal(one, other):
+    """Compares what is made of dataclasses, lists and arrays, bit by bit."""
+    assert type(one) is type(other)
+    if isinstance(one, np.ndarray):
+        assert (one.dtype, one.shape) == (other.dtype, other.shape)
+        assert one.tobytes() == other.tobytes()
+    elif hasattr(one, "__dataclass_fields__"):
+        for name in one.__dataclass_fields__:
+            assert_equal(getattr(one, name), getattr(other, name))
+    elif isinstance(one, list | tuple):
+        assert len(one) == len(other)
+        for a, b in zip(one, other, strict=True):
+            assert_equal(a, b)
+    else:
+        assert one == other
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("drives") / "metropolis_01"
+    drive(folder, "01", "a")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def recorded(folder):
+    return open_sequence(folder)
+
+
+@pytest.fixture
+def source(recorded):
+    return Source(recorded)
+
+
+@pytest.fixture
+def files(tmp_path):
+    return SurveyFiles(tmp_path / "survey")
+
+
+def test_what_is_kept_is_what_was_found(recorded, source, files):
+    choices = choose_methods()
+    survey_drive(source, BOTH, choices, files, Tell())
+    methods = [choice.make() for choice in choices]
+    found = survey_recording(recorded, BOTH, methods)
+    assert_equal(read_part(files.drive), found.drive)
+    assert_equal(read_part(files.fine), found.fine)
+    direct = describe_drive(recorded, methods, BOTH)
+    for choice, expected in zip(choices, direct, strict=True):
+        placed, described = read_part(files.described(choice))
+        assert_equal(described, expected)
+        assert placed == found.drive.placed
+    assert len(source.opened) == 1
+    assert source.opened[0]._next == len(recorded)
+
+
+@pytest.mark.parametrize("roles", [frozenset(), BOTH])
+def test_maps_are_those_of_which_the_tcr_is_measured(folder, recorded, roles):
+    methods = [choose_methods()[0].make()]
+    found = survey_recording(recorded, roles, methods)
+    assert_equal(found.drive.coarse, survey(folder).voxels)
+
+
+def test_only_what_is_missing_or_of_something_else_is_found(source, files):
+    *others, btc = sorted(choose_methods(), key=lambda one: one.name == "btc")
+    survey_drive(source, BOTH, tuple(others), files, Tell())
+    stamps = {path: path.stat().st_mtime_ns for path in files.folder.iterdir()}
+    survey_drive(source, BOTH, tuple(others), files, Tell())
+    assert len(source.opened) == 1
+    survey_drive(source, BOTH, (*others, btc), files, Tell())
+    assert len(source.opened) == 2
+    for method in others:
+        path = files.described(method)
+        assert path.stat().st_mtime_ns == stamps[path]
+    survey_drive(source, frozenset(), (*others, btc), files, Tell())
+    assert len(source.opened) == 3
+    assert len(read_part(files.drive).frames) == 0
+    survey_drive(
+        Source(source.recorded, 7, source.opened),
+        frozenset(),
+        (),
+        files,
+        Tell(),
+    )
+    assert len(source.opened) == 4
+
+
+def test_a_recording_is_known_by_its_files(tmp_path):
+    folder = tmp_path / "metropolis_01"
+    drive(folder, "01", "a")
+    first = RecordedDrive(folder).identity()
+    assert RecordedDrive(folder).identity() == first
+    link = tmp_path / "link"
+    link.symlink_to(folder)
+    assert RecordedDrive(link).identity() == first
+    (path,) = folder.glob("*.mcap")
+    path.write_bytes(path.read_bytes() + b" ")
+    assert RecordedDrive(folder).identity() != first
+    with pytest.raises(InputError, match=r"none: No such file"):
+        RecordedDrive(tmp_path / "none").identity()
+
+
+def test_drives_of_two_worlds_are_not_compared(tmp_path, recorded):
+    class Elsewhere(OnTheFly):
+        def __init__(self, other):
+            super().__init__(other)
+            self.world_frame = "utm"
+
+    (solid,) = (one for one in choose_methods() if one.name == "solid")
+    surveys = (SurveyFiles(tmp_path / "a"), SurveyFiles(tmp_path / "b"))
+    survey_drive(Source(recorded), BOTH, (solid,), surveys[0], Tell())
+    other = Source(Elsewhere(recorded))
+    survey_drive(other, BOTH, (solid,), surveys[1], Tell())
+    result = tmp_path / "result.data"
+    with pytest.raises(InputError, match="poses in frame 'utm'"):
+        recognise_places(
+            "metropolis", ("01", "04"), surveys, solid, result, Tell()
+        )
+    assert not result.exists()

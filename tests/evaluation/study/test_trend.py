@@ -1,0 +1,129 @@
+"""AUC over TCR_sym: the numbers of `cns-eval pr` and `tcr`, smoothed well."""
+
+import csv
+
+import numpy as np
+import pytest
+from small_towns import drive
+import studies
+
+from evaluation.change.drive_change import compare, survey
+from evaluation.jobs.cluster import Cluster
+from evaluation.methods import known_methods, make_method
+from evaluation.recognition.place_recognition import run
+from evaluation.sequences import open_sequence
+from evaluation.study import trend_points
+from evaluation.study.trend import smooth, smooth_band, write_trend
+from evaluation.study.trend_points import measure_trend
+from evaluation.support.errors import InputError
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("drives")
+    drive(folder / "metropolis_01", "01", "a")
+    drive(folder / "metropolis_04_control", "04", "a")
+    drive(folder / "metropolis_04", "04", "b")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def points(folder, tmp_path_factory):
+    databases = [folder / "metropolis_01", folder / "metropolis_04_control"]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            trend_points, "run_jobs", lambda jobs, cluster: studies.do(jobs)
+        )
+        return measure_trend(
+            folder / "metropolis_04",
+            databases,
+            tmp_path_factory.mktemp("trend"),
+            Cluster(),
+        )
+
+
+def test_every_method_on_every_database(points):
+    assert [(p.database, p.method) for p in points] == [
+        (database, method)
+        for database in ("metropolis_01", "metropolis_04_control")
+        for method in known_methods()
+    ]
+
+
+def test_the_numbers_are_those_of_the_single_commands(folder, points):
+    query = folder / "metropolis_04"
+    for name in ("metropolis_01", "metropolis_04_control"):
+        change = compare(survey(folder / name), survey(query)).change
+        for point in points:
+            if point.database == name and point.method != "btc":
+                outcome = run(
+                    open_sequence(folder / name),
+                    open_sequence(query),
+                    make_method(point.method, {}),
+                )
+                assert point.tcr_sym == change.symmetric
+                assert point.auc == outcome.metrics.auc
+                assert point.recall_at_1 == outcome.metrics.recall_at_1
+                assert point.queries == outcome.metrics.num_queries
+
+
+def test_the_table_holds_what_was_measured(points, tmp_path):
+    path = write_trend(points, tmp_path / "new")
+    rows = list(csv.DictReader(path.open()))
+    assert [row["method"] for row in rows] == [p.method for p in points]
+    np.testing.assert_allclose(
+        [float(row["tcr_sym"]) for row in rows],
+        [p.tcr_sym for p in points],
+        atol=1e-6,
+    )
+    assert (path.parent / "trend.pdf").stat().st_size > 1000
+
+
+def test_processes_change_nothing_and_are_not_needed_twice(
+    folder, points, tmp_path, monkeypatch
+):
+    databases = [folder / "metropolis_01", folder / "metropolis_04_control"]
+    arguments = (folder / "metropolis_04", databases, tmp_path)
+    assert measure_trend(*arguments, Cluster(num_workers=2)) == points
+    monkeypatch.setattr(
+        trend_points, "run_jobs", lambda jobs, cluster: studies.do(jobs)
+    )
+    monkeypatch.setattr(
+        trend_points, "survey_recording", lambda *_: pytest.fail("again")
+    )
+    assert measure_trend(*arguments, Cluster()) == points
+
+
+def test_a_drive_given_twice_is_named(folder, tmp_path):
+    path = folder / "metropolis_04"
+    with pytest.raises(InputError, match="metropolis_04 is there twice"):
+        measure_trend(path, [path], tmp_path, Cluster())
+
+
+def test_a_line_stays_a_line():
+    rng = np.random.default_rng(2)
+    x = rng.uniform(-1, 3, 40)
+    grid = np.linspace(-1, 3, 11)
+    np.testing.assert_allclose(
+        smooth(x, 2.0 - 0.7 * x, grid), 2.0 - 0.7 * grid, atol=1e-9
+    )
+
+
+def test_points_at_one_place_give_their_mean():
+    x, y = np.full(4, 0.3), np.array([1.0, 2.0, 3.0, 6.0])
+    np.testing.assert_allclose(smooth(x, y, np.array([0.2, 0.3])), 3.0)
+
+
+def test_the_band_holds_the_truth_about_as_often_as_it_says():
+    rng = np.random.default_rng(8)
+    grid = np.array([0.2, 0.5, 0.8])
+    held = []
+    for _ in range(40):
+        x = rng.uniform(0, 1, 50)
+        y = 0.8 - 0.5 * x + rng.normal(0, 0.05, 50)
+        low, high = smooth_band(x, y, grid)
+        truth = 0.8 - 0.5 * grid
+        held += list((low <= truth) & (truth <= high))
+    assert 0.85 < np.mean(held) < 1.0

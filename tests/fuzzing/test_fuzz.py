@@ -1,0 +1,50 @@
+"""Files damaged at random: each is read, or refused in one line.
+
+`pytest tests/fuzzing --fuzz 100000` damages files that many times in place of
+the thousand times that fit beside the other tests, and `--fuzz-seed` does
+it in other ways. A failure names the folder with the files that caused it.
+"""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import fuzz_targets
+from fuzz_targets import TARGETS
+from fuzzing import Worker
+import pytest
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def faults(tmp_path_factory, request):
+    """Target's name -> faults, all found by two processes side by side."""
+    options = request.config.option
+    shares = sum(target.share for target in TARGETS)
+
+    def feed(targets):
+        worker = Worker(
+            tmp_path_factory.mktemp("fuzz"),
+            fuzz_targets.find_target,
+            fuzz_targets.REFUSALS,
+        )
+        try:
+            return {
+                target.name: worker.run(
+                    target.name,
+                    options.fuzz_seed,
+                    round(options.fuzz * target.share / shares),
+                )
+                for target in targets
+            }
+        finally:
+            worker.close()
+
+    with ThreadPoolExecutor(2) as pool:
+        one, other = pool.map(feed, [TARGETS[::2], TARGETS[1::2]])
+    return one | other
+
+
+@pytest.mark.parametrize("name", [target.name for target in TARGETS])
+def test_damaged_files_are_read_or_refused_in_a_line(faults, name):
+    found = faults[name]
+    assert not found, f"{len(found)} faults:\n" + "\n\n".join(found[:5])

@@ -1,0 +1,45 @@
+"""Recordings without a simulation: random bytes on the usual topics."""
+
+import numpy as np
+
+from cns_drake.recording.bag_writer import BagWriter
+from cns_drake.recording.frame_clock import START_NS, frame_stamp_ns
+from cns_drake.recording.mcap_recorder import recording_topics
+from cns_drake.recording.resuming import take_over_frames
+
+TOPICS = recording_topics(["lidar"])
+FRAMES = 50
+
+
+def open_bag(folder, title="drive", **kwargs):
+    return BagWriter(
+        folder,
+        TOPICS,
+        start_ns=START_NS,
+        attachments={"scenario.json": {"title": title}},
+        scenario={"title": title},
+        **kwargs,
+    )
+
+
+def record(folder, frames=FRAMES, size=60, **kwargs):
+    """Records, or goes on recording; returns the frames taken over."""
+    with open_bag(folder, **kwargs) as bag:
+        taken_over = take_over_frames(bag, TOPICS)
+        for frame in range(taken_over, frames):
+            write_frame(bag, frame, size)
+    return taken_over
+
+
+def write_frame(bag, frame, size=60):
+    """Writes a message of `size` bytes on each topic that frame has."""
+    rng = np.random.default_rng(frame)
+    for topic in reversed(TOPICS):
+        if not topic.latched or frame == 0:
+            data = rng.bytes(size)
+            bag.write(topic.name, frame_stamp_ns(frame), data, frame)
+
+
+def contents(folder):
+    """Name -> bytes of each file in a folder."""
+    return {path.name: path.read_bytes() for path in folder.iterdir()}

@@ -1,0 +1,76 @@
+"""What holds for the structures of every city."""
+
+import numpy as np
+import pytest
+import shapely
+from shapely.strtree import STRtree
+
+from cns_drake.city.geometry.object_parts import (
+    HEADROOM,
+    part_triangles,
+)
+from cns_drake.city.ground.streets import GROUND_TAG
+
+# Parts may reach this far outside a footprint: plinths, pilasters, steps.
+OVERHANG = 0.36
+
+
+def is_ground(structure) -> bool:
+    return GROUND_TAG in structure.tags
+
+
+def check_no_structure_stands_in_another(standing):
+    footprints = [s.footprint_W.buffer(-0.01) for s in standing]
+    for i, j in STRtree(footprints).query(footprints, "intersects").T:
+        if i < j:
+            pytest.fail(f"{standing[i].name} stands in {standing[j].name}")
+
+
+def check_no_structure_stands_in_a_lane(standing, network):
+    lanes = network.lane_area()
+    shapely.prepare(lanes)
+    for structure in standing:
+        footprint = structure.footprint_W.buffer(-0.01)
+        assert not lanes.intersects(footprint), structure.name
+
+
+def check_nothing_low_reaches_far_out_of_its_footprint(standing, network):
+    """The footprints tell the truth, so that the tests above mean something.
+
+    Every triangle that is partly below head height is clipped by eye height
+    planes through its vertices: only vertices are looked at, and edges that
+    cross head height are cut there.
+    """
+    lanes = network.lane_area()
+    shapely.prepare(lanes)
+    for structure in standing:
+        low = [
+            _low_points(part, structure.model.meshes)
+            for part in structure.model.parts
+        ]
+        points = np.concatenate(low)
+        allowed = structure.model.footprint.buffer(OVERHANG)
+        shapely.prepare(allowed)
+        inside = shapely.contains_xy(allowed, points[:, 0], points[:, 1])
+        assert inside.all(), f"{structure.name} {points[~inside][0]}"
+        c, s = np.cos(structure.yaw), np.sin(structure.yaw)
+        x, y, _ = structure.xyz
+        xy = points[:, :2] @ np.array([[c, s], [-s, c]]) + (x, y)
+        in_lane = shapely.contains_xy(lanes, xy[:, 0], xy[:, 1])
+        assert not in_lane.any(), f"{structure.name} {xy[in_lane][0]}"
+
+
+def _low_points(part, meshes) -> np.ndarray:
+    """Returns where a part's edges are below head height, in S.
+
+    An awning may hang at head height.
+    """
+    p, triangles = part_triangles(part, meshes)
+    points = [p[p[:, 2] < HEADROOM - 1e-6]]
+    for i, j in ((0, 1), (1, 2), (2, 0)):
+        a, b = p[triangles[:, i]], p[triangles[:, j]]
+        cut = (a[:, 2] - HEADROOM) * (b[:, 2] - HEADROOM) < -1e-9
+        a, b = a[cut], b[cut]
+        u = (HEADROOM - a[:, 2]) / (b[:, 2] - a[:, 2])
+        points.append(a + u[:, None] * (b - a))
+    return np.concatenate(points)

@@ -1,0 +1,78 @@
+"""A scheduler of Dask and its workers, as processes like on any cluster."""
+
+import contextlib
+import os
+import subprocess
+import sys
+import threading
+
+from distributed import Client
+import psutil
+
+
+class DaskProcesses:
+    """A context manager: a scheduler, and workers that it is told to start.
+
+    Attributes:
+        address: of the scheduler.
+        workers: the processes, one thread each and nobody to restart them.
+    """
+
+    def __init__(self, folder):
+        self._folder = folder
+        self.workers = []
+
+    def __enter__(self):
+        self._scheduler = self._start(
+            "dask_scheduler", "--host", "127.0.0.1", "--port", "0"
+        )
+        for line in self._scheduler.stderr:
+            if "Scheduler at:" in line:
+                self.address = line.split()[-1]
+                break
+        # Whoever does not read on stops who writes.
+        threading.Thread(
+            target=self._scheduler.stderr.read, daemon=True
+        ).start()
+        return self
+
+    def __exit__(self, *error):
+        for process in (*self.workers, self._scheduler):
+            process.kill()
+            process.wait()
+
+    def add_workers(self, number):
+        """Starts workers and waits until the scheduler knows them."""
+        for _ in range(number):
+            worker = self._start(
+                "dask_worker",
+                self.address,
+                *("--nthreads", "1", "--no-nanny", "--no-dashboard"),
+                *("--memory-limit", "0", "--local-directory", self._folder),
+                quiet=True,
+            )
+            self.workers.append(worker)
+        alive = sum(worker.poll() is None for worker in self.workers)
+        with Client(self.address, set_as_default=False) as client:
+            client.wait_for_workers(alive, timeout=600)
+
+    def job_processes(self):
+        """Returns (worker, process of a job) for all that run."""
+        found = []
+        for worker in self.workers:
+            with contextlib.suppress(psutil.NoSuchProcess):
+                children = psutil.Process(worker.pid).children()
+                found += [(worker, child) for child in children]
+        return found
+
+    def _start(self, module, *arguments, quiet=False):
+        # The workers find the functions of the tests as well.
+        path = os.pathsep.join(sys.path)
+        return subprocess.Popen(
+            [sys.executable, "-m", f"distributed.cli.{module}", *arguments],
+            env={**os.environ, "PYTHONPATH": path},
+            cwd=self._folder,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL if quiet else subprocess.PIPE,
+            text=True,
+        )

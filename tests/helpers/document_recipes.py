@@ -1,0 +1,367 @@
+"""How each command and example of the documents is run, on a small town.
+
+Where they speak of Metropolis or Riverside, a town of five roads takes their
+place, with two stages and two short drives. All that differs from what they
+say is written here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import yaml
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """How one piece of a document is run.
+
+    Attributes:
+        start: how the piece begins.
+        changes: (old, new) texts, applied in order; each old one is there.
+            `{scheduler}` in a new one is the scheduler's address.
+        after: names of recipes that make what it needs.
+        file: where its text is saved; otherwise its lines are run.
+        command: what is run once it is saved.
+        ready: for what does not end by itself, what it says on stderr when
+            others may go on.
+        prints: texts on stdout.
+        makes: files that are there afterwards, as globs.
+        prepare: called afterwards with the folder.
+    """
+
+    start: str
+    changes: tuple[tuple[str, str], ...] = ()
+    after: tuple[str, ...] = ()
+    file: str | None = None
+    command: str | None = None
+    ready: str | None = None
+    prints: tuple[str, ...] = ()
+    makes: tuple[str, ...] = ()
+    prepare: Callable[[Path], None] | None = None
+
+
+def shorten_drives(folder: Path) -> None:
+    """Two roads instead of some twenty, fast, with few beams."""
+    first = yaml.safe_load((folder / "town/sequence_01.yaml").read_text())
+    for stage in ("01", "02"):
+        short = first | {
+            "stage": stage,
+            "route": first["route"][:2],
+            "speeds": {"cruise": 14.0, "longitudinal_acceleration": 8.0},
+            "lidars": {"lidar": {"columns": 128}},
+            "frames": 100,
+        }
+        path = folder / f"town/sequence_{stage}.yaml"
+        path.write_text(yaml.safe_dump(short))
+
+
+_FIRST = ("metropolis_01", "town_01")
+_LAST = ("metropolis_04", "town_02")
+_CITY = ".venv/bin/cns-drake city "
+
+RECIPES = {
+    "roads": Recipe(
+        "defaults: {lanes:",
+        file="town/roads.yaml",
+        changes=(("140", "60"), ("110", "50"), ("240", "110"), ("25]", "20]")),
+    ),
+    "start a city": Recipe(
+        _CITY + "town --start",
+        after=("roads",),
+        makes=(
+            "town/city.yaml",
+            "town/stages.yaml",
+            "town/sequence_0[12].yaml",
+            "town/stage_0[12].sdf",
+        ),
+        prepare=shorten_drives,
+    ),
+    "table: city": Recipe(
+        "cns-drake city FOLDER",
+        changes=(("FOLDER", "town"),),
+        after=("start a city",),
+    ),
+    "own city": Recipe(
+        ".venv/bin/cns-drake list town",
+        changes=(("town_output", "output"),),
+        after=("table: city",),
+        prints=("town_01", "town_02", "output/town_01: 100 frames"),
+        makes=(
+            "output/town_0[12]/metadata.yaml",
+            "output/town_01_stage_02/metadata.yaml",
+            "output/report/report.html",
+            "output/pages/town_01.html",
+            "town.html",
+        ),
+    ),
+    "calibration": Recipe(
+        _CITY + "town --calibrate",
+        after=("table: city",),
+        prints=("TCR_sym",),
+    ),
+    "a city anew": Recipe(
+        _CITY + "worlds/metropolis",
+        changes=(("worlds/metropolis", "town"),),
+        after=("start a city",),
+    ),
+    "reproduce": Recipe(
+        "python3 -m venv .venv && .venv/bin/pip install . &&",
+        changes=(
+            ("python3 -m venv .venv && .venv/bin/pip install . && ", ""),
+            ("reproduce metropolis", "reproduce town"),
+        ),
+        after=("own city",),
+    ),
+    "reproduce all": Recipe(
+        "cns-drake reproduce --output output",
+        changes=(("reproduce", "reproduce town"),),
+        after=("own city",),
+    ),
+    "diagram script": Recipe(
+        ".venv/bin/python diagrams/metropolis_01.py",
+        changes=(("--frames 200", "--frames 2"),),
+        makes=("recordings/metropolis_01/metadata.yaml", "drive.html"),
+    ),
+    "evaluation": Recipe(
+        ".venv/bin/cns-eval tcr output/metropolis_01",
+        changes=(_FIRST, _LAST, ("stage_04", "stage_02")),
+        after=("own city",),
+        prints=("TCR_sym of the routes alone", "AUC"),
+    ),
+    "table: simulate": Recipe(
+        "cns-drake simulate NAME|SCENARIO.yaml",
+        changes=(
+            ("NAME|SCENARIO.yaml", "town/sequence_01.yaml"),
+            ("DIR", "output --recording town.html"),
+        ),
+        after=("own city",),
+    ),
+    "table: generate": Recipe(
+        "cns-drake generate [NAME ...]",
+        changes=(("[NAME ...]", "town/sequence_*.yaml"), ("DIR", "output")),
+        after=("own city",),
+        prints=("output/town_01", "output/town_02"),
+    ),
+    "table: repair": Recipe(
+        "cns-drake repair FILE",
+        changes=(
+            ("FILE", "output/town_01/town_01_0.mcap --output repaired.mcap"),
+        ),
+        after=("own city",),
+        prints=("the file was whole",),
+        makes=("repaired.mcap",),
+    ),
+    "table: scan": Recipe(
+        "cns-drake scan WORLD.sdf",
+        changes=(
+            ("WORLD.sdf", "town/stage_01.sdf"),
+            ("X Y Z ROLL PITCH YAW", "90 0 1.6 0 0 0"),
+            ("SCAN.pcd|.bin|.npy", "before.pcd"),
+        ),
+        after=("scans",),
+    ),
+    "table: export": Recipe(
+        "cns-drake export SEQUENCE",
+        changes=(
+            ("SEQUENCE", "output/town_02"),
+            ("cns|kitti", "kitti"),
+            ("DIR", "kitti"),
+        ),
+        after=("exports",),
+    ),
+    "table: reproduce": Recipe(
+        "cns-drake reproduce [MAP ...]",
+        changes=(("[MAP ...]", "town"), ("DIR", "output")),
+        after=("own city",),
+    ),
+    "table: tcr": Recipe(
+        "cns-eval tcr A B",
+        changes=(("A B", "before.pcd after.pcd"),),
+        after=("scans",),
+    ),
+    "table: pr": Recipe(
+        "cns-eval pr DATABASE QUERY",
+        changes=(
+            ("DATABASE", "output/town_01"),
+            ("QUERY", "output/town_02"),
+            ("METHOD", "scan-context++"),
+        ),
+        after=("evaluation",),
+    ),
+    "table: scores": Recipe(
+        "cns-eval scores",
+        changes=(
+            ("METHOD", "solid"),
+            ("database DIR", "database kitti/sequences/01/velodyne"),
+            ("query DIR", "query kitti/sequences/02/velodyne"),
+            ("FILE.csv", "scores.csv"),
+        ),
+        after=("exports",),
+        makes=("scores.csv",),
+    ),
+    "table: report": Recipe(
+        "cns-eval report DIR",
+        changes=(("report DIR", "report cns"), ("DIR", "report")),
+        after=("exports",),
+        prints=("report/report.",),
+    ),
+    "table: trend": Recipe(
+        "cns-eval trend DATABASE ...",
+        changes=(
+            ("DATABASE ...", "family/town_01_m*"),
+            ("DRIVE", "family/town_02"),
+            ("DIR", "trend"),
+        ),
+        after=("family drives",),
+    ),
+    "Python": Recipe(
+        "from evaluation import sequences",
+        changes=(_LAST,),
+        after=("own city",),
+        file="read.py",
+        command=".venv/bin/python read.py",
+        prints=("1700000001500000000", "'tree_"),
+    ),
+    "own diagram": Recipe(
+        "import numpy as np\nfrom pydrake",
+        file="own_diagram.py",
+        command=".venv/bin/python own_diagram.py",
+        prints=("the nearest 7.90 m ahead",),
+    ),
+    "exports": Recipe(
+        ".venv/bin/cns-drake export",
+        changes=(_FIRST, _LAST),
+        after=("own city",),
+        makes=(
+            "cns/Town/02/gt.csv",
+            "cns/Town/02/imu.csv",
+            "cns/Town/02/pcd/1700000000000000000.pcd",
+            "cns/transformation_lidar.yaml",
+            "cns/transformation_imu.yaml",
+            "cns/export.yaml",
+            "kitti/sequences/02/velodyne/000000.bin",
+            "kitti/sequences/02/labels/000000.label",
+            "kitti/sequences/02/times.txt",
+            "kitti/sequences/02/calib.txt",
+            "kitti/sequences/02/first_pose.txt",
+            "kitti/poses/02.txt",
+        ),
+    ),
+    "scenario": Recipe("map: town ", file="drive.yaml"),
+    "drive": Recipe(
+        ".venv/bin/cns-drake simulate drive.yaml",
+        changes=(("--output", "--frames 2 --output"),),
+        after=("scenario", "start a city"),
+        prints=("recordings/drive: 2 frames",),
+    ),
+    "scenario of a world": Recipe("world: town/", file="tour.yaml"),
+    "waypoints": Recipe("x,y", file="tour.csv"),
+    "tour": Recipe(
+        ".venv/bin/cns-drake simulate tour.yaml",
+        changes=(("--output", "--frames 2 --output"),),
+        after=("scenario of a world", "waypoints", "start a city"),
+        prints=("recordings/tour: 2 frames",),
+    ),
+    "scans": Recipe(
+        ".venv/bin/cns-drake scan town",
+        changes=(("--pose 200", "--pose 90"),),
+        after=("start a city",),
+        prints=("before.pcd: ", "after.pcd: ", "TCR_sym"),
+        makes=("before.pcd", "after.pcd"),
+    ),
+    "family": Recipe(
+        "base: riverside_01",
+        changes=(
+            ("riverside_01", "town/sequence_01.yaml"),
+            ("count: 20", "count: 2"),
+            ("0, 1, 2", "0"),
+        ),
+        file="family.yaml",
+    ),
+    "family drives": Recipe(
+        ".venv/bin/cns-drake generate riverside_02 --vary",
+        changes=(
+            ("generate riverside_02", "generate town/sequence_02.yaml"),
+            ("--vary", "--frames 60 --vary"),
+            ("riverside_01", "town_01"),
+            ("riverside_02", "town_02"),
+        ),
+        after=("family", "start a city"),
+        prints=("family/town_01_m600_s0", "trend/trend.csv"),
+        makes=("family/scenarios/town_01_m600_s0.yaml", "trend/trend.pdf"),
+    ),
+    "asking family": Recipe(
+        "base: riverside_02",
+        changes=(("riverside_02", "town/sequence_02.yaml"), ("1, 2, 3", "1")),
+        file="asking.yaml",
+    ),
+    "other cities": Recipe(
+        ".venv/bin/cns-drake generate --vary asking.yaml",
+        changes=(("--vary", "--frames 3 --vary"),),
+        after=("asking family", "start a city"),
+        prints=("family/town_02_c1_m000_s0",),
+        makes=("family/cities/town_c1/stage_02.sdf",),
+    ),
+    "scheduler": Recipe(
+        ".venv/bin/dask scheduler",
+        changes=(("scheduler", "scheduler --host 127.0.0.1 --port 0"),),
+        ready=r"Scheduler at: +(?P<scheduler>tcp://\S+)",
+    ),
+    "workers": Recipe(
+        ".venv/bin/dask worker",
+        changes=(("tcp://head:8786", "{scheduler}"), ("8", "1")),
+        after=("scheduler",),
+        ready="Registered to",
+    ),
+    "cluster": Recipe(
+        ".venv/bin/cns-drake generate --output /shared",
+        changes=(
+            ("generate", "generate tour.yaml --frames 2"),
+            ("/shared/output", "shared"),
+            ("tcp://head:8786", "{scheduler}"),
+        ),
+        after=("workers", "scenario of a world", "waypoints", "start a city"),
+        prints=("shared/tour",),
+        makes=("shared/tour/metadata.yaml",),
+    ),
+    "method": Recipe(
+        "import numpy as np\n\nfrom evaluation", file="heights.py"
+    ),
+    "linter": Recipe(
+        ".venv/bin/ruff check",
+        # Of the examples in the documents, by the rules of this project.
+        after=("method", "Python", "own diagram"),
+        prints=("All checks passed!", "already formatted"),
+    ),
+    "own method": Recipe(
+        ".venv/bin/cns-eval pr output/metropolis_01",
+        changes=(_FIRST, _LAST),
+        after=("method", "own city"),
+        prints=("heights", "AUC"),
+    ),
+    "own data": Recipe(
+        ".venv/bin/cns-eval tcr kitti",
+        changes=(("sequences/04", "sequences/02"),),
+        after=("exports",),
+        prints=("TCR_sym", "ring++"),
+    ),
+}
+
+# What cannot run here: how it begins, and why.
+NOT_RUN = {
+    "python3 -m venv .venv && .venv/bin/pip install -e": "installs from the "
+    "network and runs these tests; `.ci/run` takes this very line",
+    "apt install": "changes the system; `.ci/run` installs the same packages",
+    "npm ci": "installs from the network; `.ci/run` does it",
+    ".venv/bin/pip install -e '.[docs]'": "installs from the network",
+    ".venv/bin/pip install pre-commit": "installs from the network and changes"
+    " the repository's hooks",
+    ".venv/bin/python -m pytest tests/": "tests in a test; `.ci/run` runs all"
+    " of them",
+    "ros2 bag": "needs ROS 2; test_mcap_recorder and others read "
+    "recordings with rosbags' reader of rosbag2 folders",
+    "@misc{song2025city": "a citation",
+}

@@ -1,0 +1,129 @@
+"""A folder in which the documents are followed, recipe after recipe."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from pathlib import Path
+import queue
+import re
+import subprocess
+import sys
+import threading
+
+from document_recipes import NOT_RUN, RECIPES
+import documents
+
+# A machine that runs other tests beside may take its time to answer.
+_PATIENT = {"DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "300s"}
+
+
+def claims(piece: documents.Piece) -> list[str]:
+    """Returns the recipes of a piece, or why it is not run: one, hopefully."""
+    starts = {name: recipe.start for name, recipe in RECIPES.items()}
+    starts |= {reason: start for start, reason in NOT_RUN.items()}
+    return [
+        name for name, start in starts.items() if piece.text.startswith(start)
+    ]
+
+
+class Workplace:
+    """Commands run as they are written, with the programs under test.
+
+    A recipe is followed once, and so is a command that several have. What
+    does not end by itself is ended by `close`.
+    """
+
+    def __init__(self, folder: Path):
+        self.folder = folder
+        self._started = contextlib.ExitStack()
+        self._values: dict[str, str] = {}
+        self._pieces = [
+            piece
+            for page in documents.pages()
+            for piece in documents.pieces(page)
+        ]
+        self._followed: dict[str, str] = {}
+        self._printed: dict[str, str] = {}
+        (folder / ".venv").symlink_to(sys.prefix)
+        for name in ("diagrams", "pyproject.toml"):
+            (folder / name).symlink_to(documents.ROOT / name)
+
+    def follow(self, name: str) -> str:
+        """Follows a recipe, after those that it needs; returns its stdout."""
+        if name not in self._followed:
+            for needed in RECIPES[name].after:
+                self.follow(needed)
+            self._followed[name] = self._follow(name)
+        return self._followed[name]
+
+    def close(self) -> None:
+        """Ends what is still running."""
+        self._started.close()
+
+    def _follow(self, name: str) -> str:
+        recipe = RECIPES[name]
+        (piece,) = (p for p in self._pieces if name in claims(p))
+        text = piece.text
+        for old, new in recipe.changes:
+            assert old in text, f"{piece.place}: no {old!r} to change"
+            text = text.replace(old, new.format(**self._values))
+        commands = text.splitlines()
+        if recipe.file is not None:
+            path = self.folder / recipe.file
+            path.parent.mkdir(exist_ok=True)
+            path.write_text(text)
+            commands = [recipe.command] if recipe.command else []
+        if recipe.ready is not None:
+            self._start(text, recipe.ready)
+            commands = []
+        printed = [self._run(piece.place, command) for command in commands]
+        if recipe.prepare is not None:
+            recipe.prepare(self.folder)
+        return "".join(printed)
+
+    def _run(self, place: str, command: str) -> str:
+        # The table of commands names them without their folder.
+        command = f".venv/bin/{command.removeprefix('.venv/bin/')}"
+        if command not in self._printed:
+            done = subprocess.run(
+                ["bash", "-euo", "pipefail", "-c", command],
+                cwd=self.folder,
+                capture_output=True,
+                text=True,
+                check=False,
+            )
+            assert done.returncode == 0, f"{place}: {command}\n{done.stderr}"
+            self._printed[command] = done.stdout
+        return self._printed[command]
+
+    def _start(self, command: str, ready: str) -> None:
+        process = subprocess.Popen(
+            ["bash", "-c", f"exec {command}"],
+            cwd=self.folder,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=os.environ | _PATIENT,
+        )
+        # Read to the end, or the process would stop when the pipe is full.
+        lines = queue.SimpleQueue()
+        reader = threading.Thread(target=_pass_on, args=(process, lines))
+        reader.start()
+        self._started.callback(reader.join)
+        self._started.callback(process.wait)
+        self._started.callback(process.terminate)
+        told = []
+        while (line := lines.get()) is not None:
+            told.append(line)
+            if match := re.search(ready, line):
+                self._values |= match.groupdict()
+                return
+        raise AssertionError(f"{command}\n{''.join(told)}")
+
+
+def _pass_on(process, lines: queue.SimpleQueue) -> None:
+    """Puts the lines of a process's stderr into a queue, and None."""
+    with process.stderr:
+        for line in process.stderr:
+            lines.put(line)
+    lines.put(None)

@@ -1,0 +1,84 @@
+"""Paths of known shape and shipped drives, for several tests."""
+
+import numpy as np
+import yaml
+
+from cns_drake.motion.speed_profile import Speeds
+from cns_drake.motion.trajectory import Trajectory
+from cns_drake.roads.lane_path import LanePath
+from cns_drake.roads.network import load_road_network
+from cns_drake.roads.route import make_lane_path
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.shipped import shipped_sequences
+
+SPACING = 2.0
+NO_LIMIT = 100.0
+
+
+def lane_path(points) -> LanePath:
+    """Returns a path without speed limits along evenly spaced points."""
+    points = np.asarray(points, dtype=float)
+    return LanePath(points, SPACING, np.full(len(points), NO_LIMIT))
+
+
+def helix_points(radius, slope, count, start=0.3) -> np.ndarray:
+    """Returns points on a left-hand bend that climbs steadily.
+
+    Args:
+        radius: of the bend seen from above [m].
+        slope: height per horizontal distance.
+        count: how many points, SPACING apart along the helix.
+        start: polar angle of the first [rad].
+    """
+    arc = SPACING / np.hypot(1.0, slope) * np.arange(count)
+    angle = start + arc / radius
+    return np.stack(
+        [
+            5.0 + radius * np.cos(angle),
+            -7.0 + radius * np.sin(angle),
+            1.0 + slope * arc,
+        ],
+        axis=1,
+    )
+
+
+def smoothed_radius(radius, slope=0.0) -> float:
+    """Returns the radius of the quintic spline on `helix_points`.
+
+    A uniform B-spline of order 6 multiplies a sampled wave of angular
+    frequency w by sinc(w h / 2)^6 (its Fourier transform); aliases are
+    weaker by (h / (2 pi r))^6 and do not matter here.
+    """
+    x = SPACING / np.hypot(1.0, slope) / (2 * radius)
+    return radius * (np.sin(x) / x) ** 6
+
+
+def wavy_points(seed) -> np.ndarray:
+    """Returns a random smooth road with bends and slopes, from a seed."""
+    rng = np.random.default_rng(seed)
+    s = SPACING * np.arange(150)
+    heading, height = np.zeros_like(s), np.zeros_like(s)
+    for _ in range(4):
+        length, phase = rng.uniform(60, 200), rng.uniform(0, 2 * np.pi)
+        heading += rng.uniform(0.2, 0.5) * np.sin(
+            2 * np.pi * s / length + phase
+        )
+        height += rng.uniform(0.3, 1.0) * np.sin(2 * np.pi * s / length + phase)
+    flat = np.sqrt(SPACING**2 - np.diff(height, prepend=height[0]) ** 2)
+    x = np.cumsum(flat * np.cos(heading))
+    y = np.cumsum(flat * np.sin(heading))
+    return np.stack([x, y, height], axis=1)
+
+
+def shipped_drive(name) -> tuple[Scenario, LanePath, Trajectory]:
+    """Returns a shipped sequence with its lane path and trajectory."""
+    values = yaml.safe_load(shipped_sequences()[name].read_text())
+    scenario = Scenario.model_validate({"name": name, **values})
+    network = load_road_network(scenario.roads_file)
+    path = make_lane_path(network, scenario.route, SPACING)
+    return scenario, path, Trajectory(path, scenario.speeds)
+
+
+CAREFUL = Speeds(
+    cruise=9.0, longitudinal_acceleration=1.5, lateral_acceleration=2.0
+)

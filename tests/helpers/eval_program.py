@@ -1,0 +1,78 @@
+"""Running `cns-eval` in the process of a test, on two small drives."""
+
+import math
+import signal
+import sys
+
+from drive_files import make_scan, write_recording, yaw_pose
+import numpy as np
+import pytest
+
+from evaluation.command_line import cli
+from evaluation.support import progress_bars, terminal
+from evaluation.support.interrupts import SIGNALS
+
+
+def make_block_scene(seed):
+    rng = np.random.default_rng([seed, 5])
+    parts = []
+    for _ in range(40):
+        foot = rng.uniform(-60.0, 60.0, 2)
+        size = [*rng.uniform(1.0, 8.0, 2), rng.uniform(2.0, 20.0)]
+        parts.append(
+            rng.uniform(size=(150, 3)) * size + np.array([*foot, -1.6])
+        )
+    return np.concatenate(parts)
+
+
+def write_towns(folder):
+    """Writes two drives of eight frames, 10 m apart; and their scans."""
+    for name, side in (("town_01", 0.0), ("town_02", 1.0)):
+        scans = [make_block_scene(i) - [0.0, side, 0.0] for i in range(8)]
+        write_recording(
+            folder / name,
+            [make_scan(scan) for scan in scans],
+            [yaw_pose(10.0 * i, side, 0.0, 0.0) for i in range(8)],
+        )
+        singles = folder / f"{name}_scans"
+        singles.mkdir()
+        for i, scan in enumerate(scans[:4]):
+            four = np.c_[scan, np.ones(len(scan))].astype(np.float32)
+            four.tofile(singles / f"{i:06d}.bin")
+        np.save(folder / f"{name}.npy", np.concatenate(scans))
+
+
+def run(capsys, *arguments):
+    """Runs `cns-eval` in this process; returns status, stdout, stderr."""
+    return run_program(capsys, "cns-eval", cli.main, *arguments)
+
+
+def run_program(capture, name, main, *arguments):
+    """Runs a program in this process; returns status, stdout, stderr."""
+    old = sys.argv
+    # The program leaves signals as a process that ends wants them.
+    handlers = {number: signal.getsignal(number) for number in SIGNALS}
+    sys.argv = [name, *map(str, arguments)]
+    try:
+        with pytest.MonkeyPatch.context() as patch:
+            # No lines of progress, however slow the machine is.
+            for module in (progress_bars, terminal):
+                patch.setattr(module, "LINE_INTERVAL", math.inf)
+            with pytest.raises(SystemExit) as info:
+                main()
+    finally:
+        sys.argv = old
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+    out, err = capture.readouterr()
+    return info.value.code, out, err
+
+
+def assert_refused(capsys, arguments, *words):
+    status, out, err = run(capsys, *arguments)
+    assert status == 2
+    assert out == ""
+    assert err.startswith("cns-eval: error: ")
+    assert err.count("\n") == 1
+    for word in words:
+        assert str(word) in err

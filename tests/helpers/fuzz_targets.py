@@ -1,0 +1,353 @@
+"""What reads files, each with good files to begin with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+import shutil
+
+from bag_recordings import contents, record
+import bent_drive
+import dataset_folders
+from fuzzing import Target
+import helipr_drive
+from mcap.writer import CompressionType
+from mcap_bytes import write_mcap
+import mulran_drive
+import numpy as np
+from small_city import PLAN, ROADS, STAGES
+from small_map import box_visual, world_text
+import yaml
+
+from cns_drake.city.generation.city_structures import make_city
+from cns_drake.city.plan.city_plan import load_plan
+from cns_drake.city.plan.stages import load_stages
+from cns_drake.export.exporting import export_sequence
+from cns_drake.pictures.stage_pictures import load_views
+from cns_drake.recording.frame_clock import FRAME_PERIOD
+from cns_drake.recording.recording_folder import RecordingFolder
+from cns_drake.recording.repair import repair_mcap
+from cns_drake.roads.network import load_road_network
+from cns_drake.roads.route import Route, make_lane_path
+from cns_drake.scenarios.planning import plan_drive
+from cns_drake.scenarios.scenario import Scenario, load_scenario
+from cns_drake.scenarios.sequence_table import sequence_rows
+from cns_drake.scenarios.variation import load_family, write_scenarios
+from cns_drake.scene.perception_geometry import read_perception_geometry
+from cns_drake.scene.world import load_world
+from cns_drake.sensors.beam_pattern import make_beam_pattern
+from cns_drake.simulation.scanning import save_scan, scan_world
+from cns_drake.simulation.simulation import simulate
+from evaluation import sequences
+from evaluation.clouds.cloud_files import read_cloud
+from evaluation.support.errors import InputError
+from evaluation.support.errors import InputError as ReadingError
+
+REFUSALS = (InputError, ReadingError)
+
+_ROUTE = [
+    {"road": "north", "direction": "forward", "lane": 1, "start": 5.0},
+    {"road": "south", "direction": "forward", "lane": 1, "end": 60.0},
+]
+_SPEEDS = {
+    "cruise": 8.0,
+    "longitudinal_acceleration": 1.5,
+    "lateral_acceleration": 2.0,
+}
+_VISUALS = (
+    box_visual("ground/plate", (0, 0, -0.5, 0, 0, 0), (300, 300, 1)),
+    box_visual("hall_001/body", (30, 25, 5, 0, 0, 0.3), (20, 12, 10)),
+    '<visual name="wedge_001/roof"><pose>5 9 0 0 0 1</pose><geometry><mesh>'
+    "<uri>wedge.obj</uri><scale>2 2 2</scale></mesh></geometry><material>"
+    "<diffuse>0.5 0.2 0.1 1</diffuse></material></visual>",
+    '<visual name="ball"><geometry><sphere><radius>2</radius></sphere>'
+    "</geometry></visual>",
+    '<visual name="tree_001/trunk"><geometry><cylinder><radius>0.3</radius>'
+    "<length>4</length></cylinder></geometry></visual>",
+)
+_WEDGE = (
+    "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+)
+_TABLE = (
+    "instance,name,class,label,x,y,z,yaw,tags\n"
+    "1,ground,terrain,72,0.0,0.0,0.0,0.0,\n"
+    "2,hall_001,building,50,30.0,25.0,0.0,0.3,\n"
+    "3,wedge_001,building,50,5.0,9.0,0.0,1.0,\n"
+    "4,tree_001,vegetation,70,0.0,0.0,0.0,0.0,\n"
+)
+_VIEWS = (
+    "street: {position: [1, 2, 3], target: [10, 20, 3], fov_y: 60}\n"
+    "park: {position: [5.5, 0, 30], target: [0, 0, 0]}\n"
+)
+
+
+def _write_town(folder: Path) -> None:
+    """A map with roads, a stage, a table and a drive of its own."""
+    (folder / "roads.yaml").write_text(ROADS)
+    (folder / "stage_01.sdf").write_text(world_text(_VISUALS))
+    (folder / "wedge.obj").write_text(_WEDGE)
+    (folder / "structures.csv").write_text(_TABLE)
+    (folder / "tour.csv").write_text(
+        "x,y,z\n-10,5,0\n40,5,0.5\n40,60,1\n20,90,1\n"
+    )
+    lidar = {"preset": "vlp-16", "columns": 16, "xyz": [0.1, 0.0, 1.7]}
+    drives = {
+        "sequence_01": {"map": ".", "stage": "01", "route": _ROUTE},
+        "tour": {"world": "stage_01.sdf", "waypoints": "tour.csv"},
+    }
+    for name, values in drives.items():
+        shared = {
+            "title": "a tour",
+            "speeds": _SPEEDS,
+            "lidars": {"lidar": lidar},
+            "imu": {"xyz": [-1.0, 0.0, 1.6], "rpy_deg": [0.0, 0.0, 2.0]},
+            "frames": 2,
+            "seed": 3,
+        }
+        (folder / f"{name}.yaml").write_text(yaml.safe_dump(values | shared))
+    family = {
+        "base": "sequence_01.yaml",
+        "stage": "01",
+        "missing": {"from": 0.0, "to": 0.5, "count": 2},
+        "seeds": [0, 1],
+        "routes": {"count": 2, "length": 60.0, "seed": 1},
+        "lidars": ["cns", "vlp-16"],
+    }
+    (folder / "family.yaml").write_text(yaml.safe_dump(family))
+    (folder / "views.yaml").write_text(_VIEWS)
+
+
+def _plan(name: str):
+    return lambda folder: plan_drive(load_scenario(folder / f"{name}.yaml"))
+
+
+def _simulate(folder: Path) -> None:
+    """Records what is left of a scenario, unless that takes too long."""
+    scenario = load_scenario(folder / "sequence_01.yaml")
+    if _is_small(scenario):
+        simulate(scenario, folder / "out")
+
+
+def _is_small(scenario: Scenario) -> bool:
+    beams = sum(
+        len(lidar.pattern().d_Sset) for lidar in scenario.lidars.values()
+    )
+    return beams < 40_000 and (scenario.frames or 1000) < 20
+
+
+def _vary(folder: Path) -> None:
+    members = load_family(folder / "family.yaml")
+    if len(members) < 100:
+        write_scenarios(members, folder / "out" / "scenarios")
+
+
+def _load_roads(folder: Path) -> None:
+    network = load_road_network(folder / "roads.yaml")
+    make_lane_path(network, Route.model_validate(_ROUTE), 2.0, "route")
+    for area in (network.carriageway, network.sidewalks, network.medians):
+        area()
+
+
+def _list_town(folder: Path) -> None:
+    sequence_rows(folder)
+
+
+def _write_city(folder: Path) -> None:
+    (folder / "roads.yaml").write_text(ROADS)
+    (folder / "city.yaml").write_text(PLAN)
+    (folder / "stages.yaml").write_text(STAGES)
+    (folder / "views.yaml").write_text(_VIEWS)
+
+
+def _load_views(folder: Path) -> None:
+    for view in load_views(folder / "views.yaml").values():
+        view.project(np.eye(3), 96, 54)
+
+
+def _load_stages(folder: Path) -> None:
+    names = ["brick_block_001", "office_001", "tree_001", "tree_002", "rest"]
+    stages = load_stages(folder / "stages.yaml", names)
+    for stage in stages.stages:
+        stages.absent(stage)
+
+
+def _lay_out(folder: Path) -> None:
+    make_city(folder).meshes()
+
+
+def _scan(folder: Path) -> None:
+    from pydrake.math import RigidTransform
+
+    world = load_world(folder / "stage_01.sdf")
+    read_perception_geometry(world.scene_graph.model_inspector())
+    pattern = make_beam_pattern("vlp-16", FRAME_PERIOD, num_columns=8)
+    points = scan_world(world, RigidTransform([0.0, 0.0, 2.0]), pattern)
+    save_scan(points, folder / "out" / "scan.pcd")
+
+
+def _write_recording(folder: Path, **options) -> None:
+    drive = bent_drive.write_drive(folder / "town_07", **options)
+    information = {"version": 8, "storage_identifier": "mcap"}
+    (drive / "metadata.yaml").write_text(
+        yaml.safe_dump({"rosbag2_bagfile_information": information})
+    )
+
+
+def _read_sequence(path: Path):
+    """Reads all that there is, and returns it."""
+    sequence = sequences.open(path)
+    return repr(
+        (
+            len(sequence),
+            sequence.world_frame,
+            sequence.stamps_ns.tolist(),
+            sequence.X_WS.tolist(),
+            getattr(sequence, "odometry", None),
+            getattr(sequence, "imu", None),
+            sequence.scenario,
+            sequence.instances,
+            sequence.notes,
+            [(scan.dtype, scan.tobytes()) for scan in sequence],
+        )
+    )
+
+
+def _export(format_name: str):
+    def write(folder: Path) -> None:
+        drive = bent_drive.write_drive(folder / "rec" / "town_07")
+        export_sequence(drive, format_name, folder / format_name)
+        shutil.rmtree(folder / "rec")
+
+    return write
+
+
+def _repair(folder: Path) -> None:
+    repair_mcap(folder / "source.mcap", folder / "out" / "repaired.mcap")
+
+
+def _write_source(folder: Path) -> None:
+    (folder / "source.mcap").write_bytes(
+        write_mcap(CompressionType.LZ4, profile="ros2")
+    )
+
+
+def _write_interrupted(folder: Path) -> None:
+    """What a run leaves that is killed just before its end."""
+    record(folder / "whole" / "drive", 20)
+    files = RecordingFolder(folder / "drive")
+    shutil.copytree(folder / "whole" / "drive", files.path)
+    files.mcap.rename(f"{files.mcap}.part")
+    for file in (files.metadata, files.scenario):
+        file.unlink()
+
+
+def _go_on(folder: Path) -> dict[str, bytes]:
+    """Goes on with a copy; whatever is left, the result is the same."""
+    shutil.copytree(folder / "drive", folder / "out" / "drive")
+    record(folder / "out" / "drive", 20)
+    return contents(folder / "out" / "drive")
+
+
+def _write_clouds(folder: Path) -> None:
+    points = dataset_folders.make_points(20)
+    dataset_folders.write_pcd(folder / "binary.pcd", points)
+    rows = "\n".join(" ".join(map(str, (*p, 0.5))) for p in points.tolist())
+    header = (folder / "binary.pcd").read_bytes().split(b"DATA")[0].decode()
+    (folder / "text.pcd").write_text(f"{header}DATA ascii\n{rows}\n")
+    # LZF may be all literals.
+    plain = np.hstack([points, points[:, :1]]).T.astype("<f4").tobytes()
+    packed = b"".join(
+        bytes([len(plain[k : k + 32]) - 1]) + plain[k : k + 32]
+        for k in range(0, len(plain), 32)
+    )
+    sizes = np.array([len(packed), len(plain)], "<u4").tobytes()
+    (folder / "packed.pcd").write_bytes(
+        f"{header}DATA binary_compressed\n".encode() + sizes + packed
+    )
+    for name in ("ascii", "binary_little_endian"):
+        head = (
+            f"ply\nformat {name} 1.0\nelement vertex 20\nproperty float x\n"
+            "property float y\nproperty float z\nend_header\n"
+        ).encode()
+        text = "\n".join(" ".join(map(str, p)) for p in points.tolist())
+        body = text.encode() if name == "ascii" else points.tobytes()
+        (folder / f"{name}.ply").write_bytes(head + body)
+    (folder / "points.bin").write_bytes(dataset_folders.xyzi(points))
+    np.save(folder / "points.npy", points)
+    record_type = [("x", "f8"), ("y", "f4"), ("z", "i2"), ("i", "u1")]
+    np.save(folder / "records.npy", np.zeros(20, dtype=record_type))
+
+
+def _read_clouds(folder: Path) -> None:
+    for path in sorted(folder.glob("*.*")):
+        read_cloud(path).tobytes()
+
+
+def _write_mulran(folder: Path) -> None:
+    mulran_drive.write_drive(folder / "drive")
+
+
+def _write_helipr(folder: Path) -> None:
+    helipr_drive.write_drive(folder / "drive", ("Ouster",))
+
+
+def _read_drive(folder: Path):
+    return _read_sequence(folder / "drive")
+
+
+_TOWN = ("roads.yaml", "stage_01.sdf", "structures.csv", "wedge.obj")
+
+TARGETS = (
+    Target(
+        "scenario", 7, _write_town, ("sequence_01.yaml",),
+        _plan("sequence_01"),
+    ),
+    Target(
+        "drive", 0.7, _write_town,
+        ("sequence_01.yaml", *_TOWN), _simulate,
+    ),
+    Target(
+        "waypoints", 6, _write_town, ("tour.yaml", "tour.csv"), _plan("tour")
+    ),
+    Target("family", 2, _write_town, ("family.yaml", "structures.csv"), _vary),
+    Target(
+        "world", 3, _write_town,
+        ("stage_01.sdf", "structures.csv", "wedge.obj"), _scan,
+    ),
+    Target("roads", 7, _write_town, ("roads.yaml",), _load_roads),
+    Target(
+        "listing", 0.5, _write_town, ("sequence_01.yaml", "structures.csv"),
+        _list_town,
+    ),
+    Target("views", 10, _write_city, ("views.yaml",), _load_views),
+    Target("stages", 10, _write_city, ("stages.yaml",), _load_stages),
+    Target(
+        "plan", 12, _write_city, ("city.yaml",),
+        lambda folder: load_plan(folder / "city.yaml"),
+    ),
+    Target("city", 0.3, _write_city, ("city.yaml", "roads.yaml"), _lay_out),
+    Target(
+        "mcap", 20, _write_recording, ("town_07/*",),
+        lambda folder: _read_sequence(folder / "town_07"),
+        exact=True, only_bytes=True,
+    ),
+    Target("repair", 4, _write_source, ("source.mcap",), _repair),
+    Target(
+        "resume", 1.2, _write_interrupted, ("drive/*.part",), _go_on, exact=True
+    ),
+    Target("clouds", 20, _write_clouds, ("*.*",), _read_clouds),
+    Target(
+        "kitti", 12, _export("kitti"), ("kitti/**/*",),
+        lambda folder: _read_sequence(folder / "kitti" / "sequences" / "07"),
+    ),
+    Target(
+        "cns", 7, _export("cns"), ("cns/**/*",),
+        lambda folder: _read_sequence(folder / "cns" / "Town" / "07"),
+    ),
+    Target("mulran", 6, _write_mulran, ("drive/**/*",), _read_drive),
+    Target("helipr", 6, _write_helipr, ("drive/**/*",), _read_drive),
+)  # fmt: skip
+
+
+def find_target(name: str) -> Target:
+    """Returns the target of a name."""
+    return next(target for target in TARGETS if target.name == name)

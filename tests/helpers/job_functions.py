@@ -1,0 +1,81 @@
+"""What jobs of the tests do; imported by the processes in which they run."""
+
+import os
+from pathlib import Path
+import signal
+import threading
+
+from evaluation.support.errors import InputError
+
+
+def join(inputs, path, tell):
+    """Writes the contents of files, one after the other."""
+    for done, file in enumerate(inputs):
+        tell.progress(done, len(inputs))
+        assert file.is_file()
+    path.write_text("+".join(file.read_text() for file in inputs) or path.name)
+
+
+def is_there(inputs, path):
+    return path.is_file()
+
+
+def yes(*arguments):
+    return True
+
+
+def cannot_tell(*arguments):
+    raise InputError("FILE: cannot be read")
+
+
+def note_process(path, tell):
+    tell.note("here I am")
+    path.write_text(f"{os.getpid()} {os.getppid()} {os.getsid(0)}")
+
+
+def refuse(tell):
+    raise InputError("FILE: field: cannot be used")
+
+
+def stumble(tell):
+    raise ZeroDivisionError("over nothing")
+
+
+def die(tries, tell):
+    """Dies each time, and leaves a mark."""
+    with tries.open("a") as stream:
+        stream.write("x")
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def die_first(tries, path, tell):
+    """Dies twice, of two causes, then succeeds."""
+    with tries.open("a") as stream:
+        stream.write("x")
+    tried = len(tries.read_text())
+    if tried == 1:
+        os._exit(3)
+    if tried == 2:
+        raise MemoryError
+    path.write_text("at last")
+
+
+def hold(pipe: Path, tell):
+    """Says its process through a named pipe, then works for ever."""
+    with pipe.open("w") as stream:
+        stream.write(str(os.getpid()))
+    # However a signal falls, it is noticed.
+    while not threading.Event().wait(0.1):
+        pass
+
+
+def kill_worker(tries, tell):
+    """Takes the worker along, and leaves a mark."""
+    with tries.open("a") as stream:
+        stream.write("x")
+    os.kill(os.getppid(), signal.SIGKILL)
+    threading.Event().wait()
+
+
+def note_variable(name, output, tell):
+    output.write_text(repr(os.environ.get(name)))

@@ -1,0 +1,126 @@
+"""The cities as the generator makes them and as their files hold them."""
+
+from dataclasses import dataclass
+import fcntl
+from functools import cache
+import os
+from pathlib import Path
+import pickle
+
+import numpy as np
+from pydrake.geometry import Role, SceneGraph
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+
+from cns_drake.city.generation.city_structures import City, make_city
+from cns_drake.city.geometry.object_parts import part_triangles
+from cns_drake.city.geometry.structures import Structure
+from cns_drake.city.ground.streets import GROUND_TAG
+from cns_drake.roads.network import RoadNetwork, load_road_network
+from cns_drake.scenarios.shipped import worlds_folder
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a city should have; ranges hold least and greatest count.
+
+    Attributes:
+        last_stage: the whole city.
+        buildings, trees, small: numbers of structures that stand.
+        sides: least and greatest length of the world's sides [m].
+    """
+
+    last_stage: str
+    buildings: tuple[int, int]
+    trees: tuple[int, int]
+    small: tuple[int, int]
+    sides: tuple[float, float]
+
+
+PLANS = {
+    "metropolis": Plan("04", (60, 110), (200, 400), (400, 900), (330, 420)),
+    "riverside": Plan("02", (110, 170), (350, 500), (900, 1400), (460, 560)),
+    "downtown": Plan("04", (150, 230), (330, 480), (900, 1500), (490, 510)),
+    "suburbia": Plan("02", (70, 110), (300, 500), (500, 900), (330, 420)),
+}
+
+
+def world_of(name: str) -> Path:
+    """Returns the folder of a map."""
+    return worlds_folder() / name
+
+
+@cache
+def city(name: str) -> City:
+    """Returns the generated city, made by the first process that asks."""
+    file = Path(os.environ["CNS_DRAKE_TEST_CITIES"]) / f"{name}.pickle"
+    # Opened without truncation: who waits must find what was written.
+    with file.open("a+b") as stream:
+        fcntl.flock(stream, fcntl.LOCK_EX)
+        if file.stat().st_size == 0:
+            pickle.dump(make_city(world_of(name)), stream)
+        stream.seek(0)
+        return pickle.load(stream)
+
+
+@cache
+def network_of(name: str) -> RoadNetwork:
+    """Returns the roads of a map."""
+    return load_road_network(world_of(name) / "roads.yaml")
+
+
+@cache
+def structures_of(name: str) -> dict[str, Structure]:
+    """Returns the structures of the generated city, by name."""
+    return {structure.name: structure for structure in city(name).structures}
+
+
+@cache
+def ground_triangles(name: str, structure_name: str) -> np.ndarray:
+    """Returns the triangles (N, 3, 3) of a structure of the ground, in W."""
+    structure = structures_of(name)[structure_name]
+    assert GROUND_TAG in structure.tags
+    corners = []
+    for part in structure.model.parts:
+        p, triangles = part_triangles(part, structure.model.meshes)
+        corners.append(p[triangles])
+    return np.concatenate(corners)
+
+
+def stage_files(name: str) -> list[Path]:
+    """Returns the committed stages, earliest first."""
+    return sorted(world_of(name).glob("stage_*.sdf"))
+
+
+@cache
+def parse_strictly(sdf: Path) -> SceneGraph:
+    """Parses a world as Drake does, with strict parsing."""
+    scene_graph = SceneGraph()
+    plant = MultibodyPlant(time_step=0.0)
+    plant.RegisterAsSourceForSceneGraph(scene_graph)
+    parser = Parser(plant)
+    parser.SetStrictParsing()
+    parser.AddModels(str(sdf))
+    plant.Finalize()
+    return scene_graph
+
+
+@cache
+def visuals(sdf: Path) -> dict[str, tuple]:
+    """Returns visual name -> pose, shape and colour, as comparable text."""
+    inspector = parse_strictly(sdf).model_inspector()
+    result = {}
+    for geometry_id in inspector.GetAllGeometryIds(Role.kPerception):
+        name = inspector.GetName(geometry_id).rpartition("::")[2]
+        properties = inspector.GetPerceptionProperties(geometry_id)
+        result[name] = (
+            str(inspector.GetPoseInFrame(geometry_id).GetAsMatrix34().tolist()),
+            str(inspector.GetShape(geometry_id)),
+            str(properties.GetProperty("phong", "diffuse")),
+        )
+    return result
+
+
+def structure_of(visual: str) -> str:
+    """Returns the structure that a visual is part of."""
+    return visual.partition("/")[0]

@@ -1,0 +1,104 @@
+"""A small report to make pages of: two drives, two methods."""
+
+import numpy as np
+
+from evaluation.maps.thumbnails import thumbnail
+from evaluation.methods import make_method
+from evaluation.recognition.place_recognition import judge_retrieval
+from evaluation.recognition.recognition_result import RecognitionResult
+from evaluation.recognition.retrieval import Retrieval
+from evaluation.report.figures import top_view
+from evaluation.report.findings import Finding
+from evaluation.report.page import PageContent
+from evaluation.report.page_data import Illustration, make_drive
+from evaluation.report.result_tables import (
+    audit_table,
+    change_table,
+    recognition_table,
+)
+
+PLACES = 5.0 * np.arange(10)
+QUERIES = np.array([0.0, 10.0, 20.0, 30.0, 100.0])
+MAP = "metropolis"
+
+
+def make_content(folder, **changed):
+    """Returns the content of a page; its figures are written to a folder."""
+    svg = (
+        '<svg xmlns="http://www.w3.org/2000/svg" width="900" height="300">'
+        "</svg>"
+    )
+    for name in ("pr", "change"):
+        (folder / f"{name}.svg").write_text(svg)
+    results = [
+        _result("scan-context++", [0, 9, None, 6, 3]),
+        _result("ring++", [1, 2, 4, 0, 3]),
+        _result("ring++", [0, 0, 1, 1, 1, 2, 2, 3, 3, 4], back=True),
+    ]
+    values = {
+        "findings": [Finding("A < B & C.", "does not hold", "1 of 2.")],
+        "changes": [],
+        "change": change_table([]),
+        "recognition": [
+            recognition_table(results, [], mode)
+            for mode in (None, "all", "filtered")
+        ],
+        "audit": audit_table(results),
+        "illustrations": [
+            Illustration(folder / "pr", 'curves "P" < R', "svg"),
+            Illustration(
+                folder / "change",
+                "before and after",
+                "svg",
+                section="change",
+                num_panels=2,
+                legend=(((200, 0, 0), "gone < new"),),
+            ),
+            Illustration(folder / "none", "not for the page", "svg", "print"),
+        ],
+        "recognitions": results,
+        "drives": {
+            "metropolis_01": _drive("metropolis_01", PLACES, 0, 0.0),
+            "metropolis_04": _drive("metropolis_04", QUERIES, 2, 0.5 * np.pi),
+        },
+    }
+    return PageContent(**(values | changed))
+
+
+def _poses(xs, y, yaw):
+    X = np.tile(np.eye(4), (len(xs), 1, 1))
+    X[:, :2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
+    X[:, 0, 3], X[:, 1, 3], X[:, 2, 3] = xs, y, 1.6
+    return X
+
+
+def _drive(name, xs, y, yaw):
+    rng = np.random.default_rng(5)
+    ground = np.c_[rng.uniform(-60, 160, (4000, 2)), np.zeros(4000)]
+    # A wall that is 20 m ahead.
+    wall = np.c_[np.full(200, 20.25), np.linspace(-9, 9, 200), np.ones(200)]
+    scans = [thumbnail(wall, 1.6, i) for i in range(len(xs))]
+    X_WS = _poses(xs, y, yaw)
+    view = top_view(ground, X_WS[:, :3, 3])
+    return make_drive(name, view, X_WS, range(len(xs)), scans)
+
+
+def _result(method, best, back=False):
+    """Scores 0.9 for the best place of each query, 0.2 for its neighbours.
+
+    A query whose best place is None has no candidate.
+    """
+    queries, places = (PLACES, QUERIES) if back else (QUERIES, PLACES)
+    scores = np.full((len(queries), len(places)), np.nan)
+    for row, place in zip(scores, best, strict=True):
+        if place is not None:
+            row[:] = 0.2 - 0.001 * np.arange(len(places))
+            row[place] = 0.9
+    distances = np.hypot(queries[:, None] - places, 2.0)
+    retrieval = Retrieval(
+        np.arange(len(queries)), np.arange(len(places)), scores, distances
+    )
+    stages = ("04", "01") if back else ("01", "04")
+    names = [f"{MAP}_{stage}" for stage in stages]
+    outcome = judge_retrieval(make_method(method, {}), *names, retrieval)
+    return RecognitionResult.of(MAP, stages, outcome)

@@ -1,0 +1,34 @@
+"""Studies whose jobs run in the process of a test, one after the other.
+
+That jobs run anywhere else is the business of `evaluation.jobs` and its
+tests; processes would only make these slow.
+"""
+
+from evaluation.jobs.job_process import nothing_left
+from evaluation.jobs.running import Tell
+from evaluation.study.assembly import assemble
+from evaluation.study.collection import find_recordings
+from evaluation.study.plan import plan_study
+
+
+def do(jobs):
+    """Does what jobs leave to do, in their order; none needs a later one."""
+    for job in jobs:
+        if not nothing_left(job.is_done, job.arguments):
+            job.function(*job.arguments, Tell())
+
+
+def report(recordings, output, methods=None):
+    """Returns the path of the report on a folder of recordings."""
+    found = find_recordings(recordings)
+    do(plan_study(found, output, methods))
+    return assemble(found, output, methods)
+
+
+def report_files(output):
+    """Returns name -> bytes of all files that a report consists of."""
+    return {
+        path.relative_to(output).as_posix(): path.read_bytes()
+        for path in sorted(output.rglob("*"))
+        if path.is_file() and output / "parts" not in path.parents
+    }

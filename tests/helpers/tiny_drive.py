@@ -1,0 +1,73 @@
+"""A drive that costs next to nothing: one hall, few beams, three seconds."""
+
+import contextlib
+import signal
+import sys
+
+from small_map import box_visual, world_text
+import yaml
+
+from cns_drake.scenarios.scenario import make_scenario
+from cns_drake.simulation.simulation import simulate
+from evaluation.support.interrupts import (
+    INTERRUPTED,
+    interrupt_on_termination,
+)
+
+FRAMES = 60
+
+
+def tiny_scenario(folder, **changes):
+    """Writes world and waypoints; returns their scenario, `tiny_01`."""
+    visuals = [
+        box_visual("ground/plate", (0, 0, -0.5, 0, 0, 0), (200, 200, 1)),
+        box_visual("hall/body", (30, 25, 5, 0, 0, 0.3), (20, 12, 10)),
+    ]
+    (folder / "tiny.sdf").write_text(world_text(visuals))
+    (folder / "tiny.csv").write_text("x,y\n-10,5\n40,5\n40,60\n")
+    values = {
+        "name": "tiny_01",
+        "world": str(folder / "tiny.sdf"),
+        "waypoints": str(folder / "tiny.csv"),
+        "speeds": {
+            "cruise": 6.0,
+            "longitudinal_acceleration": 1.5,
+            "lateral_acceleration": 2.0,
+        },
+        # Noise and motion must not depend on where a run has begun.
+        "lidars": {
+            "lidar": {
+                "preset": "vlp-16",
+                "columns": 8,
+                "range_noise": 0.02,
+                "dropout": 0.1,
+                "motion_distortion": True,
+            }
+        },
+        "frames": FRAMES,
+    }
+    return make_scenario(values | changes, "test")
+
+
+def write_scenario(scenario, folder):
+    """Writes a scenario as a file for the command line; returns its path."""
+    file = folder / f"{scenario.name}.yaml"
+    file.write_text(yaml.safe_dump(scenario.model_dump(exclude_none=True)))
+    return file
+
+
+def run_and_tell(scenario, output, sender):
+    """Simulates in a process of its own and tells of each frame.
+
+    Exits with INTERRUPTED if SIGTERM has ended the run in good order.
+    """
+    status = INTERRUPTED
+    with contextlib.suppress(KeyboardInterrupt):
+        interrupt_on_termination()
+        sender.send(0)
+        simulate(
+            scenario, output, on_frame=lambda done, total: sender.send(done)
+        )
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        status = 0
+    sys.exit(status)

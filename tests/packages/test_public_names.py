@@ -1,0 +1,113 @@
+"""What the packages offer by name, and that examples use nothing else."""
+
+import ast
+import importlib
+import inspect
+from pathlib import Path
+import subprocess
+import sys
+import textwrap
+
+import documents
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("cns_drake", "evaluation")
+PUBLIC = {name: importlib.import_module(name).__all__ for name in PACKAGES}
+# Modules that are public as a whole.
+PUBLIC["evaluation.methods"] = ["Method", "MethodConfig", "register"]
+NAMES = [(package, name) for package in PACKAGES for name in PUBLIC[package]]
+
+
+def private_imports(code):
+    """Returns what Python code imports of the packages that is not public."""
+    found = []
+    for node in ast.walk(ast.parse(code)):
+        if isinstance(node, ast.Import):
+            asked = [(alias.name, None) for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            asked = [(node.module, alias.name) for alias in node.names]
+        else:
+            continue
+        found += [
+            (module, name)
+            for module, name in asked
+            if module.split(".")[0] in PACKAGES
+            and (module, name) != ("evaluation", "sequences")
+            and name not in PUBLIC.get(module, ())
+        ]
+    return found
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_importing_a_package_loads_nothing_heavy(package):
+    code = f"import {package}, sys; print(*sys.modules)"
+    loaded = subprocess.check_output(
+        [sys.executable, "-c", code], cwd=ROOT, text=True
+    ).split()
+    assert package in loaded
+    assert {"numpy", "pydrake", "pydantic", "typer"}.isdisjoint(loaded)
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_type_checkers_see_the_same_names(package):
+    tree = ast.parse((ROOT / package / "__init__.py").read_text())
+    (block,) = (node for node in tree.body if isinstance(node, ast.If))
+    seen = {
+        (getattr(node, "module", None), alias.name)
+        for node in block.body
+        for alias in node.names
+    } - {(None, "evaluation"), ("evaluation.support.errors", "InputError")}
+    homes = importlib.import_module(package)._HOMES
+    given = {
+        (f"{package}.{home}", name)
+        for home, names in homes.items()
+        for name in names
+    } - {("evaluation.support.errors", "InputError")}
+    assert seen == given
+    others = {"__version__", "evaluation", "InputError"}
+    named = {name for _, name in given}
+    assert named - others == set(PUBLIC[package]) - others
+
+
+@pytest.mark.parametrize(("package", "name"), NAMES)
+def test_public_names_say_how_to_use_them(package, name):
+    module = importlib.import_module(package)
+    value = getattr(module, name)
+    assert name in dir(module)
+    if not (inspect.isclass(value) or inspect.isfunction(value)):
+        return
+    lines = value.__doc__.splitlines()
+    (start,) = (i for i, line in enumerate(lines) if "Example:" in line)
+    example = textwrap.dedent("\n".join(lines[start + 1 :]))
+    assert "from cns_drake import" in example or "from evaluation" in example
+    assert private_imports(example) == []
+
+
+def test_names_that_are_not_there():
+    for package in PACKAGES:
+        with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
+            _ = importlib.import_module(package).nothing
+
+
+@pytest.mark.parametrize(
+    "path", sorted((ROOT / "diagrams").glob("*.py")), ids=lambda path: path.stem
+)
+def test_diagrams_use_public_names(path):
+    assert private_imports(path.read_text()) == []
+
+
+def test_the_documents_use_public_names():
+    blocks = [
+        block.text
+        for page in documents.pages()
+        for block in documents.fenced(page)
+        if block.language == "python"
+    ]
+    assert blocks
+    assert [private_imports(block) for block in blocks] == [[]] * len(blocks)
+
+
+def test_private_names_are_noticed():
+    code = "from cns_drake.sensors.lidar import Lidar\nimport evaluation.jobs"
+    assert len(private_imports(code)) == 2
