@@ -1,0 +1,159 @@
+"""What the documents say of options, files, formats, packages is so."""
+
+import pydoc
+import re
+
+import documents
+from mcap.reader import make_reader
+import typer
+import yaml
+
+from cns_drake.command_line import cli
+from cns_drake.scenarios.variation import Family
+from cns_drake.sensors.beam_pattern import LIDAR_PRESETS
+from evaluation.command_line import cli as evaluation_cli
+from evaluation.sequences import open_sequence
+
+PAGES = documents.pages()
+CODES = [piece.text for page in PAGES for piece in documents.inline(page)]
+# Of tools that are not this project's.
+FOREIGN_OPTIONS = {"--nthreads", "--nworkers"}
+
+
+def commands():
+    """Returns `PROGRAM COMMAND` -> its options."""
+    found = {}
+    for program, app in (
+        ("cns-drake", cli.app),
+        ("cns-eval", evaluation_cli.app),
+    ):
+        group = typer.main.get_command(app)
+        for name, command in group.commands.items():
+            found[f"{program} {name}"] = {
+                option for each in command.params for option in each.opts
+            }
+    return found
+
+
+def test_the_table_has_every_command():
+    index = documents.read("docs/index.md")
+    rows = documents.table(index, "| command | does |")
+    named = {" ".join(row[0].strip("`").split()[:2]) for row in rows}
+    assert named == commands().keys()
+
+
+def test_options_exist():
+    known = {"--help", "--version"}.union(*commands().values())
+    named = {code.split()[0] for code in CODES if code.startswith("--")}
+    assert len(named) > 8
+    assert named - known - FOREIGN_OPTIONS == set()
+
+
+def test_names_of_commands_exist():
+    named = {
+        code for code in CODES if re.fullmatch(r"cns-(drake|eval) \w+", code)
+    }
+    assert named
+    assert named <= commands().keys()
+
+
+def test_files_of_the_project_are_there():
+    folders = tuple(
+        f"{path.name}/" for path in documents.ROOT.iterdir() if path.is_dir()
+    )
+    named = [
+        code
+        for code in CODES
+        if code.startswith(folders) and not code.startswith("output/")
+    ]
+    assert len(named) > 5
+    for code in named:
+        assert list(documents.ROOT.glob(code.replace("NN", "*"))), code
+
+
+def test_names_in_modules_exist():
+    named = [
+        code for code in CODES if code.startswith(("evaluation.", "cns_drake."))
+    ]
+    assert named
+    for code in named:
+        assert pydoc.locate(code.partition("(")[0]) is not None, code
+
+
+def test_examples_of_what_multiplies_families():
+    page = documents.read("docs/scenarios.md")
+    codes = [piece.text for piece in documents.inline(page)]
+    routes = yaml.safe_load(next(c for c in codes if c.startswith("routes: {")))
+    cells = {
+        row[0].strip("`"): row[2]
+        for row in documents.table(page, "## Families")
+    }
+    lidars = yaml.safe_load(cells["lidars"].split("`")[1])
+    parts = yaml.safe_load(cells["missing"].split("`")[1])
+    values = routes | {"lidars": lidars, "missing": parts}
+    family = Family.model_validate({"base": "riverside_01"} | values)
+    assert family.routes.count == 10
+    assert len(family.missing) == 20
+    assert set(family.lidars) <= LIDAR_PRESETS.keys()
+
+
+def test_topics(short_recording):
+    page = documents.read("docs/recordings.md")
+    said = {
+        topic.strip("` "): row[1]
+        for row in documents.table(page, "## Topics")
+        for topic in row[0].split(",")
+    }
+    (file,) = short_recording.glob("*.mcap")
+    with file.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+        attachments = {a.name for a in make_reader(stream).iter_attachments()}
+    schemas = summary.schemas
+    assert said == {
+        channel.topic: schemas[channel.schema_id].name
+        for channel in summary.channels.values()
+    }
+    rows = documents.table(page, "| attachment | holds |")
+    assert attachments == {row[0].strip("`") for row in rows}
+
+
+def test_fields_of_points(short_recording):
+    page = documents.read("docs/recordings.md")
+    (example,) = (
+        block.text
+        for block in documents.fenced(page)
+        if "sequences.open(" in block.text
+    )
+    scan = open_sequence(short_recording).scan(0)
+    assert f"# NumPy: {' '.join(scan.dtype.names)}\n" in example
+    assert f"{scan.dtype.itemsize} bytes a point" in page.text
+
+
+def test_dependencies():
+    said = {
+        name
+        for row in documents.table(
+            documents.read("CONTRIBUTING.md"), "| package | why |"
+        )
+        for name in row[0].replace("`", "").split(", ")
+    }
+    project = (documents.ROOT / "pyproject.toml").read_text()
+    _, _, rest = project.partition("\ndependencies = [\n")
+    needed = {
+        name.removesuffix("-cpu")
+        for name in re.findall(r'^  "([\w-]+)', rest.split("\n]")[0], re.M)
+    }
+    assert said == needed
+
+
+def test_what_is_installed_is_what_ci_installs():
+    script = (documents.ROOT / ".ci/run").read_text()
+    (command,) = (code for code in CODES if code.startswith("apt install "))
+    for package in command.split()[2:]:
+        assert f" {package} " in script
+    assert "npm ci" in script
+    # It takes the line itself out of the README.
+    pattern = re.search(r"grep -m1 '([^']+)' README\.md", script)[1]
+    text = documents.read("README.md").text
+    line = re.search(pattern, text, re.MULTILINE)[0]
+    assert "'.[test]'" in line

@@ -1,0 +1,47 @@
+"""The documents hang together: links lead somewhere, the README is short."""
+
+import re
+
+import documents
+import pytest
+
+PAGES = {page.name: page for page in documents.pages()}
+
+
+@pytest.mark.parametrize("page", PAGES.values(), ids=PAGES)
+def test_links_lead_somewhere(page):
+    for target in re.findall(r"\]\(([^)]+)\)", documents.prose(page)):
+        if target.startswith("https://"):
+            continue
+        file, _, anchor = target.partition("#")
+        linked = follow(page, file) if file else page.name
+        assert (documents.ROOT / linked).exists(), target
+        if anchor:
+            assert anchor in documents.anchors(PAGES[linked]), target
+
+
+def follow(page, file):
+    """Returns the path from the root of the project of what a page names."""
+    path = (documents.ROOT / page.name).parent / file
+    # Else it would lead out of the project.
+    return str(path.resolve().relative_to(documents.ROOT))
+
+
+def test_pages_are_reached_from_the_readme():
+    reached, waiting = set(), {"README.md"}
+    while waiting:
+        page = PAGES[waiting.pop()]
+        reached.add(page.name)
+        linked = re.findall(r"\]\(([\w./]+\.md)", page.text)
+        waiting |= {follow(page, file) for file in linked} - reached
+    assert reached == PAGES.keys()
+
+
+def test_pictures_are_shown():
+    shown = "\n".join(page.text for page in PAGES.values())
+    for picture in (documents.ROOT / "docs/pictures").iterdir():
+        assert f"pictures/{picture.name})" in shown, picture
+
+
+def test_readme_is_short():
+    assert len(PAGES["README.md"].text.split()) <= 1200
