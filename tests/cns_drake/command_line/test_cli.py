@@ -209,4 +209,4 @@ def test_every_sequence_has_a_script_that_names_it():
     scripts = {path.stem: path.read_text() for path in DIAGRAMS.glob("*.py")}
     assert scripts.keys() == recordable_sequences().keys()
     for name, text in scripts.items():
-        assert f'main("{name}", __doc__)' in text
+        assert f'run_script("{name}", __doc__)' in text

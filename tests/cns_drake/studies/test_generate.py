@@ -54,7 +54,7 @@ def test_interrupted_killed_and_run_again(scenarios, files, tmp_path):
     os.killpg(run.process.pid, signal.SIGINT)
     status, results = run.end()
     assert (status, results) == (130, [])
-    assert run.told[-1] == "interrupted\n"
+    assert run.told[-1] == "cns-drake: interrupted\n"
     assert not [line for line in run.told if "Traceback" in line]
     assert not (output / "long" / "metadata.yaml").exists()
 
