@@ -60,7 +60,7 @@ def test_flat_wall_comes_below_an_arch():
 @pytest.mark.parametrize("along_y", [False, True])
 def test_gables_stand_below_the_ends_of_the_ridge(along_y):
     wing = Wing.at(0, 0, 6, 6, 4.0, 7.0, Roof("gable", along_y, 0.4, 0.3))
-    materials = Materials({"walls": (1, 1, 1), "roof": (0, 0, 0)})
+    materials = Materials(walls=(1, 1, 1), roof=(0, 0, 0))
     add_roof(materials, wing)
     assembly = Assembly("h")
     materials.finish(assembly)
@@ -86,9 +86,7 @@ def test_a_mirrored_wing():
 
 def test_dormers_stay_below_the_ridge_and_on_the_slope():
     for kind in ("gable", "shed", "flat"):
-        materials = Materials(
-            {"walls": (1, 1, 1), "glass": (0, 0, 1), "roof": (1, 0, 0)}
-        )
+        materials = Materials(walls=(1, 1, 1), glass=(0, 0, 1), roof=(1, 0, 0))
         dormers.add_dormers(materials, HALL, 2.0, 18.0, 3, kind)
         assembly = Assembly("d")
         materials.finish(assembly)
@@ -105,7 +103,7 @@ def test_dormers_stay_below_the_ridge_and_on_the_slope():
 
 def test_no_dormer_on_a_flat_slope():
     wing = Wing.at(0, 0, 20, 16, 6.0, 8.0, Roof())
-    materials = Materials({"walls": (1, 1, 1)})
+    materials = Materials(walls=(1, 1, 1))
     dormers.add_dormers(materials, wing, 0.0, 20.0, 3, "gable")
     assembly = Assembly("d")
     materials.finish(assembly)
@@ -121,7 +119,7 @@ def test_storeys_leave_the_roof_its_pitch(height, storeys):
 
 
 def test_each_material_becomes_one_part():
-    materials = Materials({"a": (1, 0, 0), "b": (0, 1, 0), "c": (0, 0, 1)})
+    materials = Materials(a=(1, 0, 0), b=(0, 1, 0), c=(0, 0, 1))
     materials.add("b", box_mesh((1, 1, 1)))
     materials.add("a", box_mesh((1, 1, 1)), box_mesh((1, 2, 3), (5, 0, 0)))
     assembly = Assembly("h", rgb=(9, 9, 9))
