@@ -2,6 +2,7 @@
 
 import os
 from pathlib import Path
+import select
 import signal
 import threading
 
@@ -67,6 +68,19 @@ def hold(pipe: Path, tell):
     # However a signal falls, it is noticed.
     while not threading.Event().wait(0.1):
         pass
+
+
+def read_holder(pipe: Path) -> int:
+    """Returns the process that holds, as soon as it is told.
+
+    Open for both, the pipe does not wait for one that fails before it tells.
+    """
+    reader = os.open(pipe, os.O_RDWR)
+    try:
+        assert select.select([reader], [], [], 600)[0], "no job began"
+        return int(os.read(reader, 100))
+    finally:
+        os.close(reader)
 
 
 def kill_worker(tries, tell):

@@ -94,7 +94,7 @@ def test_jobs_end_with_the_client_that_wanted_them(dask, tmp_path, number):
         "from pathlib import Path\n"
         "import job_functions\n"
         "from evaluation.jobs.cluster import Cluster\n"
-        "from evaluation.jobs import Job, run_jobs\n"
+        "from evaluation.jobs.running import Job, run_jobs\n"
         "address, pipe = sys.argv[1:]\n"
         "job = Job('holds', job_functions.hold, (Path(pipe),))\n"
         "run_jobs([job], Cluster(scheduler=address))\n"
@@ -102,10 +102,8 @@ def test_jobs_end_with_the_client_that_wanted_them(dask, tmp_path, number):
     client = subprocess.Popen(
         [sys.executable, "-c", script, dask.address, pipe],
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
-        stderr=subprocess.DEVNULL,
     )
-    with pipe.open() as stream:
-        job = psutil.Process(int(stream.read()))
+    job = psutil.Process(job_functions.read_holder(pipe))
     client.send_signal(number)
     client.wait()
     assert psutil.wait_procs([job], timeout=600)[1] == []

@@ -236,8 +236,7 @@ def test_a_job_that_is_not_wanted_ends(tmp_path):
 
     def is_wanted():
         if not told:
-            with pipe.open() as stream:
-                told.append(int(stream.read()))
+            told.append(job_functions.read_holder(pipe))
             return True
         return False
 
@@ -267,8 +266,7 @@ def test_a_job_ends_with_its_parent_even_if_that_is_killed(tmp_path):
         ],
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
     )
-    with pipe.open() as stream:
-        process = psutil.Process(int(stream.read()))
+    process = psutil.Process(job_functions.read_holder(pipe))
     parent.kill()
     parent.wait()
     assert psutil.wait_procs([process], timeout=600)[1] == []
