@@ -1,7 +1,5 @@
 """An ideal IMU: Drake's accelerometer and gyroscope, wired."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from pydrake.math import RigidTransform
