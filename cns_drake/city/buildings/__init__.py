@@ -9,7 +9,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import replace
 from importlib import import_module
 import pkgutil
 
@@ -17,41 +16,15 @@ import numpy as np
 from shapely.geometry import Polygon
 
 from cns_drake.city.buildings import blocks, houses, public, shops, towers
-from cns_drake.city.buildings.parts.site import Archetype, Site
+from cns_drake.city.buildings.archetypes import ARCHETYPES
+from cns_drake.city.buildings.parts.site import Assembly, Dice, Site
 from cns_drake.city.geometry.structures import Model
 
-# By their names: every module of these packages holds one.
-ARCHETYPES: dict[str, Archetype] = {
-    module.name: import_module(f"{room.__name__}.{module.name}").ARCHETYPE
+# By their names: each draws the `Parameters` of its archetype, and builds it.
+_MODULES = {
+    module.name: import_module(f"{room.__name__}.{module.name}")
     for room in (blocks, houses, public, shops, towers)
     for module in pkgutil.iter_modules(room.__path__)
-}
-
-# Which of them each map is built of.
-_STOCKS = {
-    "metropolis": """
-        art_deco_tower brick_block car_park church corner_building
-        court_block glass_skyscraper hotel museum observation_tower office
-        podium_tower slab_tower waterfront_hall
-    """,
-    # A small town at a river.
-    "riverside": """
-        row_house walk_up balcony_flats shop_house mill town_hall chapel
-        barn school kiosk_row brick_block corner_store waterfront_hall
-    """,
-    # Houses with gardens around a commercial street.
-    "suburbia": """
-        detached_house bungalow semi_detached terrace shop_strip
-        corner_store garden_flats gas_station supermarket sports_hall
-        park_pavilion balcony_flats chapel church school shop_house walk_up
-    """,
-    # An office district, and houses at its south-eastern edge.
-    "downtown": """
-        grid_tower banded_tower parking_deck unfinished_tower shopping_hall
-        gallery_flats elevated_station balcony_flats brick_block bungalow
-        corner_building court_block detached_house gas_station hotel office
-        podium_tower semi_detached slab_tower supermarket terrace
-    """,
 }
 
 
@@ -96,10 +69,8 @@ def sample(
     site = Site(footprint, name, frozenset(blind_edges))
     if not kind.party_walls:
         site = site.detached(kind.overhang)
-    model = kind.build(kind.draw(site, height, rng), site, rng)
-    return replace(model, footprint=footprint)
-
-
-def stock(city: str) -> tuple[str, ...]:
-    """Returns the archetypes that one of the shipped cities is built of."""
-    return tuple(_STOCKS[city].split())
+    module = _MODULES[archetype]
+    parameters = module.Parameters(Dice(site, height, rng))
+    assembly = Assembly(site, rng, parameters.rgb)
+    module.build(parameters, assembly)
+    return Model(tuple(assembly.parts), assembly.meshes, footprint)

@@ -78,7 +78,7 @@ def car_meshes(form: CarForm) -> tuple[Mesh, Mesh]:
     else:
         paint += _pillars(form)
         trim.append(_cabin(form, 0.025))
-    return merge_meshes(paint), merge_meshes(trim)
+    return merge_meshes(*paint), merge_meshes(*trim)
 
 
 def _lower_body(form: CarForm) -> Mesh:

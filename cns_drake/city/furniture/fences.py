@@ -130,7 +130,7 @@ def _railing(count: int) -> Mesh:
         for m in range(1, 14):
             p = x + 0.03 + m * 2.0 / 14
             pieces.append(tube([(p, 0, 0.14), (p, 0, 1.02)], (0.014, 0.014), 3))
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 def _picket(count: int) -> Mesh:
@@ -150,7 +150,7 @@ def _picket(count: int) -> Mesh:
                 (p, 1.12),
             ]
             pieces.append(side_prism(outline, -0.01, 0.015))
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 def _garden_wall(count: int) -> Mesh:
@@ -168,7 +168,7 @@ def _garden_wall(count: int) -> Mesh:
             _box(x + 0.04, x + 0.44, -0.2, 0.2, _ROOT, 1.62),
             _box(x, x + 0.48, -0.24, 0.24, 1.62, 1.7),
         ]
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 def _hoarding(count: int) -> Mesh:
@@ -189,7 +189,7 @@ def _hoarding(count: int) -> Mesh:
                 4,
             ),
         ]
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 def _site_fence(count: int) -> Mesh:
@@ -206,7 +206,7 @@ def _site_fence(count: int) -> Mesh:
         for p in np.linspace(x + 0.06, x + 3.44, 20)[1:-1]:
             pieces.append(tube([(p, 0, 0.15), (p, 0, 1.98)], (0.006, 0.006), 3))
         pieces.append(_box(x + 0.02, x + 0.26, -0.35, 0.35, -0.02, 0.13))
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 def _concrete_barrier(count: int) -> Mesh:
@@ -229,7 +229,7 @@ def _concrete_barrier(count: int) -> Mesh:
         for rows in ((0, 1, 6, 7), (1, 2, 5, 6), (2, 3, 4, 5)):
             solid = prism(profile[list(rows)], 2.0 * k + 0.01, 2.0 * k + 1.97)
             pieces.append(along_x(solid))
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 def _hedge(count: int) -> Mesh:

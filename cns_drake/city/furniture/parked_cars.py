@@ -156,7 +156,7 @@ def _truck_box() -> Mesh:
         box_mesh((0.08, 2.26, 2.16), (x, 0, 1.95)) for x in (-3.24, 0.84)
     ]
     pieces += [box_mesh((4.1, 2.26, 0.08), (-1.2, 0, z)) for z in (0.93, 3.0)]
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 _CLASSES = {"box_truck": "truck", "bus": "bus"}

@@ -150,7 +150,7 @@ def _shelter(advert: float) -> tuple[Mesh, Mesh]:
         box_mesh((0.02, 1.24, 2.0), (-0.62, y, 1.35)) for y in (-1.28, 0, 1.28)
     ]
     panes.append(box_mesh((0.85, 0.02, 2.0), (-0.16, -1.95 * advert, 1.35)))
-    return merge_meshes(frame), merge_meshes(panes)
+    return merge_meshes(*frame), merge_meshes(*panes)
 
 
 @cache
@@ -164,7 +164,7 @@ def _kiosk() -> Mesh:
         ]
     )
     return merge_meshes(
-        [
+        *[
             box_mesh(
                 (2.2, 3.0, 1.0 + ROOT_DEPTH), (0, 0, 0.5 - ROOT_DEPTH / 2)
             ),
@@ -219,14 +219,10 @@ def _advertising_pillar() -> Mesh:
 @cache
 def _advertising_panel() -> Mesh:
     return merge_meshes(
-        [
-            box_mesh((0.16, 1.3, 2.1), (0, 0, 1.45)),
-            box_mesh((0.24, 1.4, 0.1), (0, 0, 2.5)),
-            box_mesh((0.24, 1.4, 0.08), (0, 0, 0.4)),
-            box_mesh(
-                (0.14, 0.5, 0.4 + ROOT_DEPTH), (0, 0, 0.2 - ROOT_DEPTH / 2)
-            ),
-        ]
+        box_mesh((0.16, 1.3, 2.1), (0, 0, 1.45)),
+        box_mesh((0.24, 1.4, 0.1), (0, 0, 2.5)),
+        box_mesh((0.24, 1.4, 0.08), (0, 0, 0.4)),
+        box_mesh((0.14, 0.5, 0.4 + ROOT_DEPTH), (0, 0, 0.2 - ROOT_DEPTH / 2)),
     )
 
 
@@ -256,7 +252,7 @@ def _phone_box() -> Mesh:
             box_mesh((0.86, 0.74, 0.05), (0, 0, z)),
             box_mesh((0.74, 0.86, 0.05), (0, 0, z)),
         ]
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 @cache
@@ -274,12 +270,12 @@ def _cafe_set() -> Mesh:
         for y in (-0.18, 0.18):
             top = 0.7 if x > 0 else 0.44
             chair.append(tube([(x, y, 0), (x, y, top)], (0.018, 0.018), 3))
-    seat = merge_meshes(chair)
+    seat = merge_meshes(*chair)
     for k, radius in enumerate((0.72, 0.8, 0.7, 0.86)):
         turn = k * np.pi / 2 + (0.1, -0.25, 0.2, 0.0)[k]
         away = (radius * np.cos(turn), radius * np.sin(turn), 0.0)
         pieces.append(seat.moved(away, turn + (0.2, 0.0, -0.3, 0.1)[k]))
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 @cache
@@ -312,7 +308,7 @@ def _market_stall() -> tuple[Mesh, Mesh]:
     valance = prism(
         [(1.09, -1.55), (1.12, -1.55), (1.12, 1.55), (1.09, 1.55)], 2.0, 2.22
     )
-    return merge_meshes(stall), merge_meshes([awning, valance])
+    return merge_meshes(*stall), merge_meshes(awning, valance)
 
 
 PAVILIONS = {

@@ -74,7 +74,7 @@ def _swing() -> Mesh:
             beam((lag, y + side, 0.55), (0, y + side, 2.43), 0.02, 0.02)
             for side in (-0.22, 0.22)
         ]
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 @cache
@@ -111,7 +111,7 @@ def _slide() -> Mesh:
             for y in (-0.3, 0.3)
         ]
     pieces.append(beam((2.9, 0, -0.1), (2.9, 0, 0.25), 0.4, 0.08))
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 @cache
@@ -126,7 +126,7 @@ def _picnic_table() -> Mesh:
             beam((0.6, y, 0.0), (0.2, y, 0.73), 0.06, 0.1),
             beam((-0.75, y, 0.4), (0.75, y, 0.4), 0.06, 0.1),
         ]
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 PLAYGROUND = {

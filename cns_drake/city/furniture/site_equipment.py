@@ -181,7 +181,7 @@ def _container() -> Mesh:
         box_mesh((0.05, 0.05, 2.3), (3.0, y, 1.3))
         for y in (-0.8, -0.35, 0.35, 0.8)
     ]
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 @cache
@@ -211,7 +211,7 @@ def _cabin() -> Mesh:
             box_mesh((0.08, 0.1, tall), (x + side * width / 2, 1.22, middle))
             for side in (-1, 1)
         ]
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 @cache
@@ -235,7 +235,7 @@ def _skip() -> Mesh:
     ]
     rim = [box_mesh((3.3, 0.12, 0.08), (0, y, 1.2)) for y in (-0.85, 0.85)]
     floor = box_mesh((2.1, 1.7, 0.08), (0, 0, 0.09))
-    return merge_meshes([*walls, *ends, *rim, floor])
+    return merge_meshes(*walls, *ends, *rim, floor)
 
 
 @cache
@@ -277,7 +277,7 @@ def _pipe_stack() -> Mesh:
             z = radius * (1 + layer * np.sqrt(3))
             pieces.append(pipe.moved((0.08 * (k % 2), y, z)))
     pieces += [box_mesh((0.1, 2.5, 0.12), (x, 0, 0.0)) for x in (-1.6, 1.6)]
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 @cache
@@ -287,12 +287,10 @@ def _brick_pallet() -> Mesh:
         box_mesh((1.2, 0.12, 0.12), (0, y, 0.06)) for y in (-0.44, 0, 0.44)
     ]
     return merge_meshes(
-        [
-            *slats,
-            box_mesh((1.2, 1.0, 0.04), (0, 0, 0.14)),
-            box_mesh((1.1, 0.95, 0.55), (0, 0, 0.44)),
-            box_mesh((1.0, 0.9, 0.38), (0.04, -0.02, 0.91)),
-        ]
+        *slats,
+        box_mesh((1.2, 1.0, 0.04), (0, 0, 0.14)),
+        box_mesh((1.1, 0.95, 0.55), (0, 0, 0.44)),
+        box_mesh((1.0, 0.9, 0.38), (0.04, -0.02, 0.91)),
     )
 
 
@@ -330,33 +328,29 @@ def _excavator() -> tuple[Mesh, Mesh]:
     bucket = side_prism(
         [(3.7, 0.55), (4.5, 0.5), (4.65, 1.35), (4.2, 1.55)], -0.75, 0.35
     )
-    return merge_meshes(tracks), merge_meshes([house, cab, *arm, bucket])
+    return merge_meshes(*tracks), merge_meshes(house, cab, *arm, bucket)
 
 
 @cache
 def _portable_toilet() -> Mesh:
     return merge_meshes(
-        [
-            box_mesh((1.1, 1.1, 2.1), (0, 0, 1.1)),
-            box_mesh((1.2, 1.2, 0.12), (0, 0, 0.06)),
-            box_mesh((0.06, 0.75, 1.8), (0.55, 0, 1.1)),
-            side_prism(
-                [(-0.6, 2.15), (0.6, 2.15), (0.3, 2.35), (-0.3, 2.35)],
-                -0.6,
-                0.6,
-            ),
-            lathe([(0.05, 0.3), (0.05, 2.55)], 5).moved((-0.6, 0.3, 0)),
-        ]
+        box_mesh((1.1, 1.1, 2.1), (0, 0, 1.1)),
+        box_mesh((1.2, 1.2, 0.12), (0, 0, 0.06)),
+        box_mesh((0.06, 0.75, 1.8), (0.55, 0, 1.1)),
+        side_prism(
+            [(-0.6, 2.15), (0.6, 2.15), (0.3, 2.35), (-0.3, 2.35)],
+            -0.6,
+            0.6,
+        ),
+        lathe([(0.05, 0.3), (0.05, 2.55)], 5).moved((-0.6, 0.3, 0)),
     )
 
 
 @cache
 def _cone() -> Mesh:
     return merge_meshes(
-        [
-            box_mesh((0.4, 0.4, 0.06), (0, 0, 0.02)),
-            lathe([(0.15, 0.05), (0.03, 0.75)], 8),
-        ]
+        box_mesh((0.4, 0.4, 0.06), (0, 0, 0.02)),
+        lathe([(0.15, 0.05), (0.03, 0.75)], 8),
     )
 
 

@@ -207,18 +207,16 @@ def _bench() -> Mesh:
             beam((-0.26, y, 0.66), (0.2, y, 0.66), 0.05, 0.04),
             beam((0.2, y, 0.43), (0.2, y, 0.66), 0.05, 0.04),
         ]
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 @cache
 def _litter_bin() -> Mesh:
     return merge_meshes(
-        [
-            lathe([(0.16, -ROOT_DEPTH), (0.16, 0.08), (0.24, 0.7)], 10),
-            lathe([(0.27, 0.7), (0.27, 0.76)], 10),
-            lathe([(0.03, 0.76), (0.03, 0.95)], 4),
-            lathe([(0.28, 0.92), (0.24, 1.0), (0.06, 1.05)], 10),
-        ]
+        lathe([(0.16, -ROOT_DEPTH), (0.16, 0.08), (0.24, 0.7)], 10),
+        lathe([(0.27, 0.7), (0.27, 0.76)], 10),
+        lathe([(0.03, 0.76), (0.03, 0.95)], 4),
+        lathe([(0.28, 0.92), (0.24, 1.0), (0.06, 1.05)], 10),
     )
 
 
@@ -244,29 +242,27 @@ def _rubbish_container() -> Mesh:
         for x in (-0.3, 0.3)
         for y in (-0.5, 0.5)
     ]
-    return merge_meshes([body, lid, *wheels])
+    return merge_meshes(body, lid, *wheels)
 
 
 @cache
 def _hydrant() -> Mesh:
     side = lathe([(0.07, -0.2), (0.07, 0.2)], 6)
     return merge_meshes(
-        [
-            lathe(
-                [
-                    (0.16, -ROOT_DEPTH),
-                    (0.16, 0.06),
-                    (0.11, 0.08),
-                    (0.11, 0.5),
-                    (0.14, 0.52),
-                    (0.13, 0.62),
-                    (0.05, 0.72),
-                ],
-                8,
-            ),
-            along_y(side).moved((0, 0, 0.42)),
-            along_x(side).moved((0.08, 0, 0.4)),
-        ]
+        lathe(
+            [
+                (0.16, -ROOT_DEPTH),
+                (0.16, 0.06),
+                (0.11, 0.08),
+                (0.11, 0.5),
+                (0.14, 0.52),
+                (0.13, 0.62),
+                (0.05, 0.72),
+            ],
+            8,
+        ),
+        along_y(side).moved((0, 0, 0.42)),
+        along_x(side).moved((0.08, 0, 0.4)),
     )
 
 
@@ -282,10 +278,10 @@ def _rack_hoop() -> Mesh:
         (0.35, 0, -ROOT_DEPTH),
     ]
     return merge_meshes(
-        [
+        *(
             tube(corners[k : k + 2], (0.025, 0.025), 5)
             for k in range(len(corners) - 1)
-        ]
+        )
     )
 
 
@@ -318,40 +314,36 @@ def _bicycle() -> Mesh:
         tube([(0.33, -0.28, 1.0), (0.33, 0.28, 1.0)], (0.018, 0.018), 4),
         box_mesh((0.26, 0.14, 0.06), (-0.27, 0, 0.95)),
     ]
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 @cache
 def _post_box() -> Mesh:
     return merge_meshes(
-        [
-            lathe(
-                [
-                    (0.27, -ROOT_DEPTH),
-                    (0.27, 0.12),
-                    (0.23, 0.14),
-                    (0.23, 1.3),
-                    (0.28, 1.33),
-                    (0.27, 1.42),
-                    (0.1, 1.55),
-                ],
-                10,
-            ),
-            box_mesh((0.06, 0.3, 0.05), (0.23, 0, 1.2)),
-        ]
+        lathe(
+            [
+                (0.27, -ROOT_DEPTH),
+                (0.27, 0.12),
+                (0.23, 0.14),
+                (0.23, 1.3),
+                (0.28, 1.33),
+                (0.27, 1.42),
+                (0.1, 1.55),
+            ],
+            10,
+        ),
+        box_mesh((0.06, 0.3, 0.05), (0.23, 0, 1.2)),
     )
 
 
 @cache
 def _cabinet() -> Mesh:
     return merge_meshes(
-        [
-            box_mesh((0.4, 0.98, 0.4), (0, 0, -0.1)),
-            box_mesh((0.34, 0.46, 1.0), (0, -0.24, 0.6)),
-            box_mesh((0.34, 0.46, 1.0), (0, 0.24, 0.6)),
-            box_mesh((0.44, 1.02, 0.06), (0, 0, 1.13)),
-            box_mesh((0.05, 0.03, 0.16), (0.18, 0.06, 0.7)),
-        ]
+        box_mesh((0.4, 0.98, 0.4), (0, 0, -0.1)),
+        box_mesh((0.34, 0.46, 1.0), (0, -0.24, 0.6)),
+        box_mesh((0.34, 0.46, 1.0), (0, 0.24, 0.6)),
+        box_mesh((0.44, 1.02, 0.06), (0, 0, 1.13)),
+        box_mesh((0.05, 0.03, 0.16), (0.18, 0.06, 0.7)),
     )
 
 
@@ -365,11 +357,9 @@ def _newspaper_box() -> Mesh:
         (-0.2, 0.35),
     ]
     return merge_meshes(
-        [
-            side_prism(outline, -0.22, 0.22),
-            box_mesh((0.3, 0.3, 0.4), (0, 0, 0.16)),
-            box_mesh((0.04, 0.34, 0.3), (0.22, 0, 0.72)),
-        ]
+        side_prism(outline, -0.22, 0.22),
+        box_mesh((0.3, 0.3, 0.4), (0, 0, 0.16)),
+        box_mesh((0.04, 0.34, 0.3), (0.22, 0, 0.72)),
     )
 
 

@@ -122,7 +122,7 @@ def _curved_arm() -> Mesh:
         [(0.05, 0.08), (0.17, 0.03), (0.17, -0.03), (0.1, -0.08)][::-1], 8
     )
     stretched = Mesh(head.vertices * (2.2, 1.0, 1.0), head.faces)
-    return merge_meshes([*pieces, stretched.moved((1.5, 0.0, 1.19))])
+    return merge_meshes(*pieces, stretched.moved((1.5, 0.0, 1.19)))
 
 
 @cache

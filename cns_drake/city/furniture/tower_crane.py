@@ -101,7 +101,7 @@ def _mast() -> Mesh:
         low, high = (a, b) if k % 2 else (b, a)
         pieces.append(beam((*low, 0), (*high, z / 2), 0.08, 0.08))
         pieces.append(beam((*high, z / 2), (*low, z), 0.08, 0.08))
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 @cache
@@ -116,17 +116,15 @@ def _jib() -> Mesh:
             beam((x / 2, 0, tall), (x, y, 0), 0.07, 0.07),
         ]
     pieces.append(beam((0, -w, 0), (x, w, 0), 0.06, 0.06))
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 @cache
 def _cab() -> Mesh:
     """Returns the slewing ring and the driver's cab."""
     return merge_meshes(
-        [
-            box_mesh((2.0, 2.0, 0.6), (0, 0, 0.3)),
-            box_mesh((1.8, 1.2, 1.9), (1.6, -1.2, -0.4)),
-        ]
+        box_mesh((2.0, 2.0, 0.6), (0, 0, 0.3)),
+        box_mesh((1.8, 1.2, 1.9), (1.6, -1.2, -0.4)),
     )
 
 

@@ -169,7 +169,7 @@ def _signal_head(lamps: int) -> Mesh:
         hood = lathe([(0.13, 0.0), (0.13, 0.18)], 8)
         z = (k - (lamps - 1) / 2) * pitch
         pieces.append(along_y(hood).moved((0.0, 0.09, z)))
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 @cache

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,7 +67,7 @@ def _number(value: float) -> str:
     return f"{value:.{_DECIMALS}f}".rstrip("0").rstrip(".")
 
 
-def merge_meshes(meshes: Iterable[Mesh]) -> Mesh:
+def merge_meshes(*meshes: Mesh) -> Mesh:
     """Returns one mesh that holds the given ones."""
     vertices, faces, offset = [np.zeros((0, 3))], [], 0
     for mesh in meshes:

@@ -47,7 +47,7 @@ def marking_structure(network: RoadNetwork) -> Structure:
             ),
         ]
         if road.length > _LEAST_LENGTH and strips:
-            pieces[name] = merge_meshes(_strip(road, *s) for s in strips)
+            pieces[name] = merge_meshes(*(_strip(road, *s) for s in strips))
     return as_structure("markings", "road", pieces, network.lane_area(), _RGB)
 
 
@@ -120,8 +120,10 @@ def _strip(
     if np.ptp(road.height([first, (first + last) / 2, last])) > 0:
         ends = sample_stations(first, last, _SLOPE_PIECE)
         return merge_meshes(
-            _quadrilateral(road, a, b, right, left)
-            for a, b in itertools.pairwise(ends)
+            *(
+                _quadrilateral(road, a, b, right, left)
+                for a, b in itertools.pairwise(ends)
+            )
         )
     return _quadrilateral(road, first, last, right, left)
 

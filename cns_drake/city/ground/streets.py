@@ -172,7 +172,7 @@ def _surface(
                 top,
                 along=edge.intersection(piece.buffer(_NEAR)).buffer(_NEAR),
             )
-            pieces[part] = merge_meshes([pieces[part], stones])
+            pieces[part] = merge_meshes(pieces[part], stones)
     return as_structure(name, semantic_class, pieces, area, rgb)
 
 
@@ -189,9 +189,7 @@ def _kerb_structure(
         near = piece.buffer(_NEAR)
         rim = shapely.segmentize(paved, spacing) if spacing > 0 else paved
         upstand = wall_mesh(rim, road, top, along=near)
-        pieces[part] = merge_meshes(
-            [surface_mesh(piece, top, spacing), upstand]
-        )
+        pieces[part] = merge_meshes(surface_mesh(piece, top, spacing), upstand)
     return as_structure("kerbs", "sidewalk", pieces, kerbs, _KERB_RGB)
 
 

@@ -178,7 +178,7 @@ def _slope(
             rest = snap(rest.difference(pad.area))
             meshes.append(surface_mesh(level, pad.height))
         meshes.append(surface_mesh(rest, shape, spacing))
-        pieces[f"tile_{k:02d}"] = merge_meshes(meshes)
+        pieces[f"tile_{k:02d}"] = merge_meshes(*meshes)
     return as_structure(name, semantic_class, pieces, area, rgb)
 
 

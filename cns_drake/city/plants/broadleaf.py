@@ -156,7 +156,7 @@ def _wood(
         near = joints[np.argmin(np.linalg.norm(joints - center, axis=1))]
         if np.linalg.norm(center - near) > 0.3:
             pieces.append(tube([near, center], [0.14 * r, 0.05 * r], 3))
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 def _spread_out(points: np.ndarray, count: int) -> list[int]:

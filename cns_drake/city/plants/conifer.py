@@ -62,4 +62,4 @@ def grow_conifer(rng: np.random.Generator) -> tuple[Mesh, Mesh]:
         length.append(rng.uniform(0.5, 0.75))
         width.append(0.2)
     needles = leaves(base, direction, normal, length, width)
-    return merge_meshes(wood), keep_above(needles, _CROWN_BASE)
+    return merge_meshes(*wood), keep_above(needles, _CROWN_BASE)

@@ -45,8 +45,8 @@ def grow_palm(rng: np.random.Generator) -> tuple[Mesh, Mesh]:
         ]
         rows.append(_leaflets(rng, rib, out))
     merged = [np.concatenate(column) for column in zip(*rows, strict=True)]
-    fronds = merge_meshes([leaves(*merged), *ribs])
-    return merge_meshes(wood), fronds
+    fronds = merge_meshes(leaves(*merged), *ribs)
+    return merge_meshes(*wood), fronds
 
 
 def _leaflets(rng: np.random.Generator, rib: np.ndarray, out: np.ndarray):

@@ -141,7 +141,7 @@ def _shrub(variant: int) -> Mesh:
     points[:, 2] += 0.18
     foliage = tufts(rng, points, direction, 4, 0.25, 0.18)
     stems = [tube([(0, 0, -0.15), p], (0.02, 0.008), 3) for p in points[::7]]
-    return merge_meshes([keep_above(foliage, 0.0), *stems])
+    return merge_meshes(keep_above(foliage, 0.0), *stems)
 
 
 @cache
@@ -156,7 +156,7 @@ def _bed_edge() -> Mesh:
         for x in (-1.95, 1.95)
     ]
     pieces.append(box_mesh((3.8, 1.3, 0.2), (0, 0, 0.0)))
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 @cache
@@ -198,7 +198,7 @@ def _planter_box() -> Mesh:
     rim = [box_mesh((2.0, 0.06, 0.08), (0, y, 0.54)) for y in (-0.32, 0.32)] + [
         box_mesh((0.06, 0.58, 0.08), (x, 0, 0.54)) for x in (-0.97, 0.97)
     ]
-    return merge_meshes([body, *rim])
+    return merge_meshes(body, *rim)
 
 
 SHRUBS = {

@@ -83,7 +83,7 @@ def _grow_staked(rng: np.random.Generator) -> tuple[Mesh, Mesh]:
         for y in (-0.38, 0.38)
     ]
     tie = beam((0, -0.4, 1.55), (0, 0.4, 1.55), 0.03, 0.1)
-    return merge_meshes([wood, *stakes, tie]), crown
+    return merge_meshes(wood, *stakes, tie), crown
 
 
 SPECIES = {

@@ -72,4 +72,4 @@ def grow_willow(rng: np.random.Generator) -> tuple[Mesh, Mesh]:
         rng.uniform(0.6, 1.0, n),
         rng.uniform(0.2, 0.36, n),
     )
-    return merge_meshes(wood), keep_above(foliage, _CROWN_BASE)
+    return merge_meshes(*wood), keep_above(foliage, _CROWN_BASE)

@@ -33,12 +33,10 @@ OUTLINES = {"turned": TURNED, "l_shape": L_SHAPE, "oblique": OBLIQUE}
 def closed(points, facade, z0=0.0):
     """The facade with its glass and lids at depth 0."""
     return merge_meshes(
-        [
-            facade_mesh(points, facade, z0),
-            glass_mesh(points, facade, z0),
-            massing.flat(points, z0, up=False),
-            massing.flat(points, z0 + facade.height),
-        ]
+        facade_mesh(points, facade, z0),
+        glass_mesh(points, facade, z0),
+        massing.flat(points, z0, up=False),
+        massing.flat(points, z0 + facade.height),
     )
 
 

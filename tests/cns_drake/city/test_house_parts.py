@@ -19,6 +19,11 @@ HALL = Wing.at(0, 0, 20, 8, 6.0, 9.0, Roof())
 PORCH = Wing.at(8, -3, 12, 0.1, 2.5, 3.5, Roof())
 
 
+def empty_assembly(name):
+    site = Site(box(0, 0, 9, 9), name)
+    return Assembly(site, np.random.default_rng(0), rgb=(9, 9, 9))
+
+
 def test_other_wings_hide_walls_up_to_their_tops():
     boxes = (HALL, PORCH)
     assert free_stretches(HALL, 0, boxes, 1.0) == [(0.0, 8.0), (12.0, 20.0)]
@@ -62,7 +67,7 @@ def test_gables_stand_below_the_ends_of_the_ridge(along_y):
     wing = Wing.at(0, 0, 6, 6, 4.0, 7.0, Roof("gable", along_y, 0.4, 0.3))
     materials = Materials(walls=(1, 1, 1), roof=(0, 0, 0))
     add_roof(materials, wing)
-    assembly = Assembly("h")
+    assembly = empty_assembly("h")
     materials.finish(assembly)
     walls = assembly.meshes["h_walls"].vertices
     across = walls[:, 0] if along_y else walls[:, 1]
@@ -88,7 +93,7 @@ def test_dormers_stay_below_the_ridge_and_on_the_slope():
     for kind in ("gable", "shed", "flat"):
         materials = Materials(walls=(1, 1, 1), glass=(0, 0, 1), roof=(1, 0, 0))
         dormers.add_dormers(materials, HALL, 2.0, 18.0, 3, kind)
-        assembly = Assembly("d")
+        assembly = empty_assembly("d")
         materials.finish(assembly)
         corners = np.vstack([m.vertices for m in assembly.meshes.values()])
         assert corners[:, 2].max() < 9.0
@@ -105,7 +110,7 @@ def test_no_dormer_on_a_flat_slope():
     wing = Wing.at(0, 0, 20, 16, 6.0, 8.0, Roof())
     materials = Materials(walls=(1, 1, 1))
     dormers.add_dormers(materials, wing, 0.0, 20.0, 3, "gable")
-    assembly = Assembly("d")
+    assembly = empty_assembly("d")
     materials.finish(assembly)
     assert assembly.parts == []
 
@@ -122,7 +127,7 @@ def test_each_material_becomes_one_part():
     materials = Materials(a=(1, 0, 0), b=(0, 1, 0), c=(0, 0, 1))
     materials.add("b", box_mesh((1, 1, 1)))
     materials.add("a", box_mesh((1, 1, 1)), box_mesh((1, 2, 3), (5, 0, 0)))
-    assembly = Assembly("h", rgb=(9, 9, 9))
+    assembly = empty_assembly("h")
     turned = materials.moved((1.0, 2.0, 0.0), yaw=np.pi / 2)
     turned.finish(assembly)
     assert [(p.name, p.rgb) for p in assembly.parts] == [

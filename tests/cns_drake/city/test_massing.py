@@ -120,11 +120,11 @@ def test_frustum_spire_and_sloped_prism_have_their_volumes():
     square = massing.rectangle(0, 0, 6, 6)
     small = massing.rectangle(2, 2, 4, 4)
     floor = massing.flat(square, 0.0, up=False)
-    frustum = merge_meshes([massing.frustum(square, small, 0.0, 3.0), floor])
+    frustum = merge_meshes(massing.frustum(square, small, 0.0, 3.0), floor)
     assert volume(frustum) == pytest.approx(3.0 / 3 * (36 + 12 + 4))
-    spire = merge_meshes([massing.spire(square, (3, 3), 0.0, 5.0), floor])
+    spire = merge_meshes(massing.spire(square, (3, 3), 0.0, 5.0), floor)
     assert volume(spire) == pytest.approx(5.0 / 3 * 36)
-    wedge = merge_meshes([massing.sloped_prism(square, 0.0, 4.0, 0.25), floor])
+    wedge = merge_meshes(massing.sloped_prism(square, 0.0, 4.0, 0.25), floor)
     assert volume(wedge) == pytest.approx(36 * (1.0 + 4.0) / 2)
     for mesh in (frustum, spire, wedge):
         assert is_closed(merge(mesh))
@@ -134,7 +134,7 @@ def test_roof_pan_hollows_the_top_out():
     walls = massing.skirt(TURNED, TURNED, 0.0, 5.0)
     floor = massing.flat(TURNED, 0.0, up=False)
     pan = massing.roof_pan(TURNED, 4.0, 5.0, 0.3)
-    mesh = merge_meshes([walls, floor, pan])
+    mesh = merge_meshes(walls, floor, pan)
     inner = area(TURNED) - 2 * 0.3 * (14 + 9) + 4 * 0.09
     assert volume(mesh) == pytest.approx(5.0 * area(TURNED) - inner)
     assert is_closed(merge(mesh))
@@ -144,7 +144,7 @@ def test_revolved_profile_has_the_volume_of_its_polygons():
     profile = [(2.0, 0.0), (3.0, 1.5), (3.0, 4.0), (0.0, 6.0)]
     mesh = massing.revolved(profile, 12, (5.0, -3.0))
     floor = massing.regular_polygon(2.0, 12, (5.0, -3.0))
-    mesh = merge_meshes([mesh, massing.flat(floor, 0.0, up=False)])
+    mesh = merge_meshes(mesh, massing.flat(floor, 0.0, up=False))
     unit = 0.5 * 12 * math.sin(2 * math.pi / 12)
     expected = unit * (1.5 / 3 * (4 + 6 + 9) + 2.5 * 9 + 2.0 / 3 * 9)
     assert volume(mesh) == pytest.approx(expected)
@@ -162,7 +162,7 @@ def test_revolved_profile_has_the_volume_of_its_polygons():
 def test_sheds_hold_their_section(profile, section):
     mesh = massing.extruded(profile, -3.0, 7.0)
     base = massing.rectangle(-3.0, 0.0, 7.0, 8.0)
-    mesh = merge_meshes([mesh, massing.flat(base, 0.0, up=False)])
+    mesh = merge_meshes(mesh, massing.flat(base, 0.0, up=False))
     assert volume(mesh) == pytest.approx(10.0 * section)
     assert_closed(mesh)
 

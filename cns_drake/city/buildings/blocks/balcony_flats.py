@@ -7,9 +7,8 @@ import numpy as np
 from cns_drake.city.buildings.parts import bays, details, massing, tiers
 from cns_drake.city.buildings.parts.facades import Band, Facade
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice, Site
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
-from cns_drake.city.geometry.structures import Model
 
 _WALLS = (
     (0.90, 0.89, 0.86),
@@ -27,7 +26,7 @@ _RAILS = (
 _FRONT_M = 1.7
 
 
-class BalconyFlats:
+class Parameters:
     """Parameters of a slab of flats; lengths in metres.
 
     Attributes:
@@ -67,10 +66,9 @@ class BalconyFlats:
         self.rail_rgb = d.pick(_RAILS)
 
 
-def build(p: BalconyFlats, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the slab along the front of a rectangle."""
-    assembly = Assembly(site.name, p.rgb)
-    sections = _sections(p, site)
+    sections = _sections(p, assembly.site)
     plan, fronts = _outline(sections)
     storeys = max(2, round((p.height - 1.9) / p.storey))
     lower = p.step if p.sections > 1 and storeys > 3 else 0
@@ -99,16 +97,15 @@ def build(p: BalconyFlats, site: Site, rng: np.random.Generator) -> Model:
             thickness=0.25,
         )  # fmt: skip
         items = p.roof_items[k :: p.sections]
-        equip_roof(assembly, section, roof, items, rng, prefix=f"{part}_")
+        equip_roof(assembly, section, roof, items, prefix=f"{part}_")
     stairs = [
         _stair(p, wall, ground.height + common * exact, k == 0)
         for k, wall in enumerate(walls)
     ]
-    assembly.add("stairs", merge_meshes(stairs), rgb=p.rail_rgb)
-    return assembly.model(site)
+    assembly.add("stairs", *stairs, rgb=p.rail_rgb)
 
 
-def _sections(p: BalconyFlats, site: Site) -> list[np.ndarray]:
+def _sections(p: Parameters, site: Site) -> list[np.ndarray]:
     """Returns the rectangles of the sections, left to right."""
     x0, y0, x1, _ = site.bounds
     bounds = np.round(np.linspace(x0, x1, p.sections + 1), 2).tolist()
@@ -143,7 +140,7 @@ def _outline(sections) -> tuple[np.ndarray, list[int]]:
 class _Front:
     """The front of a section: its bays, the stair's, those with balconies."""
 
-    def __init__(self, p: BalconyFlats, plan, edge: int):
+    def __init__(self, p: Parameters, plan, edge: int):
         self.edge = edge
         self.wall = details.WallFrame(plan, edge)
         self.cells = bays.stretches(self.wall.length, p.pitch, 0.5)
@@ -163,7 +160,7 @@ class _Front:
         return sum(self.cells[self.middle]) / 2
 
 
-def _window(p: BalconyFlats, storey: float, sill: float = 0.85) -> bays.Bay:
+def _window(p: Parameters, storey: float, sill: float = 0.85) -> bays.Bay:
     return bays.window(p.window_width, sill, storey - 0.45, p.recess)
 
 
@@ -216,7 +213,7 @@ def _add_balconies(assembly, p, walls, z0: float, stack) -> None:
             ]
     if pieces:
         assembly.stack(
-            "balconies", merge_meshes(pieces), z0, per_group * storey, groups,
+            "balconies", merge_meshes(*pieces), z0, per_group * storey, groups,
             rgb=p.rail_rgb,
         )  # fmt: skip
 
@@ -233,7 +230,7 @@ def _runs(cells, spots, joined: bool):
     return runs
 
 
-def _stair(p: BalconyFlats, front: _Front, top: float, highest: bool) -> Mesh:
+def _stair(p: Parameters, front: _Front, top: float, highest: bool) -> Mesh:
     """A canopy at the door, and the stair where it stands out."""
     x = front.stair
     pieces = [
@@ -252,9 +249,4 @@ def _stair(p: BalconyFlats, front: _Front, top: float, highest: bool) -> Mesh:
     elif highest:
         spot = (x - 2.2, x + 2.2, -5.0, -1.5)
         pieces.append(massing.box(*spot, top - 0.1, p.height))
-    return merge_meshes([front.wall.place(piece) for piece in pieces])
-
-
-ARCHETYPE = Archetype(
-    BalconyFlats, build, heights=(9.0, 33.0), widths=(11.0, 70.0), overhang=0.35
-)
+    return merge_meshes(*(front.wall.place(piece) for piece in pieces))

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from cns_drake.city.buildings.parts import bays, details, tiers
 from cns_drake.city.buildings.parts.facades import Band, Facade
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
-from cns_drake.city.geometry.structures import MeshShape, Model
+from cns_drake.city.buildings.parts.site import Assembly, Dice
+from cns_drake.city.geometry.structures import MeshShape
 
 _BRICKS = (
     (0.56, 0.33, 0.27),
@@ -21,7 +19,7 @@ _BRICKS = (
 _MOST_FLIGHTS = 8
 
 
-class BrickBlock:
+class Parameters:
     """Parameters of a brick block; lengths in metres."""
 
     def __init__(self, d: Dice):
@@ -58,10 +56,10 @@ class BrickBlock:
         self.rgb = d.pick(_BRICKS)
 
 
-def build(p: BrickBlock, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the block on any outline."""
+    site = assembly.site
     outline = site.outline
-    assembly = Assembly(site.name, p.rgb)
     crown_height = p.parapet + 1.4
     groups, per_group, storey = tiers.divided(
         p.height - p.ground_height - crown_height, p.storey_height
@@ -90,12 +88,12 @@ def build(p: BrickBlock, site: Site, rng: np.random.Generator) -> Model:
     shades = []
     for x0, x1 in bays.stretches(front.length, 2 * p.pitch, 0.6):
         clear = x1 < middle - 1.7 or x0 > middle + 1.7
-        if clear and rng.random() < 0.6:
+        if clear and assembly.rng.random() < 0.6:
             shade = details.awning(
                 x0 + 0.4, x1 - 0.4, 1.2, 2.6, p.ground_height - 0.9
             )
             shades.append(front.place(shade))
-    tiers.add_awnings(assembly, shades, rng)
+    tiers.add_awnings(assembly, shades)
     top = tiers.add_ground(assembly, outline, ground, [front.place(roof)])
 
     sash = bays.window(
@@ -130,10 +128,9 @@ def build(p: BrickBlock, site: Site, rng: np.random.Generator) -> Model:
         plain=site.blind_edges,
     )
     roof = tiers.add_crown(assembly, outline, frieze, top, p.parapet)
-    equip_roof(assembly, outline, roof, p.roof_items, rng)
+    equip_roof(assembly, outline, roof, p.roof_items)
     if p.stairs_edge is not None and groups * per_group <= _MOST_FLIGHTS:
         _add_fire_stairs(assembly, p, site, bottom, storey, top)
-    return assembly.model(site)
 
 
 def _add_fire_stairs(assembly, p, site, bottom, storey, top) -> None:
@@ -151,13 +148,3 @@ def _add_fire_stairs(assembly, p, site, bottom, storey, top) -> None:
             wall.heading,
             rgb=(0.2, 0.2, 0.22),
         )
-
-
-ARCHETYPE = Archetype(
-    BrickBlock,
-    build,
-    heights=(12.0, 40.0),
-    widths=(10.0, 60.0),
-    any_outline=True,
-    party_walls=True,
-)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cns_drake.city.buildings.archetypes import ARCHETYPES
 from cns_drake.city.buildings.parts import (
     bays,
     details,
@@ -13,9 +14,8 @@ from cns_drake.city.buildings.parts import (
 )
 from cns_drake.city.buildings.parts.facades import Band, Facade
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice, Site
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
-from cns_drake.city.geometry.structures import Model
 
 _STUCCOS = ((0.84, 0.78, 0.66), (0.76, 0.66, 0.56), (0.82, 0.80, 0.76))
 
@@ -23,7 +23,7 @@ _STUCCOS = ((0.84, 0.78, 0.66), (0.76, 0.66, 0.56), (0.82, 0.80, 0.76))
 _ROOF_ITEMS = ("stair_house", "skylight", "vents", "ac_unit")
 
 
-class CornerBuilding:
+class Parameters:
     """Parameters of a corner house; lengths in metres.
 
     `corner` is the rounded corner of the rectangle (0: front left,
@@ -51,15 +51,15 @@ class CornerBuilding:
         self.roof_rgb = d.pick(((0.3, 0.42, 0.38), (0.32, 0.33, 0.36)))
 
 
-def build(p: CornerBuilding, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the house on a rectangle."""
+    site = assembly.site
     if p.corner not in site.free_corners:
-        site = site.detached(ARCHETYPE.overhang)
-    assembly = Assembly(site.name, p.rgb)
+        site = site.detached(ARCHETYPES["corner_building"].overhang)
     rectangle = site.outline
     plan = massing.rounded(rectangle, {p.corner: p.radius}, 2.8)
     blind = outlines.edges_on(plan, rectangle, site.blind_edges)
-    top = _add_shops(assembly, p, plan, blind, rng)
+    top = _add_shops(assembly, p, plan, blind)
     bottom = top
     top = _add_first_floor(assembly, p, plan, blind, top)
     crown = p.height - p.dome_height
@@ -87,8 +87,7 @@ def build(p: CornerBuilding, site: Site, rng: np.random.Generator) -> Model:
     roof = tiers.add_crown(assembly, plan, eaves, top, 0.8)
     dome = _dome(p, plan, roof)
     assembly.add("dome", dome, rgb=p.roof_rgb)
-    _equip(assembly, p, site, roof, rng)
-    return assembly.model(site)
+    _equip(assembly, p, site, roof)
 
 
 def _is_front(plan, edge: int) -> bool:
@@ -97,7 +96,7 @@ def _is_front(plan, edge: int) -> bool:
     return edge == 0 or (along[0] > 0.1 and abs(along[1]) > 0.1)
 
 
-def _add_shops(assembly, p: CornerBuilding, plan, blind, rng) -> float:
+def _add_shops(assembly, p: Parameters, plan, blind) -> float:
     h = p.ground_height
     shops = bays.rhythm(
         2 * p.pitch,
@@ -133,13 +132,13 @@ def _add_shops(assembly, p: CornerBuilding, plan, blind, rng) -> float:
     shades = [
         front.place(details.awning(a + 0.3, b - 0.3, 1.3, 2.7, h - 1.2))
         for a, b in bays.stretches(front.length, 2 * p.pitch, 0.35)
-        if rng.random() < 0.5
+        if assembly.rng.random() < 0.5
     ]
-    tiers.add_awnings(assembly, shades, rng)
+    tiers.add_awnings(assembly, shades)
     return tiers.add_ground(assembly, plan, ground)
 
 
-def _add_first_floor(assembly, p: CornerBuilding, plan, blind, z0) -> float:
+def _add_first_floor(assembly, p: Parameters, plan, blind, z0) -> float:
     """The tall main floor: arched windows, balconies in front of some."""
     h = p.first_height
     arched = bays.arched(p.window_width, 0.5, h - 1.6, p.recess)
@@ -169,14 +168,14 @@ def _add_first_floor(assembly, p: CornerBuilding, plan, blind, z0) -> float:
     )
 
 
-def _center(p: CornerBuilding, plan) -> np.ndarray:
+def _center(p: Parameters, plan) -> np.ndarray:
     """Returns the middle of the rounded corner's circle."""
     low, high = plan.min(axis=0), plan.max(axis=0)
     x = low[0] + p.radius if p.corner == 0 else high[0] - p.radius
     return np.array([x, low[1] + p.radius])
 
 
-def _dome(p: CornerBuilding, plan, z0) -> Mesh:
+def _dome(p: Parameters, plan, z0) -> Mesh:
     """A drum over the corner under a dome, a cone or an open lantern."""
     center, r = _center(p, plan), 0.62 * p.radius
     top, height = p.height, p.height - z0
@@ -192,7 +191,7 @@ def _dome(p: CornerBuilding, plan, z0) -> Mesh:
     rise = top - drum_top
     if p.dome == "cone":
         pieces.append(massing.spire(ring(r), center, drum_top, top))
-        return merge_meshes(pieces)
+        return merge_meshes(*pieces)
     share = 0.85 if p.dome == "dome" else 0.6
     angles = np.linspace(0.0, 0.4 * np.pi, 5)
     radii = r * np.cos(angles)
@@ -208,20 +207,11 @@ def _dome(p: CornerBuilding, plan, z0) -> Mesh:
         pieces.append(massing.flat(tip, middle, up=False))
         lid = middle
     pieces.append(massing.spire(tip, center, lid, top))
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
-def _equip(assembly, p: CornerBuilding, site: Site, roof, rng) -> None:
+def _equip(assembly, p: Parameters, site: Site, roof) -> None:
     x0, y0, x1, y1 = site.bounds
     free = massing.rectangle(x0, y0 + 2 * p.radius, x1, y1)
     if y1 - y0 - 2 * p.radius > 5.0:
-        equip_roof(assembly, free, roof, _ROOF_ITEMS, rng)
-
-
-ARCHETYPE = Archetype(
-    CornerBuilding,
-    build,
-    heights=(20.0, 45.0),
-    widths=(14.0, 50.0),
-    party_walls=True,
-)
+        equip_roof(assembly, free, roof, _ROOF_ITEMS)

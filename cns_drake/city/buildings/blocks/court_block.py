@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from cns_drake.city.buildings.parts import (
     bays,
     details,
@@ -12,15 +10,15 @@ from cns_drake.city.buildings.parts import (
     tiers,
 )
 from cns_drake.city.buildings.parts.facades import Band, Facade
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice, Site
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
-from cns_drake.city.geometry.structures import MeshShape, Model
+from cns_drake.city.geometry.structures import MeshShape
 
 _RENDERS = ((0.80, 0.70, 0.55), (0.70, 0.45, 0.38), (0.78, 0.76, 0.70))
 _SLATES = ((0.33, 0.35, 0.40), (0.45, 0.30, 0.26))
 
 
-class CourtBlock:
+class Parameters:
     """Parameters of a court block; lengths in metres."""
 
     def __init__(self, d: Dice):
@@ -48,9 +46,9 @@ class CourtBlock:
         self.roof_rgb = d.pick(_SLATES)
 
 
-def build(p: CourtBlock, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the block on a rectangle, its court open to the back."""
-    assembly = Assembly(site.name, p.rgb)
+    site = assembly.site
     form = outlines.u_shape if p.shape == "U" else outlines.l_shape
     plan = form(*site.bounds, p.wing, p.back)
     if p.mirrored:
@@ -76,12 +74,11 @@ def build(p: CourtBlock, site: Site, rng: np.random.Generator) -> Model:
     )
     top = tiers.add_storeys(assembly, plan, walls, top, groups, per_group)
     _add_oriels(assembly, p, plan, bottom, groups * per_group, storey)
-    roof = _mansard(p, plan, top, rng)
+    roof = _mansard(p, plan, top, assembly.rng)
     assembly.add("mansard", roof, rgb=p.roof_rgb)
-    return assembly.model(site)
 
 
-def _add_ground(assembly, p: CourtBlock, plan, site: Site) -> float:
+def _add_ground(assembly, p: Parameters, plan, site: Site) -> float:
     h = p.ground_height
     shops = bays.rhythm(
         1.7 * p.pitch, [bays.shop_front(h - 0.9, 0.3)], margin=0.7
@@ -99,18 +96,16 @@ def _add_ground(assembly, p: CourtBlock, plan, site: Site) -> float:
     return tiers.add_ground(assembly, plan, ground)
 
 
-def _add_oriels(assembly, p: CourtBlock, plan, z0, count, storey) -> None:
+def _add_oriels(assembly, p: Parameters, plan, z0, count, storey) -> None:
     """Bay windows that hang on the street front from the first floor up."""
     half, r = 0.75, p.oriel_reach
     outline = [(-half - 0.5, 0.0), (-half, -r), (half, -r), (half + 0.5, 0.0)]
     floor = Facade(storey, (Band(0.9, storey - 0.5, 0.14),))
     height = count * storey
     oriel = merge_meshes(
-        [
-            tiers.block(outline, floor.stacked(count), 0.0),
-            massing.flat(outline, 0.0, up=False),
-            massing.spire(outline, (0.0, 0.0), height, height + 0.6),
-        ]
+        tiers.block(outline, floor.stacked(count), 0.0),
+        massing.flat(outline, 0.0, up=False),
+        massing.spire(outline, (0.0, 0.0), height, height + 0.6),
     )
     shape = MeshShape(assembly.define("oriel", oriel))
     wall = details.WallFrame(plan, 0)
@@ -121,7 +116,7 @@ def _add_oriels(assembly, p: CourtBlock, plan, z0, count, storey) -> None:
         assembly.place(f"oriel_{k}", shape, (x, y, z0), wall.heading)
 
 
-def _mansard(p: CourtBlock, plan, z0, rng) -> Mesh:
+def _mansard(p: Parameters, plan, z0, rng) -> Mesh:
     eaves = massing.inset(plan, -0.5)
     knee = massing.inset(plan, p.mansard_inset - 0.6)
     slope = min(1.6, p.wing / 2 - p.mansard_inset - 0.4)
@@ -147,10 +142,10 @@ def _mansard(p: CourtBlock, plan, z0, rng) -> Mesh:
         y = middle[1] + p.mansard_inset + 2.4 + float(rng.uniform(0.0, 1.5))
         stack = (x - 0.6, x + 0.6, y - 0.35, y + 0.35)
         pieces.append(massing.box(*stack, z2, p.height, bottom=False))
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
-def _dormer(p: CourtBlock, x: float, z0: float, z1: float) -> Mesh:
+def _dormer(p: Parameters, x: float, z0: float, z1: float) -> Mesh:
     """A dormer whose back runs into the slope, in wall coordinates."""
     low, high = z0 + 0.4, min(z0 + 2.4, z1 - 0.2)
     deep = p.mansard_inset
@@ -165,9 +160,4 @@ def _dormer(p: CourtBlock, x: float, z0: float, z1: float) -> Mesh:
     # The back wall is inside the roof; the sill stands before the window.
     front = Mesh(walls.vertices, walls.faces[1:])
     sill = massing.box(x - 0.8, x + 0.8, -0.6, 0.05, low - 0.15, low + 0.1)
-    return merge_meshes([front, lid, sill])
-
-
-ARCHETYPE = Archetype(
-    CourtBlock, build, heights=(14.0, 36.0), widths=(22.0, 70.0)
-)
+    return merge_meshes(front, lid, sill)

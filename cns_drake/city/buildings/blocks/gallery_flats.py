@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from cns_drake.city.buildings.parts import bays, details, massing, tiers
 from cns_drake.city.buildings.parts.facades import Band, Facade
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
-from cns_drake.city.geometry.structures import Model
 
 _CONCRETES = ((0.74, 0.73, 0.70), (0.80, 0.77, 0.70), (0.66, 0.67, 0.68))
 _PANELS = (
@@ -21,7 +18,7 @@ _PANELS = (
 )
 
 
-class GalleryFlats:
+class Parameters:
     """Parameters of a bar; lengths in metres.
 
     Attributes:
@@ -61,10 +58,9 @@ class GalleryFlats:
         self.panel_rgb = d.pick(_PANELS)
 
 
-def build(p: GalleryFlats, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the bar along x on a rectangle."""
-    assembly = Assembly(site.name, p.rgb)
-    x0, y0, x1, y1 = site.bounds
+    x0, y0, x1, y1 = assembly.site.bounds
     front = y0 + (p.gallery if p.gallery_front else 0.1)
     back = min(front + p.depth, y1 - (0.1 if p.gallery_front else p.gallery))
     a = x0 + p.stair_width * p.stair_left
@@ -77,19 +73,18 @@ def build(p: GalleryFlats, site: Site, rng: np.random.Generator) -> Model:
     walls = _storey(p, storey, open_edge)
     top = tiers.add_storeys(assembly, slab, walls, top, groups, per_group)
     stack = (groups, per_group, storey)
-    _add_galleries(assembly, p, slab, open_edge, stack, rng)
+    _add_galleries(assembly, p, slab, open_edge, stack)
     crown = Facade(0.6, (Band(0.4, 0.6, -0.1),))
     roof = tiers.add_crown(assembly, slab, crown, top, 0.5, thickness=0.25)
-    equip_roof(assembly, slab, roof, p.roof_items, rng)
+    equip_roof(assembly, slab, roof, p.roof_items)
     left = x0 if p.stair_left else b - 0.05
     shaft = massing.rectangle(
         left, slab[0, 1] + 0.8, left + p.stair_width + 0.05, slab[2, 1] - 0.8
     )
     _add_stair(assembly, p, shaft)
-    return assembly.model(site)
 
 
-def _add_ground(assembly, p: GalleryFlats, slab) -> float:
+def _add_ground(assembly, p: Parameters, slab) -> float:
     """Adds cellars, bicycle rooms and a glazed hall."""
     h = p.ground
     store = bays.gate(2.4, 2.2, 0.2)
@@ -107,7 +102,7 @@ def _add_ground(assembly, p: GalleryFlats, slab) -> float:
     return tiers.add_ground(assembly, slab, facade)
 
 
-def _storey(p: GalleryFlats, storey: float, open_edge: int) -> Facade:
+def _storey(p: Parameters, storey: float, open_edge: int) -> Facade:
     head = round(storey - 0.45, 2)
 
     def flat(a: float, b: float):
@@ -128,7 +123,7 @@ def _storey(p: GalleryFlats, storey: float, open_edge: int) -> Facade:
     return Facade(storey, (), bays.by_edge(layouts, blank), glass)
 
 
-def _add_galleries(assembly, p, slab, edge, stack, rng) -> None:
+def _add_galleries(assembly, p, slab, edge, stack) -> None:
     """Adds one gallery per storey, posts through all, and screens."""
     wall = details.WallFrame(slab, edge)
     end, reach = wall.length, p.gallery - 0.05
@@ -136,7 +131,7 @@ def _add_galleries(assembly, p, slab, edge, stack, rng) -> None:
     storeys = groups * per_group
     gallery = details.balcony(0.02, end - 0.02, reach, 0.0, p.rail)
     group = merge_meshes(
-        gallery.moved((0.0, 0.0, k * storey)) for k in range(per_group)
+        *(gallery.moved((0.0, 0.0, k * storey)) for k in range(per_group))
     )
     assembly.stack(
         "gallery", wall.place(group), p.ground, per_group * storey, groups
@@ -151,21 +146,21 @@ def _add_galleries(assembly, p, slab, edge, stack, rng) -> None:
         posts.append(
             massing.box(*spot, -massing.FOUNDATION_M, top - 0.1, bottom=False)
         )
-    assembly.add("posts", merge_meshes([wall.place(m) for m in posts]))
+    assembly.add("posts", *(wall.place(m) for m in posts))
     screens = []
     for a, b in cells:
         for k in range(storeys):
-            if rng.random() < p.panels:
+            if assembly.rng.random() < p.panels:
                 z = p.ground + k * storey
-                u = float(rng.uniform(a + 0.2, b - 1.8))
+                u = float(assembly.rng.uniform(a + 0.2, b - 1.8))
                 spot = (round(u, 2), round(u + 1.5, 2), reach, reach + 0.06)
                 screens.append(massing.box(*spot, z + 0.1, z + storey - 0.15))
     if screens:
-        mesh = merge_meshes([wall.place(m) for m in screens])
+        mesh = merge_meshes(*(wall.place(m) for m in screens))
         assembly.add("screens", mesh, rgb=p.panel_rgb)
 
 
-def _add_stair(assembly, p: GalleryFlats, shaft) -> None:
+def _add_stair(assembly, p: Parameters, shaft) -> None:
     slit = bays.with_middle(
         bays.plain, bays.window(1.4, 2.8, p.height - 1.0, 0.25), 2.2
     )
@@ -179,13 +174,4 @@ def _add_stair(assembly, p: GalleryFlats, shaft) -> None:
     )
     base = massing.foundation(shaft)
     body = tiers.block(shaft, facade, 0.0)
-    assembly.add("stair", merge_meshes([base, body]), rgb=p.panel_rgb)
-
-
-ARCHETYPE = Archetype(
-    GalleryFlats,
-    build,
-    heights=(12.0, 45.0),
-    widths=(12.0, 90.0),
-    overhang=0.35,
-)
+    assembly.add("stair", base, body, rgb=p.panel_rgb)

@@ -20,9 +20,8 @@ from cns_drake.city.buildings.parts.roof_equipment import (
     add_chimney,
     equip_roof,
 )
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
-from cns_drake.city.geometry.mesh import Mesh, merge_meshes
-from cns_drake.city.geometry.structures import Model
+from cns_drake.city.buildings.parts.site import Assembly, Dice
+from cns_drake.city.geometry.mesh import Mesh
 
 _WALLS = (*family_house.BRICKS, (0.66, 0.50, 0.38), (0.72, 0.62, 0.50))
 
@@ -30,7 +29,7 @@ _WALLS = (*family_house.BRICKS, (0.66, 0.50, 0.38), (0.72, 0.62, 0.50))
 _FRONT_M, _BACK_M = 1.5, 0.5
 
 
-class WalkUp:
+class Parameters:
     """Parameters of a walk-up; lengths in metres.
 
     Attributes:
@@ -72,9 +71,9 @@ class WalkUp:
         self.roof_rgb = d.pick(family_house.ROOFS)
 
 
-def build(p: WalkUp, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the flats on a rectangle."""
-    assembly = Assembly(site.name, p.rgb)
+    site = assembly.site
     x0, y0, x1, y1 = site.bounds
     side = 0.5
     body = massing.rectangle(
@@ -107,11 +106,10 @@ def build(p: WalkUp, site: Site, rng: np.random.Generator) -> Model:
         plain=blind,
     )
     top = tiers.add_storeys(assembly, plan, walls, top, groups, per_group)
-    _add_top(assembly, p, body, plan, top, blind, rng)
-    return assembly.model(site)
+    _add_top(assembly, p, body, plan, top, blind)
 
 
-def _bay_front(p: WalkUp, body) -> tuple[np.ndarray, list[int]]:
+def _bay_front(p: Parameters, body) -> tuple[np.ndarray, list[int]]:
     """Returns the plan, its front with bays, and the walls with stairs."""
     (x0, y0), (x1, y1) = body[0], body[2]
     count = max(1, round((x1 - x0) / p.section))
@@ -132,7 +130,7 @@ def _bay_front(p: WalkUp, body) -> tuple[np.ndarray, list[int]]:
     return np.array(plan), stairs
 
 
-def _add_ground(assembly, p: WalkUp, plan, stairs, blind) -> float:
+def _add_ground(assembly, p: Parameters, plan, stairs, blind) -> float:
     """Adds the raised ground floor with its entrances and steps."""
     h = round(p.floor + p.storey, 2)
     sill, head = round(p.floor + 0.8, 2), round(p.floor + 2.25, 2)
@@ -180,7 +178,7 @@ def _add_ground(assembly, p: WalkUp, plan, stairs, blind) -> float:
         )
         flight = flight.moved((0.0, room - run, 0.0))
         pieces += [wall.place(m) for m in (slab, flight, hood, *cheeks)]
-    assembly.add("steps", merge_meshes(pieces), rgb=family_house.BASE)
+    assembly.add("steps", *pieces, rgb=family_house.BASE)
     return tiers.add_ground(assembly, plan, facade)
 
 
@@ -194,7 +192,7 @@ def _both(first, second, wanted: bool):
     return layout
 
 
-def _add_top(assembly, p: WalkUp, body, plan, z0, blind, rng) -> None:
+def _add_top(assembly, p: Parameters, body, plan, z0, blind) -> None:
     if p.roof == "flat":
         rim = round(p.height - z0, 3)
         bands = tiers.cornice(
@@ -204,7 +202,7 @@ def _add_top(assembly, p: WalkUp, body, plan, z0, blind, rng) -> None:
         roof = tiers.add_crown(
             assembly, plan, crown, z0, min(0.6, rim - 0.1), thickness=0.25
         )
-        equip_roof(assembly, body, roof, p.roof_items, rng)
+        equip_roof(assembly, body, roof, p.roof_items)
         return
     solid = pitched_roofs.hip(
         body, z0 - 0.02, p.height, (max(p.bay_reach + 0.15, 0.45), 0.45, 0.45,
@@ -220,13 +218,3 @@ def _add_top(assembly, p: WalkUp, body, plan, z0, blind, rng) -> None:
             assembly, f"chimney_{k}", (x, y, p.height - 1.4),
             family_house.BRICKS[k], item="chimney_row",
         )  # fmt: skip
-
-
-ARCHETYPE = Archetype(
-    WalkUp,
-    build,
-    heights=(8.0, 20.0),
-    widths=(9.0, 45.0),
-    overhang=0.35,
-    party_walls=True,
-)

@@ -136,4 +136,4 @@ def _cheeks(a, b, back, front, low, high, rise) -> Mesh:
     for x, order in ((a, 1), (b, -1)):
         side = [(x, y, z) for y, z in corners[::order]]
         pieces.append(Mesh(np.array(side), ((0, 1, 2, 3),)))
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)

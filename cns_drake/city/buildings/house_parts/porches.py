@@ -147,7 +147,7 @@ def railing_panel() -> Mesh:
         massing.box(x - 0.03, x + 0.03, -0.02, 0.02, 0.0, 0.9, bottom=False)
         for x in np.linspace(-half + 0.05, half - 0.05, 6).tolist()
     ]
-    return merge_meshes([*rails, *posts])
+    return merge_meshes(*rails, *posts)
 
 
 def add_bay_window(
@@ -240,17 +240,13 @@ def chimney_breast(
     low = massing.rectangle(a, -0.05, b, reach)
     high = massing.rectangle(x - neck, -0.05, x + neck, reach)
     return wall.place(
-        merge_meshes(
-            [
-                massing.skirt(low, low, -massing.FOUNDATION_M, shoulder),
+        merge_meshes(massing.skirt(low, low, -massing.FOUNDATION_M, shoulder),
                 massing.skirt(low, high, shoulder, shoulder + 0.6),
                 massing.prism(high, shoulder + 0.6, top),
                 massing.box(
                     x - neck - 0.08, x + neck + 0.08, -0.05, reach + 0.06,
                     top - 0.35, top - 0.15,
-                ),
-            ]
-        )
+                ),)
     )  # fmt: skip
 
 

@@ -12,10 +12,9 @@ from cns_drake.city.buildings.house_parts.openings import (
 from cns_drake.city.buildings.parts import bays, details, massing, wings
 from cns_drake.city.buildings.parts.facades import Band, Patch
 from cns_drake.city.buildings.parts.materials import Materials
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.buildings.parts.wings import Roof, Wing
 from cns_drake.city.geometry.mesh import Mesh
-from cns_drake.city.geometry.structures import Model
 
 _BOARDS = (
     (0.50, 0.22, 0.18),
@@ -32,7 +31,7 @@ _MARGIN = 0.5
 _RECESS = 0.15
 
 
-class Barn:
+class Parameters:
     """Parameters of a barn; lengths in metres.
 
     Attributes:
@@ -64,9 +63,8 @@ class Barn:
         self.roof_rgb = d.pick(_ROOFS)
 
 
-def build(p: Barn, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the barn along the longer side of a rectangle."""
-    assembly = Assembly(site.name, p.rgb)
     materials = Materials(
         walls=p.rgb,
         glass=assembly.glass_rgb,
@@ -74,7 +72,7 @@ def build(p: Barn, site: Site, rng: np.random.Generator) -> Model:
         trim=_TRIM,
         doors=_DOORS,
     )
-    x0, y0, x1, y1 = site.bounds
+    x0, y0, x1, y1 = assembly.site.bounds
     along_y = y1 - y0 >= x1 - x0
     left, right = x0 + _MARGIN, x1 - _MARGIN
     front, back = y0 + _MARGIN + p.deck, y1 - _MARGIN
@@ -116,10 +114,9 @@ def build(p: Barn, site: Site, rng: np.random.Generator) -> Model:
     if p.deck > 0:
         _add_jetty(materials, p, (left, right), y0, front)
     materials.finish(assembly)
-    return assembly.model(site)
 
 
-def _aisle(p: Barn, main: Wing, limits, along_y: bool) -> Wing:
+def _aisle(p: Parameters, main: Wing, limits, along_y: bool) -> Wing:
     """Returns the lean-to against the long side of the barn."""
     left, right, back = limits
     high = main.wall_top + 0.1
@@ -142,7 +139,9 @@ def _lean(area, low, high, *, along_y: bool, rising: bool = False) -> Wing:
     return Wing.at(*area, low, high, roof)
 
 
-def _add_doors(materials, p: Barn, wing: Wing, openings, edge: int) -> None:
+def _add_doors(
+    materials, p: Parameters, wing: Wing, openings, edge: int
+) -> None:
     """Adds a pair of braced doors that slide along the wall."""
     wall = wing.wall(edge)
     width = min(p.door_width, 0.5 * wall.length)
@@ -186,7 +185,7 @@ def _brace(x0: float, x1: float, height: float) -> Mesh:
     return details.beam((x0, 0.1, 0.2), (x1, 0.1, height - 0.1), 0.1)
 
 
-def _add_battens(materials, p: Barn, wing, boxes, openings, edge) -> None:
+def _add_battens(materials, p: Parameters, wing, boxes, openings, edge) -> None:
     """Adds upright battens on the free parts of a wall between openings."""
     wall = wing.wall(edge)
     reliefs = openings.layout(edge, wall.length)
@@ -199,7 +198,7 @@ def _add_battens(materials, p: Barn, wing, boxes, openings, edge) -> None:
             materials.add("walls", wall.place(strip))
 
 
-def _add_ridge(materials, p: Barn, main: Wing) -> None:
+def _add_ridge(materials, p: Parameters, main: Wing) -> None:
     """Adds louvred ventilators on the ridge, and a hoist in the gable."""
     middle = (main.x0 + main.x1) / 2, (main.y0 + main.y1) / 2
     z = main.top
@@ -219,7 +218,7 @@ def _add_ridge(materials, p: Barn, main: Wing) -> None:
         )
 
 
-def _add_jetty(materials, p: Barn, xs, y0: float, front: float) -> None:
+def _add_jetty(materials, p: Parameters, xs, y0: float, front: float) -> None:
     """Adds a plank deck on posts in front of a boat house."""
     a, b = xs
     y0 += 0.1
@@ -230,8 +229,3 @@ def _add_jetty(materials, p: Barn, xs, y0: float, front: float) -> None:
             massing.box(*spot, -massing.FOUNDATION_M, 1.1, bottom=False)
         )
     materials.add("doors", *pieces)
-
-
-ARCHETYPE = Archetype(
-    Barn, build, heights=(5.0, 14.0), widths=(7.0, 40.0), overhang=0.35
-)

@@ -14,15 +14,14 @@ from cns_drake.city.buildings.house_parts import (
 from cns_drake.city.buildings.house_parts.family_house import ROOF_M
 from cns_drake.city.buildings.parts import massing
 from cns_drake.city.buildings.parts.roof_equipment import add_chimney
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice, Site
 from cns_drake.city.buildings.parts.wings import Roof, Wing
-from cns_drake.city.geometry.structures import Model
 
 # Kept free around the walls, for wide eaves [m].
 _MARGIN = 0.75
 
 
-class Bungalow:
+class Parameters:
     """Parameters of a bungalow; lengths in metres.
 
     Attributes:
@@ -82,7 +81,7 @@ class _Plan:
         )
 
 
-def _planned(p: Bungalow, site: Site) -> _Plan:
+def _planned(p: Parameters, site: Site) -> _Plan:
     x0, y0, x1, y1 = site.bounds
     left, right, back = x0 + _MARGIN, x1 - _MARGIN, y1 - _MARGIN
     width = right - left
@@ -122,9 +121,9 @@ def _planned(p: Bungalow, site: Site) -> _Plan:
     return plan.mirrored(x0 + x1) if p.mirrored else plan
 
 
-def build(p: Bungalow, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the bungalow along the front of a rectangle."""
-    assembly = Assembly(site.name, p.rgb)
+    site = assembly.site
     materials = family_house.house_materials(
         assembly, p.rgb, p.roof_rgb, p.accent_rgb
     )
@@ -152,10 +151,9 @@ def build(p: Bungalow, site: Site, rng: np.random.Generator) -> Model:
         scale=(1.5, 1.2, 0.95),
     )  # fmt: skip
     materials.finish(assembly)
-    return assembly.model(site)
 
 
-def _add_main(assembly, materials, p: Bungalow, plan, boxes, y0) -> None:
+def _add_main(assembly, materials, p: Parameters, plan, boxes, y0) -> None:
     main = plan.main
     openings = family_house.window_rows(
         main, boxes, p.floor, 1, p.window_pitch, p.window_width
@@ -187,7 +185,7 @@ def _add_main(assembly, materials, p: Bungalow, plan, boxes, y0) -> None:
         materials.add("base", wall.place(slab))
 
 
-def _add_carport(materials, p: Bungalow, area) -> None:
+def _add_carport(materials, p: Parameters, area) -> None:
     """Adds a flat roof on six posts, with a shed at its end."""
     x0, y0, x1, y1 = area
     top = 2.65
@@ -198,8 +196,3 @@ def _add_carport(materials, p: Bungalow, area) -> None:
             materials.add("trim", massing.post(x, y, 0.08, top - 0.2))
     shed = (x0 + 0.1, x1 - 0.1, y1 - 1.6, y1 - 0.1)
     materials.add("walls", massing.box(*shed, -massing.FOUNDATION_M, top - 0.2))
-
-
-ARCHETYPE = Archetype(
-    Bungalow, build, heights=(3.8, 8.0), widths=(8.0, 30.0), overhang=0.35
-)

@@ -14,15 +14,14 @@ from cns_drake.city.buildings.house_parts import (
 )
 from cns_drake.city.buildings.house_parts.family_house import ROOF_M, STOREY_M
 from cns_drake.city.buildings.parts.roof_equipment import add_chimney
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice, Site
 from cns_drake.city.buildings.parts.wings import Roof, Wing
-from cns_drake.city.geometry.structures import Model
 
 # Kept free around the walls, for eaves and chimneys [m].
 _MARGIN = 0.5
 
 
-class DetachedHouse:
+class Parameters:
     """Parameters of a detached house; lengths in metres.
 
     `plan` is `box`, `ell` (a wing to the front), `tee` (a wing to the
@@ -101,7 +100,7 @@ class _Plan:
         )
 
 
-def _planned(p: DetachedHouse, site: Site) -> _Plan:
+def _planned(p: Parameters, site: Site) -> _Plan:
     """Lays the house out."""
     x0, y0, x1, y1 = site.bounds
     left, right, back = x0 + _MARGIN, x1 - _MARGIN, y1 - _MARGIN
@@ -145,13 +144,12 @@ def _planned(p: DetachedHouse, site: Site) -> _Plan:
     return plan.mirrored(x0 + x1) if p.mirrored else plan
 
 
-def build(p: DetachedHouse, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the house on a rectangle, its porch in front."""
-    assembly = Assembly(site.name, p.rgb)
     materials = family_house.house_materials(
         assembly, p.rgb, p.roof_rgb, p.accent_rgb
     )
-    plan = _planned(p, site)
+    plan = _planned(p, assembly.site)
     _add_main(assembly, materials, p, plan)
     for wing in plan.wings:
         _add_wing(materials, p, plan, wing)
@@ -159,10 +157,9 @@ def build(p: DetachedHouse, site: Site, rng: np.random.Generator) -> Model:
         family_house.add_garage(materials, plan.garage, plan.boxes)
     _add_chimney(assembly, materials, p, plan)
     materials.finish(assembly)
-    return assembly.model(site)
 
 
-def _add_main(assembly, materials, p: DetachedHouse, plan: _Plan) -> None:
+def _add_main(assembly, materials, p: Parameters, plan: _Plan) -> None:
     main = plan.main
     openings = family_house.window_rows(
         main, plan.boxes, p.deck, plan.storeys, p.window_pitch, p.window_width
@@ -176,7 +173,7 @@ def _add_main(assembly, materials, p: DetachedHouse, plan: _Plan) -> None:
         dormers.add_dormers(materials, main, a, b, p.dormers, p.dormer, 3.0)
 
 
-def _add_porch(assembly, materials, p: DetachedHouse, plan, free) -> None:
+def _add_porch(assembly, materials, p: Parameters, plan, free) -> None:
     """Roofs the door; a `full` porch runs along the free front."""
     wall = plan.main.wall(0)
     a, b = free
@@ -215,7 +212,7 @@ def _add_porch(assembly, materials, p: DetachedHouse, plan, free) -> None:
             )
 
 
-def _add_wing(materials, p: DetachedHouse, plan: _Plan, wing: Wing) -> None:
+def _add_wing(materials, p: Parameters, plan: _Plan, wing: Wing) -> None:
     count = max(1, round((wing.wall_top - p.deck) / STOREY_M))
     openings = family_house.window_rows(
         wing, plan.boxes, p.deck, count, p.window_pitch, p.window_width
@@ -229,7 +226,7 @@ def _add_wing(materials, p: DetachedHouse, plan: _Plan, wing: Wing) -> None:
         )
 
 
-def _add_chimney(assembly, materials, p: DetachedHouse, plan: _Plan) -> None:
+def _add_chimney(assembly, materials, p: Parameters, plan: _Plan) -> None:
     main = plan.main
     y = (main.y0 + main.y1) / 2
     if p.chimney == "breast":
@@ -244,8 +241,3 @@ def _add_chimney(assembly, materials, p: DetachedHouse, plan: _Plan) -> None:
         add_chimney(
             assembly, "chimney", (x, y, main.top - 1.2), family_house.BRICKS[0]
         )
-
-
-ARCHETYPE = Archetype(
-    DetachedHouse, build, heights=(5.0, 12.0), widths=(8.0, 26.0), overhang=0.35
-)

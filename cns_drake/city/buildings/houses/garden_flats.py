@@ -10,16 +10,16 @@ from cns_drake.city.buildings.house_parts.openings import Openings
 from cns_drake.city.buildings.parts import bays, details, massing, wings
 from cns_drake.city.buildings.parts.facades import Band
 from cns_drake.city.buildings.parts.roof_equipment import add_chimney
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.buildings.parts.wings import Roof, Wing
 from cns_drake.city.geometry.mesh import merge_meshes
-from cns_drake.city.geometry.structures import MeshShape, Model
+from cns_drake.city.geometry.structures import MeshShape
 
 _MARGIN = 0.5
 _FLOOR = 0.3
 
 
-class GardenFlats:
+class Parameters:
     """Parameters of a group of flats; lengths in metres.
 
     Attributes:
@@ -49,13 +49,12 @@ class GardenFlats:
         self.accent_rgb = d.pick(family_house.ACCENTS)
 
 
-def build(p: GardenFlats, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the group along the front of a rectangle."""
-    assembly = Assembly(site.name, p.rgb)
     materials = family_house.house_materials(
         assembly, p.rgb, p.roof_rgb, p.accent_rgb
     )
-    x0, y0, x1, y1 = site.bounds
+    x0, y0, x1, y1 = assembly.site.bounds
     left, right = x0 + _MARGIN, x1 - _MARGIN
     count = max(1, round((right - left) / p.section))
     bounds = np.linspace(left, right, count + 1)
@@ -79,7 +78,6 @@ def build(p: GardenFlats, site: Site, rng: np.random.Generator) -> Model:
     for k, wing in enumerate(boxes):
         _add_house(assembly, materials, p, wing, boxes, storeys, k)
     materials.finish(assembly)
-    return assembly.model(site)
 
 
 def _add_house(assembly, materials, p, wing, boxes, storeys, number) -> None:
@@ -147,17 +145,12 @@ def _add_verandas(
         frame.append(massing.box(a - 0.1, b + 0.1, -0.05, reach + 0.1,
                                  top - 0.25, top))  # fmt: skip
     part = f"house_{number}"
-    mesh = merge_meshes(pieces)
+    mesh = merge_meshes(*pieces)
     shape = MeshShape(assembly.define(f"{part}_verandas", mesh))
     for k in range(1, storeys):
         assembly.place(
             f"{part}_verandas_{k}", shape, (0.0, 0.0, _FLOOR + k * storey),
             rgb=family_house.TRIM,
         )  # fmt: skip
-    posts = merge_meshes([wall.place(m) for m in frame])
+    posts = merge_meshes(*(wall.place(m) for m in frame))
     assembly.add(f"{part}_posts", posts, rgb=family_house.TRIM)
-
-
-ARCHETYPE = Archetype(
-    GardenFlats, build, heights=(8.0, 20.0), widths=(12.0, 50.0), overhang=0.35
-)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from cns_drake.city.buildings.house_parts import (
     family_house,
     house_walls,
@@ -11,9 +9,8 @@ from cns_drake.city.buildings.house_parts import (
 )
 from cns_drake.city.buildings.house_parts.openings import Openings
 from cns_drake.city.buildings.parts import wings
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.buildings.parts.wings import Roof, Wing
-from cns_drake.city.geometry.structures import Model
 
 _WALLS = (
     *family_house.BRICKS,
@@ -26,7 +23,7 @@ _WALLS = (
 _MOST_DEPTH = 10.5
 
 
-class RowHouse:
+class Parameters:
     """Parameters of a row house; lengths in metres."""
 
     def __init__(self, d: Dice):
@@ -44,9 +41,9 @@ class RowHouse:
         self.accent_rgb = d.pick(family_house.ACCENTS)
 
 
-def build(p: RowHouse, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the house on a rectangle."""
-    assembly = Assembly(site.name, p.rgb)
+    site = assembly.site
     materials = family_house.house_materials(
         assembly, p.rgb, p.roof_rgb, p.accent_rgb
     )
@@ -70,10 +67,9 @@ def build(p: RowHouse, site: Site, rng: np.random.Generator) -> Model:
     if back - main.y1 > 1.0:
         _add_annex(materials, p, main, back)
     materials.finish(assembly)
-    return assembly.model(site)
 
 
-def _add_annex(materials, p: RowHouse, main: Wing, back: float) -> None:
+def _add_annex(materials, p: Parameters, main: Wing, back: float) -> None:
     """Adds a low wing behind the house, on one side."""
     width = p.annex_width * (main.x1 - main.x0)
     x0 = main.x0 if p.annex_left else main.x1 - width
@@ -88,13 +84,3 @@ def _add_annex(materials, p: RowHouse, main: Wing, back: float) -> None:
     openings.row((1, 2, 3), 0.9, 2.6, [house_walls.sash(1.1, 0.1, 0.9, 2.1)])
     openings.add_walls(materials, (house_walls.GLASS_M,))
     wings.add_roof(materials, annex)
-
-
-ARCHETYPE = Archetype(
-    RowHouse,
-    build,
-    heights=(6.5, 16.0),
-    widths=(4.5, 16.0),
-    overhang=0.35,
-    party_walls=True,
-)

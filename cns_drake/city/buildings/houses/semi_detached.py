@@ -13,15 +13,14 @@ from cns_drake.city.buildings.house_parts.family_house import ROOF_M, STOREY_M
 from cns_drake.city.buildings.house_parts.openings import Openings
 from cns_drake.city.buildings.parts import massing
 from cns_drake.city.buildings.parts.roof_equipment import add_chimney
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.buildings.parts.wings import Roof, Wing
-from cns_drake.city.geometry.structures import Model
 
 # Kept free around the walls, for eaves [m].
 _MARGIN = 0.5
 
 
-class SemiDetached:
+class Parameters:
     """Parameters of a pair of houses; lengths in metres.
 
     Attributes:
@@ -59,13 +58,12 @@ class SemiDetached:
         self.accent_rgb = d.pick(family_house.ACCENTS)
 
 
-def build(p: SemiDetached, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the pair on a rectangle."""
-    assembly = Assembly(site.name, p.rgb)
     materials = family_house.house_materials(
         assembly, p.rgb, p.roof_rgb, p.accent_rgb
     )
-    x0, y0, x1, y1 = site.bounds
+    x0, y0, x1, y1 = assembly.site.bounds
     left, right, back = x0 + _MARGIN, x1 - _MARGIN, y1 - _MARGIN
     front = y0 + min(2.4, 0.25 * (y1 - y0))
     deep = min(back - front, 10.0)
@@ -100,10 +98,9 @@ def build(p: SemiDetached, site: Site, rng: np.random.Generator) -> Model:
         family_house.add_garage(materials, garage, boxes)
     _add_chimneys(assembly, p, main)
     materials.finish(assembly)
-    return assembly.model(site)
 
 
-def _middles(p: SemiDetached, main: Wing) -> tuple[float, float]:
+def _middles(p: Parameters, main: Wing) -> tuple[float, float]:
     """Returns the x of the bays in the main wall's coordinates [m]."""
     half = (main.x1 - main.x0) / 2
     # Doors take the middle or the ends, bays what is left of each half.
@@ -112,7 +109,7 @@ def _middles(p: SemiDetached, main: Wing) -> tuple[float, float]:
     return half - offset, half + offset
 
 
-def _gabled_bays(p: SemiDetached, main: Wing) -> tuple[Wing, ...]:
+def _gabled_bays(p: Parameters, main: Wing) -> tuple[Wing, ...]:
     width = min(p.bay_width, 0.45 * (main.x1 - main.x0) / 2)
     if width < 1.8:
         return ()
@@ -129,7 +126,7 @@ def _gabled_bays(p: SemiDetached, main: Wing) -> tuple[Wing, ...]:
     )  # fmt: skip
 
 
-def _add_entrances(materials, p: SemiDetached, main, openings, y0) -> None:
+def _add_entrances(materials, p: Parameters, main, openings, y0) -> None:
     """Adds the doors under one roof or two, and bays on the ground."""
     wall = main.wall(0)
     half = wall.length / 2
@@ -165,7 +162,7 @@ def _add_entrances(materials, p: SemiDetached, main, openings, y0) -> None:
         materials.add("base", wall.place(step))
 
 
-def _add_chimneys(assembly, p: SemiDetached, main: Wing) -> None:
+def _add_chimneys(assembly, p: Parameters, main: Wing) -> None:
     y = (main.y0 + main.y1) / 2
     if p.chimneys == "middle":
         spots = [(main.x0 + main.x1) / 2]
@@ -178,8 +175,3 @@ def _add_chimneys(assembly, p: SemiDetached, main: Wing) -> None:
             family_house.BRICKS[0], item="chimney_row",
             yaw=np.pi / 2, scale=(0.8, 1.0, 1.0),
         )  # fmt: skip
-
-
-ARCHETYPE = Archetype(
-    SemiDetached, build, heights=(6.0, 12.0), widths=(9.0, 26.0), overhang=0.35
-)

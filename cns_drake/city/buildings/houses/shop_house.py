@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from cns_drake.city.buildings.house_parts import (
     family_house,
     house_walls,
@@ -18,8 +16,7 @@ from cns_drake.city.buildings.parts import bays
 from cns_drake.city.buildings.parts.facades import Band
 from cns_drake.city.buildings.parts.materials import Materials
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
-from cns_drake.city.geometry.structures import Model
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 
 _WALLS = (
     *family_house.BRICKS,
@@ -38,7 +35,7 @@ _AWNINGS = (
 _SIGNS = ((0.24, 0.26, 0.30), (0.36, 0.20, 0.16), (0.20, 0.32, 0.30))
 
 
-class ShopHouse:
+class Parameters:
     """Parameters of a shop house; lengths in metres.
 
     Attributes:
@@ -80,9 +77,9 @@ class ShopHouse:
         self.awning_rgb = d.pick(_AWNINGS)
 
 
-def build(p: ShopHouse, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the house on a rectangle."""
-    assembly = Assembly(site.name, p.rgb)
+    site = assembly.site
     materials = Materials(
         walls=p.rgb,
         glass=assembly.glass_rgb,
@@ -114,7 +111,7 @@ def build(p: ShopHouse, site: Site, rng: np.random.Generator) -> Model:
             openings, edges, ground, step, upper, pitch,
             p.unit.window_width, head=head,
         )  # fmt: skip
-    _add_ground(materials, p, wing, openings, rng)
+    _add_ground(materials, p, wing, openings, assembly.rng)
     _add_oriels(materials, p, wing, openings, upper, step)
     house_walls.add_casings(materials, wing, openings, (0,), p.unit.casing)
     bands = [Band(round(ground - 0.3, 2), ground, -p.course)]
@@ -126,14 +123,13 @@ def build(p: ShopHouse, site: Site, rng: np.random.Generator) -> Model:
     row_unit.add_roof(materials, p.unit, wing)
     if p.unit.roof == "flat":
         z = wing.top - wing.roof.parapet
-        equip_roof(assembly, wing.outline, z, p.roof_items, rng)
+        equip_roof(assembly, wing.outline, z, p.roof_items)
     elif p.unit.chimney:
         row_unit.add_stack(assembly, p.unit, wing, "chimney")
     materials.finish(assembly)
-    return assembly.model(site)
 
 
-def _add_ground(materials, p: ShopHouse, wing, openings, rng) -> None:
+def _add_ground(materials, p: Parameters, wing, openings, rng) -> None:
     """Adds the shops, the door to the flats, service doors at the back."""
     wall = wing.wall(0)
     door, length = 1.7 * (p.unit.floor < p.height - 3.0), wall.length
@@ -150,7 +146,7 @@ def _add_ground(materials, p: ShopHouse, wing, openings, rng) -> None:
     openings.row((2,), 0.5, 4.5, back, 0.8)
 
 
-def _add_oriels(materials, p: ShopHouse, wing, openings, upper, step) -> None:
+def _add_oriels(materials, p: Parameters, wing, openings, upper, step) -> None:
     if upper < 1 or step < 2.5 or p.oriels == 0:
         return
     wall = wing.wall(0)
@@ -169,13 +165,3 @@ def _add_oriels(materials, p: ShopHouse, wing, openings, upper, step) -> None:
             materials, wall, x, width, 0.6, low, high,
             storeys=max(1, upper - 1), canted=p.unit.bay != "box",
         )  # fmt: skip
-
-
-ARCHETYPE = Archetype(
-    ShopHouse,
-    build,
-    heights=(6.0, 18.0),
-    widths=(5.5, 30.0),
-    overhang=1.0,
-    party_walls=True,
-)

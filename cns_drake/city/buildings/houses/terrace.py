@@ -9,18 +9,15 @@ import numpy as np
 from cns_drake.city.buildings.house_parts import family_house, row_unit
 from cns_drake.city.buildings.house_parts.row_unit import RowUnit
 from cns_drake.city.buildings.parts.site import (
-    Archetype,
     Assembly,
     Dice,
-    Site,
     pick,
 )
-from cns_drake.city.geometry.structures import Model
 
 _DOORS = ("accent", "trim", "roof")
 
 
-class Terrace:
+class Parameters:
     """Parameters of a terrace; lengths in metres.
 
     Attributes:
@@ -58,9 +55,9 @@ class Terrace:
         self.accent_rgb = d.pick(family_house.ACCENTS)
 
 
-def build(p: Terrace, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the terrace along the front of a rectangle."""
-    assembly = Assembly(site.name, p.rgb)
+    site = assembly.site
     materials = family_house.house_materials(
         assembly, p.rgb, p.roof_rgb, p.accent_rgb
     )
@@ -76,7 +73,7 @@ def build(p: Terrace, site: Site, rng: np.random.Generator) -> Model:
             if not is_end or edge in site.blind_edges
         }
         low = (k // 2) % 2 == 1
-        unit = _varied(p, k, rng)
+        unit = _varied(p, k, assembly.rng)
         y = front + p.setback * (low and deep)
         row_unit.add_unit(
             assembly,
@@ -86,13 +83,12 @@ def build(p: Terrace, site: Site, rng: np.random.Generator) -> Model:
             p.height - p.step * low,
             frozenset(blind),
             part=f"house_{k:02d}_",
-            door_material=pick(rng, _DOORS),
+            door_material=pick(assembly.rng, _DOORS),
         )
     materials.finish(assembly)
-    return assembly.model(site)
 
 
-def _varied(p: Terrace, k: int, rng: np.random.Generator) -> RowUnit:
+def _varied(p: Parameters, k: int, rng: np.random.Generator) -> RowUnit:
     """Returns one house: single things differ, the rest stays."""
     crossed = rng.random() < p.crossed
     bay = p.unit.bay if rng.random() < p.bays else "none"
@@ -105,13 +101,3 @@ def _varied(p: Terrace, k: int, rng: np.random.Generator) -> RowUnit:
         canopy=bool(rng.random() < 0.5),
         chimney=k % 2 == 0,
     )
-
-
-ARCHETYPE = Archetype(
-    Terrace,
-    build,
-    heights=(6.0, 13.0),
-    widths=(8.0, 50.0),
-    overhang=0.35,
-    party_walls=True,
-)

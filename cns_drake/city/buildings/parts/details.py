@@ -63,7 +63,7 @@ def canopy(x0: float, x1: float, reach: float, z: float) -> Mesh:
         for x in (x0 + 0.4, x1 - 0.4)
     ]
     slab = box_mesh((x1 - x0, reach, 0.3), ((x0 + x1) / 2, reach / 2, z + 0.15))
-    return merge_meshes([slab, *rods])
+    return merge_meshes(slab, *rods)
 
 
 def awning(x0: float, x1: float, reach: float, z0: float, z1: float) -> Mesh:
@@ -138,7 +138,7 @@ def piers(
         for x in places:
             pier = _pier(round(x, 2), width, depth, reach, z0, z1)
             pieces.append(wall.place(pier))
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 def pilasters(
@@ -172,7 +172,7 @@ def pilasters(
             if k % every == 0 and k > 0:
                 pier = _pier(round(x, 2), width, 0.02, reach, z0, z1)
                 pieces.append(wall.place(pier))
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 def corner_piers(
@@ -216,7 +216,7 @@ def corner_piers(
             inner[k],
         ]
         pieces.append(massing.prism(plan, z0, z1, bottom=True))
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 def _pier(x, width, depth, reach, z0, z1) -> Mesh:
@@ -239,7 +239,7 @@ def steps(x0: float, x1: float, reach: float, rise: float, count: int) -> Mesh:
         y = reach * (count - k) / count
         top = rise * (k + 1) / count
         pieces.append(massing.box(x0, x1, 0.0, y, -massing.FOUNDATION_M, top))
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 @functools.cache
@@ -267,7 +267,7 @@ def fire_stairs_flight() -> Mesh:
         beam((-1.6, y, 0.0), (1.4, y, high), 0.12)
         for y in (-0.35 * reach, -0.85 * reach)
     ]
-    return merge_meshes(bars)
+    return merge_meshes(*bars)
 
 
 def column(x: float, y: float, z0: float, z1: float, radius: float) -> Mesh:
@@ -277,11 +277,9 @@ def column(x: float, y: float, z0: float, z1: float, radius: float) -> Mesh:
     r = 1.25 * radius
     block = massing.rectangle(x - r, y - r, x + r, y + r)
     return merge_meshes(
-        [
-            massing.prism(block, z0, z0 + 0.3),
-            massing.skirt(shaft, top, z0 + 0.3, z1 - 0.4),
-            massing.prism(block, z1 - 0.4, z1, bottom=True),
-        ]
+        massing.prism(block, z0, z0 + 0.3),
+        massing.skirt(shaft, top, z0 + 0.3, z1 - 0.4),
+        massing.prism(block, z1 - 0.4, z1, bottom=True),
     )
 
 

@@ -208,12 +208,12 @@ def prism(points, z0: float, z1: float, *, bottom: bool = False) -> Mesh:
     pieces = [skirt(points, points, z0, z1), flat(points, z1)]
     if bottom:
         pieces.append(flat(points, z0, up=False))
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 def frustum(lower, upper, z0: float, z1: float) -> Mesh:
     """Returns a tapering solid without a bottom."""
-    return merge_meshes([skirt(lower, upper, z0, z1), flat(upper, z1)])
+    return merge_meshes(skirt(lower, upper, z0, z1), flat(upper, z1))
 
 
 def sloped_prism(points, z0: float, height: float, low: float) -> Mesh:
@@ -270,7 +270,7 @@ def revolved(profile, count: int, center=(0.0, 0.0)) -> Mesh:
     radius, z = profile[-1]
     if radius > 0:
         pieces.append(flat(ring(radius), z))
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 def extruded(profile, x0: float, x1: float) -> Mesh:
@@ -323,7 +323,7 @@ def roof_pan(points, z_floor: float, z_top: float, thickness: float) -> Mesh:
     coping = skirt(points, inner, z_top, z_top)
     # Seen from the roof the wall faces inwards: an outline run backwards.
     wall = skirt(inner[::-1], inner[::-1], z_floor, z_top)
-    return merge_meshes([coping, wall, flat(inner, z_floor)])
+    return merge_meshes(coping, wall, flat(inner, z_floor))
 
 
 def gable_roof(

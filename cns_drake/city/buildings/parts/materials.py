@@ -26,13 +26,13 @@ class Materials:
         """Returns the same, rotated about z by `yaw`, then translated."""
         result = Materials(**self._colours)
         for material, pieces in self._pieces.items():
-            mesh = merge_meshes(pieces)
+            mesh = merge_meshes(*pieces)
             result.add(material, mesh.moved(translation, yaw))
         return result
 
     def finish(self, assembly: Assembly) -> None:
         """Adds one part for each material in use, named like it."""
         for material, rgb in self._colours.items():
-            mesh = merge_meshes(self._pieces.get(material, []))
+            mesh = merge_meshes(*self._pieces.get(material, []))
             if mesh.faces:
                 assembly.add(material, mesh, rgb=rgb)

@@ -188,11 +188,9 @@ def hip(outline, z: float, top: float, eaves: float, fascia: float) -> Mesh:
     outer = massing.inset(outline, -np.asarray(eaves))
     ridge = _ridge(outer)
     return merge_meshes(
-        [
-            massing.flat(outer, z, up=False),
-            massing.skirt(outer, outer, z, z + fascia),
-            massing.skirt(outer, ridge, z + fascia, top),
-        ]
+        massing.flat(outer, z, up=False),
+        massing.skirt(outer, outer, z, z + fascia),
+        massing.skirt(outer, ridge, z + fascia, top),
     )
 
 
@@ -212,12 +210,10 @@ def mansard(
     bend = massing.inset(outline, run)
     ridge = _ridge(bend)
     return merge_meshes(
-        [
-            massing.flat(outer, z, up=False),
-            massing.skirt(outer, outer, z, z + fascia),
-            massing.skirt(outer, bend, z + fascia, knee),
-            massing.skirt(bend, ridge, knee, top),
-        ]
+        massing.flat(outer, z, up=False),
+        massing.skirt(outer, outer, z, z + fascia),
+        massing.skirt(outer, bend, z + fascia, knee),
+        massing.skirt(bend, ridge, knee, top),
     )
 
 

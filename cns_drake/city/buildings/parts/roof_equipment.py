@@ -25,44 +25,38 @@ def _ac_unit() -> Mesh:
         for x in (-0.6, 0.6)
     ]
     skids = [box_mesh((2.6, 0.15, 0.25), (0.0, y, 0.125)) for y in (-0.5, 0.5)]
-    return merge_meshes(
-        [box_mesh((2.4, 1.4, 1.1), (0, 0, 0.75)), *fans, *skids]
-    )
+    return merge_meshes(box_mesh((2.4, 1.4, 1.1), (0, 0, 0.75)), *fans, *skids)
 
 
 def _air_handler() -> Mesh:
     """A long unit with an intake hood and a duct that dives into the roof."""
     return merge_meshes(
-        [
-            box_mesh((4.2, 1.8, 1.7), (0, 0, 1.05)),
-            box_mesh((0.9, 1.5, 0.9), (-2.5, 0, 1.2)),
-            box_mesh((1.4, 0.8, 0.8), (2.7, 0, 1.3)),
-            box_mesh((0.8, 0.8, 1.7), (3.2, 0, 0.85)),
-            box_mesh((4.0, 0.2, 0.2), (0, 0.7, 0.1)),
-            box_mesh((4.0, 0.2, 0.2), (0, -0.7, 0.1)),
-        ]
+        box_mesh((4.2, 1.8, 1.7), (0, 0, 1.05)),
+        box_mesh((0.9, 1.5, 0.9), (-2.5, 0, 1.2)),
+        box_mesh((1.4, 0.8, 0.8), (2.7, 0, 1.3)),
+        box_mesh((0.8, 0.8, 1.7), (3.2, 0, 0.85)),
+        box_mesh((4.0, 0.2, 0.2), (0, 0.7, 0.1)),
+        box_mesh((4.0, 0.2, 0.2), (0, -0.7, 0.1)),
     )
 
 
 def _cooling_tower() -> Mesh:
     ring = massing.regular_polygon(1.1, 10)
     return merge_meshes(
-        [
-            box_mesh((2.8, 2.8, 0.3), (0, 0, 0.55)),
-            *(
-                box_mesh((0.2, 0.2, 0.4), (x, y, 0.2))
-                for x in (-1.2, 1.2)
-                for y in (-1.2, 1.2)
-            ),
-            massing.frustum(
-                massing.rectangle(-1.3, -1.3, 1.3, 1.3),
-                massing.rectangle(-1.15, -1.15, 1.15, 1.15),
-                0.7,
-                2.6,
-            ),
-            massing.roof_pan(ring, 2.7, 3.3, 0.12),
-            massing.skirt(ring, ring, 2.6, 3.3),
-        ]
+        box_mesh((2.8, 2.8, 0.3), (0, 0, 0.55)),
+        *(
+            box_mesh((0.2, 0.2, 0.4), (x, y, 0.2))
+            for x in (-1.2, 1.2)
+            for y in (-1.2, 1.2)
+        ),
+        massing.frustum(
+            massing.rectangle(-1.3, -1.3, 1.3, 1.3),
+            massing.rectangle(-1.15, -1.15, 1.15, 1.15),
+            0.7,
+            2.6,
+        ),
+        massing.roof_pan(ring, 2.7, 3.3, 0.12),
+        massing.skirt(ring, ring, 2.6, 3.3),
     )
 
 
@@ -86,14 +80,12 @@ def _water_tower() -> Mesh:
         )
     ]
     return merge_meshes(
-        [
-            *legs,
-            *braces,
-            box_mesh((3.2, 3.2, 0.25), (0, 0, 3.6)),
-            massing.prism(barrel, 3.7, 7.0, bottom=True),
-            massing.spire(eaves, (0, 0), 7.0, 8.4),
-            massing.flat(eaves, 7.0, up=False),
-        ]
+        *legs,
+        *braces,
+        box_mesh((3.2, 3.2, 0.25), (0, 0, 3.6)),
+        massing.prism(barrel, 3.7, 7.0, bottom=True),
+        massing.spire(eaves, (0, 0), 7.0, 8.4),
+        massing.flat(eaves, 7.0, up=False),
     )
 
 
@@ -107,30 +99,26 @@ def _stair_house() -> Mesh:
     v = np.array([(x, y, z) for y in (-1.3, 1.3) for x, z in side], dtype=float)
     band = Mesh(v, ((1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)))
     door = box_mesh((0.12, 1.1, 2.1), (1.4, 0, 1.05))
-    return merge_meshes([*walls, band, door])
+    return merge_meshes(*walls, band, door)
 
 
 def _lift_house() -> Mesh:
     return merge_meshes(
-        [
-            box_mesh((5.0, 4.0, 3.4), (0, 0, 1.7)),
-            box_mesh((5.4, 4.4, 0.25), (0, 0, 3.5)),
-            box_mesh((0.12, 1.2, 2.1), (2.5, 0.8, 1.05)),
-            box_mesh((1.6, 0.15, 1.0), (-0.8, -2.0, 2.2)),
-            box_mesh((1.6, 0.15, 1.0), (-0.8, 2.0, 2.2)),
-        ]
+        box_mesh((5.0, 4.0, 3.4), (0, 0, 1.7)),
+        box_mesh((5.4, 4.4, 0.25), (0, 0, 3.5)),
+        box_mesh((0.12, 1.2, 2.1), (2.5, 0.8, 1.05)),
+        box_mesh((1.6, 0.15, 1.0), (-0.8, -2.0, 2.2)),
+        box_mesh((1.6, 0.15, 1.0), (-0.8, 2.0, 2.2)),
     )
 
 
 def _tank() -> Mesh:
     body = massing.regular_polygon(1.2, 10)
     return merge_meshes(
-        [
-            massing.prism(body, 0.3, 2.3, bottom=True),
-            box_mesh((2.2, 0.3, 0.3), (0, 0.6, 0.15)),
-            box_mesh((2.2, 0.3, 0.3), (0, -0.6, 0.15)),
-            massing.prism(massing.regular_polygon(0.35, 6), 2.3, 2.6),
-        ]
+        massing.prism(body, 0.3, 2.3, bottom=True),
+        box_mesh((2.2, 0.3, 0.3), (0, 0.6, 0.15)),
+        box_mesh((2.2, 0.3, 0.3), (0, -0.6, 0.15)),
+        massing.prism(massing.regular_polygon(0.35, 6), 2.3, 2.6),
     )
 
 
@@ -144,16 +132,14 @@ def _mast() -> Mesh:
         box_mesh((0.08, 1.6, 0.08), (0, 0, 6.4)),
         box_mesh((1.0, 0.06, 0.06), (0, 0, 9.6)),
     ]
-    return merge_meshes([*stages, *arms])
+    return merge_meshes(*stages, *arms)
 
 
 def _skylight() -> Mesh:
     curb = massing.rectangle(-2.0, -1.0, 2.0, 1.0)
     return merge_meshes(
-        [
-            massing.skirt(curb, curb, 0.0, 0.4),
-            massing.gable_roof(-2.0, -1.0, 2.0, 1.0, 0.4, 0.7),
-        ]
+        massing.skirt(curb, curb, 0.0, 0.4),
+        massing.gable_roof(-2.0, -1.0, 2.0, 1.0, 0.4, 0.7),
     )
 
 
@@ -167,7 +153,7 @@ def _vents() -> Mesh:
             massing.skirt(pipe, pipe, 0.0, z),
             massing.prism(cap, z, z + 0.2, bottom=True),
         ]
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 def _dish() -> Mesh:
@@ -177,12 +163,12 @@ def _dish() -> Mesh:
     back = massing.spire(rim, (0, 0), 0.0, -0.38)
     back = Mesh(back.vertices, tuple(f[::-1] for f in back.faces))
     front = Mesh(front.vertices, tuple(f[::-1] for f in front.faces))
-    bowl = merge_meshes([front, back])
+    bowl = merge_meshes(front, back)
     c = s = math.sqrt(0.5)
     tilt = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
     bowl = Mesh(bowl.vertices @ tilt.T + (0.15, 0.0, 1.5), bowl.faces)
     return merge_meshes(
-        [bowl, massing.prism(massing.regular_polygon(0.08, 6), 0.0, 1.35)]
+        bowl, massing.prism(massing.regular_polygon(0.08, 6), 0.0, 1.35)
     )
 
 
@@ -193,11 +179,9 @@ def _chimney() -> Mesh:
         for x in (-0.2, 0.2)
     ]
     return merge_meshes(
-        [
-            massing.skirt(_CHIMNEY_PLAN, _CHIMNEY_PLAN, -_ROOT_M, 1.8),
-            massing.box(-0.52, 0.52, -0.34, 0.34, 1.8, 2.1),
-            *pots,
-        ]
+        massing.skirt(_CHIMNEY_PLAN, _CHIMNEY_PLAN, -_ROOT_M, 1.8),
+        massing.box(-0.52, 0.52, -0.34, 0.34, 1.8, 2.1),
+        *pots,
     )
 
 
@@ -209,11 +193,9 @@ def _chimney_row() -> Mesh:
     ]
     body = massing.rectangle(-1.0, -0.28, 1.0, 0.28)
     return merge_meshes(
-        [
-            massing.skirt(body, body, -_ROOT_M, 1.7),
-            massing.box(-1.08, 1.08, -0.36, 0.36, 1.7, 2.0),
-            *pots,
-        ]
+        massing.skirt(body, body, -_ROOT_M, 1.7),
+        massing.box(-1.08, 1.08, -0.36, 0.36, 1.7, 2.0),
+        *pots,
     )
 
 
@@ -280,22 +262,20 @@ def equip_roof(
     roof,
     z: float,
     items: Sequence[str],
-    rng: np.random.Generator,
     clear: float = 1.0,
     prefix: str = "",
 ) -> None:
     """Stands equipment on a flat roof without overlaps, as far as it fits.
 
     Args:
-        assembly: the building.
+        assembly: the building; its `rng` draws places, headings, sizes.
         roof: outline of the free roof [m].
         z: height of the roof [m].
         items: names of `_MAKERS`, the most important first.
-        rng: draws places, headings and sizes.
         clear: distance kept from the edge [m].
         prefix: of the names of the visuals.
     """
-    room = Polygon(roof)
+    room, rng = Polygon(roof), assembly.rng
     x0, y0, x1, y1 = room.bounds
     along = np.subtract(roof[1], roof[0])
     heading = math.atan2(along[1], along[0])

@@ -1,17 +1,17 @@
-"""What every building builder takes and how it returns its model."""
+"""What every builder of buildings takes: ground, dice, an assembly."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from shapely.geometry import Polygon
 
 from cns_drake.city.buildings.parts import massing
-from cns_drake.city.geometry.mesh import Mesh
-from cns_drake.city.geometry.structures import MeshShape, Model, Part, Shape
+from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+from cns_drake.city.geometry.structures import MeshShape, Part, Shape
 
 Rgb = tuple[float, float, float]
 T = TypeVar("T")
@@ -159,71 +159,40 @@ class Dice:
         return words.split()[: self.whole(low, high)]
 
 
-@dataclass(frozen=True)
-class Archetype:
-    """A kind of building: its parameters and how to build it.
-
-    Attributes:
-        parameters: class whose instances draw themselves from a `Dice`.
-        build: (parameters, site, rng) -> model.
-        heights: least and greatest sensible height [m].
-        widths: least and greatest sensible side of the footprint [m].
-        overhang: how far eaves, balconies, canopies and pilasters reach
-            outside the footprint [m]; near the ground at most
-            `GROUND_OVERHANG_M`.
-        any_outline: whether it follows any polygon; else rectangles only.
-        party_walls: whether it can stand wall to wall with a neighbour;
-            else it keeps its overhang clear of blind edges.
-    """
-
-    parameters: Callable[[Dice], Any]
-    build: Callable[[Any, Site, np.random.Generator], Model]
-    heights: tuple[float, float]
-    widths: tuple[float, float]
-    overhang: float = 1.5
-    any_outline: bool = False
-    party_walls: bool = False
-
-    @property
-    def name(self) -> str:
-        """Its key in the registry, which its module has as name."""
-        return self.parameters.__module__.rsplit(".", 1)[1]
-
-    def draw(self, site: Site, height: float, rng: np.random.Generator) -> Any:
-        """Draws the parameters of one building."""
-        return self.parameters(Dice(site, height, rng))
-
-
-# Plinths and pilasters may stand this far outside the footprint; above
-# `HEAD_ROOM_M` the archetype's own overhang holds.
-GROUND_OVERHANG_M = 0.35
-HEAD_ROOM_M = 2.3
-
-
 @dataclass
 class Assembly:
-    """Collects the parts and meshes of one building."""
+    """Collects the parts and meshes of one building: a builder fills it.
 
-    name: str
+    Attributes:
+        site: the ground it stands on.
+        rng: the source of all variation that its parameters leave open.
+        rgb: of parts without a colour of their own.
+        glass_rgb: of its panes.
+    """
+
+    site: Site
+    rng: np.random.Generator
     rgb: Rgb | None = None
     glass_rgb: Rgb = (0.20, 0.26, 0.31)
     parts: list[Part] = field(default_factory=list)
     meshes: dict[str, Mesh] = field(default_factory=dict)
 
-    def add(self, part: str, mesh: Mesh, z: float = 0.0, rgb=None) -> None:
-        """Adds a mesh of this building's own and places it once.
+    def add(
+        self, part: str, *meshes: Mesh, z: float = 0.0, rgb: Rgb | None = None
+    ) -> None:
+        """Adds a mesh of this building's own, merged of these, at a height.
 
-        A mesh without faces (pilasters on walls too short for any) is left
-        out.
+        Meshes without any faces (pilasters on walls too short for them) are
+        left out.
         """
-        if not mesh.faces:
-            return
-        key = self.define(part, mesh)
-        self.place(part, MeshShape(key), (0.0, 0.0, z), rgb=rgb)
+        mesh = merge_meshes(*meshes)
+        if mesh.faces:
+            shape = MeshShape(self.define(part, mesh))
+            self.place(part, shape, (0.0, 0.0, z), rgb=rgb)
 
     def define(self, key: str, mesh: Mesh) -> str:
         """Adds a mesh of this building's own; returns its full name."""
-        name = f"{self.name}_{key}"
+        name = f"{self.site.name}_{key}"
         if name in self.meshes:
             raise ValueError(f"mesh {name} is defined twice")
         self.meshes[name] = mesh
@@ -249,13 +218,14 @@ class Assembly:
         self.meshes[mesh_name] = mesh
 
     def place(
-        self, part: str, shape: Shape, xyz, yaw: float = 0.0, rgb=None
+        self,
+        part: str,
+        shape: Shape,
+        xyz: Iterable[float],
+        yaw: float = 0.0,
+        rgb: Rgb | None = None,
     ) -> None:
         """Places a shape as one visual."""
         x, y, z = (round(float(v), 3) for v in xyz)
         rpy = (0.0, 0.0, round(float(yaw), 5))
         self.parts.append(Part(part, shape, (x, y, z), rpy, rgb or self.rgb))
-
-    def model(self, site: Site) -> Model:
-        """Returns the finished building."""
-        return Model(tuple(self.parts), dict(self.meshes), site.footprint)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
-import numpy as np
+from numpy.typing import ArrayLike
 
 from cns_drake.city.buildings.parts import details, massing
 from cns_drake.city.buildings.parts.facades import (
@@ -15,7 +15,7 @@ from cns_drake.city.buildings.parts.facades import (
     facade_mesh,
     glass_mesh,
 )
-from cns_drake.city.buildings.parts.site import Assembly
+from cns_drake.city.buildings.parts.site import Assembly, pick
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 # A pane cuts this far into the reveals in front of it, lest rays slip
@@ -32,13 +32,11 @@ _AWNING_COLOURS = (
 )
 
 
-def add_awnings(
-    assembly: Assembly, pieces: Sequence[Mesh], rng: np.random.Generator
-) -> None:
+def add_awnings(assembly: Assembly, pieces: Sequence[Mesh]) -> None:
     """Adds the awnings of a building in a colour of their own."""
     if pieces:
-        rgb = _AWNING_COLOURS[int(rng.integers(len(_AWNING_COLOURS)))]
-        assembly.add("awnings", merge_meshes(pieces), rgb=rgb)
+        rgb = pick(assembly.rng, _AWNING_COLOURS)
+        assembly.add("awnings", *pieces, rgb=rgb)
 
 
 def divided(
@@ -72,7 +70,7 @@ def add_ground(
     """Adds the ground floor on its foundation; returns its top [m]."""
     base = massing.foundation(outline)
     walls = facade_mesh(outline, facade)
-    assembly.add(part, merge_meshes([base, walls, *extras]))
+    assembly.add(part, base, walls, *extras)
     _add_glass(assembly, outline, facade, 0.0, part)
     return facade.height
 
@@ -98,7 +96,7 @@ def add_storeys(
     for k in range(per_group):
         pieces += [e.moved((0.0, 0.0, k * facade.height)) for e in extras]
     step = per_group * facade.height
-    assembly.stack(part, merge_meshes(pieces), z0, step, groups)
+    assembly.stack(part, merge_meshes(*pieces), z0, step, groups)
     top = round(z0 + groups * step, 3)
     if len(facade.glass) == 1:
         glass = _pane(outline, facade, z0, top)
@@ -201,7 +199,7 @@ def add_grooved(
             )
         )
     if pieces:
-        assembly.add(f"{part}_piers", merge_meshes(pieces))
+        assembly.add(f"{part}_piers", *pieces)
     return top
 
 
@@ -213,7 +211,7 @@ def block(outline, facade: Facade, z0: float) -> Mesh:
     ]
     if facade.glass:
         pieces.append(glass_mesh(outline, facade, z0))
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 def add_crown(
@@ -233,23 +231,21 @@ def add_crown(
     """
     roof = round(facade.height - parapet, 3)
     mesh = merge_meshes(
-        [
-            facade_mesh(outline, facade),
-            massing.roof_pan(outline, roof, facade.height, thickness),
-            *extras,
-        ]
+        facade_mesh(outline, facade),
+        massing.roof_pan(outline, roof, facade.height, thickness),
+        *extras,
     )
-    assembly.add(part, mesh, z0)
+    assembly.add(part, mesh, z=z0)
     _add_glass(assembly, outline, facade, z0, part)
     return round(z0 + roof, 3)
 
 
-def _add_glass(assembly, outline, facade: Facade, z0: float, part: str):
+def _add_glass(
+    assembly: Assembly, outline: ArrayLike, facade: Facade, z0: float, part: str
+) -> None:
     if facade.glass:
         glass = glass_mesh(outline, facade)
-        if glass.faces:
-            rgb = assembly.glass_rgb
-            assembly.add(f"{part}_glass", glass, z0, rgb=rgb)
+        assembly.add(f"{part}_glass", glass, z=z0, rgb=assembly.glass_rgb)
 
 
 def cornice(

@@ -9,15 +9,15 @@ import numpy as np
 from cns_drake.city.buildings.parts import bays, details, massing, tiers
 from cns_drake.city.buildings.parts.facades import Band, Facade
 from cns_drake.city.buildings.parts.helix import ramp_turn
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
-from cns_drake.city.geometry.structures import MeshShape, Model
+from cns_drake.city.geometry.structures import MeshShape
 
 _SLAB_M = 0.32
 _STAIR_RISE_M = 3.0
 
 
-class CarPark:
+class Parameters:
     """Parameters of a car park; lengths in metres.
 
     The ramp stands at the front on the left or on the right; where the
@@ -47,10 +47,9 @@ class CarPark:
         )
 
 
-def build(p: CarPark, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the car park on a rectangle."""
-    assembly = Assembly(site.name, p.rgb)
-    x0, y0, x1, y1 = site.bounds
+    x0, y0, x1, y1 = assembly.site.bounds
     r = p.ramp_radius
     center = (x0 + r if p.ramp_left else x1 - r, y0 + r)
     _add_ramp(assembly, p, center)
@@ -61,17 +60,16 @@ def build(p: CarPark, site: Site, rng: np.random.Generator) -> Model:
     else:
         decks = massing.rectangle(x0, y0, center[0] - reach, y1)
     if decks[1, 0] - decks[0, 0] > 10.0:
-        _add_decks(assembly, p, decks, rng)
+        _add_decks(assembly, p, decks)
         _add_stair(assembly, p, _stair_by_decks(p, decks, center))
     else:
         side = min(5.0, 0.29 * r)
         x = x1 - side if p.ramp_left else x0
         corner = massing.rectangle(x, y1 - side, x + side, y1)
         _add_stair(assembly, p, corner)
-    return assembly.model(site)
 
 
-def _add_ramp(assembly, p: CarPark, center) -> None:
+def _add_ramp(assembly, p: Parameters, center) -> None:
     """Turns of the ramp around a core, on a ring of columns."""
     r, inner = p.ramp_radius - 0.05, p.ramp_radius - 0.05 - p.lane
     start = 0.0 if p.ramp_left else math.pi
@@ -98,10 +96,10 @@ def _add_ramp(assembly, p: CarPark, center) -> None:
             z = (p.storeys + lift) * p.storey_height - 0.1
             plan = massing.regular_polygon(0.25, 6, (x, y))
             pieces.append(massing.prism(plan, -massing.FOUNDATION_M, z))
-    assembly.add("ramp_core", merge_meshes(pieces))
+    assembly.add("ramp_core", *pieces)
 
 
-def _add_decks(assembly, p: CarPark, plan, rng) -> None:
+def _add_decks(assembly, p: Parameters, plan) -> None:
     deck = _deck(plan, p.parapet, p.column_pitch)
     assembly.stack("deck", deck, p.storey_height, p.storey_height, p.storeys)
     x0, y0, x1, y1 = *plan[0], *plan[2]
@@ -117,10 +115,10 @@ def _add_decks(assembly, p: CarPark, plan, rng) -> None:
     ends = (x0 + 0.25 * (x1 - x0), x1 - 0.2 * (x1 - x0))
     spine = massing.rectangle(ends[0], middle - 0.15, ends[1], middle + 0.15)
     columns.append(massing.prism(spine, -massing.FOUNDATION_M, top))
-    assembly.add("columns", merge_meshes(columns))
-    panels = _panels(p, plan, rng)
+    assembly.add("columns", *columns)
+    panels = _panels(p, plan, assembly.rng)
     if panels:
-        assembly.add("panels", merge_meshes(panels), rgb=p.panel_rgb)
+        assembly.add("panels", *panels, rgb=p.panel_rgb)
 
 
 def _deck(plan, parapet: float, pitch: float) -> Mesh:
@@ -133,16 +131,14 @@ def _deck(plan, parapet: float, pitch: float) -> Mesh:
         for x in [cells[0][0], *(b for _, b in cells)]
     ]
     return merge_meshes(
-        [
-            massing.skirt(plan, plan, -_SLAB_M, parapet),
-            massing.flat(plan, -_SLAB_M, up=False),
-            massing.roof_pan(plan, 0.0, parapet, 0.18),
-            *beams,
-        ]
+        massing.skirt(plan, plan, -_SLAB_M, parapet),
+        massing.flat(plan, -_SLAB_M, up=False),
+        massing.roof_pan(plan, 0.0, parapet, 0.18),
+        *beams,
     )
 
 
-def _panels(p: CarPark, plan, rng) -> list[Mesh]:
+def _panels(p: Parameters, plan, rng) -> list[Mesh]:
     """Screens between the decks, on the front, the back and the far side."""
     pieces = []
     gap = p.storey_height - _SLAB_M
@@ -165,7 +161,7 @@ def _panels(p: CarPark, plan, rng) -> list[Mesh]:
     return pieces
 
 
-def _stair_by_decks(p: CarPark, decks, center) -> np.ndarray:
+def _stair_by_decks(p: Parameters, decks, center) -> np.ndarray:
     """Behind the ramp, against the decks; or in their far back corner."""
     side = 5.0
     (x0, _), (x1, y1) = decks[0], decks[2]
@@ -177,7 +173,7 @@ def _stair_by_decks(p: CarPark, decks, center) -> np.ndarray:
     return massing.rectangle(x, y1 - side, x + side, y1)
 
 
-def _add_stair(assembly, p: CarPark, plan) -> None:
+def _add_stair(assembly, p: Parameters, plan) -> None:
     """Stairs and lift in a shaft with a glazed slit, above all decks."""
     slit = bays.with_middle(
         bays.plain, bays.window(1.6, 2.6, p.height - 1.2, 0.3), 2.4
@@ -192,7 +188,4 @@ def _add_stair(assembly, p: CarPark, plan) -> None:
     )
     base = massing.foundation(plan)
     body = tiers.block(plan, walls, 0.0)
-    assembly.add("stairs", merge_meshes([base, body]), rgb=p.panel_rgb)
-
-
-ARCHETYPE = Archetype(CarPark, build, heights=(12.0, 36.0), widths=(20.0, 70.0))
+    assembly.add("stairs", base, body, rgb=p.panel_rgb)

@@ -11,10 +11,9 @@ from cns_drake.city.buildings.house_parts.openings import (
 from cns_drake.city.buildings.parts import bays, massing, wings
 from cns_drake.city.buildings.parts.facades import Band
 from cns_drake.city.buildings.parts.materials import Materials
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.buildings.parts.wings import Roof, Wing
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
-from cns_drake.city.geometry.structures import Model
 
 _WALLS = (
     (0.90, 0.89, 0.86),
@@ -29,7 +28,7 @@ _RECESS = 0.22
 _THICK = 0.2
 
 
-class Chapel:
+class Parameters:
     """Parameters of a chapel; lengths in metres.
 
     Attributes:
@@ -64,13 +63,12 @@ class Chapel:
         self.roof_rgb = d.pick(_ROOFS)
 
 
-def build(p: Chapel, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the chapel along the longer side of a rectangle.
 
     Its door is in front, or on the left where it lies along x.
     """
-    assembly = Assembly(site.name, p.rgb)
-    x0, y0, x1, y1 = site.bounds
+    x0, y0, x1, y1 = assembly.site.bounds
     if y1 - y0 >= x1 - x0:
         pieces = _pieces(p, assembly, x1 - x0, y1 - y0)
         pieces.moved((x0, y0, 0.0)).finish(assembly)
@@ -78,10 +76,9 @@ def build(p: Chapel, site: Site, rng: np.random.Generator) -> Model:
         # Built along y, then turned a quarter to the right.
         pieces = _pieces(p, assembly, y1 - y0, x1 - x0)
         pieces.moved((x0, y1, 0.0), yaw=-np.pi / 2).finish(assembly)
-    return assembly.model(site)
 
 
-def _pieces(p: Chapel, assembly, width: float, length: float) -> Materials:
+def _pieces(p: Parameters, assembly, width: float, length: float) -> Materials:
     """Returns the chapel over 0..width, 0..length, its door at y = 0."""
     materials = Materials(
         walls=p.rgb, glass=assembly.glass_rgb, roof=p.roof_rgb, trim=_TRIM
@@ -113,7 +110,7 @@ def _pieces(p: Chapel, assembly, width: float, length: float) -> Materials:
     return materials
 
 
-def _nave(p: Chapel, width: float, length: float) -> Wing:
+def _nave(p: Parameters, width: float, length: float) -> Wing:
     wide = min(p.nave * width, 11.0)
     if p.belfry == "side":
         wide = min(wide, width - p.tower - 2 * _MARGIN - 0.1)
@@ -131,7 +128,7 @@ def _nave(p: Chapel, width: float, length: float) -> Wing:
                    roof)  # fmt: skip
 
 
-def _tower(p: Chapel, nave: Wing, width: float) -> Wing:
+def _tower(p: Parameters, nave: Wing, width: float) -> Wing:
     """Returns the shaft of the tower, up to the foot of the spire."""
     side = p.tower
     middle = (nave.x0 + nave.x1) / 2
@@ -152,7 +149,7 @@ def _porch(nave: Wing) -> Wing:
     return Wing.at(*area, min(2.6, nave.wall_top - 0.2), top, roof)
 
 
-def _annex(p: Chapel, nave: Wing, width: float) -> Wing | None:
+def _annex(p: Parameters, nave: Wing, width: float) -> Wing | None:
     """Returns a vestry beside the choir, where there is room."""
     room = width - _MARGIN - nave.x1, nave.x0 - _MARGIN
     side = int(room[1] > room[0])
@@ -172,7 +169,7 @@ def _annex(p: Chapel, nave: Wing, width: float) -> Wing | None:
     return Wing.at(*area, low, high, roof)
 
 
-def _add_nave(materials, p: Chapel, nave: Wing, boxes) -> None:
+def _add_nave(materials, p: Parameters, nave: Wing, boxes) -> None:
     openings = Openings(nave, boxes)
     high = nave.wall_top
     spring = max(1.6, high - 1.5)
@@ -192,7 +189,7 @@ def _add_nave(materials, p: Chapel, nave: Wing, boxes) -> None:
     wings.add_roof(materials, nave, rose)
 
 
-def _add_buttresses(materials, p: Chapel, nave: Wing, boxes) -> None:
+def _add_buttresses(materials, p: Parameters, nave: Wing, boxes) -> None:
     high = 0.75 * nave.wall_top
     for edge in (1, 3):
         wall = nave.wall(edge)
@@ -202,15 +199,13 @@ def _add_buttresses(materials, p: Chapel, nave: Wing, boxes) -> None:
                 plan = massing.rectangle(u - 0.22, -0.05, u + 0.22, 0.42)
                 slope = massing.rectangle(u - 0.22, -0.05, u + 0.22, 0.05)
                 piece = merge_meshes(
-                    [
-                        massing.skirt(plan, plan, -massing.FOUNDATION_M, high),
-                        massing.frustum(plan, slope, high, high + 0.5),
-                    ]
+                    massing.skirt(plan, plan, -massing.FOUNDATION_M, high),
+                    massing.frustum(plan, slope, high, high + 0.5),
                 )
                 materials.add("walls", wall.place(piece))
 
 
-def _add_tower(materials, p: Chapel, tower: Wing, boxes) -> None:
+def _add_tower(materials, p: Parameters, tower: Wing, boxes) -> None:
     """Adds the shaft, its bell chamber and the spire with a cross."""
     openings = Openings(tower, boxes)
     side, top = tower.x1 - tower.x0, tower.wall_top
@@ -235,7 +230,7 @@ def _add_tower(materials, p: Chapel, tower: Wing, boxes) -> None:
     materials.add("trim", _cross(x, y, p.height - 1.3, p.height))
 
 
-def _spire(p: Chapel, tower: Wing) -> list[Mesh]:
+def _spire(p: Parameters, tower: Wing) -> list[Mesh]:
     z, tip = tower.wall_top, p.height - 1.0
     x, y = (tower.x0 + tower.x1) / 2, (tower.y0 + tower.y1) / 2
     eaves = massing.inset(tower.outline, -0.3)
@@ -267,16 +262,12 @@ def _spire(p: Chapel, tower: Wing) -> list[Mesh]:
 def _cross(x: float, y: float, z0: float, z1: float) -> Mesh:
     arm = z1 - 0.4
     return merge_meshes(
-        [
-            massing.box(x - 0.06, x + 0.06, y - 0.06, y + 0.06, z0, z1),
-            massing.box(
-                x - 0.35, x + 0.35, y - 0.06, y + 0.06, arm, arm + 0.12
-            ),
-        ]
+        massing.box(x - 0.06, x + 0.06, y - 0.06, y + 0.06, z0, z1),
+        massing.box(x - 0.35, x + 0.35, y - 0.06, y + 0.06, arm, arm + 0.12),
     )
 
 
-def _add_cote(materials, p: Chapel, nave: Wing) -> None:
+def _add_cote(materials, p: Parameters, nave: Wing) -> None:
     """Adds a small open belfry on the ridge at the front."""
     x, y = (nave.x0 + nave.x1) / 2, nave.y0 + 1.1
     low, high = nave.top - 0.9, p.height - 1.6
@@ -321,8 +312,3 @@ def _add_small(materials, wing: Wing, boxes, *, is_porch: bool) -> None:
         openings.row(range(4), 1.2, 2.2, [bays.window(0.8, 1.0, head, _RECESS)])
     openings.add_walls(materials, (_RECESS,))
     wings.add_roof(materials, wing)
-
-
-ARCHETYPE = Archetype(
-    Chapel, build, heights=(10.0, 30.0), widths=(9.0, 40.0), overhang=0.35
-)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from shapely.geometry import box
 
 from cns_drake.city.buildings.parts import bays, details, massing, tiers
 from cns_drake.city.buildings.parts.facades import (
@@ -15,14 +14,14 @@ from cns_drake.city.buildings.parts.facades import (
     facade_mesh,
     glass_mesh,
 )
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
-from cns_drake.city.geometry.structures import Model
+from cns_drake.city.geometry.structures import Part
 
 _STONES = ((0.66, 0.61, 0.53), (0.56, 0.36, 0.30), (0.62, 0.62, 0.60))
 
 
-class Church:
+class Parameters:
     """Parameters of a church; lengths in metres. The spire is `height`."""
 
     def __init__(self, d: Dice):
@@ -46,35 +45,34 @@ class Church:
         self.roof_rgb = d.pick(((0.3, 0.31, 0.34), (0.45, 0.27, 0.22)))
 
 
-def build(p: Church, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the church along the longer side of a rectangle.
 
     Its portal is at the front, or on the left where it lies along x.
     """
-    x0, y0, x1, y1 = site.bounds
-    if x1 - x0 > y1 - y0:
-        # Built a quarter turn to the right of where it will stand.
-        along = Site(box(-y1, x0, -y0, x1), site.name)
-        return _turned(_built(p, along), site)
-    return _built(p, site)
+    x0, y0, x1, y1 = assembly.site.bounds
+    if x1 - x0 <= y1 - y0:
+        _add_all(p, assembly, x0, y0, x1, y1)
+        return
+    # Built a quarter turn to the right of where it will stand.
+    _add_all(p, assembly, -y1, x0, -y0, x1)
+    assembly.parts = [_turned(part) for part in assembly.parts]
 
 
-def _turned(model: Model, site: Site) -> Model:
-    """Returns the model turned by a quarter to the right (x, y -> y, -x)."""
-    parts = tuple(
-        replace(
-            part,
-            xyz=(part.xyz[1], -part.xyz[0], part.xyz[2]),
-            rpy=(0.0, 0.0, round(part.rpy[2] - np.pi / 2, 5)),
-        )
-        for part in model.parts
-    )
-    return Model(parts, model.meshes, site.footprint)
+def _turned(part: Part) -> Part:
+    """Returns the part turned by a quarter to the right (x, y -> y, -x)."""
+    (x, y, z), yaw = part.xyz, round(part.rpy[2] - np.pi / 2, 5)
+    return replace(part, xyz=(y, -x, z), rpy=(0.0, 0.0, yaw))
 
 
-def _built(p: Church, site: Site) -> Model:
-    assembly = Assembly(site.name, p.rgb)
-    x0, y0, x1, y1 = site.bounds
+def _add_all(
+    p: Parameters,
+    assembly: Assembly,
+    x0: float,
+    y0: float,
+    x1: float,
+    y1: float,
+) -> None:
     middle, half = (x0 + x1) / 2, p.nave_width / 2
     apse = half
     front = y0 + 1.6 + (0.6 * p.tower_width if p.tower_at == "middle" else 0.0)
@@ -97,14 +95,13 @@ def _built(p: Church, site: Site) -> Model:
         sign = -1.0 if p.tower_at == "left" else 1.0
         tower = (middle + sign * (half + 0.35 * side), front + side + 0.5)
     _add_tower(assembly, p, tower, side)
-    return assembly.model(site)
 
 
 def _lancet(width: float, low: float, spring: float, depth: float):
     return bays.arched(width, low, spring, depth, rise=0.9 * width, pier=0.4)
 
 
-def _add_nave(assembly, p: Church, nave) -> None:
+def _add_nave(assembly, p: Parameters, nave) -> None:
     """The tall middle: a portal and a rose in front, clerestory above."""
     h, d = p.nave_height, p.window_depth
 
@@ -145,7 +142,7 @@ def _add_nave(assembly, p: Church, nave) -> None:
     tiers.add_ground(assembly, nave, walls, [gable], part="nave")
 
 
-def _add_aisles(assembly, p: Church, outer) -> None:
+def _add_aisles(assembly, p: Parameters, outer) -> None:
     h, d = p.aisle_height, p.window_depth
     windows = bays.rhythm(
         p.bay, [_lancet(1.5, 1.6, max(2.2, h - 2.4), d)], margin=1.6
@@ -170,7 +167,7 @@ def _add_aisles(assembly, p: Church, outer) -> None:
     tiers.add_ground(assembly, outer, walls, buttresses, part="aisles")
 
 
-def _add_apse(assembly, p: Church, center, radius: float) -> None:
+def _add_apse(assembly, p: Parameters, center, radius: float) -> None:
     """A many-sided choir under half a cone."""
     n = p.apse_sides
     angles = np.linspace(0.0, np.pi, n + 1)
@@ -196,13 +193,13 @@ def _add_apse(assembly, p: Church, center, radius: float) -> None:
     )
     base = massing.foundation(plan)
     pieces = [base, facade_mesh(plan, walls)]
-    assembly.add("apse", merge_meshes(pieces))
+    assembly.add("apse", *pieces)
     assembly.add("apse_glass", glass_mesh(plan, walls), rgb=assembly.glass_rgb)
     eaves = massing.flat(massing.inset(plan, -0.3), h, up=False)
-    assembly.add("apse_roof", merge_meshes([cone, eaves]), rgb=p.roof_rgb)
+    assembly.add("apse_roof", cone, eaves, rgb=p.roof_rgb)
 
 
-def _add_roofs(assembly, p: Church, nave, outer) -> None:
+def _add_roofs(assembly, p: Parameters, nave, outer) -> None:
     (x0, y0), (x1, y1) = nave[0], nave[2]
     x, h = (x0 + x1) / 2, p.nave_height
     # The gable roof lies along y: the shed along x, turned.
@@ -220,10 +217,10 @@ def _add_roofs(assembly, p: Church, nave, outer) -> None:
         faces = [tuple(range(n)), tuple(range(2 * n - 1, n - 1, -1))]
         faces += [(k, n + k, n + (k + 1) % n, (k + 1) % n) for k in range(n)]
         pieces.append(Mesh(np.array(vertices), tuple(faces)))
-    assembly.add("roofs", merge_meshes(pieces), rgb=p.roof_rgb)
+    assembly.add("roofs", *pieces, rgb=p.roof_rgb)
 
 
-def _add_tower(assembly, p: Church, center, half: float) -> None:
+def _add_tower(assembly, p: Parameters, center, half: float) -> None:
     """The tower in three stages, belfry openings in the last."""
     plan = massing.regular_polygon(half * np.sqrt(2), 4, center, -0.75 * np.pi)
     wall = round(p.tower_wall * p.height, 1)
@@ -264,7 +261,7 @@ def _add_tower(assembly, p: Church, center, half: float) -> None:
     pieces = [tiers.block(plan, top, shaft)]
     if p.spire != "bulb":
         pieces += _pinnacles(center, half, wall)
-    assembly.add("belfry", merge_meshes(pieces))
+    assembly.add("belfry", *pieces)
     assembly.add("spire", _spire(p, center, half, wall), rgb=p.roof_rgb)
 
 
@@ -279,7 +276,7 @@ def _pinnacles(center, half: float, z: float) -> list[Mesh]:
     return pieces
 
 
-def _spire(p: Church, center, half: float, z: float) -> Mesh:
+def _spire(p: Parameters, center, half: float, z: float) -> Mesh:
     tip = p.height
     if p.spire == "bulb":
         r = half * 0.95
@@ -297,7 +294,4 @@ def _spire(p: Church, center, half: float, z: float) -> Mesh:
         half * np.sqrt(2) * 0.98, 4, center, -0.75 * np.pi
     )
     broach = massing.spire(square, center, z, z + 0.45 * (tip - z))
-    return merge_meshes([needle, broach])
-
-
-ARCHETYPE = Archetype(Church, build, heights=(30.0, 80.0), widths=(24.0, 70.0))
+    return merge_meshes(needle, broach)

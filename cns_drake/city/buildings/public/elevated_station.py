@@ -13,9 +13,8 @@ from cns_drake.city.buildings.parts.facades import (
     glass_mesh,
 )
 from cns_drake.city.buildings.parts.materials import Materials
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.geometry.mesh import Mesh
-from cns_drake.city.geometry.structures import Model
 
 _CONCRETES = ((0.70, 0.69, 0.67), (0.62, 0.62, 0.60), (0.74, 0.71, 0.64))
 _STEELS = ((0.30, 0.42, 0.38), (0.46, 0.28, 0.24), (0.40, 0.44, 0.50))
@@ -24,7 +23,7 @@ _ROOFS = ((0.60, 0.62, 0.64), (0.40, 0.50, 0.48), (0.52, 0.36, 0.30))
 _TRACK_M = 3.8
 
 
-class ElevatedStation:
+class Parameters:
     """Parameters of a station; lengths in metres.
 
     Attributes:
@@ -60,9 +59,8 @@ class ElevatedStation:
         self.roof_rgb = d.pick(_ROOFS)
 
 
-def build(p: ElevatedStation, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the station along x, its tracks from end to end of the site."""
-    assembly = Assembly(site.name, p.rgb)
     materials = Materials(
         concrete=p.rgb,
         track=_TRACK,
@@ -70,7 +68,7 @@ def build(p: ElevatedStation, site: Site, rng: np.random.Generator) -> Model:
         roof=p.roof_rgb,
         glass=assembly.glass_rgb,
     )
-    x0, y0, x1, y1 = site.bounds
+    x0, y0, x1, y1 = assembly.site.bounds
     y = (y0 + y1) / 2
     tracks, platforms = _lanes(p, y)
     low = min(a for a, _ in (*tracks, *platforms))
@@ -84,10 +82,9 @@ def build(p: ElevatedStation, site: Site, rng: np.random.Generator) -> Model:
     _add_hall(materials, p, (x0, x1), (low, high))
     _add_stairs(materials, p, ends, (y0 + 0.2, low), platforms)
     materials.finish(assembly)
-    return assembly.model(site)
 
 
-def _lanes(p: ElevatedStation, y: float):
+def _lanes(p: Parameters, y: float):
     """Returns the strips of the tracks and of the platforms, in y."""
     if p.island:
         half = p.platform / 2
@@ -132,7 +129,7 @@ def _add_viaduct(materials, p, xs, ys, tracks) -> None:
             materials.add("steel", massing.box(*rail, bottom=False))
 
 
-def _pier(p: ElevatedStation, x: float, y0, y1, top: float) -> list[Mesh]:
+def _pier(p: Parameters, x: float, y0, y1, top: float) -> list[Mesh]:
     half = 0.5
     if p.pier == "wall":
         inset = 0.16 * (y1 - y0)
@@ -158,7 +155,7 @@ def _pier(p: ElevatedStation, x: float, y0, y1, top: float) -> list[Mesh]:
     ]
 
 
-def _add_platform(materials, p: ElevatedStation, ends, strip) -> None:
+def _add_platform(materials, p: Parameters, ends, strip) -> None:
     a, b = ends
     y0, y1 = strip
     bed = p.deck - 1.05
@@ -175,7 +172,7 @@ def _add_platform(materials, p: ElevatedStation, ends, strip) -> None:
         )  # fmt: skip
 
 
-def _add_roof(materials, p: ElevatedStation, ends, strip) -> None:
+def _add_roof(materials, p: Parameters, ends, strip) -> None:
     """Adds a roof on a row of columns along the middle of a platform."""
     a, b = ends
     run = p.covered * (b - a)
@@ -222,7 +219,7 @@ def _add_fence(assembly, p, ends, strip, number: int, middle: float) -> None:
             add_railing(assembly, name, wall, start, end, p.deck, p.steel_rgb)
 
 
-def _add_hall(materials, p: ElevatedStation, xs, ys) -> None:
+def _add_hall(materials, p: Parameters, xs, ys) -> None:
     """Adds the glazed hall with the ticket office under the deck."""
     (x0, x1), (y0, y1) = xs, ys
     x, half = (x0 + x1) / 2 + 0.5, min(p.hall / 2, 0.2 * (x1 - x0))
@@ -249,7 +246,7 @@ def _add_hall(materials, p: ElevatedStation, xs, ys) -> None:
     materials.add("glass", glass_mesh(plan, facade))
 
 
-def _add_stairs(materials, p: ElevatedStation, ends, room, platforms) -> None:
+def _add_stairs(materials, p: Parameters, ends, room, platforms) -> None:
     """Adds stairs beside the viaduct up to the platforms, and a lift.
 
     Where there is no room beside it, a lift must do.
@@ -311,12 +308,3 @@ def _flight(start, sign, run, strip, rise) -> list[Mesh]:
             faces = [face[::-1] for face in faces]
         pieces.append(Mesh(v, tuple(faces)))
     return pieces
-
-
-ARCHETYPE = Archetype(
-    ElevatedStation,
-    build,
-    heights=(9.0, 16.0),
-    widths=(14.0, 120.0),
-    overhang=0.6,
-)

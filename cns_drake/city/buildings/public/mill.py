@@ -10,10 +10,9 @@ from cns_drake.city.buildings.house_parts.openings import Openings
 from cns_drake.city.buildings.parts import bays, details, massing, tiers, wings
 from cns_drake.city.buildings.parts.facades import Band, Facade
 from cns_drake.city.buildings.parts.materials import Materials
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.buildings.parts.wings import Roof, Wing
 from cns_drake.city.geometry.mesh import Mesh
-from cns_drake.city.geometry.structures import Model
 
 _BRICKS = ((0.54, 0.33, 0.27), (0.48, 0.30, 0.25), (0.62, 0.45, 0.35))
 _ROOFS = ((0.36, 0.36, 0.38), (0.44, 0.30, 0.25), (0.42, 0.44, 0.44))
@@ -22,7 +21,7 @@ _MARGIN = 0.5
 _RECESS = 0.25
 
 
-class Mill:
+class Parameters:
     """Parameters of a mill; lengths in metres.
 
     Attributes:
@@ -66,13 +65,12 @@ class Mill:
         self.roof_rgb = d.pick(_ROOFS)
 
 
-def build(p: Mill, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the mill on a rectangle, its dock in front."""
-    assembly = Assembly(site.name, p.rgb)
     materials = Materials(
         annex=p.rgb, glass=assembly.glass_rgb, roof=p.roof_rgb, timber=_TIMBER
     )
-    x0, y0, x1, y1 = site.bounds
+    x0, y0, x1, y1 = assembly.site.bounds
     front, back = y0 + 2.2, y1 - _MARGIN
     wheel_room = 1.7 if p.wheel else 0.0
     left = x0 + _MARGIN + wheel_room * p.mirrored + p.boiler * (not p.mirrored)
@@ -100,10 +98,9 @@ def build(p: Mill, site: Site, rng: np.random.Generator) -> Model:
     if p.wheel:
         _add_wheel(materials, p, main)
     materials.finish(assembly)
-    return assembly.model(site)
 
 
-def _add_storeys(assembly, p: Mill, plan, goal: float) -> float:
+def _add_storeys(assembly, p: Parameters, plan, goal: float) -> float:
     """Adds the walls; returns their top [m]."""
     ground_height = 4.2 if goal > 9.0 else 3.6
     arch = bays.arched(1.8, 0.0, 2.3, _RECESS, rise=0.5)
@@ -142,7 +139,7 @@ def _add_storeys(assembly, p: Mill, plan, goal: float) -> float:
     return top
 
 
-def _add_dock(materials, p: Mill, main: Wing) -> None:
+def _add_dock(materials, p: Parameters, main: Wing) -> None:
     """Adds a loading dock with steps under a timber canopy."""
     wall = main.wall(0)
     a, b = 0.15 * wall.length, 0.85 * wall.length
@@ -164,7 +161,7 @@ def _add_dock(materials, p: Mill, main: Wing) -> None:
     materials.add("timber", *(wall.place(piece) for piece in pieces))
 
 
-def _add_hoist(materials, p: Mill, main: Wing) -> None:
+def _add_hoist(materials, p: Parameters, main: Wing) -> None:
     """Adds a timber hoist house that stands out above the hatches."""
     wall = main.wall(0)
     x, half = wall.length / 2, p.hoist / 2
@@ -195,14 +192,14 @@ def _add_hoist(materials, p: Mill, main: Wing) -> None:
     materials.add("timber", *(wall.place(m) for m in (beam, *struts)))
 
 
-def _beside(p: Mill, main: Wing, xs) -> tuple[float, float]:
+def _beside(p: Parameters, main: Wing, xs) -> tuple[float, float]:
     """Returns the x range between the main house and the site's end."""
     if p.mirrored:
         return main.x1 - 0.05, xs[1] - _MARGIN
     return xs[0] + _MARGIN, main.x0 + 0.05
 
 
-def _add_boiler(materials, p: Mill, main: Wing, xs) -> None:
+def _add_boiler(materials, p: Parameters, main: Wing, xs) -> None:
     a, b = _beside(p, main, xs)
     deep = 0.75 * (main.y1 - main.y0)
     top = min(6.5, 0.6 * main.wall_top)
@@ -215,7 +212,7 @@ def _add_boiler(materials, p: Mill, main: Wing, xs) -> None:
     wings.add_roof(materials, house, material="annex")
 
 
-def _add_chimney(materials, p: Mill, main: Wing, xs) -> None:
+def _add_chimney(materials, p: Parameters, main: Wing, xs) -> None:
     """Adds a round chimney on a square base through the boiler house."""
     a, b = _beside(p, main, xs)
     r, top = p.chimney, p.height
@@ -234,7 +231,7 @@ def _add_chimney(materials, p: Mill, main: Wing, xs) -> None:
     )
 
 
-def _add_wheel(materials, p: Mill, main: Wing) -> None:
+def _add_wheel(materials, p: Parameters, main: Wing) -> None:
     """Adds a water wheel with paddles beside the side wall."""
     edge = 3 if p.mirrored else 1
     wall = main.wall(edge)
@@ -286,8 +283,3 @@ def _strut(start, end, width: float) -> Mesh:
     side = np.array([-along[2], 0.0, along[0]]) * width / 2
     corners = [start - side, end - side, end + side, start + side]
     return _plate(corners, width)
-
-
-ARCHETYPE = Archetype(
-    Mill, build, heights=(12.0, 28.0), widths=(14.0, 70.0), overhang=0.35
-)

@@ -7,15 +7,14 @@ import numpy as np
 from cns_drake.city.buildings.parts import bays, details, massing, tiers
 from cns_drake.city.buildings.parts.facades import Band, Facade
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
-from cns_drake.city.geometry.structures import Model
 
 _STONES = ((0.82, 0.79, 0.72), (0.75, 0.73, 0.70), (0.80, 0.74, 0.64))
 _STEPS_M = 4.5
 
 
-class Museum:
+class Parameters:
     """Parameters of a museum; lengths in metres.
 
     `crown` is `pediment`, `dome` or `attic`; its top is at `height`.
@@ -39,10 +38,9 @@ class Museum:
         self.rgb = d.pick(_STONES)
 
 
-def build(p: Museum, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the museum on a rectangle, steps and forecourt included."""
-    assembly = Assembly(site.name, p.rgb)
-    x0, y0, x1, y1 = site.bounds
+    x0, y0, x1, y1 = assembly.site.bounds
     share = {"pediment": 0.72, "dome": 0.62, "attic": 0.84}[p.crown]
     top = round(share * p.height, 2)
     porch_y = y0 + _STEPS_M
@@ -67,7 +65,7 @@ def build(p: Museum, site: Site, rng: np.random.Generator) -> Model:
         )
         if p.statues:
             pieces.append(_statue(x + 0.4, y0 + 1.4, p.podium + 0.2))
-    assembly.add("podium", merge_meshes(pieces))
+    assembly.add("podium", *pieces)
     _add_walls(assembly, p, plan, top, porch)
     assembly.add("porch", _porch(p, porch, porch_y, front, top))
     roof = top - 1.0
@@ -80,8 +78,7 @@ def build(p: Museum, site: Site, rng: np.random.Generator) -> Model:
         assembly.add("pediment", gable)
     back = massing.rectangle(x0 + 1.0, (front + y1) / 2 + 6.0, x1 - 1.0, y1)
     if back[2, 1] - back[0, 1] > 6.0:
-        equip_roof(assembly, back, roof, ("skylight",) * 3 + ("vents",), rng)
-    return assembly.model(site)
+        equip_roof(assembly, back, roof, ("skylight",) * 3 + ("vents",))
 
 
 def _statue(x: float, y: float, z: float) -> Mesh:
@@ -89,15 +86,13 @@ def _statue(x: float, y: float, z: float) -> Mesh:
     body = ((0.42, z + 1.1), (0.28, z + 2.1), (0.34, z + 2.5), (0.12, z + 2.7))
     head = ((0.1, z + 2.7), (0.17, z + 2.85), (0.0, z + 3.1))
     return merge_meshes(
-        [
-            massing.box(x - 0.5, x + 0.5, y - 0.5, y + 0.5, z - 0.1, z + 1.1),
-            massing.revolved(body, 7, (x, y)),
-            massing.revolved(head, 6, (x, y)),
-        ]
+        massing.box(x - 0.5, x + 0.5, y - 0.5, y + 0.5, z - 0.1, z + 1.1),
+        massing.revolved(body, 7, (x, y)),
+        massing.revolved(head, 6, (x, y)),
     )
 
 
-def _add_walls(assembly, p: Museum, plan, top: float, porch) -> None:
+def _add_walls(assembly, p: Parameters, plan, top: float, porch) -> None:
     """Wings with arched niches, and the doors behind the columns."""
     z0, h = p.podium, top - p.podium
     niche = bays.arched(1.9, 1.4, h - 4.2, p.niche_depth)
@@ -131,7 +126,7 @@ def _add_walls(assembly, p: Museum, plan, top: float, porch) -> None:
     tiers.add_crown(assembly, plan, walls, z0, 1.0, part="walls")
 
 
-def _porch(p: Museum, porch, y0: float, y1: float, top: float) -> Mesh:
+def _porch(p: Parameters, porch, y0: float, y1: float, top: float) -> Mesh:
     """Columns on the podium that carry an entablature."""
     beam = top - 2.2
     pieces = [
@@ -147,7 +142,7 @@ def _porch(p: Museum, porch, y0: float, y1: float, top: float) -> Mesh:
     for x in (xs[0], xs[-1]):
         y = (y0 + 0.4 + r + y1) / 2
         pieces.append(details.column(round(x, 2), y, p.podium, beam, r))
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 def _pediment(porch, y0: float, y1: float, z0: float, z1: float) -> Mesh:
@@ -156,7 +151,7 @@ def _pediment(porch, y0: float, y1: float, z0: float, z1: float) -> Mesh:
     body = massing.gable_roof(y0 + 0.3, -b, y1, -a, z0, z1 - 0.4 - z0)
     shell = _gable_shell(y0 - 0.3, y1, a, b, z0, z1)
     turned = body.moved(yaw=np.pi / 2)
-    return merge_meshes([turned, shell])
+    return merge_meshes(turned, shell)
 
 
 def _gable_shell(y0, y1, a, b, z0, z1) -> Mesh:
@@ -170,7 +165,7 @@ def _gable_shell(y0, y1, a, b, z0, z1) -> Mesh:
     return Mesh(np.array(vertices), tuple(faces))
 
 
-def _dome(p: Museum, plan, z0: float) -> Mesh:
+def _dome(p: Parameters, plan, z0: float) -> Mesh:
     """A square base, a drum and a ribbed dome over the middle."""
     center = plan.mean(axis=0)
     radius = min(0.3 * np.ptp(plan[:, 1]), 0.2 * np.ptp(plan[:, 0]), 9.0)
@@ -195,16 +190,14 @@ def _dome(p: Museum, plan, z0: float) -> Mesh:
     lantern = profile[-1][0]
     profile += [(lantern, p.height - 1.2), (0.0, p.height)]
     return merge_meshes(
-        [
-            massing.prism(square, z0 - 0.2, base),
-            tiers.block(ring, wall, base),
-            ribs,
-            massing.revolved(profile, 16, center),
-        ]
+        massing.prism(square, z0 - 0.2, base),
+        tiers.block(ring, wall, base),
+        ribs,
+        massing.revolved(profile, 16, center),
     )
 
 
-def _add_attic(assembly, p: Museum, plan, z0: float) -> None:
+def _add_attic(assembly, p: Parameters, plan, z0: float) -> None:
     """A second, lower storey set back all around."""
     side = np.ptp(plan, axis=0).min()
     inner = massing.inset(plan, round(min(0.18 * side, 4.0), 1))
@@ -218,6 +211,3 @@ def _add_attic(assembly, p: Museum, plan, z0: float) -> None:
         glass=(0.3,),
     )
     tiers.add_crown(assembly, inner, walls, z0, 0.5, part="attic")
-
-
-ARCHETYPE = Archetype(Museum, build, heights=(14.0, 32.0), widths=(26.0, 90.0))

@@ -17,9 +17,7 @@ from cns_drake.city.buildings.parts import (
 )
 from cns_drake.city.buildings.parts.facades import Band, Facade, glass_mesh
 from cns_drake.city.buildings.parts.materials import Materials
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
-from cns_drake.city.geometry.mesh import merge_meshes
-from cns_drake.city.geometry.structures import Model
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 
 _TIMBERS = ((0.88, 0.87, 0.83), (0.44, 0.34, 0.26), (0.34, 0.42, 0.38))
 _ROOFS = ((0.34, 0.46, 0.42), (0.44, 0.28, 0.23), (0.36, 0.37, 0.40))
@@ -27,7 +25,7 @@ _STONE = (0.66, 0.64, 0.60)
 _EAVES_M = 0.6
 
 
-class ParkPavilion:
+class Parameters:
     """Parameters of a pavilion; lengths in metres.
 
     Attributes:
@@ -60,13 +58,12 @@ class ParkPavilion:
         self.roof_rgb = d.pick(_ROOFS)
 
 
-def build(p: ParkPavilion, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the pavilion in the middle of a rectangle."""
-    assembly = Assembly(site.name, p.rgb)
     materials = Materials(
         timber=p.rgb, glass=assembly.glass_rgb, roof=p.roof_rgb, stone=_STONE
     )
-    x0, y0, x1, y1 = site.bounds
+    x0, y0, x1, y1 = assembly.site.bounds
     if p.kind == "shelter":
         _add_shelter(materials, p, (x0, y0, x1, y1))
     else:
@@ -74,10 +71,9 @@ def build(p: ParkPavilion, site: Site, rng: np.random.Generator) -> Model:
         reach = min(x1 - x0, y1 - y0) / 2 - _EAVES_M
         _add_round(assembly, materials, p, center, reach)
     materials.finish(assembly)
-    return assembly.model(site)
 
 
-def _add_round(assembly, materials, p: ParkPavilion, center, reach) -> None:
+def _add_round(assembly, materials, p: Parameters, center, reach) -> None:
     """Adds a deck, posts or glazed walls, and a roof over a polygon."""
     phase = -math.pi / 2 + math.pi / p.sides
     steps_room = 0.3 * max(2, round(p.floor / 0.17))
@@ -115,7 +111,7 @@ def _add_round(assembly, materials, p: ParkPavilion, center, reach) -> None:
     _add_round_roof(materials, p, center, plan, z)
 
 
-def _add_glazing(materials, p: ParkPavilion, plan) -> None:
+def _add_glazing(materials, p: Parameters, plan) -> None:
     """Adds walls of glass over a parapet, a door in front."""
     window = bays.ribbon(0.8, p.eaves - 0.5, 0.12, 0.3)
     door = bays.window(1.5, 0.05, p.eaves - 0.5, 0.12, mullions=1)
@@ -131,7 +127,7 @@ def _add_glazing(materials, p: ParkPavilion, plan) -> None:
     materials.add("glass", glass_mesh(plan, facade, p.floor))
 
 
-def _add_round_roof(materials, p: ParkPavilion, center, plan, z) -> None:
+def _add_round_roof(materials, p: Parameters, center, plan, z) -> None:
     """Adds a cone, straight or bent, with its lantern and finial."""
     eaves = massing.inset(plan, -_EAVES_M * 0.8)
     top = p.height - 0.5
@@ -169,7 +165,7 @@ def _add_round_roof(materials, p: ParkPavilion, center, plan, z) -> None:
     materials.add("timber", massing.prism(finial, top - 0.3, p.height))
 
 
-def _add_shelter(materials, p: ParkPavilion, area) -> None:
+def _add_shelter(materials, p: Parameters, area) -> None:
     """Adds a hipped or gabled roof on posts, tables and a hearth."""
     x0, y0, x1, y1 = area
     a, b = x0 + _EAVES_M + 0.1, x1 - _EAVES_M - 0.1
@@ -224,11 +220,6 @@ def _add_tables(materials, area, floor: float) -> None:
                         floor + 0.45, bottom=False)
             for v in (u - 0.75, u + 0.75)
         ]  # fmt: skip
-        materials.add("timber", merge_meshes([top, leg, *seats]))
+        materials.add("timber", top, leg, *seats)
     hearth = massing.box(a + 0.3, a + 1.0, y - 0.5, y + 0.5, floor, floor + 1.0)
     materials.add("stone", hearth)
-
-
-ARCHETYPE = Archetype(
-    ParkPavilion, build, heights=(4.0, 10.0), widths=(5.0, 24.0), overhang=0.35
-)

@@ -6,9 +6,9 @@ import numpy as np
 
 from cns_drake.city.buildings.parts import bays, details, massing, tiers
 from cns_drake.city.buildings.parts.facades import Band, Facade
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
-from cns_drake.city.geometry.structures import MeshShape, Model
+from cns_drake.city.geometry.structures import MeshShape
 
 _CONCRETES = ((0.72, 0.71, 0.69), (0.64, 0.63, 0.61), (0.78, 0.76, 0.70))
 _SCREENS = (
@@ -21,7 +21,7 @@ _SLAB_M = 0.3
 _STAIR_M = 5.0
 
 
-class ParkingDeck:
+class Parameters:
     """Parameters of a parking deck; lengths in metres.
 
     Attributes:
@@ -59,24 +59,22 @@ class ParkingDeck:
         self.screen_rgb = d.pick(_SCREENS)
 
 
-def build(p: ParkingDeck, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the decks on a rectangle, their ramps along its long side."""
-    assembly = Assembly(site.name, p.rgb)
-    x0, y0, x1, y1 = site.bounds
+    x0, y0, x1, y1 = assembly.site.bounds
     a, b, c, d = x0 + 0.3, x1 - 0.3, y0 + 0.3, y1 - 0.3
     low, high = (c, d - p.ramp) if p.ramp_back else (c + p.ramp, d)
     plan = np.round(massing.rectangle(a, low, b, high), 2)
     _add_decks(assembly, p, plan)
     strip = (a, high, b, d) if p.ramp_back else (a, c, b, low)
     _add_ramps(assembly, p, strip)
-    _add_screens(assembly, p, plan, rng)
+    _add_screens(assembly, p, plan)
     _add_stairs(assembly, p, plan)
     if p.roofed:
         _add_roof(assembly, p, plan)
-    return assembly.model(site)
 
 
-def _add_decks(assembly, p: ParkingDeck, plan) -> None:
+def _add_decks(assembly, p: Parameters, plan) -> None:
     """Adds the decks with beams, columns, and walls on the ground."""
     (x0, y0), (x1, y1) = plan[0], plan[2]
     across = bays.stretches(x1 - x0, p.pitch, 0.4)
@@ -91,12 +89,10 @@ def _add_decks(assembly, p: ParkingDeck, plan) -> None:
         for x in xs
     ]
     deck = merge_meshes(
-        [
-            massing.skirt(plan, plan, -_SLAB_M, p.parapet),
-            massing.flat(plan, -_SLAB_M, up=False),
-            massing.roof_pan(plan, 0.0, p.parapet, 0.18),
-            *beams,
-        ]
+        massing.skirt(plan, plan, -_SLAB_M, p.parapet),
+        massing.flat(plan, -_SLAB_M, up=False),
+        massing.roof_pan(plan, 0.0, p.parapet, 0.18),
+        *beams,
     )
     assembly.stack("deck", deck, p.storey, p.storey, p.storeys)
     top = p.storeys * p.storey - 0.1
@@ -114,10 +110,10 @@ def _add_decks(assembly, p: ParkingDeck, plan) -> None:
         massing.box(*spine, middle - 0.12, middle + 0.12,
                     -massing.FOUNDATION_M, top, bottom=False)
     )  # fmt: skip
-    assembly.add("columns", merge_meshes(columns))
+    assembly.add("columns", *columns)
 
 
-def _add_ramps(assembly, p: ParkingDeck, strip) -> None:
+def _add_ramps(assembly, p: Parameters, strip) -> None:
     """Adds a ramp per storey, up to the right and up to the left in turn."""
     x0, y0, x1, y1 = strip
     length = min(x1 - x0 - 2.0, max(0.62 * (x1 - x0), 7.0 * p.storey))
@@ -155,7 +151,7 @@ def _add_ramps(assembly, p: ParkingDeck, strip) -> None:
                 massing.box(u, u + 0.18, y0 + 0.05, y1 - 0.05, z - 0.05,
                             z + p.parapet)
             )  # fmt: skip
-    assembly.add("landings", merge_meshes(pieces))
+    assembly.add("landings", *pieces)
 
 
 def _ramp(length: float, width: float, rise: float, parapet: float) -> Mesh:
@@ -171,15 +167,13 @@ def _ramp(length: float, width: float, rise: float, parapet: float) -> Mesh:
         return Mesh(v, faces)
 
     return merge_meshes(
-        [
-            prism(-w, w, -_SLAB_M, 0.0),
-            prism(-w, -w + 0.2, -_SLAB_M + 0.02, parapet),
-            prism(w - 0.2, w, -_SLAB_M + 0.02, parapet),
-        ]
+        prism(-w, w, -_SLAB_M, 0.0),
+        prism(-w, -w + 0.2, -_SLAB_M + 0.02, parapet),
+        prism(w - 0.2, w, -_SLAB_M + 0.02, parapet),
     )
 
 
-def _add_screens(assembly, p: ParkingDeck, plan, rng) -> None:
+def _add_screens(assembly, p: Parameters, plan) -> None:
     """Adds fins, panels or cables between the decks on the open sides."""
     if p.screen == "none":
         return
@@ -192,7 +186,7 @@ def _add_screens(assembly, p: ParkingDeck, plan, rng) -> None:
         if p.screen == "panels":
             for a, b in bays.stretches(wall.length, 3 * p.screen_pitch, 0.5):
                 for k in range(1, p.storeys + 1):
-                    wanted = rng.random() < 0.55
+                    wanted = assembly.rng.random() < 0.55
                     if wanted and not _is_hidden(wall, a, b, shafts):
                         z = k * p.storey - 0.25
                         spot = (round(a + 0.1, 2), round(b - 0.1, 2), 0.0, 0.12)
@@ -215,10 +209,10 @@ def _add_screens(assembly, p: ParkingDeck, plan, rng) -> None:
                     bar = (0.6, wall.length - 0.6, 0.02, 0.06)
                     pieces.append(wall.place(massing.box(*bar, z, z + 0.05)))
     if pieces:
-        assembly.add("screens", merge_meshes(pieces), rgb=p.screen_rgb)
+        assembly.add("screens", *pieces, rgb=p.screen_rgb)
 
 
-def _shafts(p: ParkingDeck, plan) -> list[np.ndarray]:
+def _shafts(p: Parameters, plan) -> list[np.ndarray]:
     """Returns the outlines of the stairs, a little in front of the decks."""
     (x0, y0), (x1, y1) = plan[0], plan[2]
     s = min(_STAIR_M, 0.3 * (y1 - y0))
@@ -240,7 +234,7 @@ def _is_hidden(wall, u0: float, u1: float, shafts) -> bool:
     )
 
 
-def _add_stairs(assembly, p: ParkingDeck, plan) -> None:
+def _add_stairs(assembly, p: Parameters, plan) -> None:
     """Adds glazed stair shafts at two corners of the decks."""
     pieces, panes = [], []
     for shaft in _shafts(p, plan):
@@ -262,11 +256,11 @@ def _add_stairs(assembly, p: ParkingDeck, plan) -> None:
             massing.flat(shaft, p.height),
         ]
         panes.append(tiers.glass_mesh(shaft, facade))
-    assembly.add("stairs", merge_meshes(pieces), rgb=p.screen_rgb)
-    assembly.add("stairs_glass", merge_meshes(panes), rgb=assembly.glass_rgb)
+    assembly.add("stairs", *pieces, rgb=p.screen_rgb)
+    assembly.add("stairs_glass", *panes, rgb=assembly.glass_rgb)
 
 
-def _add_roof(assembly, p: ParkingDeck, plan) -> None:
+def _add_roof(assembly, p: Parameters, plan) -> None:
     """Adds rows of tilted roofs, with panels, over the top deck."""
     (x0, y0), (x1, y1) = plan[0], plan[2]
     z = p.storeys * p.storey
@@ -285,9 +279,4 @@ def _add_roof(assembly, p: ParkingDeck, plan) -> None:
         pieces.append(Mesh(v, tuple(f[::-1] for f in faces)))
         for x in np.linspace(a + 0.6, b - 0.6, max(2, round((b - a) / 9))):
             pieces.append(massing.post(x, y, 0.1, z + 2.75, z - 0.05))
-    assembly.add("roof", merge_meshes(pieces), rgb=(0.24, 0.27, 0.32))
-
-
-ARCHETYPE = Archetype(
-    ParkingDeck, build, heights=(9.5, 30.0), widths=(24.0, 100.0), overhang=0.35
-)
+    assembly.add("roof", *pieces, rgb=(0.24, 0.27, 0.32))

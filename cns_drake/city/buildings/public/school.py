@@ -16,9 +16,8 @@ from cns_drake.city.buildings.parts import (
 from cns_drake.city.buildings.parts.facades import Band, Facade
 from cns_drake.city.buildings.parts.materials import Materials
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.buildings.parts.wings import Roof, Wing
-from cns_drake.city.geometry.structures import Model
 
 _WALLS = ((0.62, 0.42, 0.34), (0.82, 0.76, 0.64), (0.74, 0.72, 0.68))
 _ROOFS = ((0.44, 0.28, 0.23), (0.36, 0.37, 0.40))
@@ -28,7 +27,7 @@ _MARGIN = 0.6
 _RECESS = 0.16
 
 
-class School:
+class Parameters:
     """Parameters of a school; lengths in metres.
 
     Attributes:
@@ -76,16 +75,15 @@ class School:
         self.accent_rgb = d.pick(_ACCENTS)
 
 
-def build(p: School, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the school on a rectangle, its entrance in front."""
-    assembly = Assembly(site.name, p.rgb)
-    x0, y0, x1, y1 = site.bounds
+    x0, y0, x1, y1 = assembly.site.bounds
     front = y0 + 3.2
     left, right, back = x0 + _MARGIN, x1 - _MARGIN, y1 - _MARGIN
     gym = p.gym + 1.5 * (p.gym > 0)
     a, b = (left + gym, right) if p.mirrored else (left, right - gym)
     bar = np.round(massing.rectangle(a, front, b, front + p.depth), 2)
-    top = _add_classes(assembly, p, bar, rng)
+    top = _add_classes(assembly, p, bar)
     materials = Materials(
         gym=p.rgb,
         glass=assembly.glass_rgb,
@@ -100,10 +98,9 @@ def build(p: School, site: Site, rng: np.random.Generator) -> Model:
         c, d = (left, a + 0.05) if p.mirrored else (b - 0.05, right)
         _add_gym(materials, p, (c, d), (front, back), bar)
     materials.finish(assembly)
-    return assembly.model(site)
 
 
-def _add_classes(assembly, p: School, bar, rng) -> float:
+def _add_classes(assembly, p: Parameters, bar) -> float:
     """Adds the classroom wing; returns the top of its walls [m]."""
     room = p.height - (p.rise + 0.1 if p.roof == "hip" else 2.4)
     storey = round(max(room, 3.2) / p.storeys, 3)
@@ -132,11 +129,11 @@ def _add_classes(assembly, p: School, bar, rng) -> float:
     rim = 0.7
     crown = Facade(rim, (Band(rim - 0.3, rim, -0.15),))
     z = tiers.add_crown(assembly, bar, crown, top, 0.5, thickness=0.3)
-    equip_roof(assembly, bar, z, p.roof_items, rng)
+    equip_roof(assembly, bar, z, p.roof_items)
     return top
 
 
-def _add_entrance(materials, p: School, bar, top: float) -> None:
+def _add_entrance(materials, p: Parameters, bar, top: float) -> None:
     """Adds a stair hall with glass, a canopy on posts and steps."""
     wall = details.WallFrame(bar, 0)
     share = 0.72 if p.mirrored else 0.28
@@ -169,7 +166,9 @@ def _add_entrance(materials, p: School, bar, top: float) -> None:
     materials.add("trim", *(front.place(piece) for piece in pieces))
 
 
-def _add_back_wing(materials, p: School, bar, back: float, top: float) -> None:
+def _add_back_wing(
+    materials, p: Parameters, bar, back: float, top: float
+) -> None:
     """Adds a lower wing behind, on the side away from the gymnasium."""
     (a, _), (b, y) = bar[0], bar[2]
     wide = min(9.0, 0.4 * (b - a))
@@ -188,7 +187,7 @@ def _add_back_wing(materials, p: School, bar, back: float, top: float) -> None:
     wings.add_roof(materials, wing, material="gym")
 
 
-def _add_gym(materials, p: School, xs, ys, bar) -> None:
+def _add_gym(materials, p: Parameters, xs, ys, bar) -> None:
     """Adds the gymnasium with high windows, and its link to the school."""
     a, b = xs
     side = 1.5
@@ -229,8 +228,3 @@ def _add_gym(materials, p: School, xs, ys, bar) -> None:
     passage.row((0, 2), 0.3, 2.0, [bays.window(1.4, 0.4, 2.6, _RECESS)], 0.3)
     passage.add_walls(materials, (_RECESS,), material="trim")
     wings.add_roof(materials, link, material="trim")
-
-
-ARCHETYPE = Archetype(
-    School, build, heights=(7.0, 18.0), widths=(20.0, 90.0), overhang=0.35
-)

@@ -3,8 +3,6 @@ rooms, bands of high windows."""
 
 from __future__ import annotations
 
-import numpy as np
-
 from cns_drake.city.buildings.house_parts.openings import (
     Openings,
     free_stretches,
@@ -13,9 +11,8 @@ from cns_drake.city.buildings.parts import bays, massing, pitched_roofs, wings
 from cns_drake.city.buildings.parts.facades import Band
 from cns_drake.city.buildings.parts.materials import Materials
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.buildings.parts.wings import Roof, Wing
-from cns_drake.city.geometry.structures import Model
 
 _WALLS = ((0.80, 0.78, 0.74), (0.62, 0.44, 0.36), (0.66, 0.70, 0.72))
 _ROOFS = ((0.42, 0.46, 0.50), (0.52, 0.30, 0.24), (0.36, 0.44, 0.40))
@@ -25,7 +22,7 @@ _RECESS = 0.2
 _MARGIN = 0.6
 
 
-class SportsHall:
+class Parameters:
     """Parameters of a sports hall; lengths in metres.
 
     Attributes:
@@ -60,16 +57,15 @@ class SportsHall:
         self.frame_rgb = d.pick(_FRAMES)
 
 
-def build(p: SportsHall, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the hall on a rectangle, its entrance in front."""
-    assembly = Assembly(site.name, p.rgb)
     materials = Materials(
         walls=p.rgb,
         glass=assembly.glass_rgb,
         roof=p.roof_rgb,
         frames=p.frame_rgb,
     )
-    x0, y0, x1, y1 = site.bounds
+    x0, y0, x1, y1 = assembly.site.bounds
     front = y0 + (p.annex + 1.6 if p.annex else 1.8)
     area = (x0 + _MARGIN, front, x1 - _MARGIN, y1 - _MARGIN)
     along_y = area[3] - area[1] > area[2] - area[0]
@@ -77,14 +73,13 @@ def build(p: SportsHall, site: Site, rng: np.random.Generator) -> Model:
     for hall in halls:
         _add_hall(materials, p, hall, halls)
     if p.annex:
-        _add_annex(assembly, materials, p, halls, y0, rng)
+        _add_annex(assembly, materials, p, halls, y0)
     else:
         _add_porch(materials, p, halls)
     materials.finish(assembly)
-    return assembly.model(site)
 
 
-def _halls(p: SportsHall, area, along_y: bool) -> list[Wing]:
+def _halls(p: Parameters, area, along_y: bool) -> list[Wing]:
     """Returns one hall, or the two halves of a butterfly."""
     x0, y0, x1, y1 = area
     top = p.height - 0.15
@@ -110,7 +105,7 @@ def _halls(p: SportsHall, area, along_y: bool) -> list[Wing]:
     ]
 
 
-def _add_hall(materials, p: SportsHall, hall: Wing, halls) -> None:
+def _add_hall(materials, p: Parameters, hall: Wing, halls) -> None:
     openings = Openings(hall, halls)
     high = hall.wall_top
     band = bays.window(p.bay - 0.9, high - 2.4, high - 0.6, _RECESS, mullions=1)
@@ -129,7 +124,7 @@ def _add_hall(materials, p: SportsHall, hall: Wing, halls) -> None:
     _add_frames(materials, p, hall, halls)
 
 
-def _add_frames(materials, p: SportsHall, hall: Wing, halls) -> None:
+def _add_frames(materials, p: Parameters, hall: Wing, halls) -> None:
     """Adds posts along the walls, and ribs over the roof."""
     reach = p.frame_reach - 0.02
     along_y = hall.roof.along_y
@@ -164,7 +159,7 @@ def _add_frames(materials, p: SportsHall, hall: Wing, halls) -> None:
         materials.add("frames", rib)
 
 
-def _add_annex(assembly, materials, p: SportsHall, halls, y0, rng) -> None:
+def _add_annex(assembly, materials, p: Parameters, halls, y0) -> None:
     """Adds the low front: an entrance between changing rooms."""
     hall = halls[0]
     x0 = min(w.x0 for w in halls)
@@ -192,10 +187,10 @@ def _add_annex(assembly, materials, p: SportsHall, halls, y0, rng) -> None:
     )  # fmt: skip
     materials.add("frames", annex.wall(0).place(lid))
     top = annex.top - annex.roof.parapet
-    equip_roof(assembly, annex.outline, top, p.roof_items, rng, clear=0.5)
+    equip_roof(assembly, annex.outline, top, p.roof_items, clear=0.5)
 
 
-def _add_porch(materials, p: SportsHall, halls) -> None:
+def _add_porch(materials, p: Parameters, halls) -> None:
     wall = halls[0].wall(0)
     x = wall.length / 2
     doors = massing.box(x - 2.2, x + 2.2, -0.02, 1.5, 2.7, 3.0)
@@ -206,8 +201,3 @@ def _add_porch(materials, p: SportsHall, halls) -> None:
         materials.add("frames", wall.place(piece))
     leaf = massing.box(x - 1.6, x + 1.6, -0.02, 0.1, 0.0, 2.5)
     materials.add("glass", wall.place(leaf))
-
-
-ARCHETYPE = Archetype(
-    SportsHall, build, heights=(7.0, 18.0), widths=(18.0, 80.0), overhang=0.35
-)

@@ -14,9 +14,8 @@ from cns_drake.city.buildings.parts import (
     tiers,
 )
 from cns_drake.city.buildings.parts.facades import Band, Facade
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
-from cns_drake.city.geometry.structures import Model
 
 _WALLS = ((0.82, 0.77, 0.66), (0.60, 0.40, 0.32), (0.76, 0.72, 0.66))
 _STONE = (0.84, 0.81, 0.74)
@@ -24,7 +23,7 @@ _ROOFS = ((0.34, 0.36, 0.38), (0.34, 0.46, 0.42), (0.45, 0.29, 0.24))
 _MARGIN = 0.6
 
 
-class TownHall:
+class Parameters:
     """Parameters of a town hall; lengths in metres.
 
     Attributes:
@@ -66,10 +65,9 @@ class TownHall:
         self.roof_rgb = d.pick(_ROOFS)
 
 
-def build(p: TownHall, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the town hall on a rectangle."""
-    assembly = Assembly(site.name, p.rgb)
-    x0, y0, x1, y1 = site.bounds
+    x0, y0, x1, y1 = assembly.site.bounds
     depth = y1 - y0
     ahead = min(4.6, 0.28 * depth)
     front = y0 + ahead
@@ -82,13 +80,12 @@ def build(p: TownHall, site: Site, rng: np.random.Generator) -> Model:
     roofs = [pitched_roofs.hip(body, top - 0.02, ridge, 0.5, 0.35)]
     for end in _pavilions(p, body):
         roofs.append(_pavilion_roof(p, end, top - 0.02, ridge))
-    assembly.add("roof", merge_meshes(roofs), rgb=p.roof_rgb)
+    assembly.add("roof", *roofs, rgb=p.roof_rgb)
     _add_porch(assembly, p, body, ahead, top)
     _add_tower(assembly, p, body, top)
-    return assembly.model(site)
 
 
-def _pavilions(p: TownHall, body) -> list[np.ndarray]:
+def _pavilions(p: Parameters, body) -> list[np.ndarray]:
     """Returns the rectangles of the pavilions, half a metre in front."""
     if p.pavilion == 0.0:
         return []
@@ -102,7 +99,7 @@ def _pavilions(p: TownHall, body) -> list[np.ndarray]:
     ]
 
 
-def _pavilion_roof(p: TownHall, plan, z: float, ridge: float) -> Mesh:
+def _pavilion_roof(p: Parameters, plan, z: float, ridge: float) -> Mesh:
     """Returns a hip, or a mansard that is as high as the main ridge."""
     if p.mansard:
         knee = z + 0.75 * (ridge - z)
@@ -111,7 +108,7 @@ def _pavilion_roof(p: TownHall, plan, z: float, ridge: float) -> Mesh:
     return pitched_roofs.hip(plan, z, ridge + 0.3, 0.5, 0.35)
 
 
-def _with_pavilions(p: TownHall, body) -> np.ndarray:
+def _with_pavilions(p: Parameters, body) -> np.ndarray:
     """Returns the outline of the walls."""
     ends = _pavilions(p, body)
     if not ends:
@@ -123,7 +120,7 @@ def _with_pavilions(p: TownHall, body) -> np.ndarray:
     )
 
 
-def _add_walls(assembly, p: TownHall, plan) -> float:
+def _add_walls(assembly, p: Parameters, plan) -> float:
     """Adds plinth, storeys and cornice; returns their top [m]."""
     recess = 0.25
     h = round(p.floor + p.storey, 2)
@@ -154,7 +151,7 @@ def _add_walls(assembly, p: TownHall, plan) -> float:
     return round(z + rim, 3)
 
 
-def _add_porch(assembly, p: TownHall, body, ahead: float, top: float) -> None:
+def _add_porch(assembly, p: Parameters, body, ahead: float, top: float) -> None:
     """Adds steps, columns and a pediment in front of the door."""
     wall = details.WallFrame(body, 0)
     x = wall.length / 2
@@ -184,10 +181,10 @@ def _add_porch(assembly, p: TownHall, body, ahead: float, top: float) -> None:
     )  # fmt: skip
     # The ridge runs away from the wall: wall x and y change places.
     placed.append(wall.place(massing.swapped(gable)))
-    assembly.add("porch", merge_meshes(placed), rgb=_STONE)
+    assembly.add("porch", *placed, rgb=_STONE)
 
 
-def _add_tower(assembly, p: TownHall, body, z0: float) -> None:
+def _add_tower(assembly, p: Parameters, body, z0: float) -> None:
     """Adds the tower above the door: clock, open belfry, crown."""
     (x0, y0), (x1, _) = body[0], body[2]
     x, s = (x0 + x1) / 2, p.tower / 2
@@ -218,13 +215,13 @@ def _add_tower(assembly, p: TownHall, body, z0: float) -> None:
             dial.faces,
         )  # fmt: skip
         dials.append(frame.place(disc))
-    assembly.add("tower", merge_meshes(pieces))
-    assembly.add("dials", merge_meshes(dials), rgb=(0.92, 0.91, 0.87))
+    assembly.add("tower", *pieces)
+    assembly.add("dials", *dials, rgb=(0.92, 0.91, 0.87))
     assembly.add("belfry", _belfry(p, (x, y), s, clock, bell), rgb=_STONE)
     assembly.add("crown", _crown(p, (x, y), s, bell), rgb=p.roof_rgb)
 
 
-def _belfry(p: TownHall, center, s: float, z0: float, z1: float) -> Mesh:
+def _belfry(p: Parameters, center, s: float, z0: float, z1: float) -> Mesh:
     """Eight posts around a core that carries the crown."""
     x, y = center
     core = massing.regular_polygon(0.45 * s, 8, center)
@@ -239,10 +236,10 @@ def _belfry(p: TownHall, center, s: float, z0: float, z1: float) -> Mesh:
                              y + s - 0.05)  # fmt: skip
     pieces.append(massing.roof_pan(rail, z0, z0 + 0.8, 0.2))
     pieces.append(massing.skirt(rail, rail, z0, z0 + 0.8))
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
-def _crown(p: TownHall, center, s: float, z0: float) -> Mesh:
+def _crown(p: Parameters, center, s: float, z0: float) -> Mesh:
     top, eaves = p.height, 1.02 * s
     x, y = center
     plate = massing.box(x - eaves, x + eaves, y - eaves, y + eaves, z0,
@@ -252,7 +249,7 @@ def _crown(p: TownHall, center, s: float, z0: float) -> Mesh:
         base = massing.inset(
             massing.rectangle(x - eaves, y - eaves, x + eaves, y + eaves), 0.1
         )
-        return merge_meshes([plate, massing.spire(base, center, z, top)])
+        return merge_meshes(plate, massing.spire(base, center, z, top))
     share = 0.75 if p.crown == "dome" else 0.45
     profile = [
         (0.92 * s * math.cos(t), z + share * rise * math.sin(t))
@@ -263,9 +260,4 @@ def _crown(p: TownHall, center, s: float, z0: float) -> Mesh:
         profile += [(0.8 * neck, lid), (0.8 * neck, lid + 0.25 * rise),
                     (1.2 * neck, lid + 0.26 * rise)]  # fmt: skip
     profile.append((0.0, top))
-    return merge_meshes([plate, massing.revolved(profile, 10, center)])
-
-
-ARCHETYPE = Archetype(
-    TownHall, build, heights=(18.0, 45.0), widths=(18.0, 60.0), overhang=0.35
-)
+    return merge_meshes(plate, massing.revolved(profile, 10, center))

@@ -13,15 +13,14 @@ from cns_drake.city.buildings.parts.facades import (
     facade_mesh,
     glass_mesh,
 )
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
-from cns_drake.city.geometry.structures import Model
 
 _WALLS = ((0.60, 0.36, 0.29), (0.62, 0.62, 0.60), (0.70, 0.64, 0.52))
 _ROOFS = ((0.42, 0.44, 0.46), (0.50, 0.33, 0.27), (0.36, 0.42, 0.40))
 
 
-class WaterfrontHall:
+class Parameters:
     """Parameters of a hall; lengths in metres.
 
     `roof` is `gable`, `barrel` or `sawtooth`; the ridge is at `height`.
@@ -47,10 +46,9 @@ class WaterfrontHall:
         self.roof_rgb = d.pick(_ROOFS)
 
 
-def build(p: WaterfrontHall, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the hall on a rectangle, its dock at the front."""
-    assembly = Assembly(site.name, p.rgb)
-    x0, y0, x1, y1 = site.bounds
+    x0, y0, x1, y1 = assembly.site.bounds
     front = y0 + p.dock_depth
     plan = massing.rectangle(x0, front, x1, y1)
     walls = _walls(p)
@@ -63,13 +61,12 @@ def build(p: WaterfrontHall, site: Site, rng: np.random.Generator) -> Model:
         ),
         _dock(p, x0, x1, y0, front),
     ]  # fmt: skip
-    assembly.add("walls", merge_meshes(pieces))
+    assembly.add("walls", *pieces)
     assembly.add("glass", glass_mesh(plan, walls), rgb=assembly.glass_rgb)
     assembly.add("roof", _roof(p, plan), rgb=p.roof_rgb)
-    return assembly.model(site)
 
 
-def _walls(p: WaterfrontHall) -> Facade:
+def _walls(p: Parameters) -> Facade:
     """Tall windows between the piers, doors under every few of them."""
     head = p.eaves - 1.0
     window = bays.window(
@@ -95,7 +92,7 @@ def _walls(p: WaterfrontHall) -> Facade:
     )
 
 
-def _dock(p: WaterfrontHall, x0, x1, y0, front) -> Mesh:
+def _dock(p: Parameters, x0, x1, y0, front) -> Mesh:
     """A loading platform under a canopy on posts, steps at both ends."""
     high = p.dock_height
     a, b = x0 + 2.0, x1 - 2.0
@@ -115,10 +112,10 @@ def _dock(p: WaterfrontHall, x0, x1, y0, front) -> Mesh:
     for x, _ in bays.stretches(b - a, 1.5 * p.pitch, 0.3)[1:]:
         post = (a + x - 0.12, a + x + 0.12, y0 + 0.6, y0 + 0.84)
         pieces.append(massing.box(*post, high - 0.1, eaves - 0.2))
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
-def _roof(p: WaterfrontHall, plan) -> Mesh:
+def _roof(p: Parameters, plan) -> Mesh:
     (x0, y0), (x1, y1) = plan[0], plan[2]
     rise = p.height - p.eaves
     if p.roof == "sawtooth":
@@ -131,7 +128,7 @@ def _roof(p: WaterfrontHall, plan) -> Mesh:
         shed = massing.extruded(_profile(p.roof, a, b, rise), x0, x1)
         pieces.append(shed.moved((0.0, 0.0, p.eaves)))
         pieces += _ridge(p, x0, x1, (a + b) / 2)
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
 def _sawtooth(x0: float, x1: float, rise: float) -> list:
@@ -155,7 +152,7 @@ def _profile(roof: str, a: float, b: float, rise: float) -> list:
     return [(a, 0.0), *arc, (b, 0.0)]
 
 
-def _ridge(p: WaterfrontHall, x0, x1, y) -> list[Mesh]:
+def _ridge(p: Parameters, x0, x1, y) -> list[Mesh]:
     """A monitor along the ridge with ventilators at equal distances."""
     top, low = p.height - 0.25, p.height - 1.1
     length = x1 - x0
@@ -166,8 +163,3 @@ def _ridge(p: WaterfrontHall, x0, x1, y) -> list[Mesh]:
         hood = (x - 0.5, x + 0.5, y - 0.9, y + 0.9)
         pieces.append(massing.box(*hood, low, p.height, bottom=False))
     return pieces
-
-
-ARCHETYPE = Archetype(
-    WaterfrontHall, build, heights=(8.0, 18.0), widths=(18.0, 110.0)
-)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cns_drake.city.buildings.archetypes import ARCHETYPES
 from cns_drake.city.buildings.parts import (
     bays,
     details,
@@ -13,9 +14,8 @@ from cns_drake.city.buildings.parts import (
 )
 from cns_drake.city.buildings.parts.facades import Band, Facade
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.geometry.mesh import merge_meshes
-from cns_drake.city.geometry.structures import Model
 
 _WALLS = (
     (0.58, 0.36, 0.29),
@@ -26,7 +26,7 @@ _WALLS = (
 _SIGNS = ((0.55, 0.18, 0.16), (0.20, 0.30, 0.44), (0.22, 0.36, 0.28))
 
 
-class CornerStore:
+class Parameters:
     """Parameters of a corner store; lengths in metres.
 
     Attributes:
@@ -61,17 +61,17 @@ class CornerStore:
         self.sign_rgb = d.pick(_SIGNS)
 
 
-def build(p: CornerStore, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the store on a rectangle."""
+    site = assembly.site
     if p.corner not in site.free_corners:
-        site = site.detached(ARCHETYPE.overhang)
-    assembly = Assembly(site.name, p.rgb)
+        site = site.detached(ARCHETYPES["corner_store"].overhang)
     rectangle = site.outline
     plan, front = _plan(p, rectangle)
     blind = outlines.edges_on(plan, rectangle, site.blind_edges)
     side = (front - 1) % 5 if p.corner == 0 else (front + 1) % 5
     streets = (0, front, side)
-    top = _add_shop(assembly, p, plan, streets, blind, rng)
+    top = _add_shop(assembly, p, plan, streets, blind)
     rim = p.raised + 0.6
     room = p.height - rim - top
     if room > 2.4:
@@ -88,13 +88,12 @@ def build(p: CornerStore, site: Site, rng: np.random.Generator) -> Model:
             plain=blind,
         )
         top = tiers.add_storeys(assembly, plan, walls, top, groups, per_group)
-    _add_parapet(assembly, p, plan, front, top, blind, rng)
+    _add_parapet(assembly, p, plan, front, top, blind)
     materials_sign = _corner_sign(p, plan, front)
     assembly.add("sign", materials_sign, rgb=p.sign_rgb)
-    return assembly.model(site)
 
 
-def _plan(p: CornerStore, rectangle) -> tuple[np.ndarray, int]:
+def _plan(p: Parameters, rectangle) -> tuple[np.ndarray, int]:
     """Returns the five corners, and the edge across the cut-off one."""
     (x0, y0), (x1, y1) = rectangle[0], rectangle[2]
     c = p.cut
@@ -105,7 +104,7 @@ def _plan(p: CornerStore, rectangle) -> tuple[np.ndarray, int]:
     return np.array(points), 4
 
 
-def _add_shop(assembly, p: CornerStore, plan, streets, blind, rng) -> float:
+def _add_shop(assembly, p: Parameters, plan, streets, blind) -> float:
     h = p.ground
     head, front = round(h - 1.0, 2), streets[1]
     glazed = bays.rhythm(
@@ -135,16 +134,16 @@ def _add_shop(assembly, p: CornerStore, plan, streets, blind, rng) -> float:
                 a + 0.3, b - 0.3, -0.02, 0.1, head + 0.1, head + 0.7
             )
             boards.append(wall.place(board))
-            if rng.random() < p.awnings:
+            if assembly.rng.random() < p.awnings:
                 shade = details.awning(a + 0.2, b - 0.2, 0.95, 2.4, head + 0.05)
                 shades.append(wall.place(shade))
-    tiers.add_awnings(assembly, shades, rng)
+    tiers.add_awnings(assembly, shades)
     if boards:
-        assembly.add("boards", merge_meshes(boards), rgb=p.sign_rgb)
+        assembly.add("boards", *boards, rgb=p.sign_rgb)
     return tiers.add_ground(assembly, plan, ground)
 
 
-def _add_parapet(assembly, p: CornerStore, plan, front, z0, blind, rng):
+def _add_parapet(assembly, p: Parameters, plan, front, z0, blind):
     """Adds the cornice and the roof, higher above the corner."""
     rim = round(p.height - p.raised - z0, 3)
     bands = tiers.cornice(rim - 0.1, p.cornice, thickness=0.45, steps=2)
@@ -154,10 +153,10 @@ def _add_parapet(assembly, p: CornerStore, plan, front, z0, blind, rng):
     wall = details.WallFrame(plan, front)
     piece = massing.box(0.1, wall.length - 0.1, -0.25, 0.04, low, high)
     assembly.add("pediment", wall.place(piece))
-    equip_roof(assembly, plan, roof, p.roof_items, rng)
+    equip_roof(assembly, plan, roof, p.roof_items)
 
 
-def _corner_sign(p: CornerStore, plan, front):
+def _corner_sign(p: Parameters, plan, front):
     """A canopy above the door and an upright sign over it."""
     wall = details.WallFrame(plan, front)
     middle, z = wall.length / 2, p.ground - 0.55
@@ -165,14 +164,4 @@ def _corner_sign(p: CornerStore, plan, front):
     lid = massing.box(middle - half, middle + half, -0.05, 0.9, z - 0.25, z)
     top = min(p.height - 0.4, z + 2.6)
     blade = massing.box(middle - 0.1, middle + 0.1, -0.05, 0.75, z - 0.05, top)
-    return wall.place(merge_meshes([lid, blade]))
-
-
-ARCHETYPE = Archetype(
-    CornerStore,
-    build,
-    heights=(5.0, 16.0),
-    widths=(8.0, 30.0),
-    overhang=1.0,
-    party_walls=True,
-)
+    return wall.place(merge_meshes(lid, blade))

@@ -9,10 +9,9 @@ from cns_drake.city.buildings.parts import bays, massing, wings
 from cns_drake.city.buildings.parts.facades import Band
 from cns_drake.city.buildings.parts.materials import Materials
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.buildings.parts.wings import Roof, Wing
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
-from cns_drake.city.geometry.structures import Model
 
 _BRANDS = (
     (0.74, 0.20, 0.16),
@@ -26,7 +25,7 @@ _CONCRETE = (0.62, 0.61, 0.58)
 _RECESS = 0.18
 
 
-class GasStation:
+class Parameters:
     """Parameters of a gas station; lengths in metres.
 
     Attributes:
@@ -58,9 +57,8 @@ class GasStation:
         self.brand_rgb = d.pick(_BRANDS)
 
 
-def build(p: GasStation, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the station on a rectangle, its forecourt in front."""
-    assembly = Assembly(site.name, p.rgb)
     materials = Materials(
         walls=p.rgb,
         glass=assembly.glass_rgb,
@@ -68,7 +66,7 @@ def build(p: GasStation, site: Site, rng: np.random.Generator) -> Model:
         steel=_STEEL,
         concrete=_CONCRETE,
     )
-    x0, y0, x1, y1 = site.bounds
+    x0, y0, x1, y1 = assembly.site.bounds
     shop_front = y1 - p.shop_depth - 0.3
     room = shop_front - 3.0 - (y0 + 1.5)
     deep = min(room, 7.0 * p.lanes + 1.5)
@@ -80,19 +78,18 @@ def build(p: GasStation, site: Site, rng: np.random.Generator) -> Model:
     )
     _add_canopy(materials, p, canopy)
     _add_islands(materials, p, canopy)
-    _add_shop(assembly, materials, p, (x0, x1), (shop_front, y1 - 0.3), rng)
+    _add_shop(assembly, materials, p, (x0, x1), (shop_front, y1 - 0.3))
     _add_sign(materials, p, (x0, x1), y0)
     materials.finish(assembly)
-    return assembly.model(site)
 
 
-def _rows(p: GasStation, canopy) -> list[float]:
+def _rows(p: Parameters, canopy) -> list[float]:
     """Returns where the rows of pumps lie, in y [m]."""
     (_, y0), (_, y1) = canopy[0], canopy[2]
     return [y0 + (k + 0.5) * (y1 - y0) / p.lanes for k in range(p.lanes)]
 
 
-def _add_canopy(materials, p: GasStation, canopy) -> None:
+def _add_canopy(materials, p: Parameters, canopy) -> None:
     """Adds the roof on its columns, lights on its underside."""
     (x0, y0), (x1, y1) = canopy[0], canopy[2]
     top, low = p.canopy_top, p.canopy_top - p.fascia
@@ -131,7 +128,7 @@ def _add_canopy(materials, p: GasStation, canopy) -> None:
             materials.add("steel", massing.post(x, y, 0.22, low + 0.1))
 
 
-def _add_islands(materials, p: GasStation, canopy) -> None:
+def _add_islands(materials, p: Parameters, canopy) -> None:
     """Adds kerbed islands with their pumps and bollards."""
     (x0, _), (x1, _) = canopy[0], canopy[2]
     step = (x1 - x0 - 3.0) / p.pumps
@@ -161,10 +158,10 @@ def _pump() -> Mesh:
         pieces.append(massing.box(-0.3, 0.3, y0, y1, 1.0, 1.45))
         for x in (-0.34, 0.26):
             pieces.append(massing.box(x, x + 0.1, y0, y1, 0.55, 0.95))
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
-def _add_shop(assembly, materials, p: GasStation, xs, ys, rng) -> None:
+def _add_shop(assembly, materials, p: Parameters, xs, ys) -> None:
     x0, x1 = xs[0] + 0.4, xs[1] - 0.4
     wash = 5.2 if p.wash else 0.0
     wide = min(x1 - x0 - wash - (0.6 if wash else 0.0), 18.0)
@@ -186,13 +183,13 @@ def _add_shop(assembly, materials, p: GasStation, xs, ys, rng) -> None:
     sign = massing.box(0.3, wide - 0.3, -0.02, 0.3, 2.85, p.shop_height + 0.02)
     materials.add("brand", wall.place(sign))
     z = shop.top - shop.roof.parapet
-    equip_roof(assembly, shop.outline, z, p.roof_items, rng)
+    equip_roof(assembly, shop.outline, z, p.roof_items)
     if wash:
         a = x0 if p.mirrored else x1 - wash
         _add_wash(materials, p, (a, a + wash), ys)
 
 
-def _add_wash(materials, p: GasStation, xs, ys) -> None:
+def _add_wash(materials, p: Parameters, xs, ys) -> None:
     """Adds a car wash: a gate in front and one behind."""
     box = Wing.at(
         xs[0], ys[0], xs[1], ys[1], p.shop_height - 0.3, p.shop_height - 0.2,
@@ -206,7 +203,7 @@ def _add_wash(materials, p: GasStation, xs, ys) -> None:
     wings.add_roof(materials, box)
 
 
-def _add_sign(materials, p: GasStation, xs, y0: float) -> None:
+def _add_sign(materials, p: Parameters, xs, y0: float) -> None:
     """Adds the price sign at a front corner."""
     x = xs[0] + 1.2 if p.mirrored else xs[1] - 1.2
     y, top = y0 + 0.9, p.height
@@ -217,8 +214,3 @@ def _add_sign(materials, p: GasStation, xs, y0: float) -> None:
         materials.add("steel" if k % 2 else "brand", board)
     crown = massing.box(x - 0.95, x + 0.95, y - 0.2, y + 0.2, top - 0.5, top)
     materials.add("brand", crown)
-
-
-ARCHETYPE = Archetype(
-    GasStation, build, heights=(5.0, 9.0), widths=(18.0, 50.0), overhang=0.35
-)

@@ -15,9 +15,8 @@ from cns_drake.city.buildings.parts import (
 )
 from cns_drake.city.buildings.parts.facades import Band, Patch
 from cns_drake.city.buildings.parts.materials import Materials
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.buildings.parts.wings import Roof, Wing
-from cns_drake.city.geometry.structures import Model
 
 _STALLS = (
     (0.30, 0.42, 0.36),
@@ -32,7 +31,7 @@ _TIMBER = (0.42, 0.35, 0.28)
 _COUNTER = 1.05
 
 
-class KioskRow:
+class Parameters:
     """Parameters of a row; lengths in metres.
 
     Attributes:
@@ -63,9 +62,8 @@ class KioskRow:
         self.awning_rgb = d.pick(_AWNINGS)
 
 
-def build(p: KioskRow, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the row along the front of a rectangle."""
-    assembly = Assembly(site.name, p.rgb)
     materials = Materials(
         stalls=p.rgb,
         others=p.second_rgb,
@@ -74,13 +72,13 @@ def build(p: KioskRow, site: Site, rng: np.random.Generator) -> Model:
         awning=p.awning_rgb,
         timber=_TIMBER,
     )
-    x0, y0, x1, y1 = site.bounds
+    x0, y0, x1, y1 = assembly.site.bounds
     left, right = x0 + 0.5, x1 - 0.5
     front = y0 + 2.2 if p.arcade == 0.0 else y0 + p.arcade + 0.5
     boxes = _stalls(p, left, right, front)
     tallest = len(boxes) // 2
     for k, wing in enumerate(boxes):
-        _add_stall(materials, p, wing, boxes, k, rng)
+        _add_stall(materials, p, wing, boxes, k, assembly.rng)
         if k == tallest and p.tower:
             _add_lantern(materials, p, wing)
     if p.arcade > 0:
@@ -89,10 +87,9 @@ def build(p: KioskRow, site: Site, rng: np.random.Generator) -> Model:
                        -massing.FOUNDATION_M, 0.12)  # fmt: skip
     materials.add("timber", slab)
     materials.finish(assembly)
-    return assembly.model(site)
 
 
-def _stalls(p: KioskRow, left: float, right: float, front: float):
+def _stalls(p: Parameters, left: float, right: float, front: float):
     """Returns the boxes of the stalls; the middle one is the tallest."""
     unit = p.stall + p.gap / p.group
     count = max(1, int((right - left + p.gap) / unit))
@@ -117,7 +114,9 @@ def _stalls(p: KioskRow, left: float, right: float, front: float):
     return boxes
 
 
-def _add_stall(materials, p: KioskRow, wing: Wing, boxes, k: int, rng) -> None:
+def _add_stall(
+    materials, p: Parameters, wing: Wing, boxes, k: int, rng
+) -> None:
     """Adds a stall: a counter under an awning, or closed shutters."""
     openings = Openings(wing, boxes)
     wall, material = wing.wall(0), ("stalls", "others")[k % 2]
@@ -143,7 +142,7 @@ def _add_stall(materials, p: KioskRow, wing: Wing, boxes, k: int, rng) -> None:
     wings.add_roof(materials, wing, material=material)
 
 
-def _add_lantern(materials, p: KioskRow, wing: Wing) -> None:
+def _add_lantern(materials, p: Parameters, wing: Wing) -> None:
     """Adds a small square lantern with its own roof."""
     x, y = (wing.x0 + wing.x1) / 2, (wing.y0 + wing.y1) / 2
     low, top = wing.wall_top, p.height
@@ -157,7 +156,7 @@ def _add_lantern(materials, p: KioskRow, wing: Wing) -> None:
     )
 
 
-def _add_arcade(materials, p: KioskRow, xs, front: float) -> None:
+def _add_arcade(materials, p: Parameters, xs, front: float) -> None:
     """Adds a lean-to roof on posts along the whole row."""
     a, b = xs
     low, y = 2.35, front - p.arcade
@@ -172,8 +171,3 @@ def _add_arcade(materials, p: KioskRow, xs, front: float) -> None:
         )
     beam = massing.box(a, b, y, y + 0.16, low - 0.15, low + 0.06)
     materials.add("timber", beam)
-
-
-ARCHETYPE = Archetype(
-    KioskRow, build, heights=(3.2, 8.0), widths=(6.0, 60.0), overhang=0.35
-)

@@ -14,9 +14,8 @@ from cns_drake.city.buildings.parts import bays, massing, wings
 from cns_drake.city.buildings.parts.facades import Band
 from cns_drake.city.buildings.parts.materials import Materials
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.buildings.parts.wings import Roof, Wing
-from cns_drake.city.geometry.structures import Model
 
 _WALLS = (
     (0.78, 0.74, 0.66),
@@ -37,7 +36,7 @@ _AWNINGS = ((0.75, 0.72, 0.62), (0.40, 0.20, 0.20), (0.24, 0.36, 0.34))
 _FRONT_M, _BACK_M = 0.4, 0.1
 
 
-class ShopStrip:
+class Parameters:
     """Parameters of a strip; lengths in metres.
 
     Attributes:
@@ -68,9 +67,9 @@ class ShopStrip:
         self.awning_rgb = d.pick(_AWNINGS)
 
 
-def build(p: ShopStrip, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the strip along the front of a rectangle."""
-    assembly = Assembly(site.name, p.rgb)
+    site = assembly.site
     materials = Materials(
         walls=p.rgb,
         facing=p.second_rgb,
@@ -82,34 +81,33 @@ def build(p: ShopStrip, site: Site, rng: np.random.Generator) -> Model:
     )
     x0, y0, x1, y1 = site.bounds
     count = max(1, round((x1 - x0) / p.unit_width))
-    shares = rng.uniform(0.8, 1.2, count)
+    shares = assembly.rng.uniform(0.8, 1.2, count)
     bounds = x0 + (x1 - x0) * np.cumsum([0.0, *shares]) / shares.sum()
-    highest = int(rng.integers(count))
+    highest = int(assembly.rng.integers(count))
     for k in range(count):
         ends = ((3, k == 0), (1, k + 1 == count))
         blind = {e for e, end in ends if not end or e in site.blind_edges}
         tall = p.height > p.ground + 3.4 and (
-            k == highest or rng.random() < p.upper
+            k == highest or assembly.rng.random() < p.upper
         )
-        top = p.height if k == highest else _top(p, tall, rng)
-        back = y1 - _BACK_M - float(rng.uniform(0.0, 0.12)) * (y1 - y0)
+        top = p.height if k == highest else _top(p, tall, assembly.rng)
+        back = y1 - _BACK_M - float(assembly.rng.uniform(0.0, 0.12)) * (y1 - y0)
         area = (bounds[k], y0 + _FRONT_M, bounds[k + 1], back)
         roof = Roof("flat", parapet=min(0.5, top - p.ground - 0.1))
         wing = Wing.at(*area, top - 0.1, top, roof, blind)
-        _add_unit(materials, p, wing, tall, rng)
+        _add_unit(materials, p, wing, tall, assembly.rng)
         if k % 3 == 0:
             items = p.roof_items
-            _equip(assembly, wing, items, rng, f"unit_{k}_")
+            _equip(assembly, wing, items, f"unit_{k}_")
     materials.finish(assembly)
-    return assembly.model(site)
 
 
-def _equip(assembly, wing, items, rng, prefix: str) -> None:
+def _equip(assembly, wing, items, prefix: str) -> None:
     z = wing.top - wing.roof.parapet
-    equip_roof(assembly, wing.outline, z, items, rng, prefix=prefix)
+    equip_roof(assembly, wing.outline, z, items, prefix=prefix)
 
 
-def _top(p: ShopStrip, tall: bool, rng) -> float:
+def _top(p: Parameters, tall: bool, rng) -> float:
     """Returns the parapet of a unit that is not the highest [m]."""
     drop = p.steps * int(rng.integers(0, 3))
     if tall or p.height < p.ground + 3.4:
@@ -117,7 +115,7 @@ def _top(p: ShopStrip, tall: bool, rng) -> float:
     return round(p.ground + 0.5 + 0.5 * drop, 2)
 
 
-def _add_unit(materials, p: ShopStrip, wing: Wing, tall: bool, rng) -> None:
+def _add_unit(materials, p: Parameters, wing: Wing, tall: bool, rng) -> None:
     openings = Openings(wing)
     wall = wing.wall(0)
     cladding = "walls" if rng.random() < 0.5 else "facing"
@@ -147,7 +145,7 @@ def _add_unit(materials, p: ShopStrip, wing: Wing, tall: bool, rng) -> None:
     _add_parapet(materials, p, wing, cladding, rng)
 
 
-def _add_parapet(materials, p: ShopStrip, wing: Wing, cladding, rng):
+def _add_parapet(materials, p: Parameters, wing: Wing, cladding, rng):
     """Frames the parapet's front: a coping, or piers at its ends."""
     wall, top = wing.wall(0), wing.top
     length = wall.length
@@ -166,13 +164,3 @@ def _add_parapet(materials, p: ShopStrip, wing: Wing, cladding, rng):
             0.25 * length, 0.75 * length, -0.15, 0.1, top - 0.3, top + 0.7
         )
         materials.add("sign", wall.place(sign))
-
-
-ARCHETYPE = Archetype(
-    ShopStrip,
-    build,
-    heights=(4.0, 12.0),
-    widths=(7.0, 60.0),
-    overhang=1.0,
-    party_walls=True,
-)

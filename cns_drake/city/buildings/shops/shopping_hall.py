@@ -15,10 +15,9 @@ from cns_drake.city.buildings.parts import (
 from cns_drake.city.buildings.parts.facades import Band
 from cns_drake.city.buildings.parts.materials import Materials
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.buildings.parts.wings import Roof, Wing
 from cns_drake.city.geometry.mesh import Mesh
-from cns_drake.city.geometry.structures import Model
 
 _WALLS = (
     (0.80, 0.76, 0.68),
@@ -36,7 +35,7 @@ _STEEL = (0.76, 0.77, 0.78)
 _RECESS = 0.3
 
 
-class ShoppingHall:
+class Parameters:
     """Parameters of a shopping hall; lengths in metres.
 
     Attributes:
@@ -78,9 +77,8 @@ class ShoppingHall:
         self.accent_rgb = d.pick(_ACCENTS)
 
 
-def build(p: ShoppingHall, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the hall on a rectangle, its main portal in front."""
-    assembly = Assembly(site.name, p.rgb)
     materials = Materials(
         walls=p.rgb,
         anchor=p.second_rgb,
@@ -89,7 +87,7 @@ def build(p: ShoppingHall, site: Site, rng: np.random.Generator) -> Model:
         steel=_STEEL,
         roof=p.accent_rgb,
     )
-    x0, y0, x1, y1 = site.bounds
+    x0, y0, x1, y1 = assembly.site.bounds
     front, back = y0 + 4.0, y1 - 0.4
     left, right = x0 + 0.4, x1 - 0.4
     flat = Roof("flat", parapet=0.9)
@@ -106,18 +104,15 @@ def build(p: ShoppingHall, site: Site, rng: np.random.Generator) -> Model:
     z = hall.top - 0.9
     for k, area in enumerate(_free_roofs(p, hall)):
         items = p.roof_items[k::2]
-        equip_roof(
-            assembly, area, z, items, rng, clear=1.5, prefix=f"side_{k}_"
-        )
+        equip_roof(assembly, area, z, items, clear=1.5, prefix=f"side_{k}_")
     materials.finish(assembly)
-    return assembly.model(site)
 
 
 def _middle(hall: Wing) -> float:
     return (hall.x0 + hall.x1) / 2
 
 
-def _anchor(p: ShoppingHall, hall: Wing) -> Wing:
+def _anchor(p: Parameters, hall: Wing) -> Wing:
     """Returns the taller store at the back corner."""
     wide = (hall.x1 - hall.x0) / 2 - p.spine / 2 - 1.0
     deep = 0.45 * (hall.y1 - hall.y0)
@@ -129,7 +124,7 @@ def _anchor(p: ShoppingHall, hall: Wing) -> Wing:
     )  # fmt: skip
 
 
-def _free_roofs(p: ShoppingHall, hall: Wing) -> list[np.ndarray]:
+def _free_roofs(p: Parameters, hall: Wing) -> list[np.ndarray]:
     """Returns the parts of the flat roof left and right of the vault."""
     x, half = _middle(hall), p.spine / 2 + 0.4
     deep = hall.y1 - hall.y0
@@ -142,7 +137,7 @@ def _free_roofs(p: ShoppingHall, hall: Wing) -> list[np.ndarray]:
     ]
 
 
-def _add_hall(materials, p: ShoppingHall, hall: Wing, boxes) -> None:
+def _add_hall(materials, p: Parameters, hall: Wing, boxes) -> None:
     """Adds walls of panels with show windows and a band of louvres."""
     openings = Openings(hall, boxes)
     show = bays.shop_front(3.6, _RECESS, door=False, riser=0.3)
@@ -159,7 +154,7 @@ def _add_hall(materials, p: ShoppingHall, hall: Wing, boxes) -> None:
     wings.add_roof(materials, hall)
 
 
-def _add_anchor(materials, p: ShoppingHall, anchor: Wing, boxes) -> None:
+def _add_anchor(materials, p: Parameters, anchor: Wing, boxes) -> None:
     openings = Openings(anchor, boxes)
     high = bays.window(3.0, anchor.top - 2.6, anchor.top - 1.2, _RECESS)
     openings.row(range(4), p.hall + 0.2, 5.0, [high], 1.0)
@@ -175,13 +170,13 @@ def _add_anchor(materials, p: ShoppingHall, anchor: Wing, boxes) -> None:
     materials.add("accent", wall.place(sign))
 
 
-def _vault_line(p: ShoppingHall, x: float, half: float, z: float, top: float):
+def _vault_line(p: Parameters, x: float, half: float, z: float, top: float):
     if p.vault == "gable":
         return pitched_roofs.gable_line(x - half, x + half, z, top)
     return pitched_roofs.barrel_line(x - half, x + half, z, top)
 
 
-def _add_spine(materials, p: ShoppingHall, hall: Wing) -> None:
+def _add_spine(materials, p: Parameters, hall: Wing) -> None:
     """Adds the glazed vault with its ribs along the middle."""
     x, half = _middle(hall), p.spine / 2
     z = p.hall - 0.9
@@ -213,7 +208,7 @@ def _add_spine(materials, p: ShoppingHall, hall: Wing) -> None:
         materials.add("steel", rib)
 
 
-def _add_portal(materials, p: ShoppingHall, hall: Wing) -> None:
+def _add_portal(materials, p: Parameters, hall: Wing) -> None:
     """Adds a tall glazed portal with a roof on columns in front."""
     x, half = _middle(hall), p.portal / 2
     top = min(p.height, p.hall + 0.62 * (p.height - p.hall))
@@ -245,7 +240,7 @@ def _add_portal(materials, p: ShoppingHall, hall: Wing) -> None:
     materials.add("steel", wall.place(sign))
 
 
-def _add_docks(materials, p: ShoppingHall, hall: Wing) -> None:
+def _add_docks(materials, p: Parameters, hall: Wing) -> None:
     """Adds loading doors behind, flush with the site's edge."""
     wall = hall.wall(2)
     side = 0.72 if p.anchor_left else 0.28
@@ -257,12 +252,3 @@ def _add_docks(materials, p: ShoppingHall, hall: Wing) -> None:
         frame = massing.box(u - 1.8, u + 1.8, -0.02, 0.3, 4.2, 4.5)
         materials.add("steel", wall.place(gate))
         materials.add("accent", wall.place(frame))
-
-
-ARCHETYPE = Archetype(
-    ShoppingHall,
-    build,
-    heights=(9.0, 26.0),
-    widths=(28.0, 120.0),
-    overhang=0.35,
-)

@@ -9,9 +9,8 @@ from cns_drake.city.buildings.parts import bays, details, massing, wings
 from cns_drake.city.buildings.parts.facades import Band
 from cns_drake.city.buildings.parts.materials import Materials
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.buildings.parts.wings import Roof, Wing
-from cns_drake.city.geometry.structures import Model
 
 _WALLS = (
     (0.82, 0.80, 0.76),
@@ -25,7 +24,7 @@ _STEEL = (0.72, 0.73, 0.74)
 _RECESS = 0.25
 
 
-class Supermarket:
+class Parameters:
     """Parameters of a supermarket; lengths in metres.
 
     Attributes:
@@ -64,9 +63,8 @@ class Supermarket:
         self.brand_rgb = d.pick(_BRANDS)
 
 
-def build(p: Supermarket, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the hall on a rectangle, its entrance in front."""
-    assembly = Assembly(site.name, p.rgb)
     materials = Materials(
         walls=p.rgb,
         glass=assembly.glass_rgb,
@@ -74,7 +72,7 @@ def build(p: Supermarket, site: Site, rng: np.random.Generator) -> Model:
         roof=p.brand_rgb,
         steel=_STEEL,
     )
-    x0, y0, x1, y1 = site.bounds
+    x0, y0, x1, y1 = assembly.site.bounds
     left = x0 + 0.3 + p.dock_depth * p.dock_left
     right = x1 - 0.3 - p.dock_depth * (not p.dock_left)
     front = y0 + p.canopy + 1.2
@@ -104,12 +102,11 @@ def build(p: Supermarket, site: Site, rng: np.random.Generator) -> Model:
         _add_dock(materials, p, hall)
     _add_shelters(materials, p, wall, y0)
     z = hall.top - hall.roof.parapet
-    equip_roof(assembly, hall.outline, z, p.roof_items, rng, clear=2.0)
+    equip_roof(assembly, hall.outline, z, p.roof_items, clear=2.0)
     materials.finish(assembly)
-    return assembly.model(site)
 
 
-def _add_canopy(materials, p: Supermarket, wall) -> None:
+def _add_canopy(materials, p: Parameters, wall) -> None:
     """Adds a flat canopy on posts along the front."""
     z = 3.45
     lid = massing.box(0.3, wall.length - 0.3, -0.05, p.canopy, z, z + 0.4)
@@ -127,7 +124,7 @@ def _add_canopy(materials, p: Supermarket, wall) -> None:
         )
 
 
-def _add_entrance(materials, p: Supermarket, hall: Wing) -> None:
+def _add_entrance(materials, p: Parameters, hall: Wing) -> None:
     """Adds a porch with sliding doors, higher than the hall."""
     length, w = hall.x1 - hall.x0, p.entrance_width
     x = float(
@@ -154,7 +151,7 @@ def _add_entrance(materials, p: Supermarket, hall: Wing) -> None:
     materials.add("steel", porch.wall(0).place(sign))
 
 
-def _add_dock(materials, p: Supermarket, hall: Wing) -> None:
+def _add_dock(materials, p: Parameters, hall: Wing) -> None:
     """Adds a loading dock with its roof and a wall beside the hall."""
     wall = hall.wall(3 if p.dock_left else 1)
     reach = p.dock_depth - 0.4
@@ -177,7 +174,7 @@ def _add_dock(materials, p: Supermarket, hall: Wing) -> None:
         materials.add("steel", wall.place(gate))
 
 
-def _add_shelters(materials, p: Supermarket, wall, y0: float) -> None:
+def _add_shelters(materials, p: Parameters, wall, y0: float) -> None:
     """Adds bent roofs for trolleys in front of the canopy's ends."""
     for k in range(p.shelters):
         x = 3.2 if k == 0 else wall.length - 3.2
@@ -191,8 +188,3 @@ def _add_shelters(materials, p: Supermarket, wall, y0: float) -> None:
             )
         pieces.append(massing.box(a, b, y + 0.85, y + 0.9, 0.5, 1.1))
         materials.add("steel", *(wall.place(piece) for piece in pieces))
-
-
-ARCHETYPE = Archetype(
-    Supermarket, build, heights=(6.0, 14.0), widths=(20.0, 90.0), overhang=0.35
-)

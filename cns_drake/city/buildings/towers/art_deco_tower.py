@@ -12,14 +12,12 @@ from cns_drake.city.buildings.parts import (
     tiers,
 )
 from cns_drake.city.buildings.parts.facades import Band, Facade
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
-from cns_drake.city.geometry.mesh import merge_meshes
-from cns_drake.city.geometry.structures import Model
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 
 _STONES = ((0.76, 0.70, 0.60), (0.68, 0.64, 0.58), (0.70, 0.58, 0.48))
 
 
-class ArtDecoTower:
+class Parameters:
     """Parameters of an art-deco tower; lengths in metres.
 
     `steps` has, for each tier above the base, where it starts (as a
@@ -56,10 +54,9 @@ class ArtDecoTower:
         self.rgb = d.pick(_STONES)
 
 
-def build(p: ArtDecoTower, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the tower on a rectangle."""
-    assembly = Assembly(site.name, p.rgb)
-    base = site.outline
+    base = assembly.site.outline
     plan = outlines.notched(base, p.notch) if p.notch else base
     top = _add_ground(assembly, p, plan)
     crown_height = round(min(0.16 * p.height, 16.0), 1)
@@ -76,10 +73,9 @@ def build(p: ArtDecoTower, site: Site, rng: np.random.Generator) -> Model:
         plan = massing.inset(base, (across, along, across, along))
         plan = outlines.notched(plan, p.notch) if p.notch else plan
     _add_crown(assembly, p, plan, top)
-    return assembly.model(site)
 
 
-def _add_ground(assembly, p: ArtDecoTower, plan) -> float:
+def _add_ground(assembly, p: Parameters, plan) -> float:
     h = p.ground_height
     wall = details.WallFrame(plan, 0)
     portal = bays.entrance(p.portal_width, h - 1.6, 1.4, surround=0.3)
@@ -104,7 +100,7 @@ def _add_terrace(assembly, plan, z, k) -> None:
     tiers.add_crown(assembly, plan, parapet, z, 1.1, part=f"terrace_{k}")
 
 
-def _add_crown(assembly, p: ArtDecoTower, plan, z0) -> None:
+def _add_crown(assembly, p: Parameters, plan, z0) -> None:
     pieces = []
     height = p.height - z0
     step = round((1.0 - p.spire) * height / p.crown_steps, 2)
@@ -120,9 +116,4 @@ def _add_crown(assembly, p: ArtDecoTower, plan, z0) -> None:
     z = z0 + p.crown_steps * step
     middle = np.mean(plan, axis=0)
     pieces.append(massing.spire(plan, middle, z, z0 + height))
-    assembly.add("crown", merge_meshes(pieces))
-
-
-ARCHETYPE = Archetype(
-    ArtDecoTower, build, heights=(50.0, 180.0), widths=(18.0, 60.0)
-)
+    assembly.add("crown", *pieces)

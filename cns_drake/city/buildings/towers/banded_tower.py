@@ -8,9 +8,9 @@ import numpy as np
 from cns_drake.city.buildings.parts import bays, details, massing, tiers
 from cns_drake.city.buildings.parts.facades import Band, Facade, facade_mesh
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.geometry.mesh import merge_meshes
-from cns_drake.city.geometry.structures import MeshShape, Model
+from cns_drake.city.geometry.structures import MeshShape
 
 _BANDS = (
     (0.84, 0.84, 0.82),
@@ -21,7 +21,7 @@ _BANDS = (
 _GLASSES = ((0.22, 0.30, 0.36), (0.24, 0.36, 0.36), (0.18, 0.22, 0.28))
 
 
-class BandedTower:
+class Parameters:
     """Parameters of a tower; lengths in metres.
 
     Attributes:
@@ -58,10 +58,10 @@ class BandedTower:
         self.glass_rgb = d.pick(_GLASSES)
 
 
-def build(p: BandedTower, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the tower on a rectangle."""
-    assembly = Assembly(site.name, p.rgb, p.glass_rgb)
-    x0, y0, x1, y1 = site.bounds
+    assembly.glass_rgb = p.glass_rgb
+    x0, y0, x1, y1 = assembly.site.bounds
     base = massing.rectangle(x0 + 0.8, y0 + 0.8, x1 - 0.8, y1 - 0.8)
     step = max(2.8, 0.5 * p.radius)
     outer = np.round(
@@ -86,11 +86,10 @@ def build(p: BandedTower, site: Site, rng: np.random.Generator) -> Model:
     roof = tiers.add_crown(
         assembly, plan, crown, z, min(0.9, rim - 0.1), thickness=0.3
     )
-    equip_roof(assembly, plan, roof, p.roof_items, rng)
-    return assembly.model(site)
+    equip_roof(assembly, plan, roof, p.roof_items)
 
 
-def _add_lobby(assembly, p: BandedTower, plan) -> float:
+def _add_lobby(assembly, p: Parameters, plan) -> float:
     h = p.lobby
     pane = bays.ribbon(0.2, h - 0.9, 0.3, 0.16)
     # Long walls may meet at right angles, where recesses must not touch.
@@ -116,7 +115,7 @@ def _add_lobby(assembly, p: BandedTower, plan) -> float:
 class _Stack:
     """Storeys of one outline, to be placed several times."""
 
-    def __init__(self, assembly, p: BandedTower, plan, counts, name: str):
+    def __init__(self, assembly, p: Parameters, plan, counts, name: str):
         self.plan = plan
         self._assembly = assembly
         self._groups, per_group, storey = counts
@@ -136,7 +135,7 @@ class _Stack:
                     depth=p.recess + 0.05, margin=0.8,
                 )
             )  # fmt: skip
-        self._walls = MeshShape(assembly.define(name, merge_meshes(pieces)))
+        self._walls = MeshShape(assembly.define(name, merge_meshes(*pieces)))
         height = round(self._groups * self._step, 3)
         pane = massing.inset(plan, p.recess - 0.004)
         self._glass = MeshShape(
@@ -185,11 +184,6 @@ def _add_garden(assembly, plan, inner, z0, height, number) -> float:
             columns.append(massing.skirt(shaft, shaft, z0, z0 + height))
     floor = massing.roof_pan(plan, z0, z0 + 1.0, 0.2)
     edge = massing.skirt(plan, plan, z0, z0 + 1.0)
-    mesh = merge_meshes([walls, floor, edge, *columns])
+    mesh = merge_meshes(walls, floor, edge, *columns)
     assembly.add(f"garden_{number}", mesh)
     return round(z0 + height, 3)
-
-
-ARCHETYPE = Archetype(
-    BandedTower, build, heights=(25.0, 100.0), widths=(16.0, 60.0)
-)

@@ -13,8 +13,7 @@ from cns_drake.city.buildings.parts import (
 )
 from cns_drake.city.buildings.parts.facades import Band, Facade
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
-from cns_drake.city.geometry.structures import Model
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 
 _TINTS = (
     ((0.62, 0.66, 0.70), (0.24, 0.34, 0.42)),
@@ -29,7 +28,7 @@ _CROWNS = ("screen", "wedge", "stepped")
 _ROOF_ITEMS = ("lift_house", "mast", *2 * ("cooling_tower",), "air_handler")
 
 
-class GlassSkyscraper:
+class Parameters:
     """Parameters of a glass skyscraper; lengths in metres.
 
     `setbacks` has, for each tier above the first, where it starts (as a
@@ -81,10 +80,10 @@ class GlassSkyscraper:
         self.glass_rgb = glass_rgb
 
 
-def build(p: GlassSkyscraper, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the skyscraper on any outline."""
-    assembly = Assembly(site.name, p.rgb, p.glass_rgb)
-    base = site.outline
+    assembly.glass_rgb = p.glass_rgb
+    base = assembly.site.outline
     plan = _shaped(base, p)
     top = _add_lobby(assembly, p, plan)
     levels = [*(round(f * p.height, 1) for f, _ in p.setbacks)]
@@ -100,11 +99,10 @@ def build(p: GlassSkyscraper, site: Site, rng: np.random.Generator) -> Model:
     top = tiers.add_grooved(
         assembly, plan, p.wall, top, goal, "tier_top", rise=rise
     )
-    _add_crown(assembly, p, plan, top, rng)
-    return assembly.model(site)
+    _add_crown(assembly, p, plan, top)
 
 
-def _shaped(outline, p: GlassSkyscraper) -> np.ndarray:
+def _shaped(outline, p: Parameters) -> np.ndarray:
     size = p.corner_size
     if p.corner == "chamfered":
         return outlines.chamfered(outline, size)
@@ -116,7 +114,7 @@ def _shaped(outline, p: GlassSkyscraper) -> np.ndarray:
     return outline
 
 
-def _add_lobby(assembly, p: GlassSkyscraper, plan) -> float:
+def _add_lobby(assembly, p: Parameters, plan) -> float:
     height = p.lobby_height
     front = details.WallFrame(plan, 0)
     middle = front.length / 2
@@ -149,7 +147,7 @@ def _add_lobby(assembly, p: GlassSkyscraper, plan) -> float:
     return tiers.add_ground(assembly, plan, lobby, [columns, front.place(roof)])
 
 
-def _add_crown(assembly, p, plan, z0, rng) -> None:
+def _add_crown(assembly, p, plan, z0) -> None:
     height = round(p.height - z0, 3)
     if p.crown == "wedge":
         assembly.add("crown", massing.sloped_prism(plan, z0, height, 0.35))
@@ -167,13 +165,4 @@ def _add_crown(assembly, p, plan, z0, rng) -> None:
     parapet = 0.7 * height if p.crown == "screen" else 1.0
     walls = Facade(height, louvres)
     roof = tiers.add_crown(assembly, plan, walls, z0, parapet)
-    equip_roof(assembly, plan, roof, _ROOF_ITEMS, rng)
-
-
-ARCHETYPE = Archetype(
-    GlassSkyscraper,
-    build,
-    heights=(70.0, 220.0),
-    widths=(20.0, 60.0),
-    any_outline=True,
-)
+    equip_roof(assembly, plan, roof, _ROOF_ITEMS)

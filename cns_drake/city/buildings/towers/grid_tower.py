@@ -13,8 +13,7 @@ from cns_drake.city.buildings.parts import (
 )
 from cns_drake.city.buildings.parts.facades import Band, Facade
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
-from cns_drake.city.geometry.structures import Model
+from cns_drake.city.buildings.parts.site import Assembly, Dice, Site
 
 _CLADDINGS = (
     (0.80, 0.78, 0.74),
@@ -26,7 +25,7 @@ _CLADDINGS = (
 _GLASSES = ((0.20, 0.26, 0.31), (0.24, 0.32, 0.34), (0.16, 0.20, 0.26))
 
 
-class GridTower:
+class Parameters:
     """Parameters of a tower; lengths in metres.
 
     Attributes:
@@ -73,10 +72,10 @@ class GridTower:
         return self.recess + 0.15
 
 
-def build(p: GridTower, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the tower on a rectangle."""
-    assembly = Assembly(site.name, p.rgb, p.glass_rgb)
-    plan = np.round(_plan(p, site), 2)
+    assembly.glass_rgb = p.glass_rgb
+    plan = np.round(_plan(p, assembly.site), 2)
     top = _add_lobby(assembly, p, plan)
     goal = p.height - p.crown
     if p.waist > 0:
@@ -93,11 +92,10 @@ def build(p: GridTower, site: Site, rng: np.random.Generator) -> Model:
         assembly, plan, crown, top, rim - 0.6, thickness=0.45
     )
     free = massing.inset(plan, 0.5)
-    equip_roof(assembly, free, roof, p.roof_items, rng, clear=0.8)
-    return assembly.model(site)
+    equip_roof(assembly, free, roof, p.roof_items, clear=0.8)
 
 
-def _plan(p: GridTower, site: Site) -> np.ndarray:
+def _plan(p: Parameters, site: Site) -> np.ndarray:
     """Returns the outline, its front first, a little within the site."""
     x0, y0, x1, y1 = site.bounds
     base = massing.rectangle(x0 + 0.3, y0 + 0.3, x1 - 0.3, y1 - 0.3)
@@ -113,7 +111,7 @@ def _plan(p: GridTower, site: Site) -> np.ndarray:
     )  # fmt: skip
 
 
-def _add_lobby(assembly, p: GridTower, plan) -> float:
+def _add_lobby(assembly, p: Parameters, plan) -> float:
     """Adds a tall glazed hall behind the feet of the piers."""
     h = p.lobby
     glazing = bays.rhythm(
@@ -135,7 +133,7 @@ def _add_lobby(assembly, p: GridTower, plan) -> float:
     return tiers.add_ground(assembly, plan, facade, [front.place(lid)])
 
 
-def _add_grid(assembly, p: GridTower, plan, z0, goal, part: str) -> float:
+def _add_grid(assembly, p: Parameters, plan, z0, goal, part: str) -> float:
     """Adds storeys behind frames; returns their top [m]."""
     unit = p.storey * (2 if p.double else 1)
     groups, per_group, height = tiers.divided(goal - z0, unit, 7)
@@ -153,7 +151,7 @@ def _add_grid(assembly, p: GridTower, plan, z0, goal, part: str) -> float:
     )
 
 
-def _add_plant_floor(assembly, p: GridTower, plan, z0) -> float:
+def _add_plant_floor(assembly, p: Parameters, plan, z0) -> float:
     """Adds a floor of louvres, set back behind the grid."""
     inner = massing.inset(plan, p.recess)
     slats = [
@@ -167,8 +165,3 @@ def _add_plant_floor(assembly, p: GridTower, plan, z0) -> float:
     for z, up in ((z0, True), (top, False)):
         assembly.add(f"ledge_{int(up)}", massing.flat(plan, z, up=up))
     return top
-
-
-ARCHETYPE = Archetype(
-    GridTower, build, heights=(28.0, 120.0), widths=(16.0, 60.0)
-)

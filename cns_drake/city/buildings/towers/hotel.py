@@ -13,9 +13,8 @@ from cns_drake.city.buildings.parts import (
 )
 from cns_drake.city.buildings.parts.facades import Band, Facade
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.geometry.mesh import merge_meshes
-from cns_drake.city.geometry.structures import Model
 
 _PAINTS = ((0.86, 0.83, 0.77), (0.80, 0.72, 0.62), (0.72, 0.75, 0.76))
 _FORECOURT_M = 7.0
@@ -24,7 +23,7 @@ _FORECOURT_M = 7.0
 _ROOF_ITEMS = ("cooling_tower", "air_handler", "mast", "vents", "ac_unit")
 
 
-class Hotel:
+class Parameters:
     """Parameters of a hotel; lengths in metres."""
 
     def __init__(self, d: Dice):
@@ -47,10 +46,9 @@ class Hotel:
         self.rgb = d.pick(_PAINTS)
 
 
-def build(p: Hotel, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the hotel on a rectangle, behind a forecourt."""
-    assembly = Assembly(site.name, p.rgb)
-    x0, y0, x1, y1 = site.bounds
+    x0, y0, x1, y1 = assembly.site.bounds
     front = y0 + _FORECOURT_M
     if p.round_ends:
         plan = outlines.stadium(x0, front, x1, y1, 3.2)
@@ -71,12 +69,11 @@ def build(p: Hotel, site: Site, rng: np.random.Generator) -> Model:
         glass=(0.3,),
     )
     roof = tiers.add_crown(assembly, bar, walls, roof, 0.4, part="bar")
-    equip_roof(assembly, bar, roof, _ROOF_ITEMS, rng)
+    equip_roof(assembly, bar, roof, _ROOF_ITEMS)
     _add_sign(assembly, p, plan)
-    return assembly.model(site)
 
 
-def _add_lobby(assembly, p: Hotel, plan, y0) -> float:
+def _add_lobby(assembly, p: Parameters, plan, y0) -> float:
     h = p.ground_height
     glazing = bays.rhythm(
         p.pitch, [bays.ribbon(0.4, h - 1.2, 0.4, 0.5)], margin=0.5
@@ -108,7 +105,7 @@ def _add_lobby(assembly, p: Hotel, plan, y0) -> float:
     return tiers.add_ground(assembly, plan, lobby, [roof, *pillars, drive])
 
 
-def _add_rooms(assembly, p: Hotel, plan, z0, goal) -> float:
+def _add_rooms(assembly, p: Parameters, plan, z0, goal) -> float:
     groups, per_group, storey = tiers.divided(goal - z0, p.storey_height, 15)
     head = round(storey - 0.45, 2)
     french = bays.window(p.pitch - 1.2, 0.0, head, p.recess, mullions=1)
@@ -134,7 +131,7 @@ def _add_rooms(assembly, p: Hotel, plan, z0, goal) -> float:
     )
 
 
-def _add_sign(assembly, p: Hotel, plan) -> None:
+def _add_sign(assembly, p: Parameters, plan) -> None:
     """A blade sign up the front, at one end of the balconies."""
     front = details.WallFrame(plan, 0)
     x = 0.4 if p.sign_left else front.length - 0.4
@@ -144,8 +141,5 @@ def _add_sign(assembly, p: Hotel, plan) -> None:
         massing.box(x - 0.08, x + 0.08, 0.0, 0.4, z, z + 0.15)
         for z in (low + 0.5, high - 0.7)
     ]
-    sign = front.place(merge_meshes([blade, *arms]))
+    sign = front.place(merge_meshes(blade, *arms))
     assembly.add("sign", sign, rgb=(0.55, 0.16, 0.14))
-
-
-ARCHETYPE = Archetype(Hotel, build, heights=(25.0, 80.0), widths=(20.0, 70.0))

@@ -6,14 +6,12 @@ import numpy as np
 
 from cns_drake.city.buildings.parts import bays, details, massing, tiers
 from cns_drake.city.buildings.parts.facades import Band, Facade
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
-from cns_drake.city.geometry.mesh import merge_meshes
-from cns_drake.city.geometry.structures import Model
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 
 _SIDES = 16
 
 
-class ObservationTower:
+class Parameters:
     """Parameters of an observation tower; lengths in metres."""
 
     def __init__(self, d: Dice):
@@ -32,10 +30,9 @@ class ObservationTower:
         self.rgb = d.pick(((0.78, 0.77, 0.75), (0.66, 0.68, 0.72)))
 
 
-def build(p: ObservationTower, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the tower in the middle of a rectangle."""
-    assembly = Assembly(site.name, p.rgb)
-    x0, y0, x1, y1 = site.bounds
+    x0, y0, x1, y1 = assembly.site.bounds
     center = ((x0 + x1) / 2, (y0 + y1) / 2)
     _add_pavilion(assembly, p, center)
     # Room for the bowl, the floors, the cone and some mast above it.
@@ -53,13 +50,12 @@ def build(p: ObservationTower, site: Site, rng: np.random.Generator) -> Model:
         center,
     )
     ribs = [_rib(p, center, 2 * np.pi * k / p.ribs, pod) for k in range(p.ribs)]
-    assembly.add("shaft", merge_meshes([shaft, *ribs]))
+    assembly.add("shaft", shaft, *ribs)
     top = _add_pod(assembly, p, center, pod)
     _add_mast(assembly, p, center, top)
-    return assembly.model(site)
 
 
-def _add_pavilion(assembly, p: ObservationTower, center) -> None:
+def _add_pavilion(assembly, p: Parameters, center) -> None:
     h = p.pavilion_height
     # A flat side looks to the front, for the entrance.
     phase = -np.pi / 2 - np.pi / 12
@@ -81,7 +77,7 @@ def _add_pavilion(assembly, p: ObservationTower, center) -> None:
     tiers.add_ground(assembly, plan, walls, [lid], part="pavilion")
 
 
-def _rib(p: ObservationTower, center, angle: float, pod: float):
+def _rib(p: Parameters, center, angle: float, pod: float):
     """A fin that runs up the shaft, broad at its foot."""
     foot, neck = p.foot_radius, p.neck_radius
     lower = massing.rectangle(0.5 * neck, -0.35, foot + 1.0, 0.35)
@@ -90,7 +86,7 @@ def _rib(p: ObservationTower, center, angle: float, pod: float):
     return fin.moved(yaw=angle).moved((*center, 0.0))
 
 
-def _add_pod(assembly, p: ObservationTower, center, z0: float) -> float:
+def _add_pod(assembly, p: Parameters, center, z0: float) -> float:
     """A bowl, floors of glass under ledges, and a cone on top."""
     r, floor = p.pod_radius, 4.0
     bowl = massing.revolved(
@@ -113,11 +109,11 @@ def _add_pod(assembly, p: ObservationTower, center, z0: float) -> float:
     rim = r * (1.0 - 0.1 * (p.pod_floors - 1))
     cone = [(rim, z), (neck, z + 2.5), (neck, z + 5.5)]
     pieces.append(massing.revolved(cone, _SIDES, center))
-    assembly.add("pod", merge_meshes(pieces))
+    assembly.add("pod", *pieces)
     return z + 5.5
 
 
-def _add_mast(assembly, p: ObservationTower, center, z0: float) -> None:
+def _add_mast(assembly, p: Parameters, center, z0: float) -> None:
     """Sections of a mast, each thinner than the one below it."""
     start = max(z0, p.height * (1.0 - p.mast_share))
     profile = []
@@ -128,8 +124,3 @@ def _add_mast(assembly, p: ObservationTower, center, z0: float) -> None:
     column = [(1.4, z0 - 0.2), (1.4, start)] if start > z0 else []
     mast = massing.revolved([*column, *profile], 8, center)
     assembly.add("mast", mast, rgb=(0.75, 0.25, 0.2))
-
-
-ARCHETYPE = Archetype(
-    ObservationTower, build, heights=(55.0, 160.0), widths=(16.0, 50.0)
-)

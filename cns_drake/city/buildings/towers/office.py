@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from cns_drake.city.buildings.parts import bays, details, massing, tiers
 from cns_drake.city.buildings.parts.facades import Band, Facade
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
-from cns_drake.city.geometry.structures import Model
+from cns_drake.city.buildings.parts.site import Assembly, Dice, Site
 
 _PANELS = (
     (0.78, 0.77, 0.74),
@@ -18,7 +15,7 @@ _PANELS = (
 )
 
 
-class Office:
+class Parameters:
     """Parameters of an office; lengths in metres.
 
     `style` is `ribbon` (bands of glass), `frame` (deep square frames) or
@@ -46,11 +43,11 @@ class Office:
         self.rgb = d.pick(_PANELS)
 
 
-def build(p: Office, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the office on any outline."""
-    assembly = Assembly(site.name, p.rgb)
+    site = assembly.site
     outline = site.outline
-    top = _add_ground(assembly, p, site, rng)
+    top = _add_ground(assembly, p, site)
     goal = p.height - p.penthouse_height - p.parapet - 0.5
     if p.style == "grooves":
         wall = tiers.Grooves(
@@ -90,11 +87,10 @@ def build(p: Office, site: Site, rng: np.random.Generator) -> Model:
         inset = min(p.penthouse_inset, massing.inset_limit(outline))
         outline = massing.inset(outline, inset)
         roof = _add_penthouse(assembly, p, outline, roof)
-    equip_roof(assembly, outline, roof, p.roof_items, rng)
-    return assembly.model(site)
+    equip_roof(assembly, outline, roof, p.roof_items)
 
 
-def _add_ground(assembly, p: Office, site: Site, rng) -> float:
+def _add_ground(assembly, p: Parameters, site: Site) -> float:
     outline, h = site.outline, p.ground_height
     front = details.WallFrame(outline, 0)
     pitch = 1.6 * p.pitch
@@ -120,14 +116,14 @@ def _add_ground(assembly, p: Office, site: Site, rng) -> float:
     shades = []
     for x0, x1 in bays.stretches(front.length, pitch, 0.7):
         free = x1 < middle - 2.6 or x0 > middle + 2.6
-        if rng.random() < p.awnings and free:
+        if assembly.rng.random() < p.awnings and free:
             shade = details.awning(x0 + 0.3, x1 - 0.3, 1.3, 2.7, h - 1.1)
             shades.append(front.place(shade))
-    tiers.add_awnings(assembly, shades, rng)
+    tiers.add_awnings(assembly, shades)
     return tiers.add_ground(assembly, outline, ground, [front.place(roof)])
 
 
-def _add_windows(assembly, p: Office, site: Site, z0, goal) -> float:
+def _add_windows(assembly, p: Parameters, site: Site, z0, goal) -> float:
     groups, per_group, storey = tiers.divided(goal - z0, p.storey_height)
     head = round(storey - 0.4, 2)
     if p.style == "ribbon":
@@ -149,7 +145,7 @@ def _add_windows(assembly, p: Office, site: Site, z0, goal) -> float:
     )
 
 
-def _add_penthouse(assembly, p: Office, outline, roof) -> float:
+def _add_penthouse(assembly, p: Parameters, outline, roof) -> float:
     # It starts on the roof; its own parapet ends at the full height.
     height = round(p.height - roof, 3)
     eaves = height - 0.9
@@ -161,13 +157,3 @@ def _add_penthouse(assembly, p: Office, outline, roof) -> float:
     return tiers.add_crown(
         assembly, outline, walls, roof, 0.6, part="penthouse"
     )
-
-
-ARCHETYPE = Archetype(
-    Office,
-    build,
-    heights=(12.0, 45.0),
-    widths=(14.0, 70.0),
-    any_outline=True,
-    party_walls=True,
-)

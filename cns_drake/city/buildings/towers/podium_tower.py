@@ -15,9 +15,8 @@ from cns_drake.city.buildings.parts import (
 )
 from cns_drake.city.buildings.parts.facades import Band, Facade
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice, Site
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
-from cns_drake.city.geometry.structures import Model
 
 _CLADDINGS = (
     ((0.70, 0.66, 0.60), (0.84, 0.83, 0.80)),
@@ -29,7 +28,7 @@ _CLADDINGS = (
 _ROOF_ITEMS = ("lift_house", "cooling_tower", "air_handler", "mast")
 
 
-class PodiumTower:
+class Parameters:
     """Parameters of a podium tower; lengths in metres.
 
     The tower covers the share `tower` of the podium along x and y and
@@ -57,15 +56,15 @@ class PodiumTower:
         self.mullions = int(run < 70.0)
         self.balconies = d.chance(0.5)
         self.awnings = d.uniform(0.3, 0.9)
-        self.podium_rgb = podium_rgb
+        self.rgb = podium_rgb
         self.tower_rgb = tower_rgb
 
 
-def build(p: PodiumTower, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds podium and tower on a rectangle."""
-    assembly = Assembly(site.name, p.podium_rgb)
+    site = assembly.site
     x0, y0, x1, y1 = site.bounds
-    top = _add_shops(assembly, p, site, rng)
+    top = _add_shops(assembly, p, site)
     walls = _podium_storey(p)
     top = tiers.add_storeys(
         assembly, site.outline, walls, top, p.podium_storeys, 1, part="podium"
@@ -84,11 +83,10 @@ def build(p: PodiumTower, site: Site, rng: np.random.Generator) -> Model:
     if p.chamfer:
         plan = outlines.chamfered(plan, p.chamfer)
     assembly.rgb = p.tower_rgb
-    _add_tower(assembly, p, plan, roof, rng)
-    return assembly.model(site)
+    _add_tower(assembly, p, plan, roof)
 
 
-def _add_shops(assembly, p: PodiumTower, site: Site, rng) -> float:
+def _add_shops(assembly, p: Parameters, site: Site) -> float:
     outline, h = site.outline, p.ground_height
     shops = bays.rhythm(
         p.shop_pitch,
@@ -116,21 +114,21 @@ def _add_shops(assembly, p: PodiumTower, site: Site, rng) -> float:
     shades = []
     for a, b in bays.stretches(front.length, p.shop_pitch, 0.8):
         free = b < middle - 3.2 or a > middle + 3.2
-        if rng.random() < p.awnings and free:
+        if assembly.rng.random() < p.awnings and free:
             shade = details.awning(a + 0.4, b - 0.4, 1.35, 2.7, h - 1.3)
             shades.append(front.place(shade))
-    tiers.add_awnings(assembly, shades, rng)
+    tiers.add_awnings(assembly, shades)
     return tiers.add_ground(assembly, outline, facade, [front.place(roof)])
 
 
-def _podium_storey(p: PodiumTower) -> Facade:
+def _podium_storey(p: Parameters) -> Facade:
     storey = 4.2
     window = bays.window(p.shop_pitch - 1.4, 0.7, storey - 0.7, 0.3, mullions=2)
     layout = bays.rhythm(p.shop_pitch, [window], margin=0.8)
     return Facade(storey, (Band(0.0, 0.25, -0.12),), layout, glass=(0.3,))
 
 
-def _add_tower(assembly, p: PodiumTower, plan, z0, rng) -> None:
+def _add_tower(assembly, p: Parameters, plan, z0) -> None:
     crown = 3.0
     groups, per_group, storey = tiers.divided(
         p.height - crown - z0, p.storey_height
@@ -158,7 +156,7 @@ def _add_tower(assembly, p: PodiumTower, plan, z0, rng) -> None:
     louvres = tuple(Band(z, z + 0.35, 0.15) for z in (0.5, 1.2, 1.9))
     screen = Facade(crown, (*louvres, Band(2.6, crown, -0.15)))
     roof = tiers.add_crown(assembly, plan, screen, top, 2.2)
-    equip_roof(assembly, plan, roof, _ROOF_ITEMS, rng)
+    equip_roof(assembly, plan, roof, _ROOF_ITEMS)
 
 
 def _add_garden(assembly, site: Site, tower, z) -> None:
@@ -197,9 +195,4 @@ def _garden(length: float, width: float) -> Mesh:
         for y in (1.6, width - 0.2):
             post = (x, x + 0.15, y, y + 0.15, -0.1, 2.7)
             pieces.append(massing.box(*post, bottom=False))
-    return merge_meshes(pieces)
-
-
-ARCHETYPE = Archetype(
-    PodiumTower, build, heights=(40.0, 130.0), widths=(26.0, 70.0)
-)
+    return merge_meshes(*pieces)

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from cns_drake.city.buildings.parts import bays, details, massing, tiers
 from cns_drake.city.buildings.parts.facades import Band, Facade
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
-from cns_drake.city.geometry.mesh import merge_meshes
-from cns_drake.city.geometry.structures import Model
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 
 _CONCRETES = ((0.66, 0.65, 0.62), (0.74, 0.71, 0.66), (0.58, 0.58, 0.58))
 
@@ -20,7 +16,7 @@ _STAIR_RISE = 2.4
 _ROOF_ITEMS = ("tank", "tank", "mast", "vents", "stair_house", "dish")
 
 
-class SlabTower:
+class Parameters:
     """Parameters of a slab; lengths in metres."""
 
     def __init__(self, d: Dice):
@@ -39,10 +35,9 @@ class SlabTower:
         self.rgb = d.pick(_CONCRETES)
 
 
-def build(p: SlabTower, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the slab along x on a rectangle."""
-    assembly = Assembly(site.name, p.rgb)
-    x0, y0, x1, y1 = site.bounds
+    x0, y0, x1, y1 = assembly.site.bounds
     front = y1 - p.depth if p.at_back else y0
     back = front + p.depth
     if p.stair_left:
@@ -59,17 +54,16 @@ def build(p: SlabTower, site: Site, rng: np.random.Generator) -> Model:
         _PARAPET, (Band(0.0, 0.25, -0.12), Band(1.0, _PARAPET, -0.12))
     )
     roof = tiers.add_crown(assembly, slab, edge, top, 0.9)
-    equip_roof(assembly, slab, roof, _ROOF_ITEMS, rng)
+    equip_roof(assembly, slab, roof, _ROOF_ITEMS)
     shaft = massing.rectangle(stair[0], front + 1.2, stair[1], back - 1.2)
     _add_stair(assembly, p, shaft, storey)
     room = front - y0 if p.at_back else y1 - back
     if room > 9.0:
         ys = (y0, front - 1.0) if p.at_back else (back + 1.0, y1)
         _add_pavilion(assembly, p, (x0, x1), ys)
-    return assembly.model(site)
 
 
-def _add_hall(assembly, p: SlabTower, slab) -> float:
+def _add_hall(assembly, p: Parameters, slab) -> float:
     """A glazed hall behind rows of pillars that carry the slab."""
     h = p.ground_height
     hall = massing.inset(slab, (2.4, 0.4, 2.4, 0.4))
@@ -101,7 +95,7 @@ def _add_hall(assembly, p: SlabTower, slab) -> float:
     return tiers.add_ground(assembly, hall, walls, pieces)
 
 
-def _storey(p: SlabTower, storey: float) -> Facade:
+def _storey(p: Parameters, storey: float) -> Facade:
     head = round(storey - 0.3, 2)
     loggia = bays.loggia(p.pitch - 0.3, p.loggia_depth, p.rail, head)
     window = bays.window(1.9, 0.9, head - 0.2, p.window_recess)
@@ -120,7 +114,7 @@ def _storey(p: SlabTower, storey: float) -> Facade:
     )
 
 
-def _add_stair(assembly, p: SlabTower, shaft, storey) -> None:
+def _add_stair(assembly, p: Parameters, shaft, storey) -> None:
     """A shaft beside the slab, lit by a slit from the ground to its top."""
     slit = bays.with_middle(
         bays.plain, bays.window(1.2, 1.0, p.height - 2.0, 0.3), 2.0
@@ -129,10 +123,10 @@ def _add_stair(assembly, p: SlabTower, shaft, storey) -> None:
     bands = (Band(p.height - 0.5, p.height, -0.15),)
     walls = Facade(p.height, bands, layouts)
     base = massing.foundation(shaft)
-    assembly.add("stairs", merge_meshes([base, tiers.block(shaft, walls, 0.0)]))
+    assembly.add("stairs", base, tiers.block(shaft, walls, 0.0))
 
 
-def _add_pavilion(assembly, p: SlabTower, xs, ys) -> None:
+def _add_pavilion(assembly, p: Parameters, xs, ys) -> None:
     """A low glazed pavilion in the open part of the site."""
     width = 0.55 * (xs[1] - xs[0])
     left = xs[0] if p.stair_left else xs[1] - width
@@ -152,8 +146,3 @@ def _add_pavilion(assembly, p: SlabTower, xs, ys) -> None:
     tiers.add_ground(assembly, plan, walls, part="pavilion")
     lid = massing.roof_pan(plan, h - 0.4, h, 0.25)
     assembly.add("pavilion_roof", lid)
-
-
-ARCHETYPE = Archetype(
-    SlabTower, build, heights=(30.0, 90.0), widths=(14.0, 80.0)
-)

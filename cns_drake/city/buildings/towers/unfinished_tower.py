@@ -14,9 +14,8 @@ from cns_drake.city.buildings.parts.facades import (
     facade_mesh,
     glass_mesh,
 )
-from cns_drake.city.buildings.parts.site import Archetype, Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
-from cns_drake.city.geometry.structures import Model
 
 _CONCRETE = (0.66, 0.65, 0.63)
 _STEEL = (0.52, 0.53, 0.55)
@@ -31,7 +30,7 @@ _CLADDING_M = 0.35
 _LIFT_M = 2.0
 
 
-class UnfinishedTower:
+class Parameters:
     """Parameters of a building site's tower; lengths in metres.
 
     Attributes:
@@ -66,13 +65,14 @@ class UnfinishedTower:
         self.nets = d.uniform(0.2, 0.7)
         self.props = d.chance(0.7)
         self.hoist = d.chance(0.6)
-        self.rgb = d.pick(_CLADDINGS)
+        self.rgb = _CONCRETE
+        self.clad_rgb = d.pick(_CLADDINGS)
         self.net_rgb = d.pick(_NETS)
 
 
-def build(p: UnfinishedTower, site: Site, rng: np.random.Generator) -> Model:
+def build(p: Parameters, assembly: Assembly) -> None:
     """Builds the tower on a rectangle."""
-    assembly = Assembly(site.name, _CONCRETE)
+    site = assembly.site
     x0, y0, x1, y1 = site.bounds
     gap = _SCAFFOLD_M + 0.2
     plan = np.round(
@@ -84,21 +84,20 @@ def build(p: UnfinishedTower, site: Site, rng: np.random.Generator) -> Model:
         _add_cladding(assembly, p, plan)
     if p.props:
         _add_props(assembly, p, plan)
-    _add_scaffolds(assembly, p, plan, rng)
+    _add_scaffolds(assembly, p, plan)
     if p.hoist:
         _add_hoist(assembly, p, plan)
-    return assembly.model(site)
 
 
-def _repeated(pieces, p: UnfinishedTower) -> Mesh:
+def _repeated(pieces, p: Parameters) -> Mesh:
     """Returns a storey's meshes for each storey of a group."""
-    storey = merge_meshes(pieces)
+    storey = merge_meshes(*pieces)
     return merge_meshes(
-        storey.moved((0.0, 0.0, k * p.storey)) for k in range(p.group)
+        *(storey.moved((0.0, 0.0, k * p.storey)) for k in range(p.group))
     )
 
 
-def _columns(p: UnfinishedTower, plan) -> list[tuple[float, float]]:
+def _columns(p: Parameters, plan) -> list[tuple[float, float]]:
     """Returns where the columns stand."""
     (x0, y0), (x1, y1) = plan[0], plan[2]
     places = []
@@ -109,7 +108,7 @@ def _columns(p: UnfinishedTower, plan) -> list[tuple[float, float]]:
     return [(x, y) for x in xs for y in ys]
 
 
-def _add_frame(assembly, p: UnfinishedTower, plan) -> None:
+def _add_frame(assembly, p: Parameters, plan) -> None:
     """Adds a storey's columns and the slab on them, over and over."""
     pieces = [
         massing.post(x, y, 0.25, p.storey - _SLAB_M + 0.02, 0.0)
@@ -141,10 +140,10 @@ def _add_frame(assembly, p: UnfinishedTower, plan) -> None:
         for u in np.linspace(0.1, wall.length - 0.1, 6).tolist():
             post = (u - 0.03, u + 0.03, -0.09, -0.03)
             stubs.append(wall.place(massing.box(*post, top, top + 1.1)))
-    assembly.add("stubs", merge_meshes(stubs))
+    assembly.add("stubs", *stubs)
 
 
-def _add_core(assembly, p: UnfinishedTower, plan) -> None:
+def _add_core(assembly, p: Parameters, plan) -> None:
     """Adds the core with its doorways and the form that climbs on it."""
     (x0, y0), (x1, y1) = plan[0], plan[2]
     x, y = (x0 + x1) / 2, (y0 + y1) / 2
@@ -162,7 +161,7 @@ def _add_core(assembly, p: UnfinishedTower, plan) -> None:
         massing.skirt(core, core, top, p.height - 0.4),
         massing.roof_pan(core, p.height - 2.0, p.height - 0.4, 0.3),
     ]
-    assembly.add("core", merge_meshes(pieces))
+    assembly.add("core", *pieces)
     form = massing.inset(core, -0.3)
     low = p.height - 2.6
     panels = [
@@ -170,10 +169,10 @@ def _add_core(assembly, p: UnfinishedTower, plan) -> None:
         massing.flat(form, low, up=False),
         massing.roof_pan(form, p.height - 0.6, p.height, 0.3),
     ]
-    assembly.add("form", merge_meshes(panels), rgb=_TIMBER)
+    assembly.add("form", *panels, rgb=_TIMBER)
 
 
-def _add_cladding(assembly, p: UnfinishedTower, plan) -> None:
+def _add_cladding(assembly, p: Parameters, plan) -> None:
     """Adds the finished walls of the lower storeys."""
     outer = massing.inset(plan, -_CLADDING_M)
     head = round(p.storey - 0.5, 2)
@@ -188,7 +187,7 @@ def _add_cladding(assembly, p: UnfinishedTower, plan) -> None:
     walls = [facade_mesh(outer, facade), _rim(plan, outer, 0.0, p.storey)]
     groups, step = p.clad // p.group, p.group * p.storey
     assembly.stack(
-        "cladding", _repeated(walls, p), 0.0, step, groups, rgb=p.rgb
+        "cladding", _repeated(walls, p), 0.0, step, groups, rgb=p.clad_rgb
     )
     panes = [glass_mesh(outer, facade)]
     assembly.stack(
@@ -196,16 +195,16 @@ def _add_cladding(assembly, p: UnfinishedTower, plan) -> None:
         rgb=assembly.glass_rgb,
     )  # fmt: skip
     foot = massing.foundation(outer)
-    assembly.add("foot", foot, rgb=p.rgb)
+    assembly.add("foot", foot, rgb=p.clad_rgb)
 
 
 def _rim(inner, outer, z0: float, z1: float) -> Mesh:
     """The top edge of cladding panels, and their backs, seen from within."""
     backs = massing.skirt(inner[::-1], inner[::-1], z0, z1)
-    return merge_meshes([backs, massing.skirt(outer, inner, z1, z1)])
+    return merge_meshes(backs, massing.skirt(outer, inner, z1, z1))
 
 
-def _add_props(assembly, p: UnfinishedTower, plan) -> None:
+def _add_props(assembly, p: Parameters, plan) -> None:
     """Adds props below the top slab, along the front and the back."""
     (x0, y0), (x1, y1) = plan[0], plan[2]
     low = (p.storeys - 1) * p.storey
@@ -215,15 +214,16 @@ def _add_props(assembly, p: UnfinishedTower, plan) -> None:
         for y in (y0 + 1.2, y1 - 1.2):
             shaft = massing.regular_polygon(0.06, 4, (float(x), y))
             props.append(massing.skirt(shaft, shaft, low - 0.02, high))
-    assembly.add("props", merge_meshes(props), rgb=_STEEL)
+    assembly.add("props", *props, rgb=_STEEL)
 
 
-def _add_scaffolds(assembly, p: UnfinishedTower, plan, rng) -> None:
+def _add_scaffolds(assembly, p: Parameters, plan) -> None:
     """Adds scaffolds: standards of full height, and lifts between them."""
     lifts = max(2, int(p.scaffold_top * p.storey / _LIFT_M))
     per_group = -(-lifts // 6)
     groups = -(-lifts // per_group)
     top = per_group * groups * _LIFT_M
+    rng = assembly.rng
     levels, standards, nets = [], [], []
     for edge in p.scaffolds:
         wall = details.WallFrame(plan, edge)
@@ -238,20 +238,22 @@ def _add_scaffolds(assembly, p: UnfinishedTower, plan, rng) -> None:
         for a, b in itertools.pairwise(xs.tolist()):
             if rng.random() < p.nets:
                 first = int(rng.integers(0, groups * per_group - 1))
-                last = int(rng.integers(first + 1, groups * per_group + 1))
+                last = int(
+                    assembly.rng.integers(first + 1, groups * per_group + 1)
+                )
                 low, high = first * _LIFT_M + 0.2, last * _LIFT_M - 0.2
                 spot = (round(a + 0.05, 2), round(b - 0.05, 2), 1.56, 1.6)
                 nets.append(wall.place(massing.box(*spot, low, high)))
-    level = merge_meshes(levels)
+    level = merge_meshes(*levels)
     stack = merge_meshes(
-        level.moved((0.0, 0.0, k * _LIFT_M)) for k in range(per_group)
+        *(level.moved((0.0, 0.0, k * _LIFT_M)) for k in range(per_group))
     )
     assembly.stack(
         "scaffold", stack, 0.0, per_group * _LIFT_M, groups, rgb=_STEEL
     )
-    assembly.add("standards", merge_meshes(standards), rgb=_STEEL)
+    assembly.add("standards", *standards, rgb=_STEEL)
     if nets:
-        assembly.add("nets", merge_meshes(nets), rgb=p.net_rgb)
+        assembly.add("nets", *nets, rgb=p.net_rgb)
 
 
 def _scaffold_level(xs: list[float]) -> Mesh:
@@ -263,10 +265,10 @@ def _scaffold_level(xs: list[float]) -> Mesh:
     for x0, x1 in itertools.pairwise(xs[::3]):
         start, stop = (x0, 1.54, 0.05), (x1, 1.54, top - 0.15)
         pieces.append(details.beam(start, stop, 0.07))
-    return merge_meshes(pieces)
+    return merge_meshes(*pieces)
 
 
-def _add_hoist(assembly, p: UnfinishedTower, plan) -> None:
+def _add_hoist(assembly, p: Parameters, plan) -> None:
     """Adds a hoist's mast and cage at the back."""
     wall = details.WallFrame(plan, 2)
     x, top = 0.5 * wall.length, p.storeys * p.storey - 1.0
@@ -278,14 +280,5 @@ def _add_hoist(assembly, p: UnfinishedTower, plan) -> None:
         pieces.append(massing.box(x - 0.3, x + 0.3, -0.05, 0.92, z, z + 0.08))
     z = round(0.55 * top, 1)
     cage = massing.box(x + 0.4, x + 1.9, 0.15, 1.35, z, z + 2.4)
-    mesh = merge_meshes([wall.place(piece) for piece in (*pieces, cage)])
+    mesh = merge_meshes(*(wall.place(piece) for piece in (*pieces, cage)))
     assembly.add("hoist", mesh, rgb=(0.80, 0.62, 0.16))
-
-
-ARCHETYPE = Archetype(
-    UnfinishedTower,
-    build,
-    heights=(15.0, 60.0),
-    widths=(16.0, 50.0),
-    overhang=0.35,
-)
