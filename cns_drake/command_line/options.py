@@ -18,14 +18,11 @@ Frames = Annotated[
         help="Record only the first N frames (20 a second).",
     ),
 ]
-LidarPreset = Annotated[
-    str | None,
-    typer.Option(
-        metavar="PRESET",
-        help="Replace the LiDAR: cns, os1-32, os1-64, os1-128, vlp-16, "
-        "hdl-64e.",
-    ),
-]
+LIDAR_OPTION = typer.Option(
+    metavar="PRESET",
+    help="Replace the LiDAR: cns, os1-32, os1-64, os1-128, vlp-16, hdl-64e.",
+)
+LidarPreset = Annotated[str | None, LIDAR_OPTION]
 Recording = Annotated[
     Path | None,
     typer.Option(help="Also save a web page of the drive, FILE.html."),

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from cns_drake.command_line.options import (
+    LIDAR_OPTION,
     Frames,
     Graphviz,
     Jobs,
@@ -69,7 +70,7 @@ def scan(
     output: Annotated[
         Path, typer.Option(help="Where to save: .pcd, .bin or .npy.")
     ],
-    lidar: LidarPreset = "cns",
+    lidar: Annotated[str, LIDAR_OPTION] = "cns",
 ) -> None:
     """Take one scan of any SDF world."""
     with uninterrupted():

@@ -35,7 +35,7 @@ _PROJECTION = np.eye(4)
 
 def _number(sequence: McapSequence) -> str:
     """Returns the drive's two digits: those its name ends with, or 00."""
-    digits = re.search(r"\d*$", sequence.name)[0]
+    digits = re.findall(r"\d*$", sequence.name)[0]
     return f"{int(digits or 0):02d}"
 
 
@@ -71,7 +71,7 @@ def _scan_files(
 ) -> dict[str, bytes]:
     del stamp_ns
     files = {f"velodyne/{frame:06d}.bin": encode_bin(scan)}
-    if {"label", "instance"} <= set(scan.dtype.names):
+    if {"label", "instance"} <= set(scan.dtype.names or ()):
         files[f"labels/{frame:06d}.label"] = encode_labels(scan)
     return files
 

@@ -163,14 +163,16 @@ class SmoothPath:
         In one evaluation, which costs little more than that of one
         parameter.
         """
-        u = np.clip(np.atleast_1d(np.asarray(u, dtype=float)), 0.0, self.end)
+        wanted = np.atleast_1d(np.asarray(u, dtype=float))
+        wanted = np.clip(wanted, 0.0, self.end)
         last = round(self.end / self.spacing) - 1
-        knot = (u / self.spacing).astype(int).clip(0, last)
-        length = u - knot * self.spacing
+        knot = (wanted / self.spacing).astype(int).clip(0, last)
+        length = wanted - knot * self.spacing
         nodes = self._nodes(knot, length)
-        jet = self.evaluate(np.concatenate([u, nodes]))
-        section = PathSection(knot, length, jet.rows(slice(len(u), None)))
-        return jet.rows(slice(len(u))), section
+        jet = self.evaluate(np.concatenate([wanted, nodes]))
+        num = len(wanted)
+        section = PathSection(knot, length, jet.rows(slice(num, None)))
+        return jet.rows(slice(num)), section
 
     def intervals(self) -> PathSection:
         """Returns the whole path, from each knot to the next."""

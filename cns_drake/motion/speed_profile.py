@@ -36,7 +36,7 @@ class Speeds(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
-    cruise: float = Field(13.5, ge=0.5, le=60, allow_inf_nan=False)
+    cruise: float = Field(default=13.5, ge=0.5, le=60, allow_inf_nan=False)
     longitudinal_acceleration: Acceleration = 2.0
     lateral_acceleration: Acceleration = 3.0
 

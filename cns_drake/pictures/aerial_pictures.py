@@ -95,7 +95,7 @@ def view_from_above(positions: np.ndarray) -> View:
 def _draw_route(axes: Axes, view: View, positions: np.ndarray) -> None:
     # Above the car, so that the line lies over everything that is drawn.
     pixels, _ = view.project(positions, _WIDTH, _HEIGHT)
-    segments = np.stack([pixels[:-1], pixels[1:]], axis=1)
+    segments = list(np.stack([pixels[:-1], pixels[1:]], axis=1))
     # It gets thinner, so that a street that is driven again shows both.
     widths = np.linspace(5.0, 2.0, len(segments))
     # A rim tells the line from roofs of its colour.

@@ -119,7 +119,8 @@ def _draw_city(
     more, less = own.keys() - common, other.keys() - common
     _draw_layer(meshcat, "/city", world, own, common)
     _draw_layer(meshcat, _ADDITIONAL, world, own, more, _ADDITIONAL_RGBA)
-    _draw_layer(meshcat, _ABSENT, other_stage, other, less, _ABSENT_RGBA)
+    if other_stage is not None:
+        _draw_layer(meshcat, _ABSENT, other_stage, other, less, _ABSENT_RGBA)
 
 
 def _draw_layer(

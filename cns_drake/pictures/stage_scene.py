@@ -35,7 +35,7 @@ class View(BaseModel):
 
     position: Place
     target: Place
-    fov_y: float = Field(50.0, ge=0.1, le=179.0)
+    fov_y: float = Field(default=50.0, ge=0.1, le=179.0)
 
     @model_validator(mode="after")
     def _looks_somewhere(self) -> View:

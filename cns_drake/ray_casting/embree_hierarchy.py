@@ -75,8 +75,10 @@ class EmbreeHierarchy:
         self._arguments = embree.IntersectArguments(
             embree.COHERENT_RAYS, embree.INVALID_ID
         )
+        address = ctypes.cast(self._lib.rtcIntersect16, ctypes.c_void_p).value
+        assert address is not None
         self._tree = Tree(
-            ctypes.cast(self._lib.rtcIntersect16, ctypes.c_void_p).value,
+            address,
             scenes[fixed[0]] if fixed else 0,
             self._top,
             ctypes.addressof(self._arguments),

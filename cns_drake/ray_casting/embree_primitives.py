@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydrake.math import RigidTransform
 
 from cns_drake.ray_casting import embree
 from cns_drake.ray_casting.curved_proxies import circumscribe
@@ -51,7 +52,11 @@ class Primitives(NamedTuple):
 
 def merge_flat(members: Sequence[Member]) -> Iterator[Primitives]:
     """Yields the triangles of surfaces, and those about curved ones."""
-    flat = [m for m in members if isinstance(m[2], TriangleSurface)]
+    flat = [
+        (index, X_LG, surface)
+        for index, X_LG, surface in members
+        if isinstance(surface, TriangleSurface)
+    ]
     curved = [
         (PROXY_OWNER, X_LG, circumscribe(surface))
         for _, X_LG, surface in members
@@ -62,7 +67,9 @@ def merge_flat(members: Sequence[Member]) -> Iterator[Primitives]:
             yield _as_primitives(surfaces, mask)
 
 
-def _as_primitives(surfaces: Sequence[Member], mask: int) -> Primitives:
+def _as_primitives(
+    surfaces: Sequence[tuple[int, RigidTransform, TriangleSurface]], mask: int
+) -> Primitives:
     merged, owners = merge_triangles(surfaces)
     return Primitives(
         embree.TRIANGLE,
@@ -89,7 +96,10 @@ def merge_curved(members: Sequence[Member]) -> Iterator[Primitives]:
     Embree intersects spheres, cones, discs and rounded segments exactly (in
     single precision).
     """
-    cones, capsules, discs, spheres = [], [], [], []
+    cones: list[tuple[int, ArrayLike]] = []
+    capsules: list[tuple[int, ArrayLike]] = []
+    spheres: list[tuple[int, ArrayLike]] = []
+    discs: list[tuple[int, ArrayLike, ArrayLike]] = []
     for index, X_LG, surface in members:
         if isinstance(surface, TriangleSurface):
             continue
@@ -143,7 +153,7 @@ def merge_curved(members: Sequence[Member]) -> Iterator[Primitives]:
 
 
 def _cut(
-    ends: Sequence, surface: CylinderSurface | CapsuleSurface
+    ends: Sequence[ArrayLike], surface: CylinderSurface | CapsuleSurface
 ) -> list[np.ndarray]:
     """Returns the (2, 4) ends of pieces that are not too slender.
 
@@ -151,7 +161,8 @@ def _cut(
     """
     slenderness = surface.length / surface.radius
     num = math.ceil(min(slenderness / _SLENDEREST, _MOST_PIECES))
-    joints = np.linspace(*ends, max(num, 1) + 1)
+    first, last = (np.asarray(end) for end in ends)
+    joints = np.linspace(first, last, max(num, 1) + 1)
     return [joints[k : k + 2] for k in range(len(joints) - 1)]
 
 

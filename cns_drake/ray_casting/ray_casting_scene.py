@@ -36,12 +36,12 @@ class RayHits:
         ranges: (N,) float32 distance along the ray [m], inf for a miss.
         geometry: (N,) int32 index into the scene's geometries, -1 for a miss.
         normals_W: (N, 3) float32 unit normal in the world, facing the ray's
-            origin, zero for a miss; None unless asked for.
+            origin, zero for a miss; (N, 0) unless asked for.
     """
 
     ranges: np.ndarray
     geometry: np.ndarray
-    normals_W: np.ndarray | None = None
+    normals_W: np.ndarray
 
 
 class RayCastingScene:
@@ -130,9 +130,10 @@ class RayCastingScene:
             np.ascontiguousarray(d_Sset, dtype=float),
         )
         hits = self._scene.cast_rays(rays, with_normals)
-        if not with_normals:
-            return RayHits(hits.ranges, hits.owner)
-        return RayHits(hits.ranges, hits.owner, self._face_rays(hits, rays))
+        normals_W = hits.normals
+        if with_normals:
+            normals_W = self._face_rays(hits, rays)
+        return RayHits(hits.ranges, hits.owner, normals_W)
 
     def _face_rays(self, hits: Hits, rays: Rays) -> np.ndarray:
         """Returns unit world normals, turned towards the rays' origins."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from pydrake.geometry import FrameId
@@ -29,14 +29,15 @@ class RayGroup:
             which in L is the unit sphere.
         members: what the group holds, posed in L.
         is_merged_world: whether L is the world, moved to O.
-        X_OL: (3, 4) affine map from L to the scene's origin, once placed.
+        X_OL: (3, 4) affine map from L to the scene's origin; there is none
+            before `place`.
     """
 
     frame_id: FrameId | None
     X_FL: np.ndarray
     members: list[Member]
     is_merged_world: bool = False
-    X_OL: np.ndarray | None = None
+    X_OL: np.ndarray = field(init=False)
 
     def place(
         self,

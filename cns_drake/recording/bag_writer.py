@@ -17,7 +17,7 @@ import json
 import os
 from pathlib import Path
 from types import TracebackType
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, NamedTuple
 
 from mcap.records import Channel, Message
 from mcap.writer import CompressionType, Writer
@@ -270,14 +270,16 @@ class BagWriter:
                 "(--overwrite discards it)"
             )
 
-    def _begin(self, stream: BinaryIO) -> tuple[Writer, dict[str, int]]:
+    def _begin(
+        self, stream: io.BytesIO | PartFile
+    ) -> tuple[Writer, dict[str, int]]:
         """Writes what precedes the messages.
 
         Returns:
             The writer, and topic -> channel id.
         """
         writer = Writer(
-            stream,
+            stream,  # type: ignore[arg-type]  # Needs tell, write, flush.
             chunk_size=_CHUNK_BYTES,
             compression=CompressionType.ZSTD,
         )

@@ -92,7 +92,7 @@ def read_records(stream: BinaryIO) -> Iterator[McapRecord | Fault]:
     size = stream.seek(0, os.SEEK_END)
     stream.seek(0)
     position: int | None = len(MCAP0_MAGIC)
-    if stream.read(position) != MCAP0_MAGIC:
+    if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
         yield Fault(0, "does not begin as an MCAP file")
         position = _next_chunk(stream, 0, size)
     budget = _MOST_READ * size

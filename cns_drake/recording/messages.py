@@ -71,18 +71,18 @@ def make_point_cloud(points: np.ndarray, frame_id: str, stamp_ns: int) -> Any:
         ray without a return.
     """
     packed = np.zeros(len(points), dtype=points.dtype)
-    for name in points.dtype.names:
-        packed[name] = points[name]
     point_field = _message_class("sensor_msgs/msg/PointField")
-    fields = [
-        point_field(
-            name=name,
-            offset=packed.dtype.fields[name][1],
-            datatype=_POINT_FIELD_DATATYPES[packed.dtype.fields[name][0]],
-            count=1,
+    fields = []
+    for name, (dtype, offset, *_) in (points.dtype.fields or {}).items():
+        packed[name] = points[name]
+        fields.append(
+            point_field(
+                name=name,
+                offset=offset,
+                datatype=_POINT_FIELD_DATATYPES[dtype],
+                count=1,
+            )
         )
-        for name in packed.dtype.names
-    ]
     return _message_class(POINT_CLOUD)(
         header=_make_header(frame_id, stamp_ns),
         height=1,

@@ -41,7 +41,7 @@ class Areas:
     lane_area: MultiPolygon
     sidewalks: MultiPolygon
     medians: MultiPolygon
-    parking_bays: dict[tuple[str, str], Polygon]
+    parking_bays: dict[tuple[str, str], BaseGeometry]
 
 
 def corner_setback(
@@ -68,14 +68,14 @@ def corner_setback(
     return max(kerb_radius, edge + kerb_radius / np.tan(angle / 2))
 
 
-def road_strip(road: Road) -> Polygon:
+def road_strip(road: Road) -> BaseGeometry:
     """Returns a road's carriageway between its junctions, without bays."""
     return _band(road, -road.half_width, road.half_width)
 
 
 def _band(
     road: Road, right: float, left: float, clearance: float = 0.0
-) -> Polygon:
+) -> BaseGeometry:
     """Returns the area between two lateral offsets of the centreline."""
     stations = road.stations(clearance=clearance)
     outline = [
@@ -85,7 +85,9 @@ def _band(
     return _simplified(Polygon(np.concatenate(outline)))
 
 
-def junction_area(roads: Mapping[str, Road], junction: Junction) -> Polygon:
+def junction_area(
+    roads: Mapping[str, Road], junction: Junction
+) -> BaseGeometry:
     """Returns the area between the ends of a junction's roads.
 
     The continuations of the roads to the junction's position are united, the
@@ -137,7 +139,7 @@ def _stub(road: Road, arm: Arm) -> LineString:
 
 
 def make_areas(
-    roads: Mapping[str, Road], junction_areas: Mapping[str, Polygon]
+    roads: Mapping[str, Road], junction_areas: Mapping[str, BaseGeometry]
 ) -> Areas:
     """Returns the areas of a whole network.
 
@@ -155,11 +157,13 @@ def make_areas(
                 ("left", (edge, far)),
             ):
                 bays[name, side] = _band(road, *offsets, _BAY_CLEARANCE)
-    medians = [
-        _median(road)
-        for road in roads.values()
-        if 0 < road.median < road.length
-    ]
+    medians = unary_union(
+        [
+            _median(road)
+            for road in roads.values()
+            if 0 < road.median < road.length
+        ]
+    )
     without_bays = _join([*lanes.values(), *junction_areas.values()])
     carriageway = _join([without_bays, *bays.values()])
     walks = [
@@ -173,7 +177,6 @@ def make_areas(
             if name in (road.start, road.end)
         )
         walks.append(area.buffer(width, quad_segs=_QUADRANT_SEGMENTS))
-    medians = unary_union(medians)
     outline = _simplified(_join(walks))
     return Areas(
         carriageway=_multi(carriageway.difference(medians)),
@@ -184,7 +187,7 @@ def make_areas(
     )
 
 
-def _median(road: Road) -> Polygon:
+def _median(road: Road) -> BaseGeometry:
     """Returns a median with round noses, between the ends of its road."""
     half = road.median / 2
     shift = (
@@ -195,7 +198,7 @@ def _median(road: Road) -> Polygon:
     return _simplified(line.buffer(half, quad_segs=_QUADRANT_SEGMENTS))
 
 
-def _simplified(area: Polygon) -> Polygon:
+def _simplified(area: BaseGeometry) -> BaseGeometry:
     """Returns an area without the vertices that its outline can do without.
 
     On an evenly sampled arc many vertices are equally dispensable. Rounding

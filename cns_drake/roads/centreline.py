@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,7 +36,7 @@ class _Piece:
 class Centreline:
     """A polyline whose corners are rounded by arcs."""
 
-    def __init__(self, points: ArrayLike, radii: Sequence[float]) -> None:
+    def __init__(self, points: ArrayLike, radii: ArrayLike) -> None:
         """Rounds each inner corner by the arc of the given radius.
 
         Args:
@@ -49,6 +48,7 @@ class Centreline:
                 or two consecutive points coincide.
         """
         points = np.asarray(points, dtype=float)
+        radii = np.asarray(radii, dtype=float)
         edges = np.diff(points, axis=0)
         lengths = np.hypot(edges[:, 0], edges[:, 1])
         if np.any(lengths < 1e-6):
@@ -56,7 +56,7 @@ class Centreline:
         headings = np.arctan2(edges[:, 1], edges[:, 0])
         turns = (np.diff(headings) + np.pi) % (2 * np.pi) - np.pi
         tangents = np.concatenate(
-            [[0.0], np.asarray(radii, float) * np.abs(np.tan(turns / 2)), [0.0]]
+            [[0.0], radii * np.abs(np.tan(turns / 2)), [0.0]]
         )
         spare = lengths - tangents[:-1] - tangents[1:]
         for segment in np.flatnonzero(spare < -_FIT_TOLERANCE):

@@ -11,11 +11,12 @@ from typing import Literal
 
 import numpy as np
 from shapely import STRtree
-from shapely.geometry import MultiPolygon, Polygon
+from shapely.geometry import MultiPolygon
+from shapely.geometry.base import BaseGeometry
 
 from cns_drake.roads import carriageway
 from cns_drake.roads.centreline import Centreline, blend
-from cns_drake.roads.road import DIRECTIONS, LaneRef, Road
+from cns_drake.roads.road import DIRECTIONS, ENDS, End, LaneRef, Road
 from cns_drake.roads.road_schema import (
     RoadEntry,
     RoadsFile,
@@ -46,7 +47,7 @@ class Arm:
     """
 
     road: str
-    end: Literal["start", "end"]
+    end: End
     heading: float
     half_width: float
     setback: float
@@ -192,7 +193,7 @@ class RoadNetwork:
         return [way for way in ways if self.is_legal(way)]
 
     @cached_property
-    def _junction_areas(self) -> dict[str, Polygon]:
+    def _junction_areas(self) -> dict[str, BaseGeometry]:
         return {
             junction.name: carriageway.junction_area(self.roads, junction)
             for junction in self.junctions.values()
@@ -202,7 +203,7 @@ class RoadNetwork:
     def _areas(self) -> carriageway.Areas:
         return carriageway.make_areas(self.roads, self._junction_areas)
 
-    def junction_area(self, junction: str) -> Polygon:
+    def junction_area(self, junction: str) -> BaseGeometry:
         """Returns a junction's area between the roads' ends and the kerbs."""
         return self._junction_areas[junction]
 
@@ -218,7 +219,7 @@ class RoadNetwork:
         """Returns the kerbed strips between the directions."""
         return self._areas.medians
 
-    def parking_bays(self) -> dict[tuple[str, str], Polygon]:
+    def parking_bays(self) -> dict[tuple[str, str], BaseGeometry]:
         """Returns the bays by (road, "left" or "right" of `forward`)."""
         return self._areas.parking_bays
 
@@ -281,7 +282,7 @@ def load_road_network(path: Path | str) -> RoadNetwork:
 def _make_curve(
     path: Path, file: RoadsFile, name: str, entry: RoadEntry
 ) -> Centreline:
-    for field in ("start", "end"):
+    for field in ENDS:
         junction = getattr(entry, field)
         if junction not in file.junctions:
             raise InputError(
@@ -304,7 +305,7 @@ def _make_junction(
     path: Path, file: RoadsFile, name: str, curves: Mapping[str, Centreline]
 ) -> Junction:
     entry = file.junctions[name]
-    ends = []
+    ends: list[tuple[float, str, End, float]] = []
     for road_name, road in file.roads.items():
         if name not in (road.start, road.end):
             continue
@@ -320,7 +321,7 @@ def _make_junction(
             f"{path}: junctions.{name}: {len(ends)} road(s) end here, "
             f"{wanted} must"
         )
-    ends = sorted((h % (2 * np.pi), *rest) for h, *rest in ends)
+    ends = sorted((h % (2 * np.pi), road, end, w) for h, road, end, w in ends)
     arms = []
     for k, (heading, road_name, end, half_width) in enumerate(ends):
         setback = getattr(file.roads[road_name], f"{end}_setback")
@@ -333,7 +334,7 @@ def _make_junction(
 
 
 def _derived_setback(
-    ends: Sequence[tuple[float, str, str, float]], k: int, kerb_radius: float
+    ends: Sequence[tuple[float, str, End, float]], k: int, kerb_radius: float
 ) -> float:
     """Returns the setback that the neighbours of the k-th arm call for."""
     if len(ends) == 1:

@@ -12,6 +12,8 @@ from scipy.interpolate import PchipInterpolator
 from cns_drake.roads.centreline import Centreline, sample_stations
 from cns_drake.roads.road_schema import RoadEntry
 
+End = Literal["start", "end"]
+ENDS: tuple[End, End] = ("start", "end")
 Direction = Literal["forward", "backward"]
 DIRECTIONS: tuple[Direction, Direction] = ("forward", "backward")
 

@@ -42,7 +42,7 @@ class RoadStyle(_Model):
         speed_limit: [m/s].
     """
 
-    lanes: tuple[LaneCount, LaneCount] = Field((1, 1), strict=False)
+    lanes: tuple[LaneCount, LaneCount] = Field(default=(1, 1), strict=False)
     lane_width: Positive = 3.5
     median: NonNegative = 0.0
     parking: NonNegative = 0.0
@@ -67,8 +67,8 @@ class RoadEntry(RoadStyle):
 
     start: str
     end: str
-    via: tuple[Corner, ...] = Field((), strict=False)
-    heights: tuple[ProfilePoint, ...] = Field((), strict=False)
+    via: tuple[Corner, ...] = Field(default=(), strict=False)
+    heights: tuple[ProfilePoint, ...] = Field(default=(), strict=False)
     start_setback: Positive | None = None
     end_setback: Positive | None = None
 

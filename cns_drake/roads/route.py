@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, RootModel, Strict
 
 from cns_drake.roads.lane_path import LanePath, sample_lane_path
 from cns_drake.roads.network import RoadNetwork
-from cns_drake.roads.road import LaneRef
+from cns_drake.roads.road import Direction, LaneRef
 from evaluation.support.errors import InputError
 
 # Distance between the points from which the path is interpolated [m].
@@ -39,10 +39,10 @@ class RouteLeg(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
     road: str
-    direction: Literal["forward", "backward"]
+    direction: Direction
     lane: LaneNumber | LaneChange
-    start: float | None = Field(None, ge=0, allow_inf_nan=False)
-    end: float | None = Field(None, gt=0, allow_inf_nan=False)
+    start: float | None = Field(default=None, ge=0, allow_inf_nan=False)
+    end: float | None = Field(default=None, gt=0, allow_inf_nan=False)
 
     @property
     def entry_lane(self) -> LaneRef:
@@ -86,7 +86,8 @@ def make_lane_path(
             the one before it, or is too short for its lane change; or the
             whole route is too short.
     """
-    pieces, limits = [], []
+    pieces: list[np.ndarray] = []
+    limits: list[np.ndarray] = []
     for k, leg in enumerate(route.root):
         try:
             _check_ends(leg, k == 0, k == len(route.root) - 1)

@@ -78,7 +78,7 @@ def _successors(
     successors = {}
     for lane in network.lanes():
         road = network.roads[lane.road]
-        exits = [lane.lane]
+        exits = range(lane.lane, lane.lane + 1)
         if road.length > MIN_LANE_CHANGE_LENGTH:
             exits = range(1, road.lanes[lane.direction] + 1)
         successors[lane] = [

@@ -26,6 +26,7 @@ def plan_drive(scenario: Scenario) -> Trajectory:
     if scenario.waypoints is not None:
         path = load_waypoint_path(scenario.waypoints, POINT_SPACING)
     else:
+        assert scenario.route is not None  # One of both is there.
         network = load_road_network(scenario.roads_file)
         path = make_lane_path(
             network, scenario.route, POINT_SPACING, scenario.source

@@ -85,14 +85,14 @@ class LidarConfig(Mount):
 
     xyz: Triple = (0.0, 0.0, 1.6)
     preset: str = "cns"
-    columns: int | None = Field(None, ge=4, le=8192)
-    min_range: float | None = Field(None, ge=0.0)
-    max_range: float | None = Field(None, gt=0.0, le=1000.0)
+    columns: int | None = Field(default=None, ge=4, le=8192)
+    min_range: float | None = Field(default=None, ge=0.0)
+    max_range: float | None = Field(default=None, gt=0.0, le=1000.0)
     # About what real units resolve; a third less to store than exact values.
-    resolution: float = Field(2.0**-10, ge=0.0, le=1.0)
-    range_noise: float = Field(0.0, ge=0.0, le=10.0)
-    dropout: float = Field(0.0, ge=0.0, le=1.0)
-    faint_dropout: float = Field(0.0, ge=0.0, le=1.0)
+    resolution: float = Field(default=2.0**-10, ge=0.0, le=1.0)
+    range_noise: float = Field(default=0.0, ge=0.0, le=10.0)
+    dropout: float = Field(default=0.0, ge=0.0, le=1.0)
+    faint_dropout: float = Field(default=0.0, ge=0.0, le=1.0)
     motion_distortion: bool = False
 
     @model_validator(mode="after")
@@ -189,19 +189,19 @@ class Scenario(_Model):
 
     name: Name
     map: str | None = None
-    stage: Name | None = Field(None, validate_default=True)
-    world: str | None = Field(None, validate_default=True)
+    stage: Name | None = Field(default=None, validate_default=True)
+    world: str | None = Field(default=None, validate_default=True)
     without: tuple[str, ...] = ()
     title: str = ""
-    route: Route | None = Field(None, validate_default=True)
-    waypoints: str | None = Field(None, validate_default=True)
+    route: Route | None = Field(default=None, validate_default=True)
+    waypoints: str | None = Field(default=None, validate_default=True)
     speeds: Speeds
     lidars: dict[Name, LidarConfig] = Field(
         default={"lidar": LidarConfig()}, min_length=1
     )
     imu: ImuConfig = ImuConfig()
-    frames: int | None = Field(None, ge=1)
-    seed: int = Field(0, ge=0)
+    frames: int | None = Field(default=None, ge=1)
+    seed: int = Field(default=0, ge=0)
 
     # The file that it was read from.
     _file: Path | None = PrivateAttr(None)
@@ -266,13 +266,13 @@ class Scenario(_Model):
     def map_folder(self) -> Path:
         """The folder of the map; of a world, where its file is."""
         if self.map is None:
-            return Path(self.world).parent
+            return self.world_file.parent
         return shipped_maps().get(self.map, Path(self.map))
 
     @property
     def world_file(self) -> Path:
         """The SDF file of the stage, or the world itself."""
-        if self.map is None:
+        if self.world is not None:
             return Path(self.world)
         return self.map_folder / f"stage_{self.stage}.sdf"
 

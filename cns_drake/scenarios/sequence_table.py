@@ -78,15 +78,15 @@ def sequence_rows(
     ).encode()
     rows = []
     for path in sorted(folder.glob("sequence_*.yaml")):
-        entries = _entries(path)
-        stage = folder / f"stage_{entries.get('stage')}.sdf"
-        if not stage.is_file():
+        stage = str(_entries(path).get("stage"))
+        world = folder / f"stage_{stage}.sdf"
+        if not world.is_file():
             continue
-        checksum = _checksum((path, folder / "roads.yaml", stage), meshes)
+        checksum = _checksum((path, folder / "roads.yaml", world), meshes)
         row = known.get(checksum)
         if row is None:
             progress(f"measuring {sequence_name(path)}")
-            row = _measure(path, checksum)
+            row = _measure(path, stage, checksum)
         rows.append(row)
     return rows
 
@@ -133,19 +133,28 @@ def _read(path: Path) -> list[SequenceRow]:
 
     Nothing is lost: its rows are measured anew.
     """
-    types = {"length": float, "duration": float}
-    types |= dict.fromkeys(("frames", "structures", "triangles"), int)
     names = [field.name for field in fields(SequenceRow)]
     try:
         return [
-            SequenceRow(*(types.get(n, str)(row[n]) for n in names))
+            SequenceRow(
+                sequence=row["sequence"],
+                map=row["map"],
+                stage=row["stage"],
+                title=row["title"],
+                checksum=row["checksum"],
+                length=float(row["length"]),
+                duration=float(row["duration"]),
+                frames=int(row["frames"]),
+                structures=int(row["structures"]),
+                triangles=int(row["triangles"]),
+            )
             for _, row in read_records(path, names)
         ]
     except (InputError, ValueError):
         return []
 
 
-def _measure(path: Path, checksum: str) -> SequenceRow:
+def _measure(path: Path, stage: str, checksum: str) -> SequenceRow:
     # Slow to import, and rarely needed.
     from cns_drake.scenarios.scenario import load_scenario
     from cns_drake.scenarios.sequence_facts import sequence_facts
@@ -162,7 +171,7 @@ def _measure(path: Path, checksum: str) -> SequenceRow:
     return SequenceRow(
         sequence=scenario.name,
         map=path.resolve().parent.name,
-        stage=scenario.stage,
+        stage=stage,
         title=scenario.title,
         checksum=checksum,
         length=round(facts.length, 1),

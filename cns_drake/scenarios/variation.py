@@ -30,7 +30,7 @@ import yaml
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import Route
 from cns_drake.roads.route_drawing import draw_route
-from cns_drake.scenarios.scenario import Scenario, load_scenario
+from cns_drake.scenarios.scenario import LidarConfig, Scenario, load_scenario
 from cns_drake.scenarios.shipped import shipped_sequences
 from cns_drake.scene.world import load_world, structures_in
 from evaluation.support.csv_files import read_records
@@ -119,12 +119,12 @@ class Family(_Model):
     stage: str | None = None
     towards: str | None = None
     missing: Annotated[tuple[_Part, ...], BeforeValidator(_spread)] = Field(
-        (0.0,), min_length=1
+        default=(0.0,), min_length=1
     )
-    seeds: tuple[_Seed, ...] = Field((0,), min_length=1)
+    seeds: tuple[_Seed, ...] = Field(default=(0,), min_length=1)
     city_seeds: Annotated[
         tuple[_Seed, ...], AfterValidator(_without_doubles)
-    ] = Field((), min_length=1)
+    ] = Field(default=(), min_length=1)
     routes: DrawnRoutes | None = None
     lidars: tuple[str, ...] = ()
 
@@ -148,7 +148,7 @@ def load_family(path: Path, redraw: Redraw | None = None) -> list[Scenario]:
         family = Family.model_validate(values)
     except ValidationError as error:
         raise InputError(describe_validation_error(path, error)) from None
-    base = family.base
+    base: str | Path = family.base
     if base not in shipped_sequences():
         base = path.parent / base
     return vary(load_scenario(base), family, path, redraw)
@@ -169,6 +169,7 @@ def vary(
     Raises:
         InputError: the base has no map, or something the family asks for is
             not there.
+        ValueError: it has `city_seeds`, and there is no `redraw`.
     """
     if base.map is None:
         raise InputError(f"{source}: base: {base.name} has no map to vary")
@@ -185,14 +186,17 @@ def vary(
         what = f"what stage {family.towards} lacks"
         removable = _difference(base, stage, family.towards, source)
     routes = _routes(base, family)
+    units: list[tuple[str | None, dict[str, LidarConfig]]]
     units = [(None, base.lidars)]
     if family.lidars:
         units = [
             (preset, base.with_lidar_preset(preset).lidars)
             for preset in family.lidars
         ]
-    cities = {None: base}
+    cities: dict[int | None, Scenario] = {None: base}
     if family.city_seeds:
+        if redraw is None:
+            raise ValueError("a family with city_seeds needs `redraw`")
         folders = redraw(base.map_folder, stage, family.city_seeds)
         cities = {
             seed: base.model_copy(update={"map": str(folder)})
@@ -217,7 +221,7 @@ def vary(
             labels.insert(1, f"c{city_seed}")
             title += f", in the city as seed {city_seed} draws it"
         order = orders[city_seed, seed]
-        update = {
+        update: dict[str, object] = {
             "name": "_".join(labels).replace("-", "_"),
             "stage": stage,
             "without": tuple(sorted(order[: round(part * len(order))])),

@@ -123,12 +123,12 @@ def _revolve(radius: np.ndarray, z: np.ndarray, sides: int) -> TriangleSurface:
     angle = 2.0 * np.pi * np.arange(sides) / sides
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     inner = range(1, len(radius) - 1)
-    vertices = [[(0.0, 0.0, z[0])]]
+    vertices = [np.array([(0.0, 0.0, z[0])])]
     vertices += [
         np.column_stack([radius[i] * circle, np.full(len(circle), z[i])])
         for i in inner
     ]
-    vertices += [[(0.0, 0.0, z[-1])]]
+    vertices += [np.array([(0.0, 0.0, z[-1])])]
 
     first = np.arange(sides)
     second = (first + 1) % sides

@@ -298,8 +298,8 @@ class _SeenGeometry:
         self._structures = structures
         self._anchored_frames = frozenset(anchored_frames)
         self._num_threads = num_threads
-        self._count = None
-        self.scene = None
+        self._count: int | None = None
+        self.scene: RayCastingScene | None = None
 
     def __deepcopy__(self, memo: dict) -> _SeenGeometry:
         return _SeenGeometry(
@@ -315,7 +315,7 @@ class _SeenGeometry:
         # geometry unless a render engine is there to accept it (measured on
         # 1.51.1), so that the count has to tell.
         count = query_object.inspector().NumGeometriesWithRole(Role.kPerception)
-        if count == self._count:
+        if self.scene is not None and count == self._count:
             self.scene.set_frame_poses(query_object.GetPoseInWorld)
             return
         self._build(query_object)

@@ -30,7 +30,7 @@ class BeamTable(NamedTuple):
 
 @compiled
 def assemble_points(
-    scan: np.recarray,
+    scan: np.ndarray,
     table: BeamTable,
     beams: np.ndarray,
     ranges: np.ndarray,
@@ -38,7 +38,7 @@ def assemble_points(
     geometry: np.ndarray,
     label: np.ndarray,
     instance: np.ndarray,
-    step: float,
+    step: np.float32,
 ) -> None:
     """Fills a scan, one point for each return.
 
@@ -52,7 +52,7 @@ def assemble_points(
             casting: an index into
         label: uint8 classes, and
         instance: uint16 structures.
-        step: float32, coordinates are rounded to multiples of it [m]; not
+        step: coordinates are rounded to multiples of it [m]; not
             rounded if 0.
     """
     for k in range(len(beams)):

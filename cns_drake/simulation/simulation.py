@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import math
 from pathlib import Path
@@ -172,7 +172,7 @@ def simulate(
                 with writer:
                     simulator.AdvanceTo(end)
         finished = time.perf_counter()
-        if page is not None:
+        if page is not None and page_file is not None:
             page.save(page_file, title=scenario.name)
     return Run(
         name=scenario.name,
@@ -190,20 +190,18 @@ class _Drive:
     """A scenario with what it takes to run it.
 
     Attributes:
-        scenario: that says how many frames it has.
+        scenario: with `frames` given.
         inputs: digests of what it was read from.
         trajectory: of the vehicle.
         world: the stage.
+        num_frames: how many it takes.
     """
 
     scenario: Scenario
-    inputs: Mapping[str, str]
+    inputs: dict[str, str]
     trajectory: Trajectory
     world: World
-
-    @property
-    def num_frames(self) -> int:
-        return self.scenario.frames
+    num_frames: int
 
 
 def _load(scenario: Scenario) -> _Drive:
@@ -217,7 +215,7 @@ def _load(scenario: Scenario) -> _Drive:
         raise InputError(
             f"{scenario.world_file}: changed while it was being read"
         )
-    return _Drive(scenario, inputs, trajectory, world)
+    return _Drive(scenario, inputs, trajectory, world, num_frames)
 
 
 def _resume(

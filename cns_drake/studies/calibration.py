@@ -116,25 +116,20 @@ class Calibration:
         structures = [entry.name for entry in _table(folder)]
         stages = load_stages(source, structures)
         names = list(stages.stages)
-        for scenario in (earlier, later):
-            if scenario.stage not in names:
-                raise InputError(
-                    f"{source}: stages: no stage '{scenario.stage}', which is "
-                    f"that of {scenario.name}"
-                )
-        if names.index(earlier.stage) >= names.index(later.stage):
+        first, second = (
+            _stage_of(scenario, names, source) for scenario in (earlier, later)
+        )
+        if names.index(first) >= names.index(second):
             raise InputError(
                 f"{earlier.name}: stage: not before that of {later.name}"
             )
         self._progress = progress
         self._city = _WholeCity(folder / f"stage_{names[-1]}.sdf")
         self._scanner = _Scanner(earlier, spacing)
-        self._absent = stages.absent(earlier.stage)
-        self.given_back, self.taken = _groups(
-            stages, earlier.stage, later.stage
-        )
+        self._absent = stages.absent(first)
+        self.given_back, self.taken = _groups(stages, first, second)
         progress(f"{earlier.name} and {later.name}: scanning")
-        absent = stages.absent(later.stage)
+        absent = stages.absent(second)
         self._later_map = _Scanner(later, spacing).map(self._city.scene(absent))
         self.control = self._estimate(absent, "control")
         self.change = self._estimate(self._absent, "as it is")
@@ -248,6 +243,20 @@ def _table(folder: Path) -> StructureTable:
     if not path.is_file():
         raise InputError(f"{path}: no such file; generate the city first")
     return load_structure_table(path)
+
+
+def _stage_of(scenario: Scenario, names: Sequence[str], source: Path) -> str:
+    """Returns the stage of a scenario.
+
+    Raises:
+        InputError: it is none of those named in the file `source`.
+    """
+    if scenario.stage is None or scenario.stage not in names:
+        raise InputError(
+            f"{source}: stages: no stage '{scenario.stage}', which is "
+            f"that of {scenario.name}"
+        )
+    return scenario.stage
 
 
 def _groups(

@@ -111,7 +111,7 @@ def control_drives(sequences: Sequence[Scenario]) -> list[Scenario]:
     compared with the last stage's own sequence, whatever it shows as change
     is due to the routes and not to the city.
     """
-    last = max(sequences, key=lambda sequence: sequence.stage)
+    last = max(sequences, key=lambda sequence: sequence.stage or "")
     return [
         sequence.model_copy(
             update={
@@ -136,10 +136,11 @@ def recording_info(
         output: the folder of recordings.
         is_waiting: whether the job of its name has to be done first.
     """
+    assert scenario.stage is not None  # It belongs to a map.
     return RecordingInfo(
         name=scenario.name,
         path=output.absolute() / scenario.name,
-        map_name=Path(scenario.map).name,
+        map_name=scenario.map_folder.name,
         stage=scenario.stage,
         route=scenario.route or scenario.waypoints,
         needs=(scenario.name,) if is_waiting else (),

@@ -167,14 +167,11 @@ def align(
     if ground != 0.0 or held.off > 0.0:
         # No longer the world of others that name it.
         frame = f"{frame}, corrected by {target.name}"
-    placed = [
-        _lowered(target.sequence, target.X_WS, ground, frame, target),
-        _lowered(source.sequence, X_TS, ground, frame, target),
-    ]
-    if swapped:
-        placed.reverse()
+    held_drive = _lowered(target.sequence, target.X_WS, ground, frame, target)
+    moved_drive = _lowered(source.sequence, X_TS, ground, frame, target)
     return Alignment(
-        *placed,
+        moved_drive if swapped else held_drive,
+        held_drive if swapped else moved_drive,
         AlignmentReport(
             held=target.name,
             moved=source.name,

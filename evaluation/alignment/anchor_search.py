@@ -81,12 +81,14 @@ def find_candidates(
     for k in track(
         range(len(source)), f"recognising {source.name}", len(source)
     ):
-        query = method.describe(gather(source.sequence, source.frames[k], 1))
+        frame = int(source.frames[k])
+        query = method.describe(gather(source.sequence, frame, 1))
         scores = np.nan_to_num(method.score(query, database), nan=-np.inf)
         for place in np.argsort(-scores, kind="stable")[:_CANDIDATES]:
             if not np.isfinite(scores[place]):
                 break
             X_PQ = method.relative_pose(query, database, int(place))
+            assert X_PQ is not None  # There is a score.
             turn = (
                 _heading(target.X_WK[place])
                 + _heading(X_PQ)
@@ -112,7 +114,7 @@ def find_guesses(candidates: Candidates) -> list[Guess]:
     """
     trials = _trials(candidates)
     is_left = np.ones(len(candidates.turn), dtype=bool)
-    guesses = []
+    guesses: list[Guess] = []
     while len(guesses) < _NUM_GUESSES and len(trials):
         agreement = np.stack(
             [_agrees(candidates, turn, move) for turn, move in trials]

@@ -55,10 +55,10 @@ def close(
     Returns:
         The loop; None if the two do not fit together.
     """
-    surfaces = source.surface(k), target.surface(place)
-    if None in surfaces:
+    moving, held = source.surface(k), target.surface(place)
+    if moving is None or held is None:
         return None
-    result = register(*surfaces, X_LK)
+    result = register(moving, held, X_LK)
     strayed = np.linalg.norm(result.X_TS[:3, 3] - X_LK[:3, 3])
     if (
         result.fitness < _LEAST_FITNESS

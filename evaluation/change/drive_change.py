@@ -122,7 +122,7 @@ class ChangeReport:
             values["coverage_masked"] = _summary(self.masked) | {
                 "radius": COVERAGE_RADIUS
             }
-        if self.control is not None:
+        if self.control is not None and self.control_names is not None:
             values["control"] = _summary(self.control) | {
                 "between": list(self.control_names)
             }
@@ -158,7 +158,9 @@ def survey_in_one_world(
         InputError: if something cannot be read, or not be aligned.
     """
     opened = [_open(path) for path in paths]
-    drives = [i for i, one in enumerate(opened) if isinstance(one, Sequence)]
+    drives = {
+        i: one for i, one in enumerate(opened) if isinstance(one, Sequence)
+    }
     if when == "always" and len(drives) < len(opened):
         raise InputError("--align always: a map file cannot be aligned")
     reports = []
@@ -169,16 +171,18 @@ def survey_in_one_world(
         first, *others = drives
         for number, other in enumerate(others):
             alignment = in_one_world(
-                opened[first],
-                opened[other],
+                drives[first],
+                drives[other],
                 when,
                 track,
                 hold_first=number > 0,
             )
             if alignment is not None:
-                opened[first], opened[other] = alignment.first, alignment.second
+                drives[first], drives[other] = alignment.first, alignment.second
                 reports.append(alignment.report)
-    return [_survey(one, track) for one in opened], reports
+    return [
+        _survey(drives.get(i, one), track) for i, one in enumerate(opened)
+    ], reports
 
 
 def survey_sequence(sequence: Sequence, voxels: VoxelMap) -> Surveyed:
@@ -257,14 +261,20 @@ def _same_stage_partner(
     source: Surveyed, target: Surveyed, control: Surveyed
 ) -> Surveyed:
     """Returns the one whose route the control does not share."""
-    if any(one.positions is None for one in (source, target, control)):
+    if (
+        source.sequence is None
+        or control.sequence is None
+        or source.positions is None
+        or target.positions is None
+        or control.positions is None
+    ):
         raise InputError(
             f"{control.name}: a control needs three recorded sequences, not"
             " map files"
         )
     check_same_world(source.sequence, control.sequence)
-    on_source = _route_distance(control, source)
-    on_target = _route_distance(control, target)
+    on_source = _route_distance(control.positions, source.positions)
+    on_target = _route_distance(control.positions, target.positions)
     if min(on_source, on_target) > _SAME_ROUTE:
         raise InputError(
             f"{control.name}: as control on neither route: {on_source:.1f} m"
@@ -274,15 +284,15 @@ def _same_stage_partner(
     return target if on_source <= on_target else source
 
 
-def _route_distance(first: Surveyed, second: Surveyed) -> float:
+def _route_distance(first: np.ndarray, second: np.ndarray) -> float:
     """Returns the mean distance between two routes, seen from either [m]."""
-    there, _ = cKDTree(second.positions).query(first.positions)
-    back, _ = cKDTree(first.positions).query(second.positions)
+    there, _ = cKDTree(second).query(first)
+    back, _ = cKDTree(first).query(second)
     return float(max(there.mean(), back.mean()))
 
 
 def _summary(change: TemporalChange) -> dict:
-    values = {
+    values: dict[str, float | str | None] = {
         "tcr_sym": _number(change.symmetric),
         "in_hull": change.num_in_hull,
         "unchanged": change.num_unchanged,

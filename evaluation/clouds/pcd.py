@@ -85,7 +85,7 @@ def _describe(header: dict[str, list[str]]) -> tuple[np.dtype, int]:
     except (TypeError, ValueError) as error:
         raise ValueError(f"PCD header: {error}") from error
     for name in "xyz":
-        if name not in names or dtype.fields[name][0].kind != "f":
+        if name not in names or dtype[name].kind != "f":
             raise ValueError(f"PCD header: no field {name} of type F")
     if number < 0:
         raise ValueError("PCD header: a negative number of points")
@@ -102,7 +102,8 @@ def _read_ascii(
     with open(path, "rb") as stream:
         stream.seek(offset)
         values = np.loadtxt(stream, dtype=np.float64, ndmin=2, max_rows=count)
-    widths = [_width(dtype, name) for name in dtype.names]
+    names = dtype.names or ()
+    widths = [_width(dtype, name) for name in names]
     if values.shape != (count, sum(widths)):
         raise ValueError(
             f"PCD: {values.shape[0]} x {values.shape[1]} numbers instead of"
@@ -110,7 +111,7 @@ def _read_ascii(
         )
     points = np.empty(count, dtype=dtype)
     columns = np.split(values, np.cumsum(widths)[:-1], axis=1)
-    for name, column in zip(dtype.names, columns, strict=True):
+    for name, column in zip(names, columns, strict=True):
         store(points, name, column.reshape(points[name].shape))
     return points
 
@@ -134,8 +135,8 @@ def _read_compressed(
     # Stored field by field: all x, then all y, ...
     points = np.empty(count, dtype=dtype)
     start = 0
-    for name in dtype.names:
-        scalar = dtype.fields[name][0]
+    for name in dtype.names or ():
+        scalar = dtype[name]
         end = start + count * scalar.itemsize
         points[name] = (
             plain[start:end].view(scalar.base).reshape(count, *scalar.shape)
@@ -146,7 +147,7 @@ def _read_compressed(
 
 def _width(dtype: np.dtype, name: str) -> int:
     """Returns how many numbers a field holds."""
-    return int(np.prod(dtype.fields[name][0].shape))
+    return int(np.prod(dtype[name].shape))
 
 
 def _check_size(path: Path, needed: int) -> None:

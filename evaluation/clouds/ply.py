@@ -101,7 +101,7 @@ def _describe_vertices(
         raise ValueError("PLY header: a negative number of vertices")
     dtype = np.dtype(fields)
     for name in "xyz":
-        if name not in dict(fields) or dtype.fields[name][0].kind != "f":
+        if name not in dict(fields) or dtype[name].kind != "f":
             raise ValueError(f"PLY header: no floating-point property {name}")
     return dtype, count
 
@@ -112,12 +112,13 @@ def _read_ascii(
     with open(path, "rb") as stream:
         stream.seek(offset)
         values = np.loadtxt(stream, dtype=np.float64, ndmin=2, max_rows=count)
-    if values.shape != (count, len(dtype.names)):
+    names = dtype.names or ()
+    if values.shape != (count, len(names)):
         raise ValueError(
             f"PLY: {values.shape[0]} x {values.shape[1]} numbers instead of"
-            f" {count} x {len(dtype.names)}"
+            f" {count} x {len(names)}"
         )
     vertices = np.empty(count, dtype=dtype)
-    for column, name in enumerate(dtype.names):
+    for column, name in enumerate(names):
         store(vertices, name, values[:, column])
     return vertices

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from evaluation.change.drive_change import ChangeReport
     from evaluation.methods.method import Method
     from evaluation.recognition.metrics import Interval
-    from evaluation.recognition.recognition_result import RecognitionResult
+    from evaluation.recognition.place_recognition import PlaceRecognition
     from evaluation.sequences.sequence import Sequence
 
 app = terminal.make_program(
@@ -120,18 +120,21 @@ def tcr(
     the directed ratios. Sequences of different world frames are aligned.
     """
     from evaluation.change import drive_change as change
+    from evaluation.sequences import Sequence
 
     paths = [path for path in (source, target, control) if path is not None]
     surveys, alignments = change.survey_in_one_world(
         paths, align.value, terminal.track
     )
     report = change.compare(
-        *surveys[:2],
+        surveys[0],
+        surveys[1],
         control=None if control is None else surveys[2],
         alignment=alignments[0] if alignments else None,
     )
     for one in surveys:
-        _tell_notes(one.sequence)
+        if isinstance(one.sequence, Sequence):
+            _tell_notes(one.sequence)
         ignored = one.voxels.num_ignored
         if ignored:
             terminal.note(f"{one.name}: {ignored} points not finite")
@@ -173,14 +176,16 @@ def pr(
     from evaluation.sequences import open_sequence
 
     chosen = _make_method(method, parameter, sensor_height)
-    drives = [open_sequence(path) for path in (database, query)]
-    for drive in drives:
+    places, asking = open_sequence(database), open_sequence(query)
+    for drive in (places, asking):
         _tell_notes(drive)
-    alignment = in_one_world(*drives, align.value, terminal.track)
+    alignment = in_one_world(places, asking, align.value, terminal.track)
     if alignment is not None:
-        drives = [alignment.first, alignment.second]
+        places, asking = alignment.first, alignment.second
         terminal.note(alignment.report.to_text())
-    result = place_recognition.run(*drives, chosen, mode.value, terminal.track)
+    result = place_recognition.run(
+        places, asking, chosen, mode.value, terminal.track
+    )
     if json:
         terminal.print_json(result.to_json())
     else:
@@ -275,8 +280,8 @@ def main() -> None:
     terminal.run(app, "cns-eval")
 
 
-def _tell_notes(sequence: Sequence | None) -> None:
-    for note in () if sequence is None else sequence.notes:
+def _tell_notes(sequence: Sequence) -> None:
+    for note in sequence.notes:
         terminal.note(note)
 
 
@@ -319,15 +324,15 @@ def _change_rows(report: ChangeReport) -> Iterator[tuple[str, str]]:
             "TCR_sym where both drove",
             terminal.number(report.masked.symmetric),
         )
-    if report.control is not None:
-        names = " <-> ".join(report.control_names)
+    if report.control is not None and report.control_names is not None:
+        value = terminal.number(report.control.symmetric)
         yield (
             "TCR_sym of the routes alone",
-            f"{terminal.number(report.control.symmetric)}  ({names})",
+            f"{value}  ({' <-> '.join(report.control_names)})",
         )
 
 
-def _recognition_rows(result: RecognitionResult) -> Iterator[tuple[str, str]]:
+def _recognition_rows(result: PlaceRecognition) -> Iterator[tuple[str, str]]:
     metrics = result.metrics
     yield "method", result.method
     yield "database -> query", f"{result.database} -> {result.query}"

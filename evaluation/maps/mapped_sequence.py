@@ -45,7 +45,7 @@ class MappedSequence(Sequence):
         return len(self._sequence)
 
     @property
-    def world_frame(self) -> str:
+    def world_frame(self) -> str:  # type: ignore[override]  # Read late.
         return self._sequence.world_frame
 
     @property

@@ -267,7 +267,9 @@ def _corners(indices: np.ndarray, voxel_size: float) -> np.ndarray:
 
 
 @compiled
-def _find(table: np.recarray, ix: int, iy: int, iz: int) -> int:
+def _find(
+    table: np.ndarray, ix: np.int32, iy: np.int32, iz: np.int32
+) -> np.int64:
     """Returns the slot of a voxel, or the free one where it belongs."""
     mask = len(table) - 1
     # Large odd factors spread neighbouring voxels; products wrap around.
@@ -287,9 +289,9 @@ def _find(table: np.recarray, ix: int, iy: int, iz: int) -> int:
 
 @compiled
 def _move(
-    table: np.recarray,
+    table: np.ndarray,
     sampled: np.ndarray,
-    larger: np.recarray,
+    larger: np.ndarray,
     larger_sampled: np.ndarray,
 ) -> None:
     """Enters all voxels of one table into another, empty one."""
@@ -305,7 +307,7 @@ def _add_points(
     points: np.ndarray,
     X: np.ndarray,
     voxel_size: float,
-    table: np.recarray,
+    table: np.ndarray,
     size: int,
     divisions: int,
     sampled: np.ndarray,

@@ -26,6 +26,8 @@ def load_method(path: Path) -> type[Method]:
     # a name that no other module has.
     name = f"own_method_{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise InputError(f"--method: {path}: not a Python file")
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     try:

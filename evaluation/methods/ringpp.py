@@ -200,14 +200,13 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         # first, a shift stands on average for 360 / n. Spectra of opposite
         # rays are equal, which leaves two headings.
         yaw = 2.0 * math.pi * shift / num_cells
-        best = None
-        for candidate in (yaw, yaw - math.pi):
-            peak, offset = _best_offset(
-                _rotate(query_bev, candidate), place_bev
-            )
-            if best is None or peak > best[0]:
-                best = peak, offset, candidate
-        _, offset, yaw = best
+        headings = (yaw, yaw - math.pi)
+        fits = [
+            _best_offset(_rotate(query_bev, heading), place_bev)
+            for heading in headings
+        ]
+        best = 1 if fits[1][0] > fits[0][0] else 0
+        offset, yaw = fits[best][1], headings[best]
         c, s = math.cos(yaw), math.sin(yaw)
         R_PQ = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         cell = 2.0 * self.config.half_width / num_cells

@@ -316,10 +316,11 @@ def _cart_context(points: np.ndarray, config: ScanContextConfig) -> np.ndarray:
     axes are twice as large, and the first row and column stay empty; points
     below the ground count as ground. Both as in the T-RO program.
     """
-    shape = tuple(
+    rows, columns = (
         2 * int(half / cell)
         for half, cell in zip(config.cart_range, config.cart_cell, strict=True)
     )
+    shape = rows, columns
     plane = points[:, :2]
     kept = ((np.abs(plane) < config.cart_range) & (plane != 0.0)).all(axis=1)
     plane = plane[kept]

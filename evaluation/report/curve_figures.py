@@ -149,7 +149,7 @@ def _draw_points(
 
 def _draw_paper(axes: Axes, method: str) -> None:
     values = [
-        (paper.tcr_values()[(key[0], *sorted(key[1:3]))], value.auc)
+        (paper.tcr_between(*key[:3]), value.auc)
         for key, value in paper.recognition_values().items()
         if key[3] == method
     ]

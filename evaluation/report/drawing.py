@@ -42,9 +42,10 @@ def method_style(method: str) -> tuple[str, str, str]:
     return _OTHER_STYLES[sum(method.encode()) % len(_OTHER_STYLES)]
 
 
-def unit(rgb: tuple[int, int, int]) -> tuple[float, ...]:
+def unit(rgb: tuple[int, int, int]) -> tuple[float, float, float]:
     """Returns a colour as matplotlib takes it."""
-    return tuple(value / 255.0 for value in rgb)
+    red, green, blue = rgb
+    return red / 255.0, green / 255.0, blue / 255.0
 
 
 def save(figure: Figure, stem: Path, page_kind: str) -> None:

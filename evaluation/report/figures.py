@@ -300,7 +300,7 @@ def _draw_route(axes: Axes, line: np.ndarray) -> None:
     number = min(len(line), _ROUTE_POINTS)
     line = line[np.linspace(0, len(line) - 1, number).round().astype(int)]
     segments = LineCollection(
-        np.stack([line[:-1], line[1:]], axis=1),
+        list(np.stack([line[:-1], line[1:]], axis=1)),
         cmap=ROUTE_COLOURS,
         array=np.linspace(0.0, 1.0, max(len(line) - 1, 1)),
         linewidths=2.0,

@@ -108,7 +108,7 @@ def trend(change: Sequence[float], auc: Sequence[float]) -> Trend:
 def paper_trend(method: str) -> Trend:
     """Returns the trend in the paper's own Table II."""
     values = [
-        (_paper_change(*key[:3]), value.auc)
+        (paper.tcr_between(*key[:3]), value.auc)
         for key, value in paper.recognition_values().items()
         if key[3] == method
     ]
@@ -118,7 +118,7 @@ def paper_trend(method: str) -> Trend:
 def _larger_than_real(changes: Sequence[ChangeResult]) -> Finding:
     real = paper.tcr_values()["kaist", "01", "06"]
     # The paper's Table I: each map's first stage against its last.
-    widest = {}
+    widest: dict[str, ChangeResult] = {}
     for result in changes:
         best = widest.get(result.map_name)
         if best is None or result.stages[0] < best.stages[0]:
@@ -278,9 +278,3 @@ def _part(number: int, total: int) -> str:
     if number == total:
         return HOLDS
     return IN_PART if number else FAILS
-
-
-def _paper_change(map_name: str, database: str, query: str) -> float:
-    values = paper.tcr_values()
-    first, last = sorted((database, query))
-    return values[map_name, first, last]

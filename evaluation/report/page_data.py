@@ -191,13 +191,14 @@ def _pair_data(
     first = results[0].outcome
     retrieval = first.retrieval
     database, query = drives[first.database], drives[first.query]
-    known = change is not None and not np.isnan(change)
+    if change is not None:
+        change = None if np.isnan(change) else round(change, 4)
     return {
         "map": pair[0],
         "label": f"{pair[0]} {pair[1]} → {pair[2]}",
         "database": first.database,
         "query": first.query,
-        "change": round(change, 4) if known else None,
+        "change": change,
         "places": np.searchsorted(
             database.frames, retrieval.database_frames
         ).tolist(),

@@ -69,7 +69,7 @@ def change_table(results: Sequence[ChangeResult]) -> Table:
         "voxels in hulls",
         "unchanged",
     )
-    rows = []
+    rows: list[tuple] = []
     for result in results:
         report = result.report
         change = report.change

@@ -39,7 +39,7 @@ def deskew(sequence: Sequence, index: int) -> np.ndarray:
             points were measured, or there are too few poses.
     """
     points = sequence.scan(index).copy()
-    if "t" not in points.dtype.names:
+    if "t" not in (points.dtype.names or ()):
         raise InputError(
             f"{sequence.name}: scan {index}: no field t, the time of each point"
         )

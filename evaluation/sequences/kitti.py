@@ -129,7 +129,7 @@ class KittiSequence(FileSequence):
             )
         points = np.empty(len(stored), dtype=[*_RECORD.descr, *_LABEL.descr])
         for part in (stored, labels):
-            for name in part.dtype.names:
+            for name in part.dtype.names or ():
                 points[name] = part[name]
         return points
 

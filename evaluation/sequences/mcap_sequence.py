@@ -84,16 +84,15 @@ class McapSequence(Sequence):
         return self._track[1]
 
     @property
-    def world_frame(self) -> str:
+    def world_frame(self) -> str:  # type: ignore[override]  # Read late.
         first = self._file.locate(_ODOMETRY_TOPIC)[0]
         return self._message(_ODOMETRY_TOPIC, first).header.frame_id
 
     @property
     def notes(self) -> tuple[str, ...]:
         lidars = (self.scenario or {}).get("lidars")
-        lidar = {}
-        if isinstance(lidars, dict):
-            lidar = lidars.get(self._lidar_topic.strip("/").split("/")[0])
+        name = self._lidar_topic.strip("/").split("/")[0]
+        lidar = lidars.get(name) if isinstance(lidars, dict) else None
         if not (isinstance(lidar, dict) and lidar.get("motion_distortion")):
             return ()
         return (
@@ -175,20 +174,20 @@ class McapSequence(Sequence):
         """Stamps (N,) of the scans, and the odometry, in one pass."""
         num_scans = len(self)
 
-        def parse(position: int, data: memoryview) -> int | bytes:
+        def parse(position: int, data: memoryview) -> tuple[int, bytes]:
             if position < num_scans:
-                return self._scan_stamp_ns(data)
-            return bytes(data)
+                return self._scan_stamp_ns(data), b""
+            return 0, bytes(data)
 
         parsed = self._file.parse_each(
             self._scans + self._file.locate(_ODOMETRY_TOPIC), parse
         )
         rows = [
             _odometry_row(self._decode(_ODOMETRY_TOPIC, data))
-            for data in parsed[num_scans:]
+            for _, data in parsed[num_scans:]
         ]
         return (
-            np.array(parsed[:num_scans], dtype=np.int64),
+            np.array([stamp for stamp, _ in parsed[:num_scans]], np.int64),
             np.array(rows, dtype=ODOMETRY_DTYPE),
         )
 

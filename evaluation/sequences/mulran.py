@@ -93,7 +93,7 @@ class MulranSequence(FileSequence):
             return stored
         # Column by column, each from ring to ring.
         points = np.empty(len(stored), dtype=_WHOLE)
-        for name in stored.dtype.names:
+        for name in stored.dtype.names or ():
             points[name] = stored[name]
         number = np.arange(len(stored))
         points["ring"] = number % _NUM_RINGS

@@ -34,9 +34,8 @@ def to_points(message: Any) -> np.ndarray:
             floating-point `x`, `y` and `z`.
     """
     dtype = _record_type(message)
-    fields = dtype.fields or {}
     for name in "xyz":
-        if fields.get(name, (np.dtype("V1"),))[0].kind != "f":
+        if name not in (dtype.names or ()) or dtype[name].kind != "f":
             raise ValueError(f"the point cloud has no field {name} of floats")
     data = np.frombuffer(message.data, dtype=np.uint8)
     if message.row_step < message.width * message.point_step:

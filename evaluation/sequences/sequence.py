@@ -131,9 +131,14 @@ def index_instances(table: Any, source: str) -> dict[int, Mapping]:
 class Placed(Protocol):
     """What is known to lie in some world; see `Sequence`."""
 
-    name: str
-    world_frame: str
-    scenario: Mapping | None
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def world_frame(self) -> str: ...
+
+    @property
+    def scenario(self) -> Mapping | None: ...
 
 
 @dataclass(frozen=True)

@@ -47,8 +47,12 @@ def measure_change(
     inputs = _change_inputs(map_name, stages, surveys)
     if is_current(result, inputs):
         return
-    drives = [_to_surveyed(read_part(survey.drive)) for survey in surveys]
-    change = ChangeResult(map_name, stages, compare_maps(*drives))
+    earlier, later, *controls = (
+        _to_surveyed(read_part(survey.drive)) for survey in surveys
+    )
+    control = controls[0] if controls else None
+    report = compare_maps(earlier, later, control)
+    change = ChangeResult(map_name, stages, report)
     write_part(result, inputs, change)
 
 

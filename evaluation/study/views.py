@@ -95,7 +95,7 @@ def measure_and_draw(
     """
     del tell
     measure_change(map_name, stages, surveys, result)
-    draw_pair(surveys[:2], result, stems, drawn)
+    draw_pair((surveys[0], surveys[1]), result, stems, drawn)
 
 
 def is_measured_and_drawn(
@@ -133,14 +133,18 @@ def draw_pair(
     if _is_drawn(stems, drawn, inputs):
         return
     result = read_part(change)
-    shown = []
-    for name, survey in zip(result.stages, surveys, strict=True):
-        drive = read_part(survey.drive)
-        fine = read_part(survey.fine)
-        shown.append(Stage(name, fine, drive.coarse, drive.positions))
+    earlier, later = (
+        _stage(name, survey)
+        for name, survey in zip(result.stages, surveys, strict=True)
+    )
     make_folder(stems[0].parent)
-    draw_change(result.map_name, *shown, result.report.change, stems)
+    draw_change(result.map_name, earlier, later, result.report.change, stems)
     write_part(drawn, inputs, None)
+
+
+def _stage(name: str, survey: SurveyFiles) -> Stage:
+    drive = read_part(survey.drive)
+    return Stage(name, read_part(survey.fine), drive.coarse, drive.positions)
 
 
 def _inputs(what: str, surveys: Sequence[SurveyFiles]) -> dict:

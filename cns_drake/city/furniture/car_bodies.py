@@ -6,6 +6,7 @@ middle of the vehicle.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -189,9 +190,9 @@ def _van_windows(form: CarForm) -> list[Mesh]:
     return panes
 
 
-def _pane(corners, size: float) -> Mesh:
+def _pane(ring: Sequence[np.ndarray], size: float) -> Mesh:
     """Returns a thin plate on four corners, counter-clockwise from outside."""
-    corners = np.asarray(corners, dtype=float)
+    corners = np.array(ring)
     middle = corners.mean(axis=0)
     corners = middle + size * (corners - middle)
     normal = np.cross(corners[2] - corners[0], corners[3] - corners[1])

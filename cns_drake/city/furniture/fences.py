@@ -75,7 +75,9 @@ def run(
     tall = round(height / kind.height, 4)
     total = max(1, round(length / kind.panel))
     stretch = round(length / (total * kind.panel), 4)
-    parts, meshes, done = [], {}, 0
+    parts: list[Part] = []
+    meshes: dict[str, Mesh] = {}
+    done = 0
     while done < total:
         count = _LONGEST
         while count > total - done:
@@ -110,7 +112,9 @@ def _panels(kind: RunKind, count: int) -> Mesh:
     return kind.make(count)
 
 
-def _box(x0, x1, y0, y1, z0, z1) -> Mesh:
+def _box(
+    x0: float, x1: float, y0: float, y1: float, z0: float, z1: float
+) -> Mesh:
     return box_mesh(
         (x1 - x0, y1 - y0, z1 - z0),
         ((x0 + x1) / 2, (y0 + y1) / 2, (z0 + z1) / 2),

@@ -147,7 +147,7 @@ def _figure() -> Mesh:
 def _obelisk() -> Mesh:
     """Returns an obelisk 10 m high."""
 
-    def square(half, z):
+    def square(half: float, z: float) -> list[tuple[float, float, float]]:
         return [
             (half, half, z),
             (-half, half, z),

@@ -8,7 +8,7 @@ import numpy as np
 
 from cns_drake.city.furniture.car_bodies import CarForm, car_meshes
 from cns_drake.city.geometry.mesh import Mesh, box_mesh, merge_meshes
-from cns_drake.city.geometry.object_parts import Builder, assemble
+from cns_drake.city.geometry.object_parts import Builder, assemble, triple
 from cns_drake.city.geometry.structures import MeshShape, Model, Part
 
 # Paint colours, roughly as often as they are seen on the road.
@@ -124,7 +124,7 @@ def car(rng: np.random.Generator, *, form: str) -> Model:
         form: a key of `FORMS`.
     """
     size = rng.uniform(0.97, 1.03, 3)
-    scale = tuple(round(float(s), 3) for s in size)
+    scale = triple(round(float(s), 3) for s in size)
     paint = _PAINTS[int(rng.integers(len(_PAINTS)))]
     meshes = dict(vehicle_meshes(form))
     colours = {"body": paint, "trim": _TRIM, "box": _WHITE}

@@ -15,7 +15,12 @@ from cns_drake.city.geometry.lofts import (
     side_prism,
 )
 from cns_drake.city.geometry.mesh import Mesh, box_mesh, merge_meshes
-from cns_drake.city.geometry.object_parts import Builder, assemble, single
+from cns_drake.city.geometry.object_parts import (
+    Builder,
+    assemble,
+    single,
+    triple,
+)
 from cns_drake.city.geometry.structures import MeshShape, Model, Part
 
 _STEEL_COLOURS = (
@@ -75,7 +80,7 @@ def skip(rng: np.random.Generator) -> Model:
 def soil_heap(rng: np.random.Generator) -> Model:
     """Returns a heap of earth or sand, 4 to 8 m across."""
     size = rng.uniform(0.55, 1.1, 2)
-    scale = (*(round(float(s), 3) for s in size), round(float(size.mean()), 3))
+    scale = triple(round(float(s), 3) for s in (*size, size.mean()))
     part = Part(
         "heap",
         MeshShape("heap", scale),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
@@ -140,17 +140,10 @@ def _lantern_head() -> Mesh:
     )
 
 
-def _double(design):
-    def build(rng: np.random.Generator, **parameters) -> Model:
-        return design(rng, arms=2, **parameters)
-
-    return build
-
-
 STREET_LIGHTS = {
     "lamp_post": Builder("pole", straight_lamp),
-    "lamp_post_double": Builder("pole", _double(straight_lamp)),
+    "lamp_post_double": Builder("pole", partial(straight_lamp, arms=2)),
     "lamp_post_curved": Builder("pole", curved_lamp),
-    "lamp_post_curved_double": Builder("pole", _double(curved_lamp)),
+    "lamp_post_curved_double": Builder("pole", partial(curved_lamp, arms=2)),
     "lantern": Builder("pole", lantern),
 }

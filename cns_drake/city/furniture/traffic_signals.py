@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 
 import numpy as np
@@ -20,6 +21,7 @@ from cns_drake.city.geometry.structures import (
     MeshShape,
     Model,
     Part,
+    Shape,
 )
 
 _STEEL = (0.45, 0.47, 0.49)
@@ -99,7 +101,14 @@ def stop_sign(rng: np.random.Generator) -> Model:
     return _sign(height, MeshShape("sign_octagon"), 0.4, _RED, meshes)
 
 
-def _sign(height, shape, drop, rgb, meshes=None, rpy=(0.0, 0.0, 0.0)) -> Model:
+def _sign(
+    height: float,
+    shape: Shape,
+    drop: float,
+    rgb: tuple[float, float, float],
+    meshes: Mapping[str, Mesh] | None = None,
+    rpy: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> Model:
     """Returns a plate on a mast, its middle `drop` below the top [m]."""
     plate = Part("plate", shape, (0.05, 0.0, height - drop), rpy, rgb)
     return assemble((post("mast", 0.035, height, rgb=_STEEL), plate), meshes)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -150,7 +150,9 @@ def _check_names(plan: CityPlan, source: str) -> None:
             _require(used, OBJECTS, f"{source}: {field}")
 
 
-def _used_names(district: DistrictPlan):
+def _used_names(
+    district: DistrictPlan,
+) -> Iterator[tuple[str, Iterable[str]]]:
     for row in district.rows:
         yield "rows", row.archetypes
     for line in district.lines:
@@ -160,7 +162,9 @@ def _used_names(district: DistrictPlan):
     yield "objects", [entry.object for entry in district.objects]
 
 
-def _require(names: Iterable[str], registry, field: str) -> None:
+def _require(
+    names: Iterable[str], registry: Container[str], field: str
+) -> None:
     for name in names:
         if name not in registry:
             raise InputError(f"{field}: unknown name {name}")

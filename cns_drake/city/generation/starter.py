@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable
+from functools import partial
 from importlib import resources
 from pathlib import Path
 
@@ -94,16 +95,20 @@ def start_city(
         write(
             f"sequence_{stage}.yaml",
             f"A drive through stage {stage}, on a route drawn by lot.",
-            lambda stage=stage, rng=rng: {
-                "map": ".",
-                "stage": stage,
-                "route": draw_route(network, _ROUTE_LENGTH, rng).model_dump(
-                    mode="json", exclude_none=True
-                ),
-                "speeds": _SPEEDS,
-            },
+            partial(_drive, network, stage, rng),
         )
     return written
+
+
+def _drive(network: RoadNetwork, stage: str, rng: np.random.Generator) -> dict:
+    """Returns a scenario that drives through one stage."""
+    route = draw_route(network, _ROUTE_LENGTH, rng)
+    return {
+        "map": ".",
+        "stage": stage,
+        "route": route.model_dump(mode="json", exclude_none=True),
+        "speeds": _SPEEDS,
+    }
 
 
 def _plan(network: RoadNetwork, seed: int) -> dict:
@@ -116,15 +121,15 @@ def _plan(network: RoadNetwork, seed: int) -> dict:
         [network.carriageway(), network.sidewalks(), network.medians()]
     )
     x0, y0, x1, y1 = streets.bounds
-    bounds = [
+    bounds = (
         int(np.floor(x0 - _MARGIN)),
         int(np.floor(y0 - _MARGIN)),
         int(np.ceil(x1 + _MARGIN)),
         int(np.ceil(y1 + _MARGIN)),
-    ]
+    )
     rng = np.random.default_rng(seed)
     characters: list[str] = []
-    districts = []
+    districts: list[dict] = []
     for piece in polygons_of(snap(box(*bounds).difference(streets))):
         is_outside = piece.intersects(box(*bounds).exterior)
         if is_outside or piece.area < _LEAST_BLOCK:
@@ -145,7 +150,7 @@ def _plan(network: RoadNetwork, seed: int) -> dict:
     districts.append({"name": "outskirts", **templates["outskirts"]})
     return {
         "seed": seed,
-        "bounds": bounds,
+        "bounds": list(bounds),
         "cars": templates["cars"],
         "street": templates["street"],
         "districts": districts,

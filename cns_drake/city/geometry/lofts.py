@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cns_drake.city.geometry.mesh import Mesh
 
@@ -13,7 +12,7 @@ from cns_drake.city.geometry.mesh import Mesh
 _PLANE_TOLERANCE = 5e-4
 
 
-def loft(sections) -> Mesh:
+def loft(sections: ArrayLike) -> Mesh:
     """Returns the closed skin over a row of cross sections.
 
     Args:
@@ -38,7 +37,7 @@ def loft(sections) -> Mesh:
     return Mesh(vertices, tuple(faces))
 
 
-def tube(points, radii: Sequence[float], sides: int) -> Mesh:
+def tube(points: ArrayLike, radii: ArrayLike, sides: int) -> Mesh:
     """Returns a closed tube along a gently bent path.
 
     All rings are parallel (perpendicular to the chord of the path), so
@@ -46,7 +45,7 @@ def tube(points, radii: Sequence[float], sides: int) -> Mesh:
 
     Args:
         points: (S, 3) centres of the rings [m].
-        radii: radius of each ring [m].
+        radii: (S,) radius of each ring [m].
         sides: corners of a ring.
     """
     points = np.asarray(points, dtype=float)
@@ -61,7 +60,7 @@ def tube(points, radii: Sequence[float], sides: int) -> Mesh:
     return loft(points[:, None] + np.asarray(radii)[:, None, None] * ring)
 
 
-def lathe(profile, sides: int) -> Mesh:
+def lathe(profile: ArrayLike, sides: int) -> Mesh:
     """Returns the closed solid of revolution about z of a profile.
 
     Args:
@@ -78,7 +77,7 @@ def lathe(profile, sides: int) -> Mesh:
     return loft(sections)
 
 
-def prism(outline, bottom: float, top: float) -> Mesh:
+def prism(outline: ArrayLike, bottom: float, top: float) -> Mesh:
     """Returns a vertical prism over a convex counter-clockwise outline.
 
     Args:
@@ -95,7 +94,7 @@ def prism(outline, bottom: float, top: float) -> Mesh:
     )
 
 
-def side_prism(outline, right: float, left: float) -> Mesh:
+def side_prism(outline: ArrayLike, right: float, left: float) -> Mesh:
     """Returns a prism over a convex outline in the x-z plane.
 
     Args:
@@ -119,7 +118,7 @@ def along_y(mesh: Mesh) -> Mesh:
     return Mesh(mesh.vertices[:, [1, 2, 0]], mesh.faces)
 
 
-def beam(start, end, width: float, depth: float) -> Mesh:
+def beam(start: ArrayLike, end: ArrayLike, width: float, depth: float) -> Mesh:
     """Returns a straight bar of rectangular section between two points.
 
     Args:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 # Coordinates are stored in whole millimetres: far below LiDAR precision, and
 # it keeps the files small and equal from machine to machine.
@@ -39,7 +40,9 @@ class Mesh:
             dtype=np.int32,
         ).reshape(-1, 3)
 
-    def moved(self, translation=(0.0, 0.0, 0.0), yaw: float = 0.0) -> Mesh:
+    def moved(
+        self, translation: ArrayLike = (0.0, 0.0, 0.0), yaw: float = 0.0
+    ) -> Mesh:
         """Returns the mesh rotated about z by `yaw`, then translated."""
         c, s = np.cos(yaw), np.sin(yaw)
         R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -69,7 +72,8 @@ def _number(value: float) -> str:
 
 def merge_meshes(*meshes: Mesh) -> Mesh:
     """Returns one mesh that holds the given ones."""
-    vertices, faces, offset = [np.zeros((0, 3))], [], 0
+    vertices, offset = [np.zeros((0, 3))], 0
+    faces: list[tuple[int, ...]] = []
     for mesh in meshes:
         vertices.append(mesh.vertices)
         faces.extend(tuple(i + offset for i in face) for face in mesh.faces)
@@ -77,7 +81,7 @@ def merge_meshes(*meshes: Mesh) -> Mesh:
     return Mesh(np.concatenate(vertices), tuple(faces))
 
 
-def box_mesh(size, center=(0.0, 0.0, 0.0)) -> Mesh:
+def box_mesh(size: ArrayLike, center: ArrayLike = (0.0, 0.0, 0.0)) -> Mesh:
     """Returns an axis-aligned box of the given size [m]."""
     half = np.asarray(size, dtype=float) / 2
     corners = np.array(

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 from shapely.geometry import MultiPoint, Polygon
 
 from cns_drake.city.geometry.mesh import Mesh, box_mesh
@@ -45,7 +46,11 @@ class Builder:
 
 
 def post(
-    name: str, radius: float, height: float, xy=(0.0, 0.0), rgb=None
+    name: str,
+    radius: float,
+    height: float,
+    xy: tuple[float, float] = (0.0, 0.0),
+    rgb: tuple[float, float, float] | None = None,
 ) -> Part:
     """Returns an upright cylinder from below the ground to `height` [m]."""
     return Part(
@@ -56,7 +61,13 @@ def post(
     )
 
 
-def bar(name: str, start, end, radius: float, rgb=None) -> Part:
+def bar(
+    name: str,
+    start: ArrayLike,
+    end: ArrayLike,
+    radius: float,
+    rgb: tuple[float, float, float] | None = None,
+) -> Part:
     """Returns a cylinder between two points [m]."""
     start, end = np.asarray(start, float), np.asarray(end, float)
     along = end - start
@@ -66,27 +77,44 @@ def bar(name: str, start, end, radius: float, rgb=None) -> Part:
     return Part(
         name,
         CylinderShape(radius, length),
-        xyz=tuple(float(x) for x in (start + end) / 2),
+        xyz=triple((start + end) / 2),
         rpy=(0.0, pitch, yaw),
         rgb=rgb,
     )
 
 
-def block(name: str, size, center, yaw: float = 0.0, rgb=None) -> Part:
+def block(
+    name: str,
+    size: Iterable[float],
+    center: Iterable[float],
+    yaw: float = 0.0,
+    rgb: tuple[float, float, float] | None = None,
+) -> Part:
     """Returns a box of the given size about `center` [m]."""
     return Part(
         name,
-        BoxShape(tuple(map(float, size))),
-        xyz=tuple(map(float, center)),
+        BoxShape(triple(size)),
+        xyz=triple(center),
         rpy=(0.0, 0.0, float(yaw)),
         rgb=rgb,
     )
 
 
-def single(mesh_name: str, mesh: Mesh, rgb, scale=(1.0, 1.0, 1.0)) -> Model:
+def single(
+    mesh_name: str,
+    mesh: Mesh,
+    rgb: tuple[float, float, float],
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0),
+) -> Model:
     """Returns a model of one mesh."""
-    part = Part("body", MeshShape(mesh_name, tuple(scale)), rgb=rgb)
+    part = Part("body", MeshShape(mesh_name, scale), rgb=rgb)
     return assemble((part,), {mesh_name: mesh})
+
+
+def triple(values: Iterable[float]) -> tuple[float, float, float]:
+    """Returns three numbers, of an array for instance, as Python's."""
+    x, y, z = values
+    return float(x), float(y), float(z)
 
 
 def assemble(
@@ -143,7 +171,7 @@ def part_triangles(
     return local @ rotation(part.rpy).T + part.xyz, mesh.triangles()
 
 
-def rotation(rpy) -> np.ndarray:
+def rotation(rpy: tuple[float, float, float]) -> np.ndarray:
     """Returns R = Rz(yaw) Ry(pitch) Rx(roll), as in SDF."""
     (cr, sr), (cp, sp), (cy, sy) = ((np.cos(a), np.sin(a)) for a in rpy)
     return np.array(

@@ -14,7 +14,7 @@ class Occupancy:
     one vectorised comparison, and only those are checked exactly.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._geometries: list[BaseGeometry] = []
         self._bounds = np.zeros((64, 4))
 

@@ -80,13 +80,15 @@ def surface_mesh(
         spacing: where positive, the polygons are first cut into squares of
             this size [m], so that the mesh can follow a height map.
     """
-    squares, pieces = np.zeros((0, 4, 2)), [geometry]
+    squares = np.zeros((0, 4, 2))
+    pieces: list[BaseGeometry | None] = [geometry]
     if spacing > 0:
         squares, pieces = _cut_into_squares(geometry, spacing)
     is_plane = iter(_are_planes(squares, height))
     whole = iter(squares)
     halves = triangulate(box(0, 0, spacing, spacing))
-    corners, faces = [], []
+    corners: list[np.ndarray] = []
+    faces: list[tuple[int, ...]] = []
 
     def add(ring: np.ndarray) -> None:
         faces.append(tuple(range(len(corners), len(corners) + len(ring))))
@@ -105,7 +107,9 @@ def surface_mesh(
     return Mesh(np.column_stack([xy, _heights(xy, height)]), tuple(faces))
 
 
-def _faces(geometry: BaseGeometry, height: HeightMap | float):
+def _faces(
+    geometry: BaseGeometry, height: HeightMap | float
+) -> Iterator[np.ndarray]:
     """Yields the corners of the faces that polygons are cut into."""
     for polygon in polygons_of(geometry):
         if _is_convex_quad(polygon):

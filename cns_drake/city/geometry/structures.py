@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import math
 
 from shapely.affinity import affine_transform
-from shapely.geometry import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry.mesh import Mesh
 
@@ -75,7 +75,7 @@ class Model:
 
     parts: tuple[Part, ...]
     meshes: dict[str, Mesh]
-    footprint: Polygon | MultiPolygon
+    footprint: BaseGeometry
 
 
 @dataclass(frozen=True)
@@ -99,13 +99,15 @@ class Structure:
     tags: tuple[str, ...] = field(default=())
 
     @property
-    def footprint_W(self) -> Polygon | MultiPolygon:
+    def footprint_W(self) -> BaseGeometry:
         """The ground area of the model, in the world [m]."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         x, y, _ = self.xyz
         return affine_transform(self.model.footprint, [c, -s, s, c, x, y])
 
-    def p_WP(self, p_SP) -> tuple[float, float, float]:
+    def p_WP(
+        self, p_SP: tuple[float, float, float]
+    ) -> tuple[float, float, float]:
         """Returns the position in the world of a point P given in S [m]."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         x, y, z = p_SP

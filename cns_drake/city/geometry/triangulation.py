@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 import shapely
-from shapely.geometry import Polygon
+from shapely.geometry import LinearRing, Polygon
 
 _MM = 1000.0
 # A corner or point as whole millimetres.
@@ -45,7 +45,7 @@ def triangulate(polygon: Polygon) -> np.ndarray:
     return np.array(triangles, dtype=float).reshape(-1, 3, 2) / _MM
 
 
-def _ring(ring) -> list[_Point]:
+def _ring(ring: LinearRing) -> list[_Point]:
     """Returns a ring's corners without repetitions, from the least one on."""
     xy = np.array(ring.coords)[:-1, :2]
     points = [tuple(p) for p in np.rint(xy * _MM).astype(int).tolist()]
@@ -175,13 +175,15 @@ def _cut_ears(ring: list[_Point]) -> list[tuple[_Point, _Point, _Point]]:
             ):
                 return triangles
             raise ValueError("the polygon crosses itself")
-    last = tuple(ring[i] for i in left)
-    if _cross(*last) > 0:
-        triangles.append(last)
+    first, second, third = (ring[i] for i in left)
+    if _cross(first, second, third) > 0:
+        triangles.append((first, second, third))
     return triangles
 
 
-def _is_ear(points: np.ndarray, left: list[int], a, b, c) -> bool:
+def _is_ear(
+    points: np.ndarray, left: list[int], a: int, b: int, c: int
+) -> bool:
     """Tells whether the corner b is convex and nothing lies in its ear."""
     pa, pb, pc = points[[a, b, c]]
     if _cross(pa, pb, pc) <= 0:

@@ -78,11 +78,6 @@ def share_out(
     return districts
 
 
-def corners_area(corners: list[tuple[float, float]] | None) -> Polygon | None:
-    """Returns the polygon of a plan's corners, or None without corners."""
-    return None if corners is None else Polygon(corners)
-
-
 def _block_at(free: BaseGeometry, point: Point) -> BaseGeometry:
     for piece in polygons_of(free):
         if piece.contains(point):
@@ -90,7 +85,7 @@ def _block_at(free: BaseGeometry, point: Point) -> BaseGeometry:
     return Polygon()
 
 
-def _polygon(corners, field: str) -> Polygon:
+def _polygon(corners: list[tuple[float, float]], field: str) -> Polygon:
     polygon = Polygon(corners) if len(corners) >= 3 else Polygon()
     if polygon.is_empty or not polygon.is_valid:
         raise InputError(f"{field}: the corners make no simple polygon")

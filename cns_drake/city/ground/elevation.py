@@ -59,7 +59,7 @@ class LevelGround:
         """Makes level ground at a height [m]."""
         self._height = height
 
-    def __call__(self, x, y) -> np.ndarray:
+    def __call__(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Returns the (N,) heights at points in W [m]."""
         return np.full(np.shape(x), self._height)
 
@@ -100,7 +100,8 @@ class SlopingGround:
         self._streets = streets
         shapely.prepare(streets)
         self._edges = _segments(streets)
-        self._edge_tree = shapely.STRtree(shapely.linestrings(self._edges))
+        edges = np.asarray(shapely.linestrings(self._edges))
+        self._edge_tree = shapely.STRtree(edges)
         self._pad_tree = shapely.STRtree([pad.area for pad in self.pads])
         self._pad_heights = np.array([pad.height for pad in self.pads])
         x0, y0, x1, y1 = bounds
@@ -108,7 +109,7 @@ class SlopingGround:
         self._y = _nodes(y0, y1)
         self._z = self._field()
 
-    def __call__(self, x, y) -> np.ndarray:
+    def __call__(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Returns the (N,) heights at points in W [m]."""
         x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
         z = self._interpolate(x, y)
@@ -122,9 +123,11 @@ class SlopingGround:
         heights = self._surface.heights(np.column_stack([x, y]))
         return heights + self._kerb_height
 
-    def _drawn(self, x, y, field: np.ndarray) -> np.ndarray:
+    def _drawn(
+        self, x: np.ndarray, y: np.ndarray, field: np.ndarray
+    ) -> np.ndarray:
         """Returns the field drawn to the streets and pads nearby."""
-        points = shapely.points(x, y)
+        points = np.asarray(shapely.points(x, y))
         weight = np.full(len(x), 1 / _REACH)
         total = field * weight
         near, edge = self._edge_tree.query_nearest(
@@ -140,7 +143,7 @@ class SlopingGround:
             near, pad = self._pad_tree.query(
                 points, predicate="dwithin", distance=_REACH
             )
-            areas = self._pad_tree.geometries[pad]
+            areas: np.ndarray = self._pad_tree.geometries[pad]
             gain = _gain(shapely.distance(points[near], areas))
             # Of pads that touch a point only the first counts.
             order = np.lexsort((pad, near))
@@ -183,13 +186,16 @@ class SlopingGround:
         return lower * (1 - v) + upper * v
 
 
+Ground = LevelGround | SlopingGround
+
+
 def make_ground(
     surface: RoadSurface,
     kerb_height: float,
     streets: BaseGeometry,
     bounds: tuple[float, float, float, float],
     pads: Sequence[Pad] = (),
-) -> LevelGround | SlopingGround:
+) -> Ground:
     """Returns level ground where all roads and pads are level, else slopes.
 
     Args:

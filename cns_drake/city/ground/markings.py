@@ -12,7 +12,7 @@ from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.ground.streets import as_structure
 from cns_drake.roads.centreline import sample_stations
 from cns_drake.roads.network import RoadNetwork
-from cns_drake.roads.road import Road
+from cns_drake.roads.road import ENDS, Direction, End, Road
 
 _RGB = (0.80, 0.79, 0.74)
 # Paint lies this high, so that it is not in one plane with the road [m].
@@ -41,7 +41,7 @@ def marking_structure(network: RoadNetwork) -> Structure:
             *_lane_lines(road),
             *(
                 strip
-                for end in ("start", "end")
+                for end in ENDS
                 if _is_junction(network, road, end)
                 for strip in _end_marks(road, end)
             ),
@@ -51,7 +51,7 @@ def marking_structure(network: RoadNetwork) -> Structure:
     return as_structure("markings", "road", pieces, network.lane_area(), _RGB)
 
 
-def _is_junction(network: RoadNetwork, road: Road, end: str) -> bool:
+def _is_junction(network: RoadNetwork, road: Road, end: End) -> bool:
     """Tells a junction from a place where one road merely goes on."""
     return len(network.junctions[getattr(road, end)].arms) > 2
 
@@ -78,7 +78,7 @@ def _lane_lines(road: Road) -> Iterator[tuple[float, float, float, float]]:
 
 
 def _end_marks(
-    road: Road, end: str
+    road: Road, end: End
 ) -> Iterator[tuple[float, float, float, float]]:
     """Yields the strips of a crossing and the stop line behind it."""
     edge = road.half_width
@@ -86,7 +86,7 @@ def _end_marks(
         # A median may reach into the crossing: its bars stay away.
         if not road.median or abs(right + _BAR / 2) > road.median / 2 + _BAR:
             yield *_from_end(road, end, _CROSSING), right, right + _BAR
-    incoming = "forward" if end == "end" else "backward"
+    incoming: Direction = "forward" if end == "end" else "backward"
     count = road.lanes[incoming]
     if count:
         offsets = [
@@ -105,7 +105,7 @@ def _across(offset: float) -> tuple[float, float]:
 
 
 def _from_end(
-    road: Road, end: str, distances: tuple[float, float]
+    road: Road, end: End, distances: tuple[float, float]
 ) -> tuple[float, float]:
     near, far = distances
     if end == "start":

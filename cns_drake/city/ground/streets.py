@@ -108,7 +108,7 @@ def ground_structure(
     name: str,
     semantic_class: str,
     area: BaseGeometry,
-    height,
+    height: HeightMap | float,
     rgb: tuple[float, float, float],
     spacing: float = 0.0,
 ) -> Structure:
@@ -164,16 +164,23 @@ def _surface(
     pieces = {}
     for part, piece, top, spacing in _street_tiles(area, height):
         pieces[part] = surface_mesh(piece, top, spacing)
-        if edge is not None and spacing > 0:
-            rim = piece.buffer(1.0, join_style="mitre").difference(piece)
-            stones = wall_mesh(
-                shapely.segmentize(rim, spacing),
-                lambda x, y, top=top: top(x, y) - _EDGING,
-                top,
-                along=edge.intersection(piece.buffer(_NEAR)).buffer(_NEAR),
-            )
+        if edge is not None and callable(top):
+            stones = _edging(piece, top, spacing, edge)
             pieces[part] = merge_meshes(pieces[part], stones)
     return as_structure(name, semantic_class, pieces, area, rgb)
+
+
+def _edging(
+    piece: BaseGeometry, top: HeightMap, spacing: float, edge: BaseGeometry
+) -> Mesh:
+    """Returns the stones along the part of an edge that borders a tile."""
+    rim = piece.buffer(1.0, join_style="mitre").difference(piece)
+    return wall_mesh(
+        shapely.segmentize(rim, spacing),
+        lambda x, y: top(x, y) - _EDGING,
+        top,
+        along=edge.intersection(piece.buffer(_NEAR)).buffer(_NEAR),
+    )
 
 
 def _kerb_structure(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 import math
 
@@ -21,7 +21,7 @@ from cns_drake.city.geometry.polygons import (
 )
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.ground.districts import District
-from cns_drake.city.ground.elevation import LevelGround, SlopingGround
+from cns_drake.city.ground.elevation import Ground
 from cns_drake.city.ground.streets import TILE, as_structure, ground_structure
 
 # Kind of ground -> semantic class and colour.
@@ -76,10 +76,10 @@ class GroundShape:
 
     def __init__(
         self,
-        base: LevelGround | SlopingGround,
+        base: Ground,
         districts: Iterable[District],
         buildings: BaseGeometry,
-        rng_of,
+        rng_of: Callable[[str], np.random.Generator],
     ):
         """Shapes the ground around what is built.
 
@@ -182,7 +182,7 @@ def _slope(
     return as_structure(name, semantic_class, pieces, area, rgb)
 
 
-def _fall(area: BaseGeometry, base: SlopingGround) -> float:
+def _fall(area: BaseGeometry, base: Ground) -> float:
     """Returns the difference between the heights on an area's outline [m]."""
     outline = shapely.segmentize(area, _SPACING)
     return float(np.ptp(base(*shapely.get_coordinates(outline).T)))

@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.city.buildings import ARCHETYPES, sample
 from cns_drake.city.buildings.parts.site import Site
 from cns_drake.city.geometry.structures import Structure
-from cns_drake.city.ground.districts import District, corners_area
+from cns_drake.city.ground.districts import District
 from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.frontage import Lot, lines_along, lot_at
 from cns_drake.city.plan.city_plan import BuildingPlan, RowPlan
@@ -144,9 +144,9 @@ def _single_house(
             f"{fault_at}.archetype: unknown archetype {plan.archetype}"
         )
     footprint = (
-        Polygon(plan.outline)
-        if plan.outline is not None
-        else Lot(0.0, 0.0, 0.0, *plan.size).footprint
+        Lot(0.0, 0.0, 0.0, *plan.size).footprint
+        if plan.size is not None
+        else Polygon(plan.outline)
     )
     yaw = math.radians(plan.yaw_deg)
     c, s = math.cos(yaw), math.sin(yaw)
@@ -168,9 +168,9 @@ def _row_houses(
 
     Rows keep to the district's own ground: a patch is there to stay open.
     """
-    area = district.grounds[district.plan.ground]
+    area: BaseGeometry = district.grounds[district.plan.ground]
     if row.within is not None:
-        area = area.intersection(corners_area(row.within))
+        area = area.intersection(Polygon(row.within))
     # Lots that touch the rim of the area must not fail by rounding.
     limit = area.buffer(0.05)
     houses: list[_House] = []

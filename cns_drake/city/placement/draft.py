@@ -16,7 +16,7 @@ from shapely.ops import unary_union
 from cns_drake.city.geometry.occupancy import Occupancy
 from cns_drake.city.geometry.polygons import HeightMap, snap
 from cns_drake.city.geometry.structures import MeshShape, Model, Structure
-from cns_drake.city.ground.elevation import LevelGround
+from cns_drake.city.ground.elevation import Ground, LevelGround
 from cns_drake.city.ground.streets import kerb_height
 from cns_drake.roads.network import RoadNetwork
 
@@ -47,7 +47,7 @@ class Draft:
                 [network.carriageway(), network.sidewalks(), network.medians()]
             )
         )
-        self.base: HeightMap = LevelGround(kerb_height(network))
+        self.base: Ground = LevelGround(kerb_height(network))
         self.structures: list[Structure] = []
         self.ground_height: HeightMap | None = None
         self._seed = seed
@@ -160,6 +160,7 @@ class Draft:
         fall = self._fall(footprint)
         if fall > _STEEPEST:
             return None
+        assert self.ground_height is not None, "the ground has no shape yet"
         z = float(self.ground_height(np.array([x]), np.array([y]))[0])
         structure = replace(structure, xyz=(x, y, round(z - fall / 2, 3)))
         self._occupancy.add(footprint)

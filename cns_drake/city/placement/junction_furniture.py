@@ -10,7 +10,7 @@ from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.naming import name_stem
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.roads.network import Arm, Junction
-from cns_drake.roads.road import Road
+from cns_drake.roads.road import Direction, Road
 
 # Distance of posts from the kerb [m].
 _FROM_KERB = 0.7
@@ -36,8 +36,8 @@ def _furnish_arm(
     draft: Draft, junction: Junction, arm: Arm, rng: np.random.Generator
 ) -> None:
     road = draft.network.roads[arm.road]
-    incoming = "forward" if arm.end == "end" else "backward"
-    outgoing = "backward" if arm.end == "end" else "forward"
+    incoming: Direction = "forward" if arm.end == "end" else "backward"
+    outgoing: Direction = "backward" if arm.end == "end" else "forward"
     tags = ("junction", junction.name)
     if len(junction.arms) < 3:
         return

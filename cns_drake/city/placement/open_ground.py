@@ -8,10 +8,10 @@ import math
 
 import numpy as np
 import shapely
-from shapely.geometry import LineString
+from shapely.geometry import LineString, Polygon
 from shapely.ops import unary_union
 
-from cns_drake.city.ground.districts import District, corners_area
+from cns_drake.city.ground.districts import District
 from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.frontage import Station, station_at
 from cns_drake.city.placement.naming import name_stem
@@ -57,16 +57,16 @@ def furnish(
         rng = draft.rng(name, "object", index)
         field = f"{source}: districts.{name}.objects.{index}"
         _place_object(draft, district, plan, rng, field)
-    for index, plan in enumerate(district.plan.lines):
+    for index, line in enumerate(district.plan.lines):
         draft.open_range()
-        _place_line(draft, district, plan, draft.rng(name, "line", index))
-    for index, plan in enumerate(district.plan.parking):
+        _place_line(draft, district, line, draft.rng(name, "line", index))
+    for index, parking in enumerate(district.plan.parking):
         draft.open_range()
         rng = draft.rng(name, "parking", index)
-        _place_cars(draft, district, plan, cars, rng)
-    for index, plan in enumerate(district.plan.scatter):
+        _place_cars(draft, district, parking, cars, rng)
+    for index, scatter in enumerate(district.plan.scatter):
         draft.open_range()
-        _scatter(draft, district, plan, draft.rng(name, "scatter", index))
+        _scatter(draft, district, scatter, draft.rng(name, "scatter", index))
 
 
 def _place_object(
@@ -213,7 +213,7 @@ def _scatter(
         ]
     )
     if plan.within is not None:
-        area = area.intersection(corners_area(plan.within))
+        area = area.intersection(Polygon(plan.within))
     area = area.buffer(-plan.clearance)
     if area.is_empty:
         return

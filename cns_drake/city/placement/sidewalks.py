@@ -7,7 +7,8 @@ import math
 
 import numpy as np
 import shapely
-from shapely.geometry import LineString
+from shapely.geometry import LineString, Polygon
+from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
 from cns_drake.city.ground.districts import District
@@ -90,9 +91,9 @@ def plant_medians(draft: Draft, plan: StreetPlan) -> None:
             s += float(rng.uniform(*plan.tree_spacing))
 
 
-def _middle_line(median) -> LineString:
+def _middle_line(median: Polygon) -> LineString:
     """Returns the long axis of a strip, without its round noses."""
-    corners = np.array(median.minimum_rotated_rectangle.exterior.coords)[:4]
+    corners = shapely.get_coordinates(median.minimum_rotated_rectangle)[:4]
     sides = np.roll(corners, -1, axis=0) - corners
     lengths = np.hypot(*sides.T)
     short = int(np.argmin(lengths[:2]))
@@ -108,7 +109,7 @@ def _walk(
     districts: Sequence[District],
     task: str,
     line: LineString,
-    keep_off,
+    keep_off: BaseGeometry,
     rng: np.random.Generator,
 ) -> None:
     """Walks along one sidewalk and places the things of one task."""

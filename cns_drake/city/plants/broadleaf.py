@@ -78,7 +78,7 @@ def _stem_axis(rng: np.random.Generator, form: BroadleafForm) -> np.ndarray:
     return axis
 
 
-def _at_height(stem: np.ndarray, z) -> np.ndarray:
+def _at_height(stem: np.ndarray, z: float | np.ndarray) -> np.ndarray:
     """Returns the points of the stem at the given heights, (..., 3)."""
     return np.stack(
         [np.interp(z, stem[:, 2], stem[:, k]) for k in range(2)]

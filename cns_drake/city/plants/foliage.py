@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cns_drake.city.geometry.mesh import Mesh
 
@@ -11,13 +12,19 @@ from cns_drake.city.geometry.mesh import Mesh
 _GRID = 100.0
 
 
-def unit(vector) -> np.ndarray:
+def unit(vector: ArrayLike) -> np.ndarray:
     """Returns the vector(s) divided by the length along the last axis."""
     vector = np.asarray(vector, dtype=float)
     return vector / np.linalg.norm(vector, axis=-1, keepdims=True)
 
 
-def leaves(base, direction, normal, length, width) -> Mesh:
+def leaves(
+    base: ArrayLike,
+    direction: ArrayLike,
+    normal: ArrayLike,
+    length: ArrayLike,
+    width: ArrayLike,
+) -> Mesh:
     """Returns one rhombus per row.
 
     Args:
@@ -29,7 +36,7 @@ def leaves(base, direction, normal, length, width) -> Mesh:
     """
     base = np.round(np.asarray(base, float) * _GRID)
     direction = unit(direction)
-    across = unit(np.cross(normal, direction))
+    across = unit(np.cross(np.asarray(normal, float), direction))
     along = direction * np.reshape(length, (-1, 1)) / 2
     across = across * np.reshape(width, (-1, 1)) / 2
     left = np.round((along + across) * _GRID)
@@ -43,8 +50,8 @@ def leaves(base, direction, normal, length, width) -> Mesh:
 
 def tufts(
     rng: np.random.Generator,
-    centers,
-    axes,
+    centers: ArrayLike,
+    axes: ArrayLike,
     leaf_count: int,
     length: float,
     width: float,

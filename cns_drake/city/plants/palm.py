@@ -49,7 +49,9 @@ def grow_palm(rng: np.random.Generator) -> tuple[Mesh, Mesh]:
     return merge_meshes(*wood), fronds
 
 
-def _leaflets(rng: np.random.Generator, rib: np.ndarray, out: np.ndarray):
+def _leaflets(
+    rng: np.random.Generator, rib: np.ndarray, out: np.ndarray
+) -> list[np.ndarray]:
     """Returns the leaflets along one rib, as the arguments of `leaves`."""
     at = np.linspace(0.2, 0.99, _LEAFLETS)
     base = np.column_stack(

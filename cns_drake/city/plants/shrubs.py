@@ -9,7 +9,12 @@ import numpy as np
 
 from cns_drake.city.geometry.lofts import lathe, loft, tube
 from cns_drake.city.geometry.mesh import Mesh, box_mesh, merge_meshes
-from cns_drake.city.geometry.object_parts import ROOT_DEPTH, Builder, assemble
+from cns_drake.city.geometry.object_parts import (
+    ROOT_DEPTH,
+    Builder,
+    assemble,
+    triple,
+)
 from cns_drake.city.geometry.structures import MeshShape, Model, Part
 from cns_drake.city.plants.foliage import keep_above, tufts
 
@@ -114,14 +119,20 @@ def _draw_shrub(rng: np.random.Generator) -> tuple[str, Mesh]:
     return f"shrub_{string.ascii_lowercase[variant]}", _shrub(variant)
 
 
-def _leafy(rng: np.random.Generator, name, mesh_name, scale, xyz) -> Part:
+def _leafy(
+    rng: np.random.Generator,
+    name: str,
+    mesh_name: str,
+    scale: tuple[float, float, float],
+    xyz: tuple[float, float, float],
+) -> Part:
     green = np.array((0.3, 0.44, 0.22)) * rng.uniform(0.85, 1.15, 3)
     return Part(
         name,
-        MeshShape(mesh_name, tuple(round(float(s), 3) for s in scale)),
-        xyz=tuple(float(x) for x in xyz),
+        MeshShape(mesh_name, triple(round(float(s), 3) for s in scale)),
+        xyz=triple(xyz),
         rpy=(0.0, 0.0, round(float(rng.uniform(-np.pi, np.pi)), 3)),
-        rgb=tuple(green.round(3).tolist()),
+        rgb=triple(green.round(3)),
     )
 
 

@@ -8,7 +8,7 @@ import string
 import numpy as np
 
 from cns_drake.city.geometry.mesh import Mesh
-from cns_drake.city.geometry.object_parts import Builder, assemble
+from cns_drake.city.geometry.object_parts import Builder, assemble, triple
 from cns_drake.city.geometry.structures import MeshShape, Model, Part
 from cns_drake.city.plants.tree_species import SPECIES
 
@@ -58,7 +58,7 @@ def tree(
     up = height / max(m.vertices[:, 2].max() for m in meshes.values())
     # Tall trees are wider too, but less than in proportion.
     across = up**0.7 * stretch
-    scale = tuple(round(float(s), 3) for s in (*across, up))
+    scale = triple(round(float(s), 3) for s in (*across, up))
     wood, crown = meshes
     rgb = np.clip(kind.leaf_rgb * tint, 0, 1)
     rpy = (0.0, 0.0, round(yaw, 3))
@@ -68,7 +68,7 @@ def tree(
             "crown",
             MeshShape(crown, scale),
             rpy=rpy,
-            rgb=tuple(round(float(c), 3) for c in rgb),
+            rgb=triple(round(float(c), 3) for c in rgb),
         ),
     )
     return assemble(parts, meshes)

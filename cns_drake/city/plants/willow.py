@@ -21,12 +21,12 @@ def grow_willow(rng: np.random.Generator) -> tuple[Mesh, Mesh]:
     fork = np.append(0.5 * lean, 2.3)
     wood = [
         tube(
-            [(0, 0, -0.5), (0, 0, 0), (*(0.2 * lean), 1.2), fork],
+            np.array([(0, 0, -0.5), (0, 0, 0), (*(0.2 * lean), 1.2), fork]),
             (0.46, 0.42, 0.33, 0.36),
             8,
         )
     ]
-    limbs = []
+    nodes_of_limbs = []
     for k in range(7):
         angle = 2 * np.pi * (k + rng.uniform(-0.25, 0.25)) / 7
         out = np.array([np.cos(angle), np.sin(angle), 0.0])
@@ -37,8 +37,8 @@ def grow_willow(rng: np.random.Generator) -> tuple[Mesh, Mesh]:
             + (0, 0, rng.uniform(6.2, 7.6))
         )
         wood.append(tube([fork, inner, outer], (0.2, 0.13, 0.04), 5))
-        limbs += [inner, 0.5 * (inner + outer), outer]
-    limbs = np.array(limbs)
+        nodes_of_limbs += [inner, 0.5 * (inner + outer), outer]
+    limbs = np.array(nodes_of_limbs)
     base, direction, normal = [], [], []
     for k in range(_STRANDS):
         # Even over the dome: equal areas, golden angle.

@@ -13,6 +13,10 @@ import csv
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from evaluation.recognition.metrics import Mode
 
 
 @dataclass(frozen=True)
@@ -35,9 +39,15 @@ def tcr_values() -> dict[tuple[str, str, str], float]:
     }
 
 
+def tcr_between(map_name: str, first: str, second: str) -> float:
+    """Returns the TCR_sym of two sequences, in either order."""
+    earlier, later = sorted((first, second))
+    return tcr_values()[map_name, earlier, later]
+
+
 @cache
 def recognition_values() -> dict[
-    tuple[str, str, str, str, str], PaperRecognition
+    tuple[str, str, str, str, Mode], PaperRecognition
 ]:
     """Returns (map, database, query, method, mode) -> values."""
     return {
@@ -46,7 +56,7 @@ def recognition_values() -> dict[
             row["database"],
             row["query"],
             row["method"],
-            row["mode"],
+            "filtered" if row["mode"] == "filtered" else "all",
         ): PaperRecognition(
             float(row["auc"]), float(row["recall_at_1"]), float(row["f1_max"])
         )
