@@ -43,7 +43,7 @@ class Tree(NamedTuple):
     owner_of_primitive: np.ndarray
 
 
-@intrinsic
+@intrinsic  # type: ignore[untyped-decorator]  # numba has no hints.
 def _call_intersect16(
     typing_context: Any,
     function: types.Type,

@@ -58,10 +58,9 @@ class EmbreeScene:
         hits = self._flat.cast(rays, with_normals=with_normals)
         if self._curved is None:
             return hits
+        again = np.flatnonzero(hits.owner == PROXY_OWNER)
         if any(shapes.contain(rays.p_OSset) for shapes in self._near):
             again = np.arange(len(rays.d_Sset))
-        else:
-            again = np.flatnonzero(hits.owner == PROXY_OWNER)
         if len(again):
             rest = rays.select(again, rays.max_ranges_of(again))
             on_curved = self._curved.cast(rest, with_normals=with_normals)

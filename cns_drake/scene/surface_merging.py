@@ -54,8 +54,8 @@ def merge_triangles(
     Returns:
         The surface in T, and the (M,) int32 index of each of its triangles.
     """
-    vertices = [np.zeros((0, 3))]
-    triangles = [np.zeros((0, 3), np.int32)]
+    vertices: list[np.ndarray] = [np.zeros((0, 3))]
+    triangles: list[np.ndarray] = [np.zeros((0, 3), np.int32)]
     owners = [np.zeros(0, np.int32)]
     num_vertices = 0
     for index, X_TG, surface in members:

@@ -23,6 +23,7 @@ def symmetric_changes(
     """Returns (map, stage, stage) -> TCR_sym, in both orders."""
     values = {}
     for result in changes:
-        for stages in (result.stages, result.stages[::-1]):
-            values[(result.map_name, *stages)] = result.report.change.symmetric
+        value = result.report.change.symmetric
+        for first, second in (result.stages, result.stages[::-1]):
+            values[result.map_name, first, second] = value
     return values

@@ -206,8 +206,8 @@ def _match(
     min_similarity: float,
 ) -> tuple[np.ndarray, np.ndarray]:
     """See `match`; sides in units of the resolution."""
-    found_query = np.empty(1024, dtype=np.int64)
-    found_table = np.empty(1024, dtype=np.int64)
+    found_query: np.ndarray = np.empty(1024, dtype=np.int64)
+    found_table: np.ndarray = np.empty(1024, dtype=np.int64)
     num_found = 0
     for i in range(len(query_sides)):
         a, b, c = query_sides[i]

@@ -132,7 +132,7 @@ def ground_footprint(
     parts: Sequence[Part], meshes: Mapping[str, Mesh]
 ) -> Polygon:
     """Returns the convex hull, in S, of what lies below `HEADROOM`."""
-    corners = [np.zeros((0, 2))]
+    corners: list[np.ndarray] = [np.zeros((0, 2))]
     for part in parts:
         p, triangles = part_triangles(part, meshes)
         corners.append(p[p[:, 2] <= HEADROOM, :2])

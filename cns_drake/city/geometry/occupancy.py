@@ -16,7 +16,7 @@ class Occupancy:
 
     def __init__(self) -> None:
         self._geometries: list[BaseGeometry] = []
-        self._bounds = np.zeros((64, 4))
+        self._bounds: np.ndarray = np.zeros((64, 4))
 
     def add(self, geometry: BaseGeometry) -> None:
         """Takes the ground of a polygon."""

@@ -64,13 +64,13 @@ def _lane_lines(road: Road) -> Iterator[tuple[float, float, float, float]]:
         for lane in range(1, count):
             inner = road.lane_offset(direction, lane)
             outer = road.lane_offset(direction, lane + 1)
-            for s in np.arange(first, last - _DASH, _DASH + _GAP):
+            for s in np.arange(first, last - _DASH, _DASH + _GAP).tolist():
                 yield s, s + _DASH, *_across((inner + outer) / 2)
     if all(road.lanes.values()) and road.median == 0:
         between = (
             road.lane_offset("forward", 1) + road.lane_offset("backward", 1)
         ) / 2
-        stations = np.arange(first, last, _PIECE)
+        stations = np.arange(first, last, _PIECE).tolist()
         for side in (-1, 1):
             offset = between + side * _LINE_WIDTH
             for s in stations:
@@ -82,7 +82,7 @@ def _end_marks(
 ) -> Iterator[tuple[float, float, float, float]]:
     """Yields the strips of a crossing and the stop line behind it."""
     edge = road.half_width
-    for right in np.arange(-edge + 0.4, edge - _BAR, _BAR_STEP):
+    for right in np.arange(-edge + 0.4, edge - _BAR, _BAR_STEP).tolist():
         # A median may reach into the crossing: its bars stay away.
         if not road.median or abs(right + _BAR / 2) > road.median / 2 + _BAR:
             yield *_from_end(road, end, _CROSSING), right, right + _BAR
