@@ -20,6 +20,8 @@ from cns_drake.city.buildings.archetypes import ARCHETYPES
 from cns_drake.city.buildings.parts.site import Assembly, Dice, Site
 from cns_drake.city.geometry.structures import Model
 
+__all__ = ["ARCHETYPES", "sample"]
+
 # By their names: each draws the `Parameters` of its archetype, and builds it.
 _MODULES = {
     module.name: import_module(f"{room.__name__}.{module.name}")
@@ -73,4 +75,4 @@ def sample(
     parameters = module.Parameters(Dice(site, height, rng))
     assembly = Assembly(site, rng, parameters.rgb)
     module.build(parameters, assembly)
-    return Model(tuple(assembly.parts), assembly.meshes, footprint)
+    return assembly.finish(footprint)

@@ -9,7 +9,6 @@ from cns_drake.city.buildings.house_parts.openings import (
 )
 from cns_drake.city.buildings.parts import bays, massing, outlines
 from cns_drake.city.buildings.parts.facades import Arch, Patch
-from cns_drake.city.buildings.parts.materials import Materials
 from cns_drake.city.buildings.parts.site import Assembly, Site
 from cns_drake.city.buildings.parts.wings import Roof, Wing, add_roof
 from cns_drake.city.geometry.mesh import box_mesh
@@ -19,9 +18,14 @@ HALL = Wing.at(0, 0, 20, 8, 6.0, 9.0, Roof())
 PORCH = Wing.at(8, -3, 12, 0.1, 2.5, 3.5, Roof())
 
 
-def empty_assembly(name):
-    site = Site(box(0, 0, 9, 9), name)
-    return Assembly(site, np.random.default_rng(0), rgb=(9, 9, 9))
+GROUND = box(0, 0, 9, 9)
+
+
+def assembly(name, **colours):
+    site = Site(GROUND, name)
+    result = Assembly(site, np.random.default_rng(0), rgb=(9, 9, 9))
+    result.paint(**colours)
+    return result
 
 
 def test_other_wings_hide_walls_up_to_their_tops():
@@ -65,17 +69,16 @@ def test_flat_wall_comes_below_an_arch():
 @pytest.mark.parametrize("along_y", [False, True])
 def test_gables_stand_below_the_ends_of_the_ridge(along_y):
     wing = Wing.at(0, 0, 6, 6, 4.0, 7.0, Roof("gable", along_y, 0.4, 0.3))
-    materials = Materials(walls=(1, 1, 1), roof=(0, 0, 0))
-    add_roof(materials, wing)
-    assembly = empty_assembly("h")
-    materials.finish(assembly)
-    walls = assembly.meshes["h_walls"].vertices
+    house = assembly("h", walls=(1, 1, 1), roof=(0, 0, 0))
+    add_roof(house, wing)
+    meshes = house.finish(GROUND).meshes
+    walls = meshes["h_walls"].vertices
     across = walls[:, 0] if along_y else walls[:, 1]
     ends = walls[:, 1] if along_y else walls[:, 0]
     assert set(np.round(ends, 6)) == {0.0, 6.0}
     top = walls[:, 2].argmax()
     assert across[top] == pytest.approx(3.0)
-    roof = assembly.meshes["h_roof"].vertices
+    roof = meshes["h_roof"].vertices
     reach = np.ptp(roof, axis=0)
     assert reach[int(along_y)] == pytest.approx(6.6)
     assert reach[int(not along_y)] == pytest.approx(6.8)
@@ -91,15 +94,14 @@ def test_a_mirrored_wing():
 
 def test_dormers_stay_below_the_ridge_and_on_the_slope():
     for kind in ("gable", "shed", "flat"):
-        materials = Materials(walls=(1, 1, 1), glass=(0, 0, 1), roof=(1, 0, 0))
-        dormers.add_dormers(materials, HALL, 2.0, 18.0, 3, kind)
-        assembly = empty_assembly("d")
-        materials.finish(assembly)
-        corners = np.vstack([m.vertices for m in assembly.meshes.values()])
+        house = assembly("d", walls=(1, 1, 1), glass=(0, 0, 1), roof=(1, 0, 0))
+        dormers.add_dormers(house, HALL, 2.0, 18.0, 3, kind)
+        meshes = house.finish(GROUND).meshes
+        corners = np.vstack([m.vertices for m in meshes.values()])
         assert corners[:, 2].max() < 9.0
         assert corners[:, 0].min() > 2.0
         assert corners[:, 0].max() < 18.0
-        panes = assembly.meshes["d_glass"]
+        panes = meshes["d_glass"]
         assert len(panes.faces) == 3
         # The slope rises from 6.2 m above the front to the ridge at y = 4.
         slope = 6.2 + (9.0 - 6.2) * panes.vertices[:, 1] / 4.0
@@ -108,11 +110,9 @@ def test_dormers_stay_below_the_ridge_and_on_the_slope():
 
 def test_no_dormer_on_a_flat_slope():
     wing = Wing.at(0, 0, 20, 16, 6.0, 8.0, Roof())
-    materials = Materials(walls=(1, 1, 1))
-    dormers.add_dormers(materials, wing, 0.0, 20.0, 3, "gable")
-    assembly = empty_assembly("d")
-    materials.finish(assembly)
-    assert assembly.parts == []
+    house = assembly("d", walls=(1, 1, 1))
+    dormers.add_dormers(house, wing, 0.0, 20.0, 3, "gable")
+    assert house.finish(GROUND).parts == ()
 
 
 @pytest.mark.parametrize(("height", "storeys"), [(5.0, 1), (9.0, 2), (12.5, 3)])
@@ -124,20 +124,19 @@ def test_storeys_leave_the_roof_its_pitch(height, storeys):
 
 
 def test_each_material_becomes_one_part():
-    materials = Materials(a=(1, 0, 0), b=(0, 1, 0), c=(0, 0, 1))
-    materials.add("b", box_mesh((1, 1, 1)))
-    materials.add("a", box_mesh((1, 1, 1)), box_mesh((1, 2, 3), (5, 0, 0)))
-    assembly = empty_assembly("h")
-    turned = materials.moved((1.0, 2.0, 0.0), yaw=np.pi / 2)
-    turned.finish(assembly)
-    assert [(p.name, p.rgb) for p in assembly.parts] == [
+    house = assembly("h", a=(1, 0, 0), b=(0, 1, 0), c=(0, 0, 1))
+    house.add_to("b", box_mesh((1, 1, 1)))
+    house.add_to("a", box_mesh((1, 1, 1)), box_mesh((1, 2, 3), (5, 0, 0)))
+    house.turn((1.0, 2.0, 0.0), np.pi / 2)
+    model = house.finish(GROUND)
+    assert [(p.name, p.rgb) for p in model.parts] == [
         ("a", (1, 0, 0)),
         ("b", (0, 1, 0)),
     ]
-    vertices = assembly.meshes["h_a"].vertices
+    vertices = model.meshes["h_a"].vertices
     np.testing.assert_allclose(vertices.max(axis=0), [2.0, 7.5, 1.5])
     with pytest.raises(ValueError, match="unknown material"):
-        materials.add("d", box_mesh((1, 1, 1)))
+        house.add_to("d", box_mesh((1, 1, 1)))
 
 
 def test_corners_without_neighbours_are_free():

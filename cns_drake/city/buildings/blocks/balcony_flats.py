@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+import itertools
+
 import numpy as np
 
 from cns_drake.city.buildings.parts import bays, details, massing, tiers
-from cns_drake.city.buildings.parts.facades import Band, Facade
+from cns_drake.city.buildings.parts.facades import Band, Facade, Relief
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
 from cns_drake.city.buildings.parts.site import Assembly, Dice, Site
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
@@ -44,7 +47,7 @@ class Parameters:
         stair: `slit` (a strip of glass) or `tower` (stands out in front).
     """
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         room = d.depth - _FRONT_M - 0.3
         stagger = d.pick((0.0, 0.0, 1.5, 2.4)) if room > 12.0 else 0.0
         self.height = d.height
@@ -66,62 +69,56 @@ class Parameters:
         self.rail_rgb = d.pick(_RAILS)
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the slab along the front of a rectangle."""
-    sections = _sections(p, assembly.site)
+    sections = _sections(p, out.site)
     plan, fronts = _outline(sections)
     storeys = max(2, round((p.height - 1.9) / p.storey))
     lower = p.step if p.sections > 1 and storeys > 3 else 0
     storey = (p.height - 1.9) / storeys
     walls = [_Front(p, plan, edge) for edge in fronts]
     ground = _facade(p, storey, walls, ground=True)
-    top = tiers.add_ground(assembly, plan, ground)
+    top = tiers.add_ground(out, plan, ground)
     count, per_group, exact = tiers.divided(
         (storeys - 1 - lower) * storey, storey, 5
     )
     facade = _facade(p, exact, walls)
-    top = tiers.add_storeys(assembly, plan, facade, top, count, per_group)
+    top = tiers.add_storeys(out, plan, facade, top, count, per_group)
     common = count * per_group
-    _add_balconies(assembly, p, walls, ground.height, (count, per_group, exact))
+    _add_balconies(out, p, walls, ground.height, (count, per_group, exact))
     for k, section in enumerate(sections):
         part, high = f"section_{k}", top
         if lower and k % 2 == 0:
             rows = bays.rhythm(p.pitch, [_window(p, exact)], 0.5)
             attic = Facade(exact, (), rows, (p.recess,))
             high = tiers.add_storeys(
-                assembly, section, attic, top, 1, lower, part=f"{part}_storey"
+                out, section, attic, top, 1, lower, part=f"{part}_storey"
             )
         rim = Facade(0.9, (Band(0.0, 0.15, -0.08), Band(0.75, 0.9, -0.08)))
         roof = tiers.add_crown(
-            assembly, section, rim, high, 0.6, part=f"{part}_crown",
+            out, section, rim, high, 0.6, part=f"{part}_crown",
             thickness=0.25,
         )  # fmt: skip
         items = p.roof_items[k :: p.sections]
-        equip_roof(assembly, section, roof, items, prefix=f"{part}_")
-    stairs = [
-        _stair(p, wall, ground.height + common * exact, k == 0)
-        for k, wall in enumerate(walls)
-    ]
-    assembly.add("stairs", *stairs, rgb=p.rail_rgb)
+        equip_roof(out, section, roof, items, prefix=f"{part}_")
+    high, stairs = ground.height + common * exact, []
+    for k, wall in enumerate(walls):
+        stairs += _stair(p, wall, high, k == 0)
+    out.add("stairs", *stairs, rgb=p.rail_rgb)
 
 
 def _sections(p: Parameters, site: Site) -> list[np.ndarray]:
     """Returns the rectangles of the sections, left to right."""
     x0, y0, x1, _ = site.bounds
     bounds = np.round(np.linspace(x0, x1, p.sections + 1), 2).tolist()
-    front = y0 + _FRONT_M
+    fronts = [y0 + _FRONT_M + p.stagger * (k % 2) for k in range(p.sections)]
     return [
-        massing.rectangle(
-            bounds[k],
-            round(front + p.stagger * (k % 2), 2),
-            bounds[k + 1],
-            round(front + p.stagger * (k % 2) + p.depth, 2),
-        )
-        for k in range(p.sections)
+        massing.rectangle(a, round(y, 2), b, round(y + p.depth, 2))
+        for (a, b), y in zip(itertools.pairwise(bounds), fronts, strict=True)
     ]
 
 
-def _outline(sections) -> tuple[np.ndarray, list[int]]:
+def _outline(sections: list[np.ndarray]) -> tuple[np.ndarray, list[int]]:
     """Returns the outline of all sections, and their front edges."""
     points: list[np.ndarray] = []
     fronts = []
@@ -140,7 +137,7 @@ def _outline(sections) -> tuple[np.ndarray, list[int]]:
 class _Front:
     """The front of a section: its bays, the stair's, those with balconies."""
 
-    def __init__(self, p: Parameters, plan, edge: int):
+    def __init__(self, p: Parameters, plan: np.ndarray, edge: int) -> None:
         self.edge = edge
         self.wall = details.WallFrame(plan, edge)
         self.cells = bays.stretches(self.wall.length, p.pitch, 0.5)
@@ -164,20 +161,22 @@ def _window(p: Parameters, storey: float, sill: float = 0.85) -> bays.Bay:
     return bays.window(p.window_width, sill, storey - 0.45, p.recess)
 
 
-def _facade(p, storey: float, walls: list[_Front], *, ground=False) -> Facade:
+def _facade(
+    p: Parameters, storey: float, walls: list[_Front], *, ground: bool = False
+) -> Facade:
     """Returns a storey; that of the ground has doors and a plinth."""
     window, french = _window(p, storey), _window(p, storey, 0.12)
     slit = bays.window(1.3, 0.3, storey, p.recess)
     door = bays.window(1.6, 0.0, 2.3, p.recess, mullions=1)
     by_front = {front.edge: front for front in walls}
-    small = bays.window(1.0, 1.0, storey - 0.5, p.recess)
-    blank = bays.with_middle(bays.plain, small, 2.0)
+    blank = bays.alone(bays.window(1.0, 1.0, storey - 0.5, p.recess), 2.0)
     rows = bays.rhythm(p.pitch, [window], 0.5)
 
-    def layout(edge: int, length: float):
+    def layout(edge: int, length: float) -> Sequence[Relief]:
         if edge not in by_front:
-            return rows(edge, length) if length > 15.0 else blank(edge, length)
-        front, relief = by_front[edge], []
+            return (rows if length > 15.0 else blank)(edge, length)
+        front = by_front[edge]
+        relief: list[Relief] = []
         for k, (a, b) in enumerate(front.cells):
             if k == front.middle:
                 if ground:
@@ -193,32 +192,36 @@ def _facade(p, storey: float, walls: list[_Front], *, ground=False) -> Facade:
     return Facade(round(storey, 3), (band,), layout, (p.recess,))
 
 
-def _add_balconies(assembly, p, walls, z0: float, stack) -> None:
+def _add_balconies(
+    out: Assembly,
+    p: Parameters,
+    walls: list[_Front],
+    z0: float,
+    stack: tuple[int, int, float],
+) -> None:
     """Places the balconies of a few storeys above one another."""
     groups, per_group, storey = stack
     pieces: list[Mesh] = []
+    joined = p.balconies == "ribbons"
     for front in walls:
-        joined = p.balconies == "ribbons"
         for a, b in _runs(front.cells, front.spots, joined):
             width = b - a - 0.3
             if not joined:
                 width = min(width, p.balcony_width)
             x = (a + b) / 2
-            balcony = details.balcony(
-                round(x - width / 2, 2), round(x + width / 2, 2),
-                p.balcony_reach, 0.0, p.rail,
-            )  # fmt: skip
+            ends = round(x - width / 2, 2), round(x + width / 2, 2)
+            balcony = details.balcony(*ends, p.balcony_reach, 0.0, p.rail)
             pieces += [
                 front.wall.place(balcony, k * storey) for k in range(per_group)
             ]
     if pieces:
-        assembly.stack(
-            "balconies", merge_meshes(*pieces), z0, per_group * storey, groups,
-            rgb=p.rail_rgb,
-        )  # fmt: skip
+        mesh, step = merge_meshes(*pieces), per_group * storey
+        out.stack("balconies", mesh, z0, step, groups, rgb=p.rail_rgb)
 
 
-def _runs(cells, spots, joined: bool):
+def _runs(
+    cells: list[bays.Span], spots: list[int], joined: bool
+) -> list[bays.Span]:
     """Returns the stretches with balconies, neighbours joined or not."""
     runs: list[tuple[float, float]] = []
     for k in spots:
@@ -230,23 +233,23 @@ def _runs(cells, spots, joined: bool):
     return runs
 
 
-def _stair(p: Parameters, front: _Front, top: float, highest: bool) -> Mesh:
+def _stair(
+    p: Parameters, front: _Front, top: float, highest: bool
+) -> list[Mesh]:
     """A canopy at the door, and the stair where it stands out."""
-    x = front.stair
+    x, wall = front.stair, front.wall
     pieces = [
-        massing.box(x - 1.5, x + 1.5, -0.05, 1.4, 2.55, 2.75),
-        massing.box(x - 1.4, x - 1.25, 1.1, 1.25, -0.5, 2.6, bottom=False),
-        massing.box(x + 1.25, x + 1.4, 1.1, 1.25, -0.5, 2.6, bottom=False),
+        wall.box(x - 1.5, x + 1.5, -0.05, 1.4, 2.55, 2.75),
+        wall.standing(x - 1.4, x - 1.25, 1.1, 1.25, 2.6),
+        wall.standing(x + 1.25, x + 1.4, 1.1, 1.25, 2.6),
     ]
     if p.stair == "tower":
         high = p.height if highest else top + 1.6
-        pieces.append(massing.box(x - 1.5, x + 1.5, -2.5, 0.9, 2.7, high))
+        pieces.append(wall.box(x - 1.5, x + 1.5, -2.5, 0.9, 2.7, high))
         for k in range(int((high - 4.2) / p.storey)):
             z = 3.7 + k * p.storey
-            pieces.append(
-                massing.box(x - 0.55, x + 0.55, 0.85, 0.98, z, z + 1.1)
-            )
+            pieces.append(wall.box(x - 0.55, x + 0.55, 0.85, 0.98, z, z + 1.1))
     elif highest:
         spot = (x - 2.2, x + 2.2, -5.0, -1.5)
-        pieces.append(massing.box(*spot, top - 0.1, p.height))
-    return merge_meshes(*(front.wall.place(piece) for piece in pieces))
+        pieces.append(wall.box(*spot, top - 0.1, p.height))
+    return pieces

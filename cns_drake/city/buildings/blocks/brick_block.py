@@ -22,7 +22,7 @@ _MOST_FLIGHTS = 8
 class Parameters:
     """Parameters of a brick block; lengths in metres."""
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         storey = d.uniform(3.1, 3.7)
         free = [
             k
@@ -56,95 +56,76 @@ class Parameters:
         self.rgb = d.pick(_BRICKS)
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the block on any outline."""
-    site = assembly.site
-    outline = site.outline
-    crown_height = p.parapet + 1.4
-    groups, per_group, storey = tiers.divided(
-        p.height - p.ground_height - crown_height, p.storey_height
-    )
-    front = details.WallFrame(outline, 0)
-    shops = bays.rhythm(
-        2 * p.pitch, [bays.shop_front(p.ground_height - 1.1)], margin=0.6
-    )
-    door = bays.entrance(1.8, 3.0)
-    back = bays.rhythm(
-        p.pitch, [bays.window(p.window_width, 1.4, 2.9, p.recess)], margin=0.8
-    )
-    belt = Band(p.ground_height - 1.0, p.ground_height - 0.1, -0.15)
-    ground = Facade(
-        p.ground_height,
-        (Band(0.0, 0.4, -0.08), belt),
-        bays.by_edge(
-            {0: bays.with_middle(shops, door, 3.4)},
-            shops if len(outline) > 4 else back,
-        ),
-        glass=(0.35, p.recess),
-        plain=site.blind_edges,
-    )
-    middle = front.length / 2
-    roof = details.canopy(middle - 1.5, middle + 1.5, 1.3, 3.1)
-    shades = []
-    for x0, x1 in bays.stretches(front.length, 2 * p.pitch, 0.6):
-        clear = x1 < middle - 1.7 or x0 > middle + 1.7
-        if clear and assembly.rng.random() < 0.6:
-            shade = details.awning(
-                x0 + 0.4, x1 - 0.4, 1.2, 2.6, p.ground_height - 0.9
-            )
-            shades.append(front.place(shade))
-    tiers.add_awnings(assembly, shades)
-    top = tiers.add_ground(assembly, outline, ground, [front.place(roof)])
-
+    outline, blind = out.site.outline, out.site.blind_edges
+    bottom = _add_shops(out, p)
+    room = p.height - p.ground_height - (p.parapet + 1.4)
+    groups, per_group, storey = tiers.divided(room, p.storey_height)
     sash = bays.window(
-        p.window_width,
-        p.sill,
-        min(p.head, storey - 0.5),
-        p.recess,
-        mullions=p.mullions,
-        transom=p.transom,
-        ledge=p.ledge,
-        hood=p.hood,
-    )
+        p.window_width, p.sill, min(p.head, storey - 0.5), p.recess,
+        mullions=p.mullions, transom=p.transom, ledge=p.ledge, hood=p.hood,
+    )  # fmt: skip
     layout = bays.rhythm(p.pitch, [sash], margin=0.9)
     course = Band(p.sill - 0.2, p.sill, -p.sill_course)
-    walls = Facade(
-        storey, (course,), layout, (p.recess,), plain=site.blind_edges
-    )
-    bottom = top
-    top = tiers.add_storeys(assembly, outline, walls, top, groups, per_group)
-
+    walls = Facade(storey, (course,), layout, (p.recess,), blind)
+    top = tiers.add_storeys(out, outline, walls, bottom, groups, per_group)
     if p.pilasters:
         strips = details.pilasters(
-            outline, p.pitch, 0.9, 3, 0.5, 0.2, bottom, top, site.blind_edges
+            outline, p.pitch, 0.9, 3, 0.5, 0.2, bottom, top, blind
         )
-        assembly.add("pilasters", strips)
-    crown_height = round(p.height - top, 3)
-    corbel = bays.bar(0.35, 0.0, crown_height - p.parapet - 0.9, -0.3)
-    frieze = Facade(
-        crown_height,
-        tiers.cornice(crown_height - p.parapet, p.cornice_reach),
-        bays.rhythm(p.pitch, [corbel if p.corbels else bays.blank], 0.9),
-        plain=site.blind_edges,
-    )
-    roof = tiers.add_crown(assembly, outline, frieze, top, p.parapet)
-    equip_roof(assembly, outline, roof, p.roof_items)
+        out.add("pilasters", strips)
+    crown = round(p.height - top, 3)
+    corbel = bays.bar(0.35, 0.0, crown - p.parapet - 0.9, -0.3)
+    cornice = tiers.cornice(crown - p.parapet, p.cornice_reach)
+    layout = bays.rhythm(p.pitch, [corbel if p.corbels else bays.blank], 0.9)
+    frieze = Facade(crown, cornice, layout, plain=blind)
+    roof = tiers.add_crown(out, outline, frieze, top, p.parapet)
+    equip_roof(out, outline, roof, p.roof_items)
     if p.stairs_edge is not None and groups * per_group <= _MOST_FLIGHTS:
-        _add_fire_stairs(assembly, p, site, bottom, storey, top)
+        wall = details.WallFrame(outline, p.stairs_edge)
+        _add_fire_stairs(out, p, wall, bottom, storey, top)
 
 
-def _add_fire_stairs(assembly, p, site, bottom, storey, top) -> None:
-    wall = details.WallFrame(site.outline, p.stairs_edge)
+def _add_shops(out: Assembly, p: Parameters) -> float:
+    outline, h = out.site.outline, p.ground_height
+    front = details.WallFrame(outline, 0)
+    shops = bays.rhythm(2 * p.pitch, [bays.shop_front(h - 1.1)], margin=0.6)
+    window = bays.window(p.window_width, 1.4, 2.9, p.recess)
+    back = bays.rhythm(p.pitch, [window], margin=0.8)
+    entry = bays.with_middle(shops, bays.entrance(1.8, 3.0), 3.4)
+    layout = bays.by_edge({0: entry}, shops if len(outline) > 4 else back)
+    bands = (Band(0.0, 0.4, -0.08), Band(h - 1.0, h - 0.1, -0.15))
+    glass, blind = (0.35, p.recess), out.site.blind_edges
+    middle = front.length / 2
+    cells = [
+        (a, b)
+        for a, b in bays.stretches(front.length, 2 * p.pitch, 0.6)
+        if b < middle - 1.7 or a > middle + 1.7
+    ]
+    shape = (0.4, 1.2, 2.6, h - 0.9)
+    shades = details.awnings(front, cells, out.rng, 0.6, shape)
+    tiers.add_awnings(out, shades)
+    roof = details.front_canopy(outline, 1.5, 1.3, 3.1)
+    ground = Facade(h, bands, layout, glass, blind)
+    return tiers.add_ground(out, outline, ground, [roof])
+
+
+def _add_fire_stairs(
+    out: Assembly,
+    p: Parameters,
+    wall: details.WallFrame,
+    bottom: float,
+    storey: float,
+    top: float,
+) -> None:
     if wall.length < 9.0:
         return
     x, y = wall.point(2.8 + p.stairs_at * (wall.length - 5.6), 0.0)
-    assembly.share("fire_stairs_flight", details.fire_stairs_flight())
+    out.share("fire_stairs_flight", details.fire_stairs_flight())
     scale = (1.0, 1.0, round(storey / details.FIRE_STAIRS_STOREY_M, 3))
+    shape = MeshShape("fire_stairs_flight", scale)
     for k in range(round((top - bottom) / storey) - 1):
-        assembly.place(
-            f"fire_stairs_{k}",
-            MeshShape("fire_stairs_flight", scale),
-            (x, y, bottom + k * storey),
-            wall.heading,
-            rgb=(0.2, 0.2, 0.22),
-        )
+        spot = (x, y, bottom + k * storey)
+        part = f"fire_stairs_{k}"
+        out.place(part, shape, spot, wall.heading, rgb=(0.2, 0.2, 0.22))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from cns_drake.city.buildings.archetypes import ARCHETYPES
@@ -12,10 +14,10 @@ from cns_drake.city.buildings.parts import (
     outlines,
     tiers,
 )
-from cns_drake.city.buildings.parts.facades import Band, Facade
+from cns_drake.city.buildings.parts.facades import Band, Facade, Relief
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Assembly, Dice, Site
-from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+from cns_drake.city.buildings.parts.site import Assembly, Dice
+from cns_drake.city.geometry.mesh import Mesh
 
 _STUCCOS = ((0.84, 0.78, 0.66), (0.76, 0.66, 0.56), (0.82, 0.80, 0.76))
 
@@ -30,7 +32,7 @@ class Parameters:
     1: front right) and `radius` its radius.
     """
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         side = min(d.width, d.depth)
         self.height = d.height
         self.corner = d.pick(d.site.free_corners or [0, 1])
@@ -51,94 +53,79 @@ class Parameters:
         self.roof_rgb = d.pick(((0.3, 0.42, 0.38), (0.32, 0.33, 0.36)))
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the house on a rectangle."""
-    site = assembly.site
+    site = out.site
     if p.corner not in site.free_corners:
         site = site.detached(ARCHETYPES["corner_building"].overhang)
     rectangle = site.outline
     plan = massing.rounded(rectangle, {p.corner: p.radius}, 2.8)
     blind = outlines.edges_on(plan, rectangle, site.blind_edges)
-    top = _add_shops(assembly, p, plan, blind)
-    bottom = top
-    top = _add_first_floor(assembly, p, plan, blind, top)
-    crown = p.height - p.dome_height
-    groups, per_group, storey = tiers.divided(
-        crown - 2.2 - top, p.storey_height
-    )
+    bottom = _add_shops(out, p, plan, blind)
+    top = _add_first_floor(out, p, plan, blind, bottom)
+    room = p.height - p.dome_height - 2.2 - top
+    groups, per_group, storey = tiers.divided(room, p.storey_height)
     window = bays.window(
         p.window_width, 0.8, storey - 0.7, p.recess, hood=p.hood
     )
-    course = Band(0.6, 0.8, -0.1)
-    walls = Facade(
-        storey,
-        (course,),
-        bays.rhythm(p.pitch, [window], 0.3),
-        glass=(p.recess,),
-        plain=blind,
-    )
-    top = tiers.add_storeys(assembly, plan, walls, top, groups, per_group)
+    rows = bays.rhythm(p.pitch, [window], 0.3)
+    walls = Facade(storey, (Band(0.6, 0.8, -0.1),), rows, (p.recess,), blind)
+    top = tiers.add_storeys(out, plan, walls, top, groups, per_group)
     if p.pilasters:
         strips = details.pilasters(
             plan, p.pitch, 0.3, 2, 0.5, 0.16, bottom, top, blind
         )
-        assembly.add("pilasters", strips)
+        out.add("pilasters", strips)
     eaves = Facade(2.2, tiers.cornice(1.4, p.cornice_reach), plain=blind)
-    roof = tiers.add_crown(assembly, plan, eaves, top, 0.8)
-    dome = _dome(p, plan, roof)
-    assembly.add("dome", dome, rgb=p.roof_rgb)
-    _equip(assembly, p, site, roof)
+    roof = tiers.add_crown(out, plan, eaves, top, 0.8)
+    out.add("dome", *_dome(p, plan, roof), rgb=p.roof_rgb)
+    x0, y0, x1, y1 = site.bounds
+    if y1 - y0 - 2 * p.radius > 5.0:
+        free = massing.rectangle(x0, y0 + 2 * p.radius, x1, y1)
+        equip_roof(out, free, roof, _ROOF_ITEMS)
 
 
-def _is_front(plan, edge: int) -> bool:
+def _is_front(plan: np.ndarray, edge: int) -> bool:
     """Whether a wall looks to the front or belongs to the curve."""
     along = plan[(edge + 1) % len(plan)] - plan[edge]
     return edge == 0 or (along[0] > 0.1 and abs(along[1]) > 0.1)
 
 
-def _add_shops(assembly, p: Parameters, plan, blind) -> float:
+def _add_shops(
+    out: Assembly, p: Parameters, plan: np.ndarray, blind: frozenset[int]
+) -> float:
     h = p.ground_height
-    shops = bays.rhythm(
-        2 * p.pitch,
-        [
-            bays.shop_front(h - 1.2, 0.4, pier=0.25),
-            bays.shop_front(h - 1.2, 0.4, pier=0.25, door=False),
-        ],
-        margin=0.35,
-    )
-    glazed = bays.rhythm(
-        3.0, [bays.shop_front(h - 1.2, 0.4, door=False, pier=0.15)], 0.1
-    )
-    service = bays.rhythm(
-        2.5 * p.pitch, [bays.window(1.4, 1.5, h - 1.2, 0.4)], 1.0
-    )
+    choices = [
+        bays.shop_front(h - 1.2, 0.4, pier=0.25, door=d) for d in (True, False)
+    ]
+    shops = bays.rhythm(2 * p.pitch, choices, margin=0.35)
+    pane = bays.shop_front(h - 1.2, 0.4, door=False, pier=0.15)
+    glazed = bays.rhythm(3.0, [pane], 0.1)
+    window = bays.window(1.4, 1.5, h - 1.2, 0.4)
+    service = bays.rhythm(2.5 * p.pitch, [window], 1.0)
     service = bays.with_middle(service, bays.gate(2.6, 2.9, 0.4), 3.4)
 
-    def layout(edge: int, length: float):
+    def layout(edge: int, length: float) -> Sequence[Relief]:
         if length < 3.0:
             return glazed(edge, length)
         along = plan[(edge + 1) % len(plan)] - plan[edge]
-        back = along[0] < -0.1
-        return (service if back else shops)(edge, length)
+        return (service if along[0] < -0.1 else shops)(edge, length)
 
-    ground = Facade(
-        h,
-        (Band(0.0, 0.3, -0.06), Band(h - 1.0, h - 0.2, -0.15)),
-        layout,
-        glass=(0.4,),
-        plain=blind,
-    )
+    bands = (Band(0.0, 0.3, -0.06), Band(h - 1.0, h - 0.2, -0.15))
     front = details.WallFrame(plan, 0)
-    shades = [
-        front.place(details.awning(a + 0.3, b - 0.3, 1.3, 2.7, h - 1.2))
-        for a, b in bays.stretches(front.length, 2 * p.pitch, 0.35)
-        if assembly.rng.random() < 0.5
-    ]
-    tiers.add_awnings(assembly, shades)
-    return tiers.add_ground(assembly, plan, ground)
+    cells = bays.stretches(front.length, 2 * p.pitch, 0.35)
+    shape = (0.3, 1.3, 2.7, h - 1.2)
+    tiers.add_awnings(out, details.awnings(front, cells, out.rng, 0.5, shape))
+    return tiers.add_ground(out, plan, Facade(h, bands, layout, (0.4,), blind))
 
 
-def _add_first_floor(assembly, p: Parameters, plan, blind, z0) -> float:
+def _add_first_floor(
+    out: Assembly,
+    p: Parameters,
+    plan: np.ndarray,
+    blind: frozenset[int],
+    z0: float,
+) -> float:
     """The tall main floor: arched windows, balconies in front of some."""
     h = p.first_height
     arched = bays.arched(p.window_width, 0.5, h - 1.6, p.recess)
@@ -148,13 +135,8 @@ def _add_first_floor(assembly, p: Parameters, plan, blind, z0) -> float:
         for edge in range(len(plan))
         if _is_front(plan, edge)
     }
-    floor = Facade(
-        h,
-        (Band(h - 0.4, h, -0.18),),
-        bays.by_edge(fronts, bays.rhythm(p.pitch, [plain], 0.3)),
-        glass=(p.recess,),
-        plain=blind,
-    )
+    layout = bays.by_edge(fronts, bays.rhythm(p.pitch, [plain], 0.3))
+    floor = Facade(h, (Band(h - 0.4, h, -0.18),), layout, (p.recess,), blind)
     rails: list[Mesh] = []
     for edge in fronts if p.balcony else ():
         wall = details.WallFrame(plan, edge)
@@ -164,18 +146,18 @@ def _add_first_floor(assembly, p: Parameters, plan, blind, z0) -> float:
             rail = details.balcony(x - 0.9, x + 0.9, 0.8, 0.25, 0.9)
             rails.append(wall.place(rail))
     return tiers.add_storeys(
-        assembly, plan, floor, z0, 1, 1, rails, part="main_floor"
+        out, plan, floor, z0, 1, 1, rails, part="main_floor"
     )
 
 
-def _center(p: Parameters, plan) -> np.ndarray:
+def _center(p: Parameters, plan: np.ndarray) -> np.ndarray:
     """Returns the middle of the rounded corner's circle."""
     low, high = plan.min(axis=0), plan.max(axis=0)
     x = low[0] + p.radius if p.corner == 0 else high[0] - p.radius
     return np.array([x, low[1] + p.radius])
 
 
-def _dome(p: Parameters, plan, z0) -> Mesh:
+def _dome(p: Parameters, plan: np.ndarray, z0: float) -> list[Mesh]:
     """A drum over the corner under a dome, a cone or an open lantern."""
     center, r = _center(p, plan), 0.62 * p.radius
     top, height = p.height, p.height - z0
@@ -190,28 +172,17 @@ def _dome(p: Parameters, plan, z0) -> Mesh:
     pieces = [tiers.block(ring(r), Facade(wall, bands, posts), z0)]
     rise = top - drum_top
     if p.dome == "cone":
-        pieces.append(massing.spire(ring(r), center, drum_top, top))
-        return merge_meshes(*pieces)
+        return [*pieces, massing.spire(ring(r), center, drum_top, top)]
     share = 0.85 if p.dome == "dome" else 0.6
     angles = np.linspace(0.0, 0.4 * np.pi, 5)
     radii = r * np.cos(angles)
     heights = drum_top + share * rise * np.sin(angles)
-    for k in range(len(angles) - 1):
-        lower, upper = ring(radii[k]), ring(radii[k + 1])
-        pieces.append(massing.skirt(lower, upper, heights[k], heights[k + 1]))
+    profile = list(zip(radii, heights, strict=True))
+    pieces.append(massing.revolved(profile, 12, center))
     lid, tip = heights[-1], ring(radii[-1])
-    pieces.append(massing.flat(tip, lid))
     if p.dome == "lantern":
         core, middle = ring(0.6 * radii[-1]), lid + 0.55 * (top - lid)
         pieces.append(massing.prism(core, lid, middle))
         pieces.append(massing.flat(tip, middle, up=False))
         lid = middle
-    pieces.append(massing.spire(tip, center, lid, top))
-    return merge_meshes(*pieces)
-
-
-def _equip(assembly, p: Parameters, site: Site, roof) -> None:
-    x0, y0, x1, y1 = site.bounds
-    free = massing.rectangle(x0, y0 + 2 * p.radius, x1, y1)
-    if y1 - y0 - 2 * p.radius > 5.0:
-        equip_roof(assembly, free, roof, _ROOF_ITEMS)
+    return [*pieces, massing.spire(tip, center, lid, top)]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from cns_drake.city.buildings.parts import (
     bays,
     details,
@@ -10,7 +12,7 @@ from cns_drake.city.buildings.parts import (
     tiers,
 )
 from cns_drake.city.buildings.parts.facades import Band, Facade
-from cns_drake.city.buildings.parts.site import Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 from cns_drake.city.geometry.structures import MeshShape
 
@@ -21,7 +23,7 @@ _SLATES = ((0.33, 0.35, 0.40), (0.45, 0.30, 0.26))
 class Parameters:
     """Parameters of a court block; lengths in metres."""
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         range_depth = d.uniform(10.0, 12.5)
         # The court has walls too.
         run = 1.3 * d.site.open_length
@@ -46,57 +48,44 @@ class Parameters:
         self.roof_rgb = d.pick(_SLATES)
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the block on a rectangle, its court open to the back."""
-    site = assembly.site
     form = outlines.u_shape if p.shape == "U" else outlines.l_shape
-    plan = form(*site.bounds, p.wing, p.back)
+    plan = form(*out.site.bounds, p.wing, p.back)
     if p.mirrored:
         plan = outlines.mirrored(plan)
-    top = _add_ground(assembly, p, plan, site)
-    bottom = top
+    bottom = _add_ground(out, p, plan)
     eaves = p.height - p.mansard_height
-    groups, per_group, storey = tiers.divided(eaves - top, p.storey_height)
-    window = bays.window(
-        p.window_width, 0.8, storey - 0.55, p.recess, ledge=0.0, hood=0.0
-    )
-    surround = bays.window(
-        p.window_width, 0.8, storey - 0.55, p.recess, ledge=0.1
-    )
-    walls = Facade(
-        storey,
-        (Band(storey - 0.15, storey, -0.07),),
-        bays.by_edge(
-            {0: bays.rhythm(p.pitch, [surround], 0.8)},
-            bays.rhythm(p.pitch, [window], 0.8),
-        ),
-        glass=(p.recess,),
-    )
-    top = tiers.add_storeys(assembly, plan, walls, top, groups, per_group)
-    _add_oriels(assembly, p, plan, bottom, groups * per_group, storey)
-    roof = _mansard(p, plan, top, assembly.rng)
-    assembly.add("mansard", roof, rgb=p.roof_rgb)
+    groups, per_group, storey = tiers.divided(eaves - bottom, p.storey_height)
+    size = (p.window_width, 0.8, storey - 0.55, p.recess)
+    windows = bays.rhythm(p.pitch, [bays.window(*size)], 0.8)
+    framed = bays.rhythm(p.pitch, [bays.window(*size, ledge=0.1)], 0.8)
+    band, layout = Band(storey - 0.15, storey, -0.07), {0: framed}
+    walls = Facade(storey, (band,), bays.by_edge(layout, windows), (p.recess,))
+    top = tiers.add_storeys(out, plan, walls, bottom, groups, per_group)
+    _add_oriels(out, p, plan, bottom, groups * per_group, storey)
+    out.add("mansard", *_mansard(p, plan, top, out.rng), rgb=p.roof_rgb)
 
 
-def _add_ground(assembly, p: Parameters, plan, site: Site) -> float:
+def _add_ground(out: Assembly, p: Parameters, plan: np.ndarray) -> float:
     h = p.ground_height
-    shops = bays.rhythm(
-        1.7 * p.pitch, [bays.shop_front(h - 0.9, 0.3)], margin=0.7
-    )
-    flats = bays.rhythm(
-        1.6 * p.pitch, [bays.window(p.window_width, 1.2, h - 0.9, 0.3)], 0.8
-    )
-    gate = bays.gate(3.2, p.gate_height, 2.4)
-    ground = Facade(
-        h,
-        (Band(0.0, 0.5, -0.08), Band(h - 0.4, h, -0.16)),
-        bays.by_edge({0: bays.with_middle(shops, gate, 5.0)}, flats),
-        glass=(0.3,),
-    )
-    return tiers.add_ground(assembly, plan, ground)
+    shops = bays.rhythm(1.7 * p.pitch, [bays.shop_front(h - 0.9, 0.3)], 0.7)
+    window = bays.window(p.window_width, 1.2, h - 0.9, 0.3)
+    flats = bays.rhythm(1.6 * p.pitch, [window], 0.8)
+    front = bays.with_middle(shops, bays.gate(3.2, p.gate_height, 2.4), 5.0)
+    layout = bays.by_edge({0: front}, flats)
+    bands = (Band(0.0, 0.5, -0.08), Band(h - 0.4, h, -0.16))
+    return tiers.add_ground(out, plan, Facade(h, bands, layout, (0.3,)))
 
 
-def _add_oriels(assembly, p: Parameters, plan, z0, count, storey) -> None:
+def _add_oriels(
+    out: Assembly,
+    p: Parameters,
+    plan: np.ndarray,
+    z0: float,
+    count: int,
+    storey: float,
+) -> None:
     """Bay windows that hang on the street front from the first floor up."""
     half, r = 0.75, p.oriel_reach
     outline = [(-half - 0.5, 0.0), (-half, -r), (half, -r), (half + 0.5, 0.0)]
@@ -107,16 +96,18 @@ def _add_oriels(assembly, p: Parameters, plan, z0, count, storey) -> None:
         massing.flat(outline, 0.0, up=False),
         massing.spire(outline, (0.0, 0.0), height, height + 0.6),
     )
-    shape = MeshShape(assembly.define("oriel", oriel))
+    shape = MeshShape(out.define("oriel", oriel))
     wall = details.WallFrame(plan, 0)
     cells = bays.stretches(wall.length, p.pitch, 0.8)[1:-1]
     step = max(p.oriel_every, len(cells) // 5)
     for k, (a, b) in enumerate(cells[::step]):
         x, y = wall.point((a + b) / 2, 0.0)
-        assembly.place(f"oriel_{k}", shape, (x, y, z0), wall.heading)
+        out.place(f"oriel_{k}", shape, (x, y, z0), wall.heading)
 
 
-def _mansard(p: Parameters, plan, z0, rng) -> Mesh:
+def _mansard(
+    p: Parameters, plan: np.ndarray, z0: float, rng: np.random.Generator
+) -> list[Mesh]:
     eaves = massing.inset(plan, -0.5)
     knee = massing.inset(plan, p.mansard_inset - 0.6)
     slope = min(1.6, p.wing / 2 - p.mansard_inset - 0.4)
@@ -142,7 +133,7 @@ def _mansard(p: Parameters, plan, z0, rng) -> Mesh:
         y = middle[1] + p.mansard_inset + 2.4 + float(rng.uniform(0.0, 1.5))
         stack = (x - 0.6, x + 0.6, y - 0.35, y + 0.35)
         pieces.append(massing.box(*stack, z2, p.height, bottom=False))
-    return merge_meshes(*pieces)
+    return pieces
 
 
 def _dormer(p: Parameters, x: float, z0: float, z1: float) -> Mesh:

@@ -15,7 +15,7 @@ from cns_drake.city.buildings.parts import (
     pitched_roofs,
     tiers,
 )
-from cns_drake.city.buildings.parts.facades import Band, Facade
+from cns_drake.city.buildings.parts.facades import Band, Facade, Layout, Relief
 from cns_drake.city.buildings.parts.roof_equipment import (
     add_chimney,
     equip_roof,
@@ -45,7 +45,7 @@ class Parameters:
         cornice: how far it sticks out.
     """
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         depth = d.depth - _FRONT_M - _BACK_M
         blind = bool({1, 3} & d.site.blind_edges)
         hipped = not blind and depth < 16.0 and d.chance(0.4)
@@ -71,45 +71,33 @@ class Parameters:
         self.roof_rgb = d.pick(family_house.ROOFS)
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the flats on a rectangle."""
-    site = assembly.site
+    site = out.site
     x0, y0, x1, y1 = site.bounds
-    side = 0.5
-    body = massing.rectangle(
-        x0 + side * (3 not in site.blind_edges),
-        y0 + _FRONT_M,
-        x1 - side * (1 not in site.blind_edges),
-        y1 - _BACK_M,
-    )
+    left = x0 + 0.5 * (3 not in site.blind_edges)
+    right = x1 - 0.5 * (1 not in site.blind_edges)
+    body = massing.rectangle(left, y0 + _FRONT_M, right, y1 - _BACK_M)
     plan, stairs = _bay_front(p, body)
     site_outline = massing.rectangle(x0, y0, x1, y1)
     blind = outlines.edges_on(plan, site_outline, site.blind_edges)
-    top = _add_ground(assembly, p, plan, stairs, blind)
+    top = _add_ground(out, p, plan, stairs, blind)
     goal = p.height - p.rise - (0.9 if p.roof == "flat" else 0.15)
     groups, per_group, storey = tiers.divided(goal - top, p.storey, 6)
     window = bays.window(
         p.window_width, 0.8, min(2.3, storey - 0.4), p.recess,
         ledge=p.ledge, hood=p.hood,
     )  # fmt: skip
+    rows = bays.rhythm(p.pitch, [window], 0.45)
     landing = bays.window(1.1, storey - 1.0, storey - 0.05, p.recess)
-    layouts = {
-        edge: bays.with_middle(bays.rhythm(p.pitch, [window], 0.45),
-                               landing, 2.2)
-        for edge in stairs
-    }  # fmt: skip
-    walls = Facade(
-        storey,
-        (),
-        bays.by_edge(layouts, bays.rhythm(p.pitch, [window], 0.45)),
-        (p.recess,),
-        plain=blind,
-    )
-    top = tiers.add_storeys(assembly, plan, walls, top, groups, per_group)
-    _add_top(assembly, p, body, plan, top, blind)
+    layouts = dict.fromkeys(stairs, bays.with_middle(rows, landing, 2.2))
+    layout = bays.by_edge(layouts, rows)
+    walls = Facade(storey, (), layout, (p.recess,), blind)
+    top = tiers.add_storeys(out, plan, walls, top, groups, per_group)
+    _add_top(out, p, body, plan, top, blind)
 
 
-def _bay_front(p: Parameters, body) -> tuple[np.ndarray, list[int]]:
+def _bay_front(p: Parameters, body: np.ndarray) -> tuple[np.ndarray, list[int]]:
     """Returns the plan, its front with bays, and the walls with stairs."""
     (x0, y0), (x1, y1) = body[0], body[2]
     count = max(1, round((x1 - x0) / p.section))
@@ -130,7 +118,13 @@ def _bay_front(p: Parameters, body) -> tuple[np.ndarray, list[int]]:
     return np.array(plan), stairs
 
 
-def _add_ground(assembly, p: Parameters, plan, stairs, blind) -> float:
+def _add_ground(
+    out: Assembly,
+    p: Parameters,
+    plan: np.ndarray,
+    stairs: list[int],
+    blind: frozenset[int],
+) -> float:
     """Adds the raised ground floor with its entrances and steps."""
     h = round(p.floor + p.storey, 2)
     sill, head = round(p.floor + 0.8, 2), round(p.floor + 2.25, 2)
@@ -141,80 +135,78 @@ def _add_ground(assembly, p: Parameters, plan, stairs, blind) -> float:
         window = bays.window(p.window_width, sill, head, p.recess)
     rows = bays.rhythm(p.pitch, [window], 0.45)
     door = bays.house_door(1.4, p.floor, round(p.floor + 2.35, 2), 0.4)
-    cellar = bays.rhythm(
-        2 * p.pitch, [bays.window(0.9, 0.1, p.floor - 0.15, 0.15)], 0.5
-    )
-    layouts = {0: rows, **dict.fromkeys(stairs, rows)}
+    vent = bays.window(0.9, 0.1, p.floor - 0.15, 0.15)
+    cellar = bays.rhythm(2 * p.pitch, [vent], 0.5)
     doors = stairs or [0]
-    for edge in doors:
-        layouts[edge] = bays.with_middle(rows, door, 2.4)
-    facade = Facade(
-        h,
-        (Band(p.floor, p.floor + 0.12, -0.08), Band(h - 0.2, h, -0.08)),
-        bays.by_edge(layouts, _both(rows, cellar, p.floor > 0.7)),
-        glass=(p.recess,),
-        plain=blind,
-    )
+    entries = dict.fromkeys(doors, bays.with_middle(rows, door, 2.4))
+    others = _both(rows, cellar) if p.floor > 0.7 else rows
+    layout = bays.by_edge({0: rows} | entries, others)
+    bands = (Band(p.floor, p.floor + 0.12, -0.08), Band(h - 0.2, h, -0.08))
     pieces: list[Mesh] = []
+    room = _FRONT_M - p.bay_reach * (not stairs) - 0.05
     for edge in doors:
-        wall = details.WallFrame(plan, edge)
-        x = wall.length / 2
-        room = _FRONT_M - p.bay_reach * (not stairs) - 0.05
-        count = max(2, round(p.floor / 0.17))
-        run = min(0.28 * count, room - 0.3)
-        slab = massing.box(
-            x - 1.1, x + 1.1, -0.05, room - run, -massing.FOUNDATION_M, p.floor
-        )
-        flight = details.steps(x - 0.8, x + 0.8, run, p.floor, count)
-        cheeks = [
-            massing.box(
-                u - 0.12, u + 0.12, -0.05, room, -massing.FOUNDATION_M, z
-            )
-            for u in (x - 0.98, x + 0.98)
-            for z in (p.floor + 0.35,)
-        ]
-        hood = massing.box(
-            x - 1.2, x + 1.2, -0.05, 0.9, p.floor + 2.5, p.floor + 2.7
-        )
-        flight = flight.moved((0.0, room - run, 0.0))
-        pieces += [wall.place(m) for m in (slab, flight, hood, *cheeks)]
-    assembly.add("steps", *pieces, rgb=family_house.BASE)
-    return tiers.add_ground(assembly, plan, facade)
+        pieces += _steps(p, details.WallFrame(plan, edge), room)
+    out.add("steps", *pieces, rgb=family_house.BASE)
+    return tiers.add_ground(
+        out, plan, Facade(h, bands, layout, (p.recess,), blind)
+    )
 
 
-def _both(first, second, wanted: bool):
+def _steps(p: Parameters, wall: details.WallFrame, room: float) -> list[Mesh]:
+    """Returns the steps up to a door, between cheeks and under a hood."""
+    x = wall.length / 2
+    count = max(2, round(p.floor / 0.17))
+    run = min(0.28 * count, room - 0.3)
+    flight = details.steps(x - 0.8, x + 0.8, run, p.floor, count)
+    slab = (x - 1.1, x + 1.1, -0.05, room - run, p.floor)
+    hood = (x - 1.2, x + 1.2, -0.05, 0.9, p.floor + 2.5, p.floor + 2.7)
+    cheeks = (
+        wall.standing(
+            u - 0.12, u + 0.12, -0.05, room, p.floor + 0.35, bottom=True
+        )
+        for u in (x - 0.98, x + 0.98)
+    )
+    return [
+        wall.standing(*slab, bottom=True),
+        wall.place(flight.moved((0.0, room - run, 0.0))),
+        wall.box(*hood),
+        *cheeks,
+    ]
+
+
+def _both(first: Layout, second: Layout) -> Layout:
     """Returns the layout of two layouts that do not meet."""
 
-    def layout(edge: int, length: float):
-        more = second(edge, length) if wanted else ()
-        return [*first(edge, length), *more]
+    def layout(edge: int, length: float) -> list[Relief]:
+        return [*first(edge, length), *second(edge, length)]
 
     return layout
 
 
-def _add_top(assembly, p: Parameters, body, plan, z0, blind) -> None:
+def _add_top(
+    out: Assembly,
+    p: Parameters,
+    body: np.ndarray,
+    plan: np.ndarray,
+    z0: float,
+    blind: frozenset[int],
+) -> None:
     if p.roof == "flat":
         rim = round(p.height - z0, 3)
-        bands = tiers.cornice(
-            max(rim - 0.15, 0.5), p.cornice, thickness=0.4, steps=2
-        )
+        top = max(rim - 0.15, 0.5)
+        bands = tiers.cornice(top, p.cornice, thickness=0.4, steps=2)
         crown = Facade(rim, bands, plain=blind)
-        roof = tiers.add_crown(
-            assembly, plan, crown, z0, min(0.6, rim - 0.1), thickness=0.25
-        )
-        equip_roof(assembly, body, roof, p.roof_items)
+        parapet = min(0.6, rim - 0.1)
+        z = tiers.add_crown(out, plan, crown, z0, parapet, thickness=0.25)
+        equip_roof(out, body, z, p.roof_items)
         return
-    solid = pitched_roofs.hip(
-        body, z0 - 0.02, p.height, (max(p.bay_reach + 0.15, 0.45), 0.45, 0.45,
-                                    0.45), 0.3
-    )  # fmt: skip
-    assembly.add("roof", solid, rgb=p.roof_rgb)
+    eaves = (max(p.bay_reach + 0.15, 0.45), 0.45, 0.45, 0.45)
+    solid = pitched_roofs.hip(body, z0 - 0.02, p.height, eaves, 0.3)
+    out.add("roof", solid, rgb=p.roof_rgb)
     (ax, ay), (bx, by) = body[0], body[2]
     for k, share in enumerate((0.35, 0.65)):
         x, y = ax + share * (bx - ax), ay + 0.5 * (by - ay)
         if by - ay > bx - ax:
             x, y = ax + 0.5 * (bx - ax), ay + share * (by - ay)
-        add_chimney(
-            assembly, f"chimney_{k}", (x, y, p.height - 1.4),
-            family_house.BRICKS[k], item="chimney_row",
-        )  # fmt: skip
+        spot, brick = (x, y, p.height - 1.4), family_house.BRICKS[k]
+        add_chimney(out, f"chimney_{k}", spot, brick, item="chimney_row")

@@ -5,18 +5,20 @@ from __future__ import annotations
 import numpy as np
 
 from cns_drake.city.buildings.parts import bays, details, pitched_roofs
-from cns_drake.city.buildings.parts.materials import Materials
 from cns_drake.city.buildings.parts.pitched_roofs import Hole
+from cns_drake.city.buildings.parts.site import Assembly
 from cns_drake.city.buildings.parts.wings import Wing
-from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+from cns_drake.city.geometry.mesh import Mesh
 
 _THICKNESS = 0.14
+_RECESS = 0.1
+_QUAD = ((0, 1, 2, 3),)
 # What the dormer's walls and roof reach into the slope behind them [m].
 _SUNK = 0.25
 
 
 def add_dormer(
-    materials: Materials,
+    out: Assembly,
     wall: details.WallFrame,
     x: float,
     width: float,
@@ -27,13 +29,11 @@ def add_dormer(
     setback: float,
     height: float,
     roof: str = "gable",
-    recess: float = 0.1,
-    material: str = "walls",
 ) -> None:
     """Adds a dormer on the slope that rises behind a wall, if it fits.
 
     Args:
-        materials: gets `glass`, `roof` and the material of its walls.
+        out: gets `glass`, `roof` and `walls`.
         wall: the wall below the slope.
         x, width: middle and width of the dormer along the wall [m].
         base: height of the slope's upper surface above the wall [m].
@@ -42,8 +42,6 @@ def add_dormer(
         setback: of the dormer's front from the wall [m].
         height: of its front above the slope [m].
         roof: `gable`, `shed` or `flat`.
-        recess: of its window [m].
-        material: of its walls.
     """
     a, b = x - width / 2, x + width / 2
     foot = base + slope * setback
@@ -55,12 +53,9 @@ def add_dormer(
     back = (edge + rise - base) / slope + _SUNK
     if roof == "gable":
         line = pitched_roofs.gable_line(a, b, edge, edge + rise)
+        wide = pitched_roofs.with_eaves(line, 0.15, 0.15)
         lid = pitched_roofs.shell(
-            pitched_roofs.with_eaves(line, 0.15, 0.15),
-            -back,
-            0.2 - setback,
-            _THICKNESS,
-            along_y=True,
+            wide, -back, 0.2 - setback, _THICKNESS, along_y=True
         )
     else:
         line = [(a, edge), (b, edge)]
@@ -71,21 +66,24 @@ def add_dormer(
     low = foot - _SUNK
     hole = Hole(
         round(a + 0.15, 2), round(b - 0.15, 2),
-        round(foot + 0.25, 2), round(eaves - 0.15, 2), recess,
+        round(foot + 0.25, 2), round(eaves - 0.15, 2), _RECESS,
     )  # fmt: skip
     front = pitched_roofs.gable_wall(under, a, b, low, [hole])
     pane = pitched_roofs.gable_glass([hole])
-    cheeks = _cheeks(
-        a, b, back, setback, low, eaves, rise if roof == "shed" else 0.0
+    top = eaves + (rise if roof == "shed" else 0.0)
+    side = [(-back, low), (-back, top), (-setback, eaves), (-setback, low)]
+    cheeks = (
+        wall.place(Mesh(np.array([(u, y, z) for y, z in ring]), _QUAD))
+        for u, ring in ((a, side), (b, side[::-1]))
     )
     shift = (0.0, -setback, 0.0)
-    materials.add(material, wall.place(front.moved(shift)), wall.place(cheeks))
-    materials.add("glass", wall.place(pane.moved(shift)))
-    materials.add("roof", wall.place(lid))
+    out.add_to("walls", wall.place(front.moved(shift)), *cheeks)
+    out.add_to("glass", wall.place(pane.moved(shift)))
+    out.add_to("roof", wall.place(lid))
 
 
 def add_dormers(
-    materials: Materials,
+    out: Assembly,
     wing: Wing,
     start: float,
     end: float,
@@ -98,7 +96,7 @@ def add_dormers(
     On a gambrel roof they stand on the steep part, without a pitched roof.
 
     Args:
-        materials: where to.
+        out: where to.
         wing: with a `gable` or `gambrel` roof along the front.
         start, end: the stretch of the front wall below them [m].
         count: of dormers, at most.
@@ -118,22 +116,7 @@ def add_dormers(
         width = min(1.5, b - a - 0.5)
         if width > 0.9:
             add_dormer(
-                materials, wing.wall(0), start + (a + b) / 2, width, base=z0,
+                out, wing.wall(0), start + (a + b) / 2, width, base=z0,
                 slope=slope, ridge=wing.top, setback=setback, height=height,
                 roof=roof,
             )  # fmt: skip
-
-
-def _cheeks(a, b, back, front, low, high, rise) -> Mesh:
-    """The two side walls, in wall coordinates; they rise to the back."""
-    pieces = []
-    corners = [
-        (-back, low),
-        (-back, high + rise),
-        (-front, high),
-        (-front, low),
-    ]
-    for x, order in ((a, 1), (b, -1)):
-        side = [(x, y, z) for y, z in corners[::order]]
-        pieces.append(Mesh(np.array(side), ((0, 1, 2, 3),)))
-    return merge_meshes(*pieces)

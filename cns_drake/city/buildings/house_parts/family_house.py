@@ -8,8 +8,7 @@ from cns_drake.city.buildings.house_parts import house_walls
 from cns_drake.city.buildings.house_parts.openings import Openings
 from cns_drake.city.buildings.parts import wings
 from cns_drake.city.buildings.parts.facades import Band
-from cns_drake.city.buildings.parts.materials import Materials
-from cns_drake.city.buildings.parts.site import Assembly, Rgb
+from cns_drake.city.buildings.parts.site import Assembly, Dice, Rgb
 from cns_drake.city.buildings.parts.wings import Roof, Wing
 
 WALLS = (
@@ -43,19 +42,30 @@ ROOF_M = 0.2
 _SIDE_PITCH_M = 3.8
 
 
-def house_materials(assembly: Assembly, walls: Rgb, roof: Rgb, accent: Rgb):
-    """Returns the materials of a family house; the rest is white or stone."""
-    return Materials(
-        walls=walls,
-        glass=assembly.glass_rgb,
-        roof=roof,
-        trim=TRIM,
-        accent=accent,
-        base=BASE,
-    )
+class Colours:
+    """What the parameters of family houses have in common: their colours."""
+
+    def draw_colours(self, d: Dice, walls: Sequence[Rgb] = WALLS) -> None:
+        """Draws those of the walls, of the roof and of doors and shutters."""
+        self.rgb = d.pick(walls)
+        self.roof_rgb = d.pick(ROOFS)
+        self.accent_rgb = d.pick(ACCENTS)
+
+    def paint(self, out: Assembly) -> None:
+        """Names the materials of the house; the rest is white or stone."""
+        out.paint(
+            walls=self.rgb,
+            glass=out.glass_rgb,
+            roof=self.roof_rgb,
+            trim=TRIM,
+            accent=self.accent_rgb,
+            base=BASE,
+        )
 
 
-def storeys_for(height: float, floor: float, span: float, pitch_deg: float):
+def storeys_for(
+    height: float, floor: float, span: float, pitch_deg: float
+) -> int:
     """Returns the storeys that bring a roof over `span` closest to a pitch.
 
     Args:
@@ -70,7 +80,9 @@ def storeys_for(height: float, floor: float, span: float, pitch_deg: float):
     return min(counts or [1], key=lambda n: abs(room - n * STOREY_M - wanted))
 
 
-def wall_top_for(height: float, floor: float, span: float, storeys: int):
+def wall_top_for(
+    height: float, floor: float, span: float, storeys: int
+) -> float:
     """Returns the height of the walls below a ridge [m]."""
     wanted = floor + storeys * STOREY_M + 0.15
     return min(wanted, height - ROOF_M - 0.08 * span)
@@ -94,7 +106,7 @@ def window_rows(
 
 
 def close_box(
-    materials: Materials,
+    out: Assembly,
     wing: Wing,
     openings: Openings,
     plinth: float,
@@ -104,19 +116,19 @@ def close_box(
     """Adds the walls and the roof around a box's openings.
 
     Args:
-        materials: where to.
+        out: where to.
         wing: the box.
         openings: its windows and doors.
         plinth: height of the foundation that shows [m].
         casing: style of the windows' frames on `edges`.
         edges: walls with framed windows.
     """
-    house_walls.add_casings(materials, wing, openings, edges, casing)
+    house_walls.add_casings(out, wing, openings, edges, casing)
     bands = (Band(0.0, plinth, -0.04),) if plinth > 0 else ()
-    openings.add_walls(materials, (house_walls.GLASS_M,), bands)
+    openings.add_walls(out, (house_walls.GLASS_M,), bands)
     low = wing.wall_top + 0.4
     attic = wings.attic_window(0.9, low, low + 1.0, house_walls.GLASS_M)
-    wings.add_roof(materials, wing, attic)
+    wings.add_roof(out, wing, attic)
 
 
 def garage_wing(
@@ -134,15 +146,13 @@ def garage_wing(
     return Wing.at(x0, y0, x1, min(y1, y0 + 6.5), wall_top, top, shape)
 
 
-def add_garage(
-    materials: Materials, garage: Wing, boxes: Sequence[Wing]
-) -> None:
+def add_garage(out: Assembly, garage: Wing, boxes: Sequence[Wing]) -> None:
     """Adds a garage, its door in front."""
     openings = Openings(garage, boxes)
     length = garage.x1 - garage.x0
     house_walls.add_garage_door(
-        materials, garage, openings, 0, length / 2, min(length - 0.7, 4.9)
+        out, garage, openings, 0, length / 2, min(length - 0.7, 4.9)
     )
     openings.row((1, 3), 1.0, 3.4, [house_walls.sash(0.9, 0.0, 1.1, 2.0)])
-    openings.add_walls(materials, (house_walls.GLASS_M,))
-    wings.add_roof(materials, garage)
+    openings.add_walls(out, (house_walls.GLASS_M,))
+    wings.add_roof(out, garage)

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-import numpy as np
-
 from cns_drake.city.buildings.house_parts import porches
 from cns_drake.city.buildings.house_parts.openings import Openings
-from cns_drake.city.buildings.parts import bays, massing
+from cns_drake.city.buildings.parts import bays
 from cns_drake.city.buildings.parts.facades import Patch, Relief
-from cns_drake.city.buildings.parts.materials import Materials
+from cns_drake.city.buildings.parts.site import Assembly
 from cns_drake.city.buildings.parts.wings import Wing
+from cns_drake.city.geometry.mesh import Mesh
 
 # Depths of windows and of the leaves of doors behind the wall [m].
 GLASS_M, DOOR_M = 0.12, 0.2
 
 
-def sash(width: float, z: float, sill: float, head: float, bars: int = 0):
+def sash(
+    width: float, z: float, sill: float, head: float, bars: int = 0
+) -> bays.Bay:
     """A window of a storey whose floor is at z; sill and head above it."""
     return bays.window(
         width,
@@ -62,7 +63,7 @@ def add_rows(
 
 
 def add_door(
-    materials: Materials,
+    out: Assembly,
     wing: Wing,
     openings: Openings,
     edge: int,
@@ -89,10 +90,10 @@ def add_door(
 
     openings.put(edge, x, width + 2 * lights + 0.5, bay)
     leaf = _leaf(x - half, x + half, floor, top)
-    materials.add(material, *(wing.wall(edge).place(part) for part in leaf))
+    out.add_to(material, *(wing.wall(edge).place(part) for part in leaf))
 
 
-def _leaf(x0: float, x1: float, z0: float, z1: float) -> list:
+def _leaf(x0: float, x1: float, z0: float, z1: float) -> list[Mesh]:
     """A door leaf with a raised frame, in wall coordinates."""
     shift = (0.0, -DOOR_M, 0.0)
     panels = [
@@ -104,7 +105,7 @@ def _leaf(x0: float, x1: float, z0: float, z1: float) -> list:
 
 
 def add_garage_door(
-    materials: Materials,
+    out: Assembly,
     wing: Wing,
     openings: Openings,
     edge: int,
@@ -114,25 +115,19 @@ def add_garage_door(
 ) -> None:
     """Adds a sectional door with ribs, as `trim`."""
     a, b = round(x - width / 2, 2), round(x + width / 2, 2)
-
-    def bay(x0: float, x1: float) -> list[Relief]:
-        return [Patch(a, b, 0.0, height, DOOR_M)]
-
-    openings.put(edge, x, width + 0.3, bay)
+    hole: list[Relief] = [Patch(a, b, 0.0, height, DOOR_M)]
+    openings.put(edge, x, width + 0.3, lambda x0, x1: hole)
     count = 4
     step = height / count
-    wall = wing.wall(edge)
     for k in range(count):
-        panel = porches.board(
-            a, b, round(k * step + 0.02, 2), round((k + 1) * step - 0.02, 2),
-            0.06,
-        )  # fmt: skip
+        low, high = round(k * step + 0.02, 2), round((k + 1) * step - 0.02, 2)
+        panel = porches.board(a, b, low, high, 0.06)
         panel = panel.moved((0.0, -DOOR_M, 0.0))
-        materials.add("trim", wall.place(panel))
+        out.add_to("trim", wing.wall(edge).place(panel))
 
 
 def add_casings(
-    materials: Materials,
+    out: Assembly,
     wing: Wing,
     openings: Openings,
     edges: Sequence[int],
@@ -145,22 +140,4 @@ def add_casings(
         boards = porches.casings(
             openings.layout(edge, wall.length), (GLASS_M,), style
         )
-        materials.add(material, *(wall.place(board) for board in boards))
-
-
-def corner_boards(wing: Wing, width: float = 0.18, reach: float = 0.04):
-    """Returns upright boards at the free corners of a wing."""
-    pieces = []
-    outline = wing.outline
-    outer = massing.inset(outline, -reach)
-    for k, corner in enumerate(outline):
-        if {k, (k - 1) % 4} & wing.blind:
-            continue
-        center = np.mean(outline, axis=0)
-        sign = np.sign(corner - center)
-        a = outer[k]
-        b = corner - width * sign
-        x0, x1 = sorted((a[0], b[0]))
-        y0, y1 = sorted((a[1], b[1]))
-        pieces.append(massing.box(x0, x1, y0, y1, 0.0, wing.wall_top))
-    return pieces
+        out.add_to(material, *(wall.place(board) for board in boards))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 import itertools
 
-from cns_drake.city.buildings.parts import bays, massing
+from cns_drake.city.buildings.parts import bays, massing, wings
 from cns_drake.city.buildings.parts.facades import (
     Arch,
     Band,
@@ -15,7 +15,7 @@ from cns_drake.city.buildings.parts.facades import (
     facade_mesh,
     glass_mesh,
 )
-from cns_drake.city.buildings.parts.materials import Materials
+from cns_drake.city.buildings.parts.site import Assembly
 from cns_drake.city.buildings.parts.wings import Wing
 
 
@@ -48,7 +48,7 @@ def free_stretches(
 class Openings:
     """The windows and doors of a wing, by edge."""
 
-    def __init__(self, wing: Wing, others: Sequence[Wing] = ()):
+    def __init__(self, wing: Wing, others: Sequence[Wing] = ()) -> None:
         self._wing = wing
         self._others = others
         self._reliefs: dict[int, list[Relief]] = {k: [] for k in range(4)}
@@ -96,7 +96,9 @@ class Openings:
         """Adds reliefs given in the wall's coordinates."""
         self._reliefs[edge] += reliefs
 
-    def clear(self, edge: int, x0: float, x1: float, z0: float, z1: float):
+    def clear(
+        self, edge: int, x0: float, x1: float, z0: float, z1: float
+    ) -> None:
         """Removes whatever meets a part of a wall."""
         self._reliefs[edge] = [
             r
@@ -118,7 +120,7 @@ class Openings:
 
     def add_walls(
         self,
-        materials: Materials,
+        out: Assembly,
         glass: Sequence[float],
         bands: Sequence[Band] = (),
         material: str = "walls",
@@ -140,7 +142,22 @@ class Openings:
             plain=wing.blind,
         )
         outline = wing.outline
-        materials.add(
+        out.add_to(
             material, massing.foundation(outline), facade_mesh(outline, facade)
         )
-        materials.add("glass", glass_mesh(outline, facade))
+        out.add_to("glass", glass_mesh(outline, facade))
+
+    def enclose(
+        self,
+        out: Assembly,
+        glass: Sequence[float],
+        bands: Sequence[Band] = (),
+        material: str = "walls",
+        attic: wings.Attic | None = None,
+    ) -> None:
+        """Adds the walls, see `add_walls`, and the roof on them.
+
+        `attic` gives the windows of its gables.
+        """
+        self.add_walls(out, glass, bands, material)
+        wings.add_roof(out, self._wing, attic, material)

@@ -20,18 +20,19 @@ from cns_drake.city.buildings.parts.facades import (
     facade_mesh,
     glass_mesh,
 )
-from cns_drake.city.buildings.parts.materials import Materials
 from cns_drake.city.buildings.parts.site import Assembly, Rgb
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 from cns_drake.city.geometry.structures import MeshShape
 
 _POST_M = 0.16
+# Depth of the windows of bays [m].
+_RECESS = 0.1
 # Length of the shared panel of railing [m].
 RAILING_M = 2.0
 
 
 def add_porch(
-    materials: Materials,
+    out: Assembly,
     wall: details.WallFrame,
     x0: float,
     x1: float,
@@ -46,7 +47,7 @@ def add_porch(
     """Adds a roofed porch in front of a wall.
 
     Args:
-        materials: gets `trim` and `roof`.
+        out: gets `trim` and `roof`.
         wall: the wall behind it.
         x0, x1: its extent along the wall [m].
         reach: of its posts out of the wall; the roof ends 0.25 m further.
@@ -67,17 +68,17 @@ def add_porch(
             massing.box(x - 0.1, x + 0.1, -0.05, y, eaves, eaves + 0.22)
         )
     lid = _porch_roof(x0, x1, reach, eaves + 0.2, top, roof)
-    materials.add("roof", wall.place(lid))
+    out.add_to("roof", wall.place(lid))
     if roof == "gable":
         z = eaves + 0.2
         line = pitched_roofs.gable_line(0.0, x1 - x0, z, top - 0.12)
         shield = pitched_roofs.gable_wall(line, 0.0, x1 - x0, z)
         pieces.append(shield.moved((x0, y + 0.08, 0.0)))
-    materials.add("trim", *(wall.place(piece) for piece in pieces))
+    out.add_to("trim", *(wall.place(piece) for piece in pieces))
 
 
 def add_steps(
-    materials: Materials,
+    out: Assembly,
     wall: details.WallFrame,
     x0: float,
     x1: float,
@@ -90,10 +91,12 @@ def add_steps(
     run = min(0.29 * count, room)
     if run > 0.05 and rise > 0.05:
         flight = details.steps(x0, x1, run, rise, count)
-        materials.add("base", wall.place(flight.moved((0.0, start, 0.0))))
+        out.add_to("base", wall.place(flight.moved((0.0, start, 0.0))))
 
 
-def _porch_roof(x0, x1, reach, z, top, roof: str) -> Mesh:
+def _porch_roof(
+    x0: float, x1: float, reach: float, z: float, top: float, roof: str
+) -> Mesh:
     a, b, out = x0 - 0.15, x1 + 0.15, reach + 0.25
     if roof == "gable":
         line = pitched_roofs.gable_line(x0, x1, z + 0.1, top)
@@ -106,7 +109,7 @@ def _porch_roof(x0, x1, reach, z, top, roof: str) -> Mesh:
 
 
 def add_railing(
-    assembly: Assembly,
+    out: Assembly,
     part: str,
     wall: details.WallFrame,
     start: tuple[float, float],
@@ -117,7 +120,7 @@ def add_railing(
     """Places the shared panel of railing between two points of a wall.
 
     Args:
-        assembly: the building.
+        out: the building.
         part: name of the visual.
         wall: in whose coordinates the points are (x along, y outwards).
         start, end: ends of the railing [m].
@@ -126,8 +129,8 @@ def add_railing(
     """
     p, q = wall.point(*start), wall.point(*end)
     length = float(np.hypot(*(q - p)))
-    assembly.share("railing_panel", railing_panel())
-    assembly.place(
+    out.share("railing_panel", railing_panel())
+    out.place(
         part,
         MeshShape("railing_panel", (round(length / RAILING_M, 3), 1.0, 1.0)),
         (*((p + q) / 2), z),
@@ -151,7 +154,7 @@ def railing_panel() -> Mesh:
 
 
 def add_bay_window(
-    materials: Materials,
+    out: Assembly,
     wall: details.WallFrame,
     x: float,
     width: float,
@@ -161,21 +164,17 @@ def add_bay_window(
     *,
     storeys: int = 1,
     canted: bool = True,
-    recess: float = 0.1,
-    material: str = "walls",
 ) -> None:
     """Adds a bay window, on the ground (z0 = 0) or hung on the wall.
 
     Args:
-        materials: gets `glass`, `roof` and the walls' material.
+        out: gets `glass`, `roof` and `walls`.
         wall: the wall behind it.
         x, width: its middle and extent along the wall [m].
         reach: out of the wall [m].
         z0, z1: bottom and top of its walls [m].
         storeys: rows of windows.
         canted: with slanted sides; else a box.
-        recess: of its windows [m].
-        material: of its walls.
     """
     a, b = x - width / 2, x + width / 2
     if canted:
@@ -191,38 +190,28 @@ def add_bay_window(
     step = height / storeys
 
     def layout(edge: int, length: float) -> list[Relief]:
-        if edge in flush or length < 0.7:
-            return []
         relief: list[Relief] = []
-        for k in range(storeys):
+        for k in range(storeys if edge not in flush and length >= 0.7 else 0):
+            z = k * step
             pane = bays.window(
-                length - 0.3,
-                round(k * step + 0.75, 2),
-                round(k * step + step - 0.45, 2),
-                recess,
-                mullions=1 if length > 1.5 else 0,
-                pier=0.15,
-            )
+                length - 0.3, round(z + 0.75, 2), round(z + step - 0.45, 2),
+                _RECESS, mullions=1 if length > 1.5 else 0, pier=0.15,
+            )  # fmt: skip
             relief += pane(0.0, length)
         return relief
 
-    facade = Facade(
-        height,
-        (Band(height - 0.2, height, -0.08),),
-        layout,
-        glass=(recess,),
-        plain=flush,
-    )
+    bands = (Band(height - 0.2, height, -0.08),)
+    facade = Facade(height, bands, layout, (_RECESS,), flush)
     if z0 == 0.0:
         under = massing.foundation(points)
     else:
         under = massing.flat(points, z0, up=False)
-    materials.add(material, facade_mesh(points, facade, z0), under)
-    materials.add("glass", glass_mesh(points, facade, z0))
+    out.add_to("walls", facade_mesh(points, facade, z0), under)
+    out.add_to("glass", glass_mesh(points, facade, z0))
     reaches = [-0.12 * (k not in flush) for k in range(len(points))]
     outer = massing.inset(points, reaches)
     tip = (outer[0] + outer[-1]) / 2
-    materials.add(
+    out.add_to(
         "roof",
         massing.flat(outer, z1, up=False),
         massing.skirt(outer, outer, z1, z1 + 0.15),
@@ -239,15 +228,14 @@ def chimney_breast(
     shoulder = 0.5 * top
     low = massing.rectangle(a, -0.05, b, reach)
     high = massing.rectangle(x - neck, -0.05, x + neck, reach)
-    return wall.place(
-        merge_meshes(massing.skirt(low, low, -massing.FOUNDATION_M, shoulder),
-                massing.skirt(low, high, shoulder, shoulder + 0.6),
-                massing.prism(high, shoulder + 0.6, top),
-                massing.box(
-                    x - neck - 0.08, x + neck + 0.08, -0.05, reach + 0.06,
-                    top - 0.35, top - 0.15,
-                ),)
-    )  # fmt: skip
+    head = (x - neck - 0.08, x + neck + 0.08, -0.05, reach + 0.06)
+    breast = merge_meshes(
+        massing.skirt(low, low, -massing.FOUNDATION_M, shoulder),
+        massing.skirt(low, high, shoulder, shoulder + 0.6),
+        massing.prism(high, shoulder + 0.6, top),
+        massing.box(*head, top - 0.35, top - 0.15),
+    )
+    return wall.place(breast)
 
 
 def casings(
@@ -296,7 +284,7 @@ def _ring(r: Relief, width: float, reach: float) -> Mesh:
     return Mesh(vertices, tuple(faces))
 
 
-def board(x0, x1, z0, z1, reach) -> Mesh:
+def board(x0: float, x1: float, z0: float, z1: float, reach: float) -> Mesh:
     """A board on a wall, without its back, in wall coordinates."""
     v = [(x, y, z) for y in (0.0, reach) for z in (z0, z1) for x in (x0, x1)]
     faces = (

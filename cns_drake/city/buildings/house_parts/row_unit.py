@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
@@ -9,11 +10,15 @@ import numpy as np
 
 from cns_drake.city.buildings.house_parts import dormers, house_walls, porches
 from cns_drake.city.buildings.house_parts.openings import Openings
-from cns_drake.city.buildings.parts import massing, pitched_roofs, wings
+from cns_drake.city.buildings.parts import (
+    details,
+    massing,
+    pitched_roofs,
+    wings,
+)
 from cns_drake.city.buildings.parts.facades import Band, Patch
-from cns_drake.city.buildings.parts.materials import Materials
 from cns_drake.city.buildings.parts.roof_equipment import add_chimney
-from cns_drake.city.buildings.parts.site import Assembly, Rgb
+from cns_drake.city.buildings.parts.site import Assembly, Rgb, pick
 from cns_drake.city.buildings.parts.wings import Roof, Wing
 from cns_drake.city.geometry.mesh import Mesh
 
@@ -62,10 +67,9 @@ class RowUnit:
 
 
 def add_unit(
-    assembly: Assembly,
-    materials: Materials,
+    out: Assembly,
     p: RowUnit,
-    area: tuple[float, float, float, float],
+    area: massing.Area,
     height: float,
     blind: frozenset[int],
     part: str = "",
@@ -74,8 +78,7 @@ def add_unit(
     """Adds a house.
 
     Args:
-        assembly: gets the chimney.
-        materials: of a family house, gets all else.
+        out: the building, with the materials of a family house.
         p: the house.
         area: x0, y0, x1, y1 of its walls; `p.stoop` in front stays free.
         height: of its top [m].
@@ -95,9 +98,9 @@ def add_unit(
             openings, edges, p.floor, step, storeys, pitch, p.window_width,
             head=min(2.2, step - 0.45),
         )  # fmt: skip
-    door = _add_entrance(materials, p, wing, openings, door_material)
-    _add_bay(materials, p, wing, openings, storeys, step, door)
-    house_walls.add_casings(materials, wing, openings, (0,), p.casing)
+    door = _add_entrance(out, p, wing, openings, door_material)
+    _add_bay(out, p, wing, openings, storeys, step, door)
+    house_walls.add_casings(out, wing, openings, (0,), p.casing)
     bands = [Band(0.0, round(p.floor, 2), -0.05)]
     if storeys > 1:
         z = round(p.floor + step, 2)
@@ -105,18 +108,15 @@ def add_unit(
     if p.roof == "flat":
         z = round(wing.wall_top - 0.45, 2)
         bands.append(Band(z, wing.wall_top, -0.22))
-    openings.add_walls(materials, (house_walls.GLASS_M,), bands)
-    add_roof(materials, p, wing)
+    openings.add_walls(out, (house_walls.GLASS_M,), bands)
+    add_roof(out, p, wing)
     if p.chimney:
-        add_stack(assembly, p, wing, f"{part}chimney")
+        add_stack(out, p, wing, f"{part}chimney")
     return wing
 
 
 def unit_box(
-    p: RowUnit,
-    area: tuple[float, float, float, float],
-    height: float,
-    blind: frozenset[int],
+    p: RowUnit, area: massing.Area, height: float, blind: frozenset[int]
 ) -> tuple[Wing, int]:
     """Returns the walls under their roof, and the storeys above `p.floor`."""
     x0, y0, x1, y1 = area
@@ -137,87 +137,82 @@ def unit_box(
         wanted = p.floor + storeys * p.storey + 0.25
         least = top - _ROOF_M - 0.75 * span
         wall_top = min(max(wanted, least), top - _ROOF_M - 0.1 * span)
-    kind = {"front": "gable", "stepped": "gable"}.get(p.roof, p.roof)
-    roof = Roof(
-        kind,
-        across,
-        eaves=0.0 if across else 0.35,
-        verge=0.0 if p.roof == "stepped" else 0.3,
-        thickness=_ROOF_M,
-        parapet=0.45,
-    )
+    kind = "gable" if across else p.roof
+    eaves, verge = 0.0 if across else 0.35, 0.0 if p.roof == "stepped" else 0.3
+    roof = Roof(kind, across, eaves, verge, _ROOF_M, parapet=0.45)
     return Wing.at(x0, y0, x1, y1, wall_top, top, roof, blind), storeys
 
 
 def _add_entrance(
-    materials, p: RowUnit, wing: Wing, openings: Openings, material: str
+    out: Assembly, p: RowUnit, wing: Wing, openings: Openings, material: str
 ) -> float:
     """Adds the door on its landing; returns where it is [m]."""
     wall = wing.wall(0)
     inset = min(0.95, 0.3 * wall.length)
     x = inset if p.door_left else wall.length - inset
     house_walls.add_door(
-        materials, wing, openings, 0, x, p.floor, height=2.25,
-        material=material,
-    )  # fmt: skip
+        out, wing, openings, 0, x, p.floor, height=2.25, material=material
+    )
     count = max(1, round(p.floor / 0.17))
     run = min(0.29 * count, max(p.stoop - 0.5, 0.3 * p.stoop))
     landing = p.stoop - run
     a, b = x - 0.65, x + 0.65
     if p.floor > 0.05:
-        slab = massing.box(a, b, -0.05, landing, -0.5, p.floor)
-        materials.add("base", wall.place(slab))
-        porches.add_steps(materials, wall, a, b, landing, p.floor, run)
+        slab = wall.standing(a, b, -0.05, landing, p.floor, bottom=True)
+        out.add_to("base", slab)
+        porches.add_steps(out, wall, a, b, landing, p.floor, run)
     if p.canopy:
         z = p.floor + 2.4
-        hood = massing.box(x - 0.8, x + 0.8, -0.05, 0.8, z, z + 0.14)
-        materials.add("trim", wall.place(hood))
+        hood = wall.box(x - 0.8, x + 0.8, -0.05, 0.8, z, z + 0.14)
+        out.add_to("trim", hood)
     return x
 
 
-def _add_bay(materials, p: RowUnit, wing, openings, storeys, step, door):
+def _add_bay(
+    out: Assembly,
+    p: RowUnit,
+    wing: Wing,
+    openings: Openings,
+    storeys: int,
+    step: float,
+    door: float,
+) -> None:
     """Adds a bay window beside the door, in place of the windows there."""
     wall = wing.wall(0)
     a, b = (door + 0.8, wall.length) if p.door_left else (0.0, door - 0.8)
     width = min(b - a - 0.7, 2.6)
-    if p.bay == "none" or width < 1.7:
+    if p.bay == "none" or width < 1.7 or (p.bay == "oriel" and storeys < 2):
         return
     count = min(p.bay_storeys, storeys)
-    x = (a + b) / 2
-    low = 0.0
+    x, low, foot = (a + b) / 2, 0.0, p.floor
     if p.bay == "oriel":
-        if storeys < 2:
-            return
-        low, count = p.floor + step, min(count, storeys - 1)
-    high = p.floor * (p.bay != "oriel") + low + count * step - 0.1
-    high = min(high, wing.wall_top - 0.6)
+        low, foot, count = p.floor + step, 0.0, min(count, storeys - 1)
+    high = min(foot + low + count * step - 0.1, wing.wall_top - 0.6)
     reach = min(0.6, 0.5 * p.stoop)
     openings.clear(0, x - width / 2 - 0.1, x + width / 2 + 0.1, low, high + 0.5)
     porches.add_bay_window(
-        materials, wall, x, width, reach, round(low, 2), round(high, 2),
+        out, wall, x, width, reach, round(low, 2), round(high, 2),
         storeys=count, canted=p.bay != "box",
     )  # fmt: skip
 
 
-def add_roof(materials: Materials, p: RowUnit, wing: Wing) -> None:
+def add_roof(out: Assembly, p: RowUnit, wing: Wing) -> None:
     """Adds a roof with its dormers, firewalls or steps."""
     low = wing.wall_top + 0.45
     attic = wings.attic_window(0.8, low, low + 1.1, house_walls.GLASS_M)
-    wings.add_roof(materials, wing, None if p.roof == "stepped" else attic)
+    wings.add_roof(out, wing, None if p.roof == "stepped" else attic)
     if p.roof == "stepped":
         for edge in (0, 2):
-            steps = _stepped_gable(wing)
-            materials.add("walls", *(wing.wall(edge).place(s) for s in steps))
-        _add_gable_windows(materials, wing)
+            out.add_to("walls", *_stepped_gable(wing, wing.wall(edge)))
+        _add_gable_windows(out, wing)
     elif p.roof in ("gable", "gambrel"):
-        _add_firewalls(materials, wing)
-        length = wing.x1 - wing.x0
-        dormers.add_dormers(materials, wing, 0.0, length, p.dormers, p.dormer)
+        _add_firewalls(out, wing)
+        dormers.add_dormers(out, wing, 0.0, wing.width, p.dormers, p.dormer)
 
 
-def _stepped_gable(wing: Wing) -> list[Mesh]:
-    """Steps up to the middle of a gable, in wall coordinates."""
-    middle = (wing.x1 - wing.x0) / 2
+def _stepped_gable(wing: Wing, wall: details.WallFrame) -> list[Mesh]:
+    """Steps up to the middle of a gable."""
+    middle = wing.width / 2
     rise = wing.top + 0.4 - wing.wall_top
     count = max(3, round(rise / 0.9))
     pieces = []
@@ -227,69 +222,70 @@ def _stepped_gable(wing: Wing) -> list[Mesh]:
         low = wing.wall_top + rise * (k / count) - 0.3
         top = wing.wall_top + rise * (k + 1) / count
         spot = (middle - half, middle + half, -0.32, 0.03, low, top)
-        pieces.append(massing.box(*(round(v, 2) for v in spot)))
+        pieces.append(wall.box(*(round(v, 2) for v in spot)))
     return pieces
 
 
-def _add_gable_windows(materials: Materials, wing: Wing) -> None:
+def _add_gable_windows(out: Assembly, wing: Wing) -> None:
     """Puts windows into the steps, their frames in front of the wall."""
-    rise = wing.top - wing.wall_top
+    x, z = wing.width / 2, wing.wall_top + 0.4
+    spots = [x - 1.1, x + 1.1] if wing.top - wing.wall_top > 3.2 else [x]
     for edge in (0, 2):
-        wall, x = wing.wall(edge), (wing.x1 - wing.x0) / 2
-        spots = [x - 1.1, x + 1.1] if rise > 3.2 else [x]
-        z = wing.wall_top + 0.4
+        wall = wing.wall(edge)
         for u in spots:
             pane = Patch(u - 0.45, u + 0.45, z, z + 1.2, house_walls.GLASS_M)
             frame = porches.casings([pane], (pane.depth,), "frame", 0.12)
             glass = porches.board(pane.x0, pane.x1, pane.z0, pane.z1, 0.05)
-            materials.add("trim", *(wall.place(piece) for piece in frame))
-            materials.add("glass", wall.place(glass))
+            out.add_to("trim", *(wall.place(piece) for piece in frame))
+            out.add_to("glass", wall.place(glass))
 
 
-def _add_firewalls(materials: Materials, wing: Wing) -> None:
+def _add_firewalls(out: Assembly, wing: Wing) -> None:
     """Raises the side walls above the roof."""
     line = [(u, z + _FIREWALL_M) for u, z in wing.line]
     for x in (wing.x0, wing.x1 - 0.3):
         wall = pitched_roofs.shell(line, x, x + 0.3, _FIREWALL_M + 0.1)
-        materials.add("walls", wall)
+        out.add_to("walls", wall)
 
 
-def add_stack(assembly: Assembly, p: RowUnit, wing: Wing, name: str) -> None:
+def add_stack(out: Assembly, p: RowUnit, wing: Wing, name: str) -> None:
     """Stands a chimney on the roof of a house."""
+    yaw = math.pi / 2
     if p.roof in ("front", "stepped"):
-        x = wing.x0 + 0.3 * (wing.x1 - wing.x0)
+        x = wing.x0 + 0.3 * wing.width
         z = pitched_roofs.line_height(wing.line, x)
-        spot = (x, wing.y0 + 0.6 * (wing.y1 - wing.y0), z - 0.6)
-        add_chimney(assembly, name, spot, p.brick, yaw=math.pi / 2)
+        spot = (x, wing.y0 + 0.6 * wing.depth, z - 0.6)
+        add_chimney(out, name, spot, p.brick, yaw=yaw)
         return
     x = wing.x0 + 0.45 if p.door_left else wing.x1 - 0.45
-    y = wing.y0 + 0.55 * (wing.y1 - wing.y0)
-    z = pitched_roofs.line_height(wing.line, y)
-    spot = (x, y, z - 0.8)
-    scale = (0.8, 0.85, 1.0)
-    add_chimney(
-        assembly, name, spot, p.brick, item="chimney_row",
-        yaw=math.pi / 2, scale=scale,
-    )  # fmt: skip
+    y = wing.y0 + 0.55 * wing.depth
+    spot = (x, y, pitched_roofs.line_height(wing.line, y) - 0.8)
+    row, scale = "chimney_row", (0.8, 0.85, 1.0)
+    add_chimney(out, name, spot, p.brick, item=row, yaw=yaw, scale=scale)
 
 
-def draw_unit(rng: np.random.Generator, width: float, roofs, bricks) -> RowUnit:
+def draw_unit(
+    rng: np.random.Generator,
+    width: float,
+    roofs: Sequence[str],
+    bricks: Sequence[Rgb],
+) -> RowUnit:
     """Draws the parameters of one house of a row."""
     return RowUnit(
-        roof=roofs[int(rng.integers(len(roofs)))],
+        roof=pick(rng, roofs),
         rise=float(rng.uniform(0.75, 1.15)),
         storey=float(rng.uniform(2.75, 3.1)),
         floor=round(float(rng.choice([0.2, 0.5, 0.8, 1.0])), 2),
         door_left=bool(rng.random() < 0.5),
         window_pitch=max(1.7, float(rng.uniform(1.9, 2.5))),
         window_width=round(float(rng.uniform(0.9, 1.2)), 2),
-        casing=("frame", "sill", "sill", "shutters")[int(rng.integers(4))],
-        bay=("none", "canted", "box", "oriel")[int(rng.integers(4))],
+        casing=pick(rng, ("frame", "sill", "sill", "shutters")),
+        bay=pick(rng, ("none", "canted", "box", "oriel")),
         bay_storeys=int(rng.integers(1, 4)),
         dormers=int(rng.integers(0, max(2, round(width / 2.2)))),
-        dormer=("gable", "shed")[int(rng.integers(2))],
+        dormer=pick(rng, ("gable", "shed")),
         canopy=bool(rng.random() < 0.4),
         stoop=1.3,
         chimney=bool(rng.random() < 0.75),
-        brick=bricks[int(rng.integers(len(bricks)))],
+        brick=pick(rng, bricks),
     )

@@ -11,10 +11,8 @@ from cns_drake.city.buildings.house_parts.openings import (
 )
 from cns_drake.city.buildings.parts import bays, details, massing, wings
 from cns_drake.city.buildings.parts.facades import Band, Patch
-from cns_drake.city.buildings.parts.materials import Materials
 from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.buildings.parts.wings import Roof, Wing
-from cns_drake.city.geometry.mesh import Mesh
 
 _BOARDS = (
     (0.50, 0.22, 0.18),
@@ -46,7 +44,7 @@ class Parameters:
         ventilators: on the ridge.
     """
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         width = min(d.width, d.depth)
         aisle = d.uniform(0.2, 0.28) * width
         self.height = d.height
@@ -63,16 +61,16 @@ class Parameters:
         self.roof_rgb = d.pick(_ROOFS)
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the barn along the longer side of a rectangle."""
-    materials = Materials(
+    out.paint(
         walls=p.rgb,
-        glass=assembly.glass_rgb,
+        glass=out.glass_rgb,
         roof=p.roof_rgb,
         trim=_TRIM,
         doors=_DOORS,
     )
-    x0, y0, x1, y1 = assembly.site.bounds
+    x0, y0, x1, y1 = out.site.bounds
     along_y = y1 - y0 >= x1 - x0
     left, right = x0 + _MARGIN, x1 - _MARGIN
     front, back = y0 + _MARGIN + p.deck, y1 - _MARGIN
@@ -81,66 +79,67 @@ def build(p: Parameters, assembly: Assembly) -> None:
         a, b = a + p.aisle * p.aisle_left, b - p.aisle * (not p.aisle_left)
     else:
         high -= p.aisle
-    hood = 0.7 if p.ventilators else 0.0
-    top = p.height - hood
+    top = p.height - (0.7 if p.ventilators else 0.0)
     half = ((b - a) if along_y else (high - low)) / 2
     wall_top = max(2.3, p.wall * top)
+    eaves = 0.35
     if p.roof == "barrel":
         # A vault is at most half a circle.
-        wall_top = max(wall_top, top - 0.8 * half)
-    eaves = 0.0 if p.roof == "barrel" else 0.35
+        eaves, wall_top = 0.0, max(wall_top, top - 0.8 * half)
     roof = Roof(p.roof, along_y, eaves, 0.35, 0.18)
     main = Wing.at(a, low, b, high, wall_top, top, roof)
     boxes = [main]
     if p.aisle > 1.5:
-        boxes.append(_aisle(p, main, (left, right, back), along_y))
-    gable = 0 if along_y else 3
+        boxes.append(_aisle(p, main, (left, right, back)))
     for wing in boxes:
-        openings = Openings(wing, boxes)
-        head = round(min(2.0, wing.wall_top - 0.3), 2)
-        window = bays.window(0.9, 1.1, head, _RECESS)
-        openings.row(range(4), 1.0, 3.2, [window], 0.8)
-        if wing is main:
-            _add_doors(materials, p, main, openings, gable)
-            if not along_y:
-                _add_doors(materials, p, main, openings, 0)
-        openings.add_walls(materials, (_RECESS,), (Band(0.0, 0.3, -0.06),))
-        low_z = wing.wall_top + 0.5
-        attic = wings.attic_window(1.0, low_z, low_z + 1.3, _RECESS)
-        wings.add_roof(materials, wing, attic)
-        for edge in range(4):
-            _add_battens(materials, p, wing, boxes, openings, edge)
-    _add_ridge(materials, p, main)
+        _add_box(out, p, wing, boxes)
+    _add_ridge(out, p, main)
     if p.deck > 0:
-        _add_jetty(materials, p, (left, right), y0, front)
-    materials.finish(assembly)
+        _add_jetty(out, (left, right), y0, front)
 
 
-def _aisle(p: Parameters, main: Wing, limits, along_y: bool) -> Wing:
+def _add_box(
+    out: Assembly, p: Parameters, wing: Wing, boxes: list[Wing]
+) -> None:
+    """Adds the barn itself, with its doors, or the lean-to."""
+    openings = Openings(wing, boxes)
+    head = round(min(2.0, wing.wall_top - 0.3), 2)
+    openings.row(
+        range(4), 1.0, 3.2, [bays.window(0.9, 1.1, head, _RECESS)], 0.8
+    )
+    if wing is boxes[0]:
+        for edge in (0,) if wing.roof.along_y else (3, 0):
+            _add_doors(out, p, wing, openings, edge)
+    low = wing.wall_top + 0.5
+    attic = wings.attic_window(1.0, low, low + 1.3, _RECESS)
+    openings.enclose(out, (_RECESS,), (Band(0.0, 0.3, -0.06),), attic=attic)
+    for edge in range(4):
+        _add_battens(out, p, wing, boxes, openings, edge)
+
+
+def _aisle(
+    p: Parameters, main: Wing, limits: tuple[float, float, float]
+) -> Wing:
     """Returns the lean-to against the long side of the barn."""
     left, right, back = limits
+    along_y = main.roof.along_y
     high = main.wall_top + 0.1
     low = max(1.9, high - 0.3 * p.aisle)
     high = max(high, low + 0.25)
-    if not along_y:
-        # Behind: a shed roof that falls to the back.
-        area = (main.x0 + 1.0, main.y1 - 0.05, main.x1 - 1.0, back)
-        return _lean(area, low, high, along_y=False)
-    if p.aisle_left:
-        return _lean((left, main.y0 + 0.8, main.x0 + 0.05, main.y1 - 0.8),
-                     low, high, along_y=True, rising=True)  # fmt: skip
-    return _lean((main.x1 - 0.05, main.y0 + 0.8, right, main.y1 - 0.8),
-                 low, high, along_y=True)  # fmt: skip
-
-
-def _lean(area, low, high, *, along_y: bool, rising: bool = False) -> Wing:
-    """Returns a box under a roof that falls away from the barn."""
-    roof = Roof("shed", along_y, 0.3, 0.25, 0.15, falling=not rising)
+    # Behind the barn, or beside it: its roof falls away from there.
+    area = (main.x0 + 1.0, main.y1 - 0.05, main.x1 - 1.0, back)
+    if along_y:
+        a, b = main.x1 - 0.05, right
+        if p.aisle_left:
+            a, b = left, main.x0 + 0.05
+        area = (a, main.y0 + 0.8, b, main.y1 - 0.8)
+    falling = not (along_y and p.aisle_left)
+    roof = Roof("shed", along_y, 0.3, 0.25, 0.15, falling=falling)
     return Wing.at(*area, low, high, roof)
 
 
 def _add_doors(
-    materials, p: Parameters, wing: Wing, openings, edge: int
+    out: Assembly, p: Parameters, wing: Wing, openings: Openings, edge: int
 ) -> None:
     """Adds a pair of braced doors that slide along the wall."""
     wall = wing.wall(edge)
@@ -157,35 +156,29 @@ def _add_doors(
         spots, half = (x - width / 2, x + 0.03), width / 2 - 0.03
     for a in spots:
         b = a + half
-        panel = [
-            porches.board(a, b, 0.08, height, 0.1),
+        brace = (a + 0.1, 0.1, 0.2), (b - 0.1, 0.1, height - 0.1)
+        frame = [
             porches.board(a, a + 0.18, 0.08, height, 0.15),
             porches.board(b - 0.18, b, 0.08, height, 0.15),
             porches.board(a, b, height - 0.18, height, 0.15),
             porches.board(a, b, 0.08, 0.26, 0.15),
-            details.beam(
-                (a + 0.1, 0.1, 0.2), (b - 0.1, 0.1, height - 0.1), 0.1
-            ),
+            details.beam(*brace, 0.1),
         ]
-        materials.add("doors", wall.place(panel[0]))
-        materials.add("trim", *(wall.place(m) for m in panel[1:]))
-    rail = massing.box(
-        x - width - 0.1,
-        x + width + 0.1,
-        0.0,
-        0.18,
-        height + 0.05,
-        height + 0.18,
-    )
-    materials.add("trim", wall.place(rail))
+        leaf = porches.board(a, b, 0.08, height, 0.1)
+        out.add_to("doors", wall.place(leaf))
+        out.add_to("trim", *(wall.place(m) for m in frame))
+    rail = (x - width - 0.1, x + width + 0.1, 0.0, 0.18)
+    out.add_to("trim", wall.box(*rail, height + 0.05, height + 0.18))
 
 
-def _brace(x0: float, x1: float, height: float) -> Mesh:
-    """The slanted board of a door, in wall coordinates."""
-    return details.beam((x0, 0.1, 0.2), (x1, 0.1, height - 0.1), 0.1)
-
-
-def _add_battens(materials, p: Parameters, wing, boxes, openings, edge) -> None:
+def _add_battens(
+    out: Assembly,
+    p: Parameters,
+    wing: Wing,
+    boxes: list[Wing],
+    openings: Openings,
+    edge: int,
+) -> None:
     """Adds upright battens on the free parts of a wall between openings."""
     wall = wing.wall(edge)
     reliefs = openings.layout(edge, wall.length)
@@ -195,37 +188,32 @@ def _add_battens(materials, p: Parameters, wing, boxes, openings, edge) -> None:
             if any(r.x0 - 0.15 < u < r.x1 + 0.15 for r in reliefs):
                 continue
             strip = porches.board(u - 0.05, u + 0.05, 0.3, wing.wall_top, 0.05)
-            materials.add("walls", wall.place(strip))
+            out.add_to("walls", wall.place(strip))
 
 
-def _add_ridge(materials, p: Parameters, main: Wing) -> None:
-    """Adds louvred ventilators on the ridge, and a hoist in the gable."""
-    middle = (main.x0 + main.x1) / 2, (main.y0 + main.y1) / 2
+def _add_ridge(out: Assembly, p: Parameters, main: Wing) -> None:
+    """Adds louvred ventilators on the ridge."""
     z = main.top
     for k in range(p.ventilators):
         share = (k + 0.5) / p.ventilators - 0.5
-        x, y = middle
+        x, y = main.center
         if main.roof.along_y:
-            y += 0.8 * share * (main.y1 - main.y0)
+            y += 0.8 * share * main.depth
         else:
-            x += 0.8 * share * (main.x1 - main.x0)
-        materials.add("walls", massing.post(x, y, 0.45, z + 0.3, z - 0.6))
-        eaves = massing.rectangle(x - 0.65, y - 0.65, x + 0.65, y + 0.65)
-        materials.add(
+            x += 0.8 * share * main.width
+        out.add_to("walls", massing.post(x, y, 0.45, z + 0.3, z - 0.6))
+        eaves = massing.square(x, y, 0.65)
+        out.add_to(
             "roof",
             massing.flat(eaves, z + 0.3, up=False),
             massing.spire(eaves, (x, y), z + 0.3, z + 0.7),
         )
 
 
-def _add_jetty(materials, p: Parameters, xs, y0: float, front: float) -> None:
+def _add_jetty(out: Assembly, xs: bays.Span, y0: float, front: float) -> None:
     """Adds a plank deck on posts in front of a boat house."""
-    a, b = xs
-    y0 += 0.1
-    pieces = [massing.box(a, b, y0, front, 0.05, 0.3)]
+    (a, b), y = xs, y0 + 0.1
+    out.add_to("doors", massing.box(a, b, y, front, 0.05, 0.3))
     for x in np.linspace(a + 0.2, b - 0.2, 4).tolist():
-        spot = (x - 0.12, x + 0.12, y0 + 0.02, y0 + 0.26)
-        pieces.append(
-            massing.box(*spot, -massing.FOUNDATION_M, 1.1, bottom=False)
-        )
-    materials.add("doors", *pieces)
+        spot = (x - 0.12, x + 0.12, y + 0.02, y + 0.26)
+        out.add_to("doors", massing.standing(*spot, 1.1))

@@ -12,6 +12,7 @@ from cns_drake.city.buildings.house_parts import (
     porches,
 )
 from cns_drake.city.buildings.house_parts.family_house import ROOF_M
+from cns_drake.city.buildings.house_parts.openings import Openings
 from cns_drake.city.buildings.parts import massing
 from cns_drake.city.buildings.parts.roof_equipment import add_chimney
 from cns_drake.city.buildings.parts.site import Assembly, Dice, Site
@@ -21,7 +22,7 @@ from cns_drake.city.buildings.parts.wings import Roof, Wing
 _MARGIN = 0.75
 
 
-class Parameters:
+class Parameters(family_house.Colours):
     """Parameters of a bungalow; lengths in metres.
 
     Attributes:
@@ -38,7 +39,7 @@ class Parameters:
         veranda: whether a porch runs along the front.
     """
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         self.height = d.height
         self.plan = d.pick(("long", "ell", "ell", "court"))
         self.parking = d.pick(("garage", "carport", "none"))
@@ -53,9 +54,7 @@ class Parameters:
         self.casing = d.pick(("frame", "sill", "shutters"))
         self.veranda = d.chance(0.5)
         self.chimney_at = d.uniform(0.25, 0.75)
-        self.rgb = d.pick(family_house.WALLS)
-        self.roof_rgb = d.pick(family_house.ROOFS)
-        self.accent_rgb = d.pick(family_house.ACCENTS)
+        self.draw_colours(d)
 
 
 @dataclass(frozen=True)
@@ -121,43 +120,34 @@ def _planned(p: Parameters, site: Site) -> _Plan:
     return plan.mirrored(x0 + x1) if p.mirrored else plan
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the bungalow along the front of a rectangle."""
-    site = assembly.site
-    materials = family_house.house_materials(
-        assembly, p.rgb, p.roof_rgb, p.accent_rgb
-    )
-    plan = _planned(p, site)
+    p.paint(out)
+    plan = _planned(p, out.site)
     boxes = (plan.main, *plan.fronts)
-    _add_main(assembly, materials, p, plan, boxes, site.bounds[1])
+    size = (p.floor, 1, p.window_pitch, p.window_width)
+    openings = family_house.window_rows(plan.main, boxes, *size)
+    _add_main(out, p, plan, openings, out.site.bounds[1])
     for k, wing in enumerate(plan.fronts):
-        openings = family_house.window_rows(
-            wing, boxes, p.floor, 1, p.window_pitch, p.window_width
-        )
-        length = wing.x1 - wing.x0
+        openings = family_house.window_rows(wing, boxes, *size)
         if p.parking == "garage" and k == 0:
+            width = min(wing.width - 0.8, 4.8)
             house_walls.add_garage_door(
-                materials, wing, openings, 0, length / 2,
-                min(length - 0.8, 4.8),
-            )  # fmt: skip
-        family_house.close_box(materials, wing, openings, p.floor, p.casing)
+                out, wing, openings, 0, wing.width / 2, width
+            )
+        family_house.close_box(out, wing, openings, p.floor, p.casing)
     if plan.carport is not None:
-        _add_carport(materials, p, plan.carport)
+        _add_carport(out, plan.carport)
     main = plan.main
-    x = main.x0 + p.chimney_at * (main.x1 - main.x0)
-    y = (main.y0 + main.y1) / 2
-    add_chimney(
-        assembly, "chimney", (x, y, main.top - 1.3), family_house.BASE,
-        scale=(1.5, 1.2, 0.95),
-    )  # fmt: skip
-    materials.finish(assembly)
+    x = main.x0 + p.chimney_at * main.width
+    spot, scale = (x, main.center[1], main.top - 1.3), (1.5, 1.2, 0.95)
+    add_chimney(out, "chimney", spot, family_house.BASE, scale=scale)
 
 
-def _add_main(assembly, materials, p: Parameters, plan, boxes, y0) -> None:
+def _add_main(
+    out: Assembly, p: Parameters, plan: _Plan, openings: Openings, y0: float
+) -> None:
     main = plan.main
-    openings = family_house.window_rows(
-        main, boxes, p.floor, 1, p.window_pitch, p.window_width
-    )
     wall = main.wall(0)
     a, b = (x - main.x0 for x in plan.free)
     door = a + 0.3 * (b - a)
@@ -165,34 +155,27 @@ def _add_main(assembly, materials, p: Parameters, plan, boxes, y0) -> None:
         x = (door + 0.6 + b) / 2
         pane = house_walls.sash(p.picture, p.floor, 0.45, 2.15, bars=2)
         openings.put(0, x, p.picture + 0.7, pane)
-    house_walls.add_door(
-        materials, main, openings, 0, door, p.floor, lights=0.3
-    )
-    family_house.close_box(materials, main, openings, p.floor, p.casing)
-    room = main.y0 - y0 - 0.4
-    reach = min(1.6, room)
+    house_walls.add_door(out, main, openings, 0, door, p.floor, lights=0.3)
+    family_house.close_box(out, main, openings, p.floor, p.casing)
+    reach = min(1.6, main.y0 - y0 - 0.4)
     if p.veranda and b - a > 4.0 and reach > 0.9:
         eaves = min(p.floor + 2.25, main.wall_top - 0.35)
         porches.add_porch(
-            materials, wall, a + 0.25, b - 0.25, reach, p.floor, eaves,
+            out, wall, a + 0.25, b - 0.25, reach, p.floor, eaves,
             eaves + 0.4, posts=max(3, round((b - a) / 2.4)),
         )  # fmt: skip
     else:
-        slab = massing.box(
-            door - 1.0, door + 1.0, -0.05, min(1.2, reach),
-            -massing.FOUNDATION_M, p.floor,
-        )  # fmt: skip
-        materials.add("base", wall.place(slab))
+        slab = (door - 1.0, door + 1.0, -0.05, min(1.2, reach), p.floor)
+        out.add_to("base", wall.standing(*slab, bottom=True))
 
 
-def _add_carport(materials, p: Parameters, area) -> None:
+def _add_carport(out: Assembly, area: massing.Area) -> None:
     """Adds a flat roof on six posts, with a shed at its end."""
     x0, y0, x1, y1 = area
     top = 2.65
-    roof = massing.box(x0, x1, y0, y1, top - 0.25, top)
-    materials.add("roof", roof)
+    out.add_to("roof", massing.box(x0, x1, y0, y1, top - 0.25, top))
     for x in (x0 + 0.15, x1 - 0.15):
         for y in np.linspace(y0 + 0.3, y1 - 2.0, 3).tolist():
-            materials.add("trim", massing.post(x, y, 0.08, top - 0.2))
-    shed = (x0 + 0.1, x1 - 0.1, y1 - 1.6, y1 - 0.1)
-    materials.add("walls", massing.box(*shed, -massing.FOUNDATION_M, top - 0.2))
+            out.add_to("trim", massing.post(x, y, 0.08, top - 0.2))
+    shed = (x0 + 0.1, x1 - 0.1, y1 - 1.6, y1 - 0.1, top - 0.2)
+    out.add_to("walls", massing.standing(*shed, bottom=True))

@@ -13,6 +13,7 @@ from cns_drake.city.buildings.house_parts import (
     porches,
 )
 from cns_drake.city.buildings.house_parts.family_house import ROOF_M, STOREY_M
+from cns_drake.city.buildings.parts import bays
 from cns_drake.city.buildings.parts.roof_equipment import add_chimney
 from cns_drake.city.buildings.parts.site import Assembly, Dice, Site
 from cns_drake.city.buildings.parts.wings import Roof, Wing
@@ -21,7 +22,7 @@ from cns_drake.city.buildings.parts.wings import Roof, Wing
 _MARGIN = 0.5
 
 
-class Parameters:
+class Parameters(family_house.Colours):
     """Parameters of a detached house; lengths in metres.
 
     `plan` is `box`, `ell` (a wing to the front), `tee` (a wing to the
@@ -29,7 +30,7 @@ class Parameters:
     on the left, unless `mirrored`.
     """
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         self.height = d.height
         self.plan = d.pick(("box", "ell", "tee", "cross", "ell"))
         self.mirrored = d.chance(0.5)
@@ -50,9 +51,7 @@ class Parameters:
         self.dormers = d.whole(0, 3)
         self.dormer = d.pick(("gable", "shed"))
         self.bay_window = d.chance(0.4)
-        self.rgb = d.pick(family_house.WALLS)
-        self.roof_rgb = d.pick(family_house.ROOFS)
-        self.accent_rgb = d.pick(family_house.ACCENTS)
+        self.draw_colours(d)
 
 
 _WING_ENDS = {
@@ -144,36 +143,35 @@ def _planned(p: Parameters, site: Site) -> _Plan:
     return plan.mirrored(x0 + x1) if p.mirrored else plan
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the house on a rectangle, its porch in front."""
-    materials = family_house.house_materials(
-        assembly, p.rgb, p.roof_rgb, p.accent_rgb
-    )
-    plan = _planned(p, assembly.site)
-    _add_main(assembly, materials, p, plan)
+    p.paint(out)
+    plan = _planned(p, out.site)
+    _add_main(out, p, plan)
     for wing in plan.wings:
-        _add_wing(materials, p, plan, wing)
+        _add_wing(out, p, plan, wing)
     if plan.garage is not None:
-        family_house.add_garage(materials, plan.garage, plan.boxes)
-    _add_chimney(assembly, materials, p, plan)
-    materials.finish(assembly)
+        family_house.add_garage(out, plan.garage, plan.boxes)
+    _add_chimney(out, p, plan)
 
 
-def _add_main(assembly, materials, p: Parameters, plan: _Plan) -> None:
+def _add_main(out: Assembly, p: Parameters, plan: _Plan) -> None:
     main = plan.main
     openings = family_house.window_rows(
         main, plan.boxes, p.deck, plan.storeys, p.window_pitch, p.window_width
     )
     a, b = (x - main.x0 for x in plan.free)
     door = a + 0.5 * (b - a)
-    house_walls.add_door(materials, main, openings, 0, door, p.deck, lights=0.3)
-    _add_porch(assembly, materials, p, plan, (a, b))
-    family_house.close_box(materials, main, openings, p.deck, p.casing)
+    house_walls.add_door(out, main, openings, 0, door, p.deck, lights=0.3)
+    _add_porch(out, p, plan, (a, b))
+    family_house.close_box(out, main, openings, p.deck, p.casing)
     if p.roof in ("gable", "gambrel"):
-        dormers.add_dormers(materials, main, a, b, p.dormers, p.dormer, 3.0)
+        dormers.add_dormers(out, main, a, b, p.dormers, p.dormer, 3.0)
 
 
-def _add_porch(assembly, materials, p: Parameters, plan, free) -> None:
+def _add_porch(
+    out: Assembly, p: Parameters, plan: _Plan, free: bays.Span
+) -> None:
     """Roofs the door; a `full` porch runs along the free front."""
     wall = plan.main.wall(0)
     a, b = free
@@ -186,58 +184,44 @@ def _add_porch(assembly, materials, p: Parameters, plan, free) -> None:
     full = p.porch == "full" and b - a > 3.5
     x0, x1 = (a + 0.3, b - 0.3) if full else (door - 1.2, door + 1.2)
     porches.add_porch(
-        materials, wall, x0, x1, reach, p.deck, eaves, top,
+        out, wall, x0, x1, reach, p.deck, eaves, top,
         roof="shed" if p.porch == "full" else p.porch,
         posts=max(3, round((x1 - x0) / 2.2)) if full else 2,
     )  # fmt: skip
     room = plan.ahead - reach - 0.02
-    porches.add_steps(
-        materials, wall, door - 0.7, door + 0.7, reach, p.deck, room
-    )
+    porches.add_steps(out, wall, door - 0.7, door + 0.7, reach, p.deck, room)
     if full and p.deck > 0.3:
         y = reach - 0.15
-        runs = (
-            ((x0 + 0.15, y), (door - 0.8, y)),
-            ((door + 0.8, y), (x1 - 0.15, y)),
-        )
+        runs = ((x0 + 0.15, door - 0.8), (door + 0.8, x1 - 0.15))
         for k, (start, end) in enumerate(runs):
             porches.add_railing(
-                assembly,
-                f"railing_{k}",
-                wall,
-                start,
-                end,
-                p.deck,
+                out, f"railing_{k}", wall, (start, y), (end, y), p.deck,
                 family_house.TRIM,
-            )
+            )  # fmt: skip
 
 
-def _add_wing(materials, p: Parameters, plan: _Plan, wing: Wing) -> None:
+def _add_wing(out: Assembly, p: Parameters, plan: _Plan, wing: Wing) -> None:
     count = max(1, round((wing.wall_top - p.deck) / STOREY_M))
     openings = family_house.window_rows(
         wing, plan.boxes, p.deck, count, p.window_pitch, p.window_width
     )
-    family_house.close_box(materials, wing, openings, p.deck, p.casing)
+    family_house.close_box(out, wing, openings, p.deck, p.casing)
     is_front = wing.y0 < plan.main.y0
-    if p.bay_window and is_front and wing.x1 - wing.x0 > 3.0:
-        x = (wing.x1 - wing.x0) / 2
-        porches.add_bay_window(
-            materials, wing.wall(0), x, 2.2, 0.4, 0.0, p.deck + 2.3
-        )
+    if p.bay_window and is_front and wing.width > 3.0:
+        size = (wing.width / 2, 2.2, 0.4, 0.0, p.deck + 2.3)
+        porches.add_bay_window(out, wing.wall(0), *size)
 
 
-def _add_chimney(assembly, materials, p: Parameters, plan: _Plan) -> None:
+def _add_chimney(out: Assembly, p: Parameters, plan: _Plan) -> None:
     main = plan.main
-    y = (main.y0 + main.y1) / 2
     if p.chimney == "breast":
         wall = main.wall(1 if p.mirrored else 3)
         x = wall.length / 2
         breast = porches.chimney_breast(wall, x, 1.6, 0.42, main.top - 0.1)
-        materials.add("base", breast)
-        spot = (*wall.point(x, 0.18).tolist(), main.top - 0.9)
-        add_chimney(assembly, "chimney", spot, family_house.BASE, yaw=np.pi / 2)
+        out.add_to("base", breast)
+        spot = (*wall.point(x, 0.18), main.top - 0.9)
+        add_chimney(out, "chimney", spot, family_house.BASE, yaw=np.pi / 2)
     elif p.chimney == "ridge":
-        x = main.x0 + p.chimney_at * (main.x1 - main.x0)
-        add_chimney(
-            assembly, "chimney", (x, y, main.top - 1.2), family_house.BRICKS[0]
-        )
+        x = main.x0 + p.chimney_at * main.width
+        spot = (x, main.center[1], main.top - 1.2)
+        add_chimney(out, "chimney", spot, family_house.BRICKS[0])

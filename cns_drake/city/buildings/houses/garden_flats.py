@@ -7,7 +7,7 @@ import numpy as np
 from cns_drake.city.buildings.house_parts import family_house, house_walls
 from cns_drake.city.buildings.house_parts.family_house import ROOF_M
 from cns_drake.city.buildings.house_parts.openings import Openings
-from cns_drake.city.buildings.parts import bays, details, massing, wings
+from cns_drake.city.buildings.parts import bays, details, wings
 from cns_drake.city.buildings.parts.facades import Band
 from cns_drake.city.buildings.parts.roof_equipment import add_chimney
 from cns_drake.city.buildings.parts.site import Assembly, Dice
@@ -19,7 +19,7 @@ _MARGIN = 0.5
 _FLOOR = 0.3
 
 
-class Parameters:
+class Parameters(family_house.Colours):
     """Parameters of a group of flats; lengths in metres.
 
     Attributes:
@@ -32,7 +32,7 @@ class Parameters:
         veranda_width, veranda_reach: of the stacks of verandas.
     """
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         self.height = d.height
         self.roof = d.pick(("gable", "gable", "hip"))
         self.pitch_deg = d.uniform(22.0, 34.0)
@@ -44,17 +44,13 @@ class Parameters:
         self.veranda_width = d.uniform(2.8, 4.0, 2)
         self.veranda_reach = d.uniform(1.4, 1.9, 2)
         self.casing = d.pick(("frame", "sill")) if d.width < 20.0 else "sill"
-        self.rgb = d.pick(family_house.WALLS)
-        self.roof_rgb = d.pick(family_house.ROOFS)
-        self.accent_rgb = d.pick(family_house.ACCENTS)
+        self.draw_colours(d)
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the group along the front of a rectangle."""
-    materials = family_house.house_materials(
-        assembly, p.rgb, p.roof_rgb, p.accent_rgb
-    )
-    x0, y0, x1, y1 = assembly.site.bounds
+    p.paint(out)
+    x0, y0, x1, y1 = out.site.bounds
     left, right = x0 + _MARGIN, x1 - _MARGIN
     count = max(1, round((right - left) / p.section))
     bounds = np.linspace(left, right, count + 1)
@@ -76,11 +72,17 @@ def build(p: Parameters, assembly: Assembly) -> None:
         area = (bounds[k] - 0.05 * (k > 0), y, bounds[k + 1], y + deep)
         boxes.append(Wing.at(*area, wall_top, top, shape))
     for k, wing in enumerate(boxes):
-        _add_house(assembly, materials, p, wing, boxes, storeys, k)
-    materials.finish(assembly)
+        _add_house(out, p, wing, boxes, storeys, k)
 
 
-def _add_house(assembly, materials, p, wing, boxes, storeys, number) -> None:
+def _add_house(
+    out: Assembly,
+    p: Parameters,
+    wing: Wing,
+    boxes: list[Wing],
+    storeys: int,
+    number: int,
+) -> None:
     openings = Openings(wing, boxes)
     storey = (wing.wall_top - 0.15 - _FLOOR) / storeys
     head = min(2.2, storey - 0.4)
@@ -91,66 +93,57 @@ def _add_house(assembly, materials, p, wing, boxes, storeys, number) -> None:
         )  # fmt: skip
     wall = wing.wall(0)
     middle = wall.length / 2
-    glazing = bays.window(
-        1.8, _FLOOR + 2.6, wing.wall_top - 0.7, house_walls.GLASS_M
-    )
+    glass = house_walls.GLASS_M
     openings.clear(0, middle - 1.1, middle + 1.1, 0.0, wing.wall_top)
     if wing.wall_top > 6.0:
-        openings.put(0, middle, 2.6, glazing)
+        stair = bays.window(1.8, _FLOOR + 2.6, wing.wall_top - 0.7, glass)
+        openings.put(0, middle, 2.6, stair)
     house_walls.add_door(
-        materials, wing, openings, 0, middle, _FLOOR, width=1.2, lights=0.4
+        out, wing, openings, 0, middle, _FLOOR, width=1.2, lights=0.4
     )
-    hood = massing.box(
-        middle - 1.4, middle + 1.4, -0.05, 1.3, _FLOOR + 2.3, _FLOOR + 2.5
-    )
-    step = massing.box(middle - 1.4, middle + 1.4, -0.05, 1.3, -0.5, _FLOOR)
-    materials.add("trim", wall.place(hood))
-    materials.add("base", wall.place(step))
-    _add_verandas(assembly, p, wall, openings, storeys, storey, wing, number)
-    house_walls.add_casings(materials, wing, openings, (0,), p.casing)
+    area = (middle - 1.4, middle + 1.4, -0.05, 1.3)
+    out.add_to("trim", wall.box(*area, _FLOOR + 2.3, _FLOOR + 2.5))
+    out.add_to("base", wall.standing(*area, _FLOOR, bottom=True))
+    _add_verandas(out, p, wing, storeys, storey, number)
+    house_walls.add_casings(out, wing, openings, (0,), p.casing)
     z = round(_FLOOR + storey, 2)
     bands = (Band(0.0, _FLOOR, -0.05), Band(z - 0.2, z, -0.05))
-    openings.add_walls(materials, (house_walls.GLASS_M,), bands)
     low = wing.wall_top + 0.4
-    attic = wings.attic_window(0.9, low, low + 1.0, house_walls.GLASS_M, 2)
-    wings.add_roof(materials, wing, attic)
+    attic = wings.attic_window(0.9, low, low + 1.0, glass, 2)
+    openings.enclose(out, (glass,), bands, attic=attic)
     if not wing.roof.along_y:
-        x, y = wing.x0 + 0.3 * wall.length, (wing.y0 + wing.y1) / 2
-        spot = (x, y, wing.top - 1.3)
-        brick = family_house.BRICKS[0]
-        add_chimney(assembly, f"chimney_{number}", spot, brick)
+        x, y = wing.x0 + 0.3 * wall.length, wing.center[1]
+        spot, brick = (x, y, wing.top - 1.3), family_house.BRICKS[0]
+        add_chimney(out, f"chimney_{number}", spot, brick)
 
 
 def _add_verandas(
-    assembly, p, wall, openings, storeys, storey, wing, number
+    out: Assembly,
+    p: Parameters,
+    wing: Wing,
+    storeys: int,
+    storey: float,
+    number: int,
 ) -> None:
     """Adds verandas left and right of the entrance, one on another."""
-    half = wall.length / 2
-    width = min(p.veranda_width, half - 2.2)
+    wall = wing.wall(0)
+    width = min(p.veranda_width, wall.length / 2 - 2.2)
     if width < 2.0:
         return
-    reach = p.veranda_reach
-    top = wing.wall_top - 0.1
+    reach, top = p.veranda_reach, wing.wall_top - 0.1
     pieces, frame = [], []
     for x in (0.9 + width / 2, wall.length - 0.9 - width / 2):
         a, b = round(x - width / 2, 2), round(x + width / 2, 2)
         pieces.append(wall.place(details.balcony(a, b, reach, 0.0, 1.0)))
         for u in (a + 0.1, b - 0.1):
             spot = (u - 0.09, u + 0.09, reach - 0.2, reach - 0.02)
-            frame.append(
-                massing.box(
-                    *spot, -massing.FOUNDATION_M, top - 0.1, bottom=False
-                )
-            )
-        frame.append(massing.box(a - 0.1, b + 0.1, -0.05, reach + 0.1,
-                                 top - 0.25, top))  # fmt: skip
-    part = f"house_{number}"
+            frame.append(wall.standing(*spot, top - 0.1))
+        lid = (a - 0.1, b + 0.1, -0.05, reach + 0.1, top - 0.25, top)
+        frame.append(wall.box(*lid))
+    part, rgb = f"house_{number}", family_house.TRIM
     mesh = merge_meshes(*pieces)
-    shape = MeshShape(assembly.define(f"{part}_verandas", mesh))
+    shape = MeshShape(out.define(f"{part}_verandas", mesh))
     for k in range(1, storeys):
-        assembly.place(
-            f"{part}_verandas_{k}", shape, (0.0, 0.0, _FLOOR + k * storey),
-            rgb=family_house.TRIM,
-        )  # fmt: skip
-    posts = merge_meshes(*(wall.place(m) for m in frame))
-    assembly.add(f"{part}_posts", posts, rgb=family_house.TRIM)
+        at = (0.0, 0.0, _FLOOR + k * storey)
+        out.place(f"{part}_verandas_{k}", shape, at, rgb=rgb)
+    out.add(f"{part}_posts", *frame, rgb=rgb)

@@ -8,7 +8,6 @@ from cns_drake.city.buildings.house_parts import (
     row_unit,
 )
 from cns_drake.city.buildings.house_parts.openings import Openings
-from cns_drake.city.buildings.parts import wings
 from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.buildings.parts.wings import Roof, Wing
 
@@ -23,10 +22,10 @@ _WALLS = (
 _MOST_DEPTH = 10.5
 
 
-class Parameters:
+class Parameters(family_house.Colours):
     """Parameters of a row house; lengths in metres."""
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         roofs = ["gable", "gambrel", "flat"]
         if d.width < 9.5:
             roofs += ["front", "stepped"]
@@ -36,51 +35,36 @@ class Parameters:
         self.annex_height = d.uniform(2.8, 3.6, 2)
         self.annex_width = d.uniform(0.45, 0.65)
         self.annex_left = d.chance(0.5)
-        self.rgb = d.pick(_WALLS)
-        self.roof_rgb = d.pick(family_house.ROOFS)
-        self.accent_rgb = d.pick(family_house.ACCENTS)
+        self.draw_colours(d, _WALLS)
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the house on a rectangle."""
-    site = assembly.site
-    materials = family_house.house_materials(
-        assembly, p.rgb, p.roof_rgb, p.accent_rgb
-    )
-    x0, y0, x1, y1 = site.bounds
+    p.paint(out)
+    x0, y0, x1, y1 = out.site.bounds
     # Eaves and cornices stay on the lot, except towards the neighbours.
     side = 0.3 * (p.unit.roof == "flat")
-    left = x0 + side * (3 not in site.blind_edges)
-    right = x1 - side * (1 not in site.blind_edges)
+    blind = out.site.blind_edges & {1, 3}
+    left, right = x0 + side * (3 not in blind), x1 - side * (1 not in blind)
     front, back = y0 + p.unit.stoop, y1 - 0.35
     deep = min(back - front, _MOST_DEPTH)
     if back - front - deep < 1.5:
         deep = back - front
-    main = row_unit.add_unit(
-        assembly,
-        materials,
-        p.unit,
-        (left, front, right, front + deep),
-        p.height,
-        site.blind_edges & {1, 3},
-    )
+    area = (left, front, right, front + deep)
+    main = row_unit.add_unit(out, p.unit, area, p.height, blind)
     if back - main.y1 > 1.0:
-        _add_annex(materials, p, main, back)
-    materials.finish(assembly)
+        _add_annex(out, p, main, back)
 
 
-def _add_annex(materials, p: Parameters, main: Wing, back: float) -> None:
+def _add_annex(out: Assembly, p: Parameters, main: Wing, back: float) -> None:
     """Adds a low wing behind the house, on one side."""
-    width = p.annex_width * (main.x1 - main.x0)
+    width = p.annex_width * main.width
     x0 = main.x0 if p.annex_left else main.x1 - width
     blind = main.blind & {3 if p.annex_left else 1}
     top = min(p.annex_height + 0.9, main.wall_top)
-    roof = Roof("shed", True, 0.0, 0.2, 0.18)
     wall_top = min(p.annex_height, top - 0.4)
-    annex = Wing.at(
-        x0, main.y1 - 0.06, x0 + width, back, wall_top, top, roof, blind
-    )
-    openings = Openings(annex, (main,))
+    area = (x0, main.y1 - 0.06, x0 + width, back)
+    roof = Roof("shed", True, 0.0, 0.2, 0.18)
+    openings = Openings(Wing.at(*area, wall_top, top, roof, blind), (main,))
     openings.row((1, 2, 3), 0.9, 2.6, [house_walls.sash(1.1, 0.1, 0.9, 2.1)])
-    openings.add_walls(materials, (house_walls.GLASS_M,))
-    wings.add_roof(materials, annex)
+    openings.enclose(out, (house_walls.GLASS_M,))

@@ -11,7 +11,6 @@ from cns_drake.city.buildings.house_parts import (
 )
 from cns_drake.city.buildings.house_parts.family_house import ROOF_M, STOREY_M
 from cns_drake.city.buildings.house_parts.openings import Openings
-from cns_drake.city.buildings.parts import massing
 from cns_drake.city.buildings.parts.roof_equipment import add_chimney
 from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.buildings.parts.wings import Roof, Wing
@@ -20,7 +19,7 @@ from cns_drake.city.buildings.parts.wings import Roof, Wing
 _MARGIN = 0.5
 
 
-class Parameters:
+class Parameters(family_house.Colours):
     """Parameters of a pair of houses; lengths in metres.
 
     Attributes:
@@ -37,7 +36,7 @@ class Parameters:
         chimneys: `middle` or `ends`.
     """
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         self.height = d.height
         self.roof = d.pick(("gable", "hip"))
         self.pitch_deg = d.uniform(30.0, 45.0)
@@ -53,17 +52,13 @@ class Parameters:
         self.garages = d.pick(("none", "flat", "shed", "hip"))
         self.garage_width = d.uniform(2.9, 3.4, 2)
         self.chimneys = d.pick(("middle", "ends"))
-        self.rgb = d.pick(family_house.WALLS)
-        self.roof_rgb = d.pick(family_house.ROOFS)
-        self.accent_rgb = d.pick(family_house.ACCENTS)
+        self.draw_colours(d)
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the pair on a rectangle."""
-    materials = family_house.house_materials(
-        assembly, p.rgb, p.roof_rgb, p.accent_rgb
-    )
-    x0, y0, x1, y1 = assembly.site.bounds
+    p.paint(out)
+    x0, y0, x1, y1 = out.site.bounds
     left, right, back = x0 + _MARGIN, x1 - _MARGIN, y1 - _MARGIN
     front = y0 + min(2.4, 0.25 * (y1 - y0))
     deep = min(back - front, 10.0)
@@ -86,18 +81,17 @@ def build(p: Parameters, assembly: Assembly) -> None:
     openings = family_house.window_rows(
         main, boxes, p.floor, n, p.window_pitch, p.window_width
     )
-    _add_entrances(materials, p, main, openings, y0)
-    family_house.close_box(materials, main, openings, p.floor, p.casing)
+    _add_entrances(out, p, main, openings, y0)
+    family_house.close_box(out, main, openings, p.floor, p.casing)
     for wing in bays:
         rows = Openings(wing, boxes)
         house_walls.add_rows(
             rows, (0,), p.floor, STOREY_M, n, 2.4, 1.5, margin=0.2
         )
-        family_house.close_box(materials, wing, rows, p.floor, p.casing)
+        family_house.close_box(out, wing, rows, p.floor, p.casing)
     for garage in garages:
-        family_house.add_garage(materials, garage, boxes)
-    _add_chimneys(assembly, p, main)
-    materials.finish(assembly)
+        family_house.add_garage(out, garage, boxes)
+    _add_chimneys(out, p, main)
 
 
 def _middles(p: Parameters, main: Wing) -> tuple[float, float]:
@@ -126,7 +120,9 @@ def _gabled_bays(p: Parameters, main: Wing) -> tuple[Wing, ...]:
     )  # fmt: skip
 
 
-def _add_entrances(materials, p: Parameters, main, openings, y0) -> None:
+def _add_entrances(
+    out: Assembly, p: Parameters, main: Wing, openings: Openings, y0: float
+) -> None:
     """Adds the doors under one roof or two, and bays on the ground."""
     wall = main.wall(0)
     half = wall.length / 2
@@ -134,44 +130,37 @@ def _add_entrances(materials, p: Parameters, main, openings, y0) -> None:
     reach = min(p.porch_reach, room - 0.3)
     offset = 0.75 if p.doors_inside else half - 0.95
     eaves = p.floor + 2.35
+    size = (reach, p.floor, eaves, eaves + 0.4)
     for x in (half - offset, half + offset):
-        house_walls.add_door(materials, main, openings, 0, x, p.floor)
+        house_walls.add_door(out, main, openings, 0, x, p.floor)
         if not p.doors_inside:
-            porches.add_porch(
-                materials, wall, x - 0.85, x + 0.85, reach, p.floor, eaves,
-                eaves + 0.4, roof="shed",
-            )  # fmt: skip
+            porches.add_porch(out, wall, x - 0.85, x + 0.85, *size)
     if p.doors_inside:
         porches.add_porch(
-            materials, wall, half - 1.6, half + 1.6, reach, p.floor, eaves,
-            eaves + 0.4, roof="flat", posts=3,
+            out, wall, half - 1.6, half + 1.6, *size, roof="flat", posts=3
+        )
+    for x in _middles(p, main) if p.bay == "canted" else ():
+        width = min(2.4, 0.5 * half)
+        ends = (x - width / 2 - 0.1, x + width / 2 + 0.1)
+        openings.clear(0, *ends, 0.0, p.floor + STOREY_M - 0.2)
+        porches.add_bay_window(
+            out, wall, x, width, min(0.7, room - 0.1), 0.0,
+            round(p.floor + 2.3, 2),
         )  # fmt: skip
-    if p.bay == "canted":
-        for x in _middles(p, main):
-            width = min(2.4, 0.5 * half)
-            openings.clear(
-                0, x - width / 2 - 0.1, x + width / 2 + 0.1, 0.0,
-                p.floor + STOREY_M - 0.2,
-            )  # fmt: skip
-            porches.add_bay_window(
-                materials, wall, x, width, min(0.7, room - 0.1), 0.0,
-                round(p.floor + 2.3, 2),
-            )  # fmt: skip
-    step = massing.box(half - 1.4, half + 1.4, reach, reach + 0.28, -0.5, 0.12)
     if p.doors_inside:
-        materials.add("base", wall.place(step))
+        step = (half - 1.4, half + 1.4, reach, reach + 0.28, 0.12)
+        out.add_to("base", wall.standing(*step, bottom=True))
 
 
-def _add_chimneys(assembly, p: Parameters, main: Wing) -> None:
-    y = (main.y0 + main.y1) / 2
-    if p.chimneys == "middle":
-        spots = [(main.x0 + main.x1) / 2]
-    else:
-        side = 0.7 if p.roof == "gable" else 0.35 * (main.x1 - main.x0)
+def _add_chimneys(out: Assembly, p: Parameters, main: Wing) -> None:
+    x, y = main.center
+    spots = [x]
+    if p.chimneys != "middle":
+        side = 0.7 if p.roof == "gable" else 0.35 * main.width
         spots = [main.x0 + side, main.x1 - side]
     for k, x in enumerate(spots):
         add_chimney(
-            assembly, f"chimney_{k}", (x, y, main.top - 1.1),
+            out, f"chimney_{k}", (x, y, main.top - 1.1),
             family_house.BRICKS[0], item="chimney_row",
             yaw=np.pi / 2, scale=(0.8, 1.0, 1.0),
         )  # fmt: skip

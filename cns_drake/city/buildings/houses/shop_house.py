@@ -14,9 +14,9 @@ from cns_drake.city.buildings.house_parts import (
 from cns_drake.city.buildings.house_parts.openings import Openings
 from cns_drake.city.buildings.parts import bays
 from cns_drake.city.buildings.parts.facades import Band
-from cns_drake.city.buildings.parts.materials import Materials
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
 from cns_drake.city.buildings.parts.site import Assembly, Dice
+from cns_drake.city.buildings.parts.wings import Wing
 
 _WALLS = (
     *family_house.BRICKS,
@@ -47,7 +47,7 @@ class Parameters:
         course: how far the band above the shops sticks out.
     """
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         x0, y0, x1, y1 = d.site.bounds
         roofs = ["flat", "gable", "gambrel"]
         if d.width < 10.0 and d.depth > d.width:
@@ -77,27 +77,22 @@ class Parameters:
         self.awning_rgb = d.pick(_AWNINGS)
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the house on a rectangle."""
-    site = assembly.site
-    materials = Materials(
+    out.paint(
         walls=p.rgb,
-        glass=assembly.glass_rgb,
+        glass=out.glass_rgb,
         roof=p.roof_rgb,
         trim=family_house.TRIM,
         accent=family_house.ACCENTS[0],
         sign=p.sign_rgb,
         awning=p.awning_rgb,
     )
-    x0, y0, x1, y1 = site.bounds
+    x0, y0, x1, y1 = out.site.bounds
     side = 0.3 * (p.unit.roof == "flat")
-    area = (
-        x0 + side * (3 not in site.blind_edges),
-        y0 + p.unit.stoop,
-        x1 - side * (1 not in site.blind_edges),
-        y1 - 0.35,
-    )
-    blind = site.blind_edges & {1, 3}
+    blind = out.site.blind_edges & {1, 3}
+    left, right = x0 + side * (3 not in blind), x1 - side * (1 not in blind)
+    area = (left, y0 + p.unit.stoop, right, y1 - 0.35)
     wing, storeys = row_unit.unit_box(p.unit, area, p.height, blind)
     openings = Openings(wing)
     ground = p.unit.floor
@@ -111,42 +106,49 @@ def build(p: Parameters, assembly: Assembly) -> None:
             openings, edges, ground, step, upper, pitch,
             p.unit.window_width, head=head,
         )  # fmt: skip
-    _add_ground(materials, p, wing, openings, assembly.rng)
-    _add_oriels(materials, p, wing, openings, upper, step)
-    house_walls.add_casings(materials, wing, openings, (0,), p.unit.casing)
+    _add_ground(out, p, wing, openings)
+    _add_oriels(out, p, wing, openings, upper, step)
+    house_walls.add_casings(out, wing, openings, (0,), p.unit.casing)
     bands = [Band(round(ground - 0.3, 2), ground, -p.course)]
     if p.unit.roof == "flat" and room > 0.8:
         z = round(wing.wall_top - 0.45, 2)
         bands.append(Band(z, wing.wall_top, -0.25))
     glass = (house_walls.GLASS_M, *shop_fronts.SHOP_GLASS_M)
-    openings.add_walls(materials, glass, bands)
-    row_unit.add_roof(materials, p.unit, wing)
+    openings.add_walls(out, glass, bands)
+    row_unit.add_roof(out, p.unit, wing)
     if p.unit.roof == "flat":
-        z = wing.top - wing.roof.parapet
-        equip_roof(assembly, wing.outline, z, p.roof_items)
+        equip_roof(out, wing.outline, wing.floor, p.roof_items)
     elif p.unit.chimney:
-        row_unit.add_stack(assembly, p.unit, wing, "chimney")
-    materials.finish(assembly)
+        row_unit.add_stack(out, p.unit, wing, "chimney")
 
 
-def _add_ground(materials, p: Parameters, wing, openings, rng) -> None:
+def _add_ground(
+    out: Assembly, p: Parameters, wing: Wing, openings: Openings
+) -> None:
     """Adds the shops, the door to the flats, service doors at the back."""
     wall = wing.wall(0)
     door, length = 1.7 * (p.unit.floor < p.height - 3.0), wall.length
     left = p.unit.door_left
     start, end = (door, length) if left else (0.0, length - door)
     shop_fronts.add_shops(
-        materials, wall, openings, 0, start, end, p.unit.floor, rng,
+        out, wall, openings, 0, start, end, p.unit.floor,
         width=p.shop_width, awnings=p.awnings,
     )  # fmt: skip
     if door:
         x = 0.9 if left else length - 0.9
-        house_walls.add_door(materials, wing, openings, 0, x, 0.0, height=2.3)
+        house_walls.add_door(out, wing, openings, 0, x, 0.0, height=2.3)
     back = [house_walls.sash(1.2, 0.0, 1.4, 2.3), bays.gate(2.2, 2.3, 0.2)]
     openings.row((2,), 0.5, 4.5, back, 0.8)
 
 
-def _add_oriels(materials, p: Parameters, wing, openings, upper, step) -> None:
+def _add_oriels(
+    out: Assembly,
+    p: Parameters,
+    wing: Wing,
+    openings: Openings,
+    upper: int,
+    step: float,
+) -> None:
     if upper < 1 or step < 2.5 or p.oriels == 0:
         return
     wall = wing.wall(0)
@@ -162,6 +164,6 @@ def _add_oriels(materials, p: Parameters, wing, openings, upper, step) -> None:
             0, x - width / 2 - 0.15, x + width / 2 + 0.15, low, high + 0.4
         )
         porches.add_bay_window(
-            materials, wall, x, width, 0.6, low, high,
+            out, wall, x, width, 0.6, low, high,
             storeys=max(1, upper - 1), canted=p.unit.bay != "box",
         )  # fmt: skip

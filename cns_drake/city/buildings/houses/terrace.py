@@ -17,7 +17,7 @@ from cns_drake.city.buildings.parts.site import (
 _DOORS = ("accent", "trim", "roof")
 
 
-class Parameters:
+class Parameters(family_house.Colours):
     """Parameters of a terrace; lengths in metres.
 
     Attributes:
@@ -31,7 +31,7 @@ class Parameters:
         bays: part of the houses with a bay window.
     """
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         width = d.uniform(5.0, 6.6)
         unit = row_unit.draw_unit(
             d.rng, width, ("gable", "gable", "gambrel"), family_house.BRICKS
@@ -50,42 +50,27 @@ class Parameters:
         self.crossed = d.uniform(0.0, 0.35)
         self.paired = d.chance(0.6)
         self.bays = d.uniform(0.2, 0.9)
-        self.rgb = d.pick(family_house.WALLS)
-        self.roof_rgb = d.pick(family_house.ROOFS)
-        self.accent_rgb = d.pick(family_house.ACCENTS)
+        self.draw_colours(d)
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the terrace along the front of a rectangle."""
-    site = assembly.site
-    materials = family_house.house_materials(
-        assembly, p.rgb, p.roof_rgb, p.accent_rgb
-    )
-    x0, y0, x1, y1 = site.bounds
+    p.paint(out)
+    x0, y0, x1, y1 = out.site.bounds
     front, back = y0 + p.unit.stoop, min(y1 - 0.35, y0 + p.unit.stoop + 10.5)
     count = max(1, round((x1 - x0) / p.width))
     bounds = np.round(np.linspace(x0, x1, count + 1), 2).tolist()
     deep = back - front - p.setback > 6.0
     for k in range(count):
-        blind = {
-            edge
-            for edge, is_end in ((3, k == 0), (1, k + 1 == count))
-            if not is_end or edge in site.blind_edges
-        }
         low = (k // 2) % 2 == 1
-        unit = _varied(p, k, assembly.rng)
+        unit = _varied(p, k, out.rng)
         y = front + p.setback * (low and deep)
+        area = (bounds[k], round(y, 2), bounds[k + 1], round(back, 2))
+        height, blind = p.height - p.step * low, out.site.blind_in(k, count)
         row_unit.add_unit(
-            assembly,
-            materials,
-            unit,
-            (bounds[k], round(y, 2), bounds[k + 1], round(back, 2)),
-            p.height - p.step * low,
-            frozenset(blind),
-            part=f"house_{k:02d}_",
-            door_material=pick(assembly.rng, _DOORS),
-        )
-    materials.finish(assembly)
+            out, unit, area, height, blind,
+            part=f"house_{k:02d}_", door_material=pick(out.rng, _DOORS),
+        )  # fmt: skip
 
 
 def _varied(p: Parameters, k: int, rng: np.random.Generator) -> RowUnit:

@@ -11,6 +11,8 @@ from collections.abc import Callable, Sequence
 from cns_drake.city.buildings.parts.facades import Arch, Layout, Patch, Relief
 
 Bay = Callable[[float, float], list[Relief]]
+# From where to where [m].
+Span = tuple[float, float]
 
 
 def _cm(value: float) -> float:
@@ -203,9 +205,7 @@ def loggia(
     return bay
 
 
-def stretches(
-    length: float, pitch: float, margin: float
-) -> list[tuple[float, float]]:
+def stretches(length: float, pitch: float, margin: float) -> list[Span]:
     """Divides a wall into equal bays of about `pitch`, clear of its ends.
 
     A wall too short for that gets one narrower bay, or none.
@@ -216,6 +216,11 @@ def stretches(
         (margin + k * room / count, margin + (k + 1) * room / count)
         for k in range(count)
     ]
+
+
+def bounds(cells: Sequence[Span]) -> list[float]:
+    """Returns where cells that touch one another begin and end."""
+    return [cells[0][0], *(end for _, end in cells)]
 
 
 def plain(edge: int, length: float) -> list[Relief]:
@@ -254,6 +259,11 @@ def with_middle(layout: Layout, bay: Bay, width: float) -> Layout:
     return combined
 
 
+def alone(bay: Bay, width: float) -> Layout:
+    """Puts a bay in the middle of plain walls."""
+    return with_middle(plain, bay, width)
+
+
 def by_edge(layouts: dict[int, Layout], otherwise: Layout) -> Layout:
     """Gives single walls a layout of their own."""
 
@@ -261,3 +271,8 @@ def by_edge(layouts: dict[int, Layout], otherwise: Layout) -> Layout:
         return layouts.get(edge, otherwise)(edge, length)
 
     return layout
+
+
+def with_door(layout: Layout, door: Bay, width: float) -> Layout:
+    """Puts a door in the middle of the front, in place of what it meets."""
+    return by_edge({0: with_middle(layout, door, width)}, layout)

@@ -6,11 +6,12 @@ along the wall, y outwards and z up.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 import functools
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cns_drake.city.buildings.parts import bays, massing
 from cns_drake.city.geometry.mesh import Mesh, box_mesh, merge_meshes
@@ -26,7 +27,7 @@ class WallFrame:
         length: of the wall [m].
     """
 
-    def __init__(self, outline, edge: int):
+    def __init__(self, outline: ArrayLike, edge: int):
         outline = np.asarray(outline, dtype=float)
         edge %= len(outline)
         start, end = outline[edge], outline[(edge + 1) % len(outline)]
@@ -45,6 +46,14 @@ class WallFrame:
         xy = self._start + np.outer(x, self._along) + np.outer(y, self._outward)
         vertices = np.column_stack([xy, height + z])
         return Mesh(vertices, tuple(face[::-1] for face in mesh.faces))
+
+    def box(self, *limits: float, bottom: bool = True) -> Mesh:
+        """Returns `massing.box`, given in wall coordinates."""
+        return self.place(massing.box(*limits, bottom=bottom))
+
+    def standing(self, *limits: float, bottom: bool = False) -> Mesh:
+        """Returns `massing.standing`, given in wall coordinates."""
+        return self.place(massing.standing(*limits, bottom=bottom))
 
     @property
     def heading(self) -> float:
@@ -66,14 +75,53 @@ def canopy(x0: float, x1: float, reach: float, z: float) -> Mesh:
     return merge_meshes(slab, *rods)
 
 
+def front_canopy(
+    outline: ArrayLike, half: float, reach: float, z: float
+) -> Mesh:
+    """A canopy above the door in the middle of the front."""
+    front = WallFrame(outline, 0)
+    middle = front.length / 2
+    return front.place(canopy(middle - half, middle + half, reach, z))
+
+
 def awning(x0: float, x1: float, reach: float, z0: float, z1: float) -> Mesh:
     """A sloped shop awning with a hanging front edge, z1 at the wall."""
     lip = 0.25
     profile = [(0.0, z1), (reach, z0 + lip), (reach, z0), (0.0, z1 - 0.12)]
     vertices = [(x, y, z) for x in (x0, x1) for y, z in profile]
+    faces: list[tuple[int, ...]]
     faces = [(k, (k + 1) % 4, 4 + (k + 1) % 4, 4 + k) for k in range(4)]
     faces += [(3, 2, 0), (2, 1, 0), (4, 5, 6), (4, 6, 7)]
     return Mesh(np.array(vertices), tuple(f[::-1] for f in faces))
+
+
+def awnings(
+    wall: WallFrame,
+    cells: Iterable[bays.Span],
+    rng: np.random.Generator,
+    share: float,
+    shape: tuple[float, float, float, float],
+    door: float = -math.inf,
+) -> list[Mesh]:
+    """Awnings above a share of the shops along a wall.
+
+    Args:
+        wall: the wall.
+        cells: the shops along it.
+        rng: draws which have one.
+        share: of the shops with one.
+        shape: how much narrower than its shop on either side, reach, lower
+            edge and upper edge of an awning [m].
+        door: half the stretch in the middle of the wall without any [m].
+    """
+    narrower, reach, z0, z1 = shape
+    middle, pieces = wall.length / 2, []
+    for a, b in cells:
+        free = b < middle - door or a > middle + door
+        if rng.random() < share and free:
+            shade = awning(a + narrower, b - narrower, reach, z0, z1)
+            pieces.append(wall.place(shade))
+    return pieces
 
 
 def balcony(
@@ -96,7 +144,7 @@ def balcony(
 
 
 def piers(
-    outline,
+    outline: ArrayLike,
     pitch: float,
     width: float,
     reach: float,
@@ -122,7 +170,7 @@ def piers(
         skip: edges without piers.
     """
     pieces = []
-    for edge in range(len(outline)):
+    for edge in range(len(np.asarray(outline))):
         wall = WallFrame(outline, edge)
         if edge in skip or wall.length < 2 * width:
             continue
@@ -142,7 +190,7 @@ def piers(
 
 
 def pilasters(
-    outline,
+    outline: ArrayLike,
     pitch: float,
     margin: float,
     every: int,
@@ -163,7 +211,7 @@ def pilasters(
         skip: edges without pilasters.
     """
     pieces = []
-    for edge in range(len(outline)):
+    for edge in range(len(np.asarray(outline))):
         wall = WallFrame(outline, edge)
         cells = bays.stretches(wall.length, pitch, margin)
         if edge in skip or len(cells) < 3:
@@ -176,7 +224,7 @@ def pilasters(
 
 
 def corner_piers(
-    outline,
+    outline: ArrayLike,
     width: float,
     reach: float,
     depth: float,
@@ -219,7 +267,9 @@ def corner_piers(
     return merge_meshes(*pieces)
 
 
-def _pier(x, width, depth, reach, z0, z1) -> Mesh:
+def _pier(
+    x: float, width: float, depth: float, reach: float, z0: float, z1: float
+) -> Mesh:
     """A box in wall coordinates.
 
     It has a back, too: piers outgrow walls, and near a corner their backs
@@ -283,13 +333,14 @@ def column(x: float, y: float, z0: float, z1: float, radius: float) -> Mesh:
     )
 
 
-def beam(start, end, width: float) -> Mesh:
+def beam(start: ArrayLike, end: ArrayLike, width: float) -> Mesh:
     """A square bar between two points that lie on no common upright."""
     start, end = np.asarray(start, float), np.asarray(end, float)
-    along = (end - start) / np.linalg.norm(end - start)
+    length = float(np.linalg.norm(end - start))
+    along = (end - start) / length
     side = np.cross(along, (0.0, 0.0, 1.0))
     side /= np.linalg.norm(side)
     up = np.cross(side, along)
-    unit = box_mesh((np.linalg.norm(end - start), width, width))
+    unit = box_mesh((length, width, width))
     R = np.column_stack([along, -side, up])
     return Mesh(unit.vertices @ R.T + (start + end) / 2, unit.faces)

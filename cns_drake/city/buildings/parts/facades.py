@@ -12,14 +12,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cns_drake.city.buildings.parts.wall_cells import (
     Arch,
+    Band,
     Corner,
     Patch,
+    Quads,
     Relief,
     WallCells,
     breaks,
@@ -40,15 +43,10 @@ __all__ = [
 ]
 
 
-class Band(NamedTuple):
-    """A strip of wall that runs around the building at one depth [m]."""
-
-    z0: float
-    z1: float
-    depth: float
-
-
 Layout = Callable[[int, float], Sequence[Relief]]
+
+
+_Strip = TypeVar("_Strip", Band, Relief)
 
 
 def _no_relief(edge: int, length: float) -> Sequence[Relief]:
@@ -91,7 +89,7 @@ class Facade:
         return Facade(height, bands, layout, self.glass, self.plain)
 
 
-def _lifted(item, dz: float):
+def _lifted(item: _Strip, dz: float) -> _Strip:
     moved = {
         name: getattr(item, name) + dz
         for name in item._fields
@@ -100,7 +98,7 @@ def _lifted(item, dz: float):
     return item._replace(**moved)
 
 
-def facade_mesh(points, facade: Facade, z0: float = 0.0) -> Mesh:
+def facade_mesh(points: ArrayLike, facade: Facade, z0: float = 0.0) -> Mesh:
     """Returns the walls around a polygon, without their glass.
 
     Args:
@@ -118,12 +116,17 @@ def facade_mesh(points, facade: Facade, z0: float = 0.0) -> Mesh:
     return _quads_mesh(points, facade, z0, wall_quads)
 
 
-def glass_mesh(points, facade: Facade, z0: float = 0.0) -> Mesh:
+def glass_mesh(points: ArrayLike, facade: Facade, z0: float = 0.0) -> Mesh:
     """Returns the glass that `facade_mesh` leaves out."""
     return _quads_mesh(points, facade, z0, glass_quads)
 
 
-def _quads_mesh(points, facade: Facade, z0: float, quads_of) -> Mesh:
+def _quads_mesh(
+    points: ArrayLike,
+    facade: Facade,
+    z0: float,
+    quads_of: Callable[[WallCells, tuple[float, ...]], Quads],
+) -> Mesh:
     points = np.asarray(points, dtype=float)
     vertices: list[np.ndarray] = []
     faces: list[tuple[int, ...]] = []
@@ -135,7 +138,7 @@ def _quads_mesh(points, facade: Facade, z0: float, quads_of) -> Mesh:
     return _welded(np.array(vertices).reshape(-1, 3), faces)
 
 
-def _welded(vertices: np.ndarray, faces) -> Mesh:
+def _welded(vertices: np.ndarray, faces: list[tuple[int, ...]]) -> Mesh:
     """Returns the mesh with coinciding vertices (to 1 um) merged."""
     keys = np.round(vertices, 6)
     unique, inverse = np.unique(keys, axis=0, return_inverse=True)
@@ -146,7 +149,9 @@ def _welded(vertices: np.ndarray, faces) -> Mesh:
 class _Panel:
     """One wall: its cells, and how they meet those of its neighbours."""
 
-    def __init__(self, points: np.ndarray, edge: int, facade: Facade, z0):
+    def __init__(
+        self, points: np.ndarray, edge: int, facade: Facade, z0: float
+    ) -> None:
         count = len(points)
         before, after = (edge - 1) % count, (edge + 1) % count
         directions = []

@@ -6,12 +6,18 @@ the sides that can be seen and wound outwards.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import itertools
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+
+Point = tuple[float, float]
+# x0, y0, x1, y1.
+Area = tuple[float, float, float, float]
 
 # Buildings reach below their own ground level, for the ground has relief.
 FOUNDATION_M = 0.5
@@ -23,7 +29,10 @@ def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
 
 
 def regular_polygon(
-    radius: float, count: int, center=(0.0, 0.0), phase: float = 0.0
+    radius: float,
+    count: int,
+    center: ArrayLike = (0.0, 0.0),
+    phase: float = 0.0,
 ) -> np.ndarray:
     """Returns `count` points on a circle."""
     angles = phase + np.arange(count) * 2 * math.pi / count
@@ -32,7 +41,12 @@ def regular_polygon(
     )
 
 
-def inset(points, distance) -> np.ndarray:
+def square(x: float, y: float, half: float) -> np.ndarray:
+    """Returns the corners of a square about (x, y)."""
+    return rectangle(x - half, y - half, x + half, y + half)
+
+
+def inset(points: ArrayLike, distance: ArrayLike) -> np.ndarray:
     """Moves each edge of an outline inwards and intersects them again.
 
     Args:
@@ -59,7 +73,7 @@ def inset(points, distance) -> np.ndarray:
     return moved
 
 
-def inset_limit(points) -> float:
+def inset_limit(points: ArrayLike) -> float:
     """Returns how far `inset` may go until an edge has lost 70 %."""
     points = np.asarray(points, dtype=float)
     probe = 1e-3
@@ -70,7 +84,9 @@ def inset_limit(points) -> float:
     return float((0.7 * length / loss).min())
 
 
-def rounded(points, corners: dict[int, float], step: float) -> np.ndarray:
+def rounded(
+    points: ArrayLike, corners: dict[int, float], step: float
+) -> np.ndarray:
     """Rounds convex corners of an outline.
 
     Args:
@@ -111,7 +127,7 @@ def rounded(points, corners: dict[int, float], step: float) -> np.ndarray:
     return np.roll(np.array(result), -front, axis=0)
 
 
-def flat(points, z: float, *, up: bool = True) -> Mesh:
+def flat(points: ArrayLike, z: float, *, up: bool = True) -> Mesh:
     """Returns a horizontal surface that fills an outline.
 
     Convex outlines become quads and at most one triangle, others triangles.
@@ -163,11 +179,11 @@ def _ears(points: np.ndarray) -> list[tuple[int, ...]]:
     return [*faces, tuple(left)]
 
 
-def _cross(a, b, c) -> float:
+def _cross(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
-def _inside(p, triangle) -> bool:
+def _inside(p: np.ndarray, triangle: np.ndarray) -> bool:
     a, b, c = triangle
     return (
         _cross(a, b, p) > -1e-9
@@ -176,7 +192,7 @@ def _inside(p, triangle) -> bool:
     )
 
 
-def skirt(lower, upper, z0: float, z1: float) -> Mesh:
+def skirt(lower: ArrayLike, upper: ArrayLike, z0: float, z1: float) -> Mesh:
     """Returns the faces from one outline up to another, seen from outside.
 
     Both outlines have the same number of corners and pairwise parallel
@@ -193,7 +209,7 @@ def skirt(lower, upper, z0: float, z1: float) -> Mesh:
     faces = []
     for k in range(n):
         m = (k + 1) % n
-        face = (k, m, n + m, n + k)
+        face: tuple[int, ...] = (k, m, n + m, n + k)
         # Edges of no length (a ridge, a spire's tip) leave triangles.
         if np.allclose(upper[k], upper[m]):
             face = (k, m, n + k)
@@ -203,7 +219,9 @@ def skirt(lower, upper, z0: float, z1: float) -> Mesh:
     return Mesh(vertices, tuple(faces))
 
 
-def prism(points, z0: float, z1: float, *, bottom: bool = False) -> Mesh:
+def prism(
+    points: ArrayLike, z0: float, z1: float, *, bottom: bool = False
+) -> Mesh:
     """Returns an upright solid; its bottom is left open where none sees it."""
     pieces = [skirt(points, points, z0, z1), flat(points, z1)]
     if bottom:
@@ -211,12 +229,14 @@ def prism(points, z0: float, z1: float, *, bottom: bool = False) -> Mesh:
     return merge_meshes(*pieces)
 
 
-def frustum(lower, upper, z0: float, z1: float) -> Mesh:
+def frustum(lower: ArrayLike, upper: ArrayLike, z0: float, z1: float) -> Mesh:
     """Returns a tapering solid without a bottom."""
     return merge_meshes(skirt(lower, upper, z0, z1), flat(upper, z1))
 
 
-def sloped_prism(points, z0: float, height: float, low: float) -> Mesh:
+def sloped_prism(
+    points: ArrayLike, z0: float, height: float, low: float
+) -> Mesh:
     """Returns a solid under a plane that rises along y.
 
     Its top is `height` above z0 at the outline's greatest y and the
@@ -238,17 +258,20 @@ def sloped_prism(points, z0: float, height: float, low: float) -> Mesh:
     return Mesh(vertices, (*walls, *roof))
 
 
-def spire(points, tip, z0: float, z1: float) -> Mesh:
+def spire(points: ArrayLike, tip: ArrayLike, z0: float, z1: float) -> Mesh:
     """Returns a pyramid over an outline."""
     points = np.asarray(points, dtype=float)
     n = len(points)
-    vertices = np.vstack(
-        [np.column_stack([points, np.full(n, z0)]), [[tip[0], tip[1], z1]]]
-    )
+    apex = [*np.asarray(tip, dtype=float), z1]
+    vertices = np.vstack([np.column_stack([points, np.full(n, z0)]), apex])
     return Mesh(vertices, tuple((k, (k + 1) % n, n) for k in range(n)))
 
 
-def revolved(profile, count: int, center=(0.0, 0.0)) -> Mesh:
+def revolved(
+    profile: Sequence[Point],
+    count: int,
+    center: ArrayLike = (0.0, 0.0),
+) -> Mesh:
     """Returns the surface that a profile sweeps around an upright axis.
 
     Args:
@@ -273,7 +296,7 @@ def revolved(profile, count: int, center=(0.0, 0.0)) -> Mesh:
     return merge_meshes(*pieces)
 
 
-def extruded(profile, x0: float, x1: float) -> Mesh:
+def extruded(profile: Sequence[Point], x0: float, x1: float) -> Mesh:
     """Returns a shed: a roof line drawn along x, with its end walls.
 
     Args:
@@ -281,11 +304,11 @@ def extruded(profile, x0: float, x1: float) -> Mesh:
             reach down to the height of its first point.
         x0, x1: ends of the shed [m].
     """
-    profile = np.asarray(profile, dtype=float)
-    base = profile[0, 1]
-    vertices, faces = [], []
+    base = profile[0][1]
+    vertices: list[tuple[float, float, float]] = []
+    faces: list[tuple[int, ...]] = []
 
-    def add(*corners) -> None:
+    def add(*corners: tuple[float, float, float]) -> None:
         faces.append(tuple(range(len(vertices), len(vertices) + len(corners))))
         vertices.extend(corners)
 
@@ -298,10 +321,22 @@ def extruded(profile, x0: float, x1: float) -> Mesh:
         if len(corners) > 2:
             add(*corners)
             add(*((x0, y, z) for _, y, z in reversed(corners)))
-    if profile[-1, 1] > base:
+    if profile[-1][1] > base:
         ya, za = profile[-1]
         add((x0, ya, za), (x1, ya, za), (x1, ya, base), (x0, ya, base))
     return Mesh(np.array(vertices), tuple(faces))
+
+
+def bar(section: Sequence[Point | np.ndarray], y0: float, y1: float) -> Mesh:
+    """Returns a solid of one section, convex, from y0 to y1.
+
+    The section's (x, z) corners run counter-clockwise seen from y0.
+    """
+    n = len(section)
+    vertices = np.array([(x, y, z) for y in (y0, y1) for x, z in section])
+    ends = tuple(range(n)), tuple(range(2 * n - 1, n - 1, -1))
+    sides = ((k, n + k, n + (k + 1) % n, (k + 1) % n) for k in range(n))
+    return Mesh(vertices, (*ends, *sides))
 
 
 def swapped(mesh: Mesh) -> Mesh:
@@ -310,13 +345,20 @@ def swapped(mesh: Mesh) -> Mesh:
     return Mesh(mesh.vertices[:, [1, 0, 2]], faces)
 
 
-def shortest_side(points) -> float:
+def shortest_side(points: ArrayLike) -> float:
     """Returns the shorter side of an outline's bounding box [m]."""
     span = np.ptp(np.asarray(points, dtype=float), axis=0)
     return float(min(span))
 
 
-def roof_pan(points, z_floor: float, z_top: float, thickness: float) -> Mesh:
+def extent(points: np.ndarray) -> Area:
+    """Returns the bounding box of an outline [m]."""
+    return (*points.min(axis=0), *points.max(axis=0))
+
+
+def roof_pan(
+    points: ArrayLike, z_floor: float, z_top: float, thickness: float
+) -> Mesh:
     """Returns a flat roof inside a parapet: coping, inner walls, floor."""
     points = np.asarray(points, dtype=float)
     inner = inset(points, thickness)
@@ -346,9 +388,31 @@ def gable_roof(
     return Mesh(vertices, faces)
 
 
-def box(x0, x1, y0, y1, z0, z1, *, bottom: bool = True) -> Mesh:
+def box(
+    x0: float,
+    x1: float,
+    y0: float,
+    y1: float,
+    z0: float,
+    z1: float,
+    *,
+    bottom: bool = True,
+) -> Mesh:
     """Returns an upright box between the given limits [m]."""
     return prism(rectangle(x0, y0, x1, y1), z0, z1, bottom=bottom)
+
+
+def standing(
+    x0: float,
+    x1: float,
+    y0: float,
+    y1: float,
+    z1: float,
+    *,
+    bottom: bool = False,
+) -> Mesh:
+    """Returns a box that stands on the ground, its foot out of sight [m]."""
+    return box(x0, x1, y0, y1, -FOUNDATION_M, z1, bottom=bottom)
 
 
 def post(
@@ -358,6 +422,6 @@ def post(
     return box(x - half, x + half, y - half, y + half, z0, z1, bottom=False)
 
 
-def foundation(points) -> Mesh:
+def foundation(points: ArrayLike) -> Mesh:
     """Returns the walls of an outline below the ground."""
     return skirt(points, points, -FOUNDATION_M, 0.0)

@@ -5,17 +5,18 @@ All keep the front edge first.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection
 import math
 
 import numpy as np
 
 
-def chamfered(points, cut: float) -> np.ndarray:
+def chamfered(points: np.ndarray, cut: float) -> np.ndarray:
     """Cuts every convex corner of an outline, `cut` metres along each edge."""
     return _replaced(points, lambda p, a, b: [p - a * cut, p + b * cut])
 
 
-def notched(points, depth: float) -> np.ndarray:
+def notched(points: np.ndarray, depth: float) -> np.ndarray:
     """Takes a square of side `depth` out of every convex corner."""
     return _replaced(
         points,
@@ -27,7 +28,10 @@ def notched(points, depth: float) -> np.ndarray:
     )
 
 
-def _replaced(points, corner) -> np.ndarray:
+def _replaced(
+    points: np.ndarray,
+    corner: Callable[[np.ndarray, np.ndarray, np.ndarray], list[np.ndarray]],
+) -> np.ndarray:
     points = np.asarray(points, dtype=float)
     result: list[np.ndarray] = []
     for k, p in enumerate(points):
@@ -41,7 +45,9 @@ def _replaced(points, corner) -> np.ndarray:
     return np.roll(np.array(result), -front, axis=0)
 
 
-def stadium(x0, y0, x1, y1, step: float = 3.0) -> np.ndarray:
+def stadium(
+    x0: float, y0: float, x1: float, y1: float, step: float = 3.0
+) -> np.ndarray:
     """A rectangle whose short ends, left and right, are half circles.
 
     Args:
@@ -58,7 +64,9 @@ def stadium(x0, y0, x1, y1, step: float = 3.0) -> np.ndarray:
     return np.roll(np.vstack([right, left]), 1, axis=0)
 
 
-def u_shape(x0, y0, x1, y1, wing: float, back: float) -> np.ndarray:
+def u_shape(
+    x0: float, y0: float, x1: float, y1: float, wing: float, back: float
+) -> np.ndarray:
     """A court open to the back: wings left and right of it, front closed."""
     return np.array(
         [
@@ -74,7 +82,9 @@ def u_shape(x0, y0, x1, y1, wing: float, back: float) -> np.ndarray:
     )
 
 
-def l_shape(x0, y0, x1, y1, wing: float, back: float) -> np.ndarray:
+def l_shape(
+    x0: float, y0: float, x1: float, y1: float, wing: float, back: float
+) -> np.ndarray:
     """A front range and one wing on the left."""
     return np.array(
         [
@@ -88,7 +98,7 @@ def l_shape(x0, y0, x1, y1, wing: float, back: float) -> np.ndarray:
     )
 
 
-def mirrored(points) -> np.ndarray:
+def mirrored(points: np.ndarray) -> np.ndarray:
     """Mirrors an outline left to right about the middle of its extent."""
     points = np.asarray(points, dtype=float)
     middle = (points[:, 0].min() + points[:, 0].max()) / 2
@@ -97,7 +107,9 @@ def mirrored(points) -> np.ndarray:
     return np.roll(flipped[::-1], 2 - len(points), axis=0)
 
 
-def edges_on(plan, outline, edges) -> frozenset[int]:
+def edges_on(
+    plan: np.ndarray, outline: np.ndarray, edges: Collection[int]
+) -> frozenset[int]:
     """Returns the edges of a plan that lie on some edges of an outline."""
     found = set()
     ends = np.roll(plan, -1, axis=0)

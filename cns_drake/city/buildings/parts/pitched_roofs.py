@@ -13,8 +13,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from cns_drake.city.buildings.parts import massing
+from cns_drake.city.buildings.parts import bays, massing
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 Line = Sequence[tuple[float, float]]
@@ -33,7 +34,9 @@ class Hole(NamedTuple):
     depth: float
 
 
-def gable_line(a: float, b: float, z: float, top: float, ridge: float = 0.5):
+def gable_line(
+    a: float, b: float, z: float, top: float, ridge: float = 0.5
+) -> list[tuple[float, float]]:
     """Two slopes over a..b from z to the ridge at `top`.
 
     `ridge` is its place between a and b, as a part of the span.
@@ -41,7 +44,9 @@ def gable_line(a: float, b: float, z: float, top: float, ridge: float = 0.5):
     return [(a, z), (a + ridge * (b - a), top), (b, z)]
 
 
-def gambrel_line(a: float, b: float, z: float, top: float, knee=(0.24, 0.66)):
+def gambrel_line(
+    a: float, b: float, z: float, top: float, knee: bays.Span = (0.24, 0.66)
+) -> list[tuple[float, float]]:
     """Steep slopes up to a knee, flatter ones above.
 
     `knee` gives its place as parts of the half span and of the rise.
@@ -51,7 +56,9 @@ def gambrel_line(a: float, b: float, z: float, top: float, knee=(0.24, 0.66)):
     return [(a, z), (a + run, up), (a + half, top), (b - run, up), (b, z)]
 
 
-def barrel_line(a: float, b: float, z: float, top: float, count: int = 8):
+def barrel_line(
+    a: float, b: float, z: float, top: float, count: int = 8
+) -> list[tuple[float, float]]:
     """A circular vault over a..b in an even `count` of chords."""
     half, middle, rise = (b - a) / 2, (a + b) / 2, top - z
     radius = (half**2 + rise**2) / (2 * rise)
@@ -62,7 +69,7 @@ def barrel_line(a: float, b: float, z: float, top: float, count: int = 8):
     ]
 
 
-def with_eaves(line: Line, low: float, high: float) -> list:
+def with_eaves(line: Line, low: float, high: float) -> list[bays.Span]:
     """Extends the first and the last slope of a line by these runs [m]."""
     (a, za), (b, zb) = line[0], line[1]
     (c, zc), (d, zd) = line[-2], line[-1]
@@ -159,11 +166,11 @@ def gable_glass(holes: Sequence[Hole]) -> Mesh:
 class _Faces:
     """Collects faces by their corners and drops those without area."""
 
-    def __init__(self):
-        self._vertices: list = []
-        self._faces: list = []
+    def __init__(self) -> None:
+        self._vertices: list[tuple[float, float, float]] = []
+        self._faces: list[tuple[int, ...]] = []
 
-    def add(self, *corners) -> None:
+    def add(self, *corners: tuple[float, float, float]) -> None:
         kept = [c for k, c in enumerate(corners) if c != corners[k - 1]]
         if len(kept) > 2:
             first = len(self._vertices)
@@ -175,7 +182,9 @@ class _Faces:
         return Mesh(vertices, tuple(self._faces))
 
 
-def hip(outline, z: float, top: float, eaves: float, fascia: float) -> Mesh:
+def hip(
+    outline: ArrayLike, z: float, top: float, eaves: ArrayLike, fascia: float
+) -> Mesh:
     """Returns a hipped roof over a rectangle, boxed in below its eaves.
 
     Args:
@@ -195,7 +204,12 @@ def hip(outline, z: float, top: float, eaves: float, fascia: float) -> Mesh:
 
 
 def mansard(
-    outline, z: float, knee: float, top: float, run: float, eaves: float
+    outline: ArrayLike,
+    z: float,
+    knee: float,
+    top: float,
+    run: float,
+    eaves: float,
 ) -> Mesh:
     """Returns a roof with steep sides up to a knee and a hip above.
 
@@ -217,7 +231,7 @@ def mansard(
     )
 
 
-def _ridge(rectangle) -> np.ndarray:
+def _ridge(rectangle: np.ndarray) -> np.ndarray:
     """Returns the ridge of a hip as corners that meet in pairs.
 
     Moving all sides in by half the shorter one leaves a line, on a square

@@ -226,15 +226,17 @@ def _mesh(item: str) -> Mesh:
     return _MAKERS[item][0]()
 
 
-def _shared(assembly: Assembly, item: str, scale) -> MeshShape:
+def _shared(
+    out: Assembly, item: str, scale: tuple[float, float, float]
+) -> MeshShape:
     """Returns the shape of an item, whose mesh all buildings share."""
     name = f"roof_{item}"
-    assembly.share(name, _mesh(item))
+    out.share(name, _mesh(item))
     return MeshShape(name, scale)
 
 
 def add_chimney(
-    assembly: Assembly,
+    out: Assembly,
     part: str,
     xyz: tuple[float, float, float],
     rgb: Rgb,
@@ -246,7 +248,7 @@ def add_chimney(
     """Stands a shared chimney on a pitched roof.
 
     Args:
-        assembly: the building.
+        out: the building.
         part: name of the visual.
         xyz: of its foot, below the roof's surface [m].
         rgb: its colour.
@@ -254,12 +256,12 @@ def add_chimney(
         yaw: its heading [rad].
         scale: along its axes.
     """
-    assembly.place(part, _shared(assembly, item, scale), xyz, yaw, rgb=rgb)
+    out.place(part, _shared(out, item, scale), xyz, yaw, rgb=rgb)
 
 
 def equip_roof(
-    assembly: Assembly,
-    roof,
+    out: Assembly,
+    roof: np.ndarray,
     z: float,
     items: Sequence[str],
     clear: float = 1.0,
@@ -268,14 +270,14 @@ def equip_roof(
     """Stands equipment on a flat roof without overlaps, as far as it fits.
 
     Args:
-        assembly: the building; its `rng` draws places, headings, sizes.
+        out: the building; its `rng` draws places, headings, sizes.
         roof: outline of the free roof [m].
         z: height of the roof [m].
         items: names of `_MAKERS`, the most important first.
         clear: distance kept from the edge [m].
         prefix: of the names of the visuals.
     """
-    room, rng = Polygon(roof), assembly.rng
+    room, rng = Polygon(roof), out.rng
     x0, y0, x1, y1 = room.bounds
     along = np.subtract(roof[1], roof[0])
     heading = math.atan2(along[1], along[0])
@@ -293,7 +295,7 @@ def equip_roof(
             )
             if fits and free.contains(Point(x, y)):
                 taken.append((x, y, radius))
-                shape = _shared(assembly, item, (stretch, scale, scale))
+                shape = _shared(out, item, (stretch, scale, scale))
                 part = f"{prefix}roof_{number:02d}"
-                assembly.place(part, shape, (x, y, z), turn)
+                out.place(part, shape, (x, y, z), turn)
                 break

@@ -7,11 +7,12 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 from shapely.geometry import Polygon
 
 from cns_drake.city.buildings.parts import massing
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
-from cns_drake.city.geometry.structures import MeshShape, Part, Shape
+from cns_drake.city.geometry.structures import MeshShape, Model, Part, Shape
 
 Rgb = tuple[float, float, float]
 T = TypeVar("T")
@@ -76,6 +77,15 @@ class Site:
         """The front corners, 0 left and 1 right, that no neighbour hides."""
         flanks = {0: {3, 0}, 1: {0, 1}}
         return [k for k, e in flanks.items() if not e & self.blind_edges]
+
+    def blind_in(self, number: int, count: int) -> frozenset[int]:
+        """The blind sides of one of `count` units in a row, left to right."""
+        outer = {3: number == 0, 1: number + 1 == count}
+        return frozenset(
+            edge
+            for edge, is_end in outer.items()
+            if not is_end or edge in self.blind_edges
+        )
 
     def detached(self, gap: float) -> Site:
         """Returns the site with its blind edges moved in by `gap`.
@@ -163,6 +173,10 @@ class Dice:
 class Assembly:
     """Collects the parts and meshes of one building: a builder fills it.
 
+    Meshes make up a part of their own (`add`), or are gathered by what they
+    are made of (`paint`, `add_to`): each material becomes one part, so that
+    a small building of many small pieces stays at a handful of visuals.
+
     Attributes:
         site: the ground it stands on.
         rng: the source of all variation that its parameters leave open.
@@ -176,6 +190,8 @@ class Assembly:
     glass_rgb: Rgb = (0.20, 0.26, 0.31)
     parts: list[Part] = field(default_factory=list)
     meshes: dict[str, Mesh] = field(default_factory=dict)
+    _colours: dict[str, Rgb] = field(default_factory=dict)
+    _pieces: dict[str, list[Mesh]] = field(default_factory=dict)
 
     def add(
         self, part: str, *meshes: Mesh, z: float = 0.0, rgb: Rgb | None = None
@@ -189,6 +205,29 @@ class Assembly:
         if mesh.faces:
             shape = MeshShape(self.define(part, mesh))
             self.place(part, shape, (0.0, 0.0, z), rgb=rgb)
+
+    def paint(self, **colours: Rgb) -> None:
+        """Names the materials of this building, with their colours."""
+        self._colours = colours
+        self._pieces = {material: [] for material in colours}
+
+    def add_to(self, material: str, *meshes: Mesh) -> None:
+        """Adds meshes to those of a material."""
+        if material not in self._pieces:
+            raise ValueError(f"unknown material {material}")
+        self._pieces[material] += meshes
+
+    def turn(self, translation: ArrayLike, yaw: float) -> None:
+        """Rotates all materials about z by `yaw`, then translates them."""
+        for material, pieces in self._pieces.items():
+            mesh = merge_meshes(*pieces).moved(translation, yaw)
+            self._pieces[material] = [mesh]
+
+    def finish(self, footprint: Polygon) -> Model:
+        """Adds a part for each material in use; returns the building."""
+        for material, pieces in self._pieces.items():
+            self.add(material, *pieces, rgb=self._colours[material])
+        return Model(tuple(self.parts), self.meshes, footprint)
 
     def define(self, key: str, mesh: Mesh) -> str:
         """Adds a mesh of this building's own; returns its full name."""

@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
+import numpy as np
 from numpy.typing import ArrayLike
 
-from cns_drake.city.buildings.parts import details, massing
+from cns_drake.city.buildings.parts import bays, details, massing
+from cns_drake.city.buildings.parts.bays import Bay
 from cns_drake.city.buildings.parts.facades import (
     Band,
     Facade,
@@ -32,11 +34,11 @@ _AWNING_COLOURS = (
 )
 
 
-def add_awnings(assembly: Assembly, pieces: Sequence[Mesh]) -> None:
+def add_awnings(out: Assembly, pieces: Sequence[Mesh]) -> None:
     """Adds the awnings of a building in a colour of their own."""
     if pieces:
-        rgb = pick(assembly.rng, _AWNING_COLOURS)
-        assembly.add("awnings", *pieces, rgb=rgb)
+        rgb = pick(out.rng, _AWNING_COLOURS)
+        out.add("awnings", *pieces, rgb=rgb)
 
 
 def divided(
@@ -61,8 +63,8 @@ def divided(
 
 
 def add_ground(
-    assembly: Assembly,
-    outline,
+    out: Assembly,
+    outline: ArrayLike,
     facade: Facade,
     extras: Sequence[Mesh] = (),
     part: str = "ground",
@@ -70,14 +72,14 @@ def add_ground(
     """Adds the ground floor on its foundation; returns its top [m]."""
     base = massing.foundation(outline)
     walls = facade_mesh(outline, facade)
-    assembly.add(part, base, walls, *extras)
-    _add_glass(assembly, outline, facade, 0.0, part)
+    out.add(part, base, walls, *extras)
+    _add_glass(out, outline, facade, 0.0, part)
     return facade.height
 
 
 def add_storeys(
-    assembly: Assembly,
-    outline,
+    out: Assembly,
+    outline: ArrayLike,
     facade: Facade,
     z0: float,
     groups: int,
@@ -96,21 +98,21 @@ def add_storeys(
     for k in range(per_group):
         pieces += [e.moved((0.0, 0.0, k * facade.height)) for e in extras]
     step = per_group * facade.height
-    assembly.stack(part, merge_meshes(*pieces), z0, step, groups)
+    out.stack(part, merge_meshes(*pieces), z0, step, groups)
     top = round(z0 + groups * step, 3)
     if len(facade.glass) == 1:
         glass = _pane(outline, facade, z0, top)
-        assembly.add(f"{part}_glass", glass, rgb=assembly.glass_rgb)
+        out.add(f"{part}_glass", glass, rgb=out.glass_rgb)
     elif facade.glass:
         glass = glass_mesh(outline, facade.stacked(per_group))
-        rgb = assembly.glass_rgb
-        assembly.stack(f"{part}_glass", glass, z0, step, groups, rgb)
+        rgb = out.glass_rgb
+        out.stack(f"{part}_glass", glass, z0, step, groups, rgb)
     return top
 
 
-def _pane(outline, facade: Facade, z0: float, z1: float) -> Mesh:
+def _pane(outline: ArrayLike, facade: Facade, z0: float, z1: float) -> Mesh:
     """Returns the pane behind all walls but plain ones."""
-    edges = range(len(outline))
+    edges = range(len(np.asarray(outline)))
     depth = facade.glass[0] - _PANE_OVERLAP
     plan = massing.inset(
         outline, [0.0 if k in facade.plain else depth for k in edges]
@@ -144,8 +146,8 @@ class Grooves:
 
 
 def add_grooved(
-    assembly: Assembly,
-    outline,
+    out: Assembly,
+    outline: ArrayLike,
     wall: Grooves,
     z0: float,
     goal: float,
@@ -167,9 +169,7 @@ def add_grooved(
     if wall.ledge > 0:
         bands.append(Band(0.0, 0.2, -wall.ledge))
     facade = Facade(storey, tuple(bands), glass=(depth,), plain=plain)
-    top = add_storeys(
-        assembly, outline, facade, z0, groups, per_group, part=part
-    )
+    top = add_storeys(out, outline, facade, z0, groups, per_group, part=part)
     pieces, into = [], depth + 0.05
     if wall.corner > 0:
         pieces.append(
@@ -199,11 +199,11 @@ def add_grooved(
             )
         )
     if pieces:
-        assembly.add(f"{part}_piers", *pieces)
+        out.add(f"{part}_piers", *pieces)
     return top
 
 
-def block(outline, facade: Facade, z0: float) -> Mesh:
+def block(outline: ArrayLike, facade: Facade, z0: float) -> Mesh:
     """Returns walls with a flat lid, glass and all, as one mesh."""
     pieces = [
         facade_mesh(outline, facade, z0),
@@ -214,9 +214,33 @@ def block(outline, facade: Facade, z0: float) -> Mesh:
     return merge_meshes(*pieces)
 
 
+def shaft_walls(
+    height: float,
+    entry: Bay,
+    slit: Bay,
+    room: float,
+    rim: tuple[float, float],
+    glass: tuple[float, ...] = (),
+) -> Facade:
+    """Returns the walls of a stair: one bay in front, one behind.
+
+    Args:
+        height: of the walls [m].
+        entry, slit: the bays, in the middle of the front and of the back.
+        room: width that they get [m].
+        rim: height and reach of a band at the top [m].
+        glass: depths of the bays that are glazed on their own [m].
+    """
+    layouts = {0: bays.alone(entry, room), 2: bays.alone(slit, room)}
+    layout = bays.by_edge(layouts, bays.plain)
+    return Facade(
+        height, (Band(height - rim[0], height, -rim[1]),), layout, glass
+    )
+
+
 def add_crown(
-    assembly: Assembly,
-    outline,
+    out: Assembly,
+    outline: ArrayLike,
     facade: Facade,
     z0: float,
     parapet: float,
@@ -235,17 +259,17 @@ def add_crown(
         massing.roof_pan(outline, roof, facade.height, thickness),
         *extras,
     )
-    assembly.add(part, mesh, z=z0)
-    _add_glass(assembly, outline, facade, z0, part)
+    out.add(part, mesh, z=z0)
+    _add_glass(out, outline, facade, z0, part)
     return round(z0 + roof, 3)
 
 
 def _add_glass(
-    assembly: Assembly, outline: ArrayLike, facade: Facade, z0: float, part: str
+    out: Assembly, outline: ArrayLike, facade: Facade, z0: float, part: str
 ) -> None:
     if facade.glass:
         glass = glass_mesh(outline, facade)
-        assembly.add(f"{part}_glass", glass, z=z0, rgb=assembly.glass_rgb)
+        out.add(f"{part}_glass", glass, z=z0, rgb=out.glass_rgb)
 
 
 def cornice(

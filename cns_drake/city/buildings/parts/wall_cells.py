@@ -23,6 +23,14 @@ END_MARGIN_M = 0.01
 _NARROW_ARCH, _WIDE_ARCH, _WIDE_ARCH_M = 4, 6, 2.0
 
 
+class Band(NamedTuple):
+    """A strip of wall that runs around the building at one depth [m]."""
+
+    z0: float
+    z1: float
+    depth: float
+
+
 class Patch(NamedTuple):
     """A rectangle of the wall pushed inwards (or out, depth < 0) [m]."""
 
@@ -75,7 +83,13 @@ class WallCells:
     arches: tuple[Arch, ...]
 
     @staticmethod
-    def painted(length, zs, groups, bands, reliefs) -> WallCells:
+    def painted(
+        length: float,
+        zs: list[float],
+        groups: np.ndarray,
+        bands: Sequence[Band],
+        reliefs: Sequence[Relief],
+    ) -> WallCells:
         """Paints bands, then reliefs, on a wall that `zs` cuts into rows.
 
         Raises:
@@ -110,9 +124,10 @@ class WallCells:
         return WallCells(xs, zs, groups, depths, hidden, arches)
 
 
-def wall_quads(
-    grid: WallCells, glass: tuple[float, ...]
-) -> Iterator[list[Corner]]:
+Quads = Iterator[list[Corner]]
+
+
+def wall_quads(grid: WallCells, glass: tuple[float, ...]) -> Quads:
     """Yields quads of `Corner`, counter-clockwise seen from outside."""
     for arch in grid.arches:
         yield from _arch_reveals(arch)
@@ -123,9 +138,7 @@ def wall_quads(
     yield from _reveal_quads(grid)
 
 
-def glass_quads(
-    grid: WallCells, glass: tuple[float, ...]
-) -> Iterator[list[Corner]]:
+def glass_quads(grid: WallCells, glass: tuple[float, ...]) -> Quads:
     """Yields the fronts at the depths of glass, which the wall leaves out."""
     for arch in grid.arches:
         if arch.depth in glass:
@@ -146,7 +159,7 @@ def _span(breaks: list[float], low: float, high: float) -> slice:
     return slice(int(first), int(last))
 
 
-def _front_quads(grid: WallCells, left_out: np.ndarray):
+def _front_quads(grid: WallCells, left_out: np.ndarray) -> Quads:
     """Yields the fewest fronts that a simple greedy merging finds."""
     xs, zs, depths = grid.xs, grid.zs, grid.depths
     groups = np.broadcast_to(grid.groups[:, None], depths.shape)
@@ -166,7 +179,9 @@ def _front_quads(grid: WallCells, left_out: np.ndarray):
         ]
 
 
-def _merged(keys, left_out) -> list[tuple[int, int, int, int]]:
+def _merged(
+    keys: np.ndarray, left_out: np.ndarray
+) -> list[tuple[int, int, int, int]]:
     """Covers cells of equal keys by (row0, row1, column0, column1) blocks."""
     todo = ~left_out
     blocks = []
@@ -187,7 +202,7 @@ def _merged(keys, left_out) -> list[tuple[int, int, int, int]]:
     return blocks
 
 
-def _reveal_quads(grid: WallCells):
+def _reveal_quads(grid: WallCells) -> Quads:
     """Yields the faces across the steps between cells of other depth."""
     xs, zs, depths = grid.xs, grid.zs, grid.depths
     num_rows, num_columns = depths.shape
@@ -212,7 +227,9 @@ def _reveal_quads(grid: WallCells):
             ]
 
 
-def _runs(steps):
+def _runs(
+    steps: list[tuple[float, float]],
+) -> Iterator[tuple[int, int, tuple[float, float]]]:
     """Yields (start, end, step) of equal neighbours that are real steps."""
     start = 0
     for k in range(1, len(steps) + 1):
@@ -236,7 +253,7 @@ def _arch_outline(arch: Arch) -> tuple[list[float], list[float]]:
     return x, z
 
 
-def _arch_reveals(arch: Arch):
+def _arch_reveals(arch: Arch) -> Quads:
     """Yields spandrels, soffit, jambs and the floor of an arch."""
     (x, z), d = _arch_outline(arch), arch.depth
     head = list(zip(x, z, strict=True))
@@ -250,7 +267,7 @@ def _arch_reveals(arch: Arch):
         yield _face((a, 0.0), (b, 0.0), (b, d), (a, d))
 
 
-def _arch_back(arch: Arch):
+def _arch_back(arch: Arch) -> Quads:
     """Yields the back wall of an arch, slice upon slice."""
     (x, z), d = _arch_outline(arch), arch.depth
     n = len(x) - 1
@@ -263,6 +280,6 @@ def _arch_back(arch: Arch):
         yield _face(*((corner, d) for corner in corners))
 
 
-def _face(*corners) -> list[Corner]:
+def _face(*corners: tuple[tuple[float, float], float]) -> list[Corner]:
     """Corners of a face inside a wall, each ((x, z), depth)."""
     return [Corner(x, z, depth, 0) for (x, z), depth in corners]

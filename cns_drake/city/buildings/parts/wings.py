@@ -6,15 +6,18 @@ A wing's edges count like those of a rectangle: 0 front, 1 right, 2 back,
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 import math
 
 import numpy as np
 
 from cns_drake.city.buildings.parts import bays, details, massing, pitched_roofs
-from cns_drake.city.buildings.parts.materials import Materials
 from cns_drake.city.buildings.parts.pitched_roofs import Hole
+from cns_drake.city.buildings.parts.site import Assembly
+
+# The windows of a gable: (from, to) -> holes.
+Attic = Callable[[float, float], list[Hole]]
 
 # Overlap of a roof's underside with the top of the walls [m].
 _SEAT = 0.02
@@ -83,14 +86,55 @@ class Wing:
 
         They keep the meshes' text short.
         """
-        walls = (round(float(v), 2) for v in (x0, y0, x1, y1, wall_top))
-        return Wing(*walls, round(float(top), 3), roof, frozenset(blind))
+        a, b, c, d, e = (round(float(v), 2) for v in (x0, y0, x1, y1, wall_top))
+        return Wing(a, b, c, d, e, round(float(top), 3), roof, frozenset(blind))
+
+    @staticmethod
+    def flat(
+        x0: float,
+        y0: float,
+        x1: float,
+        y1: float,
+        top: float,
+        parapet: float,
+        rim: float = 0.1,
+        blind: Collection[int] = (),
+    ) -> Wing:
+        """Returns a wing under a flat roof; its walls end `rim` below."""
+        roof = Roof("flat", parapet=parapet)
+        return Wing.at(x0, y0, x1, y1, top - rim, top, roof, blind)
 
     def mirrored(self, width: float) -> Wing:
         """Returns the wing with x replaced by `width` - x."""
         blind = frozenset((0, 3, 2, 1)[k] for k in self.blind)
         x0, x1 = round(width - self.x1, 2), round(width - self.x0, 2)
         return replace(self, x0=x0, x1=x1, blind=blind)
+
+    @property
+    def width(self) -> float:
+        """Along x [m]."""
+        return self.x1 - self.x0
+
+    @property
+    def depth(self) -> float:
+        """Along y [m]."""
+        return self.y1 - self.y0
+
+    @property
+    def center(self) -> massing.Point:
+        """Its middle [m]."""
+        return (self.x0 + self.x1) / 2, (self.y0 + self.y1) / 2
+
+    @property
+    def ridge(self) -> bays.Span:
+        """Where the ridge starts and ends, along x or y [m]."""
+        along_y = self.roof.along_y
+        return (self.y0, self.y1) if along_y else (self.x0, self.x1)
+
+    @property
+    def floor(self) -> float:
+        """Height of a flat roof within its parapet [m]."""
+        return self.top - self.roof.parapet
 
     @property
     def outline(self) -> np.ndarray:
@@ -128,15 +172,15 @@ class Wing:
 
 
 def add_roof(
-    materials: Materials,
+    out: Assembly,
     wing: Wing,
-    attic: bays.Bay | None = None,
+    attic: Attic | None = None,
     material: str = "walls",
 ) -> None:
     """Adds a wing's roof and gables.
 
     Args:
-        materials: where to, the roof as `roof`.
+        out: where to, the roof as `roof`.
         wing: the wing.
         attic: (x0, x1) -> holes for the windows of a gable, or None.
         material: of the gables.
@@ -146,7 +190,7 @@ def add_roof(
     reach = np.where(blind, 0.0, roof.eaves)
     if roof.kind == "flat":
         floor = round(wing.top - roof.parapet, 3)
-        materials.add(
+        out.add_to(
             material,
             massing.skirt(outline, outline, wing.wall_top, wing.top),
             massing.roof_pan(outline, floor, wing.top, 0.25),
@@ -155,20 +199,19 @@ def add_roof(
     z = wing.wall_top - _SEAT
     if roof.kind == "hip":
         solid = pitched_roofs.hip(outline, z, wing.top, reach, roof.thickness)
-        materials.add("roof", solid)
+        out.add_to("roof", solid)
         return
-    _add_shell(materials, wing, attic, material)
+    _add_shell(out, wing, attic, material)
 
 
-def _add_shell(materials, wing: Wing, attic, material: str) -> None:
+def _add_shell(
+    out: Assembly, wing: Wing, attic: Attic | None, material: str
+) -> None:
     roof, line = wing.roof, wing.line
     blind = [k in wing.blind for k in range(4)]
     low_edge, high_edge = (3, 1) if roof.along_y else (0, 2)
     start_edge, end_edge = wing.gables
-    if roof.along_y:
-        start, end = wing.y0, wing.y1
-    else:
-        start, end = wing.x0, wing.x1
+    start, end = wing.ridge
     start -= roof.verge * (not blind[start_edge])
     end += roof.verge * (not blind[end_edge])
     # A shed roof has no eaves at its upper end: its top is the wing's.
@@ -176,12 +219,10 @@ def _add_shell(materials, wing: Wing, attic, material: str) -> None:
     if roof.kind == "shed":
         ends[0 if roof.falling else 1] = False
     covering = pitched_roofs.with_eaves(line, *(roof.eaves * e for e in ends))
-    materials.add(
-        "roof",
-        pitched_roofs.shell(
-            covering, start, end, roof.thickness, along_y=roof.along_y
-        ),
+    shell = pitched_roofs.shell(
+        covering, start, end, roof.thickness, along_y=roof.along_y
     )
+    out.add_to("roof", shell)
     for edge in wing.gables:
         wall = wing.wall(edge)
         under = _seen_from(wing, edge, line)
@@ -193,10 +234,10 @@ def _add_shell(materials, wing: Wing, attic, material: str) -> None:
         gable = pitched_roofs.gable_wall(
             under, 0.0, wall.length, wing.wall_top, holes
         )
-        materials.add(material, wall.place(gable))
+        out.add_to(material, wall.place(gable))
         if holes:
             glass = pitched_roofs.gable_glass(holes)
-            materials.add("glass", wall.place(glass))
+            out.add_to("glass", wall.place(glass))
     if roof.kind == "shed":
         # The tall side, from the walls up to the roof.
         wall = wing.wall(low_edge if roof.falling else high_edge)
@@ -204,10 +245,12 @@ def _add_shell(materials, wing: Wing, attic, material: str) -> None:
         shield = pitched_roofs.gable_wall(
             [(0.0, top), (wall.length, top)], 0.0, wall.length, wing.wall_top
         )
-        materials.add(material, wall.place(shield))
+        out.add_to(material, wall.place(shield))
 
 
-def _seen_from(wing: Wing, edge: int, line) -> list[tuple[float, float]]:
+def _seen_from(
+    wing: Wing, edge: int, line: list[bays.Span]
+) -> list[tuple[float, float]]:
     """Returns the underside of the roof in a gable's wall coordinates."""
     thickness = wing.roof.thickness
     start, end = line[0][0], line[-1][0]
@@ -218,7 +261,7 @@ def _seen_from(wing: Wing, edge: int, line) -> list[tuple[float, float]]:
     return [(end - u, z - thickness) for u, z in reversed(line)]
 
 
-def _fits(hole: Hole, under) -> bool:
+def _fits(hole: Hole, under: list[bays.Span]) -> bool:
     return all(
         hole.z1 < pitched_roofs.line_height(under, x) - 0.15
         for x in (hole.x0, hole.x1)
@@ -227,7 +270,7 @@ def _fits(hole: Hole, under) -> bool:
 
 def attic_window(
     width: float, z0: float, z1: float, depth: float, count: int = 1
-):
+) -> Attic:
     """Returns windows side by side in the middle of a gable."""
 
     def holes(a: float, b: float) -> list[Hole]:

@@ -7,7 +7,6 @@ import math
 import numpy as np
 
 from cns_drake.city.buildings.parts import bays, details, massing, tiers
-from cns_drake.city.buildings.parts.facades import Band, Facade
 from cns_drake.city.buildings.parts.helix import ramp_turn
 from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
@@ -24,7 +23,7 @@ class Parameters:
     site is too narrow for decks beside it, wide ramps are all there is.
     """
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         room = min(d.width, d.depth)
         radius = min(0.5 * room, d.uniform(0.27, 0.32) * d.width, 15.0)
         if d.width - 2 * radius < 12.0:
@@ -47,98 +46,86 @@ class Parameters:
         )
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the car park on a rectangle."""
-    x0, y0, x1, y1 = assembly.site.bounds
+    x0, y0, x1, y1 = out.site.bounds
     r = p.ramp_radius
     center = (x0 + r if p.ramp_left else x1 - r, y0 + r)
-    _add_ramp(assembly, p, center)
+    _add_ramp(out, p, center)
     # The decks overlap the ramp by a lane's width, so that one drives over.
     reach = r - 0.6 * p.lane
-    if p.ramp_left:
-        decks = massing.rectangle(center[0] + reach, y0, x1, y1)
-    else:
-        decks = massing.rectangle(x0, y0, center[0] - reach, y1)
-    if decks[1, 0] - decks[0, 0] > 10.0:
-        _add_decks(assembly, p, decks)
-        _add_stair(assembly, p, _stair_by_decks(p, decks, center))
+    a, b = (center[0] + reach, x1) if p.ramp_left else (x0, center[0] - reach)
+    if b - a > 10.0:
+        decks = massing.rectangle(a, y0, b, y1)
+        _add_decks(out, p, decks)
+        _add_stair(out, p, _stair_by_decks(p, decks, center))
     else:
         side = min(5.0, 0.29 * r)
         x = x1 - side if p.ramp_left else x0
         corner = massing.rectangle(x, y1 - side, x + side, y1)
-        _add_stair(assembly, p, corner)
+        _add_stair(out, p, corner)
 
 
-def _add_ramp(assembly, p: Parameters, center) -> None:
+def _add_ramp(out: Assembly, p: Parameters, center: massing.Point) -> None:
     """Turns of the ramp around a core, on a ring of columns."""
     r, inner = p.ramp_radius - 0.05, p.ramp_radius - 0.05 - p.lane
     start = 0.0 if p.ramp_left else math.pi
     turn = ramp_turn(r, inner, p.storey_height, _SLAB_M, p.parapet, start)
-    shape = MeshShape(assembly.define("ramp", turn))
+    shape = MeshShape(out.define("ramp", turn))
     for k in range(p.storeys):
-        z = k * p.storey_height
-        assembly.place(f"ramp_{k:02d}", shape, (*center, z))
+        out.place(f"ramp_{k:02d}", shape, (*center, k * p.storey_height))
     top = p.storeys * p.storey_height + p.parapet
-    core = massing.revolved(
-        [(0.45 * inner, -massing.FOUNDATION_M), (0.45 * inner, top + 0.8)],
-        14,
-        center,
-    )
+    core = [(0.45 * inner, -massing.FOUNDATION_M), (0.45 * inner, top + 0.8)]
     hat = massing.regular_polygon(0.45 * inner + 0.8, 14, center)
-    pieces = [core, massing.prism(hat, top - 0.2, top + 0.2, bottom=True)]
+    pieces = [
+        massing.revolved(core, 14, center),
+        massing.prism(hat, top - 0.2, top + 0.2, bottom=True),
+    ]
     for k in range(8):
         angle = start + (k + 0.5) * math.pi / 4
+        # The ramp above this column ends at most here.
+        lift = (k + 0.5) / 8 - 1.0
+        z = (p.storeys + lift) * p.storey_height - 0.1
         for radius in (r - 0.45, inner + 0.45):
             x = center[0] + radius * math.cos(angle)
             y = center[1] + radius * math.sin(angle)
-            # The ramp above this column ends at most here.
-            lift = (k + 0.5) / 8 - 1.0
-            z = (p.storeys + lift) * p.storey_height - 0.1
             plan = massing.regular_polygon(0.25, 6, (x, y))
             pieces.append(massing.prism(plan, -massing.FOUNDATION_M, z))
-    assembly.add("ramp_core", *pieces)
+    out.add("ramp_core", *pieces)
 
 
-def _add_decks(assembly, p: Parameters, plan) -> None:
-    deck = _deck(plan, p.parapet, p.column_pitch)
-    assembly.stack("deck", deck, p.storey_height, p.storey_height, p.storeys)
-    x0, y0, x1, y1 = *plan[0], *plan[2]
+def _add_decks(out: Assembly, p: Parameters, plan: np.ndarray) -> None:
+    x0, y0, x1, y1 = massing.extent(plan)
     top = p.storeys * p.storey_height - 0.1
-    columns = []
-    across = bays.stretches(x1 - x0, p.column_pitch, 0.4)
-    along = bays.stretches(y1 - y0, p.column_pitch, 0.4)
-    for x in [across[0][0], *(b for _, b in across)]:
-        for y in [along[0][0], *(b for _, b in along)]:
-            columns.append(massing.post(x0 + x, y0 + y, 0.25, top))
+    across = bays.bounds(bays.stretches(x1 - x0, p.column_pitch, 0.4))
+    along = bays.bounds(bays.stretches(y1 - y0, p.column_pitch, 0.4))
+    low, high = -_SLAB_M - 0.45, -_SLAB_M + 0.02
+    beams = (
+        massing.box(x0 + x - 0.2, x0 + x + 0.2, y0 + 0.3, y1 - 0.3, low, high)
+        for x in across
+    )
+    # A slab on beams with an upstand around it; one drives at z = 0.
+    deck = merge_meshes(
+        massing.skirt(plan, plan, -_SLAB_M, p.parapet),
+        massing.flat(plan, -_SLAB_M, up=False),
+        massing.roof_pan(plan, 0.0, p.parapet, 0.18),
+        *beams,
+    )
+    out.stack("deck", deck, p.storey_height, p.storey_height, p.storeys)
+    columns = [
+        massing.post(x0 + x, y0 + y, 0.25, top) for x in across for y in along
+    ]
     # A wall along the middle stiffens the decks and hides the far side.
     middle = (y0 + y1) / 2
     ends = (x0 + 0.25 * (x1 - x0), x1 - 0.2 * (x1 - x0))
-    spine = massing.rectangle(ends[0], middle - 0.15, ends[1], middle + 0.15)
-    columns.append(massing.prism(spine, -massing.FOUNDATION_M, top))
-    assembly.add("columns", *columns)
-    panels = _panels(p, plan, assembly.rng)
-    if panels:
-        assembly.add("panels", *panels, rgb=p.panel_rgb)
+    spine = massing.standing(*ends, middle - 0.15, middle + 0.15, top)
+    out.add("columns", *columns, spine)
+    out.add("panels", *_panels(p, plan, out.rng), rgb=p.panel_rgb)
 
 
-def _deck(plan, parapet: float, pitch: float) -> Mesh:
-    """A slab on beams with an upstand around it; one drives at z = 0."""
-    (x0, y0), (x1, y1) = plan[0], plan[2]
-    cells = bays.stretches(x1 - x0, pitch, 0.4)
-    low, high = -_SLAB_M - 0.45, -_SLAB_M + 0.02
-    beams = [
-        massing.box(x0 + x - 0.2, x0 + x + 0.2, y0 + 0.3, y1 - 0.3, low, high)
-        for x in [cells[0][0], *(b for _, b in cells)]
-    ]
-    return merge_meshes(
-        massing.skirt(plan, plan, -_SLAB_M, parapet),
-        massing.flat(plan, -_SLAB_M, up=False),
-        massing.roof_pan(plan, 0.0, parapet, 0.18),
-        *beams,
-    )
-
-
-def _panels(p: Parameters, plan, rng) -> list[Mesh]:
+def _panels(
+    p: Parameters, plan: np.ndarray, rng: np.random.Generator
+) -> list[Mesh]:
     """Screens between the decks, on the front, the back and the far side."""
     pieces = []
     gap = p.storey_height - _SLAB_M
@@ -149,19 +136,15 @@ def _panels(p: Parameters, plan, rng) -> list[Mesh]:
             for k in range(1, p.storeys):
                 if rng.random() < p.panels:
                     z = k * p.storey_height
-                    screen = massing.box(
-                        round(a + 0.05, 2),
-                        round(b - 0.05, 2),
-                        -0.02,
-                        0.12,
-                        round(z - 0.2, 2),
-                        round(z + gap + 0.1, 2),
-                    )
-                    pieces.append(wall.place(screen))
+                    low, high = round(z - 0.2, 2), round(z + gap + 0.1, 2)
+                    ends = (round(a + 0.05, 2), round(b - 0.05, 2))
+                    pieces.append(wall.box(*ends, -0.02, 0.12, low, high))
     return pieces
 
 
-def _stair_by_decks(p: Parameters, decks, center) -> np.ndarray:
+def _stair_by_decks(
+    p: Parameters, decks: np.ndarray, center: massing.Point
+) -> np.ndarray:
     """Behind the ramp, against the decks; or in their far back corner."""
     side = 5.0
     (x0, _), (x1, y1) = decks[0], decks[2]
@@ -173,19 +156,10 @@ def _stair_by_decks(p: Parameters, decks, center) -> np.ndarray:
     return massing.rectangle(x, y1 - side, x + side, y1)
 
 
-def _add_stair(assembly, p: Parameters, plan) -> None:
+def _add_stair(out: Assembly, p: Parameters, plan: np.ndarray) -> None:
     """Stairs and lift in a shaft with a glazed slit, above all decks."""
-    slit = bays.with_middle(
-        bays.plain, bays.window(1.6, 2.6, p.height - 1.2, 0.3), 2.4
-    )
-    door = bays.with_middle(
-        bays.plain, bays.window(1.8, 0.0, p.height - 1.2, 0.3), 2.4
-    )
-    walls = Facade(
-        p.height,
-        (Band(p.height - 0.6, p.height, -0.2),),
-        bays.by_edge({0: door, 2: slit}, bays.plain),
-    )
-    base = massing.foundation(plan)
+    slit = bays.window(1.6, 2.6, p.height - 1.2, 0.3)
+    door = bays.window(1.8, 0.0, p.height - 1.2, 0.3)
+    walls = tiers.shaft_walls(p.height, door, slit, 2.4, (0.6, 0.2))
     body = tiers.block(plan, walls, 0.0)
-    assembly.add("stairs", base, body, rgb=p.panel_rgb)
+    out.add("stairs", massing.foundation(plan), body, rgb=p.panel_rgb)

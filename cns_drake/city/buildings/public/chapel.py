@@ -10,10 +10,9 @@ from cns_drake.city.buildings.house_parts.openings import (
 )
 from cns_drake.city.buildings.parts import bays, massing, wings
 from cns_drake.city.buildings.parts.facades import Band
-from cns_drake.city.buildings.parts.materials import Materials
 from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.buildings.parts.wings import Roof, Wing
-from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+from cns_drake.city.geometry.mesh import Mesh
 
 _WALLS = (
     (0.90, 0.89, 0.86),
@@ -45,7 +44,7 @@ class Parameters:
         annex: whether a vestry stands beside the choir.
     """
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         width = min(d.width, d.depth, 18.0)
         small = d.height < 13.0
         self.height = d.height
@@ -63,51 +62,46 @@ class Parameters:
         self.roof_rgb = d.pick(_ROOFS)
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the chapel along the longer side of a rectangle.
 
     Its door is in front, or on the left where it lies along x.
     """
-    x0, y0, x1, y1 = assembly.site.bounds
+    out.paint(walls=p.rgb, glass=out.glass_rgb, roof=p.roof_rgb, trim=_TRIM)
+    x0, y0, x1, y1 = out.site.bounds
     if y1 - y0 >= x1 - x0:
-        pieces = _pieces(p, assembly, x1 - x0, y1 - y0)
-        pieces.moved((x0, y0, 0.0)).finish(assembly)
+        _add_all(p, out, x1 - x0, y1 - y0)
+        out.turn((x0, y0, 0.0), 0.0)
     else:
         # Built along y, then turned a quarter to the right.
-        pieces = _pieces(p, assembly, y1 - y0, x1 - x0)
-        pieces.moved((x0, y1, 0.0), yaw=-np.pi / 2).finish(assembly)
+        _add_all(p, out, y1 - y0, x1 - x0)
+        out.turn((x0, y1, 0.0), -np.pi / 2)
 
 
-def _pieces(p: Parameters, assembly, width: float, length: float) -> Materials:
-    """Returns the chapel over 0..width, 0..length, its door at y = 0."""
-    materials = Materials(
-        walls=p.rgb, glass=assembly.glass_rgb, roof=p.roof_rgb, trim=_TRIM
-    )
+def _add_all(p: Parameters, out: Assembly, width: float, length: float) -> None:
+    """Adds the chapel over 0..width, 0..length, its door at y = 0."""
     nave = _nave(p, width, length)
     boxes = [nave]
-    tower = None
+    tower = porch = None
     if p.belfry != "cote":
-        tower = _tower(p, nave, width)
+        tower = _tower(p, nave)
         boxes.append(tower)
-    porch = None
     if p.porch and p.belfry != "front" and nave.y0 > 2.2:
         porch = _porch(nave)
         boxes.append(porch)
-    if p.annex:
-        annex = _annex(p, nave, width)
-        if annex is not None:
-            boxes.append(annex)
-    _add_nave(materials, p, nave, boxes)
+    annex = _annex(nave, width) if p.annex else None
+    if annex is not None:
+        boxes.append(annex)
+    _add_nave(out, p, nave, boxes)
     if p.buttresses:
-        _add_buttresses(materials, p, nave, boxes)
+        _add_buttresses(out, p, nave, boxes)
     if tower is not None:
-        _add_tower(materials, p, tower, boxes)
+        _add_tower(out, p, tower, boxes)
     else:
-        _add_cote(materials, p, nave)
+        _add_cote(out, p, nave)
     for wing in boxes:
         if wing is not nave and wing is not tower:
-            _add_small(materials, wing, boxes, is_porch=wing is porch)
-    return materials
+            _add_small(out, wing, boxes, is_porch=wing is porch)
 
 
 def _nave(p: Parameters, width: float, length: float) -> Wing:
@@ -128,13 +122,12 @@ def _nave(p: Parameters, width: float, length: float) -> Wing:
                    roof)  # fmt: skip
 
 
-def _tower(p: Parameters, nave: Wing, width: float) -> Wing:
+def _tower(p: Parameters, nave: Wing) -> Wing:
     """Returns the shaft of the tower, up to the foot of the spire."""
     side = p.tower
-    middle = (nave.x0 + nave.x1) / 2
     top = max(0.62 * p.height, nave.top - 0.3 * (nave.top - nave.wall_top))
     y0 = nave.y0 - 0.6 * side
-    x0 = middle - side / 2
+    x0 = nave.center[0] - side / 2
     if p.belfry == "side":
         x0 = nave.x1 - 0.1 if p.mirrored else nave.x0 + 0.1 - side
         y0 = nave.y0 + 0.8
@@ -142,14 +135,14 @@ def _tower(p: Parameters, nave: Wing, width: float) -> Wing:
 
 
 def _porch(nave: Wing) -> Wing:
-    middle, half = (nave.x0 + nave.x1) / 2, 1.3
+    middle, half = nave.center[0], 1.3
     roof = Roof("gable", True, 0.25, 0.25, 0.15)
     area = (middle - half, nave.y0 - 1.7, middle + half, nave.y0 + 0.1)
     top = min(4.2, nave.wall_top + 0.8)
     return Wing.at(*area, min(2.6, nave.wall_top - 0.2), top, roof)
 
 
-def _annex(p: Parameters, nave: Wing, width: float) -> Wing | None:
+def _annex(nave: Wing, width: float) -> Wing | None:
     """Returns a vestry beside the choir, where there is room."""
     room = width - _MARGIN - nave.x1, nave.x0 - _MARGIN
     side = int(room[1] > room[0])
@@ -159,80 +152,77 @@ def _annex(p: Parameters, nave: Wing, width: float) -> Wing | None:
     high = min(nave.wall_top - 0.2, 3.6)
     low = max(high - 0.45 * reach, 1.9)
     y0 = nave.y1 - 4.2
-    if side == 0:
-        area = (nave.x1 - 0.05, y0, nave.x1 + reach, nave.y1 - 0.4)
-    else:
-        area = (nave.x0 - reach, y0, nave.x0 + 0.05, nave.y1 - 0.4)
+    a, b = nave.x1 - 0.05, nave.x1 + reach
+    if side == 1:
+        a, b = nave.x0 - reach, nave.x0 + 0.05
     roof = Roof("shed", True, 0.25, 0.2, 0.15, falling=side == 0)
     if high - low < 0.3 or y0 < nave.y0 + 1.0:
         return None
-    return Wing.at(*area, low, high, roof)
+    return Wing.at(a, y0, b, nave.y1 - 0.4, low, high, roof)
 
 
-def _add_nave(materials, p: Parameters, nave: Wing, boxes) -> None:
+def _add_nave(
+    out: Assembly, p: Parameters, nave: Wing, boxes: list[Wing]
+) -> None:
     openings = Openings(nave, boxes)
     high = nave.wall_top
     spring = max(1.6, high - 1.5)
     lancet = bays.arched(1.0, 1.2, spring, _RECESS, rise=0.7)
     openings.row((1, 3), 1.5, p.bay, [lancet], 1.0)
-    middle = (nave.x1 - nave.x0) / 2
+    middle = nave.width / 2
     if p.belfry != "front":
         door = bays.arched(1.6, 0.0, 2.0, 0.5, rise=0.8)
         if high > 3.1 and not any(w.roof.thickness == 0.15 for w in boxes[1:]):
             openings.put(0, middle, 2.2, door)
         elif not any(w.y0 < nave.y0 for w in boxes[1:]):
             openings.put(0, middle, 2.2, bays.entrance(1.4, 2.1, 0.4))
-    bands = (Band(0.0, 0.45, -0.08), Band(high - 0.25, high, -0.08))
-    openings.add_walls(materials, (_RECESS,), bands[:1])
     low = high + 0.2 * (nave.top - high)
     rose = wings.attic_window(1.3, low, low + 1.6, _RECESS)
-    wings.add_roof(materials, nave, rose)
+    openings.enclose(out, (_RECESS,), (Band(0.0, 0.45, -0.08),), attic=rose)
 
 
-def _add_buttresses(materials, p: Parameters, nave: Wing, boxes) -> None:
+def _add_buttresses(
+    out: Assembly, p: Parameters, nave: Wing, boxes: list[Wing]
+) -> None:
     high = 0.75 * nave.wall_top
     for edge in (1, 3):
         wall = nave.wall(edge)
         for a, b in free_stretches(nave, edge, boxes, 0.5):
             for x, _ in bays.stretches(b - a, p.bay, 1.0)[1:]:
-                u = a + x
-                plan = massing.rectangle(u - 0.22, -0.05, u + 0.22, 0.42)
-                slope = massing.rectangle(u - 0.22, -0.05, u + 0.22, 0.05)
-                piece = merge_meshes(
-                    massing.skirt(plan, plan, -massing.FOUNDATION_M, high),
-                    massing.frustum(plan, slope, high, high + 0.5),
-                )
-                materials.add("walls", wall.place(piece))
+                left, right = a + x - 0.22, a + x + 0.22
+                plan = massing.rectangle(left, -0.05, right, 0.42)
+                slope = massing.rectangle(left, -0.05, right, 0.05)
+                body = massing.skirt(plan, plan, -massing.FOUNDATION_M, high)
+                cap = massing.frustum(plan, slope, high, high + 0.5)
+                out.add_to("walls", wall.place(body), wall.place(cap))
 
 
-def _add_tower(materials, p: Parameters, tower: Wing, boxes) -> None:
+def _add_tower(
+    out: Assembly, p: Parameters, tower: Wing, boxes: list[Wing]
+) -> None:
     """Adds the shaft, its bell chamber and the spire with a cross."""
     openings = Openings(tower, boxes)
-    side, top = tower.x1 - tower.x0, tower.wall_top
+    side, top = tower.width, tower.wall_top
     width = round(min(1.2, 0.4 * side), 2)
     louvre = bays.arched(width, top - 2.6, top - 1.3, _RECESS)
+    slit = bays.window(0.5, 0.5 * top, 0.5 * top + 1.2, _RECESS)
     for edge in range(4):
         openings.put(edge, side / 2, width + 0.7, louvre)
-        if p.belfry == "side" and edge == 3 - 2 * p.mirrored:
-            continue
-        slit = bays.window(0.5, 0.5 * top, 0.5 * top + 1.2, _RECESS)
-        openings.put(edge, side / 2, 1.0, slit)
+        if p.belfry != "side" or edge != 3 - 2 * p.mirrored:
+            openings.put(edge, side / 2, 1.0, slit)
     if p.belfry == "front":
         width = round(min(1.7, side - 1.1), 2)
-        openings.put(
-            0, side / 2, width + 0.6, bays.arched(width, 0.0, 2.1, 0.45)
-        )
+        door = bays.arched(width, 0.0, 2.1, 0.45)
+        openings.put(0, side / 2, width + 0.6, door)
     bands = (Band(0.0, 0.45, -0.1), Band(top - 3.1, top - 2.9, -0.08),
              Band(top - 0.3, top, -0.18))  # fmt: skip
-    openings.add_walls(materials, (_RECESS,), bands)
-    materials.add("roof", *_spire(p, tower))
-    x, y = (tower.x0 + tower.x1) / 2, (tower.y0 + tower.y1) / 2
-    materials.add("trim", _cross(x, y, p.height - 1.3, p.height))
+    openings.add_walls(out, (_RECESS,), bands)
+    out.add_to("roof", *_spire(p, tower))
+    out.add_to("trim", *_cross(*tower.center, p.height - 1.3, p.height))
 
 
 def _spire(p: Parameters, tower: Wing) -> list[Mesh]:
-    z, tip = tower.wall_top, p.height - 1.0
-    x, y = (tower.x0 + tower.x1) / 2, (tower.y0 + tower.y1) / 2
+    z, tip, center = tower.wall_top, p.height - 1.0, tower.center
     eaves = massing.inset(tower.outline, -0.3)
     pieces = [
         massing.flat(eaves, z - 0.02, up=False),
@@ -240,75 +230,70 @@ def _spire(p: Parameters, tower: Wing) -> list[Mesh]:
     ]
     if p.spire == "cap":
         knee = z + 0.45 * (tip - z)
-        waist = massing.inset(tower.outline, 0.32 * (tower.x1 - tower.x0))
+        waist = massing.inset(tower.outline, 0.32 * tower.width)
         pieces += [
             massing.skirt(eaves, waist, z + 0.2, knee),
-            massing.spire(waist, (x, y), knee, tip),
+            massing.spire(waist, center, knee, tip),
         ]
     elif p.spire == "broach":
         # Eight sides on a square: a low pyramid with a needle through it.
-        ring = massing.regular_polygon(
-            0.5 * (tower.x1 - tower.x0), 8, (x, y), np.pi / 8
-        )
+        ring = massing.regular_polygon(0.5 * tower.width, 8, center, np.pi / 8)
         pieces += [
-            massing.spire(eaves, (x, y), z + 0.2, z + 0.45 * (tip - z)),
-            massing.spire(ring, (x, y), z + 0.1, tip),
+            massing.spire(eaves, center, z + 0.2, z + 0.45 * (tip - z)),
+            massing.spire(ring, center, z + 0.1, tip),
         ]
     else:
-        pieces.append(massing.spire(eaves, (x, y), z + 0.2, tip))
+        pieces.append(massing.spire(eaves, center, z + 0.2, tip))
     return pieces
 
 
-def _cross(x: float, y: float, z0: float, z1: float) -> Mesh:
-    arm = z1 - 0.4
-    return merge_meshes(
-        massing.box(x - 0.06, x + 0.06, y - 0.06, y + 0.06, z0, z1),
-        massing.box(x - 0.35, x + 0.35, y - 0.06, y + 0.06, arm, arm + 0.12),
-    )
+def _cross(x: float, y: float, z0: float, z1: float) -> list[Mesh]:
+    arm, ys = z1 - 0.4, (y - 0.06, y + 0.06)
+    return [
+        massing.box(x - 0.06, x + 0.06, *ys, z0, z1),
+        massing.box(x - 0.35, x + 0.35, *ys, arm, arm + 0.12),
+    ]
 
 
-def _add_cote(materials, p: Parameters, nave: Wing) -> None:
+def _add_cote(out: Assembly, p: Parameters, nave: Wing) -> None:
     """Adds a small open belfry on the ridge at the front."""
-    x, y = (nave.x0 + nave.x1) / 2, nave.y0 + 1.1
+    x, y = nave.center[0], nave.y0 + 1.1
     low, high = nave.top - 0.9, p.height - 1.6
-    half = 0.7
     if high - nave.top < 0.9:
-        materials.add("trim", _cross(x, nave.y0, nave.top - 0.3, p.height))
+        out.add_to("trim", *_cross(x, nave.y0, nave.top - 0.3, p.height))
         return
-    base = massing.box(x - half, x + half, y - half, y + half, low,
-                       nave.top + 0.3, bottom=False)  # fmt: skip
-    posts = [
+    out.add_to("walls", massing.post(x, y, 0.7, nave.top + 0.3, low))
+    posts = (
         massing.post(u, v, 0.1, high, nave.top + 0.2)
         for u in (x - 0.55, x + 0.55)
         for v in (y - 0.55, y + 0.55)
-    ]  # fmt: skip
-    bell = massing.revolved(
-        [(0.34, high - 0.75), (0.24, high - 0.45), (0.12, high - 0.2)],
-        8, (x, y),
-    )  # fmt: skip
-    rim = massing.flat(
-        massing.regular_polygon(0.34, 8, (x, y)), high - 0.75, up=False
     )
-    materials.add("walls", base)
-    materials.add("trim", *posts, bell, rim)
-    eaves = massing.rectangle(x - 0.95, y - 0.95, x + 0.95, y + 0.95)
-    materials.add(
+    bell = [(0.34, high - 0.75), (0.24, high - 0.45), (0.12, high - 0.2)]
+    rim = massing.regular_polygon(0.34, 8, (x, y))
+    out.add_to(
+        "trim",
+        *posts,
+        massing.revolved(bell, 8, (x, y)),
+        massing.flat(rim, high - 0.75, up=False),
+        *_cross(x, y, p.height - 1.0, p.height),
+    )
+    eaves = massing.square(x, y, 0.95)
+    out.add_to(
         "roof",
         massing.flat(eaves, high - 0.02, up=False),
         massing.spire(eaves, (x, y), high - 0.02, p.height - 0.8),
     )
-    materials.add("trim", _cross(x, y, p.height - 1.0, p.height))
 
 
-def _add_small(materials, wing: Wing, boxes, *, is_porch: bool) -> None:
+def _add_small(
+    out: Assembly, wing: Wing, boxes: list[Wing], *, is_porch: bool
+) -> None:
     """Adds the porch or the vestry."""
     openings = Openings(wing, boxes)
     if is_porch:
-        head = wing.wall_top - 0.3
-        arch = bays.window(1.5, 0.0, head, 0.9)
-        openings.put(0, (wing.x1 - wing.x0) / 2, 2.2, arch)
+        arch = bays.window(1.5, 0.0, wing.wall_top - 0.3, 0.9)
+        openings.put(0, wing.width / 2, 2.2, arch)
     else:
         head = round(min(2.0, wing.wall_top - 0.3), 2)
         openings.row(range(4), 1.2, 2.2, [bays.window(0.8, 1.0, head, _RECESS)])
-    openings.add_walls(materials, (_RECESS,))
-    wings.add_roof(materials, wing)
+    openings.enclose(out, (_RECESS,))

@@ -12,7 +12,6 @@ from cns_drake.city.buildings.parts.facades import (
     facade_mesh,
     glass_mesh,
 )
-from cns_drake.city.buildings.parts.materials import Materials
 from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.geometry.mesh import Mesh
 
@@ -40,7 +39,7 @@ class Parameters:
         lift: whether a lift tower stands beside the stairs.
     """
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         depth = d.depth
         island = d.chance(0.5)
         rest = depth - 2 * _TRACK_M - 1.2
@@ -59,91 +58,91 @@ class Parameters:
         self.roof_rgb = d.pick(_ROOFS)
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the station along x, its tracks from end to end of the site."""
-    materials = Materials(
+    out.paint(
         concrete=p.rgb,
         track=_TRACK,
         steel=p.steel_rgb,
         roof=p.roof_rgb,
-        glass=assembly.glass_rgb,
+        glass=out.glass_rgb,
     )
-    x0, y0, x1, y1 = assembly.site.bounds
+    x0, y0, x1, y1 = out.site.bounds
     y = (y0 + y1) / 2
     tracks, platforms = _lanes(p, y)
     low = min(a for a, _ in (*tracks, *platforms))
     high = max(b for _, b in (*tracks, *platforms))
-    _add_viaduct(materials, p, (x0, x1), (low, high), tracks)
+    _add_viaduct(out, p, (x0, x1), (low, high), tracks)
     ends = (x0 + 0.06 * (x1 - x0), x1 - 0.06 * (x1 - x0))
     for k, strip in enumerate(platforms):
-        _add_platform(materials, p, ends, strip)
-        _add_roof(materials, p, ends, strip)
-        _add_fence(assembly, p, ends, strip, k, y)
-    _add_hall(materials, p, (x0, x1), (low, high))
-    _add_stairs(materials, p, ends, (y0 + 0.2, low), platforms)
-    materials.finish(assembly)
+        _add_platform(out, p, ends, strip)
+        _add_roof(out, p, ends, strip)
+        _add_fence(out, p, ends, strip, k, y)
+    _add_hall(out, p, (x0, x1), (low, high))
+    _add_stairs(out, p, ends, (y0 + 0.2, low), platforms)
 
 
-def _lanes(p: Parameters, y: float):
+def _lanes(p: Parameters, y: float) -> tuple[list[bays.Span], list[bays.Span]]:
     """Returns the strips of the tracks and of the platforms, in y."""
+    # Half of what lies between the tracks, and where they end.
+    half = p.platform / 2 if p.island else 0.0
+    end = half + _TRACK_M
+    tracks = [(y - end, y - half), (y + half, y + end)]
     if p.island:
-        half = p.platform / 2
-        tracks = [
-            (y - half - _TRACK_M, y - half),
-            (y + half, y + half + _TRACK_M),
-        ]
         return tracks, [(y - half, y + half)]
-    tracks = [(y - _TRACK_M, y), (y, y + _TRACK_M)]
-    sides = [
-        (y - _TRACK_M - p.platform, y - _TRACK_M),
-        (y + _TRACK_M, y + _TRACK_M + p.platform),
-    ]
+    sides = [(y - end - p.platform, y - end), (y + end, y + end + p.platform)]
     return tracks, sides
 
 
-def _add_viaduct(materials, p, xs, ys, tracks) -> None:
+def _add_viaduct(
+    out: Assembly,
+    p: Parameters,
+    xs: bays.Span,
+    ys: bays.Span,
+    tracks: list[bays.Span],
+) -> None:
     """Adds deck, girders, piers, rails."""
     (x0, x1), (y0, y1) = xs, ys
     bed = p.deck - 1.0
-    materials.add(
+    girders = (
+        massing.box(x0, x1, y, y + 0.5, bed - 1.1, bed - 0.3)
+        for y in np.linspace(y0 + 0.3, y1 - 0.8, 4).tolist()
+    )
+    out.add_to(
         "concrete",
         massing.box(x0, x1, y0, y1, bed - 0.35, bed),
-        *(
-            massing.box(x0, x1, y, y + 0.5, bed - 1.1, bed - 0.3)
-            for y in np.linspace(y0 + 0.3, y1 - 0.8, 4).tolist()
-        ),
+        *girders,
         massing.box(x0, x1, y0, y0 + 0.2, bed - 0.05, bed + 0.6),
         massing.box(x0, x1, y1 - 0.2, y1, bed - 0.05, bed + 0.6),
     )
     count = max(2, round((x1 - x0) / p.span) + 1)
     for x in np.linspace(x0 + 1.2, x1 - 1.2, count).tolist():
-        materials.add("concrete", *_pier(p, x, y0, y1, bed - 1.05))
+        out.add_to("concrete", *_pier(p, x, y0, y1, bed - 1.05))
     for a, b in tracks:
         middle = (a + b) / 2
-        materials.add(
-            "track", massing.box(x0, x1, middle - 1.3, middle + 1.3,
-                                 bed - 0.02, bed + 0.15, bottom=False)
-        )  # fmt: skip
+        ballast = (x0, x1, middle - 1.3, middle + 1.3, bed - 0.02, bed + 0.15)
+        out.add_to("track", massing.box(*ballast, bottom=False))
         for y in (middle - 0.72, middle + 0.72):
             rail = (x0, x1, y - 0.04, y + 0.04, bed + 0.1, bed + 0.32)
-            materials.add("steel", massing.box(*rail, bottom=False))
+            out.add_to("steel", massing.box(*rail, bottom=False))
 
 
-def _pier(p: Parameters, x: float, y0, y1, top: float) -> list[Mesh]:
-    half = 0.5
+def _pier(
+    p: Parameters, x: float, y0: float, y1: float, top: float
+) -> list[Mesh]:
     if p.pier == "wall":
         inset = 0.16 * (y1 - y0)
-        body = (x - half, x + half, y0 + inset, y1 - inset)
-        return [massing.box(*body, -massing.FOUNDATION_M, top, bottom=False)]
-    cap = massing.box(x - 0.7, x + 0.7, y0 + 0.4, y1 - 0.4, top - 0.9, top)
+        ys = (y0 + inset, y1 - inset)
+        return [massing.standing(x - 0.5, x + 0.5, *ys, top)]
     if p.pier == "twin":
-        shafts = []
+        cap = (x - 0.7, x + 0.7, y0 + 0.4, y1 - 0.4, top - 0.9, top)
+        pieces = [massing.box(*cap)]
         for y in (y0 + 0.22 * (y1 - y0), y1 - 0.22 * (y1 - y0)):
             ring = massing.regular_polygon(0.6, 10, (x, y))
-            shafts.append(
+            pieces.append(
                 massing.skirt(ring, ring, -massing.FOUNDATION_M, top - 0.8)
             )
-        return [cap, *shafts]
+        return pieces
     y, wide = (y0 + y1) / 2, 0.16 * (y1 - y0)
     foot = massing.rectangle(x - 0.7, y - wide, x + 0.7, y + wide)
     head = massing.rectangle(x - 0.7, y0 + 0.5, x + 0.7, y1 - 0.5)
@@ -155,24 +154,24 @@ def _pier(p: Parameters, x: float, y0, y1, top: float) -> list[Mesh]:
     ]
 
 
-def _add_platform(materials, p: Parameters, ends, strip) -> None:
+def _add_platform(
+    out: Assembly, p: Parameters, ends: bays.Span, strip: bays.Span
+) -> None:
     a, b = ends
-    y0, y1 = strip
-    bed = p.deck - 1.05
-    materials.add("concrete", massing.box(a, b, y0, y1, bed, p.deck))
-    middle = (y0 + y1) / 2
+    out.add_to("concrete", massing.box(*ends, *strip, p.deck - 1.05, p.deck))
+    y, z = sum(strip) / 2, p.deck
     for x, _ in bays.stretches(b - a, 9.0, 2.0):
         u = a + x + 3.0
-        seat = (u - 0.9, u + 0.9, middle - 0.25, middle + 0.25)
-        materials.add(
-            "steel",
-            massing.box(*seat, p.deck + 0.38, p.deck + 0.48),
-            massing.box(u - 0.6, u + 0.6, middle - 0.1, middle + 0.1, p.deck,
-                        p.deck + 0.4, bottom=False),
-        )  # fmt: skip
+        seat = (u - 0.9, u + 0.9, y - 0.25, y + 0.25, z + 0.38, z + 0.48)
+        foot = (u - 0.6, u + 0.6, y - 0.1, y + 0.1, z, z + 0.4)
+        out.add_to(
+            "steel", massing.box(*seat), massing.box(*foot, bottom=False)
+        )
 
 
-def _add_roof(materials, p: Parameters, ends, strip) -> None:
+def _add_roof(
+    out: Assembly, p: Parameters, ends: bays.Span, strip: bays.Span
+) -> None:
     """Adds a roof on a row of columns along the middle of a platform."""
     a, b = ends
     run = p.covered * (b - a)
@@ -187,21 +186,26 @@ def _add_roof(materials, p: Parameters, ends, strip) -> None:
         line = pitched_roofs.gable_line(middle - half, middle + half, low, top)
     else:
         line = pitched_roofs.barrel_line(middle - half, middle + half, low, top)
-    lid = pitched_roofs.shell(line, a, b, 0.18)
-    materials.add("roof", lid)
+    out.add_to("roof", pitched_roofs.shell(line, a, b, 0.18))
     under = pitched_roofs.line_height(line, middle) - 0.16
     for x in np.linspace(a + 1.0, b - 1.0, max(2, round(run / 8.0))).tolist():
-        materials.add(
-            "steel", massing.post(x, middle, 0.13, under, p.deck - 0.02)
-        )
+        post = massing.post(x, middle, 0.13, under, p.deck - 0.02)
+        out.add_to("steel", post)
         for side in (-1.0, 1.0):
             y = middle + side * 0.7 * half
             z = pitched_roofs.line_height(line, y) - 0.2
             foot = (x, middle + side * 0.05, min(under, z) - 0.7)
-            materials.add("steel", details.beam(foot, (x, y, z), 0.14))
+            out.add_to("steel", details.beam(foot, (x, y, z), 0.14))
 
 
-def _add_fence(assembly, p, ends, strip, number: int, middle: float) -> None:
+def _add_fence(
+    out: Assembly,
+    p: Parameters,
+    ends: bays.Span,
+    strip: bays.Span,
+    number: int,
+    middle: float,
+) -> None:
     """Adds railings on the outer side and at the ends of a platform."""
     a, b = ends
     y0, y1 = strip
@@ -216,37 +220,40 @@ def _add_fence(assembly, p, ends, strip, number: int, middle: float) -> None:
             start = (k * step + 0.05, -0.1)
             end = ((k + 1) * step - 0.05, -0.1)
             name = f"railing_{number}{edge}{k}"
-            add_railing(assembly, name, wall, start, end, p.deck, p.steel_rgb)
+            add_railing(out, name, wall, start, end, p.deck, p.steel_rgb)
 
 
-def _add_hall(materials, p: Parameters, xs, ys) -> None:
+def _add_hall(
+    out: Assembly, p: Parameters, xs: bays.Span, ys: bays.Span
+) -> None:
     """Adds the glazed hall with the ticket office under the deck."""
     (x0, x1), (y0, y1) = xs, ys
     x, half = (x0 + x1) / 2 + 0.5, min(p.hall / 2, 0.2 * (x1 - x0))
     top = p.deck - 1.9
-    plan = np.round(
-        massing.rectangle(x - half, y0 + 0.8, x + half, y1 - 0.8), 2
-    )
+    plan = massing.rectangle(x - half, y0 + 0.8, x + half, y1 - 0.8)
+    plan = np.round(plan, 2)
     glazing = bays.rhythm(2.4, [bays.ribbon(0.3, top - 0.5, 0.15, 0.2)], 0.3)
     door = bays.entrance(2.2, 2.4, 0.6, surround=0.08)
-    facade = Facade(
-        round(top, 2),
-        (Band(top - 0.35, top, -0.15),),
-        bays.by_edge(
-            {k: bays.with_middle(glazing, door, 3.6) for k in (0, 2)}, glazing
-        ),
-        (0.15,),
-    )
-    materials.add(
+    doors = bays.with_middle(glazing, door, 3.6)
+    layout = bays.by_edge({0: doors, 2: doors}, glazing)
+    band = Band(top - 0.35, top, -0.15)
+    facade = Facade(round(top, 2), (band,), layout, (0.15,))
+    out.add_to(
         "steel",
         massing.foundation(plan),
         facade_mesh(plan, facade),
         massing.flat(plan, round(top, 2)),
     )
-    materials.add("glass", glass_mesh(plan, facade))
+    out.add_to("glass", glass_mesh(plan, facade))
 
 
-def _add_stairs(materials, p: Parameters, ends, room, platforms) -> None:
+def _add_stairs(
+    out: Assembly,
+    p: Parameters,
+    ends: bays.Span,
+    room: bays.Span,
+    platforms: list[bays.Span],
+) -> None:
     """Adds stairs beside the viaduct up to the platforms, and a lift.
 
     Where there is no room beside it, a lift must do.
@@ -255,56 +262,52 @@ def _add_stairs(materials, p: Parameters, ends, room, platforms) -> None:
     run, wide = 1.7 * p.deck, min(y1 - y0 - 0.1, 2.6)
     if wide < 1.2 or b - a < run + 8.0:
         y = platforms[0][0] + 0.2
-        shaft = (a + 2.0, a + 4.0, y, y + 2.0)
-        lift = massing.box(*shaft, -massing.FOUNDATION_M, p.deck + 2.8)
-        materials.add("glass", lift)
+        _add_lift(out, p, (a + 2.0, a + 4.0), (y, y + 2.0))
         return
     y0 = y1 - wide
     for start, sign in ((a + 1.0, 1.0), (b - 1.0, -1.0)):
         if b - a < 2 * run + 6.0 and sign < 0:
             continue
-        materials.add("concrete", *_flight(start, sign, run, (y0, y1), p.deck))
+        out.add_to("concrete", *_flight(start, sign, run, (y0, y1), p.deck))
         top = start + sign * run
         u0, u1 = sorted((top - 0.05 * sign, top + sign * 2.4))
         reach = (y0, platforms[0][0] + 0.1)
         landing = massing.box(u0, u1, *reach, p.deck - 0.3, p.deck)
         post = (u0 + 0.8, u1 - 0.8, y0 + 0.1, y0 + 0.5)
-        pillar = massing.box(
-            *post, -massing.FOUNDATION_M, p.deck - 0.2, bottom=False
-        )
-        materials.add("concrete", landing, pillar)
+        out.add_to("concrete", landing, massing.standing(*post, p.deck - 0.2))
         if p.lift and sign > 0:
-            shaft = (u1 - 0.02, u1 + 2.2, y0, y0 + min(wide, 2.2))
-            lift = massing.box(*shaft, -massing.FOUNDATION_M, p.deck + 2.8)
-            materials.add("glass", lift)
+            ys = (y0, y0 + min(wide, 2.2))
+            _add_lift(out, p, (u1 - 0.02, u1 + 2.2), ys)
 
 
-def _flight(start, sign, run, strip, rise) -> list[Mesh]:
+def _add_lift(
+    out: Assembly, p: Parameters, xs: bays.Span, ys: bays.Span
+) -> None:
+    shaft = massing.standing(*xs, *ys, p.deck + 2.8, bottom=True)
+    out.add_to("glass", shaft)
+
+
+def _flight(
+    start: float, sign: float, run: float, strip: bays.Span, rise: float
+) -> list[Mesh]:
     """Stairs that rise along x from the ground, between sloped walls."""
     y0, y1 = strip
     count = max(8, round(rise / 0.32))
     step, tread = rise / count, run / count
-    pieces = []
+    pieces, foot = [], -massing.FOUNDATION_M
     for k in range(count):
-        u0, u1 = sorted(
-            (start + sign * k * tread, start + sign * (k + 1) * tread)
-        )
+        ends = (start + sign * k * tread, start + sign * (k + 1) * tread)
         z = (k + 1) * step
-        low = (
-            max(z - 0.75, -massing.FOUNDATION_M)
-            if k > 1
-            else -massing.FOUNDATION_M
-        )
-        pieces.append(massing.box(u0, u1, y0 + 0.12, y1 - 0.12, low, z))
+        low = max(z - 0.75, foot) if k > 1 else foot
+        limits = (*sorted(ends), y0 + 0.12, y1 - 0.12, low, z)
+        pieces.append(massing.box(*limits))
     for y in (y0, y1 - 0.12):
         corners = [
             (start, -0.3), (start + sign * run, rise - 0.5),
             (start + sign * run, rise + 1.0), (start, 1.0),
         ]  # fmt: skip
-        v = np.array([(x, u, z) for u in (y, y + 0.12) for x, z in corners])
-        faces = [(0, 1, 2, 3), (7, 6, 5, 4), (0, 4, 5, 1), (1, 5, 6, 2),
-                 (2, 6, 7, 3), (3, 7, 4, 0)]  # fmt: skip
+        wall = massing.bar(corners, y, y + 0.12)
         if sign < 0:
-            faces = [face[::-1] for face in faces]
-        pieces.append(Mesh(v, tuple(faces)))
+            wall = Mesh(wall.vertices, tuple(f[::-1] for f in wall.faces))
+        pieces.append(wall)
     return pieces

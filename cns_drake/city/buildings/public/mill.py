@@ -9,7 +9,6 @@ import numpy as np
 from cns_drake.city.buildings.house_parts.openings import Openings
 from cns_drake.city.buildings.parts import bays, details, massing, tiers, wings
 from cns_drake.city.buildings.parts.facades import Band, Facade
-from cns_drake.city.buildings.parts.materials import Materials
 from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.buildings.parts.wings import Roof, Wing
 from cns_drake.city.geometry.mesh import Mesh
@@ -37,7 +36,7 @@ class Parameters:
         boiler: width of the boiler house beside the main house.
     """
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         width, depth = d.width, d.depth
         chimney = width > 24.0 and d.height > 16.0 and d.chance(0.7)
         ridge = round(d.height * d.uniform(0.64, 0.74), 2)
@@ -65,12 +64,10 @@ class Parameters:
         self.roof_rgb = d.pick(_ROOFS)
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the mill on a rectangle, its dock in front."""
-    materials = Materials(
-        annex=p.rgb, glass=assembly.glass_rgb, roof=p.roof_rgb, timber=_TIMBER
-    )
-    x0, y0, x1, y1 = assembly.site.bounds
+    out.paint(annex=p.rgb, glass=out.glass_rgb, roof=p.roof_rgb, timber=_TIMBER)
+    x0, y0, x1, y1 = out.site.bounds
     front, back = y0 + 2.2, y1 - _MARGIN
     wheel_room = 1.7 if p.wheel else 0.0
     left = x0 + _MARGIN + wheel_room * p.mirrored + p.boiler * (not p.mirrored)
@@ -78,31 +75,31 @@ def build(p: Parameters, assembly: Assembly) -> None:
     right -= p.boiler * p.mirrored
     back = min(back, front + 17.0)
     plan = massing.rectangle(*(round(v, 2) for v in (left, front, right, back)))
-    along_y = plan[2, 1] - plan[0, 1] > plan[2, 0] - plan[0, 0]
-    span = min(plan[2] - plan[0])
-    rise = min(wings.ridge_rise(span, p.pitch_deg), 0.4 * p.ridge)
-    top = _add_storeys(assembly, p, plan, p.ridge - rise - 0.25)
+    a, b, c, d = massing.extent(plan)
+    along_y = d - b > c - a
+    rise = min(wings.ridge_rise(min(c - a, d - b), p.pitch_deg), 0.4 * p.ridge)
+    top = _add_storeys(out, p, plan, p.ridge - rise - 0.25)
     roof = Roof("gable", along_y, 0.4, 0.35, 0.25)
-    (a, b), (c, d) = plan[0], plan[2]
     main = Wing(a, b, c, d, top, p.ridge, roof)
     low = top + 0.18 * (p.ridge - top)
     attic = wings.attic_window(1.1, low, low + 1.6, _RECESS, 2)
-    wings.add_roof(materials, main, attic, material="annex")
-    _add_dock(materials, p, main)
+    wings.add_roof(out, main, attic, material="annex")
+    _add_dock(out, p, main)
     if not along_y:
-        _add_hoist(materials, p, main)
+        _add_hoist(out, p, main)
     if p.boiler:
-        _add_boiler(materials, p, main, (x0, x1))
+        _add_boiler(out, p, main, (x0, x1))
     if p.chimney:
-        _add_chimney(materials, p, main, (x0, x1))
+        _add_chimney(out, p, main, (x0, x1))
     if p.wheel:
-        _add_wheel(materials, p, main)
-    materials.finish(assembly)
+        _add_wheel(out, p, main)
 
 
-def _add_storeys(assembly, p: Parameters, plan, goal: float) -> float:
+def _add_storeys(
+    out: Assembly, p: Parameters, plan: np.ndarray, goal: float
+) -> float:
     """Adds the walls; returns their top [m]."""
-    ground_height = 4.2 if goal > 9.0 else 3.6
+    h = 4.2 if goal > 9.0 else 3.6
     arch = bays.arched(1.8, 0.0, 2.3, _RECESS, rise=0.5)
     window = bays.arched(p.window_width, 1.2, 2.6, _RECESS, rise=0.3)
     gate = bays.gate(2.4, p.dock + 2.4, _RECESS)
@@ -111,108 +108,92 @@ def _add_storeys(assembly, p: Parameters, plan, goal: float) -> float:
         0: bays.with_middle(front, gate, p.hoist + 0.4),
         2: bays.rhythm(2 * p.pitch, [arch, window], 0.7),
     }
-    ground = Facade(
-        ground_height,
-        (Band(ground_height - 0.25, ground_height, -0.08),),
-        bays.by_edge(layouts, front),
-        (_RECESS,),
-    )
-    z = tiers.add_ground(assembly, plan, ground)
+    layout = bays.by_edge(layouts, front)
+    ground = Facade(h, (Band(h - 0.25, h, -0.08),), layout, (_RECESS,))
+    z = tiers.add_ground(out, plan, ground)
     count, per_group, storey = tiers.divided(goal - z, p.storey, 6)
     head = storey - 0.75
     sash = bays.arched(p.window_width, 0.9, head - 0.3, _RECESS, rise=0.3)
     rows = bays.rhythm(p.pitch, [sash], 0.7)
-    hatch = bays.gate(1.9, 2.2, _RECESS)
-    walls = Facade(
-        storey,
-        (),
-        bays.by_edge({0: bays.with_middle(rows, hatch, p.hoist)}, rows),
-        (_RECESS,),
-    )
-    top = tiers.add_storeys(assembly, plan, walls, z, count, per_group)
+    layout = bays.with_door(rows, bays.gate(1.9, 2.2, _RECESS), p.hoist)
+    walls = Facade(storey, (), layout, (_RECESS,))
+    top = tiers.add_storeys(out, plan, walls, z, count, per_group)
     if p.piers:
         strips = details.pilasters(
-            plan, p.pitch, 0.7, 2, 0.6, 0.18, ground_height, top - 0.3
+            plan, p.pitch, 0.7, 2, 0.6, 0.18, h, top - 0.3
         )
-        if strips.faces:
-            assembly.add("piers", strips)
+        out.add("piers", strips)
     return top
 
 
-def _add_dock(materials, p: Parameters, main: Wing) -> None:
+def _add_dock(out: Assembly, p: Parameters, main: Wing) -> None:
     """Adds a loading dock with steps under a timber canopy."""
     wall = main.wall(0)
     a, b = 0.15 * wall.length, 0.85 * wall.length
-    materials.add(
-        "annex",
-        wall.place(
-            massing.box(a, b, -0.05, 2.0, -massing.FOUNDATION_M, p.dock)
-        ),
-        main.wall(0).place(
-            details.steps(0.0, 2.0, 1.4, p.dock, 4).moved((a - 2.0, 0.0, 0.0))
-        ),
-    )
+    steps = details.steps(0.0, 2.0, 1.4, p.dock, 4).moved((a - 2.0, 0.0, 0.0))
+    dock = wall.standing(a, b, -0.05, 2.0, p.dock, bottom=True)
+    out.add_to("annex", dock, wall.place(steps))
     z = p.dock + 2.9
-    lid = massing.box(a, b, -0.05, 1.9, z, z + 0.15)
-    pieces = [lid]
+    pieces = [wall.box(a, b, -0.05, 1.9, z, z + 0.15)]
     for x, _ in bays.stretches(b - a, 4.0, 0.2):
         u = a + x
-        pieces.append(details.beam((u, 0.0, z - 1.2), (u, 1.6, z + 0.02), 0.16))
-    materials.add("timber", *(wall.place(piece) for piece in pieces))
+        strut = details.beam((u, 0.0, z - 1.2), (u, 1.6, z + 0.02), 0.16)
+        pieces.append(wall.place(strut))
+    out.add_to("timber", *pieces)
 
 
-def _add_hoist(materials, p: Parameters, main: Wing) -> None:
+def _add_hoist(out: Assembly, p: Parameters, main: Wing) -> None:
     """Adds a timber hoist house that stands out above the hatches."""
     wall = main.wall(0)
     x, half = wall.length / 2, p.hoist / 2
     low = main.wall_top - 1.6
     top = min(main.top - 0.3, main.wall_top + 2.4)
+    left, right = main.x0 + x - half, main.x0 + x + half
+    roof, wall_top = Roof("gable", True, 0.2, 0.25, 0.18), top - 0.4 * p.hoist
     box = Wing.at(
-        main.x0 + x - half, main.y0 - 1.5, main.x0 + x + half,
-        (main.y0 + main.y1) / 2, top - 0.4 * p.hoist - 0.2, top,
-        Roof("gable", True, 0.2, 0.25, 0.18),
-    )  # fmt: skip
-    hatch = bays.window(1.5, 0.3, box.wall_top - low - 0.4, 0.2, transom=1.2)
-    facade = Facade(
-        round(box.wall_top - low, 3),
-        (),
-        bays.by_edge({0: bays.with_middle(bays.plain, hatch, 2.2)}, bays.plain),
+        left, main.y0 - 1.5, right, main.center[1], wall_top - 0.2, top, roof
     )
-    materials.add(
+    hatch = bays.window(1.5, 0.3, box.wall_top - low - 0.4, 0.2, transom=1.2)
+    layout = bays.by_edge({0: bays.alone(hatch, 2.2)}, bays.plain)
+    facade = Facade(round(box.wall_top - low, 3), (), layout)
+    out.add_to(
         "timber",
         tiers.block(box.outline, facade, round(low, 2)),
         massing.flat(box.outline, round(low, 2), up=False),
     )
-    wings.add_roof(materials, box, material="timber")
-    beam = massing.box(x - 0.12, x + 0.12, 1.4, 1.95, top - 1.3, top - 1.05)
-    struts = [
+    wings.add_roof(out, box, material="timber")
+    beam = wall.box(x - 0.12, x + 0.12, 1.4, 1.95, top - 1.3, top - 1.05)
+    struts = (
         details.beam((u, 0.0, low - 1.2), (u, 1.35, low + 0.05), 0.18)
         for u in (x - half + 0.2, x + half - 0.2)
-    ]
-    materials.add("timber", *(wall.place(m) for m in (beam, *struts)))
+    )
+    out.add_to("timber", beam, *(wall.place(strut) for strut in struts))
 
 
-def _beside(p: Parameters, main: Wing, xs) -> tuple[float, float]:
+def _beside(p: Parameters, main: Wing, xs: bays.Span) -> tuple[float, float]:
     """Returns the x range between the main house and the site's end."""
     if p.mirrored:
         return main.x1 - 0.05, xs[1] - _MARGIN
     return xs[0] + _MARGIN, main.x0 + 0.05
 
 
-def _add_boiler(materials, p: Parameters, main: Wing, xs) -> None:
+def _add_boiler(
+    out: Assembly, p: Parameters, main: Wing, xs: bays.Span
+) -> None:
     a, b = _beside(p, main, xs)
-    deep = 0.75 * (main.y1 - main.y0)
+    deep = 0.75 * main.depth
     top = min(6.5, 0.6 * main.wall_top)
     roof = Roof("gable", False, 0.3, 0.0, 0.2)
     house = Wing.at(a, main.y1 - deep, b, main.y1 - 0.4, top - 1.4, top, roof)
     openings = Openings(house, (main,))
     window = bays.arched(1.5, 1.0, top - 3.0, _RECESS, rise=0.4)
     openings.row(range(4), 1.0, 2.8, [window], 0.6)
-    openings.add_walls(materials, (_RECESS,), material="annex")
-    wings.add_roof(materials, house, material="annex")
+    openings.enclose(out, (_RECESS,), material="annex")
 
 
-def _add_chimney(materials, p: Parameters, main: Wing, xs) -> None:
+def _add_chimney(
+    out: Assembly, p: Parameters, main: Wing, xs: bays.Span
+) -> None:
     """Adds a round chimney on a square base through the boiler house."""
     a, b = _beside(p, main, xs)
     r, top = p.chimney, p.height
@@ -222,64 +203,49 @@ def _add_chimney(materials, p: Parameters, main: Wing, xs) -> None:
         (r, base), (0.72 * r, top - 1.6), (0.95 * r, top - 1.2),
         (0.95 * r, top - 0.3), (0.8 * r, top),
     ]  # fmt: skip
-    side = 1.12 * r
-    foot = massing.rectangle(x - side, y - side, x + side, y + side)
-    materials.add(
+    foot = massing.square(x, y, 1.12 * r)
+    out.add_to(
         "annex",
         massing.prism(foot, -massing.FOUNDATION_M, base),
         massing.revolved(profile, 10, (x, y)),
     )
 
 
-def _add_wheel(materials, p: Parameters, main: Wing) -> None:
+def _add_wheel(out: Assembly, p: Parameters, main: Wing) -> None:
     """Adds a water wheel with paddles beside the side wall."""
-    edge = 3 if p.mirrored else 1
-    wall = main.wall(edge)
-    r, x = p.wheel, 0.5 * wall.length
-    z = r - 0.2
+    wall = main.wall(3 if p.mirrored else 1)
+    r, x, z = p.wheel, 0.5 * wall.length, p.wheel - 0.2
     count, inner = 10, 0.78 * r
     angles = np.arange(count) * 2 * math.pi / count
+    hub = np.array([x, z])
     pieces: list[Mesh] = []
+
+    def at(radius: float, angle: float) -> np.ndarray:
+        return radius * np.array([math.cos(angle), math.sin(angle)])
+
     for y in (0.3, 1.3):
-        for k in range(count):
-            a, b = angles[k], angles[k] + 2 * math.pi / count
-            rim = [
-                (x + q * math.cos(t), y, z + q * math.sin(t))
-                for q, t in ((inner, a), (r, a), (r, b), (inner, b))
-            ]
-            pieces.append(_plate(rim, 0.1))
+        for a in angles:
+            b = a + 2 * math.pi / count
+            ends = ((inner, a), (r, a), (r, b), (inner, b))
+            rim = [(x + q * math.cos(t), z + q * math.sin(t)) for q, t in ends]
+            pieces.append(massing.bar(rim, y, y + 0.1))
         for t in angles[: count // 2]:
-            arm = inner * np.array([math.cos(t), 0.0, math.sin(t)])
-            middle = np.array([x, y + 0.05, z])
-            pieces.append(_strut(middle - arm, middle + arm, 0.12))
+            arm = at(inner, t)
+            pieces.append(_strut(hub - arm, hub + arm, y + 0.05, 0.12))
     for t in angles:
-        out = np.array([math.cos(t), 0.0, math.sin(t)])
-        across = 0.04 * np.array([-math.sin(t), 0.0, math.cos(t)])
-        hub = np.array([x, 0.35, z])
-        ends = hub + inner * out, hub + r * out
-        corners = [ends[0] - across, ends[1] - across,
-                   ends[1] + across, ends[0] + across]  # fmt: skip
-        pieces.append(_plate(corners, 1.0))
-    axle = massing.box(x - 0.15, x + 0.15, -0.1, 1.55, z - 0.15, z + 0.15)
-    pier = massing.box(
-        x - 0.5, x + 0.5, 1.45, 1.7, -massing.FOUNDATION_M, z + 0.3
-    )
-    materials.add("timber", *(wall.place(m) for m in (*pieces, axle)))
-    materials.add("annex", wall.place(pier))
+        across = 0.04 * np.array([-math.sin(t), math.cos(t)])
+        a, b = hub + inner * at(1.0, t), hub + r * at(1.0, t)
+        paddle = (a - across, b - across, b + across, a + across)
+        pieces.append(massing.bar(paddle, 0.35, 0.35 + 1.0))
+    axle = wall.box(x - 0.15, x + 0.15, -0.1, 1.55, z - 0.15, z + 0.15)
+    out.add_to("timber", *(wall.place(piece) for piece in pieces), axle)
+    pier = (x - 0.5, x + 0.5, 1.45, 1.7, z + 0.3)
+    out.add_to("annex", wall.standing(*pier, bottom=True))
 
 
-def _plate(corners, thickness: float) -> Mesh:
-    """A plate of even thickness along y over four corners in x and z."""
-    near = np.array(corners, dtype=float)
-    far = near + np.array([0.0, thickness, 0.0])
-    faces = [(0, 1, 2, 3), (7, 6, 5, 4)]
-    faces += [(k, k + 4, (k + 1) % 4 + 4, (k + 1) % 4) for k in range(4)]
-    return Mesh(np.vstack([near, far]), tuple(faces))
-
-
-def _strut(start, end, width: float) -> Mesh:
-    """A square bar in a plane of constant y."""
+def _strut(start: np.ndarray, end: np.ndarray, y: float, width: float) -> Mesh:
+    """A square bar between two points (x, z), in a plane of constant y."""
     along = (end - start) / np.linalg.norm(end - start)
-    side = np.array([-along[2], 0.0, along[0]]) * width / 2
-    corners = [start - side, end - side, end + side, start + side]
-    return _plate(corners, width)
+    side = np.array([-along[1], along[0]]) * width / 2
+    corners = (start - side, end - side, end + side, start + side)
+    return massing.bar(corners, y, y + width)

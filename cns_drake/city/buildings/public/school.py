@@ -11,10 +11,8 @@ from cns_drake.city.buildings.parts import (
     massing,
     pitched_roofs,
     tiers,
-    wings,
 )
 from cns_drake.city.buildings.parts.facades import Band, Facade
-from cns_drake.city.buildings.parts.materials import Materials
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
 from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.buildings.parts.wings import Roof, Wing
@@ -44,7 +42,7 @@ class Parameters:
         entrance: width of the glazed hall.
     """
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         width, depth = d.width, d.depth
         deep = min(d.uniform(9.0, 12.0), depth - 4.5)
         rise = round(d.uniform(0.26, 0.36) * deep, 2)
@@ -75,65 +73,61 @@ class Parameters:
         self.accent_rgb = d.pick(_ACCENTS)
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the school on a rectangle, its entrance in front."""
-    x0, y0, x1, y1 = assembly.site.bounds
+    out.paint(
+        gym=p.rgb,
+        glass=out.glass_rgb,
+        roof=p.roof_rgb,
+        accent=p.accent_rgb,
+        trim=_TRIM,
+    )
+    x0, y0, x1, y1 = out.site.bounds
     front = y0 + 3.2
     left, right, back = x0 + _MARGIN, x1 - _MARGIN, y1 - _MARGIN
     gym = p.gym + 1.5 * (p.gym > 0)
     a, b = (left + gym, right) if p.mirrored else (left, right - gym)
     bar = np.round(massing.rectangle(a, front, b, front + p.depth), 2)
-    top = _add_classes(assembly, p, bar)
-    materials = Materials(
-        gym=p.rgb,
-        glass=assembly.glass_rgb,
-        roof=p.roof_rgb,
-        accent=p.accent_rgb,
-        trim=_TRIM,
-    )
-    _add_entrance(materials, p, bar, top)
+    top = _add_classes(out, p, bar)
+    _add_entrance(out, p, bar, top)
     if p.wing and back - bar[2, 1] > 6.0:
-        _add_back_wing(materials, p, bar, back, top)
+        _add_back_wing(out, p, bar, back, top)
     if p.gym:
-        c, d = (left, a + 0.05) if p.mirrored else (b - 0.05, right)
-        _add_gym(materials, p, (c, d), (front, back), bar)
-    materials.finish(assembly)
+        xs = (left, a + 0.05) if p.mirrored else (b - 0.05, right)
+        _add_gym(out, p, xs, (front, back), bar)
 
 
-def _add_classes(assembly, p: Parameters, bar) -> float:
+def _add_classes(out: Assembly, p: Parameters, bar: np.ndarray) -> float:
     """Adds the classroom wing; returns the top of its walls [m]."""
     room = p.height - (p.rise + 0.1 if p.roof == "hip" else 2.4)
     storey = round(max(room, 3.2) / p.storeys, 3)
     if p.roof == "flat" and p.storeys == 1:
         storey = min(storey, p.height - 1.0)
-    group = bays.window(
-        p.pitch - 0.9, 0.9, storey - 0.6, _RECESS, mullions=p.mullions,
-    )  # fmt: skip
-    small = bays.window(1.4, 1.2, storey - 0.6, _RECESS)
+    head = storey - 0.6
+    group = bays.window(p.pitch - 0.9, 0.9, head, _RECESS, mullions=p.mullions)
+    small = bays.window(1.4, 1.2, head, _RECESS)
     layouts = {
         0: bays.rhythm(p.pitch, [group], 0.5),
         2: bays.rhythm(p.pitch, [small], 0.5),
     }
-    ends = bays.with_middle(bays.plain, small, 2.4)
-    walls = Facade(
-        storey, (Band(0.0, 0.3, -0.06),), bays.by_edge(layouts, ends),
-        (_RECESS,),
-    )  # fmt: skip
-    base = massing.foundation(bar)
-    assembly.add("foundation", base)
-    top = tiers.add_storeys(assembly, bar, walls, 0.0, p.storeys, 1)
+    layout = bays.by_edge(layouts, bays.alone(small, 2.4))
+    walls = Facade(storey, (Band(0.0, 0.3, -0.06),), layout, (_RECESS,))
+    out.add("foundation", massing.foundation(bar))
+    top = tiers.add_storeys(out, bar, walls, 0.0, p.storeys, 1)
     if p.roof == "hip":
         roof = pitched_roofs.hip(bar, top - 0.02, p.height, 0.5, 0.3)
-        assembly.add("hip", roof, rgb=p.roof_rgb)
+        out.add("hip", roof, rgb=p.roof_rgb)
         return top
     rim = 0.7
     crown = Facade(rim, (Band(rim - 0.3, rim, -0.15),))
-    z = tiers.add_crown(assembly, bar, crown, top, 0.5, thickness=0.3)
-    equip_roof(assembly, bar, z, p.roof_items)
+    z = tiers.add_crown(out, bar, crown, top, 0.5, thickness=0.3)
+    equip_roof(out, bar, z, p.roof_items)
     return top
 
 
-def _add_entrance(materials, p: Parameters, bar, top: float) -> None:
+def _add_entrance(
+    out: Assembly, p: Parameters, bar: np.ndarray, top: float
+) -> None:
     """Adds a stair hall with glass, a canopy on posts and steps."""
     wall = details.WallFrame(bar, 0)
     share = 0.72 if p.mirrored else 0.28
@@ -141,10 +135,7 @@ def _add_entrance(materials, p: Parameters, bar, top: float) -> None:
     x = float(np.clip(x, half + 0.4, wall.length - half - 0.4))
     high = p.height if p.roof == "flat" else min(top + 0.5, p.height)
     x0, y0 = wall.point(x - half, 1.2)
-    hall = Wing.at(
-        x0, y0, x0 + 2 * half, bar[0, 1] + 4.0, high - 0.1, high,
-        Roof("flat", parapet=0.4),
-    )  # fmt: skip
+    hall = Wing.flat(x0, y0, x0 + 2 * half, bar[0, 1] + 4.0, high, 0.4)
     openings = Openings(hall)
     glazing = bays.window(
         2 * half - 0.9, 2.9, high - 0.9, _RECESS, mullions=2, transom=3.0
@@ -152,79 +143,64 @@ def _add_entrance(materials, p: Parameters, bar, top: float) -> None:
     openings.put(0, half, 2 * half - 0.4, glazing)
     doors = bays.window(2 * half - 1.4, 0.05, 2.5, _RECESS, mullions=3)
     openings.add(0, doors(0.2, 2 * half - 0.2))
-    openings.add_walls(materials, (_RECESS,), material="accent")
-    wings.add_roof(materials, hall, material="accent")
+    openings.enclose(out, (_RECESS,), material="accent")
     front = hall.wall(0)
     a, b = -0.8, 2 * half + 0.8
-    pieces = [massing.box(a, b, -0.02, 1.75, 2.6, 2.85)]
-    for u in (a + 0.3, b - 0.3):
-        spot = (u - 0.1, u + 0.1, 1.4, 1.6)
-        pieces.append(
-            massing.box(*spot, -massing.FOUNDATION_M, 2.65, bottom=False)
-        )
-    pieces.append(massing.box(a, b, -0.02, 1.8, -massing.FOUNDATION_M, 0.15))
-    materials.add("trim", *(front.place(piece) for piece in pieces))
+    posts = (
+        front.standing(u - 0.1, u + 0.1, 1.4, 1.6, 2.65)
+        for u in (a + 0.3, b - 0.3)
+    )
+    step = front.standing(a, b, -0.02, 1.8, 0.15, bottom=True)
+    out.add_to("trim", front.box(a, b, -0.02, 1.75, 2.6, 2.85), *posts, step)
 
 
 def _add_back_wing(
-    materials, p: Parameters, bar, back: float, top: float
+    out: Assembly, p: Parameters, bar: np.ndarray, back: float, top: float
 ) -> None:
     """Adds a lower wing behind, on the side away from the gymnasium."""
     (a, _), (b, y) = bar[0], bar[2]
     wide = min(9.0, 0.4 * (b - a))
     x0 = b - wide - 0.3 if p.mirrored else a + 0.3
     high = min(top, 4.2 if p.storeys < 3 else 7.6)
-    wing = Wing.at(
-        x0, y - 0.05, x0 + wide, min(back, y + 22.0), high - 0.6, high,
-        Roof("flat", parapet=0.4),
-    )  # fmt: skip
-    openings = Openings(wing)
+    area = (x0, y - 0.05, x0 + wide, min(back, y + 22.0))
+    openings = Openings(Wing.flat(*area, high, 0.4, rim=0.6))
     for k in range(2 if high > 6.0 else 1):
         z = 3.4 * k
         pane = bays.window(2.4, z + 0.9, z + 2.6, _RECESS, mullions=1)
         openings.row((1, 2, 3), z + 0.5, 3.6, [pane], 0.8)
-    openings.add_walls(materials, (_RECESS,), material="gym")
-    wings.add_roof(materials, wing, material="gym")
+    openings.enclose(out, (_RECESS,), material="gym")
 
 
-def _add_gym(materials, p: Parameters, xs, ys, bar) -> None:
+def _add_gym(
+    out: Assembly, p: Parameters, xs: bays.Span, ys: bays.Span, bar: np.ndarray
+) -> None:
     """Adds the gymnasium with high windows, and its link to the school."""
     a, b = xs
-    side = 1.5
-    x0, x1 = (a, b - side) if p.mirrored else (a + side, b)
+    x0, x1 = (a, b - 1.5) if p.mirrored else (a + 1.5, b)
     y0 = ys[0] + 1.0
     y1 = min(ys[1], y0 + 24.0)
     top = min(p.height, 9.5)
-    wall = {"barrel": top - 0.16 * (x1 - x0), "shed": top - 1.2}.get(
-        p.gym_roof, top - 0.3
-    )
-    wall = max(wall, 0.55 * top)
-    roof = Roof(p.gym_roof, True, 0.0 if p.gym_roof == "barrel" else 0.4, 0.4,
-                0.25, parapet=0.5)  # fmt: skip
+    drop = {"barrel": 0.16 * (x1 - x0), "shed": 1.2}.get(p.gym_roof, 0.3)
+    wall = max(top - drop, 0.55 * top)
+    eaves = 0.0 if p.gym_roof == "barrel" else 0.4
+    roof = Roof(p.gym_roof, True, eaves, 0.4, 0.25, parapet=0.5)
     gym = Wing.at(x0, y0, x1, y1, wall, top, roof)
     link_y = min(bar[2, 1], y1) - 3.4
-    link = Wing.at(
-        min(x1, bar[1, 0]) - 0.1 if p.mirrored else bar[1, 0] - 0.1,
-        link_y, bar[0, 0] + 0.1 if p.mirrored else x0 + 0.1, link_y + 3.0,
-        3.1, 3.4, Roof("flat", parapet=0.2),
-    )  # fmt: skip
+    ends = (bar[1, 0] - 0.1, x0 + 0.1)
+    if p.mirrored:
+        ends = (min(x1, bar[1, 0]) - 0.1, bar[0, 0] + 0.1)
+    link = Wing.flat(ends[0], link_y, ends[1], link_y + 3.0, 3.4, 0.2, rim=0.3)
     boxes = (gym, link)
     openings = Openings(gym, boxes)
     high = bays.window(2.6, wall - 2.2, wall - 0.7, _RECESS, mullions=1)
     openings.row((1, 2, 3), 3.5, 3.6, [high], 0.9)
-    door = bays.gate(2.4, 2.6, 0.3)
-    openings.put(0, (x1 - x0) / 2, 3.4, door)
-    piers = [
-        gym.wall(edge).place(
-            massing.box(u - 0.2, u + 0.2, -0.02, 0.25, 0.0, wall - 0.3)
-        )
-        for edge in (1, 3)
-        for u in np.linspace(0.6, y1 - y0 - 0.6, 5).tolist()
-    ]
-    materials.add("accent", *piers)
-    openings.add_walls(materials, (_RECESS,), material="gym")
-    wings.add_roof(materials, gym, material="gym")
+    openings.put(0, (x1 - x0) / 2, 3.4, bays.gate(2.4, 2.6, 0.3))
+    for edge in (1, 3):
+        side = gym.wall(edge)
+        for u in np.linspace(0.6, y1 - y0 - 0.6, 5).tolist():
+            pier = side.box(u - 0.2, u + 0.2, -0.02, 0.25, 0.0, wall - 0.3)
+            out.add_to("accent", pier)
+    openings.enclose(out, (_RECESS,), material="gym")
     passage = Openings(link, boxes)
     passage.row((0, 2), 0.3, 2.0, [bays.window(1.4, 0.4, 2.6, _RECESS)], 0.3)
-    passage.add_walls(materials, (_RECESS,), material="trim")
-    wings.add_roof(materials, link, material="trim")
+    passage.enclose(out, (_RECESS,), material="trim")

@@ -15,7 +15,7 @@ from cns_drake.city.buildings.parts import (
 )
 from cns_drake.city.buildings.parts.facades import Band, Facade
 from cns_drake.city.buildings.parts.site import Assembly, Dice
-from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+from cns_drake.city.geometry.mesh import Mesh
 
 _WALLS = ((0.82, 0.77, 0.66), (0.60, 0.40, 0.32), (0.76, 0.72, 0.66))
 _STONE = (0.84, 0.81, 0.74)
@@ -40,7 +40,7 @@ class Parameters:
         pitch, window_width: of the windows.
     """
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         width, depth = d.width, d.depth
         body = d.uniform(0.36, 0.42) * d.height
         storeys = int(np.clip(round(body / 4.6), 1, 3))
@@ -65,9 +65,9 @@ class Parameters:
         self.roof_rgb = d.pick(_ROOFS)
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the town hall on a rectangle."""
-    x0, y0, x1, y1 = assembly.site.bounds
+    x0, y0, x1, y1 = out.site.bounds
     depth = y1 - y0
     ahead = min(4.6, 0.28 * depth)
     front = y0 + ahead
@@ -75,31 +75,31 @@ def build(p: Parameters, assembly: Assembly) -> None:
     body = massing.rectangle(x0 + _MARGIN, front, x1 - _MARGIN, back)
     body = np.round(body, 2)
     plan = _with_pavilions(p, body)
-    top = _add_walls(assembly, p, plan)
+    top = _add_walls(out, p, plan)
     ridge = min(top + 0.15 + p.rise, 0.62 * p.height)
     roofs = [pitched_roofs.hip(body, top - 0.02, ridge, 0.5, 0.35)]
     for end in _pavilions(p, body):
         roofs.append(_pavilion_roof(p, end, top - 0.02, ridge))
-    assembly.add("roof", *roofs, rgb=p.roof_rgb)
-    _add_porch(assembly, p, body, ahead, top)
-    _add_tower(assembly, p, body, top)
+    out.add("roof", *roofs, rgb=p.roof_rgb)
+    _add_porch(out, p, body, ahead, top)
+    _add_tower(out, p, body, top)
 
 
-def _pavilions(p: Parameters, body) -> list[np.ndarray]:
+def _pavilions(p: Parameters, body: np.ndarray) -> list[np.ndarray]:
     """Returns the rectangles of the pavilions, half a metre in front."""
     if p.pavilion == 0.0:
         return []
-    (x0, y0), (x1, y1) = body[0], body[2]
+    x0, y0, x1, y1 = massing.extent(body)
+    a, b = round(x0 + p.pavilion, 2), round(x1 - p.pavilion, 2)
     return [
-        massing.rectangle(a, y0 - 0.6, b, y1)
-        for a, b in (
-            (x0, round(x0 + p.pavilion, 2)),
-            (round(x1 - p.pavilion, 2), x1),
-        )
+        massing.rectangle(x0, y0 - 0.6, a, y1),
+        massing.rectangle(b, y0 - 0.6, x1, y1),
     ]
 
 
-def _pavilion_roof(p: Parameters, plan, z: float, ridge: float) -> Mesh:
+def _pavilion_roof(
+    p: Parameters, plan: np.ndarray, z: float, ridge: float
+) -> Mesh:
     """Returns a hip, or a mansard that is as high as the main ridge."""
     if p.mansard:
         knee = z + 0.75 * (ridge - z)
@@ -108,19 +108,19 @@ def _pavilion_roof(p: Parameters, plan, z: float, ridge: float) -> Mesh:
     return pitched_roofs.hip(plan, z, ridge + 0.3, 0.5, 0.35)
 
 
-def _with_pavilions(p: Parameters, body) -> np.ndarray:
+def _with_pavilions(p: Parameters, body: np.ndarray) -> np.ndarray:
     """Returns the outline of the walls."""
     ends = _pavilions(p, body)
     if not ends:
         return body
-    (x0, y0), (x1, y1) = body[0], body[2]
+    x0, y0, x1, y1 = massing.extent(body)
     a, b, y = ends[0][1, 0], ends[1][0, 0], ends[0][0, 1]
     return np.array(
         [(a, y0), (b, y0), (b, y), (x1, y), (x1, y1), (x0, y1), (x0, y), (a, y)]
     )
 
 
-def _add_walls(assembly, p: Parameters, plan) -> float:
+def _add_walls(out: Assembly, p: Parameters, plan: np.ndarray) -> float:
     """Adds plinth, storeys and cornice; returns their top [m]."""
     recess = 0.25
     h = round(p.floor + p.storey, 2)
@@ -128,15 +128,10 @@ def _add_walls(assembly, p: Parameters, plan) -> float:
         p.window_width, p.floor + 0.7, h - 1.5, recess,
         rise=round(p.window_width / 2, 2),
     )  # fmt: skip
-    rows = bays.rhythm(p.pitch, [arch], 0.6)
     door = bays.entrance(2.0, min(p.floor + 3.0, h - 0.6), 0.7)
-    ground = Facade(
-        h,
-        (Band(0.0, p.floor, -0.12), Band(h - 0.3, h, -0.12)),
-        bays.by_edge({0: bays.with_middle(rows, door, 4.2)}, rows),
-        (recess,),
-    )
-    z = tiers.add_ground(assembly, plan, ground)
+    layout = bays.with_door(bays.rhythm(p.pitch, [arch], 0.6), door, 4.2)
+    bands = (Band(0.0, p.floor, -0.12), Band(h - 0.3, h, -0.12))
+    z = tiers.add_ground(out, plan, Facade(h, bands, layout, (recess,)))
     if p.storeys > 1:
         size = (p.window_width, 0.8, p.storey - 1.2, recess)
         plain = bays.rhythm(p.pitch, [bays.window(*size)], 0.6)
@@ -144,14 +139,16 @@ def _add_walls(assembly, p: Parameters, plan) -> float:
         along = np.roll(plan, -1, axis=0) - plan
         fronts = {k: hooded for k in range(len(plan)) if along[k, 0] > 0.1}
         upper = Facade(p.storey, (), bays.by_edge(fronts, plain), (recess,))
-        z = tiers.add_storeys(assembly, plan, upper, z, p.storeys - 1, 1)
+        z = tiers.add_storeys(out, plan, upper, z, p.storeys - 1, 1)
     rim = 0.9
     cornice = Facade(rim, tiers.cornice(rim, 0.35, thickness=0.6))
-    assembly.add("cornice", tiers.block(plan, cornice, z), rgb=_STONE)
+    out.add("cornice", tiers.block(plan, cornice, z), rgb=_STONE)
     return round(z + rim, 3)
 
 
-def _add_porch(assembly, p: Parameters, body, ahead: float, top: float) -> None:
+def _add_porch(
+    out: Assembly, p: Parameters, body: np.ndarray, ahead: float, top: float
+) -> None:
     """Adds steps, columns and a pediment in front of the door."""
     wall = details.WallFrame(body, 0)
     x = wall.length / 2
@@ -159,69 +156,59 @@ def _add_porch(assembly, p: Parameters, body, ahead: float, top: float) -> None:
     reach = ahead - 1.9
     count = max(3, round(p.floor / 0.17))
     lintel = min(p.floor + p.storey * min(p.storeys, 2) - 0.8, top - 1.0)
-    pieces: list[Mesh] = [
-        massing.box(x - half - 0.5, x + half + 0.5, -0.2, reach,
-                    -massing.FOUNDATION_M, p.floor),
-        details.steps(x - half, x + half, 1.7, p.floor, count).moved(
-            (0.0, reach, 0.0)
-        ),
-        massing.box(x - half - 0.4, x + half + 0.4, -0.4, reach - 0.1, lintel,
-                    lintel + 0.8),
-    ]  # fmt: skip
-    placed = [wall.place(piece) for piece in pieces]
+    steps = details.steps(x - half, x + half, 1.7, p.floor, count)
+    floor = (x - half - 0.5, x + half + 0.5, -0.2, reach, p.floor)
+    beam = (x - half - 0.4, x + half + 0.4, -0.4, reach - 0.1)
+    pieces = [
+        wall.standing(*floor, bottom=True),
+        wall.place(steps.moved((0.0, reach, 0.0))),
+        wall.box(*beam, lintel, lintel + 0.8),
+    ]
     radius = min(0.38, 0.05 * (lintel - p.floor) + 0.12)
     for u in np.linspace(x - half + 0.2, x + half - 0.2, p.porch_columns):
-        spot = wall.point(float(u), reach - 0.65)
-        placed.append(
-            details.column(*spot.tolist(), p.floor, lintel + 0.02, radius)
-        )
+        a, b = wall.point(u, reach - 0.65)
+        pieces.append(details.column(a, b, p.floor, lintel + 0.02, radius))
     gable = massing.gable_roof(
         -0.4, x - half - 0.5, reach + 0.05, x + half + 0.5, lintel + 0.8,
         0.36 * half,
     )  # fmt: skip
     # The ridge runs away from the wall: wall x and y change places.
-    placed.append(wall.place(massing.swapped(gable)))
-    assembly.add("porch", *placed, rgb=_STONE)
+    pieces.append(wall.place(massing.swapped(gable)))
+    out.add("porch", *pieces, rgb=_STONE)
 
 
-def _add_tower(assembly, p: Parameters, body, z0: float) -> None:
+def _add_tower(
+    out: Assembly, p: Parameters, body: np.ndarray, z0: float
+) -> None:
     """Adds the tower above the door: clock, open belfry, crown."""
     (x0, y0), (x1, _) = body[0], body[2]
     x, s = (x0 + x1) / 2, p.tower / 2
     y = y0 + s + 0.4
-    shaft = massing.rectangle(x - s, y - s, x + s, y + s)
+    shaft = massing.square(x, y, s)
     low, room = z0 - 1.0, p.height - z0
     clock = z0 + 0.42 * room
     bell = z0 + 0.62 * room
     height = round(clock - low, 3)
     slit = bays.window(0.8, 0.4 * height, 0.4 * height + 1.6, 0.2)
-    walls = Facade(
-        height,
-        (Band(height - 0.4, height, -0.3),),
-        bays.with_middle(bays.plain, slit, 1.6),
-    )
-    pieces = [tiers.block(shaft, walls, low)]
-    dials = []
+    bands = (Band(height - 0.4, height, -0.3),)
+    walls = Facade(height, bands, bays.alone(slit, 1.6))
+    out.add("tower", tiers.block(shaft, walls, low))
     r = min(0.3 * p.tower, 0.3 * (clock - z0))
-    for edge in range(4):
-        frame = details.WallFrame(shaft, edge)
-        ring = massing.regular_polygon(r, 14)
-        dial = massing.prism(ring, 0.0, 0.15)
-        # Upright: the disc's axis turns to the wall's outward direction.
-        v = dial.vertices
-        disc = Mesh(
-            np.column_stack([v[:, 1] + s, v[:, 2] - 0.02,
-                             v[:, 0] + clock - 0.6 - r]),
-            dial.faces,
-        )  # fmt: skip
-        dials.append(frame.place(disc))
-    assembly.add("tower", *pieces)
-    assembly.add("dials", *dials, rgb=(0.92, 0.91, 0.87))
-    assembly.add("belfry", _belfry(p, (x, y), s, clock, bell), rgb=_STONE)
-    assembly.add("crown", _crown(p, (x, y), s, bell), rgb=p.roof_rgb)
+    dial = massing.prism(massing.regular_polygon(r, 14), 0.0, 0.15)
+    # Upright: the disc's axis turns to the wall's outward direction.
+    u, v, w = dial.vertices.T
+    upright = np.column_stack([v + s, w - 0.02, u + clock - 0.6 - r])
+    disc = Mesh(upright, dial.faces)
+    frames = (details.WallFrame(shaft, edge) for edge in range(4))
+    dials = (frame.place(disc) for frame in frames)
+    out.add("dials", *dials, rgb=(0.92, 0.91, 0.87))
+    out.add("belfry", *_belfry((x, y), s, clock, bell), rgb=_STONE)
+    out.add("crown", *_crown(p, (x, y), s, bell), rgb=p.roof_rgb)
 
 
-def _belfry(p: Parameters, center, s: float, z0: float, z1: float) -> Mesh:
+def _belfry(
+    center: massing.Point, s: float, z0: float, z1: float
+) -> list[Mesh]:
     """Eight posts around a core that carries the crown."""
     x, y = center
     core = massing.regular_polygon(0.45 * s, 8, center)
@@ -235,21 +222,18 @@ def _belfry(p: Parameters, center, s: float, z0: float, z1: float) -> Mesh:
     rail = massing.rectangle(x - s + 0.05, y - s + 0.05, x + s - 0.05,
                              y + s - 0.05)  # fmt: skip
     pieces.append(massing.roof_pan(rail, z0, z0 + 0.8, 0.2))
-    pieces.append(massing.skirt(rail, rail, z0, z0 + 0.8))
-    return merge_meshes(*pieces)
+    return [*pieces, massing.skirt(rail, rail, z0, z0 + 0.8)]
 
 
-def _crown(p: Parameters, center, s: float, z0: float) -> Mesh:
-    top, eaves = p.height, 1.02 * s
-    x, y = center
-    plate = massing.box(x - eaves, x + eaves, y - eaves, y + eaves, z0,
-                        z0 + 0.3)  # fmt: skip
+def _crown(
+    p: Parameters, center: massing.Point, s: float, z0: float
+) -> list[Mesh]:
+    top, eaves = p.height, massing.square(*center, 1.02 * s)
     z, rise = z0 + 0.3, top - z0 - 0.3
+    plate = massing.prism(eaves, z0, z, bottom=True)
     if p.crown == "spire":
-        base = massing.inset(
-            massing.rectangle(x - eaves, y - eaves, x + eaves, y + eaves), 0.1
-        )
-        return merge_meshes(plate, massing.spire(base, center, z, top))
+        base = massing.inset(eaves, 0.1)
+        return [plate, massing.spire(base, center, z, top)]
     share = 0.75 if p.crown == "dome" else 0.45
     profile = [
         (0.92 * s * math.cos(t), z + share * rise * math.sin(t))
@@ -260,4 +244,4 @@ def _crown(p: Parameters, center, s: float, z0: float) -> Mesh:
         profile += [(0.8 * neck, lid), (0.8 * neck, lid + 0.25 * rise),
                     (1.2 * neck, lid + 0.26 * rise)]  # fmt: skip
     profile.append((0.0, top))
-    return merge_meshes(plate, massing.revolved(profile, 10, center))
+    return [plate, massing.revolved(profile, 10, center)]

@@ -26,7 +26,7 @@ class Parameters:
     `roof` is `gable`, `barrel` or `sawtooth`; the ridge is at `height`.
     """
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         roof = d.pick(("gable", "barrel", "sawtooth"))
         dock = d.uniform(2.5, 4.0, 1)
         depth = d.depth - dock
@@ -46,9 +46,9 @@ class Parameters:
         self.roof_rgb = d.pick(_ROOFS)
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the hall on a rectangle, its dock at the front."""
-    x0, y0, x1, y1 = assembly.site.bounds
+    x0, y0, x1, y1 = out.site.bounds
     front = y0 + p.dock_depth
     plan = massing.rectangle(x0, front, x1, y1)
     walls = _walls(p)
@@ -59,11 +59,11 @@ def build(p: Parameters, assembly: Assembly) -> None:
             plan, p.pitch, p.pier_width, p.pier_reach, 0.0, p.eaves - 0.5,
             margin=0.5 + p.pier_width / 2,
         ),
-        _dock(p, x0, x1, y0, front),
+        *_dock(p, x0, x1, y0, front),
     ]  # fmt: skip
-    assembly.add("walls", *pieces)
-    assembly.add("glass", glass_mesh(plan, walls), rgb=assembly.glass_rgb)
-    assembly.add("roof", _roof(p, plan), rgb=p.roof_rgb)
+    out.add("walls", *pieces)
+    out.add("glass", glass_mesh(plan, walls), rgb=out.glass_rgb)
+    out.add("roof", _roof(p, plan), rgb=p.roof_rgb)
 
 
 def _walls(p: Parameters) -> Facade:
@@ -75,35 +75,30 @@ def _walls(p: Parameters) -> Facade:
     )  # fmt: skip
     door = bays.gate(p.pitch - 1.4, min(4.6, head - 0.3))
     front = bays.gate(p.pitch - 1.4, min(4.2 + p.dock_height, head - 0.3))
-    rows = [window] * (p.door_every - 1)
-    return Facade(
-        p.eaves,
-        (Band(0.0, 0.6, -0.1), Band(p.eaves - 0.5, p.eaves, -0.3)),
-        bays.by_edge(
-            {
-                0: bays.rhythm(p.pitch, [front, *rows], margin=0.5),
-                2: bays.rhythm(p.pitch, [window], margin=0.5),
-            },
-            bays.with_middle(
-                bays.rhythm(p.pitch, [window], margin=0.5), door, p.pitch
-            ),
-        ),
-        glass=(p.window_depth,),
-    )
+    choices = [front] + [window] * (p.door_every - 1)
+    rows = bays.rhythm(p.pitch, [window], margin=0.5)
+    layouts = {0: bays.rhythm(p.pitch, choices, margin=0.5), 2: rows}
+    layout = bays.by_edge(layouts, bays.with_middle(rows, door, p.pitch))
+    bands = (Band(0.0, 0.6, -0.1), Band(p.eaves - 0.5, p.eaves, -0.3))
+    return Facade(p.eaves, bands, layout, (p.window_depth,))
 
 
-def _dock(p: Parameters, x0, x1, y0, front) -> Mesh:
+def _dock(
+    p: Parameters, x0: float, x1: float, y0: float, front: float
+) -> list[Mesh]:
     """A loading platform under a canopy on posts, steps at both ends."""
     high = p.dock_height
     a, b = x0 + 2.0, x1 - 2.0
-    pieces = [massing.box(a, b, y0 + 0.4, front, -massing.FOUNDATION_M, high)]
+    platform = massing.standing(a, b, y0 + 0.4, front, high, bottom=True)
     steps = details.steps(0.0, p.dock_depth - 0.6, 1.6, high, 5)
-    right = massing.rectangle(a, y0 + 0.4, b, front)
-    pieces.append(details.WallFrame(right, 1).place(steps))
-    pieces.append(details.WallFrame(right, 3).place(steps))
+    ends = massing.rectangle(a, y0 + 0.4, b, front)
+    pieces = [platform]
+    pieces += [details.WallFrame(ends, k).place(steps) for k in (1, 3)]
     eaves = min(p.eaves - 0.8, high + 5.2)
-    lid = [(front - p.dock_depth + 0.1, eaves - 0.5), (front, eaves)]
-    (ya, za), (yb, zb) = lid
+    (ya, za), (yb, zb) = (
+        (front - p.dock_depth + 0.1, eaves - 0.5),
+        (front, eaves),
+    )
     section = [(ya, za), (yb, zb), (yb, zb + 0.2), (ya, za + 0.25)]
     vertices = np.array([(x, y, z) for x in (a, b) for y, z in section])
     faces = [(k, 4 + k, 4 + (k + 1) % 4, (k + 1) % 4) for k in range(4)]
@@ -112,10 +107,10 @@ def _dock(p: Parameters, x0, x1, y0, front) -> Mesh:
     for x, _ in bays.stretches(b - a, 1.5 * p.pitch, 0.3)[1:]:
         post = (a + x - 0.12, a + x + 0.12, y0 + 0.6, y0 + 0.84)
         pieces.append(massing.box(*post, high - 0.1, eaves - 0.2))
-    return merge_meshes(*pieces)
+    return pieces
 
 
-def _roof(p: Parameters, plan) -> Mesh:
+def _roof(p: Parameters, plan: np.ndarray) -> Mesh:
     (x0, y0), (x1, y1) = plan[0], plan[2]
     rise = p.height - p.eaves
     if p.roof == "sawtooth":
@@ -152,7 +147,7 @@ def _profile(roof: str, a: float, b: float, rise: float) -> list:
     return [(a, 0.0), *arc, (b, 0.0)]
 
 
-def _ridge(p: Parameters, x0, x1, y) -> list[Mesh]:
+def _ridge(p: Parameters, x0: float, x1: float, y: float) -> list[Mesh]:
     """A monitor along the ridge with ventilators at equal distances."""
     top, low = p.height - 0.25, p.height - 1.1
     length = x1 - x0

@@ -8,14 +8,13 @@ from cns_drake.city.buildings.archetypes import ARCHETYPES
 from cns_drake.city.buildings.parts import (
     bays,
     details,
-    massing,
     outlines,
     tiers,
 )
 from cns_drake.city.buildings.parts.facades import Band, Facade
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
 from cns_drake.city.buildings.parts.site import Assembly, Dice
-from cns_drake.city.geometry.mesh import merge_meshes
+from cns_drake.city.geometry.mesh import Mesh
 
 _WALLS = (
     (0.58, 0.36, 0.29),
@@ -40,7 +39,7 @@ class Parameters:
         awnings: part of the shop windows with an awning.
     """
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         x0, y0, x1, y1 = d.site.bounds
         raised = d.uniform(0.3, 0.9, 2)
         ground = min(d.uniform(3.5, 4.1), d.height - raised - 0.7)
@@ -61,39 +60,32 @@ class Parameters:
         self.sign_rgb = d.pick(_SIGNS)
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the store on a rectangle."""
-    site = assembly.site
+    site = out.site
     if p.corner not in site.free_corners:
         site = site.detached(ARCHETYPES["corner_store"].overhang)
     rectangle = site.outline
     plan, front = _plan(p, rectangle)
     blind = outlines.edges_on(plan, rectangle, site.blind_edges)
     side = (front - 1) % 5 if p.corner == 0 else (front + 1) % 5
-    streets = (0, front, side)
-    top = _add_shop(assembly, p, plan, streets, blind)
-    rim = p.raised + 0.6
-    room = p.height - rim - top
+    top = _add_shop(out, p, plan, (0, front, side), blind)
+    room = p.height - (p.raised + 0.6) - top
     if room > 2.4:
         groups, per_group, storey = tiers.divided(room, p.storey, 4)
+        head = min(2.3, storey - 0.35)
         window = bays.window(
-            p.window_width, 0.85, min(2.3, storey - 0.35), p.recess,
-            ledge=p.ledge,
-        )  # fmt: skip
-        walls = Facade(
-            storey,
-            (),
-            bays.rhythm(p.pitch, [window], 0.5),
-            (p.recess,),
-            plain=blind,
+            p.window_width, 0.85, head, p.recess, ledge=p.ledge
         )
-        top = tiers.add_storeys(assembly, plan, walls, top, groups, per_group)
-    _add_parapet(assembly, p, plan, front, top, blind)
-    materials_sign = _corner_sign(p, plan, front)
-    assembly.add("sign", materials_sign, rgb=p.sign_rgb)
+        rows = bays.rhythm(p.pitch, [window], 0.5)
+        walls = Facade(storey, (), rows, (p.recess,), blind)
+        top = tiers.add_storeys(out, plan, walls, top, groups, per_group)
+    _add_parapet(out, p, plan, front, top, blind)
+    wall = details.WallFrame(plan, front)
+    out.add("sign", *_corner_sign(p, wall), rgb=p.sign_rgb)
 
 
-def _plan(p: Parameters, rectangle) -> tuple[np.ndarray, int]:
+def _plan(p: Parameters, rectangle: np.ndarray) -> tuple[np.ndarray, int]:
     """Returns the five corners, and the edge across the cut-off one."""
     (x0, y0), (x1, y1) = rectangle[0], rectangle[2]
     c = p.cut
@@ -104,64 +96,62 @@ def _plan(p: Parameters, rectangle) -> tuple[np.ndarray, int]:
     return np.array(points), 4
 
 
-def _add_shop(assembly, p: Parameters, plan, streets, blind) -> float:
-    h = p.ground
+def _add_shop(
+    out: Assembly,
+    p: Parameters,
+    plan: np.ndarray,
+    streets: tuple[int, int, int],
+    blind: frozenset[int],
+) -> float:
+    h, pitch = p.ground, 2 * p.pitch
     head, front = round(h - 1.0, 2), streets[1]
-    glazed = bays.rhythm(
-        2 * p.pitch, [bays.shop_front(head, 0.3, door=False)], margin=0.5
-    )
-    entry = bays.with_middle(
-        bays.plain, bays.entrance(1.6, 2.4, 0.7, surround=0.1), p.cut
-    )
-    service = bays.rhythm(
-        4.0, [bays.window(1.2, 1.3, 2.3, 0.3), bays.gate(1.8, 2.2)], 0.7
-    )
+    shop = bays.shop_front(head, 0.3, door=False)
+    glazed = bays.rhythm(pitch, [shop], margin=0.5)
+    entry = bays.alone(bays.entrance(1.6, 2.4, 0.7, surround=0.1), p.cut)
+    back = [bays.window(1.2, 1.3, 2.3, 0.3), bays.gate(1.8, 2.2)]
     layouts = dict.fromkeys(streets, glazed) | {front: entry}
-    ground = Facade(
-        h,
-        (Band(0.0, 0.3, -0.05), Band(h - 0.25, h, -0.12)),
-        bays.by_edge(layouts, service),
-        glass=(0.3,),
-        plain=blind,
-    )
+    layout = bays.by_edge(layouts, bays.rhythm(4.0, back, 0.7))
+    bands = (Band(0.0, 0.3, -0.05), Band(h - 0.25, h, -0.12))
     shades, boards = [], []
     for edge in streets:
         wall = details.WallFrame(plan, edge)
         if edge == front or edge in blind:
             continue
-        for a, b in bays.stretches(wall.length, 2 * p.pitch, 0.5):
-            board = massing.box(
-                a + 0.3, b - 0.3, -0.02, 0.1, head + 0.1, head + 0.7
-            )
-            boards.append(wall.place(board))
-            if assembly.rng.random() < p.awnings:
-                shade = details.awning(a + 0.2, b - 0.2, 0.95, 2.4, head + 0.05)
-                shades.append(wall.place(shade))
-    tiers.add_awnings(assembly, shades)
-    if boards:
-        assembly.add("boards", *boards, rgb=p.sign_rgb)
-    return tiers.add_ground(assembly, plan, ground)
+        cells = bays.stretches(wall.length, pitch, 0.5)
+        for a, b in cells:
+            spot = (a + 0.3, b - 0.3, -0.02, 0.1, head + 0.1, head + 0.7)
+            boards.append(wall.box(*spot))
+        shape = (0.2, 0.95, 2.4, head + 0.05)
+        shades += details.awnings(wall, cells, out.rng, p.awnings, shape)
+    tiers.add_awnings(out, shades)
+    out.add("boards", *boards, rgb=p.sign_rgb)
+    return tiers.add_ground(out, plan, Facade(h, bands, layout, (0.3,), blind))
 
 
-def _add_parapet(assembly, p: Parameters, plan, front, z0, blind):
+def _add_parapet(
+    out: Assembly,
+    p: Parameters,
+    plan: np.ndarray,
+    front: int,
+    z0: float,
+    blind: frozenset[int],
+) -> None:
     """Adds the cornice and the roof, higher above the corner."""
     rim = round(p.height - p.raised - z0, 3)
     bands = tiers.cornice(rim - 0.1, p.cornice, thickness=0.45, steps=2)
     crown = Facade(rim, bands, plain=blind)
-    roof = tiers.add_crown(assembly, plan, crown, z0, 0.5, thickness=0.25)
-    low, high = z0 + rim - 0.3, p.height
+    roof = tiers.add_crown(out, plan, crown, z0, 0.5, thickness=0.25)
     wall = details.WallFrame(plan, front)
-    piece = massing.box(0.1, wall.length - 0.1, -0.25, 0.04, low, high)
-    assembly.add("pediment", wall.place(piece))
-    equip_roof(assembly, plan, roof, p.roof_items)
+    piece = (0.1, wall.length - 0.1, -0.25, 0.04, z0 + rim - 0.3, p.height)
+    out.add("pediment", wall.box(*piece))
+    equip_roof(out, plan, roof, p.roof_items)
 
 
-def _corner_sign(p: Parameters, plan, front):
+def _corner_sign(p: Parameters, wall: details.WallFrame) -> list[Mesh]:
     """A canopy above the door and an upright sign over it."""
-    wall = details.WallFrame(plan, front)
     middle, z = wall.length / 2, p.ground - 0.55
     half = 0.5 * wall.length - 0.25
-    lid = massing.box(middle - half, middle + half, -0.05, 0.9, z - 0.25, z)
+    lid = (middle - half, middle + half, -0.05, 0.9, z - 0.25, z)
     top = min(p.height - 0.4, z + 2.6)
-    blade = massing.box(middle - 0.1, middle + 0.1, -0.05, 0.75, z - 0.05, top)
-    return wall.place(merge_meshes(lid, blade))
+    blade = (middle - 0.1, middle + 0.1, -0.05, 0.75, z - 0.05, top)
+    return [wall.box(*lid), wall.box(*blade)]

@@ -11,10 +11,8 @@ from cns_drake.city.buildings.parts import (
     details,
     massing,
     pitched_roofs,
-    wings,
 )
 from cns_drake.city.buildings.parts.facades import Band, Patch
-from cns_drake.city.buildings.parts.materials import Materials
 from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.buildings.parts.wings import Roof, Wing
 
@@ -45,7 +43,7 @@ class Parameters:
         tower: whether one stall carries a lantern.
     """
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         depth = d.depth
         arcade = d.uniform(1.6, 2.4, 2)
         self.height = d.height
@@ -62,112 +60,106 @@ class Parameters:
         self.awning_rgb = d.pick(_AWNINGS)
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the row along the front of a rectangle."""
-    materials = Materials(
+    out.paint(
         stalls=p.rgb,
         others=p.second_rgb,
-        glass=assembly.glass_rgb,
+        glass=out.glass_rgb,
         roof=p.roof_rgb,
         awning=p.awning_rgb,
         timber=_TIMBER,
     )
-    x0, y0, x1, y1 = assembly.site.bounds
+    x0, y0, x1, y1 = out.site.bounds
     left, right = x0 + 0.5, x1 - 0.5
     front = y0 + 2.2 if p.arcade == 0.0 else y0 + p.arcade + 0.5
     boxes = _stalls(p, left, right, front)
     tallest = len(boxes) // 2
     for k, wing in enumerate(boxes):
-        _add_stall(materials, p, wing, boxes, k, assembly.rng)
+        _add_stall(out, p, wing, boxes, k)
         if k == tallest and p.tower:
-            _add_lantern(materials, p, wing)
+            _add_lantern(out, p, wing)
     if p.arcade > 0:
-        _add_arcade(materials, p, (boxes[0].x0, boxes[-1].x1), front)
+        _add_arcade(out, p, (boxes[0].x0, boxes[-1].x1), front)
     slab = massing.box(left - 0.3, right + 0.3, y0 + 0.1, y1 - 0.1,
                        -massing.FOUNDATION_M, 0.12)  # fmt: skip
-    materials.add("timber", slab)
-    materials.finish(assembly)
+    out.add_to("timber", slab)
 
 
-def _stalls(p: Parameters, left: float, right: float, front: float):
+def _stalls(
+    p: Parameters, left: float, right: float, front: float
+) -> list[Wing]:
     """Returns the boxes of the stalls; the middle one is the tallest."""
     unit = p.stall + p.gap / p.group
     count = max(1, int((right - left + p.gap) / unit))
     gaps = p.gap * ((count - 1) // p.group)
     width = (right - left - gaps) / count
+    roof = Roof(p.roof, p.roof in ("gable", "barrel"), 0.0, 0.2, 0.15)
+    if p.roof == "hip":
+        roof = Roof("hip", False, 0.25, 0.0, 0.15)
+    if p.roof == "shed":
+        roof = Roof("shed", False, 0.25, 0.0, 0.15, falling=True)
     top = p.height - (1.1 if p.tower else 0.0)
     boxes, x = [], left
     for k in range(count):
-        lower = 0.25 * (k % 2) if k != count // 2 else 0.0
-        high = top - lower
+        high = top - (0.25 * (k % 2) if k != count // 2 else 0.0)
         wall = max(2.2, high - 0.32 * min(width, p.depth))
-        wall = min(wall, high - 0.35)
-        roof = Roof(p.roof, p.roof in ("gable", "barrel"), 0.0, 0.2, 0.15)
-        if p.roof == "hip":
-            roof = Roof("hip", False, 0.25, 0.0, 0.15)
-        if p.roof == "shed":
-            roof = Roof("shed", False, 0.25, 0.0, 0.15, falling=True)
-        boxes.append(
-            Wing.at(x, front, x + width, front + p.depth, wall, high, roof)
-        )
+        area = (x, front, x + width, front + p.depth)
+        boxes.append(Wing.at(*area, min(wall, high - 0.35), high, roof))
         x += width + p.gap * ((k + 1) % p.group == 0)
     return boxes
 
 
 def _add_stall(
-    materials, p: Parameters, wing: Wing, boxes, k: int, rng
+    out: Assembly, p: Parameters, wing: Wing, boxes: list[Wing], k: int
 ) -> None:
     """Adds a stall: a counter under an awning, or closed shutters."""
     openings = Openings(wing, boxes)
     wall, material = wing.wall(0), ("stalls", "others")[k % 2]
     a, b = 0.3, wall.length - 0.3
     head = min(2.15, wing.wall_top - 0.25)
-    if rng.random() < 0.75:
-        opening = Patch(a, b, _COUNTER, head, 0.7)
-        openings.add(0, [opening])
-        shelf = massing.box(a, b, -0.3, 0.3, _COUNTER - 0.08, _COUNTER)
-        materials.add("timber", wall.place(shelf))
+    if out.rng.random() < 0.75:
+        openings.add(0, [Patch(a, b, _COUNTER, head, 0.7)])
+        shelf = wall.box(a, b, -0.3, 0.3, _COUNTER - 0.08, _COUNTER)
+        out.add_to("timber", shelf)
         if p.arcade == 0.0:
             shade = details.awning(a - 0.1, b + 0.1, 1.3, 1.95, head + 0.1)
-            materials.add("awning", wall.place(shade))
+            out.add_to("awning", wall.place(shade))
     else:
         shutter = bays.gate(b - a, head, 0.12)
         openings.add(0, shutter(a - 0.3, b + 0.3))
     door = bays.window(0.9, 0.05, 2.0, 0.12)
     openings.row((2,), 0.2, wall.length, [door], 0.3)
     sign = porches.board(a, b, head + 0.02, wing.wall_top - 0.02, 0.1)
-    materials.add("awning", wall.place(sign))
+    out.add_to("awning", wall.place(sign))
     bands = (Band(0.0, 0.25, -0.05),)
-    openings.add_walls(materials, (0.12,), bands, material)
-    wings.add_roof(materials, wing, material=material)
+    openings.enclose(out, (0.12,), bands, material)
 
 
-def _add_lantern(materials, p: Parameters, wing: Wing) -> None:
+def _add_lantern(out: Assembly, p: Parameters, wing: Wing) -> None:
     """Adds a small square lantern with its own roof."""
-    x, y = (wing.x0 + wing.x1) / 2, (wing.y0 + wing.y1) / 2
     low, top = wing.wall_top, p.height
-    body = massing.rectangle(x - 0.6, y - 0.6, x + 0.6, y + 0.6)
+    body = massing.square(*wing.center, 0.6)
     eaves = massing.inset(body, -0.25)
-    materials.add("others", massing.skirt(body, body, low, top - 0.7))
-    materials.add(
+    out.add_to("others", massing.skirt(body, body, low, top - 0.7))
+    out.add_to(
         "roof",
         massing.flat(eaves, top - 0.72, up=False),
-        massing.spire(eaves, (x, y), top - 0.72, top),
+        massing.spire(eaves, wing.center, top - 0.72, top),
     )
 
 
-def _add_arcade(materials, p: Parameters, xs, front: float) -> None:
+def _add_arcade(
+    out: Assembly, p: Parameters, xs: bays.Span, front: float
+) -> None:
     """Adds a lean-to roof on posts along the whole row."""
     a, b = xs
     low, y = 2.35, front - p.arcade
     top = min(2.9, p.height - 0.4)
     line = [(y - 0.15, low + 0.15), (front + 0.05, top)]
-    materials.add("roof", pitched_roofs.shell(line, a, b, 0.12))
+    out.add_to("roof", pitched_roofs.shell(line, a, b, 0.12))
     for x in np.linspace(a + 0.15, b - 0.15, max(2, round((b - a) / 3.2))):
-        post = (x - 0.08, x + 0.08, y, y + 0.16)
-        materials.add(
-            "timber",
-            massing.box(*post, -massing.FOUNDATION_M, low + 0.1, bottom=False),
-        )
+        post = massing.standing(x - 0.08, x + 0.08, y, y + 0.16, low + 0.1)
+        out.add_to("timber", post)
     beam = massing.box(a, b, y, y + 0.16, low - 0.15, low + 0.06)
-    materials.add("timber", beam)
+    out.add_to("timber", beam)

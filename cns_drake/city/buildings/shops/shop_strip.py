@@ -10,9 +10,8 @@ from cns_drake.city.buildings.house_parts import (
     shop_fronts,
 )
 from cns_drake.city.buildings.house_parts.openings import Openings
-from cns_drake.city.buildings.parts import bays, massing, wings
+from cns_drake.city.buildings.parts import bays
 from cns_drake.city.buildings.parts.facades import Band
-from cns_drake.city.buildings.parts.materials import Materials
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
 from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.buildings.parts.wings import Roof, Wing
@@ -50,7 +49,7 @@ class Parameters:
         roof_items: on the roofs.
     """
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         ground = round(min(d.uniform(3.6, 4.2), d.height - 0.5), 2)
         self.height = d.height
         self.unit_width = d.uniform(5.5, 9.0)
@@ -67,13 +66,13 @@ class Parameters:
         self.awning_rgb = d.pick(_AWNINGS)
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the strip along the front of a rectangle."""
-    site = assembly.site
-    materials = Materials(
+    site = out.site
+    out.paint(
         walls=p.rgb,
         facing=p.second_rgb,
-        glass=assembly.glass_rgb,
+        glass=out.glass_rgb,
         trim=family_house.TRIM,
         accent=p.accent_rgb,
         sign=p.sign_rgb,
@@ -81,33 +80,26 @@ def build(p: Parameters, assembly: Assembly) -> None:
     )
     x0, y0, x1, y1 = site.bounds
     count = max(1, round((x1 - x0) / p.unit_width))
-    shares = assembly.rng.uniform(0.8, 1.2, count)
+    shares = out.rng.uniform(0.8, 1.2, count)
     bounds = x0 + (x1 - x0) * np.cumsum([0.0, *shares]) / shares.sum()
-    highest = int(assembly.rng.integers(count))
+    highest = int(out.rng.integers(count))
     for k in range(count):
-        ends = ((3, k == 0), (1, k + 1 == count))
-        blind = {e for e, end in ends if not end or e in site.blind_edges}
+        blind = out.site.blind_in(k, count)
         tall = p.height > p.ground + 3.4 and (
-            k == highest or assembly.rng.random() < p.upper
+            k == highest or out.rng.random() < p.upper
         )
-        top = p.height if k == highest else _top(p, tall, assembly.rng)
-        back = y1 - _BACK_M - float(assembly.rng.uniform(0.0, 0.12)) * (y1 - y0)
+        top = p.height if k == highest else _top(p, tall, out.rng)
+        back = y1 - _BACK_M - float(out.rng.uniform(0.0, 0.12)) * (y1 - y0)
         area = (bounds[k], y0 + _FRONT_M, bounds[k + 1], back)
         roof = Roof("flat", parapet=min(0.5, top - p.ground - 0.1))
         wing = Wing.at(*area, top - 0.1, top, roof, blind)
-        _add_unit(materials, p, wing, tall, assembly.rng)
+        _add_unit(out, p, wing, tall)
         if k % 3 == 0:
-            items = p.roof_items
-            _equip(assembly, wing, items, f"unit_{k}_")
-    materials.finish(assembly)
+            part = f"unit_{k}_"
+            equip_roof(out, wing.outline, wing.floor, p.roof_items, prefix=part)
 
 
-def _equip(assembly, wing, items, prefix: str) -> None:
-    z = wing.top - wing.roof.parapet
-    equip_roof(assembly, wing.outline, z, items, prefix=prefix)
-
-
-def _top(p: Parameters, tall: bool, rng) -> float:
+def _top(p: Parameters, tall: bool, rng: np.random.Generator) -> float:
     """Returns the parapet of a unit that is not the highest [m]."""
     drop = p.steps * int(rng.integers(0, 3))
     if tall or p.height < p.ground + 3.4:
@@ -115,8 +107,8 @@ def _top(p: Parameters, tall: bool, rng) -> float:
     return round(p.ground + 0.5 + 0.5 * drop, 2)
 
 
-def _add_unit(materials, p: Parameters, wing: Wing, tall: bool, rng) -> None:
-    openings = Openings(wing)
+def _add_unit(out: Assembly, p: Parameters, wing: Wing, tall: bool) -> None:
+    openings, rng = Openings(wing), out.rng
     wall = wing.wall(0)
     cladding = "walls" if rng.random() < 0.5 else "facing"
     upper_floors = round((wing.top - p.ground - 0.6) / 3.0) if tall else 0
@@ -127,40 +119,34 @@ def _add_unit(materials, p: Parameters, wing: Wing, tall: bool, rng) -> None:
         head=min(2.3, storey - 0.4),
     )  # fmt: skip
     shop_fronts.add_shops(
-        materials, wall, openings, 0, 0.2, wall.length - 0.2, p.ground, rng,
+        out, wall, openings, 0, 0.2, wall.length - 0.2, p.ground,
         width=9.0, awnings=0.0 if p.canopy else 0.7, reach=p.canopy_reach,
     )  # fmt: skip
     back = [bays.gate(2.0, 2.2, 0.2), house_walls.sash(1.0, 0.0, 1.6, 2.3)]
     openings.row((2,), 0.5, 3.6, back, 0.7)
-    bands = (Band(0.0, 0.3, -0.05),)
     glass = (house_walls.GLASS_M, *shop_fronts.SHOP_GLASS_M)
-    openings.add_walls(materials, glass, bands, cladding)
-    wings.add_roof(materials, wing, material=cladding)
+    openings.enclose(out, glass, (Band(0.0, 0.3, -0.05),), cladding)
     if p.canopy:
-        z = p.ground - 0.95
-        lid = massing.box(
-            0.05, wall.length - 0.05, -0.02, p.canopy_reach, z, z + 0.22
-        )
-        materials.add("awning", wall.place(lid))
-    _add_parapet(materials, p, wing, cladding, rng)
+        z, reach = p.ground - 0.95, p.canopy_reach
+        lid = (0.05, wall.length - 0.05, -0.02, reach, z, z + 0.22)
+        out.add_to("awning", wall.box(*lid))
+    _add_parapet(out, p, wing, cladding)
 
 
-def _add_parapet(materials, p: Parameters, wing: Wing, cladding, rng):
+def _add_parapet(
+    out: Assembly, p: Parameters, wing: Wing, cladding: str
+) -> None:
     """Frames the parapet's front: a coping, or piers at its ends."""
-    wall, top = wing.wall(0), wing.top
+    wall, top, rng = wing.wall(0), wing.top, out.rng
     length = wall.length
-    low = p.ground + 0.1
     if rng.random() < 0.5:
-        coping = massing.box(
-            0.02, length - 0.02, -0.05, 0.12, top - 0.2, top - 0.02
-        )
-        materials.add("trim", wall.place(coping))
+        coping = (0.02, length - 0.02, -0.05, 0.12, top - 0.2, top - 0.02)
+        out.add_to("trim", wall.box(*coping))
     else:
         for x in (0.25, length - 0.25):
-            pier = massing.box(x - 0.22, x + 0.22, -0.05, 0.15, 0.0, top - 0.03)
-            materials.add(cladding, wall.place(pier))
-    if rng.random() < 0.4 and top - low > 0.6 and wing.top < p.height - 3.0:
-        sign = massing.box(
-            0.25 * length, 0.75 * length, -0.15, 0.1, top - 0.3, top + 0.7
-        )
-        materials.add("sign", wall.place(sign))
+            pier = (x - 0.22, x + 0.22, -0.05, 0.15, 0.0, top - 0.03)
+            out.add_to(cladding, wall.box(*pier))
+    visible = top - p.ground - 0.1 > 0.6 and top < p.height - 3.0
+    if rng.random() < 0.4 and visible:
+        sign = (0.25 * length, 0.75 * length, -0.15, 0.1, top - 0.3, top + 0.7)
+        out.add_to("sign", wall.box(*sign))

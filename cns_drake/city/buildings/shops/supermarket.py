@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from cns_drake.city.buildings.house_parts.openings import Openings
-from cns_drake.city.buildings.parts import bays, details, massing, wings
+from cns_drake.city.buildings.parts import bays, details
 from cns_drake.city.buildings.parts.facades import Band
-from cns_drake.city.buildings.parts.materials import Materials
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
 from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.buildings.parts.wings import Roof, Wing
@@ -40,7 +39,7 @@ class Parameters:
         shelters: for trolleys, in front.
     """
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         width = d.width
         entrance = min(d.uniform(7.0, 11.0), 0.4 * width)
         self.height = d.height
@@ -63,23 +62,21 @@ class Parameters:
         self.brand_rgb = d.pick(_BRANDS)
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the hall on a rectangle, its entrance in front."""
-    materials = Materials(
+    out.paint(
         walls=p.rgb,
-        glass=assembly.glass_rgb,
+        glass=out.glass_rgb,
         brand=p.brand_rgb,
         roof=p.brand_rgb,
         steel=_STEEL,
     )
-    x0, y0, x1, y1 = assembly.site.bounds
+    x0, y0, x1, y1 = out.site.bounds
     left = x0 + 0.3 + p.dock_depth * p.dock_left
     right = x1 - 0.3 - p.dock_depth * (not p.dock_left)
-    front = y0 + p.canopy + 1.2
-    roof = Roof("flat", parapet=0.9)
-    hall = Wing.at(left, front, right, y1 - 0.3, p.eaves - 0.2, p.eaves, roof)
+    area = (left, y0 + p.canopy + 1.2, right, y1 - 0.3)
+    hall = Wing.flat(*area, p.eaves, 0.9, rim=0.2)
     openings = Openings(hall)
-    wall = hall.wall(0)
     glazing = bays.window(
         p.pitch - 0.9, 0.4, 3.3, _RECESS, mullions=2, transom=2.4
     )
@@ -89,51 +86,43 @@ def build(p: Parameters, assembly: Assembly) -> None:
     service = [bays.gate(2.6, 2.8, 0.25), bays.window(1.1, 0.0, 2.2, _RECESS)]
     openings.row((2,), 0.5, 8.0, service, 1.5)
     bands = (Band(0.0, 0.4, -0.06), Band(p.eaves - 0.7, p.eaves - 0.2, -0.08))
-    openings.add_walls(materials, (_RECESS,), bands)
-    wings.add_roof(materials, hall)
+    openings.enclose(out, (_RECESS,), bands)
     piers = details.pilasters(
         hall.outline, p.pitch, 0.6, 1, 0.5, 0.2, 0.0, p.eaves - 0.5
     )
-    if piers.faces:
-        materials.add("walls", piers)
-    _add_canopy(materials, p, wall)
-    _add_entrance(materials, p, hall)
+    out.add_to("walls", piers)
+    _add_canopy(out, p, hall.wall(0))
+    _add_entrance(out, p, hall)
     if p.dock_depth:
-        _add_dock(materials, p, hall)
-    _add_shelters(materials, p, wall, y0)
-    z = hall.top - hall.roof.parapet
-    equip_roof(assembly, hall.outline, z, p.roof_items, clear=2.0)
-    materials.finish(assembly)
+        _add_dock(out, p, hall)
+    _add_shelters(out, p, hall.wall(0))
+    equip_roof(out, hall.outline, hall.floor, p.roof_items, clear=2.0)
 
 
-def _add_canopy(materials, p: Parameters, wall) -> None:
+def _add_canopy(out: Assembly, p: Parameters, wall: details.WallFrame) -> None:
     """Adds a flat canopy on posts along the front."""
-    z = 3.45
-    lid = massing.box(0.3, wall.length - 0.3, -0.05, p.canopy, z, z + 0.4)
-    materials.add("brand", wall.place(lid))
+    z, reach = 3.45, p.canopy
+    lid = wall.box(0.3, wall.length - 0.3, -0.05, reach, z, z + 0.4)
+    out.add_to("brand", lid)
     for a, _ in bays.stretches(wall.length - 1.0, p.pitch, 0.5):
         u = 0.5 + a
-        post = (u - 0.12, u + 0.12, p.canopy - 0.5, p.canopy - 0.26)
-        materials.add(
-            "steel",
-            wall.place(
-                massing.box(
-                    *post, -massing.FOUNDATION_M, z + 0.02, bottom=False
-                )
-            ),
-        )
+        post = (u - 0.12, u + 0.12, reach - 0.5, reach - 0.26, z + 0.02)
+        out.add_to("steel", wall.standing(*post))
 
 
-def _add_entrance(materials, p: Parameters, hall: Wing) -> None:
+def _add_entrance(out: Assembly, p: Parameters, hall: Wing) -> None:
     """Adds a porch with sliding doors, higher than the hall."""
-    length, w = hall.x1 - hall.x0, p.entrance_width
+    length, w = hall.width, p.entrance_width
     x = float(
         np.clip(p.entrance_at * length, w / 2 + 0.5, length - w / 2 - 0.5)
     )
     top, y0 = p.height, hall.y0 - p.canopy - 0.3
-    rise = {"tower": 0.1, "gable": 0.22 * w, "vault": 0.2 * w}[p.entrance]
+    kind, rise = {
+        "tower": ("flat", 0.1),
+        "gable": ("gable", 0.22 * w),
+        "vault": ("barrel", 0.2 * w),
+    }[p.entrance]
     wall_top = max(top - rise - 0.2, p.eaves - 0.5)
-    kind = {"tower": "flat", "gable": "gable", "vault": "barrel"}[p.entrance]
     roof = Roof(kind, True, 0.0, 0.25, 0.2, parapet=0.6)
     area = (hall.x0 + x - w / 2, y0, hall.x0 + x + w / 2, hall.y0 + 5.0)
     porch = Wing.at(*area, wall_top, top, roof)
@@ -143,48 +132,52 @@ def _add_entrance(materials, p: Parameters, hall: Wing) -> None:
     if wall_top > 5.0:
         light = bays.window(w - 2.4, 2.95, wall_top - 1.5, _RECESS, mullions=3)
         openings.add(0, light(0.8, w - 0.8))
-    openings.add_walls(materials, (_RECESS,), material="brand")
-    wings.add_roof(materials, porch, material="brand")
-    sign = massing.box(
-        0.2 * w, 0.8 * w, -0.02, 0.22, wall_top - 1.2, wall_top - 0.15
-    )
-    materials.add("steel", porch.wall(0).place(sign))
+    openings.enclose(out, (_RECESS,), material="brand")
+    sign = (0.2 * w, 0.8 * w, -0.02, 0.22, wall_top - 1.2, wall_top - 0.15)
+    out.add_to("steel", porch.wall(0).box(*sign))
 
 
-def _add_dock(materials, p: Parameters, hall: Wing) -> None:
+def _add_dock(out: Assembly, p: Parameters, hall: Wing) -> None:
     """Adds a loading dock with its roof and a wall beside the hall."""
     wall = hall.wall(3 if p.dock_left else 1)
     reach = p.dock_depth - 0.4
     # Near the back, whichever way the wall runs.
     a, b = (1.0, 10.0) if p.dock_left else (wall.length - 10.0, wall.length - 1)
     a, b = max(a, 0.5), min(b, wall.length - 0.5)
-    pieces = [
-        massing.box(a, b, -0.05, reach - 1.2, -massing.FOUNDATION_M, 1.1),
-        massing.box(a - 0.1, b + 0.1, -0.05, reach, 4.0, 4.3),
-        massing.box(
-            a - 0.1, b + 0.1, reach - 0.3, reach, -massing.FOUNDATION_M, 2.2
-        ),
-    ]
-    for u in (a + 0.2, b - 0.2):
-        spot = (u - 0.12, u + 0.12, reach - 0.27, reach - 0.03)
-        pieces.append(massing.box(*spot, 2.1, 4.05, bottom=False))
-    materials.add("walls", *(wall.place(piece) for piece in pieces))
+    posts = (
+        wall.box(
+            u - 0.12, u + 0.12, reach - 0.27, reach - 0.03, 2.1, 4.05,
+            bottom=False,
+        )
+        for u in (a + 0.2, b - 0.2)
+    )  # fmt: skip
+    screen = (a - 0.1, b + 0.1, reach - 0.3, reach, 2.2)
+    out.add_to(
+        "walls",
+        wall.standing(a, b, -0.05, reach - 1.2, 1.1, bottom=True),
+        wall.box(a - 0.1, b + 0.1, -0.05, reach, 4.0, 4.3),
+        wall.standing(*screen, bottom=True),
+        *posts,
+    )
     for u in np.linspace(a + 2.0, b - 2.0, 2).tolist():
-        gate = massing.box(u - 1.3, u + 1.3, -0.02, 0.12, 1.1, 3.7)
-        materials.add("steel", wall.place(gate))
+        out.add_to("steel", wall.box(u - 1.3, u + 1.3, -0.02, 0.12, 1.1, 3.7))
 
 
-def _add_shelters(materials, p: Parameters, wall, y0: float) -> None:
+def _add_shelters(
+    out: Assembly, p: Parameters, wall: details.WallFrame
+) -> None:
     """Adds bent roofs for trolleys in front of the canopy's ends."""
+    y = p.canopy + 0.1
     for k in range(p.shelters):
         x = 3.2 if k == 0 else wall.length - 3.2
         a, b = x - 2.2, x + 2.2
-        y = p.canopy + 0.1
-        pieces = [massing.box(a, b, y, y + 0.9, 2.1, 2.2)]
-        for u in (a + 0.1, b - 0.1):
-            spot = (u - 0.06, u + 0.06, y + 0.1, y + 0.22)
-            pieces.append(
-                massing.box(*spot, -massing.FOUNDATION_M, 2.15, bottom=False)
-            )
-        pieces.append(massing.box(a, b, y + 0.85, y + 0.9, 0.5, 1.1))
-        materials.add("steel", *(wall.place(piece) for piece in pieces))
+        posts = (
+            wall.standing(u - 0.06, u + 0.06, y + 0.1, y + 0.22, 2.15)
+            for u in (a + 0.1, b - 0.1)
+        )
+        out.add_to(
+            "steel",
+            wall.box(a, b, y, y + 0.9, 2.1, 2.2),
+            *posts,
+            wall.box(a, b, y + 0.85, y + 0.9, 0.5, 1.1),
+        )

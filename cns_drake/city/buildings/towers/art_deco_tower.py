@@ -25,7 +25,7 @@ class Parameters:
     along the sides.
     """
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         starts = d.pick(((0.5,), (0.3, 0.62)))
         share = 0.24 if len(starts) == 2 else 0.4
         steps, across, along = ([], 0.0, 0.0)
@@ -54,66 +54,54 @@ class Parameters:
         self.rgb = d.pick(_STONES)
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the tower on a rectangle."""
-    base = assembly.site.outline
+    base = out.site.outline
     plan = outlines.notched(base, p.notch) if p.notch else base
-    top = _add_ground(assembly, p, plan)
+    top = _add_ground(out, p, plan)
     crown_height = round(min(0.16 * p.height, 16.0), 1)
     goals = [p.height * f for f, _, _ in p.steps] + [p.height - crown_height]
     for k, goal in enumerate(goals):
         goal = round(goal, 1)
         top = tiers.add_grooved(
-            assembly, plan, p.wall, top, goal, f"tier_{k}", rise=1.7
+            out, plan, p.wall, top, goal, f"tier_{k}", rise=1.7
         )
         if k == len(goals) - 1:
             break
-        _add_terrace(assembly, plan, top, k)
+        _add_terrace(out, plan, top, k)
         _, across, along = p.steps[k]
         plan = massing.inset(base, (across, along, across, along))
         plan = outlines.notched(plan, p.notch) if p.notch else plan
-    _add_crown(assembly, p, plan, top)
+    _add_crown(out, p, plan, top)
 
 
-def _add_ground(assembly, p: Parameters, plan) -> float:
+def _add_ground(out: Assembly, p: Parameters, plan: np.ndarray) -> float:
     h = p.ground_height
-    wall = details.WallFrame(plan, 0)
     portal = bays.entrance(p.portal_width, h - 1.6, 1.4, surround=0.3)
-    arches = bays.rhythm(
-        1.7 * p.wall.pitch, [bays.arched(3.4, 0.5, 3.2, 0.5)], margin=1.4
-    )
-    ground = Facade(
-        h,
-        (Band(h - 0.7, h - 0.4, -0.15), Band(h - 0.4, h, -0.3)),
-        bays.by_edge(
-            {0: bays.with_middle(arches, portal, p.portal_width + 2.0)}, arches
-        ),
-        glass=(0.5,),
-    )
-    middle = wall.length / 2
-    roof = details.canopy(middle - 2.4, middle + 2.4, 1.4, 3.6)
-    return tiers.add_ground(assembly, plan, ground, [wall.place(roof)])
+    arch = bays.arched(3.4, 0.5, 3.2, 0.5)
+    arches = bays.rhythm(1.7 * p.wall.pitch, [arch], margin=1.4)
+    bands = (Band(h - 0.7, h - 0.4, -0.15), Band(h - 0.4, h, -0.3))
+    layout = bays.with_door(arches, portal, p.portal_width + 2.0)
+    roof = details.front_canopy(plan, 2.4, 1.4, 3.6)
+    return tiers.add_ground(out, plan, Facade(h, bands, layout, (0.5,)), [roof])
 
 
-def _add_terrace(assembly, plan, z, k) -> None:
+def _add_terrace(out: Assembly, plan: np.ndarray, z: float, k: int) -> None:
     parapet = Facade(1.3, (Band(0.0, 0.3, -0.12), Band(1.0, 1.3, -0.1)))
-    tiers.add_crown(assembly, plan, parapet, z, 1.1, part=f"terrace_{k}")
+    tiers.add_crown(out, plan, parapet, z, 1.1, part=f"terrace_{k}")
 
 
-def _add_crown(assembly, p: Parameters, plan, z0) -> None:
+def _add_crown(
+    out: Assembly, p: Parameters, plan: np.ndarray, z0: float
+) -> None:
     pieces = []
     height = p.height - z0
     step = round((1.0 - p.spire) * height / p.crown_steps, 2)
     side = massing.shortest_side(plan)
+    bands = (Band(0.6, 0.5 * step, 0.25), Band(step - 0.4, step, -0.25))
     for k in range(p.crown_steps):
-        step_bands = (
-            Band(0.6, 0.5 * step, 0.25),
-            Band(step - 0.4, step, -0.25),
-        )
-        ledge = Facade(step, step_bands)
-        pieces.append(tiers.block(plan, ledge, z0 + k * step))
+        pieces.append(tiers.block(plan, Facade(step, bands), z0 + k * step))
         plan = massing.inset(plan, 0.28 * side / p.crown_steps)
     z = z0 + p.crown_steps * step
-    middle = np.mean(plan, axis=0)
-    pieces.append(massing.spire(plan, middle, z, z0 + height))
-    assembly.add("crown", *pieces)
+    pieces.append(massing.spire(plan, np.mean(plan, axis=0), z, z0 + height))
+    out.add("crown", *pieces)

@@ -3,10 +3,17 @@ gardens between stacks of storeys."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from cns_drake.city.buildings.parts import bays, details, massing, tiers
-from cns_drake.city.buildings.parts.facades import Band, Facade, facade_mesh
+from cns_drake.city.buildings.parts.facades import (
+    Band,
+    Facade,
+    Relief,
+    facade_mesh,
+)
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
 from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.geometry.mesh import merge_meshes
@@ -38,7 +45,7 @@ class Parameters:
         fins: distance between upright fins; 0 for none.
     """
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         side = massing.shortest_side(d.site.outline)
         self.height = d.height
         self.radius = round(d.uniform(0.18, 0.42) * side, 2)
@@ -58,66 +65,67 @@ class Parameters:
         self.glass_rgb = d.pick(_GLASSES)
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the tower on a rectangle."""
-    assembly.glass_rgb = p.glass_rgb
-    x0, y0, x1, y1 = assembly.site.bounds
+    out.glass_rgb = p.glass_rgb
+    x0, y0, x1, y1 = out.site.bounds
     base = massing.rectangle(x0 + 0.8, y0 + 0.8, x1 - 0.8, y1 - 0.8)
     step = max(2.8, 0.5 * p.radius)
     outer = np.round(
         massing.rounded(base, dict.fromkeys(p.corners, p.radius), step), 3
     )
     inner = massing.inset(outer, min(p.turn, 0.5 * massing.inset_limit(outer)))
-    z = _add_lobby(assembly, p, inner)
+    z = _add_lobby(out, p, inner)
     gap = 3.4
     room = (p.height - 1.2 - z - gap * (p.stacks - 1)) / p.stacks
     counts = tiers.divided(room, p.storey, 12 // p.stacks)
     shapes = [
-        _Stack(assembly, p, plan, counts, name)
+        _Stack(out, p, plan, counts, name)
         for plan, name in ((outer, "wide"), (inner, "slim"))[: p.stacks]
     ]
     for k in range(p.stacks):
         z = shapes[k % 2].place(z, k)
         if k + 1 < p.stacks:
-            z = _add_garden(assembly, shapes[k % 2].plan, inner, z, gap, k)
+            z = _add_garden(out, shapes[k % 2].plan, inner, z, gap, k)
     plan = shapes[(p.stacks - 1) % 2].plan
     rim = round(p.height - z, 3)
     crown = Facade(rim, (Band(rim - 0.4, rim, -min(0.3, p.ledge)),))
     roof = tiers.add_crown(
-        assembly, plan, crown, z, min(0.9, rim - 0.1), thickness=0.3
+        out, plan, crown, z, min(0.9, rim - 0.1), thickness=0.3
     )
-    equip_roof(assembly, plan, roof, p.roof_items)
+    equip_roof(out, plan, roof, p.roof_items)
 
 
-def _add_lobby(assembly, p: Parameters, plan) -> float:
+def _add_lobby(out: Assembly, p: Parameters, plan: np.ndarray) -> float:
     h = p.lobby
     pane = bays.ribbon(0.2, h - 0.9, 0.3, 0.16)
     # Long walls may meet at right angles, where recesses must not touch.
     short, long = (bays.rhythm(3.2, [pane], m) for m in (0.1, 0.45))
 
-    def glazing(edge: int, length: float):
+    def glazing(edge: int, length: float) -> Sequence[Relief]:
         return (short if length < 4.5 else long)(edge, length)
 
     door = bays.entrance(3.4, 3.0, 1.2, surround=0.1)
-    facade = Facade(
-        h,
-        (Band(h - 0.6, h, -0.15),),
-        bays.by_edge({0: bays.with_middle(glazing, door, 5.2)}, glazing),
-        (0.3,),
-    )
-    front = details.WallFrame(plan, 0)
-    x = front.length / 2
-    half = min(3.5, max(1.2, x - 0.5))
-    lid = details.canopy(x - half, x + half, 2.0, 3.5)
-    return tiers.add_ground(assembly, plan, facade, [front.place(lid)])
+    layout = bays.with_door(glazing, door, 5.2)
+    facade = Facade(h, (Band(h - 0.6, h, -0.15),), layout, (0.3,))
+    half = min(3.5, max(1.2, details.WallFrame(plan, 0).length / 2 - 0.5))
+    lid = details.front_canopy(plan, half, 2.0, 3.5)
+    return tiers.add_ground(out, plan, facade, [lid])
 
 
 class _Stack:
     """Storeys of one outline, to be placed several times."""
 
-    def __init__(self, assembly, p: Parameters, plan, counts, name: str):
+    def __init__(
+        self,
+        out: Assembly,
+        p: Parameters,
+        plan: np.ndarray,
+        counts: tuple[int, int, float],
+        name: str,
+    ):
         self.plan = plan
-        self._assembly = assembly
+        self._out = out
         self._groups, per_group, storey = counts
         self._step = per_group * storey
         bands = (
@@ -129,42 +137,47 @@ class _Stack:
         pieces = [facade_mesh(plan, facade)]
         if p.fins > 0:
             # They cross the sunshades and meet those above and below.
-            pieces.append(
-                details.piers(
-                    plan, p.fins, 0.18, p.ledge + 0.1, 0.0, self._step,
-                    depth=p.recess + 0.05, margin=0.8,
-                )
+            fins = details.piers(
+                plan, p.fins, 0.18, p.ledge + 0.1, 0.0, self._step,
+                depth=p.recess + 0.05, margin=0.8,
             )  # fmt: skip
-        self._walls = MeshShape(assembly.define(name, merge_meshes(*pieces)))
-        height = round(self._groups * self._step, 3)
+            pieces.append(fins)
+        self._height = round(self._groups * self._step, 3)
         pane = massing.inset(plan, p.recess - 0.004)
-        self._glass = MeshShape(
-            assembly.define(
-                f"{name}_glass", massing.skirt(pane, pane, 0.0, height)
+        glass = massing.skirt(pane, pane, 0.0, self._height)
+        soffit = massing.flat(plan, 0.0, up=False)
+        self._walls, self._glass, self._soffit = (
+            MeshShape(out.define(f"{name}{part}", mesh))
+            for part, mesh in (
+                ("", merge_meshes(*pieces)),
+                ("_glass", glass),
+                ("_soffit", soffit),
             )
         )
-        soffit = massing.flat(plan, 0.0, up=False)
-        self._soffit = MeshShape(assembly.define(f"{name}_soffit", soffit))
-        self._height = height
 
     def place(self, z0: float, number: int) -> float:
         """Places the storeys; returns their top [m]."""
-        at, part = (0.0, 0.0, z0), f"stack_{number}"
-        glass_rgb = self._assembly.glass_rgb
-        self._assembly.place(f"{part}_glass", self._glass, at, rgb=glass_rgb)
-        self._assembly.place(f"{part}_soffit", self._soffit, at)
+        at, part, out = (0.0, 0.0, z0), f"stack_{number}", self._out
+        out.place(f"{part}_glass", self._glass, at, rgb=out.glass_rgb)
+        out.place(f"{part}_soffit", self._soffit, at)
         for k in range(self._groups):
             z = z0 + k * self._step
-            name = f"{part}_storey_{k:02d}"
-            self._assembly.place(name, self._walls, (0.0, 0.0, z))
+            out.place(f"{part}_storey_{k:02d}", self._walls, (0.0, 0.0, z))
         return round(z0 + self._height, 3)
 
 
-def _add_garden(assembly, plan, inner, z0, height, number) -> float:
+def _add_garden(
+    out: Assembly,
+    plan: np.ndarray,
+    inner: np.ndarray,
+    z0: float,
+    height: float,
+    number: int,
+) -> float:
     """Adds an open floor: columns around a smaller glazed core.
 
     Args:
-        assembly: the building.
+        out: the building.
         plan: outline of the floor.
         inner: the smallest outline of the storeys above.
         z0, height: of the floor [m].
@@ -179,11 +192,10 @@ def _add_garden(assembly, plan, inner, z0, height, number) -> float:
         wall = details.WallFrame(ring, edge)
         count = max(1, round(wall.length / 7.0))
         for k in range(count):
-            u, v = wall.point((k + 0.5) * wall.length / count, 0.0)
-            shaft = massing.regular_polygon(0.3, 8, (float(u), float(v)))
+            spot = wall.point((k + 0.5) * wall.length / count, 0.0)
+            shaft = massing.regular_polygon(0.3, 8, spot)
             columns.append(massing.skirt(shaft, shaft, z0, z0 + height))
     floor = massing.roof_pan(plan, z0, z0 + 1.0, 0.2)
-    edge = massing.skirt(plan, plan, z0, z0 + 1.0)
-    mesh = merge_meshes(walls, floor, edge, *columns)
-    assembly.add(f"garden_{number}", mesh)
+    rim = massing.skirt(plan, plan, z0, z0 + 1.0)
+    out.add(f"garden_{number}", walls, floor, rim, *columns)
     return round(z0 + height, 3)

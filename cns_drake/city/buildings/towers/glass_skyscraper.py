@@ -35,7 +35,7 @@ class Parameters:
     fraction of the height) and how far each edge of the site steps back.
     """
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         outline = d.site.outline
         side = massing.shortest_side(outline)
         count = len(outline)
@@ -80,29 +80,27 @@ class Parameters:
         self.glass_rgb = glass_rgb
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the skyscraper on any outline."""
-    assembly.glass_rgb = p.glass_rgb
-    base = assembly.site.outline
+    out.glass_rgb = p.glass_rgb
+    base = out.site.outline
     plan = _shaped(base, p)
-    top = _add_lobby(assembly, p, plan)
+    top = _add_lobby(out, p, plan)
     levels = [*(round(f * p.height, 1) for f, _ in p.setbacks)]
     for k, goal in enumerate(levels):
         top = tiers.add_grooved(
-            assembly, plan, p.wall, top, goal, f"tier_{k}", rise=1.1
+            out, plan, p.wall, top, goal, f"tier_{k}", rise=1.1
         )
         terrace = Facade(1.1, (Band(0.8, 1.1, -0.1),))
-        tiers.add_crown(assembly, plan, terrace, top, 1.0, part=f"terrace_{k}")
+        tiers.add_crown(out, plan, terrace, top, 1.0, part=f"terrace_{k}")
         plan = _shaped(massing.inset(base, p.setbacks[k][1]), p)
     rise = p.crown_height if p.crown == "screen" else 0.0
     goal = p.height - p.crown_height
-    top = tiers.add_grooved(
-        assembly, plan, p.wall, top, goal, "tier_top", rise=rise
-    )
-    _add_crown(assembly, p, plan, top)
+    top = tiers.add_grooved(out, plan, p.wall, top, goal, "tier_top", rise=rise)
+    _add_crown(out, p, plan, top)
 
 
-def _shaped(outline, p: Parameters) -> np.ndarray:
+def _shaped(outline: np.ndarray, p: Parameters) -> np.ndarray:
     size = p.corner_size
     if p.corner == "chamfered":
         return outlines.chamfered(outline, size)
@@ -114,48 +112,37 @@ def _shaped(outline, p: Parameters) -> np.ndarray:
     return outline
 
 
-def _add_lobby(assembly, p: Parameters, plan) -> float:
-    height = p.lobby_height
-    front = details.WallFrame(plan, 0)
-    middle = front.length / 2
-    door = bays.entrance(min(5.0, front.length / 3), 3.6, 1.6)
-    mullions = bays.rhythm(
-        2 * p.wall.pitch, [bays.bar(0.12, 0.0, height - 0.8, 0.4)], margin=1.0
+def _add_lobby(out: Assembly, p: Parameters, plan: np.ndarray) -> float:
+    height, length = p.lobby_height, details.WallFrame(plan, 0).length
+    door = bays.entrance(min(5.0, length / 3), 3.6, 1.6)
+    bar = bays.bar(0.12, 0.0, height - 0.8, 0.4)
+    mullions = bays.rhythm(2 * p.wall.pitch, [bar], margin=1.0)
+    bands = (
+        Band(0.0, height - 0.8, 0.7),
+        Band(0.0, 0.3, 0.45),
+        Band(height - 0.8, height - 0.5, -0.25),
     )
-    lobby = Facade(
-        height,
-        (
-            Band(0.0, height - 0.8, 0.7),
-            Band(0.0, 0.3, 0.45),
-            Band(height - 0.8, height - 0.5, -0.25),
-        ),
-        bays.by_edge({0: bays.with_middle(mullions, door, 7.0)}, mullions),
-        glass=(0.7,),
-    )
+    layout = bays.with_door(mullions, door, 7.0)
     columns = details.piers(
-        plan,
-        7.0,
-        0.9,
-        0.25,
-        0.0,
-        height - 0.8,
-        depth=0.75,
-        margin=0.55,
-        entrance=min(5.8, front.length / 2),
-    )
-    roof = details.canopy(middle - 4.0, middle + 4.0, 1.5, 4.2)
-    return tiers.add_ground(assembly, plan, lobby, [columns, front.place(roof)])
+        plan, 7.0, 0.9, 0.25, 0.0, height - 0.8, depth=0.75, margin=0.55,
+        entrance=min(5.8, length / 2),
+    )  # fmt: skip
+    roof = details.front_canopy(plan, 4.0, 1.5, 4.2)
+    lobby = Facade(height, bands, layout, (0.7,))
+    return tiers.add_ground(out, plan, lobby, [columns, roof])
 
 
-def _add_crown(assembly, p, plan, z0) -> None:
+def _add_crown(
+    out: Assembly, p: Parameters, plan: np.ndarray, z0: float
+) -> None:
     height = round(p.height - z0, 3)
     if p.crown == "wedge":
-        assembly.add("crown", massing.sloped_prism(plan, z0, height, 0.35))
+        out.add("crown", massing.sloped_prism(plan, z0, height, 0.35))
         return
     if p.crown == "stepped":
         low = round(0.45 * height, 2)
         ledge = Facade(low, (Band(low - 0.5, low, -0.3),))
-        tiers.add_crown(assembly, plan, ledge, z0, 1.0, part="crown_low")
+        tiers.add_crown(out, plan, ledge, z0, 1.0, part="crown_low")
         reach = 0.12 * massing.shortest_side(plan)
         plan = massing.inset(plan, min(reach, massing.inset_limit(plan)))
         z0, height = round(z0 + low - 1.0, 3), round(height - low + 1.0, 3)
@@ -164,5 +151,5 @@ def _add_crown(assembly, p, plan, z0) -> None:
     )
     parapet = 0.7 * height if p.crown == "screen" else 1.0
     walls = Facade(height, louvres)
-    roof = tiers.add_crown(assembly, plan, walls, z0, parapet)
-    equip_roof(assembly, plan, roof, _ROOF_ITEMS)
+    roof = tiers.add_crown(out, plan, walls, z0, parapet)
+    equip_roof(out, plan, roof, _ROOF_ITEMS)

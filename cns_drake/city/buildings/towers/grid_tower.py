@@ -44,7 +44,7 @@ class Parameters:
         crown: height of the screen around the roof.
     """
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         self.height = d.height
         self.plan = d.pick(("box", "offset", "notched"))
         self.shift = d.uniform(0.1, 0.18)
@@ -72,27 +72,25 @@ class Parameters:
         return self.recess + 0.15
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the tower on a rectangle."""
-    assembly.glass_rgb = p.glass_rgb
-    plan = np.round(_plan(p, assembly.site), 2)
-    top = _add_lobby(assembly, p, plan)
+    out.glass_rgb = p.glass_rgb
+    plan = np.round(_plan(p, out.site), 2)
+    top = _add_lobby(out, p, plan)
     goal = p.height - p.crown
     if p.waist > 0:
         middle = p.waist * p.height
-        top = _add_grid(assembly, p, plan, top, middle, "low")
-        top = _add_plant_floor(assembly, p, plan, top)
-    top = _add_grid(assembly, p, plan, top, goal, "storey")
+        top = _add_grid(out, p, plan, top, middle, "low")
+        top = _add_plant_floor(out, p, plan, top)
+    top = _add_grid(out, p, plan, top, goal, "storey")
     rim = round(p.height - top, 3)
     louvres = bays.rhythm(
         p.pitch, [bays.window(p.pitch - p.pier, 0.5, rim - 0.5, 0.25)], p.margin
     )
     crown = Facade(rim, (Band(0.0, 0.25, -0.1),), louvres)
-    roof = tiers.add_crown(
-        assembly, plan, crown, top, rim - 0.6, thickness=0.45
-    )
+    roof = tiers.add_crown(out, plan, crown, top, rim - 0.6, thickness=0.45)
     free = massing.inset(plan, 0.5)
-    equip_roof(assembly, free, roof, p.roof_items, clear=0.8)
+    equip_roof(out, free, roof, p.roof_items, clear=0.8)
 
 
 def _plan(p: Parameters, site: Site) -> np.ndarray:
@@ -111,29 +109,27 @@ def _plan(p: Parameters, site: Site) -> np.ndarray:
     )  # fmt: skip
 
 
-def _add_lobby(assembly, p: Parameters, plan) -> float:
+def _add_lobby(out: Assembly, p: Parameters, plan: np.ndarray) -> float:
     """Adds a tall glazed hall behind the feet of the piers."""
     h = p.lobby
-    glazing = bays.rhythm(
-        p.pitch,
-        [bays.window(p.pitch - p.pier, 0.3, h - 1.2, p.recess, transom=3.2)],
-        p.margin,
-    )
+    pane = bays.window(p.pitch - p.pier, 0.3, h - 1.2, p.recess, transom=3.2)
+    glazing = bays.rhythm(p.pitch, [pane], p.margin)
     door = bays.entrance(3.6, 3.2, p.recess + 0.6, surround=0.15)
-    facade = Facade(
-        h,
-        (Band(h - 0.9, h - 0.2, -0.12),),
-        bays.by_edge({0: bays.with_middle(glazing, door, 6.4)}, glazing),
-        (p.recess,),
-    )
-    front = details.WallFrame(plan, 0)
-    x = front.length / 2
-    reach = min(4.5, front.length / 2 - 0.6)
-    lid = details.canopy(x - reach, x + reach, 1.6, 3.7)
-    return tiers.add_ground(assembly, plan, facade, [front.place(lid)])
+    layout = bays.with_door(glazing, door, 6.4)
+    facade = Facade(h, (Band(h - 0.9, h - 0.2, -0.12),), layout, (p.recess,))
+    half = min(4.5, details.WallFrame(plan, 0).length / 2 - 0.6)
+    lid = details.front_canopy(plan, half, 1.6, 3.7)
+    return tiers.add_ground(out, plan, facade, [lid])
 
 
-def _add_grid(assembly, p: Parameters, plan, z0, goal, part: str) -> float:
+def _add_grid(
+    out: Assembly,
+    p: Parameters,
+    plan: np.ndarray,
+    z0: float,
+    goal: float,
+    part: str,
+) -> float:
     """Adds storeys behind frames; returns their top [m]."""
     unit = p.storey * (2 if p.double else 1)
     groups, per_group, height = tiers.divided(goal - z0, unit, 7)
@@ -143,15 +139,16 @@ def _add_grid(assembly, p: Parameters, plan, z0, goal, part: str) -> float:
         p.pitch - p.pier, low, high, p.recess, pier=p.pier / 2,
         transom=round((low + high) / 2, 2) if p.double else None,
     )  # fmt: skip
-    facade = Facade(
-        height, (), bays.rhythm(p.pitch, [frame], p.margin), (p.recess,)
-    )
+    layout = bays.rhythm(p.pitch, [frame], p.margin)
+    facade = Facade(height, (), layout, (p.recess,))
     return tiers.add_storeys(
-        assembly, plan, facade, z0, groups, per_group, part=part
+        out, plan, facade, z0, groups, per_group, part=part
     )
 
 
-def _add_plant_floor(assembly, p: Parameters, plan, z0) -> float:
+def _add_plant_floor(
+    out: Assembly, p: Parameters, plan: np.ndarray, z0: float
+) -> float:
     """Adds a floor of louvres, set back behind the grid."""
     inner = massing.inset(plan, p.recess)
     slats = [
@@ -160,8 +157,8 @@ def _add_plant_floor(assembly, p: Parameters, plan, z0) -> float:
     ]
     facade = Facade(3.9, tuple(slats))
     ring = tiers.block(inner, facade, z0)
-    assembly.add("plant", ring)
+    out.add("plant", ring)
     top = round(z0 + 3.9, 3)
     for z, up in ((z0, True), (top, False)):
-        assembly.add(f"ledge_{int(up)}", massing.flat(plan, z, up=up))
+        out.add(f"ledge_{int(up)}", massing.flat(plan, z, up=up))
     return top

@@ -7,6 +7,7 @@ import numpy as np
 from cns_drake.city.buildings.parts import bays, details, massing, tiers
 from cns_drake.city.buildings.parts.facades import Band, Facade
 from cns_drake.city.buildings.parts.site import Assembly, Dice
+from cns_drake.city.geometry.mesh import Mesh
 
 _SIDES = 16
 
@@ -14,7 +15,7 @@ _SIDES = 16
 class Parameters:
     """Parameters of an observation tower; lengths in metres."""
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         room = min(d.width, d.depth) / 2
         foot = round(d.uniform(0.3, 0.4) * room, 1)
         self.height = d.height
@@ -30,11 +31,11 @@ class Parameters:
         self.rgb = d.pick(((0.78, 0.77, 0.75), (0.66, 0.68, 0.72)))
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the tower in the middle of a rectangle."""
-    x0, y0, x1, y1 = assembly.site.bounds
+    x0, y0, x1, y1 = out.site.bounds
     center = ((x0 + x1) / 2, (y0 + y1) / 2)
-    _add_pavilion(assembly, p, center)
+    _add_pavilion(out, p, center)
     # Room for the bowl, the floors, the cone and some mast above it.
     above = 4.5 + 4.0 * p.pod_floors + 5.5 + 0.1 * p.height
     pod = round(min(p.pod_at * p.height, p.height - above), 1)
@@ -50,34 +51,29 @@ def build(p: Parameters, assembly: Assembly) -> None:
         center,
     )
     ribs = [_rib(p, center, 2 * np.pi * k / p.ribs, pod) for k in range(p.ribs)]
-    assembly.add("shaft", shaft, *ribs)
-    top = _add_pod(assembly, p, center, pod)
-    _add_mast(assembly, p, center, top)
+    out.add("shaft", shaft, *ribs)
+    top = _add_pod(out, p, center, pod)
+    _add_mast(out, p, center, top)
 
 
-def _add_pavilion(assembly, p: Parameters, center) -> None:
+def _add_pavilion(out: Assembly, p: Parameters, center: massing.Point) -> None:
     h = p.pavilion_height
     # A flat side looks to the front, for the entrance.
     phase = -np.pi / 2 - np.pi / 12
     plan = massing.regular_polygon(p.pavilion_radius, 12, center, phase)
-    glazing = bays.rhythm(
-        2.6, [bays.ribbon(0.4, h - 1.4, 0.5, 0.3)], margin=0.4
-    )
+    pane = bays.ribbon(0.4, h - 1.4, 0.5, 0.3)
     side = details.WallFrame(plan, 0).length
-    door = bays.with_middle(
-        bays.plain, bays.entrance(2.2, 2.7, 0.9), min(3.6, side - 0.8)
-    )
-    walls = Facade(
-        h,
-        (Band(h - 1.0, h - 0.5, -0.9), Band(h - 0.5, h, -0.2)),
-        bays.by_edge({0: door}, glazing),
-        glass=(0.5,),
-    )
+    door = bays.alone(bays.entrance(2.2, 2.7, 0.9), min(3.6, side - 0.8))
+    layout = bays.by_edge({0: door}, bays.rhythm(2.6, [pane], margin=0.4))
+    bands = (Band(h - 1.0, h - 0.5, -0.9), Band(h - 0.5, h, -0.2))
     lid = massing.roof_pan(plan, h - 0.4, h, 0.3)
-    tiers.add_ground(assembly, plan, walls, [lid], part="pavilion")
+    walls = Facade(h, bands, layout, (0.5,))
+    tiers.add_ground(out, plan, walls, [lid], part="pavilion")
 
 
-def _rib(p: Parameters, center, angle: float, pod: float):
+def _rib(
+    p: Parameters, center: massing.Point, angle: float, pod: float
+) -> Mesh:
     """A fin that runs up the shaft, broad at its foot."""
     foot, neck = p.foot_radius, p.neck_radius
     lower = massing.rectangle(0.5 * neck, -0.35, foot + 1.0, 0.35)
@@ -86,7 +82,9 @@ def _rib(p: Parameters, center, angle: float, pod: float):
     return fin.moved(yaw=angle).moved((*center, 0.0))
 
 
-def _add_pod(assembly, p: Parameters, center, z0: float) -> float:
+def _add_pod(
+    out: Assembly, p: Parameters, center: massing.Point, z0: float
+) -> float:
     """A bowl, floors of glass under ledges, and a cone on top."""
     r, floor = p.pod_radius, 4.0
     bowl = massing.revolved(
@@ -109,11 +107,13 @@ def _add_pod(assembly, p: Parameters, center, z0: float) -> float:
     rim = r * (1.0 - 0.1 * (p.pod_floors - 1))
     cone = [(rim, z), (neck, z + 2.5), (neck, z + 5.5)]
     pieces.append(massing.revolved(cone, _SIDES, center))
-    assembly.add("pod", *pieces)
+    out.add("pod", *pieces)
     return z + 5.5
 
 
-def _add_mast(assembly, p: Parameters, center, z0: float) -> None:
+def _add_mast(
+    out: Assembly, p: Parameters, center: massing.Point, z0: float
+) -> None:
     """Sections of a mast, each thinner than the one below it."""
     start = max(z0, p.height * (1.0 - p.mast_share))
     profile = []
@@ -123,4 +123,4 @@ def _add_mast(assembly, p: Parameters, center, z0: float) -> None:
         profile += [(radius, levels[k]), (radius, levels[k + 1])]
     column = [(1.4, z0 - 0.2), (1.4, start)] if start > z0 else []
     mast = massing.revolved([*column, *profile], 8, center)
-    assembly.add("mast", mast, rgb=(0.75, 0.25, 0.2))
+    out.add("mast", mast, rgb=(0.75, 0.25, 0.2))

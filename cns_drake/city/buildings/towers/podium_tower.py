@@ -15,7 +15,7 @@ from cns_drake.city.buildings.parts import (
 )
 from cns_drake.city.buildings.parts.facades import Band, Facade
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
-from cns_drake.city.buildings.parts.site import Assembly, Dice, Site
+from cns_drake.city.buildings.parts.site import Assembly, Dice
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 _CLADDINGS = (
@@ -35,7 +35,7 @@ class Parameters:
     stands at the fraction `at` of the room that is left.
     """
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         x0, y0, x1, y1 = d.site.bounds
         podium_rgb, tower_rgb = d.pick(_CLADDINGS)
         share = d.rng.uniform(0.5, 0.68, 2)
@@ -60,65 +60,47 @@ class Parameters:
         self.tower_rgb = tower_rgb
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds podium and tower on a rectangle."""
-    site = assembly.site
+    site = out.site
     x0, y0, x1, y1 = site.bounds
-    top = _add_shops(assembly, p, site)
+    top = _add_shops(out, p)
     walls = _podium_storey(p)
     top = tiers.add_storeys(
-        assembly, site.outline, walls, top, p.podium_storeys, 1, part="podium"
+        out, site.outline, walls, top, p.podium_storeys, 1, part="podium"
     )
     edge = Facade(1.6, (Band(0.2, 0.7, -0.3), Band(1.4, 1.6, -0.1)))
-    roof = tiers.add_crown(
-        assembly, site.outline, edge, top, 1.2, part="terrace"
-    )
+    roof = tiers.add_crown(out, site.outline, edge, top, 1.2, part="terrace")
     width, depth = p.tower[0] * (x1 - x0), p.tower[1] * (y1 - y0)
     left = round(x0 + p.at[0] * (x1 - x0 - width), 2)
     near = round(y0 + p.at[1] * (y1 - y0 - depth), 2)
     plan = massing.rectangle(
         left, near, round(left + width, 2), round(near + depth, 2)
     )
-    _add_garden(assembly, site, plan, roof)
+    _add_garden(out, plan, roof)
     if p.chamfer:
         plan = outlines.chamfered(plan, p.chamfer)
-    assembly.rgb = p.tower_rgb
-    _add_tower(assembly, p, plan, roof)
+    out.rgb = p.tower_rgb
+    _add_tower(out, p, plan, roof)
 
 
-def _add_shops(assembly, p: Parameters, site: Site) -> float:
-    outline, h = site.outline, p.ground_height
-    shops = bays.rhythm(
-        p.shop_pitch,
-        [
-            bays.shop_front(h - 0.6, 0.45),
-            bays.shop_front(h - 0.6, 0.45, door=False),
-        ],
-        margin=0.8,
-    )
-    service = bays.rhythm(
-        p.shop_pitch, [bays.gate(4.0, 3.4), bays.blank], margin=1.0
-    )
-    main = bays.entrance(4.0, 3.8, 1.6)
-    facade = Facade(
-        h,
-        (Band(0.0, 0.3, -0.06), Band(h - 1.1, h - 0.2, -0.2)),
-        bays.by_edge(
-            {0: bays.with_middle(shops, main, 6.0), 2: service}, shops
-        ),
-        glass=(0.45,),
-    )
-    front = details.WallFrame(outline, 0)
-    middle = front.length / 2
-    roof = details.canopy(middle - 3.2, middle + 3.2, 1.45, 4.0)
-    shades = []
-    for a, b in bays.stretches(front.length, p.shop_pitch, 0.8):
-        free = b < middle - 3.2 or a > middle + 3.2
-        if assembly.rng.random() < p.awnings and free:
-            shade = details.awning(a + 0.4, b - 0.4, 1.35, 2.7, h - 1.3)
-            shades.append(front.place(shade))
-    tiers.add_awnings(assembly, shades)
-    return tiers.add_ground(assembly, outline, facade, [front.place(roof)])
+def _add_shops(out: Assembly, p: Parameters) -> float:
+    outline, h = out.site.outline, p.ground_height
+    front, pitch = details.WallFrame(outline, 0), p.shop_pitch
+    choices = [bays.shop_front(h - 0.6, 0.45, door=d) for d in (True, False)]
+    shops = bays.rhythm(pitch, choices, margin=0.8)
+    gates = [bays.gate(4.0, 3.4), bays.blank]
+    main = bays.with_middle(shops, bays.entrance(4.0, 3.8, 1.6), 6.0)
+    service = bays.rhythm(pitch, gates, margin=1.0)
+    layout = bays.by_edge({0: main, 2: service}, shops)
+    bands = (Band(0.0, 0.3, -0.06), Band(h - 1.1, h - 0.2, -0.2))
+    cells = bays.stretches(front.length, pitch, 0.8)
+    shape = (0.4, 1.35, 2.7, h - 1.3)
+    shades = details.awnings(front, cells, out.rng, p.awnings, shape, 3.2)
+    tiers.add_awnings(out, shades)
+    roof = details.front_canopy(outline, 3.2, 1.45, 4.0)
+    facade = Facade(h, bands, layout, (0.45,))
+    return tiers.add_ground(out, outline, facade, [roof])
 
 
 def _podium_storey(p: Parameters) -> Facade:
@@ -128,47 +110,42 @@ def _podium_storey(p: Parameters) -> Facade:
     return Facade(storey, (Band(0.0, 0.25, -0.12),), layout, glass=(0.3,))
 
 
-def _add_tower(assembly, p: Parameters, plan, z0) -> None:
-    crown = 3.0
-    groups, per_group, storey = tiers.divided(
-        p.height - crown - z0, p.storey_height
-    )
+def _add_tower(
+    out: Assembly, p: Parameters, plan: np.ndarray, z0: float
+) -> None:
+    room = p.height - 3.0 - z0
+    groups, per_group, storey = tiers.divided(room, p.storey_height)
     # Deep frames, one bay wide, with the glass at their backs.
     frame = bays.window(
         1e3, round(p.frame / 2, 2), round(storey - p.frame / 2, 2), p.recess,
         pier=round(p.frame / 2, 2), mullions=p.mullions,
     )  # fmt: skip
-    walls = Facade(
-        storey, (), bays.rhythm(p.pitch, [frame], margin=0.5), glass=(p.recess,)
-    )
+    layout = bays.rhythm(p.pitch, [frame], margin=0.5)
+    walls = Facade(storey, (), layout, (p.recess,))
     extras = []
-    if p.balconies:
-        for edge in range(len(plan)):
-            wall = details.WallFrame(plan, edge)
-            if wall.length > 3 * p.pitch:
-                x = 0.5 + p.pitch
-                rail = details.balcony(x - 2.6, x, 1.4, 0.0)
-                extras.append(wall.place(rail))
-    top = tiers.add_storeys(
-        assembly, plan, walls, z0, groups, per_group, extras, part="storey"
-    )
+    for edge in range(len(plan)) if p.balconies else ():
+        wall = details.WallFrame(plan, edge)
+        if wall.length > 3 * p.pitch:
+            x = 0.5 + p.pitch
+            extras.append(wall.place(details.balcony(x - 2.6, x, 1.4, 0.0)))
+    top = tiers.add_storeys(out, plan, walls, z0, groups, per_group, extras)
     crown = round(p.height - top, 3)
     louvres = tuple(Band(z, z + 0.35, 0.15) for z in (0.5, 1.2, 1.9))
     screen = Facade(crown, (*louvres, Band(2.6, crown, -0.15)))
-    roof = tiers.add_crown(assembly, plan, screen, top, 2.2)
-    equip_roof(assembly, plan, roof, _ROOF_ITEMS)
+    roof = tiers.add_crown(out, plan, screen, top, 2.2)
+    equip_roof(out, plan, roof, _ROOF_ITEMS)
 
 
-def _add_garden(assembly, site: Site, tower, z) -> None:
+def _add_garden(out: Assembly, tower: np.ndarray, z: float) -> None:
     """Planters and a pergola on the widest strip of the podium's roof."""
-    x0, y0, x1, y1 = site.bounds
+    x0, y0, x1, y1 = out.site.bounds
     (tx0, ty0), (tx1, ty1) = tower[0], tower[2]
-    strips = [
+    strips = (
         (x0, tx0, y0, y1),
         (tx1, x1, y0, y1),
         (x0, x1, y0, ty0),
         (x0, x1, ty1, y1),
-    ]
+    )
     a, b, c, d = max(strips, key=lambda s: min(s[1] - s[0], s[3] - s[2]))
     a, b, c, d = a + 1.4, b - 1.4, c + 1.4, d - 1.4
     if min(b - a, d - c) < 2.0:
@@ -177,7 +154,7 @@ def _add_garden(assembly, site: Site, tower, z) -> None:
         garden = _garden(b - a, d - c).moved((a, c, z))
     else:
         garden = _garden(d - c, b - a).moved((b, c, z), math.pi / 2)
-    assembly.add("garden", garden, rgb=(0.45, 0.40, 0.33))
+    out.add("garden", garden, rgb=(0.45, 0.40, 0.33))
 
 
 def _garden(length: float, width: float) -> Mesh:

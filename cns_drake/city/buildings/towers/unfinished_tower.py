@@ -48,7 +48,7 @@ class Parameters:
         hoist: whether a hoist climbs the right side.
     """
 
-    def __init__(self, d: Dice):
+    def __init__(self, d: Dice) -> None:
         rise = d.height - d.uniform(3.5, 5.5)
         storeys = max(3, round(rise / d.uniform(3.4, 4.0)))
         group = -(-storeys // 8)
@@ -70,26 +70,26 @@ class Parameters:
         self.net_rgb = d.pick(_NETS)
 
 
-def build(p: Parameters, assembly: Assembly) -> None:
+def build(p: Parameters, out: Assembly) -> None:
     """Builds the tower on a rectangle."""
-    site = assembly.site
+    site = out.site
     x0, y0, x1, y1 = site.bounds
     gap = _SCAFFOLD_M + 0.2
     plan = np.round(
         massing.rectangle(x0 + gap, y0 + gap, x1 - gap, y1 - gap), 2
     )
-    _add_frame(assembly, p, plan)
-    _add_core(assembly, p, plan)
+    _add_frame(out, p, plan)
+    _add_core(out, p, plan)
     if p.clad:
-        _add_cladding(assembly, p, plan)
+        _add_cladding(out, p, plan)
     if p.props:
-        _add_props(assembly, p, plan)
-    _add_scaffolds(assembly, p, plan)
+        _add_props(out, p, plan)
+    _add_scaffolds(out, p, plan)
     if p.hoist:
-        _add_hoist(assembly, p, plan)
+        _add_hoist(out, p, plan)
 
 
-def _repeated(pieces, p: Parameters) -> Mesh:
+def _repeated(pieces: list[Mesh], p: Parameters) -> Mesh:
     """Returns a storey's meshes for each storey of a group."""
     storey = merge_meshes(*pieces)
     return merge_meshes(
@@ -97,7 +97,7 @@ def _repeated(pieces, p: Parameters) -> Mesh:
     )
 
 
-def _columns(p: Parameters, plan) -> list[tuple[float, float]]:
+def _columns(p: Parameters, plan: np.ndarray) -> list[tuple[float, float]]:
     """Returns where the columns stand."""
     (x0, y0), (x1, y1) = plan[0], plan[2]
     places = []
@@ -108,7 +108,7 @@ def _columns(p: Parameters, plan) -> list[tuple[float, float]]:
     return [(x, y) for x in xs for y in ys]
 
 
-def _add_frame(assembly, p: Parameters, plan) -> None:
+def _add_frame(out: Assembly, p: Parameters, plan: np.ndarray) -> None:
     """Adds a storey's columns and the slab on them, over and over."""
     pieces = [
         massing.post(x, y, 0.25, p.storey - _SLAB_M + 0.02, 0.0)
@@ -123,7 +123,7 @@ def _add_frame(assembly, p: Parameters, plan) -> None:
             z = p.storey + h
             pieces.append(wall.place(massing.box(*rail, z, z + 0.06)))
     groups, step = p.storeys // p.group, p.group * p.storey
-    assembly.stack("frame", _repeated(pieces, p), 0.0, step, groups)
+    out.stack("frame", _repeated(pieces, p), 0.0, step, groups)
     base = massing.prism(plan, -massing.FOUNDATION_M, 0.05)
     top = p.storeys * p.storey
     # Columns of the storey to come, and their bars.
@@ -140,10 +140,10 @@ def _add_frame(assembly, p: Parameters, plan) -> None:
         for u in np.linspace(0.1, wall.length - 0.1, 6).tolist():
             post = (u - 0.03, u + 0.03, -0.09, -0.03)
             stubs.append(wall.place(massing.box(*post, top, top + 1.1)))
-    assembly.add("stubs", *stubs)
+    out.add("stubs", *stubs)
 
 
-def _add_core(assembly, p: Parameters, plan) -> None:
+def _add_core(out: Assembly, p: Parameters, plan: np.ndarray) -> None:
     """Adds the core with its doorways and the form that climbs on it."""
     (x0, y0), (x1, y1) = plan[0], plan[2]
     x, y = (x0 + x1) / 2, (y0 + y1) / 2
@@ -161,7 +161,7 @@ def _add_core(assembly, p: Parameters, plan) -> None:
         massing.skirt(core, core, top, p.height - 0.4),
         massing.roof_pan(core, p.height - 2.0, p.height - 0.4, 0.3),
     ]
-    assembly.add("core", *pieces)
+    out.add("core", *pieces)
     form = massing.inset(core, -0.3)
     low = p.height - 2.6
     panels = [
@@ -169,10 +169,10 @@ def _add_core(assembly, p: Parameters, plan) -> None:
         massing.flat(form, low, up=False),
         massing.roof_pan(form, p.height - 0.6, p.height, 0.3),
     ]
-    assembly.add("form", *panels, rgb=_TIMBER)
+    out.add("form", *panels, rgb=_TIMBER)
 
 
-def _add_cladding(assembly, p: Parameters, plan) -> None:
+def _add_cladding(out: Assembly, p: Parameters, plan: np.ndarray) -> None:
     """Adds the finished walls of the lower storeys."""
     outer = massing.inset(plan, -_CLADDING_M)
     head = round(p.storey - 0.5, 2)
@@ -186,25 +186,25 @@ def _add_cladding(assembly, p: Parameters, plan) -> None:
     )
     walls = [facade_mesh(outer, facade), _rim(plan, outer, 0.0, p.storey)]
     groups, step = p.clad // p.group, p.group * p.storey
-    assembly.stack(
+    out.stack(
         "cladding", _repeated(walls, p), 0.0, step, groups, rgb=p.clad_rgb
     )
     panes = [glass_mesh(outer, facade)]
-    assembly.stack(
+    out.stack(
         "cladding_glass", _repeated(panes, p), 0.0, step, groups,
-        rgb=assembly.glass_rgb,
+        rgb=out.glass_rgb,
     )  # fmt: skip
     foot = massing.foundation(outer)
-    assembly.add("foot", foot, rgb=p.clad_rgb)
+    out.add("foot", foot, rgb=p.clad_rgb)
 
 
-def _rim(inner, outer, z0: float, z1: float) -> Mesh:
+def _rim(inner: np.ndarray, outer: np.ndarray, z0: float, z1: float) -> Mesh:
     """The top edge of cladding panels, and their backs, seen from within."""
     backs = massing.skirt(inner[::-1], inner[::-1], z0, z1)
     return merge_meshes(backs, massing.skirt(outer, inner, z1, z1))
 
 
-def _add_props(assembly, p: Parameters, plan) -> None:
+def _add_props(out: Assembly, p: Parameters, plan: np.ndarray) -> None:
     """Adds props below the top slab, along the front and the back."""
     (x0, y0), (x1, y1) = plan[0], plan[2]
     low = (p.storeys - 1) * p.storey
@@ -214,16 +214,16 @@ def _add_props(assembly, p: Parameters, plan) -> None:
         for y in (y0 + 1.2, y1 - 1.2):
             shaft = massing.regular_polygon(0.06, 4, (float(x), y))
             props.append(massing.skirt(shaft, shaft, low - 0.02, high))
-    assembly.add("props", *props, rgb=_STEEL)
+    out.add("props", *props, rgb=_STEEL)
 
 
-def _add_scaffolds(assembly, p: Parameters, plan) -> None:
+def _add_scaffolds(out: Assembly, p: Parameters, plan: np.ndarray) -> None:
     """Adds scaffolds: standards of full height, and lifts between them."""
     lifts = max(2, int(p.scaffold_top * p.storey / _LIFT_M))
     per_group = -(-lifts // 6)
     groups = -(-lifts // per_group)
     top = per_group * groups * _LIFT_M
-    rng = assembly.rng
+    rng = out.rng
     levels, standards, nets = [], [], []
     for edge in p.scaffolds:
         wall = details.WallFrame(plan, edge)
@@ -238,9 +238,7 @@ def _add_scaffolds(assembly, p: Parameters, plan) -> None:
         for a, b in itertools.pairwise(xs.tolist()):
             if rng.random() < p.nets:
                 first = int(rng.integers(0, groups * per_group - 1))
-                last = int(
-                    assembly.rng.integers(first + 1, groups * per_group + 1)
-                )
+                last = int(out.rng.integers(first + 1, groups * per_group + 1))
                 low, high = first * _LIFT_M + 0.2, last * _LIFT_M - 0.2
                 spot = (round(a + 0.05, 2), round(b - 0.05, 2), 1.56, 1.6)
                 nets.append(wall.place(massing.box(*spot, low, high)))
@@ -248,12 +246,10 @@ def _add_scaffolds(assembly, p: Parameters, plan) -> None:
     stack = merge_meshes(
         *(level.moved((0.0, 0.0, k * _LIFT_M)) for k in range(per_group))
     )
-    assembly.stack(
-        "scaffold", stack, 0.0, per_group * _LIFT_M, groups, rgb=_STEEL
-    )
-    assembly.add("standards", *standards, rgb=_STEEL)
+    out.stack("scaffold", stack, 0.0, per_group * _LIFT_M, groups, rgb=_STEEL)
+    out.add("standards", *standards, rgb=_STEEL)
     if nets:
-        assembly.add("nets", *nets, rgb=p.net_rgb)
+        out.add("nets", *nets, rgb=p.net_rgb)
 
 
 def _scaffold_level(xs: list[float]) -> Mesh:
@@ -268,7 +264,7 @@ def _scaffold_level(xs: list[float]) -> Mesh:
     return merge_meshes(*pieces)
 
 
-def _add_hoist(assembly, p: Parameters, plan) -> None:
+def _add_hoist(out: Assembly, p: Parameters, plan: np.ndarray) -> None:
     """Adds a hoist's mast and cage at the back."""
     wall = details.WallFrame(plan, 2)
     x, top = 0.5 * wall.length, p.storeys * p.storey - 1.0
@@ -281,4 +277,4 @@ def _add_hoist(assembly, p: Parameters, plan) -> None:
     z = round(0.55 * top, 1)
     cage = massing.box(x + 0.4, x + 1.9, 0.15, 1.35, z, z + 2.4)
     mesh = merge_meshes(*(wall.place(piece) for piece in (*pieces, cage)))
-    assembly.add("hoist", mesh, rgb=(0.80, 0.62, 0.16))
+    out.add("hoist", mesh, rgb=(0.80, 0.62, 0.16))
