@@ -207,14 +207,15 @@ def _add_tower(
         x, w = length / 2, 0.17 * length
         relief = [
             Arch(x - 0.5, x + 0.5, z, z + 1.6, z + 2.3, p.window_depth)
-            for z in np.arange(6.5, shaft - 4.0, 6.0)
+            for z in np.arange(6.5, shaft - 4.0, 6.0).tolist()
         ]
         if edge == 0 and p.tower_at == "middle":
             relief.append(Arch(x - w, x + w, 0.0, 2.8, 2.8 + w, 0.9))
         return relief
 
     courses = tuple(
-        Band(z, z + 0.3, -0.15) for z in np.arange(4.8, shaft - 1.0, 6.0)
+        Band(z, z + 0.3, -0.15)
+        for z in np.arange(4.8, shaft - 1.0, 6.0).tolist()
     )
     stage = Facade(shaft, courses, lower, glass=(p.window_depth,))
     corner = details.corner_piers(

@@ -174,10 +174,11 @@ def _add_shelter(out: Assembly, p: Parameters, area: massing.Area) -> None:
     plan = massing.rectangle(a, c, b, d)
     across = max(2, round((b - a) / 3.5) + 1)
     deep = max(2, round((d - c) / 3.5) + 1)
-    spots = {(round(u, 2), round(v, 2)) for u in np.linspace(a, b, across)
-             for v in (c, d)}  # fmt: skip
-    spots |= {(round(u, 2), round(v, 2)) for v in np.linspace(c, d, deep)
-              for u in (a, b)}  # fmt: skip
+    places: list[tuple[float, float]] = [
+        *((u, v) for u in np.linspace(a, b, across) for v in (c, d)),
+        *((u, v) for v in np.linspace(c, d, deep) for u in (a, b)),
+    ]
+    spots = {(round(u, 2), round(v, 2)) for u, v in places}
     for u, v in sorted(spots):
         out.add_to("timber", massing.post(u, v, 0.11, z, floor))
     frame = massing.inset(plan, -0.12)

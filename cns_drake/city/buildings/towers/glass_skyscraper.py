@@ -41,7 +41,7 @@ class Parameters:
         count = len(outline)
         heights = d.pick(((0.62,), (0.45, 0.78)))
         style = d.whole(0, 4)  # Ribbons, a grid, or fins (twice).
-        total = np.zeros(count)
+        total: np.ndarray = np.zeros(count)
         setbacks = []
         for fraction in heights:
             if count == 4:
@@ -147,7 +147,8 @@ def _add_crown(
         plan = massing.inset(plan, min(reach, massing.inset_limit(plan)))
         z0, height = round(z0 + low - 1.0, 3), round(height - low + 1.0, 3)
     louvres = tuple(
-        Band(z, z + 0.5, 0.2) for z in np.arange(0.8, height - 1.5, 1.0)
+        Band(z, z + 0.5, 0.2)
+        for z in np.arange(0.8, height - 1.5, 1.0).tolist()
     )
     parapet = 0.7 * height if p.crown == "screen" else 1.0
     walls = Facade(height, louvres)
