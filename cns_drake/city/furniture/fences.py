@@ -37,9 +37,11 @@ class RunKind:
         name: stem of the mesh names.
         panel: nominal length of a panel [m].
         height: nominal height [m].
-        make: `make(count)` returns `count` panels in a row from x = 0;
-            each starts with its post.
         colours: to choose from.
+        pieces: `pieces(x)` returns what each panel, from x on, has of its
+            own; it starts with its post.
+        rails: y from, y to, z from, z to of what runs through all panels
+            [m].
         end_post: x size, y from, y to, z to of the post that ends the run
             [m], or None.
     """
@@ -47,9 +49,18 @@ class RunKind:
     name: str
     panel: float
     height: float
-    make: Callable[[int], Mesh]
     colours: tuple[tuple[float, float, float], ...]
+    pieces: Callable[[float], list[Mesh]] = lambda x: []
+    rails: tuple[tuple[float, float, float, float], ...] = ()
     end_post: tuple[float, float, float, float] | None = None
+
+    def make(self, count: int) -> Mesh:
+        """Returns `count` panels in a row from x = 0."""
+        end = self.panel * count
+        meshes = [_box(0, end, *rail) for rail in self.rails]
+        for k in range(count):
+            meshes += self.pieces(self.panel * k)
+        return merge_meshes(*meshes)
 
 
 def run(
@@ -121,149 +132,91 @@ def _box(
     )
 
 
-def _railing(count: int) -> Mesh:
-    """Returns panels of upright bars between two rails, 1.05 m high."""
-    end = 2.0 * count
-    pieces = [
-        _box(0, end, -0.025, 0.025, 0.12, 0.16),
-        _box(0, end, -0.03, 0.03, 1.0, 1.05),
+def _railing(x: float) -> list[Mesh]:
+    """Returns upright bars between two rails, 1.05 m high."""
+    bars = [x + 0.03 + m * 2.0 / 14 for m in range(1, 14)]
+    return [
+        _box(x, x + 0.06, -0.03, 0.03, _ROOT, 1.1),
+        *(tube([(p, 0, 0.14), (p, 0, 1.02)], (0.014, 0.014), 3) for p in bars),
     ]
-    for k in range(count):
-        x = 2.0 * k
-        pieces.append(_box(x, x + 0.06, -0.03, 0.03, _ROOT, 1.1))
-        for m in range(1, 14):
-            p = x + 0.03 + m * 2.0 / 14
-            pieces.append(tube([(p, 0, 0.14), (p, 0, 1.02)], (0.014, 0.014), 3))
-    return merge_meshes(*pieces)
 
 
-def _picket(count: int) -> Mesh:
-    """Returns a wooden garden fence of pointed boards, 1.2 m high."""
-    end = 2.0 * count
-    pieces = [_box(0, end, -0.05, -0.01, z, z + 0.08) for z in (0.3, 0.85)]
-    for k in range(count):
-        x = 2.0 * k
-        pieces.append(_box(x, x + 0.1, -0.12, -0.05, _ROOT, 1.1))
-        for m in range(12):
-            p = x + 0.02 + m * 2.0 / 12
-            outline = [
-                (p, 0.08),
-                (p + 0.1, 0.08),
-                (p + 0.1, 1.12),
-                (p + 0.05, 1.2),
-                (p, 1.12),
-            ]
-            pieces.append(side_prism(outline, -0.01, 0.015))
-    return merge_meshes(*pieces)
+def _picket(x: float) -> list[Mesh]:
+    """Returns pointed boards of a wooden garden fence, 1.2 m high."""
+    pieces = [_box(x, x + 0.1, -0.12, -0.05, _ROOT, 1.1)]
+    for m in range(12):
+        p = x + 0.02 + m * 2.0 / 12
+        outline = [(p, 0.08), (p + 0.1, 0.08), (p + 0.1, 1.12),
+                   (p + 0.05, 1.2), (p, 1.12)]  # fmt: skip
+        pieces.append(side_prism(outline, -0.01, 0.015))
+    return pieces
 
 
-def _garden_wall(count: int) -> Mesh:
-    """Returns a brick wall with piers and a coping, 1.5 m high."""
-    end = 3.0 * count
-    pieces = [
-        _box(0, end, -0.12, 0.12, _ROOT, 1.4),
-        _box(0, end, -0.17, 0.17, 1.4, 1.48),
+def _garden_wall(x: float) -> list[Mesh]:
+    """Returns a pier of a brick wall, 1.7 m high."""
+    # The coping, too, keeps within the length, or the next wall in a row
+    # would have no room.
+    return [
+        _box(x + 0.04, x + 0.44, -0.2, 0.2, _ROOT, 1.62),
+        _box(x, x + 0.48, -0.24, 0.24, 1.62, 1.7),
     ]
-    for k in range(count):
-        x = 3.0 * k
-        # The coping, too, keeps within the length, or the next wall in a
-        # row would have no room.
-        pieces += [
-            _box(x + 0.04, x + 0.44, -0.2, 0.2, _ROOT, 1.62),
-            _box(x, x + 0.48, -0.24, 0.24, 1.62, 1.7),
-        ]
-    return merge_meshes(*pieces)
 
 
-def _hoarding(count: int) -> Mesh:
-    """Returns a construction hoarding of boards with rear struts, 2.2 m."""
-    end = 2.4 * count
-    pieces = [
-        _box(0, end, -0.03, 0.03, 0.05, 2.2),
-        _box(0, end, -0.05, 0.07, 2.2, 2.26),
+def _hoarding(x: float) -> list[Mesh]:
+    """Returns a post and a rear strut of a construction hoarding."""
+    strut = [(x + 0.05, -0.95, 0.04), (x + 0.05, -0.1, 1.7)]
+    return [
+        _box(x, x + 0.1, -0.14, 0.05, _ROOT, 2.2),
+        _box(x, x + 0.1, -1.0, -0.12, 0.0, 0.08),
+        tube(strut, (0.04, 0.04), 4),
     ]
-    for k in range(count):
-        x = 2.4 * k
-        pieces += [
-            _box(x, x + 0.1, -0.14, 0.05, _ROOT, 2.2),
-            _box(x, x + 0.1, -1.0, -0.12, 0.0, 0.08),
-            tube(
-                [(x + 0.05, -0.95, 0.04), (x + 0.05, -0.1, 1.7)],
-                (0.04, 0.04),
-                4,
-            ),
-        ]
-    return merge_meshes(*pieces)
 
 
-def _site_fence(count: int) -> Mesh:
-    """Returns temporary fence panels of tubes and wires on feet, 2 m."""
-    pieces = []
-    for k in range(count):
-        x = 3.5 * k
-        for p in (x + 0.06, x + 3.44):
-            pieces.append(tube([(p, 0, 0.0), (p, 0, 2.0)], (0.02, 0.02), 4))
-        for z in (0.15, 1.1, 1.98):
-            pieces.append(
-                tube([(x + 0.06, 0, z), (x + 3.44, 0, z)], (0.016, 0.016), 3)
-            )
-        for p in np.linspace(x + 0.06, x + 3.44, 20)[1:-1]:
-            pieces.append(tube([(p, 0, 0.15), (p, 0, 1.98)], (0.006, 0.006), 3))
-        pieces.append(_box(x + 0.02, x + 0.26, -0.35, 0.35, -0.02, 0.13))
-    return merge_meshes(*pieces)
+def _site_fence(x: float) -> list[Mesh]:
+    """Returns a temporary fence of tubes and wires on a foot, 2 m."""
+    a, b = x + 0.06, x + 3.44
+    wires = np.linspace(a, b, 20)[1:-1]
+    return [
+        *(tube([(p, 0, 0.0), (p, 0, 2.0)], (0.02, 0.02), 4) for p in (a, b)),
+        *(
+            tube([(a, 0, z), (b, 0, z)], (0.016, 0.016), 3)
+            for z in (0.15, 1.1, 1.98)
+        ),
+        *(tube([(p, 0, 0.15), (p, 0, 1.98)], (0.006, 0.006), 3) for p in wires),
+        _box(x + 0.02, x + 0.26, -0.35, 0.35, -0.02, 0.13),
+    ]
 
 
-def _concrete_barrier(count: int) -> Mesh:
-    """Returns concrete safety barriers, 0.81 m high, 2 m a piece."""
-    profile = np.array(
-        [
-            (0.3, _ROOT),
-            (0.3, 0.08),
-            (0.12, 0.33),
-            (0.075, 0.81),
-            (-0.075, 0.81),
-            (-0.12, 0.33),
-            (-0.3, 0.08),
-            (-0.3, _ROOT),
-        ]
-    )
-    pieces = []
-    for k in range(count):
-        # Two convex halves: the foot and the stem.
-        for rows in ((0, 1, 6, 7), (1, 2, 5, 6), (2, 3, 4, 5)):
-            solid = prism(profile[list(rows)], 2.0 * k + 0.01, 2.0 * k + 1.97)
-            pieces.append(along_x(solid))
-    return merge_meshes(*pieces)
+def _concrete_barrier(x: float) -> list[Mesh]:
+    """Returns a concrete safety barrier, 0.81 m high."""
+    right = [(0.3, _ROOT), (0.3, 0.08), (0.12, 0.33), (0.075, 0.81)]
+    profile = np.array([*right, *((-y, z) for y, z in reversed(right))])
+    # Convex pieces, from the foot to the stem.
+    return [
+        along_x(prism(profile[list(rows)], x + 0.01, x + 1.97))
+        for rows in ((0, 1, 6, 7), (1, 2, 5, 6), (2, 3, 4, 5))
+    ]
 
 
-def _hedge(count: int) -> Mesh:
-    """Returns a clipped hedge with a rough skin, 1.4 m high, 0.9 m deep."""
-    rng = np.random.default_rng([7002, count])
-    step = 0.25
-    ring = np.array(
-        [
-            (0.40, _ROOT),
-            (0.44, 0.35),
-            (0.45, 0.75),
-            (0.43, 1.1),
-            (0.33, 1.35),
-            (0.0, 1.42),
-            (-0.33, 1.35),
-            (-0.43, 1.1),
-            (-0.45, 0.75),
-            (-0.44, 0.35),
-            (-0.40, _ROOT),
-        ]
-    )
-    num = round(2.0 * count / step) + 1
-    section = np.zeros((num, len(ring), 3))
-    section[:, :, 0] = (step * np.arange(num))[:, None]
-    section[:, :, 1:] = ring
-    noise = rng.uniform(-1, 1, section.shape) * (0.08, 0.09, 0.07)
-    # The ends keep the plain outline, so that neighbours meet.
-    noise[[0, -1]] = 0.0
-    noise[:, [0, -1]] = 0.0
-    return loft(section + noise)
+class _Hedge(RunKind):
+    """A clipped hedge with a rough skin, 1.4 m high, 0.9 m deep."""
+
+    def make(self, count: int) -> Mesh:
+        """Returns a hedge as long as `count` panels."""
+        rng = np.random.default_rng([7002, count])
+        step = 0.25
+        side = [(0.40, _ROOT), (0.44, 0.35), (0.45, 0.75), (0.43, 1.1),
+                (0.33, 1.35)]  # fmt: skip
+        ring = [*side, (0.0, 1.42), *((-y, z) for y, z in reversed(side))]
+        num = round(2.0 * count / step) + 1
+        section = np.zeros((num, len(ring), 3))
+        section[:, :, 0] = (step * np.arange(num))[:, None]
+        section[:, :, 1:] = ring
+        noise = rng.uniform(-1, 1, section.shape) * (0.08, 0.09, 0.07)
+        # The ends keep the plain outline, so that neighbours meet.
+        noise[[0, -1]] = 0.0
+        noise[:, [0, -1]] = 0.0
+        return loft(section + noise)
 
 
 RUN_KINDS = {
@@ -273,7 +226,8 @@ RUN_KINDS = {
             "railing",
             panel=2.0,
             height=1.1,
-            make=_railing,
+            rails=((-0.025, 0.025, 0.12, 0.16), (-0.03, 0.03, 1.0, 1.05)),
+            pieces=_railing,
             colours=((0.15, 0.17, 0.18), (0.35, 0.37, 0.4), (0.16, 0.27, 0.22)),
             end_post=(0.06, -0.03, 0.03, 1.1),
         ),
@@ -281,7 +235,8 @@ RUN_KINDS = {
             "picket_fence",
             panel=2.0,
             height=1.2,
-            make=_picket,
+            rails=((-0.05, -0.01, 0.3, 0.38), (-0.05, -0.01, 0.85, 0.93)),
+            pieces=_picket,
             colours=((0.85, 0.84, 0.8), (0.5, 0.36, 0.24), (0.42, 0.42, 0.4)),
             end_post=(0.1, -0.12, -0.05, 1.1),
         ),
@@ -289,7 +244,8 @@ RUN_KINDS = {
             "garden_wall",
             panel=3.0,
             height=1.7,
-            make=_garden_wall,
+            rails=((-0.12, 0.12, _ROOT, 1.4), (-0.17, 0.17, 1.4, 1.48)),
+            pieces=_garden_wall,
             colours=((0.6, 0.38, 0.3), (0.7, 0.64, 0.54), (0.58, 0.56, 0.53)),
             end_post=(0.4, -0.2, 0.2, 1.7),
         ),
@@ -297,7 +253,8 @@ RUN_KINDS = {
             "hoarding",
             panel=2.4,
             height=2.26,
-            make=_hoarding,
+            rails=((-0.03, 0.03, 0.05, 2.2), (-0.05, 0.07, 2.2, 2.26)),
+            pieces=_hoarding,
             colours=((0.75, 0.72, 0.66), (0.2, 0.36, 0.58), (0.34, 0.5, 0.36)),
             end_post=(0.1, -0.14, 0.05, 2.2),
         ),
@@ -305,21 +262,20 @@ RUN_KINDS = {
             "site_fence",
             panel=3.5,
             height=2.0,
-            make=_site_fence,
+            pieces=_site_fence,
             colours=((0.6, 0.62, 0.63),),
         ),
         RunKind(
             "concrete_barrier",
             panel=2.0,
             height=0.81,
-            make=_concrete_barrier,
+            pieces=_concrete_barrier,
             colours=((0.55, 0.55, 0.54),),
         ),
-        RunKind(
+        _Hedge(
             "hedge",
             panel=2.0,
             height=1.4,
-            make=_hedge,
             colours=((0.24, 0.4, 0.19), (0.3, 0.44, 0.22), (0.2, 0.34, 0.2)),
         ),
     )

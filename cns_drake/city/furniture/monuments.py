@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from cns_drake.city.geometry.lofts import beam, lathe, loft, tube
+from cns_drake.city.geometry.lofts import beam, lathe, loft, rectangle, tube
 from cns_drake.city.geometry.mesh import Mesh, box_mesh, merge_meshes
 from cns_drake.city.geometry.object_parts import (
     ROOT_DEPTH,
@@ -146,21 +146,18 @@ def _figure() -> Mesh:
 @cache
 def _obelisk() -> Mesh:
     """Returns an obelisk 10 m high."""
-
-    def square(half: float, z: float) -> list[tuple[float, float, float]]:
-        return [
-            (half, half, z),
-            (-half, half, z),
-            (-half, -half, z),
-            (half, -half, z),
-        ]
-
     return merge_meshes(
-        loft([square(2.2, -ROOT_DEPTH), square(2.2, 0.25)]),
-        loft([square(1.7, 0.25), square(1.7, 0.5)]),
-        loft([square(1.05, 0.5), square(1.0, 2.0)]),
-        loft([square(1.15, 2.0), square(1.15, 2.2)]),
-        loft([square(0.7, 2.2), square(0.45, 9.2), square(0.05, 10.0)]),
+        loft([rectangle(2.2, 2.2, -ROOT_DEPTH), rectangle(2.2, 2.2, 0.25)]),
+        loft([rectangle(1.7, 1.7, 0.25), rectangle(1.7, 1.7, 0.5)]),
+        loft([rectangle(1.05, 1.05, 0.5), rectangle(1.0, 1.0, 2.0)]),
+        loft([rectangle(1.15, 1.15, 2.0), rectangle(1.15, 1.15, 2.2)]),
+        loft(
+            [
+                rectangle(0.7, 0.7, 2.2),
+                rectangle(0.45, 0.45, 9.2),
+                rectangle(0.05, 0.05, 10.0),
+            ]
+        ),
     )
 
 

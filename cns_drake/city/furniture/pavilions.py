@@ -14,6 +14,7 @@ from cns_drake.city.geometry.lofts import (
     lathe,
     loft,
     prism,
+    rectangle,
     side_prism,
     tube,
 )
@@ -22,14 +23,17 @@ from cns_drake.city.geometry.object_parts import (
     ROOT_DEPTH,
     Builder,
     assemble,
+    one_mesh,
     post,
-    single,
 )
 from cns_drake.city.geometry.structures import MeshShape, Model, Part
 
 _DARK = (0.2, 0.22, 0.24)
 _STEEL = (0.45, 0.47, 0.49)
 _GLASS = (0.55, 0.65, 0.68)
+_PILLAR = (0.6, 0.62, 0.55)
+_KIOSKS = ((0.2, 0.33, 0.28), (0.5, 0.22, 0.18), (0.3, 0.34, 0.42))
+_PHONE_BOXES = ((0.68, 0.14, 0.13), (0.3, 0.4, 0.5))
 
 
 def bus_shelter(rng: np.random.Generator) -> Model:
@@ -48,40 +52,6 @@ def bus_shelter(rng: np.random.Generator) -> Model:
         ),
         {f"shelter_{side}_frame": frame, f"shelter_{side}_panes": panes},
     )
-
-
-def kiosk(rng: np.random.Generator) -> Model:
-    """Returns a street kiosk with a counter, an awning and a hipped roof."""
-    colours = ((0.2, 0.33, 0.28), (0.5, 0.22, 0.18), (0.3, 0.34, 0.42))
-    wide = round(float(rng.uniform(0.9, 1.25)), 3)
-    return single(
-        "kiosk", _kiosk(), colours[int(rng.integers(3))], (1, wide, 1)
-    )
-
-
-def advertising_pillar(rng: np.random.Generator) -> Model:
-    """Returns a round advertising pillar with a domed cap."""
-    tall = round(float(rng.uniform(0.95, 1.1)), 3)
-    return single(
-        "advertising_pillar",
-        _advertising_pillar(),
-        (0.6, 0.62, 0.55),
-        (1.0, 1.0, tall),
-    )
-
-
-def advertising_panel(rng: np.random.Generator) -> Model:
-    """Returns a free-standing poster case; its sides face +x and -x."""
-    tall = round(float(rng.uniform(0.92, 1.08)), 3)
-    return single(
-        "advertising_panel", _advertising_panel(), _DARK, (1.0, 1.0, tall)
-    )
-
-
-def phone_box(rng: np.random.Generator) -> Model:
-    """Returns a phone box with a recessed door towards +x."""
-    colours = ((0.68, 0.14, 0.13), (0.3, 0.4, 0.5))
-    return single("phone_box", _phone_box(), colours[int(rng.integers(2))])
 
 
 def cafe_table(rng: np.random.Generator) -> Model:
@@ -155,12 +125,12 @@ def _shelter(advert: float) -> tuple[Mesh, Mesh]:
 
 @cache
 def _kiosk() -> Mesh:
-    """Returns a kiosk 2.2 m by 3 m."""
+    """Returns a kiosk with a counter and an awning, 2.2 m by 3 m."""
     roof = loft(
         [
-            _rectangle(1.5, 1.9, 2.7),
-            _rectangle(1.5, 1.9, 2.85),
-            _rectangle(0.5, 0.9, 3.4),
+            rectangle(1.5, 1.9, 2.7),
+            rectangle(1.5, 1.9, 2.85),
+            rectangle(0.5, 0.9, 3.4),
         ]
     )
     return merge_meshes(
@@ -185,20 +155,9 @@ def _kiosk() -> Mesh:
     )
 
 
-def _rectangle(half_x: float, half_y: float, z: float) -> np.ndarray:
-    """Returns a horizontal rectangle, counter-clockwise from above."""
-    return np.array(
-        [
-            (half_x, half_y, z),
-            (-half_x, half_y, z),
-            (-half_x, -half_y, z),
-            (half_x, -half_y, z),
-        ]
-    )
-
-
 @cache
 def _advertising_pillar() -> Mesh:
+    """Returns a round pillar with a domed cap."""
     return lathe(
         [
             (0.75, -ROOT_DEPTH),
@@ -218,6 +177,7 @@ def _advertising_pillar() -> Mesh:
 
 @cache
 def _advertising_panel() -> Mesh:
+    """Returns a free-standing poster case; its sides face +x and -x."""
     return merge_meshes(
         box_mesh((0.16, 1.3, 2.1), (0, 0, 1.45)),
         box_mesh((0.24, 1.4, 0.1), (0, 0, 2.5)),
@@ -228,6 +188,7 @@ def _advertising_panel() -> Mesh:
 
 @cache
 def _phone_box() -> Mesh:
+    """Returns a phone box with a recessed door towards +x."""
     pieces = [
         box_mesh(
             (0.95, 0.95, 0.15 + ROOT_DEPTH), (0, 0, 0.075 - ROOT_DEPTH / 2)
@@ -236,9 +197,9 @@ def _phone_box() -> Mesh:
         box_mesh((0.98, 0.98, 0.22), (0, 0, 2.2)),
         loft(
             [
-                _rectangle(0.45, 0.45, 2.31),
-                _rectangle(0.32, 0.32, 2.42),
-                _rectangle(0.1, 0.1, 2.47),
+                rectangle(0.45, 0.45, 2.31),
+                rectangle(0.32, 0.32, 2.42),
+                rectangle(0.1, 0.1, 2.47),
             ]
         ),
     ]
@@ -313,10 +274,16 @@ def _market_stall() -> tuple[Mesh, Mesh]:
 
 PAVILIONS = {
     "bus_shelter": Builder("other-structure", bus_shelter),
-    "kiosk": Builder("other-structure", kiosk),
-    "advertising_pillar": Builder("other-object", advertising_pillar),
-    "advertising_panel": Builder("other-object", advertising_panel),
-    "phone_box": Builder("other-object", phone_box),
+    "kiosk": one_mesh(
+        "kiosk", _kiosk, _KIOSKS, "other-structure", y=(0.9, 1.25)
+    ),
+    "advertising_pillar": one_mesh(
+        "advertising_pillar", _advertising_pillar, [_PILLAR], z=(0.95, 1.1)
+    ),
+    "advertising_panel": one_mesh(
+        "advertising_panel", _advertising_panel, [_DARK], z=(0.92, 1.08)
+    ),
+    "phone_box": one_mesh("phone_box", _phone_box, _PHONE_BOXES),
     "cafe_table": Builder("other-object", cafe_table),
     "market_stall": Builder("other-structure", market_stall),
 }

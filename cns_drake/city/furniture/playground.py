@@ -7,40 +7,20 @@ from itertools import pairwise
 
 import numpy as np
 
-from cns_drake.city.geometry.lofts import beam, loft, tube
+from cns_drake.city.geometry.lofts import beam, loft, rectangle, tube
 from cns_drake.city.geometry.mesh import Mesh, box_mesh, merge_meshes
 from cns_drake.city.geometry.object_parts import (
     ROOT_DEPTH,
     Builder,
     assemble,
     block,
+    one_mesh,
     post,
-    single,
 )
 from cns_drake.city.geometry.structures import Model
 
 _COLOURS = ((0.7, 0.2, 0.16), (0.2, 0.38, 0.62), (0.78, 0.62, 0.18))
 _WOOD = (0.52, 0.38, 0.25)
-
-
-def swing(rng: np.random.Generator) -> Model:
-    """Returns a swing for two along y, 3.4 m wide and 2.5 m high."""
-    wide = round(float(rng.uniform(0.92, 1.12)), 3)
-    colour = _COLOURS[int(rng.integers(3))]
-    return single("swing", _swing(), colour, (1.0, wide, 1.0))
-
-
-def slide(rng: np.random.Generator) -> Model:
-    """Returns a slide with a roofed tower; it runs out towards +x."""
-    tall = round(float(rng.uniform(0.9, 1.1)), 3)
-    colour = _COLOURS[int(rng.integers(3))]
-    return single("slide", _slide(), colour, (1.0, 1.0, tall))
-
-
-def picnic_table(rng: np.random.Generator) -> Model:
-    """Returns a table with two benches along y."""
-    wide = round(float(rng.uniform(0.9, 1.15)), 3)
-    return single("picnic_table", _picnic_table(), _WOOD, (1.0, wide, 1.0))
 
 
 def basketball_hoop(rng: np.random.Generator) -> Model:
@@ -61,6 +41,7 @@ def basketball_hoop(rng: np.random.Generator) -> Model:
 
 @cache
 def _swing() -> Mesh:
+    """Returns a swing for two along y, 3.4 m wide and 2.5 m high."""
     pieces = [tube([(0, -1.7, 2.45), (0, 1.7, 2.45)], (0.06, 0.06), 6)]
     pieces += [
         tube([(x, y, -ROOT_DEPTH), (0, 0.9 * y, 2.45)], (0.05, 0.05), 5)
@@ -79,6 +60,7 @@ def _swing() -> Mesh:
 
 @cache
 def _slide() -> Mesh:
+    """Returns a slide with a roofed tower; it runs out towards +x."""
     pieces = [
         beam((x, y, -ROOT_DEPTH), (x, y, 2.7), 0.1, 0.1)
         for x in (-0.55, 0.55)
@@ -89,7 +71,7 @@ def _slide() -> Mesh:
     pieces.append(
         loft(
             [
-                [(h, h, z), (-h, h, z), (-h, -h, z), (h, -h, z)]
+                rectangle(h, h, z)
                 for h, z in ((0.8, 2.65), (0.78, 2.72), (0.08, 3.4))
             ]
         )
@@ -116,6 +98,7 @@ def _slide() -> Mesh:
 
 @cache
 def _picnic_table() -> Mesh:
+    """Returns a table with two benches along y."""
     pieces = [
         box_mesh((0.24, 1.8, 0.05), (x, 0, 0.75)) for x in (-0.26, 0, 0.26)
     ]
@@ -130,8 +113,10 @@ def _picnic_table() -> Mesh:
 
 
 PLAYGROUND = {
-    "swing": Builder("other-object", swing),
-    "slide": Builder("other-object", slide),
-    "picnic_table": Builder("other-object", picnic_table),
+    "swing": one_mesh("swing", _swing, _COLOURS, y=(0.92, 1.12)),
+    "slide": one_mesh("slide", _slide, _COLOURS, z=(0.9, 1.1)),
+    "picnic_table": one_mesh(
+        "picnic_table", _picnic_table, [_WOOD], y=(0.9, 1.15)
+    ),
     "basketball_hoop": Builder("pole", basketball_hoop),
 }

@@ -18,7 +18,7 @@ from cns_drake.city.geometry.mesh import Mesh, box_mesh, merge_meshes
 from cns_drake.city.geometry.object_parts import (
     Builder,
     assemble,
-    single,
+    one_mesh,
     triple,
 )
 from cns_drake.city.geometry.structures import MeshShape, Model, Part
@@ -33,12 +33,8 @@ _YELLOW = (0.82, 0.62, 0.14)
 _ORANGE = (0.86, 0.4, 0.12)
 _EARTH = (0.46, 0.38, 0.28)
 _DARK = (0.2, 0.21, 0.22)
-
-
-def container(rng: np.random.Generator) -> Model:
-    """Returns a ribbed 20-foot container along x, doors towards +x."""
-    colour = _STEEL_COLOURS[int(rng.integers(len(_STEEL_COLOURS)))]
-    return single("container", _container(), colour)
+_PIPE = (0.6, 0.58, 0.54)
+_TOILETS = ((0.2, 0.4, 0.55), (0.25, 0.45, 0.3))
 
 
 def site_cabin(rng: np.random.Generator, *, storeys: int = 1) -> Model:
@@ -90,12 +86,6 @@ def soil_heap(rng: np.random.Generator) -> Model:
     return assemble((part,), {"heap": _heap()})
 
 
-def pipe_stack(rng: np.random.Generator) -> Model:
-    """Returns a pyramid of pipes along x."""
-    long = round(float(rng.uniform(0.8, 1.3)), 3)
-    return single("pipe_stack", _pipe_stack(), (0.6, 0.58, 0.54), (long, 1, 1))
-
-
 def brick_pallets(rng: np.random.Generator) -> Model:
     """Returns two to five pallets of bricks in a loose row along y."""
     count = int(rng.integers(2, 6))
@@ -134,12 +124,6 @@ def excavator(rng: np.random.Generator) -> Model:
     )
 
 
-def portable_toilet(rng: np.random.Generator) -> Model:
-    """Returns a portable toilet, its door towards +x."""
-    colour = ((0.2, 0.4, 0.55), (0.25, 0.45, 0.3))[int(rng.integers(2))]
-    return single("portable_toilet", _portable_toilet(), colour)
-
-
 def traffic_cones(rng: np.random.Generator, *, count: int = 5) -> Model:
     """Returns a row of traffic cones along x, 1.5 m apart.
 
@@ -165,7 +149,7 @@ def traffic_cones(rng: np.random.Generator, *, count: int = 5) -> Model:
 
 @cache
 def _container() -> Mesh:
-    """Returns a container 6.06 m by 2.44 m by 2.59 m."""
+    """Returns a ribbed container along x, 6.06 m by 2.44 m by 2.59 m."""
     pieces = [box_mesh((5.96, 2.36, 2.49), (0, 0, 1.3))]
     pieces += [
         box_mesh((0.16, 0.16, 2.59), (x, y, 1.295))
@@ -338,6 +322,7 @@ def _excavator() -> tuple[Mesh, Mesh]:
 
 @cache
 def _portable_toilet() -> Mesh:
+    """Returns a portable toilet, its door towards +x."""
     return merge_meshes(
         box_mesh((1.1, 1.1, 2.1), (0, 0, 1.1)),
         box_mesh((1.2, 1.2, 0.12), (0, 0, 0.06)),
@@ -360,13 +345,15 @@ def _cone() -> Mesh:
 
 
 SITE_EQUIPMENT = {
-    "container": Builder("other-structure", container),
+    "container": one_mesh(
+        "container", _container, _STEEL_COLOURS, "other-structure"
+    ),
     "site_cabin": Builder("other-structure", site_cabin),
     "skip": Builder("other-object", skip),
     "soil_heap": Builder("terrain", soil_heap),
-    "pipe_stack": Builder("other-object", pipe_stack),
+    "pipe_stack": one_mesh("pipe_stack", _pipe_stack, [_PIPE], x=(0.8, 1.3)),
     "brick_pallets": Builder("other-object", brick_pallets),
     "excavator": Builder("other-vehicle", excavator),
-    "portable_toilet": Builder("other-object", portable_toilet),
+    "portable_toilet": one_mesh("portable_toilet", _portable_toilet, _TOILETS),
     "traffic_cones": Builder("other-object", traffic_cones),
 }

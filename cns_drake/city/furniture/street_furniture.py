@@ -24,6 +24,7 @@ from cns_drake.city.geometry.object_parts import (
     Builder,
     assemble,
     block,
+    one_mesh,
     post,
     single,
 )
@@ -39,12 +40,8 @@ _DARK = (0.2, 0.22, 0.24)
 _WOOD = (0.52, 0.37, 0.24)
 _STONE = (0.66, 0.64, 0.6)
 _RED = (0.7, 0.16, 0.14)
-
-
-def bench(rng: np.random.Generator) -> Model:
-    """Returns a slatted bench with a back."""
-    scale = (1.0, round(float(rng.uniform(0.9, 1.15)), 3), 1.0)
-    return single("bench", _bench(), _WOOD, scale)
+_YELLOW = (0.85, 0.7, 0.15)
+_GREEN = (0.16, 0.3, 0.2)
 
 
 def stone_bench(rng: np.random.Generator) -> Model:
@@ -61,14 +58,6 @@ def stone_bench(rng: np.random.Generator) -> Model:
     ]
     slab = block("seat", (0.5, length, 0.12), (0, 0, 0.46), rgb=_STONE)
     return assemble((*feet, slab))
-
-
-def litter_bin(rng: np.random.Generator) -> Model:
-    """Returns a round litter bin with a hood."""
-    tall = round(float(rng.uniform(0.9, 1.1)), 3)
-    colours = (_DARK, (0.16, 0.3, 0.2), _STEEL)
-    colour = colours[int(rng.integers(len(colours)))]
-    return single("litter_bin", _litter_bin(), colour, (1.0, 1.0, tall))
 
 
 def recycling_bins(rng: np.random.Generator) -> Model:
@@ -93,12 +82,6 @@ def bollard(rng: np.random.Generator) -> Model:
     height = float(rng.uniform(0.8, 0.95))
     head = Part("head", SphereShape(0.08), xyz=(0.0, 0.0, height), rgb=_DARK)
     return assemble((post("shaft", 0.06, height, rgb=_DARK), head))
-
-
-def hydrant(rng: np.random.Generator) -> Model:
-    """Returns a fire hydrant."""
-    tall = round(float(rng.uniform(0.95, 1.1)), 3)
-    return single("hydrant", _hydrant(), _RED, (1.0, 1.0, tall))
 
 
 def bicycle_rack(rng: np.random.Generator) -> Model:
@@ -159,24 +142,10 @@ def ticket_machine(rng: np.random.Generator) -> Model:
     )
 
 
-def post_box(rng: np.random.Generator) -> Model:
-    """Returns a pillar box."""
-    tall = round(float(rng.uniform(0.96, 1.06)), 3)
-    colour = (_RED, (0.85, 0.7, 0.15))[int(rng.integers(2))]
-    return single("post_box", _post_box(), colour, (1.0, 1.0, tall))
-
-
-def cabinet(rng: np.random.Generator) -> Model:
-    """Returns an electrical cabinet on a plinth."""
-    width = round(float(rng.uniform(0.8, 1.6)), 3)
-    tall = round(float(rng.uniform(0.85, 1.15)), 3)
-    return single("cabinet", _cabinet(), (0.52, 0.55, 0.5), (1.0, width, tall))
-
-
 def newspaper_boxes(rng: np.random.Generator) -> Model:
     """Returns two to four newspaper boxes side by side along y."""
     count = int(rng.integers(2, 5))
-    colours = (_RED, (0.2, 0.35, 0.6), (0.85, 0.7, 0.15), _DARK, _STONE)
+    colours = (_RED, (0.2, 0.35, 0.6), _YELLOW, _DARK, _STONE)
     parts = [
         Part(
             f"box_{k}",
@@ -364,17 +333,23 @@ def _newspaper_box() -> Mesh:
 
 
 STREET_FURNITURE = {
-    "bench": Builder("other-object", bench),
+    "bench": one_mesh("bench", _bench, [_WOOD], y=(0.9, 1.15)),
     "stone_bench": Builder("other-object", stone_bench),
-    "litter_bin": Builder("other-object", litter_bin),
+    "litter_bin": one_mesh(
+        "litter_bin", _litter_bin, [_DARK, _GREEN, _STEEL], z=(0.9, 1.1)
+    ),
     "recycling_bins": Builder("other-object", recycling_bins),
     "bollard": Builder("pole", bollard),
-    "hydrant": Builder("other-object", hydrant),
+    "hydrant": one_mesh("hydrant", _hydrant, [_RED], z=(0.95, 1.1)),
     "bicycle_rack": Builder("bicycle", bicycle_rack),
     "bicycle": Builder("bicycle", bicycle),
     "parking_meter": Builder("pole", parking_meter),
     "ticket_machine": Builder("other-object", ticket_machine),
-    "post_box": Builder("other-object", post_box),
-    "cabinet": Builder("other-object", cabinet),
+    "post_box": one_mesh(
+        "post_box", _post_box, [_RED, _YELLOW], z=(0.96, 1.06)
+    ),
+    "cabinet": one_mesh(
+        "cabinet", _cabinet, [(0.52, 0.55, 0.5)], y=(0.8, 1.6), z=(0.85, 1.15)
+    ),
     "newspaper_boxes": Builder("other-object", newspaper_boxes),
 }

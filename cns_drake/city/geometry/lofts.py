@@ -94,6 +94,12 @@ def prism(outline: ArrayLike, bottom: float, top: float) -> Mesh:
     )
 
 
+def rectangle(half_x: float, half_y: float, z: float) -> np.ndarray:
+    """Returns (4, 3) corners at height z, counter-clockwise from above."""
+    x, y = half_x, half_y
+    return np.array([(x, y, z), (-x, y, z), (-x, -y, z), (x, -y, z)])
+
+
 def side_prism(outline: ArrayLike, right: float, left: float) -> Mesh:
     """Returns a prism over a convex outline in the x-z plane.
 

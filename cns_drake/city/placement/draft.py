@@ -18,6 +18,8 @@ from cns_drake.city.geometry.polygons import HeightMap, snap
 from cns_drake.city.geometry.structures import MeshShape, Model, Structure
 from cns_drake.city.ground.elevation import Ground, LevelGround
 from cns_drake.city.ground.streets import kerb_height
+from cns_drake.city.placement.naming import name_stem
+from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.roads.network import RoadNetwork
 
 # An object stands upright where the ground falls by at most this much below
@@ -109,29 +111,29 @@ class Draft:
 
     def place(
         self,
-        kind: str,
-        semantic_class: str,
+        name: str,
         model: Model,
         xy: tuple[float, float],
         yaw: float,
         tags: Iterable[str],
         *,
+        kind: str | None = None,
         clearance: float = 0.0,
         crown_part: float = 0.0,
         within: BaseGeometry | None = None,
     ) -> Structure | None:
-        """Places a model on the finished ground if there is room for it.
+        """Places an object on the finished ground if there is room for it.
 
         A model without room uses up a name as well, so that the names of
         others do not depend on whether it fits.
 
         Args:
-            kind: stem of the name.
-            semantic_class: of the structure.
+            name: of the object, a key of `OBJECTS`.
             model: its geometry.
             xy: position in W [m].
             yaw: heading in W [rad].
             tags: free words.
+            kind: stem of the structure's name; the object's by default.
             clearance: to everything that stands already [m].
             crown_part: how much of the reach of a tree's crown must be
                 clear of buildings, from 0 to 1.
@@ -142,8 +144,8 @@ class Draft:
         """
         x, y = (round(float(value), 3) for value in xy)
         structure = Structure(
-            self.next_name(kind),
-            semantic_class,
+            self.next_name(kind or name_stem(name)),
+            OBJECTS[name].semantic_class,
             model,
             (x, y, 0.0),
             float(yaw),

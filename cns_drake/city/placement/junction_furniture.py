@@ -7,10 +7,9 @@ import math
 import numpy as np
 
 from cns_drake.city.placement.draft import Draft
-from cns_drake.city.placement.naming import name_stem
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.roads.network import Arm, Junction
-from cns_drake.roads.road import Direction, Road
+from cns_drake.roads.road import Direction
 
 # Distance of posts from the kerb [m].
 _FROM_KERB = 0.7
@@ -36,87 +35,41 @@ def _furnish_arm(
     draft: Draft, junction: Junction, arm: Arm, rng: np.random.Generator
 ) -> None:
     road = draft.network.roads[arm.road]
-    incoming: Direction = "forward" if arm.end == "end" else "backward"
-    outgoing: Direction = "backward" if arm.end == "end" else "forward"
-    tags = ("junction", junction.name)
+    starts = arm.end == "start"
+    incoming: Direction = "backward" if starts else "forward"
+    outgoing: Direction = "forward" if starts else "backward"
     if len(junction.arms) < 3:
         return
+
+    def place(name: str, distance: float, side: int, turn: float) -> None:
+        """Places an object beside the arm.
+
+        Args:
+            name: of the object.
+            distance: from the junction's edge along the arm [m].
+            side: 1: to the left seen from the junction (incoming traffic has
+                it on the right), -1: to the right.
+            turn: heading of the object against the arm's outward direction.
+        """
+        outwards = 1 if starts else -1
+        edge = road.first_station if starts else road.last_station
+        offset = side * outwards * (road.half_width + _FROM_KERB)
+        x, y, _, heading = road.evaluate([edge + outwards * distance], offset)[
+            0
+        ]
+        yaw = (heading if starts else heading + math.pi) + turn
+        tags, model = ("junction", junction.name), OBJECTS[name].build(rng)
+        draft.place(name, model, (x, y), yaw, tags, clearance=0.1)
+
     if road.lanes[incoming]:
         if sum(road.lanes.values()) <= _SMALL_ROAD_LANES:
             # Facing the traffic that comes along the arm.
-            _place(draft, "sign_stop", road, arm, 1.0, 1, 0.0, rng, tags)
+            place("sign_stop", 1.0, 1, 0.0)
         else:
-            half_turn = -math.pi / 2
-            _place(
-                draft,
-                "traffic_light",
-                road,
-                arm,
-                _LIGHT_DISTANCE,
-                1,
-                half_turn,
-                rng,
-                tags,
-            )
-            _place(
-                draft,
-                "traffic_light_post",
-                road,
-                arm,
-                1.5,
-                -1,
-                half_turn,
-                rng,
-                tags,
-            )
-        _place(draft, "sign_street_name", road, arm, 0.2, 1, 0.0, rng, tags)
+            place("traffic_light", _LIGHT_DISTANCE, 1, -math.pi / 2)
+            place("traffic_light_post", 1.5, -1, -math.pi / 2)
+        place("sign_street_name", 0.2, 1, 0.0)
     if road.lanes[outgoing] and road.length > 2 * _SIGN_DISTANCE:
         sign = _SIGNS[int(rng.integers(len(_SIGNS)))]
         # Facing the traffic that comes out of the junction.
-        _place(draft, sign, road, arm, _SIGN_DISTANCE, -1, math.pi, rng, tags)
-
-
-def _place(
-    draft: Draft,
-    name: str,
-    road: Road,
-    arm: Arm,
-    distance: float,
-    side: int,
-    turn: float,
-    rng: np.random.Generator,
-    tags: tuple[str, ...],
-) -> None:
-    """Places an object beside an arm.
-
-    Args:
-        draft: the city so far.
-        name: of the object.
-        road: the arm's road.
-        arm: of the junction.
-        distance: from the junction's edge along the arm [m].
-        side: 1: to the left seen from the junction (incoming traffic has
-            it on the right), -1: to the right.
-        turn: heading of the object against the arm's outward direction.
-        rng: the junction's generator.
-        tags: of the structure.
-    """
-    outwards = 1 if arm.end == "start" else -1
-    station = (
-        road.first_station + distance
-        if arm.end == "start"
-        else road.last_station - distance
-    )
-    offset = side * outwards * (road.half_width + _FROM_KERB)
-    x, y, _, heading = road.evaluate([station], offset)[0]
-    away = heading if arm.end == "start" else heading + math.pi
-    builder = OBJECTS[name]
-    draft.place(
-        name_stem(name),
-        builder.semantic_class,
-        builder.build(rng),
-        (x, y),
-        away + turn,
-        tags,
-        clearance=0.1,
-    )
+        place(sign, _SIGN_DISTANCE, -1, math.pi)

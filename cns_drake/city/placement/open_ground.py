@@ -14,7 +14,6 @@ from shapely.ops import unary_union
 from cns_drake.city.ground.districts import District
 from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.frontage import Station, station_at
-from cns_drake.city.placement.naming import name_stem
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plan.city_plan import (
     LinePlan,
@@ -76,19 +75,12 @@ def _place_object(
     rng: np.random.Generator,
     field: str,
 ) -> None:
-    builder = OBJECTS[plan.object]
     try:
-        model = builder.build(rng, **plan.parameters)
+        model = OBJECTS[plan.object].build(rng, **plan.parameters)
     except (TypeError, ValueError) as error:
         raise InputError(f"{field}.parameters: {error}") from error
-    placed = draft.place(
-        plan.kind or name_stem(plan.object),
-        builder.semantic_class,
-        model,
-        plan.at,
-        math.radians(plan.yaw_deg),
-        (district.plan.name,),
-    )
+    yaw, tags = math.radians(plan.yaw_deg), (district.plan.name,)
+    placed = draft.place(plan.object, model, plan.at, yaw, tags, kind=plan.kind)
     if placed is None:
         raise InputError(f"{field}.at: stands in something else")
 
@@ -126,23 +118,16 @@ def _place_run(
     line = np.linspace(start, end, math.ceil(length) + 1)
     fall = float(np.abs(np.diff(draft.base(*line.T))).sum())
     count = max(count, math.ceil(round(fall, 3) / _HIGHEST_STEP))
-    yaw = math.atan2(*(end - start)[::-1])
+    yaw = math.atan2(*(end - start)[::-1]) + math.radians(plan.yaw_deg)
     name = pick(plan.objects, rng)
-    builder = OBJECTS[name]
     for k in range(count):
         middle = start + (end - start) * (k + 0.5) / count
         # A finger's breadth between runs, so that they do not overlap.
-        model = builder.build(
+        model = OBJECTS[name].build(
             rng, length=length / count - 0.06, **plan.parameters
         )
-        draft.place(
-            plan.kind or name_stem(name),
-            builder.semantic_class,
-            model,
-            tuple(middle),
-            yaw + math.radians(plan.yaw_deg),
-            (district.plan.name,),
-        )
+        tags = (district.plan.name,)
+        draft.place(name, model, tuple(middle), yaw, tags, kind=plan.kind)
 
 
 def _place_cars(
@@ -187,15 +172,7 @@ def place_car(
         tags: of the structure.
     """
     name = pick(cars, rng)
-    builder = OBJECTS[name]
-    draft.place(
-        name_stem(name),
-        builder.semantic_class,
-        builder.build(rng),
-        xy,
-        yaw,
-        tags,
-    )
+    draft.place(name, OBJECTS[name].build(rng), xy, yaw, tags)
 
 
 def _scatter(
@@ -248,15 +225,13 @@ def _try_object(
     yaw: float,
     rng: np.random.Generator,
 ) -> None:
-    builder = OBJECTS[name]
-    model = builder.build(rng)
     draft.place(
-        kind or name_stem(name),
-        builder.semantic_class,
-        model,
+        name,
+        OBJECTS[name].build(rng),
         (at.x, at.y),
         yaw,
         (district.plan.name,),
+        kind=kind,
         clearance=_CLEARANCE,
         crown_part=_CROWN_PART,
         within=district.area,

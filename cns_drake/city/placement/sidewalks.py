@@ -14,7 +14,6 @@ from shapely.ops import unary_union
 from cns_drake.city.ground.districts import District
 from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.frontage import Station, lines_along, station_at
-from cns_drake.city.placement.naming import name_stem
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.placement.open_ground import place_car
 from cns_drake.city.plan.city_plan import CityPlan, StreetPlan
@@ -164,20 +163,13 @@ def _place(
         facing_street: turn the object to the right and set it back, so that
             its front touches the line; else it stands on the line, along it.
     """
-    builder = OBJECTS[name]
-    model = builder.build(rng)
+    model = OBJECTS[name].build(rng)
     xy, yaw = (at.x, at.y), at.yaw
     if facing_street:
         front = model.footprint.bounds[2]
         xy = (at.x - front * math.sin(at.yaw), at.y + front * math.cos(at.yaw))
         yaw = at.yaw - math.pi / 2
     draft.place(
-        name_stem(name),
-        builder.semantic_class,
-        model,
-        xy,
-        yaw,
-        tags,
-        clearance=_CLEARANCE,
-        crown_part=_CROWN_PART,
-    )
+        name, model, xy, yaw, tags,
+        clearance=_CLEARANCE, crown_part=_CROWN_PART,
+    )  # fmt: skip

@@ -7,7 +7,7 @@ import string
 
 import numpy as np
 
-from cns_drake.city.geometry.lofts import lathe, loft, tube
+from cns_drake.city.geometry.lofts import lathe, loft, rectangle, tube
 from cns_drake.city.geometry.mesh import Mesh, box_mesh, merge_meshes
 from cns_drake.city.geometry.object_parts import (
     ROOT_DEPTH,
@@ -202,7 +202,7 @@ def _planter_box() -> Mesh:
     """Returns a tapered box, 2 m by 0.7 m, with slats."""
     body = loft(
         [
-            [(x, y, z), (-x, y, z), (-x, -y, z), (x, -y, z)]
+            rectangle(x, y, z)
             for x, y, z in ((0.92, 0.28, -0.02), (0.98, 0.33, 0.5))
         ]
     )

@@ -12,7 +12,7 @@ from cns_drake.city.buildings.house_parts import (
     shop_fronts,
 )
 from cns_drake.city.buildings.house_parts.openings import Openings
-from cns_drake.city.buildings.parts import bays
+from cns_drake.city.buildings.parts import bays, tiers
 from cns_drake.city.buildings.parts.facades import Band
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
 from cns_drake.city.buildings.parts.site import Assembly, Dice
@@ -24,13 +24,6 @@ _WALLS = (
     (0.74, 0.66, 0.54),
     (0.70, 0.72, 0.66),
     (0.82, 0.70, 0.60),
-)
-_AWNINGS = (
-    (0.55, 0.18, 0.16),
-    (0.20, 0.36, 0.28),
-    (0.85, 0.80, 0.68),
-    (0.22, 0.30, 0.45),
-    (0.72, 0.48, 0.18),
 )
 _SIGNS = ((0.24, 0.26, 0.30), (0.36, 0.20, 0.16), (0.20, 0.32, 0.30))
 
@@ -74,7 +67,7 @@ class Parameters:
         self.rgb = d.pick(_WALLS)
         self.roof_rgb = d.pick(family_house.ROOFS)
         self.sign_rgb = d.pick(_SIGNS)
-        self.awning_rgb = d.pick(_AWNINGS)
+        self.awning_rgb = d.pick(tiers.AWNINGS)
 
 
 def build(p: Parameters, out: Assembly) -> None:

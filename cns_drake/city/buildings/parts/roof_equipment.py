@@ -42,19 +42,16 @@ def _air_handler() -> Mesh:
 
 def _cooling_tower() -> Mesh:
     ring = massing.regular_polygon(1.1, 10)
+    legs = (
+        box_mesh((0.2, 0.2, 0.4), (x, y, 0.2))
+        for x in (-1.2, 1.2)
+        for y in (-1.2, 1.2)
+    )
+    foot, head = massing.square(0.0, 0.0, 1.3), massing.square(0.0, 0.0, 1.15)
     return merge_meshes(
         box_mesh((2.8, 2.8, 0.3), (0, 0, 0.55)),
-        *(
-            box_mesh((0.2, 0.2, 0.4), (x, y, 0.2))
-            for x in (-1.2, 1.2)
-            for y in (-1.2, 1.2)
-        ),
-        massing.frustum(
-            massing.rectangle(-1.3, -1.3, 1.3, 1.3),
-            massing.rectangle(-1.15, -1.15, 1.15, 1.15),
-            0.7,
-            2.6,
-        ),
+        *legs,
+        massing.frustum(foot, head, 0.7, 2.6),
         massing.roof_pan(ring, 2.7, 3.3, 0.12),
         massing.skirt(ring, ring, 2.6, 3.3),
     )
@@ -64,24 +61,17 @@ def _water_tower() -> Mesh:
     """A barrel under a cone on four braced legs."""
     barrel = massing.regular_polygon(1.9, 12)
     eaves = massing.regular_polygon(2.1, 12)
+    h = 1.15
     legs = [
         box_mesh((0.22, 0.22, 3.6), (x, y, 1.8))
-        for x in (-1.15, 1.15)
-        for y in (-1.15, 1.15)
+        for x in (-h, h)
+        for y in (-h, h)
     ]
-    braces = [
-        box_mesh(size, (x, y, z))
-        for z in (1.2, 2.4)
-        for size, x, y in (
-            ((2.3, 0.1, 0.14), 0, -1.15),
-            ((2.3, 0.1, 0.14), 0, 1.15),
-            ((0.1, 2.3, 0.14), -1.15, 0),
-            ((0.1, 2.3, 0.14), 1.15, 0),
-        )
-    ]
+    for z in (1.2, 2.4):
+        legs += [box_mesh((2.3, 0.1, 0.14), (0, y, z)) for y in (-h, h)]
+        legs += [box_mesh((0.1, 2.3, 0.14), (x, 0, z)) for x in (-h, h)]
     return merge_meshes(
         *legs,
-        *braces,
         box_mesh((3.2, 3.2, 0.25), (0, 0, 3.6)),
         massing.prism(barrel, 3.7, 7.0, bottom=True),
         massing.spire(eaves, (0, 0), 7.0, 8.4),

@@ -25,7 +25,7 @@ from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 _PANE_OVERLAP = 0.004
 
 
-_AWNING_COLOURS = (
+AWNINGS = (
     (0.55, 0.18, 0.16),
     (0.20, 0.36, 0.28),
     (0.85, 0.80, 0.68),
@@ -37,7 +37,7 @@ _AWNING_COLOURS = (
 def add_awnings(out: Assembly, pieces: Sequence[Mesh]) -> None:
     """Adds the awnings of a building in a colour of their own."""
     if pieces:
-        rgb = pick(out.rng, _AWNING_COLOURS)
+        rgb = pick(out.rng, AWNINGS)
         out.add("awnings", *pieces, rgb=rgb)
 
 

@@ -72,12 +72,8 @@ class Parameters:
 
 def build(p: Parameters, out: Assembly) -> None:
     """Builds the tower on a rectangle."""
-    site = out.site
-    x0, y0, x1, y1 = site.bounds
     gap = _SCAFFOLD_M + 0.2
-    plan = np.round(
-        massing.rectangle(x0 + gap, y0 + gap, x1 - gap, y1 - gap), 2
-    )
+    plan = np.round(massing.inset(out.site.outline, gap), 2)
     _add_frame(out, p, plan)
     _add_core(out, p, plan)
     if p.clad:
@@ -89,17 +85,16 @@ def build(p: Parameters, out: Assembly) -> None:
         _add_hoist(out, p, plan)
 
 
-def _repeated(pieces: list[Mesh], p: Parameters) -> Mesh:
-    """Returns a storey's meshes for each storey of a group."""
+def _repeated(pieces: list[Mesh], count: int, step: float) -> Mesh:
+    """Returns `count` copies of some meshes above one another."""
     storey = merge_meshes(*pieces)
-    return merge_meshes(
-        *(storey.moved((0.0, 0.0, k * p.storey)) for k in range(p.group))
-    )
+    copies = (storey.moved((0.0, 0.0, k * step)) for k in range(count))
+    return merge_meshes(*copies)
 
 
-def _columns(p: Parameters, plan: np.ndarray) -> list[tuple[float, float]]:
+def _columns(p: Parameters, plan: np.ndarray) -> list[massing.Point]:
     """Returns where the columns stand."""
-    (x0, y0), (x1, y1) = plan[0], plan[2]
+    x0, y0, x1, y1 = massing.extent(plan)
     places = []
     for a, b in ((x0, x1), (y0, y1)):
         count = min(6, max(2, round((b - a) / p.pitch) + 1))
@@ -110,109 +105,87 @@ def _columns(p: Parameters, plan: np.ndarray) -> list[tuple[float, float]]:
 
 def _add_frame(out: Assembly, p: Parameters, plan: np.ndarray) -> None:
     """Adds a storey's columns and the slab on them, over and over."""
-    pieces = [
-        massing.post(x, y, 0.25, p.storey - _SLAB_M + 0.02, 0.0)
-        for x, y in _columns(p, plan)
-    ]  # fmt: skip
-    low = p.storey - _SLAB_M
-    pieces.append(massing.prism(plan, low, p.storey, bottom=True))
-    for edge in range(4):
-        wall = details.WallFrame(plan, edge)
-        for h in (0.5, 1.0):
-            rail = (0.05, wall.length - 0.05, -0.08, -0.03)
-            z = p.storey + h
-            pieces.append(wall.place(massing.box(*rail, z, z + 0.06)))
-    groups, step = p.storeys // p.group, p.group * p.storey
-    out.stack("frame", _repeated(pieces, p), 0.0, step, groups)
-    base = massing.prism(plan, -massing.FOUNDATION_M, 0.05)
+    columns, low = _columns(p, plan), p.storey - _SLAB_M
     top = p.storeys * p.storey
+    pieces = [massing.post(x, y, 0.25, low + 0.02, 0.0) for x, y in columns]
+    pieces.append(massing.prism(plan, low, p.storey, bottom=True))
     # Columns of the storey to come, and their bars.
-    stubs = [base]
-    for x, y in _columns(p, plan):
-        stubs.append(
-            massing.box(x - 0.25, x + 0.25, y - 0.25, y + 0.25, top - 0.05,
-                        top + 0.5)
-        )  # fmt: skip
+    stubs = [massing.prism(plan, -massing.FOUNDATION_M, 0.05)]
+    for x, y in columns:
+        foot = (x - 0.25, x + 0.25, y - 0.25, y + 0.25)
         bar = massing.regular_polygon(0.05, 3, (x + 0.12, y))
+        stubs.append(massing.box(*foot, top - 0.05, top + 0.5))
         stubs.append(massing.prism(bar, top + 0.45, top + 1.5))
     for edge in range(4):
         wall = details.WallFrame(plan, edge)
+        for z in (p.storey + 0.5, p.storey + 1.0):
+            rail = (0.05, wall.length - 0.05, -0.08, -0.03)
+            pieces.append(wall.box(*rail, z, z + 0.06))
         for u in np.linspace(0.1, wall.length - 0.1, 6).tolist():
             post = (u - 0.03, u + 0.03, -0.09, -0.03)
-            stubs.append(wall.place(massing.box(*post, top, top + 1.1)))
+            stubs.append(wall.box(*post, top, top + 1.1))
+    group, step = _repeated(pieces, p.group, p.storey), p.group * p.storey
+    out.stack("frame", group, 0.0, step, p.storeys // p.group)
     out.add("stubs", *stubs)
 
 
 def _add_core(out: Assembly, p: Parameters, plan: np.ndarray) -> None:
     """Adds the core with its doorways and the form that climbs on it."""
-    (x0, y0), (x1, y1) = plan[0], plan[2]
+    x0, y0, x1, y1 = massing.extent(plan)
     x, y = (x0 + x1) / 2, (y0 + y1) / 2
     a, b = p.core[0] * (x1 - x0) / 2, p.core[1] * (y1 - y0) / 2
     core = np.round(massing.rectangle(x - a, y - b, x + a, y + b), 2)
-    door = bays.window(1.2, 0.05, 2.2, 0.35)
-    facade = Facade(
-        p.storey, (), bays.by_edge({0: bays.with_middle(bays.plain, door, 2.0),
-                                    2: bays.with_middle(bays.plain, door, 2.0)},
-                                   bays.plain),
-    ).stacked(p.storeys)  # fmt: skip
-    top = round(p.storeys * p.storey, 3)
-    pieces = [
+    door = bays.alone(bays.window(1.2, 0.05, 2.2, 0.35), 2.0)
+    layout = bays.by_edge({0: door, 2: door}, bays.plain)
+    facade = Facade(p.storey, (), layout).stacked(p.storeys)
+    top, high = round(p.storeys * p.storey, 3), p.height
+    out.add(
+        "core",
         facade_mesh(core, facade),
-        massing.skirt(core, core, top, p.height - 0.4),
-        massing.roof_pan(core, p.height - 2.0, p.height - 0.4, 0.3),
-    ]
-    out.add("core", *pieces)
+        massing.skirt(core, core, top, high - 0.4),
+        massing.roof_pan(core, high - 2.0, high - 0.4, 0.3),
+    )
     form = massing.inset(core, -0.3)
-    low = p.height - 2.6
-    panels = [
-        massing.skirt(form, form, low, p.height),
-        massing.flat(form, low, up=False),
-        massing.roof_pan(form, p.height - 0.6, p.height, 0.3),
-    ]
-    out.add("form", *panels, rgb=_TIMBER)
+    out.add(
+        "form",
+        massing.skirt(form, form, high - 2.6, high),
+        massing.flat(form, high - 2.6, up=False),
+        massing.roof_pan(form, high - 0.6, high, 0.3),
+        rgb=_TIMBER,
+    )
 
 
 def _add_cladding(out: Assembly, p: Parameters, plan: np.ndarray) -> None:
     """Adds the finished walls of the lower storeys."""
     outer = massing.inset(plan, -_CLADDING_M)
     head = round(p.storey - 0.5, 2)
-    length = max(np.ptp(plan, axis=0))
-    pitch = max(p.pitch / 2, length / 8)
-    facade = Facade(
-        p.storey,
-        (Band(0.0, 0.2, -0.08),),
-        bays.rhythm(pitch, [bays.window(pitch - 0.5, 0.7, head, 0.2)], 0.5),
-        (0.2,),
-    )
-    walls = [facade_mesh(outer, facade), _rim(plan, outer, 0.0, p.storey)]
-    groups, step = p.clad // p.group, p.group * p.storey
-    out.stack(
-        "cladding", _repeated(walls, p), 0.0, step, groups, rgb=p.clad_rgb
-    )
+    pitch = max(p.pitch / 2, max(np.ptp(plan, axis=0)) / 8)
+    rows = bays.rhythm(pitch, [bays.window(pitch - 0.5, 0.7, head, 0.2)], 0.5)
+    facade = Facade(p.storey, (Band(0.0, 0.2, -0.08),), rows, (0.2,))
+    # The panels' backs, seen from within, and their top edge.
+    backs = massing.skirt(plan[::-1], plan[::-1], 0.0, p.storey)
+    rim = massing.skirt(outer, plan, p.storey, p.storey)
+    walls = [facade_mesh(outer, facade), backs, rim]
     panes = [glass_mesh(outer, facade)]
-    out.stack(
-        "cladding_glass", _repeated(panes, p), 0.0, step, groups,
-        rgb=out.glass_rgb,
-    )  # fmt: skip
-    foot = massing.foundation(outer)
-    out.add("foot", foot, rgb=p.clad_rgb)
-
-
-def _rim(inner: np.ndarray, outer: np.ndarray, z0: float, z1: float) -> Mesh:
-    """The top edge of cladding panels, and their backs, seen from within."""
-    backs = massing.skirt(inner[::-1], inner[::-1], z0, z1)
-    return merge_meshes(backs, massing.skirt(outer, inner, z1, z1))
+    groups, step = p.clad // p.group, p.group * p.storey
+    for part, pieces, rgb in (
+        ("cladding", walls, p.clad_rgb),
+        ("cladding_glass", panes, out.glass_rgb),
+    ):
+        mesh = _repeated(pieces, p.group, p.storey)
+        out.stack(part, mesh, 0.0, step, groups, rgb=rgb)
+    out.add("foot", massing.foundation(outer), rgb=p.clad_rgb)
 
 
 def _add_props(out: Assembly, p: Parameters, plan: np.ndarray) -> None:
     """Adds props below the top slab, along the front and the back."""
-    (x0, y0), (x1, y1) = plan[0], plan[2]
+    x0, y0, x1, y1 = massing.extent(plan)
     low = (p.storeys - 1) * p.storey
     high = p.storeys * p.storey - _SLAB_M + 0.02
     props = []
     for x in np.linspace(x0 + 1.5, x1 - 1.5, max(3, round((x1 - x0) / 3.0))):
         for y in (y0 + 1.2, y1 - 1.2):
-            shaft = massing.regular_polygon(0.06, 4, (float(x), y))
+            shaft = massing.regular_polygon(0.06, 4, (x, y))
             props.append(massing.skirt(shaft, shaft, low - 0.02, high))
     out.add("props", *props, rgb=_STEEL)
 
@@ -222,34 +195,33 @@ def _add_scaffolds(out: Assembly, p: Parameters, plan: np.ndarray) -> None:
     lifts = max(2, int(p.scaffold_top * p.storey / _LIFT_M))
     per_group = -(-lifts // 6)
     groups = -(-lifts // per_group)
-    top = per_group * groups * _LIFT_M
-    rng = out.rng
+    lifts, rng = per_group * groups, out.rng
     levels, standards, nets = [], [], []
     for edge in p.scaffolds:
         wall = details.WallFrame(plan, edge)
         count = max(2, round((wall.length - 0.4) / max(2.8, wall.length / 11)))
-        xs = np.round(np.linspace(0.2, wall.length - 0.2, count + 1), 2)
-        levels.append(wall.place(_scaffold_level(xs.tolist())))
-        for x in xs.tolist():
+        xs = np.round(
+            np.linspace(0.2, wall.length - 0.2, count + 1), 2
+        ).tolist()
+        levels.append(wall.place(_scaffold_level(xs)))
+        for x in xs:
             for y in (0.6, 1.45):
-                pole = massing.rectangle(x - 0.04, y - 0.04, x + 0.04, y + 0.04)
-                mesh = massing.prism(pole, -massing.FOUNDATION_M, top + 0.9)
+                pole = massing.square(x, y, 0.04)
+                mesh = massing.prism(
+                    pole, -massing.FOUNDATION_M, lifts * _LIFT_M + 0.9
+                )
                 standards.append(wall.place(mesh))
-        for a, b in itertools.pairwise(xs.tolist()):
+        for a, b in itertools.pairwise(xs):
             if rng.random() < p.nets:
-                first = int(rng.integers(0, groups * per_group - 1))
-                last = int(out.rng.integers(first + 1, groups * per_group + 1))
+                first = int(rng.integers(0, lifts - 1))
+                last = int(rng.integers(first + 1, lifts + 1))
                 low, high = first * _LIFT_M + 0.2, last * _LIFT_M - 0.2
                 spot = (round(a + 0.05, 2), round(b - 0.05, 2), 1.56, 1.6)
-                nets.append(wall.place(massing.box(*spot, low, high)))
-    level = merge_meshes(*levels)
-    stack = merge_meshes(
-        *(level.moved((0.0, 0.0, k * _LIFT_M)) for k in range(per_group))
-    )
+                nets.append(wall.box(*spot, low, high))
+    stack = _repeated(levels, per_group, _LIFT_M)
     out.stack("scaffold", stack, 0.0, per_group * _LIFT_M, groups, rgb=_STEEL)
     out.add("standards", *standards, rgb=_STEEL)
-    if nets:
-        out.add("nets", *nets, rgb=p.net_rgb)
+    out.add("nets", *nets, rgb=p.net_rgb)
 
 
 def _scaffold_level(xs: list[float]) -> Mesh:
@@ -268,13 +240,13 @@ def _add_hoist(out: Assembly, p: Parameters, plan: np.ndarray) -> None:
     """Adds a hoist's mast and cage at the back."""
     wall = details.WallFrame(plan, 2)
     x, top = 0.5 * wall.length, p.storeys * p.storey - 1.0
-    pieces = []
-    for u in (x - 0.3, x + 0.3):
-        for v in (0.3, 0.9):
-            pieces.append(massing.post(u, v, 0.05, top))
+    pieces = [
+        wall.standing(u - 0.05, u + 0.05, v - 0.05, v + 0.05, top)
+        for u in (x - 0.3, x + 0.3)
+        for v in (0.3, 0.9)
+    ]
     for z in np.arange(1.0, top, 4.5).tolist():
-        pieces.append(massing.box(x - 0.3, x + 0.3, -0.05, 0.92, z, z + 0.08))
+        pieces.append(wall.box(x - 0.3, x + 0.3, -0.05, 0.92, z, z + 0.08))
     z = round(0.55 * top, 1)
-    cage = massing.box(x + 0.4, x + 1.9, 0.15, 1.35, z, z + 2.4)
-    mesh = merge_meshes(*(wall.place(piece) for piece in (*pieces, cage)))
-    out.add("hoist", mesh, rgb=(0.80, 0.62, 0.16))
+    cage = wall.box(x + 0.4, x + 1.9, 0.15, 1.35, z, z + 2.4)
+    out.add("hoist", *pieces, cage, rgb=(0.80, 0.62, 0.16))
