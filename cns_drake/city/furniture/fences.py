@@ -115,7 +115,7 @@ def run(
                 rgb=colour,
             )
         )
-    return assemble(parts, meshes)
+    return assemble(*parts, meshes=meshes)
 
 
 @cache

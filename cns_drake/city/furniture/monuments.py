@@ -38,7 +38,8 @@ def statue(rng: np.random.Generator) -> Model:
         ),
     )
     return assemble(
-        parts, {"statue_pedestal": _pedestal(), "statue_figure": _figure()}
+        *parts,
+        meshes={"statue_pedestal": _pedestal(), "statue_figure": _figure()},
     )
 
 
@@ -56,7 +57,7 @@ def obelisk(rng: np.random.Generator, *, height: float | None = None) -> Model:
     parts = (
         Part("body", MeshShape("obelisk", (wide, wide, tall)), rgb=_STONE),
     )
-    return assemble(parts, {"obelisk": _obelisk()})
+    return assemble(*parts, meshes={"obelisk": _obelisk()})
 
 
 def fountain(rng: np.random.Generator, *, radius: float | None = None) -> Model:
@@ -75,7 +76,9 @@ def fountain(rng: np.random.Generator, *, radius: float | None = None) -> Model:
         Part("water", MeshShape("fountain_water", scale), rgb=_WATER),
     )
     stone, water = _fountain()
-    return assemble(parts, {"fountain_stone": stone, "fountain_water": water})
+    return assemble(
+        *parts, meshes={"fountain_stone": stone, "fountain_water": water}
+    )
 
 
 def flag_poles(
@@ -104,7 +107,7 @@ def flag_poles(
                 rgb=tuple(rng.uniform(0.15, 0.85, 3).round(3).tolist()),
             ),
         ]
-    return assemble(parts, {"flag": _flag()})
+    return assemble(*parts, meshes={"flag": _flag()})
 
 
 @cache

@@ -7,7 +7,7 @@ from functools import cache, partial
 import numpy as np
 
 from cns_drake.city.furniture.car_bodies import CarForm, car_meshes
-from cns_drake.city.geometry.mesh import Mesh, box_mesh, merge_meshes
+from cns_drake.city.geometry.mesh import Mesh, box_mesh, boxes, merge_meshes
 from cns_drake.city.geometry.object_parts import Builder, assemble, triple
 from cns_drake.city.geometry.structures import MeshShape, Model, Part
 
@@ -136,7 +136,7 @@ def car(rng: np.random.Generator, *, form: str) -> Model:
         )
         for name in meshes
     ]
-    return assemble(parts, meshes)
+    return assemble(*parts, meshes=meshes)
 
 
 @cache
@@ -152,10 +152,8 @@ def vehicle_meshes(form: str) -> dict[str, Mesh]:
 def _truck_box() -> Mesh:
     """Returns the box body of a small truck with its frame and doors."""
     pieces = [box_mesh((4.1, 2.2, 2.1), (-1.2, 0, 1.95))]
-    pieces += [
-        box_mesh((0.08, 2.26, 2.16), (x, 0, 1.95)) for x in (-3.24, 0.84)
-    ]
-    pieces += [box_mesh((4.1, 2.26, 0.08), (-1.2, 0, z)) for z in (0.93, 3.0)]
+    pieces += boxes((0.08, 2.26, 2.16), (-3.24, 0.84), (0,), (1.95,))
+    pieces += boxes((4.1, 2.26, 0.08), (-1.2,), (0,), (0.93, 3.0))
     return merge_meshes(*pieces)
 
 

@@ -18,7 +18,7 @@ from cns_drake.city.geometry.lofts import (
     side_prism,
     tube,
 )
-from cns_drake.city.geometry.mesh import Mesh, box_mesh, merge_meshes
+from cns_drake.city.geometry.mesh import Mesh, box_mesh, boxes, merge_meshes
 from cns_drake.city.geometry.object_parts import (
     ROOT_DEPTH,
     Builder,
@@ -45,12 +45,10 @@ def bus_shelter(rng: np.random.Generator) -> Model:
     side = "left" if advert > 0 else "right"
     frame, panes = _shelter(advert)
     return assemble(
-        (
-            Part("frame", MeshShape(f"shelter_{side}_frame"), rgb=_DARK),
-            Part("panes", MeshShape(f"shelter_{side}_panes"), rgb=_GLASS),
-            post("stop", 0.03, 2.9, (0.9, -2.6 * scale[1]), _STEEL),
-        ),
-        {f"shelter_{side}_frame": frame, f"shelter_{side}_panes": panes},
+        Part("frame", MeshShape(f"shelter_{side}_frame"), rgb=_DARK),
+        Part("panes", MeshShape(f"shelter_{side}_panes"), rgb=_GLASS),
+        post("stop", 0.03, 2.9, (0.9, -2.6 * scale[1]), _STEEL),
+        meshes={f"shelter_{side}_frame": frame, f"shelter_{side}_panes": panes},
     )
 
 
@@ -76,7 +74,7 @@ def cafe_table(rng: np.random.Generator) -> Model:
         ),
     )
     return assemble(
-        parts, {"cafe_set": _cafe_set(), "cafe_umbrella": _umbrella()}
+        *parts, meshes={"cafe_set": _cafe_set(), "cafe_umbrella": _umbrella()}
     )
 
 
@@ -94,7 +92,9 @@ def market_stall(rng: np.random.Generator) -> Model:
         ),
     )
     stall, awning = _market_stall()
-    return assemble(parts, {"market_stall": stall, "market_awning": awning})
+    return assemble(
+        *parts, meshes={"market_stall": stall, "market_awning": awning}
+    )
 
 
 @cache
@@ -116,9 +116,7 @@ def _shelter(advert: float) -> tuple[Mesh, Mesh]:
         beam((-0.45, y, -0.1), (-0.45, y, 0.46), 0.05, 0.05)
         for y in (-1.2 * advert, 0.6 * advert)
     ]
-    panes = [
-        box_mesh((0.02, 1.24, 2.0), (-0.62, y, 1.35)) for y in (-1.28, 0, 1.28)
-    ]
+    panes = boxes((0.02, 1.24, 2.0), (-0.62,), (-1.28, 0, 1.28), (1.35,))
     panes.append(box_mesh((0.85, 0.02, 2.0), (-0.16, -1.95 * advert, 1.35)))
     return merge_meshes(*frame), merge_meshes(*panes)
 
@@ -203,11 +201,7 @@ def _phone_box() -> Mesh:
             ]
         ),
     ]
-    pieces += [
-        box_mesh((0.1, 0.1, 2.0), (x, y, 1.1))
-        for x in (-0.41, 0.41)
-        for y in (-0.41, 0.41)
-    ]
+    pieces += boxes((0.1, 0.1, 2.0), (-0.41, 0.41), (-0.41, 0.41), (1.1,))
     for z in (0.45, 0.95, 1.45, 1.85):
         pieces += [
             box_mesh((0.86, 0.74, 0.05), (0, 0, z)),

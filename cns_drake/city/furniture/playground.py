@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from cns_drake.city.geometry.lofts import beam, loft, rectangle, tube
-from cns_drake.city.geometry.mesh import Mesh, box_mesh, merge_meshes
+from cns_drake.city.geometry.mesh import Mesh, box_mesh, boxes, merge_meshes
 from cns_drake.city.geometry.object_parts import (
     ROOT_DEPTH,
     Builder,
@@ -28,14 +28,10 @@ def basketball_hoop(rng: np.random.Generator) -> Model:
     height = float(rng.uniform(3.4, 3.7))
     steel = (0.35, 0.37, 0.4)
     return assemble(
-        (
-            post("post", 0.07, height, rgb=steel),
-            block("arm", (0.9, 0.1, 0.1), (0.4, 0, height - 0.3), rgb=steel),
-            block(
-                "board", (0.05, 1.8, 1.05), (0.85, 0, height), rgb=_COLOURS[0]
-            ),
-            block("rim", (0.46, 0.46, 0.03), (1.12, 0, height - 0.4)),
-        )
+        post("post", 0.07, height, rgb=steel),
+        block("arm", (0.9, 0.1, 0.1), (0.4, 0, height - 0.3), rgb=steel),
+        block("board", (0.05, 1.8, 1.05), (0.85, 0, height), rgb=_COLOURS[0]),
+        block("rim", (0.46, 0.46, 0.03), (1.12, 0, height - 0.4)),
     )
 
 
@@ -99,10 +95,8 @@ def _slide() -> Mesh:
 @cache
 def _picnic_table() -> Mesh:
     """Returns a table with two benches along y."""
-    pieces = [
-        box_mesh((0.24, 1.8, 0.05), (x, 0, 0.75)) for x in (-0.26, 0, 0.26)
-    ]
-    pieces += [box_mesh((0.28, 1.8, 0.05), (x, 0, 0.45)) for x in (-0.7, 0.7)]
+    pieces = boxes((0.24, 1.8, 0.05), (-0.26, 0, 0.26), (0,), (0.75,))
+    pieces += boxes((0.28, 1.8, 0.05), (-0.7, 0.7), (0,), (0.45,))
     for y in (-0.6, 0.6):
         pieces += [
             beam((-0.6, y, 0.0), (-0.2, y, 0.73), 0.06, 0.1),

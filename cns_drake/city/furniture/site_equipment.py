@@ -14,7 +14,7 @@ from cns_drake.city.geometry.lofts import (
     loft,
     side_prism,
 )
-from cns_drake.city.geometry.mesh import Mesh, box_mesh, merge_meshes
+from cns_drake.city.geometry.mesh import Mesh, box_mesh, boxes, merge_meshes
 from cns_drake.city.geometry.object_parts import (
     Builder,
     assemble,
@@ -55,7 +55,7 @@ def site_cabin(rng: np.random.Generator, *, storeys: int = 1) -> Model:
         )
         for k in range(storeys)
     ]
-    return assemble(parts, {"site_cabin": _cabin()})
+    return assemble(*parts, meshes={"site_cabin": _cabin()})
 
 
 def skip(rng: np.random.Generator) -> Model:
@@ -70,7 +70,7 @@ def skip(rng: np.random.Generator) -> Model:
             rgb=_EARTH,
         ),
     )
-    return assemble(parts, {"skip_shell": _skip(), "heap": _heap()})
+    return assemble(*parts, meshes={"skip_shell": _skip(), "heap": _heap()})
 
 
 def soil_heap(rng: np.random.Generator) -> Model:
@@ -83,7 +83,7 @@ def soil_heap(rng: np.random.Generator) -> Model:
         rpy=(0.0, 0.0, round(float(rng.uniform(-3, 3)), 3)),
         rgb=(_EARTH, (0.72, 0.63, 0.46))[int(rng.integers(2))],
     )
-    return assemble((part,), {"heap": _heap()})
+    return assemble(part, meshes={"heap": _heap()})
 
 
 def brick_pallets(rng: np.random.Generator) -> Model:
@@ -103,7 +103,7 @@ def brick_pallets(rng: np.random.Generator) -> Model:
         )
         for k in range(count)
     ]
-    return assemble(parts, {"brick_pallet": _brick_pallet()})
+    return assemble(*parts, meshes={"brick_pallet": _brick_pallet()})
 
 
 def excavator(rng: np.random.Generator) -> Model:
@@ -120,7 +120,7 @@ def excavator(rng: np.random.Generator) -> Model:
         ),
     )
     return assemble(
-        parts, {"excavator_tracks": tracks, "excavator_upper": upper}
+        *parts, meshes={"excavator_tracks": tracks, "excavator_upper": upper}
     )
 
 
@@ -144,32 +144,19 @@ def traffic_cones(rng: np.random.Generator, *, count: int = 5) -> Model:
         )
         for k in range(count)
     ]
-    return assemble(parts, {"traffic_cone": _cone()})
+    return assemble(*parts, meshes={"traffic_cone": _cone()})
 
 
 @cache
 def _container() -> Mesh:
     """Returns a ribbed container along x, 6.06 m by 2.44 m by 2.59 m."""
     pieces = [box_mesh((5.96, 2.36, 2.49), (0, 0, 1.3))]
-    pieces += [
-        box_mesh((0.16, 0.16, 2.59), (x, y, 1.295))
-        for x in (-2.95, 2.95)
-        for y in (-1.14, 1.14)
-    ]
-    pieces += [
-        box_mesh((5.74, 0.12, 0.14), (0, y, z))
-        for y in (-1.16, 1.16)
-        for z in (0.07, 2.52)
-    ]
-    pieces += [
-        box_mesh((0.14, 0.05, 2.3), (x, y, 1.3))
-        for x in np.linspace(-2.6, 2.6, 14)
-        for y in (-1.195, 1.195)
-    ]
-    pieces += [
-        box_mesh((0.05, 0.05, 2.3), (3.0, y, 1.3))
-        for y in (-0.8, -0.35, 0.35, 0.8)
-    ]
+    posts, rungs = (-2.95, 2.95), np.linspace(-2.6, 2.6, 14).tolist()
+    pieces += boxes((0.16, 0.16, 2.59), posts, (-1.14, 1.14), (1.295,))
+    pieces += boxes((5.74, 0.12, 0.14), (0,), (-1.16, 1.16), (0.07, 2.52))
+    pieces += boxes((0.14, 0.05, 2.3), rungs, (-1.195, 1.195), (1.3,))
+    bars = (-0.8, -0.35, 0.35, 0.8)
+    pieces += boxes((0.05, 0.05, 2.3), (3.0,), bars, (1.3,))
     return merge_meshes(*pieces)
 
 
@@ -181,11 +168,7 @@ def _cabin() -> Mesh:
         box_mesh((6.06, 2.5, 0.12), (0, 0, 0.16)),
         box_mesh((6.06, 2.5, 0.14), (0, 0, 2.63)),
     ]
-    pieces += [
-        box_mesh((0.12, 0.12, 2.6), (x, y, 1.3))
-        for x in (-2.97, 2.97)
-        for y in (-1.19, 1.19)
-    ]
+    pieces += boxes((0.12, 0.12, 2.6), (-2.97, 2.97), (-1.19, 1.19), (1.3,))
     # Frames stand out, so that the panes between them look recessed.
     for x, width, low, high in (
         (-1.9, 1.4, 1.1, 2.1),
@@ -193,9 +176,7 @@ def _cabin() -> Mesh:
         (2.0, 0.95, 0.2, 2.2),
     ):
         middle, tall = (low + high) / 2, high - low
-        pieces += [
-            box_mesh((width, 0.1, 0.08), (x, 1.22, z)) for z in (low, high)
-        ]
+        pieces += boxes((width, 0.1, 0.08), (x,), (1.22,), (low, high))
         pieces += [
             box_mesh((0.08, 0.1, tall), (x + side * width / 2, 1.22, middle))
             for side in (-1, 1)
@@ -219,9 +200,7 @@ def _skip() -> Mesh:
         beam((side * 1.05, 0, 0.1), (side * 1.57, 0, 0.75), 1.7, 0.06)
         for side in (-1, 1)
     ]
-    ends += [
-        box_mesh((0.06, 1.7, 0.48), (side * 1.57, 0, 0.96)) for side in (-1, 1)
-    ]
+    ends += boxes((0.06, 1.7, 0.48), (-1.57, 1.57), (0,), (0.96,))
     rim = [box_mesh((3.3, 0.12, 0.08), (0, y, 1.2)) for y in (-0.85, 0.85)]
     floor = box_mesh((2.1, 1.7, 0.08), (0, 0, 0.09))
     return merge_meshes(*walls, *ends, *rim, floor)
@@ -272,9 +251,7 @@ def _pipe_stack() -> Mesh:
 @cache
 def _brick_pallet() -> Mesh:
     """Returns bricks on a pallet, 1.2 m by 1 m by 1.1 m."""
-    slats = [
-        box_mesh((1.2, 0.12, 0.12), (0, y, 0.06)) for y in (-0.44, 0, 0.44)
-    ]
+    slats = boxes((1.2, 0.12, 0.12), (0,), (-0.44, 0, 0.44), (0.06,))
     return merge_meshes(
         *slats,
         box_mesh((1.2, 1.0, 0.04), (0, 0, 0.14)),

@@ -18,7 +18,7 @@ from cns_drake.city.geometry.lofts import (
     side_prism,
     tube,
 )
-from cns_drake.city.geometry.mesh import Mesh, box_mesh, merge_meshes
+from cns_drake.city.geometry.mesh import Mesh, box_mesh, boxes, merge_meshes
 from cns_drake.city.geometry.object_parts import (
     ROOT_DEPTH,
     Builder,
@@ -57,7 +57,7 @@ def stone_bench(rng: np.random.Generator) -> Model:
         for k, side in enumerate((-1, 1))
     ]
     slab = block("seat", (0.5, length, 0.12), (0, 0, 0.46), rgb=_STONE)
-    return assemble((*feet, slab))
+    return assemble(*feet, slab)
 
 
 def recycling_bins(rng: np.random.Generator) -> Model:
@@ -74,14 +74,14 @@ def recycling_bins(rng: np.random.Generator) -> Model:
         )
         for k in range(count)
     ]
-    return assemble(parts, {"rubbish_container": _rubbish_container()})
+    return assemble(*parts, meshes={"rubbish_container": _rubbish_container()})
 
 
 def bollard(rng: np.random.Generator) -> Model:
     """Returns a bollard with a round head."""
     height = float(rng.uniform(0.8, 0.95))
     head = Part("head", SphereShape(0.08), xyz=(0.0, 0.0, height), rgb=_DARK)
-    return assemble((post("shaft", 0.06, height, rgb=_DARK), head))
+    return assemble(post("shaft", 0.06, height, rgb=_DARK), head)
 
 
 def bicycle_rack(rng: np.random.Generator) -> Model:
@@ -105,7 +105,7 @@ def bicycle_rack(rng: np.random.Generator) -> Model:
                     tuple(rng.uniform(0.15, 0.6, 3).round(3).tolist()),
                 )
             )
-    return assemble(parts, meshes)
+    return assemble(*parts, meshes=meshes)
 
 
 def bicycle(rng: np.random.Generator) -> Model:
@@ -118,10 +118,8 @@ def parking_meter(rng: np.random.Generator) -> Model:
     """Returns a parking meter on a post."""
     height = float(rng.uniform(1.15, 1.3))
     return assemble(
-        (
-            post("post", 0.035, height, rgb=_STEEL),
-            block("head", (0.16, 0.22, 0.36), (0, 0, height + 0.1), rgb=_DARK),
-        )
+        post("post", 0.035, height, rgb=_STEEL),
+        block("head", (0.16, 0.22, 0.36), (0, 0, height + 0.1), rgb=_DARK),
     )
 
 
@@ -129,16 +127,14 @@ def ticket_machine(rng: np.random.Generator) -> Model:
     """Returns a parking ticket machine with a small solar roof."""
     turn = float(rng.uniform(-0.1, 0.1))
     return assemble(
-        (
-            block(
-                "case",
-                (0.28, 0.36, 1.5 + ROOT_DEPTH),
-                (0, 0, (1.5 - ROOT_DEPTH) / 2),
-                turn,
-                (0.35, 0.4, 0.5),
-            ),
-            block("roof", (0.5, 0.46, 0.06), (0.05, 0, 1.56), turn, _DARK),
-        )
+        block(
+            "case",
+            (0.28, 0.36, 1.5 + ROOT_DEPTH),
+            (0, 0, (1.5 - ROOT_DEPTH) / 2),
+            turn,
+            (0.35, 0.4, 0.5),
+        ),
+        block("roof", (0.5, 0.46, 0.06), (0.05, 0, 1.56), turn, _DARK),
     )
 
 
@@ -155,15 +151,13 @@ def newspaper_boxes(rng: np.random.Generator) -> Model:
         )
         for k in range(count)
     ]
-    return assemble(parts, {"newspaper_box": _newspaper_box()})
+    return assemble(*parts, meshes={"newspaper_box": _newspaper_box()})
 
 
 @cache
 def _bench() -> Mesh:
     """Returns a bench 1.8 m long on two cast frames."""
-    pieces = [
-        box_mesh((0.11, 1.8, 0.04), (x, 0, 0.45)) for x in (0.16, 0.02, -0.12)
-    ]
+    pieces = boxes((0.11, 1.8, 0.04), (0.16, 0.02, -0.12), (0,), (0.45,))
     pieces += [
         beam((x, -0.9, z), (x, 0.9, z), 0.04, 0.11)
         for x, z in ((-0.24, 0.6), (-0.3, 0.76))
@@ -206,11 +200,7 @@ def _rubbish_container() -> Mesh:
         -0.68,
         0.68,
     )
-    wheels = [
-        box_mesh((0.16, 0.06, 0.2), (x, y, 0.1))
-        for x in (-0.3, 0.3)
-        for y in (-0.5, 0.5)
-    ]
+    wheels = boxes((0.16, 0.06, 0.2), (-0.3, 0.3), (-0.5, 0.5), (0.1,))
     return merge_meshes(body, lid, *wheels)
 
 

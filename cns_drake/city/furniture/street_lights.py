@@ -53,7 +53,7 @@ def straight_lamp(
         ]
     if arms == 2:
         parts.pop(0)
-    return assemble(parts)
+    return assemble(*parts)
 
 
 def curved_lamp(
@@ -83,7 +83,7 @@ def curved_lamp(
                 rgb=_DARK,
             )
         )
-    return assemble(parts, {"lamp_curved_arm": _curved_arm()})
+    return assemble(*parts, meshes={"lamp_curved_arm": _curved_arm()})
 
 
 def lantern(rng: np.random.Generator, *, height: float | None = None) -> Model:
@@ -105,7 +105,7 @@ def lantern(rng: np.random.Generator, *, height: float | None = None) -> Model:
             rgb=_LAMP,
         ),
     )
-    return assemble(parts, {"lamp_lantern": _lantern_head()})
+    return assemble(*parts, meshes={"lamp_lantern": _lantern_head()})
 
 
 @cache

@@ -81,7 +81,7 @@ def tower_crane(
         bar("rope", at(trolley, hook), at(trolley, top + 0.6), 0.04),
         block("hook", (0.4, 0.5, 0.9), at(trolley, hook), heading, _YELLOW),
     ]
-    return assemble(parts, {
+    return assemble(*parts, meshes={
         "crane_mast": _mast(),
         "crane_jib": _jib(),
         "crane_cab": _cab(),

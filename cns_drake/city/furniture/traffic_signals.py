@@ -55,7 +55,7 @@ def mast_arm_light(
         Part("signal_1", head, xyz=(0.45 * arm, 0.1, height - 0.4), rgb=_BLACK),
         Part("signal_2", head, xyz=(0.0, 0.15, 3.0), rgb=_BLACK),
     )
-    return assemble(parts, {"signal_head_3": _signal_head(3)})
+    return assemble(*parts, meshes={"signal_head_3": _signal_head(3)})
 
 
 def post_light(rng: np.random.Generator) -> Model:
@@ -77,7 +77,7 @@ def _light(mast: Part, lamps: int, z: float, *others: Part) -> Model:
     """Returns a head of `lamps` at a mast, its middle at height z [m]."""
     name = f"signal_head_{lamps}"
     head = Part("signal", MeshShape(name), xyz=(0.0, 0.1, z), rgb=_BLACK)
-    return assemble((mast, head, *others), {name: _signal_head(lamps)})
+    return assemble(mast, head, *others, meshes={name: _signal_head(lamps)})
 
 
 def round_sign(rng: np.random.Generator) -> Model:
@@ -111,7 +111,9 @@ def _sign(
 ) -> Model:
     """Returns a plate on a mast, its middle `drop` below the top [m]."""
     plate = Part("plate", shape, (0.05, 0.0, height - drop), rpy, rgb)
-    return assemble((post("mast", 0.035, height, rgb=_STEEL), plate), meshes)
+    return assemble(
+        post("mast", 0.035, height, rgb=_STEEL), plate, meshes=meshes
+    )
 
 
 def rectangular_sign(rng: np.random.Generator) -> Model:
@@ -120,15 +122,13 @@ def rectangular_sign(rng: np.random.Generator) -> Model:
     width = float(rng.uniform(0.45, 0.65))
     tall = float(rng.uniform(0.6, 0.9))
     return assemble(
-        (
-            post("mast", 0.035, height, rgb=_STEEL),
-            block(
-                "plate",
-                (0.03, width, tall),
-                (0.05, 0, height - 0.5 * tall),
-                rgb=(_BLUE, _WHITE)[int(rng.integers(2))],
-            ),
-        )
+        post("mast", 0.035, height, rgb=_STEEL),
+        block(
+            "plate",
+            (0.03, width, tall),
+            (0.05, 0, height - 0.5 * tall),
+            rgb=(_BLUE, _WHITE)[int(rng.integers(2))],
+        ),
     )
 
 
@@ -136,18 +136,14 @@ def street_name_sign(rng: np.random.Generator) -> Model:
     """Returns two crossed street name blades on a post."""
     height = float(rng.uniform(3.0, 3.3))
     return assemble(
-        (
-            post("mast", 0.03, height, rgb=_STEEL),
-            block(
-                "blade_x", (1.1, 0.03, 0.22), (0.4, 0, height - 0.12), rgb=_BLUE
-            ),
-            block(
-                "blade_y",
-                (0.03, 1.0, 0.22),
-                (0, 0.35, height - 0.36),
-                rgb=_BLUE,
-            ),
-        )
+        post("mast", 0.03, height, rgb=_STEEL),
+        block("blade_x", (1.1, 0.03, 0.22), (0.4, 0, height - 0.12), rgb=_BLUE),
+        block(
+            "blade_y",
+            (0.03, 1.0, 0.22),
+            (0, 0.35, height - 0.36),
+            rgb=_BLUE,
+        ),
     )
 
 
@@ -157,11 +153,9 @@ def direction_board(rng: np.random.Generator) -> Model:
     height = 4.6
     side = 0.35 * width
     return assemble(
-        (
-            post("mast_0", 0.06, height, (0.0, side), _STEEL),
-            post("mast_1", 0.06, height, (0.0, -side), _STEEL),
-            block("plate", (0.05, width, 1.7), (0.09, 0, 3.75), rgb=_BLUE),
-        )
+        post("mast_0", 0.06, height, (0.0, side), _STEEL),
+        post("mast_1", 0.06, height, (0.0, -side), _STEEL),
+        block("plate", (0.05, width, 1.7), (0.09, 0, 3.75), rgb=_BLUE),
     )
 
 

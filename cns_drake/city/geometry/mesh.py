@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+import itertools
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -96,3 +98,13 @@ def box_mesh(size: ArrayLike, center: ArrayLike = (0.0, 0.0, 0.0)) -> Mesh:
         (1, 3, 7, 5),
     )
     return Mesh(corners * half + np.asarray(center), faces)
+
+
+def boxes(
+    size: ArrayLike,
+    xs: Sequence[float],
+    ys: Sequence[float],
+    zs: Sequence[float],
+) -> list[Mesh]:
+    """Returns equal boxes about all points of a grid [m]."""
+    return [box_mesh(size, point) for point in itertools.product(xs, ys, zs)]

@@ -108,7 +108,7 @@ def single(
 ) -> Model:
     """Returns a model of one mesh."""
     part = Part("body", MeshShape(mesh_name, scale), rgb=rgb)
-    return assemble((part,), {mesh_name: mesh})
+    return assemble(part, meshes={mesh_name: mesh})
 
 
 def one_mesh(
@@ -145,15 +145,13 @@ def triple(values: Iterable[float]) -> tuple[float, float, float]:
     return float(x), float(y), float(z)
 
 
-def assemble(
-    parts: Sequence[Part], meshes: Mapping[str, Mesh] | None = None
-) -> Model:
+def assemble(*parts: Part, meshes: Mapping[str, Mesh] | None = None) -> Model:
     """Returns the model of some parts; its footprint comes from them.
 
     The footprint is the convex hull of all geometry below `HEADROOM`.
     """
     meshes = dict(meshes or {})
-    return Model(tuple(parts), meshes, ground_footprint(parts, meshes))
+    return Model(parts, meshes, ground_footprint(parts, meshes))
 
 
 def ground_footprint(

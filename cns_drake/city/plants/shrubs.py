@@ -8,7 +8,7 @@ import string
 import numpy as np
 
 from cns_drake.city.geometry.lofts import lathe, loft, rectangle, tube
-from cns_drake.city.geometry.mesh import Mesh, box_mesh, merge_meshes
+from cns_drake.city.geometry.mesh import Mesh, box_mesh, boxes, merge_meshes
 from cns_drake.city.geometry.object_parts import (
     ROOT_DEPTH,
     Builder,
@@ -34,7 +34,7 @@ def shrub(rng: np.random.Generator, *, height: float | None = None) -> Model:
     name, mesh = _draw_shrub(rng)
     across = height**0.8 * rng.uniform(0.85, 1.2, 2)
     part = _leafy(rng, "leaves", name, (*across, height), (0.0, 0.0, 0.0))
-    return assemble((part,), {name: mesh})
+    return assemble(part, meshes={name: mesh})
 
 
 def flower_bed(
@@ -58,8 +58,11 @@ def flower_bed(
         ),
     )
     return assemble(
-        parts,
-        {"flower_bed_edge": _bed_edge(), "flower_bed_plants": _bed_plants()},
+        *parts,
+        meshes={
+            "flower_bed_edge": _bed_edge(),
+            "flower_bed_plants": _bed_plants(),
+        },
     )
 
 
@@ -69,17 +72,15 @@ def round_planter(rng: np.random.Generator) -> Model:
     name, mesh = _draw_shrub(rng)
     tall = float(rng.uniform(0.7, 1.1))
     return assemble(
-        (
-            Part("pot", MeshShape("round_pot", (size, size, size)), rgb=_STONE),
-            _leafy(
-                rng,
-                "leaves",
-                name,
-                (0.75 * size, 0.75 * size, tall),
-                (0.0, 0.0, round(0.5 * size, 3)),
-            ),
+        Part("pot", MeshShape("round_pot", (size, size, size)), rgb=_STONE),
+        _leafy(
+            rng,
+            "leaves",
+            name,
+            (0.75 * size, 0.75 * size, tall),
+            (0.0, 0.0, round(0.5 * size, 3)),
         ),
-        {"round_pot": _round_pot(), name: mesh},
+        meshes={"round_pot": _round_pot(), name: mesh},
     )
 
 
@@ -111,7 +112,7 @@ def box_planter(
         parts.append(
             _leafy(rng, f"leaves_{k}", name, (0.6, 0.55, tall), (x, 0.0, 0.45))
         )
-    return assemble(parts, meshes)
+    return assemble(*parts, meshes=meshes)
 
 
 def _draw_shrub(rng: np.random.Generator) -> tuple[str, Mesh]:
@@ -158,14 +159,9 @@ def _shrub(variant: int) -> Mesh:
 @cache
 def _bed_edge() -> Mesh:
     """Returns a kerb around earth, 4 m by 1.5 m."""
-    pieces = [
-        box_mesh((4.0, 0.1, 0.15 + ROOT_DEPTH), (0, y, 0.075 - ROOT_DEPTH / 2))
-        for y in (-0.7, 0.7)
-    ]
-    pieces += [
-        box_mesh((0.1, 1.3, 0.15 + ROOT_DEPTH), (x, 0, 0.075 - ROOT_DEPTH / 2))
-        for x in (-1.95, 1.95)
-    ]
+    tall, z = 0.15 + ROOT_DEPTH, 0.075 - ROOT_DEPTH / 2
+    pieces = boxes((4.0, 0.1, tall), (0,), (-0.7, 0.7), (z,))
+    pieces += boxes((0.1, 1.3, tall), (-1.95, 1.95), (0,), (z,))
     pieces.append(box_mesh((3.8, 1.3, 0.2), (0, 0, 0.0)))
     return merge_meshes(*pieces)
 
@@ -206,9 +202,8 @@ def _planter_box() -> Mesh:
             for x, y, z in ((0.92, 0.28, -0.02), (0.98, 0.33, 0.5))
         ]
     )
-    rim = [box_mesh((2.0, 0.06, 0.08), (0, y, 0.54)) for y in (-0.32, 0.32)] + [
-        box_mesh((0.06, 0.58, 0.08), (x, 0, 0.54)) for x in (-0.97, 0.97)
-    ]
+    rim = boxes((2.0, 0.06, 0.08), (0,), (-0.32, 0.32), (0.54,))
+    rim += boxes((0.06, 0.58, 0.08), (-0.97, 0.97), (0,), (0.54,))
     return merge_meshes(body, *rim)
 
 

@@ -71,7 +71,7 @@ def tree(
             rgb=triple(round(float(c), 3) for c in rgb),
         ),
     )
-    return assemble(parts, meshes)
+    return assemble(*parts, meshes=meshes)
 
 
 TREES = {

@@ -51,14 +51,14 @@ def test_footprint_ignores_what_hangs_above_the_headroom():
     mast = post("mast", 0.1, 5.0)
     high = block("sign", (3.0, 3.0, 0.5), (2.0, 0.0, HEADROOM + 0.26))
     low = block("sign", (3.0, 3.0, 0.5), (2.0, 0.0, HEADROOM + 0.24))
-    assert assemble((mast, high)).footprint.bounds[2] < 0.2
-    assert assemble((mast, low)).footprint.bounds[2] > 3.5
+    assert assemble(mast, high).footprint.bounds[2] < 0.2
+    assert assemble(mast, low).footprint.bounds[2] > 3.5
 
 
 def test_footprint_cuts_a_slanted_part_at_the_headroom():
     # From the ground to twice the headroom: half of it counts.
     lean = bar("lean", (0, 0, 0), (4.0, 0, 2 * HEADROOM), 0.001)
-    assert assemble((lean,)).footprint.bounds[2] == pytest.approx(2.0, abs=0.03)
+    assert assemble(lean).footprint.bounds[2] == pytest.approx(2.0, abs=0.03)
 
 
 def test_footprint_holds_round_shapes_and_scaled_turned_meshes():
@@ -73,7 +73,7 @@ def test_footprint_holds_round_shapes_and_scaled_turned_meshes():
         ),
     )
     meshes = {"crate": box_mesh((1.0, 1.0, 0.4))}
-    footprint = assemble(parts, meshes).footprint
+    footprint = assemble(*parts, meshes=meshes).footprint
     rng = np.random.default_rng(6)
     for part in parts:
         points = surface_points(part, meshes, rng, 500)

@@ -21,7 +21,6 @@ from cns_drake.city.geometry.mesh import Mesh
 
 _STUCCOS = ((0.84, 0.78, 0.66), (0.76, 0.66, 0.56), (0.82, 0.80, 0.76))
 
-
 _ROOF_ITEMS = ("stair_house", "skylight", "vents", "ac_unit")
 
 

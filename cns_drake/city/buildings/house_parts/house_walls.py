@@ -20,14 +20,8 @@ def sash(
     width: float, z: float, sill: float, head: float, bars: int = 0
 ) -> bays.Bay:
     """A window of a storey whose floor is at z; sill and head above it."""
-    return bays.window(
-        width,
-        round(z + sill, 2),
-        round(z + head, 2),
-        GLASS_M,
-        mullions=bars,
-        pier=0.25,
-    )
+    low, high = round(z + sill, 2), round(z + head, 2)
+    return bays.window(width, low, high, GLASS_M, mullions=bars, pier=0.25)
 
 
 def add_rows(

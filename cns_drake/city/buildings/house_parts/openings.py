@@ -134,13 +134,8 @@ class Openings:
             material: of the walls.
         """
         wing = self._wing
-        facade = Facade(
-            wing.wall_top,
-            tuple(bands),
-            self.layout,
-            tuple(glass),
-            plain=wing.blind,
-        )
+        bands, glass = tuple(bands), tuple(glass)
+        facade = Facade(wing.wall_top, bands, self.layout, glass, wing.blind)
         outline = wing.outline
         out.add_to(
             material, massing.foundation(outline), facade_mesh(outline, facade)

@@ -203,11 +203,7 @@ def _add_ridge(out: Assembly, p: Parameters, main: Wing) -> None:
             x += 0.8 * share * main.width
         out.add_to("walls", massing.post(x, y, 0.45, z + 0.3, z - 0.6))
         eaves = massing.square(x, y, 0.65)
-        out.add_to(
-            "roof",
-            massing.flat(eaves, z + 0.3, up=False),
-            massing.spire(eaves, (x, y), z + 0.3, z + 0.7),
-        )
+        out.add_to("roof", massing.tent(eaves, (x, y), z + 0.3, z + 0.7))
 
 
 def _add_jetty(out: Assembly, xs: bays.Span, y0: float, front: float) -> None:

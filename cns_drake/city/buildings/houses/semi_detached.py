@@ -111,13 +111,14 @@ def _gabled_bays(p: Parameters, main: Wing) -> tuple[Wing, ...]:
     top = main.wall_top + ROOF_M + rise
     shape = Roof("gable", True, 0.2, 0.25, ROOF_M)
     middle = (main.y0 + main.y1) / 2
-    return tuple(
-        Wing.at(
-            main.x0 + x - width / 2, main.y0 - p.bay_reach,
-            main.x0 + x + width / 2, middle, main.wall_top, top, shape,
-        )
+    fronts = (
+        (main.x0 + x - width / 2, main.x0 + x + width / 2)
         for x in _middles(p, main)
-    )  # fmt: skip
+    )
+    y0 = main.y0 - p.bay_reach
+    return tuple(
+        Wing.at(a, y0, b, middle, main.wall_top, top, shape) for a, b in fronts
+    )
 
 
 def _add_entrances(

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cns_drake.city.buildings.parts import bays, massing
-from cns_drake.city.geometry.mesh import Mesh, box_mesh, merge_meshes
+from cns_drake.city.geometry.mesh import Mesh, box_mesh, boxes, merge_meshes
 
 # Height that the shared flight of fire stairs climbs; parts scale it [m].
 FIRE_STAIRS_STOREY_M = 3.4
@@ -214,10 +214,8 @@ def pilasters(
     for edge in range(len(np.asarray(outline))):
         wall = WallFrame(outline, edge)
         cells = bays.stretches(wall.length, pitch, margin)
-        if edge in skip or len(cells) < 3:
-            continue
-        for k, (x, _) in enumerate(cells):
-            if k % every == 0 and k > 0:
+        if edge not in skip and len(cells) > 2:
+            for x, _ in cells[every::every]:
                 pier = _pier(round(x, 2), width, 0.02, reach, z0, z1)
                 pieces.append(wall.place(pier))
     return merge_meshes(*pieces)
@@ -301,17 +299,12 @@ def fire_stairs_flight() -> Mesh:
     flight up to the next one at z = `FIRE_STAIRS_STOREY_M`.
     """
     length, reach, high = 4.0, 1.1, FIRE_STAIRS_STOREY_M
+    end, middle = length / 2, -reach / 2
     bars = [
-        box_mesh((length, reach, 0.08), (0.0, -reach / 2, 0.0)),
-        *(box_mesh((length, 0.05, 0.06), (0.0, -reach, z)) for z in (0.5, 1.0)),
-        *(
-            box_mesh((0.05, reach, 0.06), (x, -reach / 2, 1.0))
-            for x in (-length / 2, length / 2)
-        ),
-        *(
-            box_mesh((0.06, 0.06, 1.0), (x, -reach, 0.5))
-            for x in (-length / 2, 0.0, length / 2)
-        ),
+        box_mesh((length, reach, 0.08), (0.0, middle, 0.0)),
+        *boxes((length, 0.05, 0.06), (0.0,), (-reach,), (0.5, 1.0)),
+        *boxes((0.05, reach, 0.06), (-end, end), (middle,), (1.0,)),
+        *boxes((0.06, 0.06, 1.0), (-end, 0.0, end), (-reach,), (0.5,)),
     ]
     bars += [
         beam((-1.6, y, 0.0), (1.4, y, high), 0.12)

@@ -143,9 +143,12 @@ def flat(points: ArrayLike, z: float, *, up: bool = True) -> Mesh:
         faces = _ears(points)
     if not up:
         faces = [face[::-1] for face in faces]
-    return Mesh(
-        np.column_stack([points, np.full(len(points), z)]), tuple(faces)
-    )
+    return Mesh(_at(points, z), tuple(faces))
+
+
+def _at(points: np.ndarray, z: float | np.ndarray) -> np.ndarray:
+    """Returns an outline's corners at one height, or each at its own."""
+    return np.column_stack([points, np.broadcast_to(z, len(points))])
 
 
 def _turns(points: np.ndarray) -> np.ndarray:
@@ -200,12 +203,7 @@ def skirt(lower: ArrayLike, upper: ArrayLike, z0: float, z1: float) -> Mesh:
     """
     lower, upper = np.asarray(lower, float), np.asarray(upper, float)
     n = len(lower)
-    vertices = np.vstack(
-        [
-            np.column_stack([lower, np.full(n, z0)]),
-            np.column_stack([upper, np.full(n, z1)]),
-        ]
-    )
+    vertices = np.vstack([_at(lower, z0), _at(upper, z1)])
     faces = []
     for k in range(n):
         m = (k + 1) % n
@@ -247,12 +245,7 @@ def sloped_prism(
     share = (y - y.min()) / (y.max() - y.min())
     top = flat(points, 0.0)
     z1 = z0 + height * (low + (1.0 - low) * share)
-    vertices = np.vstack(
-        [
-            np.column_stack([points, np.full(n, z0)]),
-            np.column_stack([points, z1]),
-        ]
-    )
+    vertices = np.vstack([_at(points, z0), _at(points, z1)])
     walls = tuple((k, (k + 1) % n, n + (k + 1) % n, n + k) for k in range(n))
     roof = tuple(tuple(n + i for i in face) for face in top.faces)
     return Mesh(vertices, (*walls, *roof))
@@ -263,8 +256,13 @@ def spire(points: ArrayLike, tip: ArrayLike, z0: float, z1: float) -> Mesh:
     points = np.asarray(points, dtype=float)
     n = len(points)
     apex = [*np.asarray(tip, dtype=float), z1]
-    vertices = np.vstack([np.column_stack([points, np.full(n, z0)]), apex])
+    vertices = np.vstack([_at(points, z0), apex])
     return Mesh(vertices, tuple((k, (k + 1) % n, n) for k in range(n)))
+
+
+def tent(eaves: ArrayLike, tip: ArrayLike, z0: float, z1: float) -> Mesh:
+    """Returns a pyramid that is closed below."""
+    return merge_meshes(flat(eaves, z0, up=False), spire(eaves, tip, z0, z1))
 
 
 def revolved(

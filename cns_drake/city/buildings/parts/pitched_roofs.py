@@ -195,12 +195,8 @@ def hip(
         fascia: height of the upright edge [m].
     """
     outer = massing.inset(outline, -np.asarray(eaves))
-    ridge = _ridge(outer)
-    return merge_meshes(
-        massing.flat(outer, z, up=False),
-        massing.skirt(outer, outer, z, z + fascia),
-        massing.skirt(outer, ridge, z + fascia, top),
-    )
+    slopes = massing.skirt(outer, _ridge(outer), z + fascia, top)
+    return merge_meshes(*_boxed_eaves(outer, z, fascia), slopes)
 
 
 def mansard(
@@ -222,13 +218,15 @@ def mansard(
     """
     outer, fascia = massing.inset(outline, -eaves), 0.3
     bend = massing.inset(outline, run)
-    ridge = _ridge(bend)
-    return merge_meshes(
-        massing.flat(outer, z, up=False),
-        massing.skirt(outer, outer, z, z + fascia),
-        massing.skirt(outer, bend, z + fascia, knee),
-        massing.skirt(bend, ridge, knee, top),
-    )
+    steep = massing.skirt(outer, bend, z + fascia, knee)
+    slopes = massing.skirt(bend, _ridge(bend), knee, top)
+    return merge_meshes(*_boxed_eaves(outer, z, fascia), steep, slopes)
+
+
+def _boxed_eaves(outer: np.ndarray, z: float, fascia: float) -> list[Mesh]:
+    """Returns the underside of the eaves and their upright edge."""
+    edge = massing.skirt(outer, outer, z, z + fascia)
+    return [massing.flat(outer, z, up=False), edge]
 
 
 def _ridge(rectangle: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ from shapely.geometry import Point, Polygon
 
 from cns_drake.city.buildings.parts import massing
 from cns_drake.city.buildings.parts.site import Assembly, Rgb
-from cns_drake.city.geometry.mesh import Mesh, box_mesh, merge_meshes
+from cns_drake.city.geometry.mesh import Mesh, box_mesh, boxes, merge_meshes
 from cns_drake.city.geometry.structures import MeshShape
 
 
@@ -24,7 +24,7 @@ def _ac_unit() -> Mesh:
         massing.prism(massing.regular_polygon(0.42, 8, (x, 0.0)), 1.3, 1.5)
         for x in (-0.6, 0.6)
     ]
-    skids = [box_mesh((2.6, 0.15, 0.25), (0.0, y, 0.125)) for y in (-0.5, 0.5)]
+    skids = boxes((2.6, 0.15, 0.25), (0.0,), (-0.5, 0.5), (0.125,))
     return merge_meshes(box_mesh((2.4, 1.4, 1.1), (0, 0, 0.75)), *fans, *skids)
 
 
@@ -42,11 +42,7 @@ def _air_handler() -> Mesh:
 
 def _cooling_tower() -> Mesh:
     ring = massing.regular_polygon(1.1, 10)
-    legs = (
-        box_mesh((0.2, 0.2, 0.4), (x, y, 0.2))
-        for x in (-1.2, 1.2)
-        for y in (-1.2, 1.2)
-    )
+    legs = boxes((0.2, 0.2, 0.4), (-1.2, 1.2), (-1.2, 1.2), (0.2,))
     foot, head = massing.square(0.0, 0.0, 1.3), massing.square(0.0, 0.0, 1.15)
     return merge_meshes(
         box_mesh((2.8, 2.8, 0.3), (0, 0, 0.55)),
@@ -61,15 +57,11 @@ def _water_tower() -> Mesh:
     """A barrel under a cone on four braced legs."""
     barrel = massing.regular_polygon(1.9, 12)
     eaves = massing.regular_polygon(2.1, 12)
-    h = 1.15
-    legs = [
-        box_mesh((0.22, 0.22, 3.6), (x, y, 1.8))
-        for x in (-h, h)
-        for y in (-h, h)
-    ]
+    sides = (-1.15, 1.15)
+    legs = boxes((0.22, 0.22, 3.6), sides, sides, (1.8,))
     for z in (1.2, 2.4):
-        legs += [box_mesh((2.3, 0.1, 0.14), (0, y, z)) for y in (-h, h)]
-        legs += [box_mesh((0.1, 2.3, 0.14), (x, 0, z)) for x in (-h, h)]
+        legs += boxes((2.3, 0.1, 0.14), (0,), sides, (z,))
+        legs += boxes((0.1, 2.3, 0.14), sides, (0,), (z,))
     return merge_meshes(
         *legs,
         box_mesh((3.2, 3.2, 0.25), (0, 0, 3.6)),

@@ -64,13 +64,10 @@ class Site:
         outline = self.outline
         ends = np.roll(outline, -1, axis=0)
         lengths = np.linalg.norm(ends - outline, axis=1)
-        return float(
-            sum(
-                length
-                for k, length in enumerate(lengths)
-                if k not in self.blind_edges
-            )
+        open_edges = (
+            k for k in range(len(lengths)) if k not in self.blind_edges
         )
+        return float(sum(lengths[k] for k in open_edges))
 
     @property
     def free_corners(self) -> list[int]:

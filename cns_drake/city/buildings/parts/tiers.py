@@ -172,32 +172,17 @@ def add_grooved(
     top = add_storeys(out, outline, facade, z0, groups, per_group, part=part)
     pieces, into = [], depth + 0.05
     if wall.corner > 0:
+        size = (wall.corner, wall.reach, into)
         pieces.append(
-            details.corner_piers(
-                outline,
-                wall.corner,
-                wall.reach,
-                into,
-                z0,
-                top + rise,
-                skip=plain,
-            )
+            details.corner_piers(outline, *size, z0, top + rise, plain)
         )
     if wall.width > 0:
         margin = max(wall.corner + wall.pitch - wall.width, into + wall.width)
-        pieces.append(
-            details.piers(
-                outline,
-                wall.pitch,
-                wall.width,
-                wall.reach,
-                z0,
-                top + rise,
-                depth=into,
-                margin=margin,
-                skip=plain,
-            )
-        )
+        piers = details.piers(
+            outline, wall.pitch, wall.width, wall.reach, z0, top + rise,
+            depth=into, margin=margin, skip=plain,
+        )  # fmt: skip
+        pieces.append(piers)
     if pieces:
         out.add(f"{part}_piers", *pieces)
     return top

@@ -278,13 +278,9 @@ def attic_window(
         first = (a + b) / 2 - step * (count - 1) / 2
         return [
             Hole(
-                round(first + k * step - width / 2, 2),
-                round(first + k * step + width / 2, 2),
-                z0,
-                z1,
-                depth,
+                round(x - width / 2, 2), round(x + width / 2, 2), z0, z1, depth
             )
-            for k in range(count)
+            for x in (first + k * step for k in range(count))
         ]
 
     return holes

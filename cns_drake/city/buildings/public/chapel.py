@@ -277,12 +277,8 @@ def _add_cote(out: Assembly, p: Parameters, nave: Wing) -> None:
         massing.flat(rim, high - 0.75, up=False),
         *_cross(x, y, p.height - 1.0, p.height),
     )
-    eaves = massing.square(x, y, 0.95)
-    out.add_to(
-        "roof",
-        massing.flat(eaves, high - 0.02, up=False),
-        massing.spire(eaves, (x, y), high - 0.02, p.height - 0.8),
-    )
+    eaves, z = massing.square(x, y, 0.95), high - 0.02
+    out.add_to("roof", massing.tent(eaves, (x, y), z, p.height - 0.8))
 
 
 def _add_small(

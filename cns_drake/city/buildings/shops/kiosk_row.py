@@ -142,11 +142,7 @@ def _add_lantern(out: Assembly, p: Parameters, wing: Wing) -> None:
     body = massing.square(*wing.center, 0.6)
     eaves = massing.inset(body, -0.25)
     out.add_to("others", massing.skirt(body, body, low, top - 0.7))
-    out.add_to(
-        "roof",
-        massing.flat(eaves, top - 0.72, up=False),
-        massing.spire(eaves, wing.center, top - 0.72, top),
-    )
+    out.add_to("roof", massing.tent(eaves, wing.center, top - 0.72, top))
 
 
 def _add_arcade(

@@ -162,12 +162,10 @@ def _add_spine(out: Assembly, p: Parameters, hall: Wing) -> None:
     y0, y1 = hall.y0 + 2.0, hall.y1 - 0.5
     curb = massing.rectangle(x - half, y0, x + half, y1)
     out.add_to("steel", massing.skirt(curb, curb, z - 0.05, low + 0.06))
-    line_of = (
-        pitched_roofs.gable_line
-        if p.vault == "gable"
-        else pitched_roofs.barrel_line
-    )
-    line = line_of(x - half, x + half, low + 0.15, top)
+    sides = (x - half, x + half, low + 0.15, top)
+    line = pitched_roofs.barrel_line(*sides)
+    if p.vault == "gable":
+        line = pitched_roofs.gable_line(*sides)
     glass = pitched_roofs.shell(line, y0, y1, 0.12, along_y=True)
     out.add_to("glass", glass)
     # Walls below the ends of the vault.

@@ -24,7 +24,6 @@ _TINTS = (
 _CORNERS = ("plain", "chamfered", "notched", "rounded")
 _CROWNS = ("screen", "wedge", "stepped")
 
-
 _ROOF_ITEMS = ("lift_house", "mast", *2 * ("cooling_tower",), "air_handler")
 
 

@@ -77,16 +77,13 @@ def build(p: Parameters, out: Assembly) -> None:
     out.glass_rgb = p.glass_rgb
     plan = np.round(_plan(p, out.site), 2)
     top = _add_lobby(out, p, plan)
-    goal = p.height - p.crown
     if p.waist > 0:
-        middle = p.waist * p.height
-        top = _add_grid(out, p, plan, top, middle, "low")
+        top = _add_grid(out, p, plan, top, p.waist * p.height, "low")
         top = _add_plant_floor(out, p, plan, top)
-    top = _add_grid(out, p, plan, top, goal, "storey")
+    top = _add_grid(out, p, plan, top, p.height - p.crown, "storey")
     rim = round(p.height - top, 3)
-    louvres = bays.rhythm(
-        p.pitch, [bays.window(p.pitch - p.pier, 0.5, rim - 0.5, 0.25)], p.margin
-    )
+    louvre = bays.window(p.pitch - p.pier, 0.5, rim - 0.5, 0.25)
+    louvres = bays.rhythm(p.pitch, [louvre], p.margin)
     crown = Facade(rim, (Band(0.0, 0.25, -0.1),), louvres)
     roof = tiers.add_crown(out, plan, crown, top, rim - 0.6, thickness=0.45)
     free = massing.inset(plan, 0.5)

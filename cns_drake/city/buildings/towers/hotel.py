@@ -18,7 +18,6 @@ from cns_drake.city.buildings.parts.site import Assembly, Dice
 _PAINTS = ((0.86, 0.83, 0.77), (0.80, 0.72, 0.62), (0.72, 0.75, 0.76))
 _FORECOURT_M = 7.0
 
-
 _ROOF_ITEMS = ("cooling_tower", "air_handler", "mast", "vents", "ac_unit")
 
 
@@ -53,20 +52,16 @@ def build(p: Parameters, out: Assembly) -> None:
         plan = outlines.stadium(x0, front, x1, y1, 3.2)
     else:
         block = massing.rectangle(x0, front, x1, y1)
-        corners = {0: p.corner, 1: p.corner}
-        plan = massing.rounded(block, corners, 2.8)
+        plan = massing.rounded(block, {0: p.corner, 1: p.corner}, 2.8)
     top = _add_lobby(out, p, plan, y0)
     goal = p.height - p.bar_height - 1.2
     top = _add_rooms(out, p, plan, top, goal)
     edge = Facade(1.2, (Band(0.0, 0.3, -0.15), Band(0.9, 1.2, -0.2)))
     roof = tiers.add_crown(out, plan, edge, top, 1.1)
     bar = massing.inset(plan, p.bar_inset)
-    height = round(p.height - roof, 3)
-    walls = Facade(
-        height,
-        (Band(0.4, height - 1.2, 0.3), Band(height - 0.9, height - 0.5, -1.3)),
-        glass=(0.3,),
-    )
+    h = round(p.height - roof, 3)
+    bands = (Band(0.4, h - 1.2, 0.3), Band(h - 0.9, h - 0.5, -1.3))
+    walls = Facade(h, bands, glass=(0.3,))
     roof = tiers.add_crown(out, bar, walls, roof, 0.4, part="bar")
     equip_roof(out, bar, roof, _ROOF_ITEMS)
     _add_sign(out, p, plan)

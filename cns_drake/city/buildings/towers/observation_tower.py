@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from cns_drake.city.buildings.parts import bays, details, massing, tiers
@@ -39,17 +41,13 @@ def build(p: Parameters, out: Assembly) -> None:
     # Room for the bowl, the floors, the cone and some mast above it.
     above = 4.5 + 4.0 * p.pod_floors + 5.5 + 0.1 * p.height
     pod = round(min(p.pod_at * p.height, p.height - above), 1)
-    middle = 0.5 * (p.foot_radius + p.neck_radius)
-    shaft = massing.revolved(
-        [
-            (p.foot_radius, p.pavilion_height - 0.5),
-            (middle, 0.35 * pod),
-            (p.neck_radius, 0.75 * pod),
-            (p.neck_radius, pod + 1.0),
-        ],
-        _SIDES,
-        center,
+    profile = (
+        (p.foot_radius, p.pavilion_height - 0.5),
+        (0.5 * (p.foot_radius + p.neck_radius), 0.35 * pod),
+        (p.neck_radius, 0.75 * pod),
+        (p.neck_radius, pod + 1.0),
     )
+    shaft = massing.revolved(profile, _SIDES, center)
     ribs = [_rib(p, center, 2 * np.pi * k / p.ribs, pod) for k in range(p.ribs)]
     out.add("shaft", shaft, *ribs)
     top = _add_pod(out, p, center, pod)
@@ -86,28 +84,20 @@ def _add_pod(
     out: Assembly, p: Parameters, center: massing.Point, z0: float
 ) -> float:
     """A bowl, floors of glass under ledges, and a cone on top."""
-    r, floor = p.pod_radius, 4.0
-    bowl = massing.revolved(
-        [(p.neck_radius, z0), (0.7 * r, z0 + 2.2), (r, z0 + 4.5)],
-        _SIDES,
-        center,
-    )
-    pieces, z = [bowl], z0 + 4.5
+    r, floor, z = p.pod_radius, 4.0, z0 + 4.5
+    bowl = ((p.neck_radius, z0), (0.7 * r, z0 + 2.2), (r, z))
+    pieces = [massing.revolved(bowl, _SIDES, center)]
+    wall = Facade(floor, (Band(0.0, 0.5, -0.4), Band(1.0, floor - 0.5, 0.3)))
     for k in range(p.pod_floors):
         ring = massing.regular_polygon(r * (1.0 - 0.1 * k), _SIDES, center)
-        wall = Facade(
-            floor, (Band(0.0, 0.5, -0.4), Band(1.0, floor - 0.5, 0.3))
-        )
         pieces.append(tiers.block(ring, wall, z))
         pieces.append(
             details.piers(ring, 99.0, 0.25, 0.1, z + 0.5, z + floor, depth=0.35)
         )
         z += floor
-    neck = 0.4 * r
-    rim = r * (1.0 - 0.1 * (p.pod_floors - 1))
-    cone = [(rim, z), (neck, z + 2.5), (neck, z + 5.5)]
-    pieces.append(massing.revolved(cone, _SIDES, center))
-    out.add("pod", *pieces)
+    neck, rim = 0.4 * r, r * (1.0 - 0.1 * (p.pod_floors - 1))
+    cone = ((rim, z), (neck, z + 2.5), (neck, z + 5.5))
+    out.add("pod", *pieces, massing.revolved(cone, _SIDES, center))
     return z + 5.5
 
 
@@ -116,11 +106,9 @@ def _add_mast(
 ) -> None:
     """Sections of a mast, each thinner than the one below it."""
     start = max(z0, p.height * (1.0 - p.mast_share))
-    profile = []
-    levels = np.linspace(start, p.height, 5)
-    radii = (0.9, 0.65, 0.4, 0.2)
-    for k, radius in enumerate(radii):
-        profile += [(radius, levels[k]), (radius, levels[k + 1])]
-    column = [(1.4, z0 - 0.2), (1.4, start)] if start > z0 else []
-    mast = massing.revolved([*column, *profile], 8, center)
+    profile = [(1.4, z0 - 0.2), (1.4, start)] if start > z0 else []
+    levels = itertools.pairwise(np.linspace(start, p.height, 5))
+    for radius, (low, high) in zip((0.9, 0.65, 0.4, 0.2), levels, strict=True):
+        profile += [(radius, low), (radius, high)]
+    mast = massing.revolved(profile, 8, center)
     out.add("mast", mast, rgb=(0.75, 0.25, 0.2))

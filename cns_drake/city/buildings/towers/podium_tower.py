@@ -24,7 +24,6 @@ _CLADDINGS = (
     ((0.60, 0.50, 0.42), (0.56, 0.60, 0.63)),
 )
 
-
 _ROOF_ITEMS = ("lift_house", "cooling_tower", "air_handler", "mast")
 
 
@@ -62,21 +61,18 @@ class Parameters:
 
 def build(p: Parameters, out: Assembly) -> None:
     """Builds podium and tower on a rectangle."""
-    site = out.site
-    x0, y0, x1, y1 = site.bounds
-    top = _add_shops(out, p)
-    walls = _podium_storey(p)
+    (x0, y0, x1, y1), base = out.site.bounds, out.site.outline
+    top, walls = _add_shops(out, p), _podium_storey(p)
     top = tiers.add_storeys(
-        out, site.outline, walls, top, p.podium_storeys, 1, part="podium"
+        out, base, walls, top, p.podium_storeys, 1, part="podium"
     )
     edge = Facade(1.6, (Band(0.2, 0.7, -0.3), Band(1.4, 1.6, -0.1)))
-    roof = tiers.add_crown(out, site.outline, edge, top, 1.2, part="terrace")
+    roof = tiers.add_crown(out, base, edge, top, 1.2, part="terrace")
     width, depth = p.tower[0] * (x1 - x0), p.tower[1] * (y1 - y0)
     left = round(x0 + p.at[0] * (x1 - x0 - width), 2)
     near = round(y0 + p.at[1] * (y1 - y0 - depth), 2)
-    plan = massing.rectangle(
-        left, near, round(left + width, 2), round(near + depth, 2)
-    )
+    right, far = round(left + width, 2), round(near + depth, 2)
+    plan = massing.rectangle(left, near, right, far)
     _add_garden(out, plan, roof)
     if p.chamfer:
         plan = outlines.chamfered(plan, p.chamfer)
@@ -159,17 +155,19 @@ def _add_garden(out: Assembly, tower: np.ndarray, z: float) -> None:
 
 def _garden(length: float, width: float) -> Mesh:
     """Planters along x, behind them the posts and beams of a pergola."""
-    pieces = [
-        massing.box(
-            u * length, (u + 0.12) * length, 0.0, 1.2, -0.1, 0.8, bottom=False
-        )
+    planters = (
+        (u * length, (u + 0.12) * length, 0.0, 1.2, -0.1, 0.8)
         for u in (0.1, 0.32, 0.54, 0.76)
-    ]
+    )
     places = [round(u * length, 2) for u in np.linspace(0.25, 0.75, 7)]
-    for x in places:
-        pieces.append(massing.box(x, x + 0.15, 1.5, width, 2.6, 2.85))
-    for x in (places[0], places[-1]):
-        for y in (1.6, width - 0.2):
-            post = (x, x + 0.15, y, y + 0.15, -0.1, 2.7)
-            pieces.append(massing.box(*post, bottom=False))
-    return merge_meshes(*pieces)
+    beams = (massing.box(x, x + 0.15, 1.5, width, 2.6, 2.85) for x in places)
+    posts = (
+        (x, x + 0.15, y, y + 0.15, -0.1, 2.7)
+        for x in (places[0], places[-1])
+        for y in (1.6, width - 0.2)
+    )
+    return merge_meshes(
+        *(massing.box(*spot, bottom=False) for spot in planters),
+        *beams,
+        *(massing.box(*spot, bottom=False) for spot in posts),
+    )

@@ -14,7 +14,6 @@ _CONCRETES = ((0.66, 0.65, 0.62), (0.74, 0.71, 0.66), (0.58, 0.58, 0.58))
 _PARAPET = 1.2
 _STAIR_RISE = 2.4
 
-
 _ROOF_ITEMS = ("tank", "tank", "mast", "vents", "stair_house", "dish")
 
 
@@ -42,20 +41,18 @@ def build(p: Parameters, out: Assembly) -> None:
     x0, y0, x1, y1 = out.site.bounds
     front = y1 - p.depth if p.at_back else y0
     back = front + p.depth
+    split = x0 + p.stair_width if p.stair_left else x1 - p.stair_width
+    stair, ends = (split, x1), (x0, split)
     if p.stair_left:
-        stair, ends = (x0, x0 + p.stair_width), (x0 + p.stair_width, x1)
-    else:
-        stair, ends = (x1 - p.stair_width, x1), (x0, x1 - p.stair_width)
+        stair, ends = ends, stair
     slab = massing.rectangle(ends[0], front, ends[1], back)
     top = _add_hall(out, p, slab)
     goal = p.height - _STAIR_RISE - _PARAPET
     groups, per_group, storey = tiers.divided(goal - top, p.storey_height, 7)
     walls = _storey(p, storey)
     top = tiers.add_storeys(out, slab, walls, top, groups, per_group)
-    edge = Facade(
-        _PARAPET, (Band(0.0, 0.25, -0.12), Band(1.0, _PARAPET, -0.12))
-    )
-    roof = tiers.add_crown(out, slab, edge, top, 0.9)
+    bands = (Band(0.0, 0.25, -0.12), Band(1.0, _PARAPET, -0.12))
+    roof = tiers.add_crown(out, slab, Facade(_PARAPET, bands), top, 0.9)
     equip_roof(out, slab, roof, _ROOF_ITEMS)
     shaft = massing.rectangle(stair[0], front + 1.2, stair[1], back - 1.2)
     _add_stair(out, p, shaft)

@@ -72,8 +72,8 @@ class Parameters:
 
 def build(p: Parameters, out: Assembly) -> None:
     """Builds the tower on a rectangle."""
-    gap = _SCAFFOLD_M + 0.2
-    plan = np.round(massing.inset(out.site.outline, gap), 2)
+    site = massing.rectangle(*out.site.bounds)
+    plan = np.round(massing.inset(site, _SCAFFOLD_M + 0.2), 2)
     _add_frame(out, p, plan)
     _add_core(out, p, plan)
     if p.clad:
