@@ -13,6 +13,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cns_drake.city.buildings.parts.ear_cutting import ears
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
 Point = tuple[float, float]
@@ -140,7 +141,7 @@ def flat(points: ArrayLike, z: float, *, up: bool = True) -> Mesh:
             for k in range(1, n - 1, 2)
         ]
     else:
-        faces = _ears(points)
+        faces = ears(points)
     if not up:
         faces = [face[::-1] for face in faces]
     return Mesh(_at(points, z), tuple(faces))
@@ -160,39 +161,6 @@ def _turns(points: np.ndarray) -> np.ndarray:
 
 def _is_convex(points: np.ndarray) -> bool:
     return bool((_turns(points) > -1e-9).all())
-
-
-def _ears(points: np.ndarray) -> list[tuple[int, ...]]:
-    """Triangulates a simple outline by cutting ears off (O(N^3))."""
-    left = list(range(len(points)))
-    faces = []
-    while len(left) > 3:
-        for k in range(len(left)):
-            a, b, c = left[k - 1], left[k], left[(k + 1) % len(left)]
-            triangle = points[[a, b, c]]
-            others = [i for i in left if i not in (a, b, c)]
-            if _cross(*triangle) > 1e-9 and not any(
-                _inside(points[i], triangle) for i in others
-            ):
-                faces.append((a, b, c))
-                left.pop(k)
-                break
-        else:
-            raise ValueError("an outline crosses itself or runs clockwise")
-    return [*faces, tuple(left)]
-
-
-def _cross(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-
-
-def _inside(p: np.ndarray, triangle: np.ndarray) -> bool:
-    a, b, c = triangle
-    return (
-        _cross(a, b, p) > -1e-9
-        and _cross(b, c, p) > -1e-9
-        and _cross(c, a, p) > -1e-9
-    )
 
 
 def skirt(lower: ArrayLike, upper: ArrayLike, z0: float, z1: float) -> Mesh:
