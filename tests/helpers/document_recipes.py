@@ -312,7 +312,10 @@ RECIPES = {
     ),
     "workers": Recipe(
         ".venv/bin/dask worker",
-        changes=(("tcp://head:8786", "{scheduler}"), ("8", "1")),
+        changes=(
+            ("tcp://head:8786", "{scheduler}"),
+            ("--nworkers 8", "--nworkers 1"),
+        ),
         after=("scheduler",),
         ready="Registered to",
     ),
