@@ -64,7 +64,12 @@ class Route(RootModel[list[RouteLeg]]):
 
 
 def make_lane_path(
-    network: RoadNetwork, route: Route, spacing: float, source: object = "route"
+    network: RoadNetwork,
+    route: Route,
+    spacing: float,
+    source: object = "route",
+    *,
+    aside: float = 0.0,
 ) -> LanePath:
     """Strings the lanes of a route and the ways between them together.
 
@@ -80,6 +85,7 @@ def make_lane_path(
         spacing: the distance of the points, rounded so that it divides the
             length of the route [m].
         source: the file that errors name.
+        aside: how far to the right of the lanes' middle the path runs [m].
 
     Raises:
         InputError: a leg names no lane of the network, does not follow from
@@ -104,11 +110,23 @@ def make_lane_path(
         pieces.append(points)
         limits.append(np.full(len(points), limit))
     return sample_lane_path(
-        np.concatenate(pieces),
+        _moved_right(np.concatenate(pieces), aside),
         np.concatenate(limits),
         spacing,
         f"{source}: route",
     )
+
+
+def _moved_right(points: np.ndarray, distance: float) -> np.ndarray:
+    """Returns the (N, 3) points of a path beside a path, at its heights."""
+    if distance == 0:
+        return points
+    along = np.gradient(points[:, :2], axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    right = np.column_stack([along[:, 1], -along[:, 0]])
+    moved = points.copy()
+    moved[:, :2] += distance * right
+    return moved
 
 
 def _check_ends(leg: RouteLeg, is_first: bool, is_last: bool) -> None:

@@ -29,7 +29,11 @@ def plan_drive(scenario: Scenario) -> Trajectory:
         assert scenario.route is not None  # One of both is there.
         network = load_road_network(scenario.roads_file)
         path = make_lane_path(
-            network, scenario.route, POINT_SPACING, scenario.source
+            network,
+            scenario.route,
+            POINT_SPACING,
+            scenario.source,
+            aside=scenario.aside,
         )
     return Trajectory(path, scenario.speeds)
 

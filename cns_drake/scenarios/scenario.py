@@ -173,6 +173,8 @@ class Scenario(_Model):
         without: names of structures that are left out of it.
         title: what the sequence shows, in words.
         route: the lanes to follow.
+        aside: how far to the right of its lanes' middle the vehicle keeps;
+            negative to the left [m].
         waypoints: a CSV file of places to pass instead; see
             `cns_drake.roads.waypoints.load_waypoint_path`.
         speeds: how fast.
@@ -194,6 +196,7 @@ class Scenario(_Model):
     without: tuple[str, ...] = ()
     title: str = ""
     route: Route | None = Field(default=None, validate_default=True)
+    aside: float = Field(default=0.0, ge=-3.0, le=3.0)
     waypoints: str | None = Field(default=None, validate_default=True)
     speeds: Speeds
     lidars: dict[Name, LidarConfig] = Field(

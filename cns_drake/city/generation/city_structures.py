@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator
+from collections.abc import Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -39,28 +39,30 @@ class City:
     """A whole city.
 
     Attributes:
-        structures: the ground first, then what stands on it; a structure's
-            instance id is its place in this order, counted from 1.
+        structures: the ground first, then what stands on it.
+        cars: object -> weight of its parked cars.
     """
 
     structures: tuple[Structure, ...]
+    cars: Mapping[str, float]
 
-    def meshes(self) -> dict[str, Mesh]:
-        """Returns all meshes by name.
 
-        Raises:
-            ValueError: if two different meshes have the same name, or one
-                has no faces.
-        """
-        meshes: dict[str, Mesh] = {}
-        for structure in self.structures:
-            for name, mesh in structure.model.meshes.items():
-                if not mesh.faces:
-                    raise ValueError(f"mesh {name} has no faces")
-                known = meshes.setdefault(name, mesh)
-                if known is not mesh and known.to_obj() != mesh.to_obj():
-                    raise ValueError(f"two different meshes are called {name}")
-        return meshes
+def meshes_of(structures: Iterable[Structure]) -> dict[str, Mesh]:
+    """Returns all meshes of structures by name.
+
+    Raises:
+        ValueError: if two different meshes have the same name, or one has no
+            faces.
+    """
+    meshes: dict[str, Mesh] = {}
+    for structure in structures:
+        for name, mesh in structure.model.meshes.items():
+            if not mesh.faces:
+                raise ValueError(f"mesh {name} has no faces")
+            known = meshes.setdefault(name, mesh)
+            if known is not mesh and known.to_obj() != mesh.to_obj():
+                raise ValueError(f"two different meshes are called {name}")
+    return meshes
 
 
 def make_city(world: Path) -> City:
@@ -131,7 +133,7 @@ def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
         *ground_structures(districts, shape, plan.water_level),
         *bridge_structures(districts, draft.streets, shape, plan.water_level),
     ]
-    return City((*ground, *draft.structures))
+    return City((*ground, *draft.structures), plan.cars)
 
 
 def _check_names(plan: CityPlan, source: str) -> None:

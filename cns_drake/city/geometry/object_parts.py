@@ -181,20 +181,24 @@ def part_triangles(
     Round shapes become the prisms and the octahedra-like hulls that just
     contain them, so that a footprint made from them is never too small.
     """
+    mesh = part_mesh(part, meshes)
+    return mesh.vertices, mesh.triangles()
+
+
+def part_mesh(part: Part, meshes: Mapping[str, Mesh]) -> Mesh:
+    """Returns a part's mesh in S, round shapes as in `part_triangles`."""
     shape = part.shape
+    scale = np.ones(3)
     if isinstance(shape, MeshShape):
-        mesh = meshes[shape.mesh]
-        local = mesh.vertices * np.asarray(shape.scale)
+        mesh, scale = meshes[shape.mesh], np.asarray(shape.scale)
     elif isinstance(shape, BoxShape):
         mesh = box_mesh(shape.size)
-        local = mesh.vertices
     elif isinstance(shape, CylinderShape):
         mesh = _round_mesh(shape.radius, shape.length)
-        local = mesh.vertices
     else:
         mesh = _round_mesh(shape.radius, 2 * shape.radius)
-        local = mesh.vertices
-    return local @ rotation(part.rpy).T + part.xyz, mesh.triangles()
+    vertices = mesh.vertices * scale @ rotation(part.rpy).T + part.xyz
+    return Mesh(vertices, mesh.faces)
 
 
 def rotation(rpy: tuple[float, float, float]) -> np.ndarray:

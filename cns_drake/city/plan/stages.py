@@ -1,8 +1,9 @@
-"""Stages of a city: which structures each one still lacks."""
+"""Stages of a city: how much younger than the whole city each one is."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable, Mapping
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated
 
@@ -18,32 +19,56 @@ class _Model(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+class Growth(_Model):
+    """Structures that stand, but have not grown to their full height yet.
+
+    Attributes:
+        height: how high they are, above their own ground [m].
+        structures: their names, or patterns such as `office_*`.
+        but: names or patterns of those that are not meant.
+    """
+
+    height: float = Field(gt=2.0, allow_inf_nan=False)
+    structures: list[str] = Field(min_length=1)
+    but: list[str] = Field(default_factory=list)
+
+
 class Stage(_Model):
-    """One stage, told in words and by what it lacks.
+    """One stage, told in words and by what sets it apart from the next.
 
     Attributes:
         story: what a visitor of this stage would notice.
         absent: story item -> names of the structures that the next stage
-            adds. What later stages add is absent as well.
+            adds, or patterns. What later stages add is absent as well.
+        lower: story item -> structures that the next stage raises. What
+            later stages raise is low as well.
+        sites: story item -> structures that are under construction at this
+            stage only.
     """
 
     story: str
     absent: dict[str, list[str]] = Field(default_factory=dict)
+    lower: dict[str, Growth] = Field(default_factory=dict)
+    sites: dict[str, Growth] = Field(default_factory=dict)
 
 
 class Stages(_Model):
     """The stages of a city, from `stages.yaml`.
 
-    Every stage has all structures of the stage before it, because each one
-    lists only what the next stage adds; the last stage is the whole city.
+    Every stage has all structures of the stage before it, none of them
+    lower, because each one lists only what the next stage adds and raises;
+    the last stage is the whole city.
 
     Attributes:
         stages: stage name -> stage, earliest first.
+        lots: use -> buildings, or patterns, on whose lots it is found until
+            they are built; by default a lot's use goes by its size.
         candidates: further structures that the stories would allow to be
             absent from the first stage, the next one to take away first.
     """
 
     stages: dict[StageName, Stage]
+    lots: dict[str, list[str]] = Field(default_factory=dict)
     candidates: list[str] = Field(default_factory=list)
 
     def absent(self, stage: str) -> set[str]:
@@ -52,15 +77,41 @@ class Stages(_Model):
         Raises:
             KeyError: if there is no such stage.
         """
+        return {
+            name
+            for later in self._onwards(stage)
+            for group in later.absent.values()
+            for name in group
+        }
+
+    def heights(self, stage: str) -> dict[str, float]:
+        """Returns the structures that are low at a stage, and how high [m].
+
+        Raises:
+            KeyError: if there is no such stage.
+        """
+        heights: dict[str, float] = {}
+        for later in self._onwards(stage):
+            for group in later.lower.values():
+                for name in group.structures:
+                    known = heights.get(name, group.height)
+                    heights[name] = min(known, group.height)
+        return heights
+
+    def sites(self, stage: str) -> dict[str, float]:
+        """Returns what is under construction at a stage, and how high [m]."""
+        return {
+            name: group.height
+            for group in self.stages[stage].sites.values()
+            for name in group.structures
+        }
+
+    def _onwards(self, stage: str) -> list[Stage]:
+        """Returns a stage and all later ones."""
         names = list(self.stages)
         if stage not in self.stages:
             raise KeyError(stage)
-        return {
-            name
-            for later in names[names.index(stage) :]
-            for group in self.stages[later].absent.values()
-            for name in group
-        }
+        return [self.stages[name] for name in names[names.index(stage) :]]
 
 
 def load_stages(path: Path, structures: Collection[str]) -> Stages:
@@ -70,41 +121,102 @@ def load_stages(path: Path, structures: Collection[str]) -> Stages:
         path: the file.
         structures: the names of all structures of the city.
 
+    Returns:
+        The stages, patterns replaced by the names that they stand for.
+
     Raises:
         InputError: if the file cannot be read, has a wrong key or type, its
-            stages are out of order, the last one lacks something, or a name
-            is unknown or listed twice.
+            stages are out of order, the last one lacks something, a name is
+            unknown or absent twice, or a pattern stands for nothing.
     """
     content = read_yaml(path)
     try:
         stages = Stages.model_validate(content)
     except ValidationError as error:
         raise InputError(describe_validation_error(path, error)) from error
-    _check(stages, path, set(structures))
+    _check(stages, path)
+    stages = _resolved(stages, _Names(path, structures))
+    _check_absent_once(stages, path)
     return stages
 
 
-def _check(stages: Stages, path: Path, structures: set[str]) -> None:
+class _Names:
+    """The structures of a city, which patterns are looked up in."""
+
+    def __init__(self, path: Path, structures: Iterable[str]):
+        self._path = path
+        self._all = list(structures)
+        self._known = set(self._all)
+
+    def of(self, field: str, patterns: Iterable[str]) -> list[str]:
+        """Returns what names and patterns stand for, in their order."""
+        found: list[str] = []
+        for pattern in patterns:
+            names = [pattern]
+            if "*" in pattern or "?" in pattern:
+                names = [n for n in self._all if fnmatchcase(n, pattern)]
+            if not names or not self._known.issuperset(names):
+                raise InputError(
+                    f"{self._path}: {field}: unknown structure {pattern}"
+                )
+            found += names
+        return found
+
+
+def _resolved(stages: Stages, names: _Names) -> Stages:
+    def growth(field: str, groups: Mapping[str, Growth]) -> dict[str, Growth]:
+        result = {}
+        for item, group in groups.items():
+            where = f"{field}.{item}"
+            but = set(names.of(f"{where}.but", group.but))
+            meant = names.of(f"{where}.structures", group.structures)
+            kept = [name for name in meant if name not in but]
+            result[item] = Growth(height=group.height, structures=kept)
+        return result
+
+    resolved = {
+        stage: Stage(
+            story=plan.story,
+            absent={
+                item: names.of(f"stages.{stage}.absent.{item}", group)
+                for item, group in plan.absent.items()
+            },
+            lower=growth(f"stages.{stage}.lower", plan.lower),
+            sites=growth(f"stages.{stage}.sites", plan.sites),
+        )
+        for stage, plan in stages.stages.items()
+    }
+    return Stages(
+        stages=resolved,
+        lots={u: names.of(f"lots.{u}", p) for u, p in stages.lots.items()},
+        candidates=names.of("candidates", stages.candidates),
+    )
+
+
+def _check(stages: Stages, path: Path) -> None:
     names = list(stages.stages)
     if not names:
         raise InputError(f"{path}: stages: at least one stage is needed")
     if names != sorted(names):
         raise InputError(f"{path}: stages: must be in rising order")
-    if stages.stages[names[-1]].absent:
-        raise InputError(
-            f"{path}: stages.{names[-1]}.absent: the last stage is the whole "
-            "city and lacks nothing"
-        )
+    last = stages.stages[names[-1]]
+    for field in ("absent", "lower", "sites"):
+        if getattr(last, field):
+            raise InputError(
+                f"{path}: stages.{names[-1]}.{field}: the last stage is the "
+                "whole city and lacks nothing"
+            )
+
+
+def _check_absent_once(stages: Stages, path: Path) -> None:
     seen: dict[str, str] = {}
     lists = [
         (f"stages.{stage}.absent.{item}", group)
-        for stage in names
-        for item, group in stages.stages[stage].absent.items()
+        for stage, plan in stages.stages.items()
+        for item, group in plan.absent.items()
     ]
     for field, group in [*lists, ("candidates", stages.candidates)]:
         for name in group:
-            if name not in structures:
-                raise InputError(f"{path}: {field}: unknown structure {name}")
             if name in seen:
                 raise InputError(
                     f"{path}: {field}: {name} is already in {seen[name]}"

@@ -1,0 +1,1 @@
+"""Younger cities: buildings that are lower yet, and lots in other use."""

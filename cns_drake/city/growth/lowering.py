@@ -1,0 +1,238 @@
+"""A building before its upper storeys were added.
+
+What stands below the height is left as it is, to the millimetre, so that
+whoever passes in the street sees the same front; above it lies a roof of the
+building's own.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+from shapely.geometry import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
+from shapely.ops import unary_union
+
+from cns_drake.city.buildings.parts.roof_equipment import equip_roof
+from cns_drake.city.buildings.parts.site import Assembly, Rgb, Site
+from cns_drake.city.geometry.mesh import Mesh
+from cns_drake.city.geometry.object_parts import part_mesh
+from cns_drake.city.geometry.polygons import (
+    polygons_of,
+    snap,
+    surface_mesh,
+    wall_mesh,
+)
+from cns_drake.city.geometry.structures import MeshShape, Model, Part
+
+# Walls and the glass behind them count as one where they are this close [m].
+_REVEAL = 0.7
+# Pieces of walls that end at a height by chance carry no roof [m^2].
+_LEAST_ROOF = 4.0
+# Corners lie at whole millimetres; a cut between them meets none [m].
+_BETWEEN = 0.0005
+# What rises less above the height is no storey [m].
+_STOREY = 2.5
+_PARAPET = 0.9
+_PARAPET_WIDTH = 0.3
+# The band that closes the walls starts this far below the roof [m].
+_BAND = 0.5
+# and reaches so far out of them [m].
+_BAND_REACH = 0.04
+_ROOF_ITEMS = ("stair_house", "ac_unit", "vents", "skylight")
+
+
+def lowered(model: Model, height: float, name: str, seed: int) -> Model:
+    """Returns a building that ends at a height, under a flat roof.
+
+    Args:
+        model: the whole building.
+        height: of the roof above the building's own ground [m]; its parapet
+            and what stands on the roof reach higher.
+        name: of the building; its new meshes are called after it.
+        seed: of what stands on the roof.
+
+    Returns:
+        A building with the same footprint; the model itself where less than
+        a storey of it lies above `height`, or nothing there is enclosed.
+    """
+    if top_of(model) < height + _STOREY:
+        return model
+    site = Site(model.footprint, f"{name}_at_{round(10 * height)}")
+    assembly = Assembly(site, np.random.default_rng(seed), _wall_rgb(model))
+    parts: list[Part] = []
+    edges: list[np.ndarray] = []
+    for part in model.parts:
+        mesh = part_mesh(part, model.meshes)
+        low, high = mesh.vertices[:, 2].min(), mesh.vertices[:, 2].max()
+        if high <= height:
+            parts.append(part)
+        elif low < height and not _is_shared(part):
+            below, cut = cut_at(mesh, height + _BETWEEN)
+            edges.append(cut)
+            if below.faces:
+                shape = MeshShape(assembly.define(part.name, below))
+                parts.append(Part(part.name, shape, rgb=part.rgb))
+    plan = enclosed(np.concatenate([np.zeros((0, 2, 2)), *edges]))
+    if plan.is_empty:
+        return model
+    _add_roof(assembly, plan, height)
+    used = {p.shape.mesh for p in parts if isinstance(p.shape, MeshShape)}
+    meshes = {key: m for key, m in model.meshes.items() if key in used}
+    return Model(
+        (*parts, *assembly.parts),
+        {**meshes, **assembly.meshes},
+        model.footprint,
+    )
+
+
+def top_of(model: Model) -> float:
+    """Returns the height of a building without equipment on its roof [m]."""
+    return max(
+        float(part_mesh(part, model.meshes).vertices[:, 2].max())
+        for part in model.parts
+        if not _is_shared(part)
+    )
+
+
+def cut_at(mesh: Mesh, height: float) -> tuple[Mesh, np.ndarray]:
+    """Returns what of a mesh lies below a height, and the cut.
+
+    Args:
+        mesh: with plane convex faces.
+        height: of the cut [m].
+
+    Returns:
+        The lower part, open at the cut; (N, 2, 2) starts and ends of the
+        edges in which the cut meets faces, whose backs are on the left [m].
+    """
+    corners: list[np.ndarray] = []
+    faces: list[tuple[int, ...]] = []
+    edges = []
+    z = mesh.vertices[:, 2]
+    for face in mesh.faces:
+        ring = mesh.vertices[list(face)]
+        if z[list(face)].max() > height:
+            normal = np.cross(ring[1] - ring[0], ring[2] - ring[0])
+            ring, crossing = _clipped(ring, height)
+            if len(crossing) == 2:
+                along = np.subtract(*crossing[::-1])
+                # What a wall encloses is on the left where it faces right.
+                right = along[1] * normal[0] - along[0] * normal[1]
+                edges.append(crossing if right > 0 else crossing[::-1])
+        # The lower part of a quadrilateral may have five corners.
+        while len(ring) >= 3:
+            piece, ring = ring[:4], np.delete(ring, (1, 2), axis=0)
+            faces.append(tuple(range(len(corners), len(corners) + len(piece))))
+            corners.extend(piece)
+    return Mesh(np.array(corners).reshape(-1, 3), tuple(faces)), np.array(
+        edges
+    ).reshape(-1, 2, 2)
+
+
+def _clipped(
+    ring: np.ndarray, height: float
+) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Returns the corners of a face below a height, and where it is cut."""
+    kept, crossing = [], []
+    for p, q in zip(ring, np.roll(ring, -1, axis=0), strict=True):
+        if p[2] <= height:
+            kept.append(p)
+        if (p[2] - height) * (q[2] - height) < 0:
+            share = (height - p[2]) / (q[2] - p[2])
+            cut = p + share * (q - p)
+            cut[2] = height
+            kept.append(cut)
+            crossing.append(cut[:2])
+    return np.array(kept).reshape(-1, 3), crossing
+
+
+def enclosed(edges: np.ndarray) -> MultiPolygon:
+    """Returns the ground within walls that are cut.
+
+    Args:
+        edges: (N, 2, 2) starts and ends of the walls' edges, what they
+            enclose on their left [m].
+
+    Returns:
+        Polygons with their courtyards, in whole millimetres. Reveals and the
+        gaps between walls and what stands before them belong to it.
+    """
+    edges = edges[np.ptp(edges, axis=1).max(axis=1) > 0.001]
+    lines = shapely.linestrings(edges)
+    walls = unary_union(shapely.buffer(lines, _REVEAL, cap_style="square"))
+    plan: BaseGeometry = MultiPolygon()
+    # From the outside inwards: courtyards lie within what encloses them.
+    for ring in sorted(polygons_of(walls), key=_outer_area, reverse=True):
+        mine = shapely.intersects(lines, ring)
+        if _turns_left(edges[mine]):
+            shell = _offset(Polygon(ring.exterior), -_REVEAL)
+            plan = plan.union(shell)
+        else:
+            holes = [Polygon(hole) for hole in ring.interiors]
+            yard = _offset(unary_union(holes), _REVEAL)
+            plan = plan.difference(yard)
+    return MultiPolygon(
+        [
+            piece
+            for piece in polygons_of(snap(plan.simplify(0.05)))
+            if piece.area > _LEAST_ROOF
+        ]
+    )
+
+
+def _offset(area: BaseGeometry, distance: float) -> BaseGeometry:
+    """Returns an area grown by a distance, with its corners [m]."""
+    # On edges in one line GEOS divides by zero on its way to the result.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return area.buffer(distance, join_style="mitre")
+
+
+def _outer_area(polygon: Polygon) -> float:
+    return Polygon(polygon.exterior).area
+
+
+def _turns_left(edges: np.ndarray) -> bool:
+    """Tells whether edges run counter-clockwise, taken together."""
+    a, b = (edges - edges.mean(axis=(0, 1))).transpose(1, 0, 2)
+    return float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum()) > 0
+
+
+def _add_roof(assembly: Assembly, plan: MultiPolygon, height: float) -> None:
+    """Closes the walls by a band, a parapet and a flat roof."""
+    top = round(height + _PARAPET, 3)
+    outer = snap(_offset(plan, _BAND_REACH))
+    inner = snap(_offset(plan, -_PARAPET_WIDTH))
+    band = wall_mesh(outer, height - _BAND, top)
+    assembly.add(
+        "new_roof",
+        # Seen from outside, not from within.
+        Mesh(band.vertices, tuple(face[::-1] for face in band.faces)),
+        surface_mesh(outer.difference(inner), top),
+        wall_mesh(inner, height, top),
+        surface_mesh(inner, height),
+    )
+    for number, piece in enumerate(polygons_of(inner)):
+        ring = np.array(shapely.orient_polygons(piece).exterior.coords[:-1])
+        equip_roof(assembly, ring, height, _ROOF_ITEMS, prefix=f"new_{number}_")
+
+
+def _is_shared(part: Part) -> bool:
+    """Whether a part is equipment, whose mesh other buildings use too."""
+    shape = part.shape
+    return isinstance(shape, MeshShape) and shape.mesh.startswith("roof_")
+
+
+def _wall_rgb(model: Model) -> Rgb | None:
+    """Returns the colour of the building's largest part, its walls."""
+
+    def extent(part: Part) -> float:
+        low, high = np.array(
+            [
+                f(part_mesh(part, model.meshes).vertices, axis=0)
+                for f in (np.min, np.max)
+            ]
+        )
+        return float(np.prod(high - low))
+
+    return max(model.parts, key=extent).rgb
