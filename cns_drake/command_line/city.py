@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from evaluation.support.errors import InputError
+from cns_drake.command_line.options import Jobs
 from evaluation.support.interrupts import uninterrupted
 from evaluation.support.terminal import note
 
@@ -44,25 +44,17 @@ def city(
         tuple[str, str] | None,
         typer.Option(
             metavar="EARLIER LATER",
-            help="Generate nothing; estimate TCR_sym between the sequences of "
-            "two stages of the generated city, such as 01 04, and what each "
-            "group of stages.yaml contributes to it.",
+            help="Generate nothing; simulate the sequences of two stages, such "
+            "as 01 04, and what becomes of TCR_sym and of each method without "
+            "the offset of the routes, without what is absent, and without "
+            "what is lower.",
         ),
     ] = None,
-    target: Annotated[
-        float | None,
-        typer.Option(
-            metavar="TCR_SYM",
-            help="With --calibrate: propose what to change in the earlier "
-            "stage to reach this TCR_sym.",
-        ),
-    ] = None,
+    jobs: Jobs = None,
 ) -> None:
     """Build a city from its roads and plan."""
-    if target is not None and calibrate is None:
-        raise InputError("--target: only with --calibrate")
     if calibrate is not None:
-        _calibrate(folder, *calibrate, target)
+        _calibrate(folder, *calibrate, jobs)
         return
     with uninterrupted():
         from cns_drake.city.generation.generate import (
@@ -87,16 +79,17 @@ def city(
 
 
 def _calibrate(
-    folder: Path, earlier: str, later: str, target: float | None
+    folder: Path, earlier: str, later: str, jobs: int | None
 ) -> None:
     with uninterrupted():  # Only who calibrates needs the evaluation.
         from cns_drake.scenarios.scenario import load_scenario
-        from cns_drake.studies.calibration import Calibration
-        from cns_drake.studies.calibration_report import report_lines
+        from cns_drake.studies.knob_effects import effect_lines, knob_effects
+        from evaluation.jobs.cluster import choose_cluster
 
     scenarios = [
         load_scenario(folder / f"sequence_{stage}.yaml")
         for stage in (earlier, later)
     ]
-    for line in report_lines(Calibration(*scenarios, progress=note), target):
+    effects = knob_effects(*scenarios, choose_cluster(jobs, None))
+    for line in effect_lines(effects):
         print(line)

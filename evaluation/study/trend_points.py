@@ -5,7 +5,7 @@ Every database is a job of its own.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -84,29 +84,49 @@ def measure_trend(
     """
     methods = choose_methods(own_methods)
     asking = open_sequence(query)
-    paths = {asking.name: query}
+    sources: dict[str, DriveSource] = {}
     for path in databases:
         sequence = open_sequence(path)
-        if sequence.name in paths:
+        if sequence.name in sources or sequence.name == asking.name:
             raise InputError(f"{path}: {sequence.name} is there twice")
-        paths[sequence.name] = path
+        sources[sequence.name] = _recorded(path)
         check_same_world(sequence, asking)
+    return measure_drives(
+        asking.name, _recorded(query), sources, output, cluster, methods
+    )
+
+
+def measure_drives(
+    asking: str,
+    query: DriveSource,
+    databases: Mapping[str, DriveSource],
+    output: Path,
+    cluster: Cluster,
+    methods: tuple[MethodChoice, ...],
+) -> list[TrendPoint]:
+    """Returns the points of drives that need not be recorded.
+
+    Args:
+        asking: name of the drive that asks.
+        query: opens it.
+        databases: name -> what opens a drive that is asked.
+        output: folder for intermediate results, made if needed.
+        cluster: where the work is done.
+        methods: to run.
+
+    Raises:
+        InputError: see `measure_trend`.
+    """
     files = StudyFiles(output.absolute())
     make_folder(output)
-    survey = files.survey(asking.name)
-    jobs = [
-        survey_job(asking.name, _recorded(query), {"queries"}, methods, survey)
-    ]
-    points = {
-        name: files.trend_points(name, asking.name)
-        for name in paths
-        if name != asking.name
-    }
+    survey = files.survey(asking)
+    jobs = [survey_job(asking, query, {"queries"}, methods, survey)]
+    points = {name: files.trend_points(name, asking) for name in databases}
     jobs += [
         Job(
             name=f"measure {name}",
             function=measure_database,
-            arguments=(_recorded(paths[name]), survey, methods, result),
+            arguments=(databases[name], survey, methods, result),
             needs=(jobs[0].name,),
             cost=_COST,
             output=result,

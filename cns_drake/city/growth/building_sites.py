@@ -21,9 +21,7 @@ _CRANE_REACH = 30.0
 _MOST_SIDES = 12
 
 
-def building_site(
-    model: Model, height: float, name: str, seed: int
-) -> Model:
+def building_site(model: Model, height: float, name: str, seed: int) -> Model:
     """Returns the frame of a building that is being built, with its crane.
 
     Args:

@@ -224,15 +224,11 @@ def _is_shared(part: Part) -> bool:
 
 
 def _wall_rgb(model: Model) -> Rgb | None:
-    """Returns the colour of the building's largest part, its walls."""
+    """Returns the colour of the building's largest part that is no glass."""
 
     def extent(part: Part) -> float:
-        low, high = np.array(
-            [
-                f(part_mesh(part, model.meshes).vertices, axis=0)
-                for f in (np.min, np.max)
-            ]
-        )
-        return float(np.prod(high - low))
+        vertices = part_mesh(part, model.meshes).vertices
+        return float(np.prod(np.ptp(vertices, axis=0)))
 
-    return max(model.parts, key=extent).rgb
+    walls = [part for part in model.parts if "glass" not in part.name]
+    return max(walls, key=extent).rgb

@@ -63,13 +63,10 @@ class Stages(_Model):
         stages: stage name -> stage, earliest first.
         lots: use -> buildings, or patterns, on whose lots it is found until
             they are built; by default a lot's use goes by its size.
-        candidates: further structures that the stories would allow to be
-            absent from the first stage, the next one to take away first.
     """
 
     stages: dict[StageName, Stage]
     lots: dict[str, list[str]] = Field(default_factory=dict)
-    candidates: list[str] = Field(default_factory=list)
 
     def absent(self, stage: str) -> set[str]:
         """Returns the names of all structures that a stage lacks.
@@ -105,6 +102,22 @@ class Stages(_Model):
             for group in self.stages[stage].sites.values()
             for name in group.structures
         }
+
+    def on_its_own(self, stage: str) -> Stage:
+        """Returns a stage with all that sets it apart from the whole city.
+
+        Raises:
+            KeyError: if there is no such stage.
+        """
+        return Stage(
+            story=self.stages[stage].story,
+            absent={"": sorted(self.absent(stage))},
+            lower={
+                name: Growth(height=height, structures=[name])
+                for name, height in self.heights(stage).items()
+            },
+            sites=self.stages[stage].sites,
+        )
 
     def _onwards(self, stage: str) -> list[Stage]:
         """Returns a stage and all later ones."""
@@ -189,7 +202,6 @@ def _resolved(stages: Stages, names: _Names) -> Stages:
     return Stages(
         stages=resolved,
         lots={u: names.of(f"lots.{u}", p) for u, p in stages.lots.items()},
-        candidates=names.of("candidates", stages.candidates),
     )
 
 
@@ -215,7 +227,7 @@ def _check_absent_once(stages: Stages, path: Path) -> None:
         for stage, plan in stages.stages.items()
         for item, group in plan.absent.items()
     ]
-    for field, group in [*lists, ("candidates", stages.candidates)]:
+    for field, group in lists:
         for name in group:
             if name in seen:
                 raise InputError(

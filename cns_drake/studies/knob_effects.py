@@ -1,0 +1,144 @@
+"""What makes two drives through a city as different as they are.
+
+A city's change has three knobs: how far the drives pass each other, what is
+absent at the earlier stage, and what is lower there. Each is taken back in
+turn, and the drives are simulated anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+import shutil
+import tempfile
+
+from cns_drake.city.generation.city_structures import City, make_city
+from cns_drake.city.generation.generate import render_stages
+from cns_drake.city.generation.sdf import MESH_FOLDER
+from cns_drake.city.plan.stages import Stage, Stages, load_stages
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.simulation.simulated_drive import SimulatedDrive
+from evaluation.jobs.cluster import Cluster
+from evaluation.study.chosen_methods import choose_methods
+from evaluation.study.trend_points import TrendPoint, measure_drives
+
+_AS_IT_IS = "as_it_is"
+# Variant of the earlier stage -> what a reader is told.
+_TITLES = {
+    _AS_IT_IS: "as it is",
+    "no_aside": "the earlier drive in the middle of its lanes",
+    "nothing_absent": "nothing absent",
+    "nothing_lower": "nothing lower",
+    "no_change": "the earlier drive in the later stage",
+}
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A pair of drives with one of the knobs taken back.
+
+    Attributes:
+        title: which one, in words.
+        points: a point for each method.
+    """
+
+    title: str
+    points: tuple[TrendPoint, ...]
+
+
+def knob_effects(
+    earlier: Scenario, later: Scenario, cluster: Cluster
+) -> list[Effect]:
+    """Simulates the pair as it is and with each knob taken back.
+
+    Args:
+        earlier: a sequence; the database.
+        later: a sequence of the same map at a later stage; it asks.
+        cluster: where the work is done.
+
+    Raises:
+        InputError: the map's files cannot be used.
+    """
+    with tempfile.TemporaryDirectory(prefix="calibration_") as scratch:
+        folder = Path(scratch) / "map"
+        drives = _variants(earlier, later, folder)
+        points = measure_drives(
+            later.name,
+            SimulatedDrive(later),
+            {name: SimulatedDrive(drive) for name, drive in drives.items()},
+            Path(scratch) / "study",
+            cluster,
+            choose_methods(),
+        )
+    return [
+        Effect(
+            _TITLES[name],
+            tuple(point for point in points if point.database == name),
+        )
+        for name in drives
+    ]
+
+
+def _variants(
+    earlier: Scenario, later: Scenario, folder: Path
+) -> dict[str, Scenario]:
+    """Builds the stages that are needed; returns the drives through them."""
+    source = earlier.map_folder
+    city = make_city(source)
+    names = [structure.name for structure in city.structures]
+    stages = load_stages(source / "stages.yaml", names)
+    as_it_is = stages.on_its_own(earlier.stage)
+    plans = {
+        _AS_IT_IS: as_it_is,
+        "nothing_absent": as_it_is.model_copy(update={"absent": {}}),
+        "nothing_lower": as_it_is.model_copy(update={"lower": {}}),
+    }
+    drives = {}
+    for variant, plan in plans.items():
+        if variant != _AS_IT_IS and plan == as_it_is:
+            continue
+        path = folder / variant
+        _write_map(path, city, stages, earlier.stage, plan, source)
+        drives[variant] = earlier.model_copy(update={"map": str(path)})
+    if earlier.aside:
+        drives["no_aside"] = drives[_AS_IT_IS].model_copy(update={"aside": 0.0})
+    drives["no_change"] = earlier.model_copy(update={"stage": later.stage})
+    return {
+        name: drives[name].model_copy(update={"name": name})
+        for name in _TITLES
+        if name in drives
+    }
+
+
+def _write_map(
+    path: Path,
+    city: City,
+    stages: Stages,
+    stage: str,
+    plan: Stage,
+    source: Path,
+) -> None:
+    """Writes a map folder with one stage."""
+    alone = stages.model_copy(
+        update={"stages": {stage: plan, "99": Stage(story="the whole city")}}
+    )
+    files = render_stages(
+        source.name, city, alone, [stage], source / "stages.yaml"
+    )
+    (path / MESH_FOLDER).mkdir(parents=True)
+    shutil.copy(source / "roads.yaml", path)
+    for name, text in files.items():
+        (path / name).write_text(text, encoding="utf-8")
+
+
+def effect_lines(effects: Sequence[Effect]) -> Iterator[str]:
+    """Yields a table of TCR_sym, and of AUC and R@1 of each method."""
+    methods = [point.method for point in effects[0].points]
+    yield "  ".join(
+        [f"{'AUC/R@1':<44} TCR_sym", *(f"{m:>14}" for m in methods)]
+    )
+    for effect in effects:
+        numbers = [f"{p.auc:>9.3f}/{p.recall_at_1:.2f}" for p in effect.points]
+        change = effect.points[0].tcr_sym
+        yield "  ".join([f"{effect.title:<44}  {change:.4f}", *numbers])
