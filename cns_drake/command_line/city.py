@@ -86,10 +86,10 @@ def _calibrate(
         from cns_drake.studies.knob_effects import effect_lines, knob_effects
         from evaluation.jobs.cluster import choose_cluster
 
-    scenarios = [
+    first, last = (
         load_scenario(folder / f"sequence_{stage}.yaml")
         for stage in (earlier, later)
-    ]
-    effects = knob_effects(*scenarios, choose_cluster(jobs, None))
+    )
+    effects = knob_effects(first, last, choose_cluster(jobs, None))
     for line in effect_lines(effects):
         print(line)

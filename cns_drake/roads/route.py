@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, RootModel, Strict
 
 from cns_drake.roads.lane_path import LanePath, sample_lane_path
 from cns_drake.roads.network import RoadNetwork
-from cns_drake.roads.road import Direction, LaneRef
+from cns_drake.roads.road import Direction, LaneRef, Road
 from evaluation.support.errors import InputError
 
 # Distance between the points from which the path is interpolated [m].
@@ -18,6 +18,10 @@ _DENSE_SPACING = 0.25
 # less than the second length there is none.
 _LANE_CHANGE_LENGTH = 50.0
 MIN_LANE_CHANGE_LENGTH = 20.0
+# On its way aside a car takes this much of a road [m], and the middle of its
+# rear axle keeps so far from kerbs and medians, for its front swings out [m].
+_ASIDE_LENGTH = 25.0
+CAR_ROOM = 1.4
 
 LaneNumber = Annotated[int, Field(ge=1)]
 LaneChange = Annotated[tuple[LaneNumber, LaneNumber], Strict(False)]
@@ -85,7 +89,9 @@ def make_lane_path(
         spacing: the distance of the points, rounded so that it divides the
             length of the route [m].
         source: the file that errors name.
-        aside: how far to the right of the lanes' middle the path runs [m].
+        aside: how far to the right of the lanes' middle the path runs along
+            each road, from a junction to the next and as far as the road has
+            room for a car [m].
 
     Raises:
         InputError: a leg names no lane of the network, does not follow from
@@ -97,7 +103,7 @@ def make_lane_path(
     for k, leg in enumerate(route.root):
         try:
             _check_ends(leg, k == 0, k == len(route.root) - 1)
-            points = _leg_points(network, leg)
+            points = _leg_points(network, leg, aside)
             limit = network.roads[leg.road].speed_limit
             if k > 0:
                 way = _way(network, route.root[k - 1], leg)
@@ -110,23 +116,11 @@ def make_lane_path(
         pieces.append(points)
         limits.append(np.full(len(points), limit))
     return sample_lane_path(
-        _moved_right(np.concatenate(pieces), aside),
+        np.concatenate(pieces),
         np.concatenate(limits),
         spacing,
         f"{source}: route",
     )
-
-
-def _moved_right(points: np.ndarray, distance: float) -> np.ndarray:
-    """Returns the (N, 3) points of a path beside a path, at its heights."""
-    if distance == 0:
-        return points
-    along = np.gradient(points[:, :2], axis=0)
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
-    right = np.column_stack([along[:, 1], -along[:, 0]])
-    moved = points.copy()
-    moved[:, :2] += distance * right
-    return moved
 
 
 def _check_ends(leg: RouteLeg, is_first: bool, is_last: bool) -> None:
@@ -136,7 +130,9 @@ def _check_ends(leg: RouteLeg, is_first: bool, is_last: bool) -> None:
         raise ValueError("end is for the last leg only")
 
 
-def _leg_points(network: RoadNetwork, leg: RouteLeg) -> np.ndarray:
+def _leg_points(
+    network: RoadNetwork, leg: RouteLeg, aside: float
+) -> np.ndarray:
     """Returns the (N, 3) points of a leg on its road.
 
     Raises:
@@ -161,11 +157,41 @@ def _leg_points(network: RoadNetwork, leg: RouteLeg) -> np.ndarray:
     offset = offsets[0] + (offsets[1] - offsets[0]) * _lane_change(
         travelled, offsets[0] != offsets[1]
     )
+    offset = _moved_right(road, leg.direction, offset, travelled, aside)
     if leg.direction == "forward":
         stations = road.first_station + travelled
     else:
         stations = road.last_station - travelled
     return road.evaluate(stations, offset)[:, :3]
+
+
+def _moved_right(
+    road: Road,
+    direction: Direction,
+    offset: np.ndarray,
+    travelled: np.ndarray,
+    aside: float,
+) -> np.ndarray:
+    """Returns the offsets of a path beside a lane, on the carriageway [m].
+
+    At both ends of the road it is in the middle of the lane, on a short road
+    all the way.
+    """
+    if aside == 0 or road.length < 2 * _ASIDE_LENGTH:
+        return offset
+    right = -1.0 if direction == "forward" else 1.0
+    outer = road.half_width - CAR_ROOM
+    inner = road.median / 2 + CAR_ROOM if road.median else -outer
+    from_end = np.minimum(travelled, road.length - travelled)
+    share = _smooth_step(np.clip(from_end / _ASIDE_LENGTH, 0.0, 1.0))
+    from_middle = right * offset
+    wanted = np.clip(from_middle + aside, inner, outer)
+    return right * (from_middle + share * (wanted - from_middle))
+
+
+def _smooth_step(u: np.ndarray) -> np.ndarray:
+    """Returns the quintic from 0 to 1 with two derivatives zero at its ends."""
+    return u**3 * (10 - 15 * u + 6 * u**2)
 
 
 def _lane_change(travelled: np.ndarray, wanted: bool) -> np.ndarray:
@@ -184,8 +210,7 @@ def _lane_change(travelled: np.ndarray, wanted: bool) -> np.ndarray:
         )
     length = min(available, _LANE_CHANGE_LENGTH)
     middle = (travelled[0] + travelled[-1]) / 2
-    u = np.clip((travelled - middle) / length + 0.5, 0.0, 1.0)
-    return u**3 * (10 - 15 * u + 6 * u**2)
+    return _smooth_step(np.clip((travelled - middle) / length + 0.5, 0.0, 1.0))
 
 
 def _way(network: RoadNetwork, previous: RouteLeg, leg: RouteLeg) -> np.ndarray:

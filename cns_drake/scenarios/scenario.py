@@ -173,8 +173,9 @@ class Scenario(_Model):
         without: names of structures that are left out of it.
         title: what the sequence shows, in words.
         route: the lanes to follow.
-        aside: how far to the right of its lanes' middle the vehicle keeps;
-            negative to the left [m].
+        aside: how far to the right of its lanes' middle the vehicle keeps
+            between junctions, where the road has room; negative to the left
+            [m].
         waypoints: a CSV file of places to pass instead; see
             `cns_drake.roads.waypoints.load_waypoint_path`.
         speeds: how fast.

@@ -22,6 +22,7 @@ from cns_drake.simulation.simulated_drive import SimulatedDrive
 from evaluation.jobs.cluster import Cluster
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.trend_points import TrendPoint, measure_drives
+from evaluation.support.errors import InputError
 
 _AS_IT_IS = "as_it_is"
 # Variant of the earlier stage -> what a reader is told.
@@ -85,10 +86,13 @@ def _variants(
 ) -> dict[str, Scenario]:
     """Builds the stages that are needed; returns the drives through them."""
     source = earlier.map_folder
+    first, last = earlier.stage, later.stage
+    if first is None or last is None or later.map_folder != source:
+        raise InputError(f"{later.name}: map: not that of {earlier.name}")
     city = make_city(source)
     names = [structure.name for structure in city.structures]
     stages = load_stages(source / "stages.yaml", names)
-    as_it_is = stages.on_its_own(earlier.stage)
+    as_it_is = stages.on_its_own(first)
     plans = {
         _AS_IT_IS: as_it_is,
         "nothing_absent": as_it_is.model_copy(update={"absent": {}}),
@@ -99,11 +103,11 @@ def _variants(
         if variant != _AS_IT_IS and plan == as_it_is:
             continue
         path = folder / variant
-        _write_map(path, city, stages, earlier.stage, plan, source)
+        _write_map(path, city, stages, first, plan, source)
         drives[variant] = earlier.model_copy(update={"map": str(path)})
     if earlier.aside:
         drives["no_aside"] = drives[_AS_IT_IS].model_copy(update={"aside": 0.0})
-    drives["no_change"] = earlier.model_copy(update={"stage": later.stage})
+    drives["no_change"] = earlier.model_copy(update={"stage": last})
     return {
         name: drives[name].model_copy(update={"name": name})
         for name in _TITLES

@@ -36,6 +36,7 @@ TABLES = [
     ("city", "### A street", city_plan.StreetPlan, None),
     ("city", "## `stages.yaml`", stages.Stages, None),
     ("city", "### A stage", stages.Stage, None),
+    ("city", "### A growth", stages.Growth, None),
     ("scenarios", "## Fields", scenario.Scenario, None),
     ("scenarios", "### Route", RouteLeg, None),
     ("scenarios", "### Speeds", Speeds, None),

@@ -75,7 +75,9 @@ def shipped_drive(name) -> tuple[Scenario, LanePath, Trajectory]:
     values = yaml.safe_load(shipped_sequences()[name].read_text())
     scenario = Scenario.model_validate({"name": name, **values})
     network = load_road_network(scenario.roads_file)
-    path = make_lane_path(network, scenario.route, SPACING)
+    path = make_lane_path(
+        network, scenario.route, SPACING, aside=scenario.aside
+    )
     return scenario, path, Trajectory(path, scenario.speeds)
 
 

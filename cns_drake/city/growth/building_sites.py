@@ -88,7 +88,8 @@ def largest_rectangle(footprint: BaseGeometry) -> Polygon:
     shapely.prepare(room)
     inside = boxes[shapely.covers(room, boxes)]
     if len(inside) == 0:
-        return footprint.representative_point().buffer(0.1).envelope
+        x, y = footprint.representative_point().coords[0]
+        return box(x - 0.1, y - 0.1, x + 0.1, y + 0.1)
     return max(inside, key=lambda one: one.area)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 import math
 
 import numpy as np
-from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry.occupancy import Occupancy
 from cns_drake.city.geometry.structures import Structure
@@ -101,7 +101,7 @@ def lot_objects(
 
 
 def _places(
-    footprint: Polygon, use: str, rng: np.random.Generator
+    footprint: BaseGeometry, use: str, rng: np.random.Generator
 ) -> Iterator[tuple[float, float, float]]:
     """Yields x, y and heading of the places that are taken, in S."""
     x0, y0, x1, y1 = largest_rectangle(footprint).bounds

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
-from shapely.geometry import MultiPolygon, Polygon
+from shapely.geometry import MultiPolygon, Polygon, box
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
@@ -58,7 +58,8 @@ def lowered(model: Model, height: float, name: str, seed: int) -> Model:
     """
     if top_of(model) < height + _STOREY:
         return model
-    site = Site(model.footprint, f"{name}_at_{round(10 * height)}")
+    ground = box(*model.footprint.bounds)
+    site = Site(ground, f"{name}_at_{round(10 * height)}")
     assembly = Assembly(site, np.random.default_rng(seed), _wall_rgb(model))
     parts: list[Part] = []
     edges: list[np.ndarray] = []

@@ -114,9 +114,10 @@ def test_the_village_has(area, stems, least):
     assert len(inside) >= least
 
 
-def test_the_village_has_no_gas_station_yet():
-    assert {s.name for s in named("gas_station", "sports_hall")} <= absent()
-    assert len(named("gas_station")) == 1
+def test_the_village_has_no_apartment_blocks_yet():
+    assert {s.name for s in named("balcony_flats")} <= absent()
+    assert {s.name for s in named("bungalow")} & absent()
+    assert not {s.name for s in named("church", "school")} & absent()
 
 
 def test_the_pond_lies_below_the_lawn():

@@ -3,9 +3,10 @@
 import numpy as np
 from pydantic import ValidationError
 import pytest
+from scipy.spatial import cKDTree
 
 from cns_drake.roads.network import load_road_network
-from cns_drake.roads.route import Route, make_lane_path
+from cns_drake.roads.route import CAR_ROOM, Route, make_lane_path
 from cns_drake.scenarios.shipped import worlds_folder
 from evaluation.support.errors import InputError
 
@@ -19,10 +20,9 @@ def leg(road, direction="forward", lane=1, **ends):
     return {"road": road, "direction": direction, "lane": lane, **ends}
 
 
-def path_of(network, *legs, spacing=0.5):
-    return make_lane_path(
-        network, Route.model_validate(list(legs)), spacing, "drive.yaml"
-    )
+def path_of(network, *legs, spacing=0.5, aside=0.0):
+    route = Route.model_validate(list(legs))
+    return make_lane_path(network, route, spacing, "drive.yaml", aside=aside)
 
 
 def test_points_follow_the_lanes_and_are_even(network):
@@ -42,6 +42,43 @@ def test_points_follow_the_lanes_and_are_even(network):
     np.testing.assert_allclose(path.points[-1], middle[-1], atol=1e-9)
     centre = network.roads["avenue_south"].centreline()[-1]
     np.testing.assert_allclose(path.points[0] - centre, [5.25, 0, 0], atol=0.02)
+
+
+def lateral(network, road, direction, lane, aside):
+    """Distances to the right of the road's middle line along a road [m]."""
+    path = path_of(network, leg(road, direction, lane), aside=aside).points
+    centre = network.roads[road].centreline(0.1)
+    centre = centre if direction == "forward" else centre[::-1]
+    nearest = cKDTree(centre).query(path)[1]
+    along = np.gradient(centre[:, :2], axis=0)[nearest]
+    off = path[:, :2] - centre[nearest, :2]
+    right = along[:, 1] * off[:, 0] - along[:, 0] * off[:, 1]
+    return right / np.linalg.norm(along, axis=1)
+
+
+# Lanes of 3.5 m; the boulevard has a median of 4.5 m.
+@pytest.mark.parametrize("direction", ["forward", "backward"])
+@pytest.mark.parametrize(
+    ("road", "lane", "aside", "expected"),
+    [
+        ("ring_north_east", 2, -1.5, 3.75),
+        ("ring_north_east", 2, 0.3, 5.55),
+        # As far as there is room for a car.
+        ("ring_north_east", 2, 1.0, 7.0 - CAR_ROOM),
+        ("ring_north_east", 1, -2.5, -0.75),
+        ("boulevard_middle", 1, -1.0, 2.25 + CAR_ROOM),
+        ("inner_street_west", 1, -3.0, -1.25),
+    ],
+)
+def test_aside_between_junctions(
+    network, direction, road, lane, aside, expected
+):
+    right = lateral(network, road, direction, lane, aside)
+    middle = slice(len(right) // 2 - 5, len(right) // 2 + 5)
+    np.testing.assert_allclose(right[middle], expected, atol=0.03)
+    # At the junctions it is in its lane.
+    usual = lateral(network, road, direction, lane, 0.0)
+    np.testing.assert_allclose(right[[0, -1]], usual[[0, -1]], atol=0.03)
 
 
 def test_start_and_end_are_measured_from_the_entry(network):

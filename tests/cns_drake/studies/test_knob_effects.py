@@ -1,0 +1,99 @@
+"""Calibration: the pair as it is, and with each knob taken back."""
+
+import pytest
+from small_city import write_small_city
+
+from cns_drake.city.generation.generate import generate_city
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.studies.knob_effects import effect_lines, knob_effects
+from evaluation.jobs.cluster import Cluster
+from evaluation.support.errors import InputError
+
+pytestmark = pytest.mark.slow
+
+STAGES = """
+stages:
+  "01":
+    story: low, and without a house
+    absent: {a house: [office_001]}
+    lower: {others: {height: 5, structures: ["brick_block_*"]}}
+  "02": {story: all of it}
+"""
+
+
+def drive(folder, stage, **values):
+    legs = [
+        {"road": "south", "direction": "backward", "lane": 1},
+        {"road": "north", "direction": "forward", "lane": 1},
+    ]
+    return Scenario.model_validate(
+        {
+            "name": f"town_{stage}",
+            "map": str(folder),
+            "stage": stage,
+            "route": legs,
+            "speeds": {
+                "cruise": 14.0,
+                "longitudinal_acceleration": 4.0,
+                "lateral_acceleration": 6.0,
+            },
+            "lidars": {"lidar": {"columns": 128}},
+            **values,
+        }
+    )
+
+
+@pytest.fixture(scope="module")
+def town(tmp_path_factory):
+    folder = write_small_city(tmp_path_factory.mktemp("town") / "town")
+    (folder / "stages.yaml").write_text(STAGES)
+    generate_city(folder)
+    return folder
+
+
+def test_each_knob_is_taken_back(town):
+    effects = knob_effects(
+        drive(town, "01", aside=0.6), drive(town, "02"), Cluster(num_workers=2)
+    )
+    change = {e.title: e.points[0].tcr_sym for e in effects}
+    as_it_is, centred, present, high, unchanged = change.values()
+    assert list(change) == [
+        "as it is",
+        "the earlier drive in the middle of its lanes",
+        "nothing absent",
+        "nothing lower",
+        "the earlier drive in the later stage",
+    ]
+    # Both the house and the storeys are missed; the offset is not.
+    assert unchanged < 0.02 < present < as_it_is
+    assert unchanged < high < as_it_is
+    assert centred == pytest.approx(as_it_is, abs=0.02)
+    for effect in effects:
+        assert {p.method for p in effect.points} >= {"ring++", "btc"}
+    head, *rows = effect_lines(effects)
+    assert "TCR_sym" in head
+    assert len({len(line) for line in (head, *rows)}) == 1
+    assert f"{as_it_is:.4f}" in rows[0]
+
+
+def test_what_is_not_there_is_not_taken_back(town):
+    stages = town / "stages.yaml"
+    text = stages.read_text()
+    stages.write_text(text.replace("absent: {a house: [office_001]}\n", "\n"))
+    try:
+        effects = knob_effects(
+            drive(town, "01"), drive(town, "02"), Cluster(num_workers=2)
+        )
+    finally:
+        stages.write_text(text)
+    assert [e.title for e in effects] == [
+        "as it is",
+        "nothing lower",
+        "the earlier drive in the later stage",
+    ]
+
+
+def test_of_one_map_only(town, tmp_path):
+    other = drive(town, "02").model_copy(update={"map": str(tmp_path)})
+    with pytest.raises(InputError, match="town_02: map: not that of town_01"):
+        knob_effects(drive(town, "01"), other, Cluster())
