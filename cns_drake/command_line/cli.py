@@ -7,6 +7,7 @@ Everything slow to import is imported by the command that needs it, so that
 from __future__ import annotations
 
 from cns_drake.command_line.city import city
+from cns_drake.command_line.families import trend
 from cns_drake.command_line.listing import list_sequences
 from cns_drake.command_line.recorded import export, repair
 from cns_drake.command_line.simulating import (
@@ -53,8 +54,14 @@ app.command(
 )(reproduce)
 app.command(
     epilog=example(
+        "cns-drake trend --vary family.yaml --query riverside_02 \\",
+        "    --output trend",
+    )
+)(trend)
+app.command(
+    epilog=example(
         "cns-drake city town --start",
-        "cns-drake city town --calibrate 01 02 --target 0.15",
+        "cns-drake city town --calibrate 01 02",
     )
 )(city)
 

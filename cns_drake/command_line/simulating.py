@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from cns_drake.command_line.families import family_members
 from cns_drake.command_line.options import (
     LIDAR_OPTION,
     Frames,
@@ -135,19 +135,7 @@ def generate(
         names = list(recordable_sequences())
     scenarios = [load_scenario(name) for name in names or ()]
     if vary is not None:
-        from cns_drake.scenarios.variation import load_family, write_scenarios
-        from cns_drake.studies.redrawing import redraw_cities
-
-        def redraw(
-            map_folder: Path, stage: str, seeds: Sequence[int]
-        ) -> dict[int, Path]:
-            return redraw_cities(
-                map_folder, stage, seeds, output / "cities", cluster
-            )
-
-        members = load_family(vary, redraw)
-        write_scenarios(members, output / "scenarios")
-        scenarios += members
+        scenarios += family_members(vary, output, cluster)
     if frames is not None:
         scenarios = [s.model_copy(update={"frames": frames}) for s in scenarios]
     record_all(scenarios, output, cluster, overwrite=overwrite)

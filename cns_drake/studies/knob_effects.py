@@ -102,7 +102,8 @@ def _variants(
     for variant, plan in plans.items():
         if variant != _AS_IT_IS and plan == as_it_is:
             continue
-        path = folder / variant
+        # Drives are of one world where their maps have one name.
+        path = folder / variant / source.resolve().name
         _write_map(path, city, stages, first, plan, source)
         drives[variant] = earlier.model_copy(update={"map": str(path)})
     if earlier.aside:

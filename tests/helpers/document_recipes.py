@@ -293,6 +293,40 @@ RECIPES = {
         prints=("family/town_01_m600_s0", "trend/trend.csv"),
         makes=("family/scenarios/town_01_m600_s0.yaml", "trend/trend.pdf"),
     ),
+    "family trend": Recipe(
+        ".venv/bin/cns-drake trend --vary family.yaml",
+        changes=(
+            ("riverside_02", "town/sequence_02.yaml"),
+            ("--output trend", "--output simulated"),
+        ),
+        after=("family", "start a city"),
+        prints=("simulated/trend.csv",),
+        makes=("simulated/trend.pdf", "simulated/scenarios/*m600_s0.yaml"),
+    ),
+    "table: family trend": Recipe(
+        "cns-drake trend --vary FAMILY.yaml",
+        changes=(
+            ("FAMILY.yaml", "family.yaml"),
+            ("NAME", "town/sequence_02.yaml"),
+            ("DIR", "simulated"),
+        ),
+        after=("family trend",),
+        prints=("simulated/trend.csv",),
+    ),
+    "cleared city": Recipe(
+        ".venv/bin/cns-drake generate worlds/metropolis/cleared_01.yaml",
+        changes=(
+            (
+                "worlds/metropolis/cleared_01.yaml metropolis_04",
+                "town/sequence_01.yaml town/sequence_02.yaml --frames 60",
+            ),
+            ("cleared_01", "town_01"),
+            ("metropolis_04", "town_02"),
+            ("ring++", "solid"),
+        ),
+        after=("start a city",),
+        prints=("stress/town_01", "AUC"),
+    ),
     "asking family": Recipe(
         "base: riverside_02",
         changes=(("riverside_02", "town/sequence_02.yaml"), ("1, 2, 3", "1")),

