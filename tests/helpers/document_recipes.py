@@ -399,6 +399,8 @@ NOT_RUN = {
     " the repository's hooks",
     ".venv/bin/python -m pytest tests/": "tests in a test; `.ci/run` runs all"
     " of them",
+    '.venv/bin/python -m pytest -m "not slow"': "the quick tests in one of "
+    "them; `.ci/run` runs all",
     "ros2 bag": "needs ROS 2; test_mcap_recorder and others read "
     "recordings with rosbags' reader of rosbag2 folders",
     "@misc{song2025city": "a citation",
