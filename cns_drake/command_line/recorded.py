@@ -17,6 +17,7 @@ class ExportFormat(str, Enum):
 
     CNS = "cns"
     KITTI = "kitti"
+    TUM = "tum"
 
 
 def export(
@@ -29,7 +30,9 @@ def export(
     layout: Annotated[
         ExportFormat,
         typer.Option(
-            "--format", help="Layout of the CNS data set, or KITTI odometry."
+            "--format",
+            help="Layout of the CNS data set, or KITTI odometry; or the "
+            "trajectory alone, as TUM.",
         ),
     ],
     output: Annotated[

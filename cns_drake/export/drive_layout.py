@@ -32,7 +32,8 @@ class Layout:
         inner_files: likewise within that folder, relative to it; without
             the scans.
         scan_files: of a frame's number, its stamp [ns] and its scan -> what
-            is stored of it: path in the drive's folder -> content.
+            is stored of it: path in the drive's folder -> content. None
+            where nothing is.
         shared_outer_files: whether those outside the folder are one for all
             drives, so that they must agree.
     """
@@ -41,7 +42,7 @@ class Layout:
     drive_folder: Callable[[McapSequence], PurePosixPath]
     outer_files: Callable[[McapSequence], dict[str, str]]
     inner_files: Callable[[McapSequence], dict[str, str]]
-    scan_files: Callable[[int, int, np.ndarray], dict[str, bytes]]
+    scan_files: Callable[[int, int, np.ndarray], dict[str, bytes]] | None
     shared_outer_files: bool
 
 
@@ -70,6 +71,11 @@ def structure_files(sequence: McapSequence) -> dict[str, str]:
         return {}
     table = list(sequence.instances.values())
     return {"structures.json": json.dumps(table, indent=1) + "\n"}
+
+
+def seconds(stamp_ns: int) -> str:
+    """Returns a stamp in seconds with all its nanoseconds."""
+    return f"{stamp_ns // 10**9}.{stamp_ns % 10**9:09d}"
 
 
 def join_rows(rows: Iterable[Iterable[object]], separator: str) -> str:

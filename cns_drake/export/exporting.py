@@ -15,6 +15,7 @@ import shutil
 from cns_drake.export.cns_layout import CNS
 from cns_drake.export.drive_layout import Layout
 from cns_drake.export.kitti_layout import KITTI
+from cns_drake.export.tum_layout import TUM
 from cns_drake.recording.rosbag2_metadata import to_yaml
 from evaluation.sequences.mcap_sequence import McapSequence, holds_mcap
 from evaluation.support.errors import InputError
@@ -26,7 +27,7 @@ from evaluation.support.files import (
 )
 from evaluation.support.yaml_files import read_yaml
 
-_LAYOUTS = {"cns": CNS, "kitti": KITTI}
+_LAYOUTS = {"cns": CNS, "kitti": KITTI, "tum": TUM}
 _MARKER = "export.yaml"
 
 
@@ -42,7 +43,7 @@ def export_sequence(
 
     Args:
         recording: the .mcap file, or the folder that holds it.
-        format_name: `cns` or `kitti`.
+        format_name: `cns`, `kitti` or `tum`.
         output: the folder of drives; new, empty, or one that this function
             has written drives of the same format to.
         lidar: whose scans, if the recording has several LiDARs.
@@ -134,6 +135,9 @@ def _write_drive(
         folder.mkdir(parents=True)
         for name, text in layout.inner_files(sequence).items():
             (folder / name).write_text(text, encoding="utf-8")
+        if layout.scan_files is None:
+            on_frame(len(sequence), len(sequence))
+            return
         for frame, (stamp_ns, scan) in enumerate(
             zip(sequence.stamps_ns.tolist(), sequence, strict=True)
         ):

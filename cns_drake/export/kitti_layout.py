@@ -16,6 +16,7 @@ from cns_drake.export.drive_layout import (
     Layout,
     join_rows,
     scenario_files,
+    seconds,
     structure_files,
 )
 from evaluation.clouds.cloud_writing import encode_bin, encode_labels
@@ -44,9 +45,7 @@ def _drive_folder(sequence: McapSequence) -> PurePosixPath:
 
 
 def _outer_files(sequence: McapSequence) -> dict[str, str]:
-    X_S0S = poses.inverse(sequence.X_WS[0]) @ sequence.X_WS
-    X_C0C = _X_CS @ X_S0S @ poses.inverse(_X_CS)
-    return {f"poses/{_number(sequence)}.txt": _rows(X_C0C)}
+    return {f"poses/{_number(sequence)}.txt": _poses(sequence)}
 
 
 def _inner_files(sequence: McapSequence) -> dict[str, str]:
@@ -54,9 +53,9 @@ def _inner_files(sequence: McapSequence) -> dict[str, str]:
     calibration = {f"P{camera}": _PROJECTION for camera in range(4)}
     calibration["Tr"] = _X_CS
     return {
-        "times.txt": "".join(
-            f"{ns // 10**9}.{ns % 10**9:09d}\n" for ns in elapsed_ns.tolist()
-        ),
+        # Readers of KITTI look in `poses`, those of SemanticKITTI here.
+        "poses.txt": _poses(sequence),
+        "times.txt": "".join(f"{seconds(ns)}\n" for ns in elapsed_ns.tolist()),
         "calib.txt": "".join(
             f"{name}: {_rows(X[None])}" for name, X in calibration.items()
         ),
@@ -76,6 +75,12 @@ def _scan_files(
     return files
 
 
+def _poses(sequence: McapSequence) -> str:
+    """Returns X_C0C of each scan as a row of text."""
+    X_S0S = poses.inverse(sequence.X_WS[0]) @ sequence.X_WS
+    return _rows(_X_CS @ X_S0S @ poses.inverse(_X_CS))
+
+
 def _rows(X: np.ndarray) -> str:
     """Returns the upper 3 x 4 of each pose (N, 4, 4) as a row of text."""
     return join_rows(X[:, :3].reshape(-1, 12).tolist(), " ")
@@ -85,6 +90,8 @@ KITTI = Layout(
     files={
         "poses/<NN>.txt": "upper 3 x 4 of the camera's pose in its frame at"
         " the first scan, a row a scan",
+        "sequences/<NN>/poses.txt": "the same, where tools for SemanticKITTI"
+        " look for it",
         "sequences/<NN>/calib.txt": "Tr: upper 3 x 4 of the LiDAR's pose in"
         " the camera's frame. There is no camera: its axes (right, down,"
         " forward) are put into the LiDAR, and P0 to P3 are the identity",

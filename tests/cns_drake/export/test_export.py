@@ -63,6 +63,60 @@ def test_kitti_reads_back(drive, kitti):
     assert read.instances == recorded.instances
 
 
+def test_kitti_has_its_poses_where_semantic_kitti_has_them(drive, kitti):
+    """Beside calib.txt: X_S0S = inv(Tr) X_C0C Tr, as its tools read them."""
+    folder = kitti / "sequences/07"
+    expected = sequences.open(drive).X_WS
+    expected = np.linalg.inv(expected[0]) @ expected
+    X_CS = np.eye(4)
+    for line in (folder / "calib.txt").read_text().splitlines():
+        key, content = line.split(":")
+        if key == "Tr":
+            X_CS[:3] = np.array(content.split(), float).reshape(3, 4)
+    X_C0C = np.tile(np.eye(4), (NUM_SCANS, 1, 1))
+    X_C0C[:, :3] = np.loadtxt(folder / "poses.txt").reshape(-1, 3, 4)
+    read = np.linalg.inv(X_CS) @ X_C0C @ X_CS
+    np.testing.assert_allclose(read, expected, rtol=0, atol=1e-9)
+    assert (folder / "poses.txt").read_bytes() == (
+        kitti / "poses/07.txt"
+    ).read_bytes()
+
+
+def test_tum_by_plain_means(drive, tmp_path):
+    """The vehicle drives as recorded, and the LiDAR stands fixed on it."""
+    folder = export_sequence(drive, "tum", tmp_path / "tum")
+    assert folder == tmp_path / "tum/town_07"
+    recorded = sequences.open(drive)
+    vehicle = np.loadtxt(folder / "base_link.tum")
+    lidar = np.loadtxt(folder / "lidar.tum")
+    assert vehicle.shape == lidar.shape == (NUM_SCANS, 8)
+    i = np.arange(NUM_SCANS)
+    place = np.stack([150.0 + 3.0 * i, -40.0 + i * i, 0.0 * i + 0.5], axis=1)
+    np.testing.assert_allclose(vehicle[:, 1:4], place, rtol=0, atol=1e-12)
+    R_WB = Rotation.from_quat(vehicle[:, 4:])
+    np.testing.assert_allclose(
+        R_WB.as_matrix(),
+        Rotation.from_euler("z", (2.0 + 0.3 * i)[:, None]).as_matrix(),
+        rtol=0,
+        atol=1e-12,
+    )
+    np.testing.assert_allclose(
+        lidar[:, 1:4], place + R_WB.apply(P_BS), rtol=0, atol=1e-9
+    )
+    turned = (R_WB * Rotation.from_quat(QUAT_BS)).inv()
+    angles = (turned * Rotation.from_quat(lidar[:, 4:])).magnitude()
+    np.testing.assert_allclose(angles, 0.0, rtol=0, atol=1e-9)
+    for name in ("base_link.tum", "lidar.tum"):
+        stamps = [
+            line.split()[0] for line in (folder / name).read_text().splitlines()
+        ]
+        # No digit is lost: a float has not as many.
+        assert [
+            int(stamp.replace(".", "")) for stamp in stamps
+        ] == recorded.stamps_ns.tolist()
+        assert {len(stamp.split(".")[1]) for stamp in stamps} == {9}
+
+
 @pytest.mark.slow
 def test_kitti_by_the_loader_of_kiss_icp(drive, kitti):
     from kiss_icp.datasets.kitti import KITTIOdometryDataset
@@ -180,7 +234,7 @@ def test_imu_of_a_simulated_drive(short_recording, tmp_path):
 def test_same_recording_gives_same_bytes(drive, kitti, tmp_path):
     export_sequence(drive, "kitti", tmp_path / "again")
     files = [path for path in kitti.rglob("*") if path.is_file()]
-    assert len(files) == 1 + 1 + 5 + 2 * NUM_SCANS
+    assert len(files) == 1 + 1 + 6 + 2 * NUM_SCANS
     for path in files:
         again = tmp_path / "again" / path.relative_to(kitti)
         assert again.read_bytes() == path.read_bytes()
@@ -229,7 +283,7 @@ def test_a_drive_is_not_replaced(drive, tmp_path):
     assert (drive_folder / "times.txt").read_text() == "mine"
 
 
-@pytest.mark.parametrize("format_name", ["cns", "kitti"])
+@pytest.mark.parametrize("format_name", ["cns", "kitti", "tum"])
 def test_foreign_folders_are_left_alone(drive, tmp_path, format_name):
     (tmp_path / "file").write_text("")
     (tmp_path / "photos").mkdir()
