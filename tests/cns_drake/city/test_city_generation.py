@@ -3,11 +3,18 @@
 import csv
 import xml.etree.ElementTree as ElementTree
 
+from city_checks import (
+    check_no_structure_stands_in_a_lane,
+    check_no_structure_stands_in_another,
+    check_nothing_low_reaches_far_out_of_its_footprint,
+    is_ground,
+)
 from pydrake.geometry import Role
 import pytest
 from shipped_cities import (
     PLANS,
     city,
+    network_of,
     parse_strictly,
     stage_files,
     structure_of,
@@ -126,6 +133,16 @@ def check_walls_are_those_of(low, high, height):
         assert mesh.vertices[:, 2].max() <= height + 0.001
         below = cut_at(whole, height + 0.0005)[0].to_obj()
         assert mesh.to_obj() in (below, whole.to_obj())
+
+
+def test_nothing_stands_in_another_or_in_a_lane(name, stages, growing):
+    network = network_of(name)
+    for stage in stages.stages:
+        standing = [s for s in growing.at(stage) if not is_ground(s)]
+        check_no_structure_stands_in_another(standing)
+        check_no_structure_stands_in_a_lane(standing, network)
+        lots = [s for s in standing if lot_of(s.name)]
+        check_nothing_low_reaches_far_out_of_its_footprint(lots, network)
 
 
 def test_the_list_of_stages_is_complete(name, stages):
