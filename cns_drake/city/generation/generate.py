@@ -70,8 +70,8 @@ def render_stages(
         progress: takes one line at a time.
 
     Raises:
-        InputError: if a building site has no room, or the city has too many
-            structures.
+        InputError: if something is to be low or under construction that
+            cannot be, or the city has too many structures.
     """
     growing = GrowingCity(city.structures, stages, city.cars)
     if len(growing.structures) > _MAX_STRUCTURES:
@@ -86,9 +86,7 @@ def render_stages(
         try:
             standing = growing.at(stage)
         except ValueError as error:
-            raise InputError(
-                f"{source}: stages.{stage}.sites: {error}"
-            ) from error
+            raise InputError(f"{source}: stages.{stage}.{error}") from error
         used += standing
         files[f"stage_{stage}.sdf"] = stage_sdf(
             f"{world}_{stage}",

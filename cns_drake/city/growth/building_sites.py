@@ -47,7 +47,7 @@ def building_site(model: Model, height: float, name: str, seed: int) -> Model:
     x1, y1 = min(x1, x0 + high), min(y1, y0 + high)
     if min(x1 - x0, y1 - y0) < low:
         raise ValueError(
-            f"{name}: its lot is too small for a building site, which takes "
+            f"sites: {name}: its lot is too small for a site, which takes "
             f"{low} m by {low} m"
         )
     lowest, highest = ARCHETYPES[_FRAME].heights

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 import math
+from typing import get_args
 
 import numpy as np
 from shapely.geometry.base import BaseGeometry
@@ -12,6 +13,7 @@ from cns_drake.city.geometry.occupancy import Occupancy
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.growth.building_sites import largest_rectangle
 from cns_drake.city.placement.objects import OBJECTS
+from cns_drake.city.plan.stages import LotUse
 from cns_drake.city.plan.weighted import pick
 
 # Distance to the edges of the lot, where the neighbours stand [m].
@@ -44,10 +46,10 @@ _OBJECTS: dict[str, Mapping[str, float]] = {
 }
 # Part of the places that are taken.
 _FILL = {"car_park": 0.6, "market": 0.7, "garden": 0.5, "yard": 0.45}
-USES = ("car_park", "market", "garden", "yard", "empty")
+USES: tuple[LotUse, ...] = get_args(LotUse)
 
 
-def use_by_size(structure: Structure) -> str:
+def use_by_size(structure: Structure) -> LotUse:
     """Returns the use that suits the size of a building's lot."""
     area = structure.model.footprint.area
     if area > 900:
@@ -59,7 +61,7 @@ def use_by_size(structure: Structure) -> str:
 
 def lot_objects(
     structure: Structure,
-    use: str,
+    use: LotUse,
     cars: Mapping[str, float],
     rng: np.random.Generator,
 ) -> Iterator[Structure]:
@@ -101,7 +103,7 @@ def lot_objects(
 
 
 def _places(
-    footprint: BaseGeometry, use: str, rng: np.random.Generator
+    footprint: BaseGeometry, use: LotUse, rng: np.random.Generator
 ) -> Iterator[tuple[float, float, float]]:
     """Yields x, y and heading of the places that are taken, in S."""
     x0, y0, x1, y1 = largest_rectangle(footprint).bounds

@@ -8,7 +8,7 @@ import zlib
 
 import numpy as np
 
-from cns_drake.city.geometry.structures import Model, Structure
+from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.growth.building_sites import building_site
 from cns_drake.city.growth.lot_uses import lot_objects, use_by_size
 from cns_drake.city.growth.lowering import lowered
@@ -68,6 +68,7 @@ class GrowingCity:
 
         Raises:
             KeyError: if there is no such stage.
+            ValueError: if something is to be low or built that cannot be.
         """
         absent = self._stages.absent(stage)
         heights = self._stages.heights(stage)
@@ -76,6 +77,8 @@ class GrowingCity:
         for structure in self._permanent:
             name = structure.name
             if name in sites:
+                if structure.semantic_class != "building":
+                    raise ValueError(f"sites: {name} is no building")
                 model = building_site(
                     structure.model, sites[name], name, _seed(name)
                 )
@@ -94,13 +97,13 @@ class GrowingCity:
 
 def _at_height(structure: Structure, height: float) -> Structure:
     """Returns a structure that has not grown any higher yet."""
-    return replace(structure, model=_grown(structure.name, height, structure))
-
-
-def _grown(name: str, height: float, structure: Structure) -> Model:
+    name, model = structure.name, structure.model
     if structure.semantic_class == "vegetation":
-        return younger(structure.model, height)
-    return lowered(structure.model, height, name, _seed(name))
+        return replace(structure, model=younger(model, height))
+    if structure.semantic_class == "building":
+        model = lowered(model, height, name, _seed(name))
+        return replace(structure, model=model)
+    raise ValueError(f"lower: {name} is neither a building nor a plant")
 
 
 def _seed(name: str) -> int:

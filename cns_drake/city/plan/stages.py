@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from evaluation.support.errors import InputError, describe_validation_error
 from evaluation.support.yaml_files import read_yaml
 
+LotUse = Literal["car_park", "market", "garden", "yard", "empty"]
 StageName = Annotated[str, Field(pattern=r"^\d\d$")]
 
 
@@ -66,7 +67,7 @@ class Stages(_Model):
     """
 
     stages: dict[StageName, Stage]
-    lots: dict[str, list[str]] = Field(default_factory=dict)
+    lots: dict[LotUse, list[str]] = Field(default_factory=dict)
 
     def absent(self, stage: str) -> set[str]:
         """Returns the names of all structures that a stage lacks.

@@ -111,6 +111,7 @@ def test_there_is_no_stage_03(tmp_path):
         ('"01"', '"one"', "stages.one"),
         ("story: a tower", "tale: a tower", "stages.02.story"),
         ("stages:", "lot: {}\nstages:", "lot: Extra inputs"),
+        ("stages:", "lots: {pool: []}\nstages:", "lots.pool"),
         ("stages:", "stages: [", "not readable as YAML"),
         (GOOD, "stages: {}", "at least one stage"),
         (GOOD, "", "(top level)"),

@@ -137,7 +137,7 @@ def test_a_site_stands_on_its_lot():
 
 
 def test_a_lot_too_small_for_a_frame_has_none():
-    with pytest.raises(ValueError, match="k: its lot is too small"):
+    with pytest.raises(ValueError, match="sites: k: its lot is too small"):
         building_site(typical_model("kiosk_row"), 9.0, "k", 1)
 
 
@@ -194,3 +194,19 @@ def test_a_city_grows_from_stage_to_stage():
     assert first[1:] == city.structures[2:]
     assert use_by_size(block) in USES
     assert isinstance(enclosed(np.zeros((0, 2, 2))), MultiPolygon)
+
+
+@pytest.mark.parametrize(
+    ("field", "fault"),
+    [
+        ("lower", "lower: car_001 is neither a building nor a plant"),
+        ("sites", "sites: car_001 is no building"),
+    ],
+)
+def test_a_car_does_not_grow(field, fault):
+    car = Structure("car_001", "car", typical_model("office"), (0, 0, 0))
+    groups = {"x": Growth(height=5, structures=["car_001"])}
+    first = Stage(story="", **{field: groups})
+    stages = Stages(stages={"01": first, "02": Stage(story="")})
+    with pytest.raises(ValueError, match=fault):
+        GrowingCity([car], stages, {}).at("01")
