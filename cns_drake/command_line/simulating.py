@@ -167,8 +167,7 @@ def reproduce(
         bool,
         typer.Option(
             "--quick",
-            help="The report alone: simulate without recording, and leave out "
-            "same-stage controls.",
+            help="The report alone: simulate without recording.",
         ),
     ] = False,
 ) -> None:

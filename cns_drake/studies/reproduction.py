@@ -44,12 +44,11 @@ def reproduce_maps(
         output: the folder for everything.
         cluster: where the work is done.
         with_pages: whether the web pages are made.
-        quick: make the report alone, of the same frames, and without
-            same-stage controls: what is not recorded yet is evaluated while
-            it is simulated, and not recorded.
+        quick: make the report alone, of the same frames: what is not
+            recorded yet is evaluated while it is simulated, and not recorded.
 
     Returns:
-        The path of the report.
+        The path of the report's page.
 
     Raises:
         InputError: a map is not known, the folder cannot be made, or a step
@@ -60,8 +59,8 @@ def reproduce_maps(
     for folder in folders:
         of_map = _sequences(folder)
         sequences += of_map
+        controls += control_drives(of_map)
         if not quick:
-            controls += control_drives(of_map)
             pictures += plan_pictures(folder, output / "pictures")
     pages = {s.name: output / "pages" / f"{s.name}.html" for s in sequences}
     jobs = []
@@ -79,7 +78,9 @@ def reproduce_maps(
             recording
             if is_recorded(scenario, output)
             else replace(recording, made_by=SimulatedDrive(scenario))
-            for scenario, recording in zip(sequences, recordings, strict=True)
+            for scenario, recording in zip(
+                (*sequences, *controls), recordings, strict=True
+            )
         ]
     # In the order in which `cns-eval report` finds them.
     recordings.sort(key=lambda recording: recording.name)

@@ -291,17 +291,32 @@ def _curves(
     return scores[ends], tp, fp, fn
 
 
-def _bootstrap(outcomes: QueryOutcomes, seed: int) -> tuple[Interval, Interval]:
-    """Returns percentile intervals of AUC and R@1 over resampled queries."""
-    num_queries = len(outcomes)
-    if num_queries == 0:
-        nothing = Interval(math.nan, math.nan)
-        return nothing, nothing
+def resampled_weights(num_queries: int, seed: int = 0) -> np.ndarray:
+    """Returns how often each query counts in each sample of a bootstrap.
+
+    Args:
+        num_queries: Q, one or more.
+        seed: of the drawing; equal ones draw the same queries.
+
+    Returns:
+        (B, Q) float64 counts, each row of sum Q.
+    """
     rng = np.random.default_rng([seed, num_queries])
     draws = rng.integers(num_queries, size=(_BOOTSTRAP_SAMPLES, num_queries))
-    weights = np.stack(
+    return np.stack(
         [np.bincount(draw, minlength=num_queries) for draw in draws]
     ).astype(np.float64)
+
+
+def resampled_metrics(
+    outcomes: QueryOutcomes, weights: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns AUC (B,) and R@1 (B,) of samples of the queries.
+
+    Args:
+        outcomes: of Q queries, all of which count.
+        weights: (B, Q) how often each does in each sample.
+    """
     _, tp, fp, fn = _curves(outcomes, weights)
     # Before the first query that a sample holds, nothing is accepted; there
     # the curve keeps the precision of its first point.
@@ -312,7 +327,27 @@ def _bootstrap(outcomes: QueryOutcomes, seed: int) -> tuple[Interval, Interval]:
         recalls = (weights * outcomes.is_right).sum(axis=1) / (
             weights * outcomes.has_match
         ).sum(axis=1)
-    return _interval(areas), _interval(recalls)
+    return areas, recalls
+
+
+def percentile_interval(samples: np.ndarray) -> Interval:
+    """Returns what holds 95 % of samples; those that are NaN do not count."""
+    known = samples[~np.isnan(samples)]
+    if len(known) == 0:
+        return Interval(math.nan, math.nan)
+    tail = 0.5 * (1.0 - _CONFIDENCE)
+    low, high = np.quantile(known, [tail, 1.0 - tail])
+    return Interval(float(low), float(high))
+
+
+def _bootstrap(outcomes: QueryOutcomes, seed: int) -> tuple[Interval, Interval]:
+    """Returns percentile intervals of AUC and R@1 over resampled queries."""
+    if len(outcomes) == 0:
+        nothing = Interval(math.nan, math.nan)
+        return nothing, nothing
+    weights = resampled_weights(len(outcomes), seed)
+    areas, recalls = resampled_metrics(outcomes, weights)
+    return percentile_interval(areas), percentile_interval(recalls)
 
 
 def _area(precision: np.ndarray, recall: np.ndarray) -> np.ndarray:
@@ -342,15 +377,6 @@ def _filled_from_right(values: np.ndarray) -> np.ndarray:
     rows = np.arange(len(values))
     start = np.where(known.any(axis=1), values[rows, first], 0.0)
     return np.where(known, values, start[:, None])
-
-
-def _interval(samples: np.ndarray) -> Interval:
-    known = samples[~np.isnan(samples)]
-    if len(known) == 0:
-        return Interval(math.nan, math.nan)
-    tail = 0.5 * (1.0 - _CONFIDENCE)
-    low, high = np.quantile(known, [tail, 1.0 - tail])
-    return Interval(float(low), float(high))
 
 
 def _mean(values: np.ndarray) -> float:

@@ -18,6 +18,9 @@ from evaluation.report import paper
 from evaluation.report.drawing import method_style, save
 from evaluation.report.result_tables import in_paper_order, title
 
+# A line is not fitted through fewer.
+_LEAST_POINTS = 5
+
 
 def draw_pr_curves(
     map_name: str, results: Sequence[RecognitionResult], stem: Path
@@ -60,16 +63,18 @@ def draw_auc_over_change(
 ) -> None:
     """Draws AUC against TCR_sym, ours with 95 % intervals and the paper's.
 
-    Left all queries are counted, in the middle those with a match; right is
-    the paper's Table II.
+    Left all queries are counted, then those with a match; right of them is
+    the paper's Table II, where its maps are shown.
 
     Args:
         results: of all pairs and methods.
         changes: TCR_sym of each pair.
         stem: path to write, without ending.
     """
-    figure = Figure(figsize=(10.2, 3.7), layout="constrained")
-    panels = figure.subplots(1, 3, sharex=True, sharey=True)
+    with_paper = shows_paper(results)
+    count = len(MODES) + with_paper
+    figure = Figure(figsize=(3.4 * count, 3.7), layout="constrained")
+    panels = figure.subplots(1, count, sharex=True, sharey=True)
     methods = in_paper_order(result.method for result in results)
     for axes, mode in zip(panels, MODES, strict=False):
         for index, method in enumerate(methods):
@@ -82,9 +87,12 @@ def draw_auc_over_change(
             shift = 0.0008 * (index - 0.5 * (len(methods) - 1))
             _draw_points(axes, method, points, shift)
         axes.set_title(f"this report, {mode} queries", fontsize=9)
-    for method in methods:
-        _draw_paper(panels[2], method)
-    panels[2].set_title("the paper (RING++ filtered, others all)", fontsize=9)
+    if with_paper:
+        for method in methods:
+            _draw_paper(panels[-1], method)
+        panels[-1].set_title(
+            "the paper (RING++ filtered, others all)", fontsize=9
+        )
     for axes in panels:
         axes.tick_params(labelleft=True)
         axes.set(xlabel=r"TCR$_\mathrm{sym}$", ylim=(0.0, 1.02))
@@ -92,6 +100,11 @@ def draw_auc_over_change(
     panels[0].set_ylabel("AUC")
     panels[0].legend(fontsize=7, framealpha=0.8)
     save(figure, stem, "svg")
+
+
+def shows_paper(results: Sequence[RecognitionResult]) -> bool:
+    """Tells whether a map of the paper is among the results."""
+    return any(result.pair[0] in paper.city_names() for result in results)
 
 
 def _draw_curve(
@@ -165,7 +178,7 @@ def _draw_line(
     axes: Axes, x: np.ndarray, y: np.ndarray, colour: str, style: str
 ) -> None:
     """Draws the least-squares line, where there are enough points."""
-    if len(x) < 3 or np.ptp(x) == 0.0:
+    if len(x) < _LEAST_POINTS or np.ptp(x) == 0.0:
         return
     slope, offset = np.polyfit(x, y, 1)
     ends = np.array([x.min(), x.max()])

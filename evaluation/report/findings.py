@@ -70,10 +70,14 @@ def findings(
 ) -> list[Finding]:
     """Judges the paper's findings; those of which nothing is known left out.
 
+    Only the paper's maps are judged by them.
+
     Args:
         results: place recognition of all pairs.
         changes: TCR of all pairs.
     """
+    results = [r for r in results if r.pair[0] in paper.city_names()]
+    changes = [c for c in changes if c.map_name in paper.city_names()]
     tcr = symmetric_changes(changes)
     methods = in_paper_order(result.method for result in results)
     found = []

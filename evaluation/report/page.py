@@ -15,7 +15,10 @@ from evaluation.change.change_result import (
     ChangeResult,
     symmetric_changes,
 )
+from evaluation.recognition.metrics import MODES
 from evaluation.recognition.recognition_result import RecognitionResult
+from evaluation.recognition.survival import Survival
+from evaluation.report.curve_figures import shows_paper
 from evaluation.report.findings import Finding
 from evaluation.report.page_data import (
     Illustration,
@@ -24,6 +27,7 @@ from evaluation.report.page_data import (
     browser_data,
 )
 from evaluation.report.page_routes import route_legend, route_picture
+from evaluation.report.page_survival import survival_section
 from evaluation.report.tables import Table
 from evaluation.support.files import completing
 
@@ -41,10 +45,11 @@ class PageContent:
         findings: of the paper, judged.
         changes: TCR of all pairs.
         change: Table I.
-        recognition: Table II in its forms.
+        recognition: Table II in its forms, that of mode all last but one.
         audit: all numbers.
         illustrations: figures, already written.
         recognitions: place recognition of all pairs.
+        survivals: the same with their controls.
         drives: name -> drive, all that occur in a pair.
         pages: drive -> address, relative to the page, of its recording to
             look around in; drives without one may be left out.
@@ -57,6 +62,7 @@ class PageContent:
     audit: Table
     illustrations: Sequence[Illustration]
     recognitions: Sequence[RecognitionResult]
+    survivals: Sequence[Survival]
     drives: Mapping[str, PageDrive]
     pages: Mapping[str, str] = field(default_factory=dict)
 
@@ -76,7 +82,9 @@ def write_page(path: Path, content: PageContent) -> None:
             symmetric_changes(content.changes),
             content.pages,
         )
+    chart = _figures(content.illustrations, "survival")
     sections = [
+        ("survival", "Survival", survival_section(content.survivals, chart)),
         ("summary", "Summary", _summary(content)),
         ("maps", "Maps", _maps(content)),
         ("change", "Change", _change(content)),
@@ -86,6 +94,7 @@ def write_page(path: Path, content: PageContent) -> None:
     ]
     sections = [section for section in sections if section[2]]
     slots = {
+        "lead": _lead(content),
         "style": _template("page.css"),
         "script": "\n".join(_template(name) for name in _SCRIPTS),
         "links": "".join(
@@ -101,6 +110,25 @@ def write_page(path: Path, content: PageContent) -> None:
     text = _SLOT.sub(lambda m: slots[m[1]], _template("page.html"))
     with completing(path) as part:
         part.write_text(text, encoding="utf-8")
+
+
+def _lead(content: PageContent) -> str:
+    """Returns what the page is about, and the way to the single queries."""
+    text = (
+        "How much cities changed between drives, and how well LiDAR place"
+        " recognition copes"
+    )
+    if shows_paper(content.recognitions):
+        text += (
+            ", beside the numbers of the paper “The City that Never Settles”"
+        )
+    lead = f"<p>{text}.</p>"
+    if content.recognitions:
+        lead += (
+            '<p class="links"><a href="#browser">Look at every query, one by'
+            " one</a></p>"
+        )
+    return lead
 
 
 def _summary(content: PageContent) -> str:
@@ -191,9 +219,13 @@ def _recognition(content: PageContent) -> str:
         return ""
     parts = ["<h2>Table II: place recognition</h2>"]
     parts.append(_scrolling(content.recognition[0], "grouped"))
+    names = [f"All methods in mode {mode}" for mode in MODES]
+    names = names[-(len(content.recognition) - 1) :]
     for name, table, kind in (
-        ("All methods in mode all", content.recognition[1], "grouped"),
-        ("All methods in mode filtered", content.recognition[2], "grouped"),
+        *(
+            (name, table, "grouped")
+            for name, table in zip(names, content.recognition[1:], strict=True)
+        ),
         ("All numbers: intervals, N, T, TP", content.audit, "plain audit"),
     ):
         parts.append(

@@ -30,7 +30,7 @@ _NUM_BEST = 5
 _ROUTE_STEP = 2.0
 _WEBP_QUALITY = 75
 
-Section = Literal["change", "recognition", "figures", "print"]
+Section = Literal["survival", "change", "recognition", "figures", "print"]
 
 
 @dataclass(frozen=True)

@@ -54,8 +54,8 @@ def paper_values(
 def change_table(results: Sequence[ChangeResult]) -> Table:
     """Returns Table I: the change of each pair, and what it is made of.
 
-    The paper's value for real drives through KAIST stands below, to compare
-    with.
+    The paper's value for real drives through KAIST stands below its maps, to
+    compare with.
     """
     header = (
         "map",
@@ -87,7 +87,7 @@ def change_table(results: Sequence[ChangeResult]) -> Table:
                 change.num_unchanged,
             )
         )
-    if results:
+    if any(result.map_name in paper.city_names() for result in results):
         kaist = paper.tcr_values()["kaist", "01", "06"]
         rows.append(("kaist (real)", "01 ↔ 06", None, kaist) + (None,) * 6)
     return Table(
@@ -97,6 +97,20 @@ def change_table(results: Sequence[ChangeResult]) -> Table:
         " in one stage of the city, where nothing changed. Where both drove:"
         " only voxels within 40 m of both routes.",
     )
+
+
+def recognition_tables(
+    results: Sequence[RecognitionResult], changes: Sequence[ChangeResult]
+) -> list[Table]:
+    """Returns Table II in its forms.
+
+    First as the paper seems to have counted, where its maps are shown; then
+    in each mode.
+    """
+    modes: list[Mode | None] = list(MODES)
+    if any(result.map_name in paper.city_names() for result in results):
+        modes.insert(0, None)
+    return [recognition_table(results, changes, mode) for mode in modes]
 
 
 def recognition_table(

@@ -11,17 +11,26 @@ from evaluation.change.change_result import (
     symmetric_changes,
 )
 from evaluation.recognition.recognition_result import RecognitionResult
+from evaluation.recognition.survival import Survival
 from evaluation.report import page
 from evaluation.report.curve_figures import (
     draw_auc_over_change,
     draw_pr_curves,
+    shows_paper,
 )
 from evaluation.report.findings import Finding, findings
 from evaluation.report.page_data import Illustration, PageDrive
+from evaluation.report.query_table import DriveTrack, query_table
 from evaluation.report.result_tables import (
     audit_table,
     change_table,
-    recognition_table,
+    recognition_tables,
+)
+from evaluation.report.survival_figure import draw_survival
+from evaluation.report.survival_tables import (
+    survival_numbers,
+    survival_summary,
+    survival_table,
 )
 from evaluation.report.tables import Table
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
@@ -34,6 +43,7 @@ from evaluation.study.figure_files import (
     auc_illustration,
     curves_stem,
     illustrations,
+    survival_illustration,
 )
 from evaluation.study.parts import read_part
 from evaluation.study.study_layout import StudyFiles
@@ -45,9 +55,14 @@ class _Collected:
     """What the cities contribute, one after the other."""
 
     changes: list[ChangeResult] = field(default_factory=list)
-    recognitions: list[RecognitionResult] = field(default_factory=list)
+    survivals: list[Survival] = field(default_factory=list)
+    tracks: dict[str, DriveTrack] = field(default_factory=dict)
     illustrations: list[Illustration] = field(default_factory=list)
     drives: dict[str, PageDrive] = field(default_factory=dict)
+
+    @property
+    def recognitions(self) -> list[RecognitionResult]:
+        return [one.changed for one in self.survivals]
 
 
 def assemble(
@@ -58,9 +73,10 @@ def assemble(
 ) -> Path:
     """Writes the report of a study whose jobs are done.
 
-    Files: `report.html`, which holds everything; `report.md`; `tcr` and
-    `place_recognition`, each as .csv (all numbers), .md and .tex; and what
-    is missing in the folder `figures`.
+    Files: `report.html`, which holds everything; `report.md`; `survival`,
+    `tcr` and `place_recognition`, each as .csv (all numbers), .md and .tex;
+    `queries.csv` and `queries_unchanged.csv`, every query of the pairs and of
+    their controls; and what is missing in the folder `figures`.
 
     Args:
         recordings: as in `plan_study`.
@@ -70,7 +86,7 @@ def assemble(
             in 3-D, for those that have one.
 
     Returns:
-        The path of `report.md`.
+        The path of `report.html`.
 
     Raises:
         InputError: if a job has not been done, or a file cannot be written.
@@ -82,12 +98,18 @@ def assemble(
     for city in group_cities(recordings):
         _collect(city, files, chosen, collected)
     if collected.recognitions:
-        shown = auc_illustration(files.figures)
+        shown = auc_illustration(
+            files.figures, shows_paper(collected.recognitions)
+        )
         draw_auc_over_change(
             collected.recognitions,
             symmetric_changes(collected.changes),
             shown.stem,
         )
+        collected.illustrations.insert(0, shown)
+    if any(one.unchanged is not None for one in collected.survivals):
+        shown = survival_illustration(files.figures)
+        draw_survival(collected.survivals, shown.stem)
         collected.illustrations.insert(0, shown)
     return _write_all(collected, output, pages or {})
 
@@ -101,17 +123,37 @@ def _collect(
     for earlier, later in city.change_pairs():
         change = read_part(files.change(earlier.name, later.name))
         collected.changes.append(change)
-    recognitions = [
-        read_part(files.recognition(database.name, query.name, method))
-        for database, query in city.recognition_pairs()
-        for method in methods
-    ]
-    if recognitions:
+    survivals = []
+    for pair in city.recognition_pairs():
+        control = city.unchanged_pair(*pair)
+        for method in methods:
+            changed = _read_recognition(pair, method, files)
+            unchanged = None
+            if control is not None:
+                unchanged = _read_recognition(control, method, files)
+            survivals.append(Survival.of(changed, unchanged))
+        for drive in (*pair, *(control or ())):
+            if drive.name in collected.tracks:
+                continue
+            survey = read_part(files.survey(drive.name).drive)
+            collected.tracks[drive.name] = DriveTrack(
+                survey.stamps_ns, survey.X_WS
+            )
+    if survivals:
         stem = files.figures / curves_stem(city)
-        draw_pr_curves(city.name, recognitions, stem)
-    collected.recognitions += recognitions
+        draw_pr_curves(city.name, [one.changed for one in survivals], stem)
+    collected.survivals += survivals
     collected.drives.update(read_part(files.page_drives(city.name)))
     collected.illustrations += illustrations(city, files.figures)
+
+
+def _read_recognition(
+    pair: tuple[RecordingInfo, RecordingInfo],
+    method: MethodChoice,
+    files: StudyFiles,
+) -> RecognitionResult:
+    database, query = pair
+    return read_part(files.recognition(database.name, query.name, method))
 
 
 def _write_all(
@@ -120,20 +162,21 @@ def _write_all(
     changes, recognitions = collected.changes, collected.recognitions
     found = findings(recognitions, changes)
     change = change_table(changes)
-    recognition = [
-        recognition_table(recognitions, changes, mode)
-        for mode in (None, "all", "filtered")
-    ]
+    recognition = recognition_tables(recognitions, changes)
     audit = audit_table(recognitions)
+    survival = survival_table(collected.survivals)
+    _write_queries(collected, output)
     for name, shown, numbers in (
+        ("survival", [survival], survival_numbers(collected.survivals)),
         ("tcr", [change], change),
         ("place_recognition", recognition, audit),
     ):
         _write(output / f"{name}.csv", numbers.to_csv())
         _write(output / f"{name}.md", "\n".join(map(_captioned, shown)))
         _write(output / f"{name}.tex", "\n".join(t.to_latex() for t in shown))
+    path = output / "report.html"
     page.write_page(
-        output / "report.html",
+        path,
         page.PageContent(
             findings=found,
             changes=changes,
@@ -142,21 +185,41 @@ def _write_all(
             audit=audit,
             illustrations=collected.illustrations,
             recognitions=recognitions,
+            survivals=collected.survivals,
             drives=collected.drives,
             pages=pages,
         ),
     )
-    path = output / "report.md"
     _write(
-        path,
+        output / "report.md",
         _to_markdown(
-            found, change, recognition, audit, collected.illustrations
+            survival_summary(collected.survivals),
+            survival,
+            found,
+            change,
+            recognition,
+            audit,
+            collected.illustrations,
         ),
     )
     return path
 
 
+def _write_queries(collected: _Collected, output: Path) -> None:
+    pairs = [(one.pair, one.changed) for one in collected.survivals]
+    controls = [
+        (one.pair, one.unchanged)
+        for one in collected.survivals
+        if one.unchanged is not None
+    ]
+    for name, results in (("queries", pairs), ("queries_unchanged", controls)):
+        table = query_table(results, collected.tracks)
+        _write(output / f"{name}.csv", table.to_csv())
+
+
 def _to_markdown(
+    summary: str,
+    survival: Table,
     found: list[Finding],
     change: Table,
     recognition: list[Table],
@@ -164,6 +227,9 @@ def _to_markdown(
     shown: list[Illustration],
 ) -> str:
     parts = ["# Structural change and place recognition\n"]
+    if survival.rows:
+        parts.append("## Which method survives the change?\n")
+        parts += [f"{summary}\n", _captioned(survival)]
     if found:
         parts.append("## The paper's findings\n")
         parts += [

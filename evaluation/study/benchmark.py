@@ -36,7 +36,7 @@ def write_report(
         on_note: is told which recordings are left out.
 
     Returns:
-        The path of `report.md`.
+        The path of `report.html`.
 
     Raises:
         InputError: if a recording cannot be read, or the output not be

@@ -95,6 +95,27 @@ class City:
                     return other
         return None
 
+    def unchanged_pair(
+        self, database: RecordingInfo, query: RecordingInfo
+    ) -> tuple[RecordingInfo, RecordingInfo] | None:
+        """Returns the control of a pair: its routes, in one stage.
+
+        A drive on the route of one, in the stage of the other, takes the
+        place of the one; rather of the database, so that the very same scans
+        ask.
+        """
+        for replaced, kept in ((database, query), (query, database)):
+            for other in self.others:
+                if (
+                    other.stage == kept.stage
+                    and other.route is not None
+                    and other.route == replaced.route
+                ):
+                    if replaced is database:
+                        return other, query
+                    return database, other
+        return None
+
 
 def find_recordings(
     folder: Path, on_note: Callable[[str], None] = lambda text: None

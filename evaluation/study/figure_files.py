@@ -79,11 +79,23 @@ def illustrations(city: City, folder: Path) -> list[Illustration]:
     return shown
 
 
-def auc_illustration(folder: Path) -> Illustration:
+def auc_illustration(folder: Path, with_paper: bool) -> Illustration:
     """Returns the figure of all cities together."""
+    paper = ", and the paper's" if with_paper else ""
     return Illustration(
         folder / "auc_over_tcr",
-        "AUC against TCR_sym with 95 % intervals, and the paper's",
+        f"AUC against TCR_sym with 95 % intervals{paper}",
         "svg",
-        num_panels=3,
+        num_panels=3 if with_paper else 2,
+    )
+
+
+def survival_illustration(folder: Path) -> Illustration:
+    """Returns the figure of what the change leaves of each method."""
+    return Illustration(
+        folder / "survival",
+        "AUC without the change (hollow) and with it (full), and the share"
+        " that is kept",
+        "svg",
+        section="survival",
     )

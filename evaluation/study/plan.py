@@ -102,11 +102,29 @@ def _plan_city(
     )
     jobs += [_change_job(city, pair, files) for pair in city.change_pairs()]
     jobs += [
-        _recognition_job(city, pair, method, files)
-        for pair in city.recognition_pairs()
+        _recognition_job(city, pair, name, method, files)
+        for name, pair in _compared_pairs(city).items()
         for method in methods
     ]
     return jobs
+
+
+def _compared_pairs(
+    city: City,
+) -> dict[str, tuple[RecordingInfo, RecordingInfo]]:
+    """Returns all pairs of database and query, and their controls, by name.
+
+    Two pairs may share a control.
+    """
+    pairs = city.recognition_pairs()
+    named = {f"{city.name} {d.stage} > {q.stage}": (d, q) for d, q in pairs}
+    for pair in pairs:
+        control = city.unchanged_pair(*pair)
+        if control is not None:
+            database, query = control
+            name = f"control {database.name} > {query.name}"
+            named[name] = control
+    return named
 
 
 def _roles(city: City) -> list[tuple[RecordingInfo, set[Role]]]:
@@ -122,7 +140,7 @@ def _roles(city: City) -> list[tuple[RecordingInfo, set[Role]]]:
         control = city.control(*pair)
         if control is not None:
             need(control)
-    for database, query in city.recognition_pairs():
+    for database, query in _compared_pairs(city).values():
         need(database, "places")
         need(query, "queries")
     return list(roles.values())
@@ -155,6 +173,7 @@ def _change_job(
 def _recognition_job(
     city: City,
     pair: tuple[RecordingInfo, RecordingInfo],
+    name: str,
     method: MethodChoice,
     files: StudyFiles,
 ) -> Job:
@@ -162,7 +181,7 @@ def _recognition_job(
     cost = _RECOGNITION_COST.get(method.name, _OTHER_RECOGNITION_COST)
     result = files.recognition(database.name, query.name, method)
     return Job(
-        name=f"{city.name} {database.stage} > {query.stage}, {method.name}",
+        name=f"{name}, {method.name}",
         function=recognise_places,
         arguments=(
             city.name,

@@ -28,6 +28,7 @@ class SurveyedDrive:
 
     Attributes:
         placed: its name, and the world that it lies in.
+        stamps_ns: (N,) int64 of its frames.
         X_WS: (N, 4, 4) poses of the sensor along the drive.
         coarse: the map.
         frames: (K,) frames that are places or queries, increasing; none if
@@ -36,6 +37,7 @@ class SurveyedDrive:
     """
 
     placed: PlacedDrive
+    stamps_ns: np.ndarray
     X_WS: np.ndarray
     coarse: VoxelMap
     frames: np.ndarray
@@ -111,6 +113,7 @@ def survey_recording(
         raise InputError(f"{sequence.name}: no scan holds a point")
     drive = SurveyedDrive(
         placed=PlacedDrive.of(recording),
+        stamps_ns=sequence.stamps_ns,
         X_WS=sequence.X_WS,
         coarse=coarse,
         frames=np.array(frames, dtype=np.int64),

@@ -7,6 +7,7 @@ from evaluation.methods import make_method
 from evaluation.recognition.place_recognition import judge_retrieval
 from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.recognition.retrieval import Retrieval
+from evaluation.recognition.survival import Survival
 from evaluation.report.figures import top_view
 from evaluation.report.findings import Finding
 from evaluation.report.page import PageContent
@@ -28,13 +29,14 @@ def make_content(folder, **changed):
         '<svg xmlns="http://www.w3.org/2000/svg" width="900" height="300">'
         "</svg>"
     )
-    for name in ("pr", "change"):
+    for name in ("pr", "change", "survival"):
         (folder / f"{name}.svg").write_text(svg)
     results = [
         _result("scan-context++", [0, 9, None, 6, 3]),
         _result("ring++", [1, 2, 4, 0, 3]),
         _result("ring++", [0, 0, 1, 1, 1, 2, 2, 3, 3, 4], back=True),
     ]
+    without_change = _result("scan-context++", [0, 1, 4, 6, 3])
     values = {
         "findings": [Finding("A < B & C.", "does not hold", "1 of 2.")],
         "changes": [],
@@ -55,8 +57,13 @@ def make_content(folder, **changed):
                 legend=(((200, 0, 0), "gone < new"),),
             ),
             Illustration(folder / "none", "not for the page", "svg", "print"),
+            Illustration(folder / "survival", "kept", "svg", "survival"),
         ],
         "recognitions": results,
+        "survivals": [
+            Survival.of(results[0], without_change),
+            *(Survival.of(result, None) for result in results[1:]),
+        ],
         "drives": {
             "metropolis_01": _drive("metropolis_01", PLACES, 0, 0.0),
             "metropolis_04": _drive("metropolis_04", QUERIES, 2, 0.5 * np.pi),

@@ -178,6 +178,11 @@ function readAddress() {
   return true;
 }
 
+/** The first query that has a true place; else the first. */
+function firstPlaced() {
+  return Math.max(0, pairNow().matches.findIndex((places) => places.length));
+}
+
 /** Offers the pair's methods and queries; shows the state. */
 function showPair() {
   const methods = pairNow().methods.map((method, index) => {
@@ -232,9 +237,10 @@ function start() {
   });
   byId("pair").addEventListener("change", (event) => {
     state.pair = Number(event.target.value);
-    state.query = state.rank = 0;
+    state.query = firstPlaced();
+    state.rank = 0;
     showPair();
-    go(0);
+    go(state.query);
   });
   byId("method").addEventListener("change", (event) => {
     state.method = Number(event.target.value);
@@ -262,7 +268,12 @@ function start() {
     clearTimeout(waiting);
     waiting = setTimeout(show, 100);
   });
-  if (!readAddress()) showPair();
+  if (!readAddress()) {
+    const areas = pairNow().methods.map((one) => one.metrics.all.auc);
+    state.method = areas.indexOf(Math.max(...areas));
+    state.query = firstPlaced();
+    showPair();
+  }
 }
 
 if (data) {

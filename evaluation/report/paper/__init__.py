@@ -29,6 +29,12 @@ class PaperRecognition:
 
 
 @cache
+def city_names() -> frozenset[str]:
+    """Returns the maps that the paper made."""
+    return frozenset(key[0] for key in recognition_values())
+
+
+@cache
 def tcr_values() -> dict[tuple[str, str, str], float]:
     """Returns (map, sequence, later sequence) -> TCR_sym."""
     return {

@@ -62,7 +62,7 @@ def planned(monkeypatch):
     def assemble(recordings, output, pages):
         runs[-1]["recordings"] = {one.name: one for one in recordings}
         runs[-1]["pages"] = pages
-        return output / "report.md"
+        return output / "report.html"
 
     monkeypatch.setattr(reproduction, "assemble", assemble)
     return runs
@@ -97,7 +97,7 @@ def test_everything_is_planned_before_anything_runs(
     cluster = Cluster(3)
     arguments = ([str(town)], tmp_path, cluster)
     path = reproduction.reproduce_maps(*arguments)
-    assert path == tmp_path / "report" / "report.md"
+    assert path == tmp_path / "report" / "report.html"
     (jobs,) = planned
     recordings = jobs.pop("recordings")
     assert jobs.pop("pages") == {}
@@ -147,7 +147,7 @@ def test_a_world_is_no_stage(tmp_path):
 
 
 def test_quick_gives_the_same_tables(tmp_path):
-    """But the column of controls, from simulation alone."""
+    """Controls included, from simulation alone."""
     routes = {"01": "metropolis_04", "04": "metropolis_04"}
     town = write_town(tmp_path / "town", routes, 60)
     cluster = Cluster(2)
@@ -159,10 +159,17 @@ def test_quick_gives_the_same_tables(tmp_path):
         [str(town)], tmp_path / "full", cluster, with_pages=False
     )
     assert (tmp_path / "full" / "town_01_stage_04" / "metadata.yaml").is_file()
-    name = "place_recognition.csv"
-    assert (quick.parent / name).read_text() == (full.parent / name).read_text()
-    ours, theirs = (_rows(path.parent / "tcr.csv") for path in (quick, full))
-    assert [r["TCR_sym"] for r in ours] == [r["TCR_sym"] for r in theirs]
+    for name in (
+        "place_recognition.csv",
+        "queries.csv",
+        "queries_unchanged.csv",
+        "survival.csv",
+        "tcr.csv",
+    ):
+        ours, theirs = (path.parent / name for path in (quick, full))
+        assert ours.read_text() == theirs.read_text(), name
+    rows = _rows(quick.parent / "survival.csv")
+    assert {row["control"] for row in rows} == {"town_01_stage_04"}
 
 
 def test_quick_reads_what_is_recorded(town, sequences, planned, tmp_path):
@@ -170,10 +177,12 @@ def test_quick_reads_what_is_recorded(town, sequences, planned, tmp_path):
     reproduction.reproduce_maps([str(town)], tmp_path, Cluster(), quick=True)
     (jobs,) = planned
     recordings = jobs.pop("recordings")
-    assert recordings.keys() == {"town_01", "town_04"}
+    (control,) = control_drives(sequences)
+    assert recordings.keys() == {"town_01", "town_04", control.name}
     assert recordings["town_01"].made_by is None
     assert recordings["town_04"].made_by == SimulatedDrive(sequences[1])
-    assert not {"town_01", "town_04"} & jobs.keys()
+    assert recordings[control.name].made_by == SimulatedDrive(control)
+    assert not recordings.keys() & jobs.keys()
 
 
 def _rows(path):

@@ -1,3 +1,5 @@
+from types import SimpleNamespace
+
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.patches import Patch
@@ -6,6 +8,8 @@ import pytest
 
 from evaluation.geometry.points import from_xyz
 from evaluation.maps.voxel_maps import VoxelAccumulator, VoxelMap
+from evaluation.report import curve_figures
+from evaluation.report.curve_figures import draw_auc_over_change
 from evaluation.report.drawing import save
 from evaluation.report.figures import (
     judge_points,
@@ -44,6 +48,35 @@ def test_view_from_above_shows_the_route_and_60_m_around():
     # Without a point in sight the whole map is shown.
     far = top_view(line, positions + np.array([0.0, 500.0, 0.0]))
     assert far.extent[1] > 990.0
+
+
+@pytest.mark.parametrize(("city", "panels"), [("metropolis", 3), ("town", 2)])
+def test_no_line_through_fewer_than_five_points(
+    city, panels, monkeypatch, tmp_path
+):
+    drawn = []
+    monkeypatch.setattr(
+        curve_figures, "save", lambda figure, stem, kind: drawn.append(figure)
+    )
+    around = SimpleNamespace(low=0.4, high=0.6)
+    metrics = SimpleNamespace(auc=0.5, auc_interval=around)
+    pairs = [(city, f"{stage:02d}", "09") for stage in range(5)]
+    changes = {pair: 0.05 * stage for stage, pair in enumerate(pairs)}
+    for known in (4, 5):
+        results = [
+            SimpleNamespace(
+                pair=pair,
+                method="btc",
+                metrics={"all": metrics, "filtered": metrics},
+            )
+            for pair in pairs[:known]
+        ]
+        draw_auc_over_change(results, changes, tmp_path / "auc")
+    for figure, has_line in zip(drawn, (False, True), strict=True):
+        # The paper's own table has ten pairs, and stands beside its cities.
+        assert len(figure.axes) == panels
+        styles = [line.get_linestyle() for line in figure.axes[0].lines]
+        assert ("--" in styles) is has_line
 
 
 def test_points_of_pictures_know_their_voxels():

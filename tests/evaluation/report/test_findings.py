@@ -12,11 +12,11 @@ def metrics(auc):
     return SimpleNamespace(auc=auc, recall_at_1=auc)
 
 
-def make_results(**aucs):
+def make_results(city="metropolis", **aucs):
     """Returns one result a method and pair; pairs are 01, 02, ... -> 09."""
     return [
         SimpleNamespace(
-            pair=("town", f"{i + 1:02d}", "09"),
+            pair=(city, f"{i + 1:02d}", "09"),
             method=method.replace("ring", "ring++"),
             metrics={mode: metrics(value) for mode in MODES},
         )
@@ -25,10 +25,10 @@ def make_results(**aucs):
     ]
 
 
-def make_changes(values):
+def make_changes(values, city="metropolis"):
     return [
         SimpleNamespace(
-            map_name="town",
+            map_name=city,
             stages=(f"{i + 1:02d}", "09"),
             report=SimpleNamespace(change=SimpleNamespace(symmetric=value)),
         )
@@ -91,6 +91,23 @@ def test_nothing_is_said_of_what_is_not_there():
     assert verdicts(make_results(solid=[0.5]), []) == []
     undefined = make_changes([float("nan")])
     assert len(findings(make_results(solid=[0.5]), undefined)) == 1
+
+
+def test_only_the_paper_s_cities_are_judged():
+    changes = [0.30, 0.25, 0.20, 0.15, 0.10]
+    aucs = {"ring": [0.6, 0.7, 0.8, 0.85, 0.9], "btc": [0.5] * 5}
+    assert findings(make_results("town", **aucs), make_changes(changes)) == (
+        findings([], make_changes(changes))
+    )
+    own = make_changes(changes, "town")
+    assert findings(make_results("town", **aucs), own) == []
+    both = findings(
+        make_results("town", **aucs) + make_results(ring=[0.6], btc=[0.5]),
+        own + make_changes([0.1]),
+    )
+    assert both == findings(
+        make_results(ring=[0.6], btc=[0.5]), make_changes([0.1])
+    )
 
 
 def test_trend():

@@ -38,9 +38,28 @@ def test_page_stands_alone(text):
 def test_links_lead_to_sections(text):
     links = re.findall(r'<a href="#(\w+)">', text)
     assert links == [
-        "summary", "maps", "change", "recognition", "figures", "browser"
+        # At the top, and among all.
+        "browser",
+        "survival", "summary", "maps", "change", "recognition", "figures",
+        "browser",
     ]  # fmt: skip
-    assert re.findall(r'<section id="(\w+)">', text) == links
+    assert re.findall(r'<section id="(\w+)">', text) == links[1:]
+
+
+def test_survival_comes_first(text):
+    section = text[text.index('<section id="survival">') :]
+    section = section[: section.index("</section>")]
+    # The one pair that has a control, by hand: of four queries with a place
+    # two are right with the change, four without.
+    body = section[section.index("The same of R@1") :]
+    row = re.search(
+        r"Scan Context\+\+</th><td>(.*?)</td><td>(.*?)</td><td><b>(.*?)</b>",
+        body,
+    )
+    assert row.groups() == ("1.000", "0.500", "50 %")
+    assert "For 1 of 2 pairs no control was driven" in section
+    assert section.count("<td>no control</td>") == 4
+    assert 'alt="kept"' in section
 
 
 def test_text_is_escaped(text):
@@ -134,6 +153,7 @@ def test_page_without_recognition_has_no_browser(content, tmp_path):
         recognition=[],
         audit=audit_table([]),
         recognitions=[],
+        survivals=[],
         illustrations=[],
     )
     write_page(tmp_path / "report.html", empty)

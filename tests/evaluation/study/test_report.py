@@ -164,6 +164,7 @@ def test_figures_for_print_and_page(report):
         "pr_metropolis": "svg",
         "routes_metropolis": "webp",
         "sets_metropolis_01_04": "webp",
+        "survival": "svg",
     }
     names = {path.name for path in (report / "figures").iterdir()}
     assert names == {
@@ -179,7 +180,7 @@ def test_figures_for_print_and_page(report):
 def test_report_is_the_same_whoever_works(recordings, report, tmp_path):
     write_report(recordings, tmp_path, Cluster(num_workers=2))
     files = studies.report_files(tmp_path)
-    assert len(files) == 8 + 15
+    assert len(files) == 13 + 18
     assert files == studies.report_files(report)
 
 
@@ -212,11 +213,36 @@ def test_own_method_beside_the_others(recordings, tmp_path, monkeypatch):
 
 def test_report_of_a_single_stage(tmp_path):
     drive(tmp_path / "in" / "metropolis_01", "01", "a")
-    text = studies.report(tmp_path / "in", tmp_path / "out").read_text()
+    path = studies.report(tmp_path / "in", tmp_path / "out")
+    assert path == tmp_path / "out" / "report.html"
+    text = path.with_name("report.md").read_text()
     assert "routes_metropolis.png" in text
     assert "Temporal change ratio" not in text
-    page = (tmp_path / "out" / "report.html").read_text()
+    page = path.read_text()
     assert "Queries, one by one" not in page
+    assert "Which method survives" not in page
+    for name in ("survival", "queries", "queries_unchanged"):
+        assert read_csv(tmp_path / "out" / f"{name}.csv") == []
+
+
+def test_a_city_of_one_s_own_without_a_control(tmp_path):
+    for stage, route in (("01", "a"), ("02", "b")):
+        drive(tmp_path / "in" / f"town_{stage}", stage, route, city="town")
+    path = studies.report(tmp_path / "in", tmp_path / "out")
+    rows = read_csv(path.with_name("survival.csv"))
+    assert len(rows) == 4
+    for row in rows:
+        assert row["auc_unchanged"] == row["kept"] == row["control"] == ""
+        assert 0.0 <= float(row["auc_changed"]) <= 1.0
+    (change,) = read_csv(path.with_name("tcr.csv"))
+    assert change["map"] == "town"
+    for name in ("report.md", "report.html"):
+        text = path.with_name(name).read_text()
+        assert "Here no control was driven" in text
+        assert "KAIST" not in text
+        assert "City that Never Settles" not in text
+        assert "as the paper seems" not in text
+    assert not (path.parent / "figures" / "survival.png").exists()
 
 
 def test_several_cities(tmp_path):

@@ -5,7 +5,7 @@ import pickle
 
 import pytest
 
-from evaluation.study.collection import RecordingInfo
+from evaluation.study.collection import RecordingInfo, group_cities
 from evaluation.study.plan import plan_study
 from evaluation.support.errors import InputError
 
@@ -39,7 +39,7 @@ def test_every_recording_is_surveyed_when_it_is_made(tmp_path):
         "survey metropolis_01": ["places"],
         "survey metropolis_02": ["places"],
         "survey metropolis_04": ["queries"],
-        "survey metropolis_01_stage_04": [],
+        "survey metropolis_01_stage_04": ["places"],
     }
     assert not any(tmp_path.iterdir())
 
@@ -64,8 +64,47 @@ def test_pairs_wait_for_their_surveys(tmp_path):
         "survey metropolis_02",
         "survey metropolis_04",
     )
-    # Four surveys, one city, two changes, two pairs with four methods.
-    assert len(jobs) == 4 + 1 + 2 + 8
+    control = "control metropolis_01_stage_04 > metropolis_04, btc"
+    assert jobs[control].needs == (
+        "survey metropolis_01_stage_04",
+        "survey metropolis_04",
+    )
+    # Four surveys, one city, two changes, two pairs and a control with four
+    # methods.
+    assert len(jobs) == 4 + 1 + 2 + 12
+
+
+def test_a_control_takes_the_place_of_one_drive():
+    first = info("riverside_01", "01", "a", "riverside")
+    last = info("riverside_02", "02", "b", "riverside")
+    again = info("riverside_01_stage_02", "02", "a", "riverside")
+    before = info("riverside_02_stage_01", "01", "b", "riverside")
+    (city,) = group_cities([first, last, again])
+    assert city.unchanged_pair(first, last) == (again, last)
+    assert city.unchanged_pair(last, first) == (last, again)
+    (city,) = group_cities([first, last, before])
+    assert city.unchanged_pair(first, last) == (first, before)
+    # With both, the very same scans ask.
+    (city,) = group_cities([first, last, before, again])
+    assert city.unchanged_pair(first, last) == (again, last)
+    assert city.unchanged_pair(last, first) == (before, first)
+    (city,) = group_cities([first, last])
+    assert city.unchanged_pair(first, last) is None
+
+
+def test_a_control_serves_both_ways(tmp_path):
+    drives = [
+        info("riverside_01", "01", "a", "riverside"),
+        info("riverside_02", "02", "b", "riverside"),
+        info("riverside_01_stage_02", "02", "a", "riverside"),
+    ]
+    jobs = {job.name: job for job in plan_study(drives, tmp_path)}
+    roles = sorted(jobs["survey riverside_01_stage_02"].arguments[1])
+    assert roles == ["places", "queries"]
+    assert {
+        "control riverside_01_stage_02 > riverside_02, solid",
+        "control riverside_02 > riverside_01_stage_02, solid",
+    } <= jobs.keys()
 
 
 def test_jobs_can_go_anywhere(tmp_path, monkeypatch):

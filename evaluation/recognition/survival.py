@@ -1,0 +1,140 @@
+"""What structural change leaves of a method: the same routes without it.
+
+The control of a pair of drives takes the place of one of them: the same
+route, driven through the other's stage of the city. What a method loses from
+the control to the pair is then due to the change alone, and not to where the
+routes lead.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+import numpy as np
+
+from evaluation.recognition.metrics import (
+    Interval,
+    QueryOutcomes,
+    percentile_interval,
+    resampled_metrics,
+    resampled_weights,
+)
+from evaluation.recognition.recognition_result import RecognitionResult
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A number without the change, with it, and the share that is kept.
+
+    Attributes:
+        unchanged: without the change; NaN without a control.
+        changed: with it.
+        interval: 95 %, of the share: bootstrap over queries, in each sample
+            the same ones with and without the change. NaN where the two do
+            not ask equally many queries, so that none has a partner.
+    """
+
+    unchanged: float
+    changed: float
+    interval: Interval
+
+    @property
+    def share(self) -> float:
+        """Changed over unchanged; NaN where there was nothing to keep."""
+        return float(_share(self.changed, self.unchanged))
+
+
+@dataclass(frozen=True)
+class Survival:
+    """A method on a pair of stages, with and without the change (mode all).
+
+    Attributes:
+        changed: on the pair.
+        unchanged: on its control; None without one.
+        auc: area under the precision-recall curve.
+        recall_at_1: R@1.
+    """
+
+    changed: RecognitionResult
+    unchanged: RecognitionResult | None
+    auc: Kept
+    recall_at_1: Kept
+
+    @classmethod
+    def of(
+        cls, changed: RecognitionResult, unchanged: RecognitionResult | None
+    ) -> Survival:
+        """Compares a result with that of the control, if there is one."""
+        after = changed.metrics["all"]
+        if unchanged is None:
+            unknown = Interval(math.nan, math.nan)
+            return cls(
+                changed,
+                None,
+                Kept(math.nan, after.auc, unknown),
+                Kept(math.nan, after.recall_at_1, unknown),
+            )
+        before = unchanged.metrics["all"]
+        auc, recall = paired_intervals(
+            unchanged.outcome.outcomes, changed.outcome.outcomes
+        )
+        return cls(
+            changed,
+            unchanged,
+            Kept(before.auc, after.auc, auc),
+            Kept(before.recall_at_1, after.recall_at_1, recall),
+        )
+
+    @property
+    def method(self) -> str:
+        return self.changed.method
+
+    @property
+    def pair(self) -> tuple[str, str, str]:
+        """Map, database, query."""
+        return self.changed.pair
+
+    @property
+    def control(self) -> str | None:
+        """The drive that takes the place of one of the pair."""
+        if self.unchanged is None:
+            return None
+        before, after = self.unchanged.outcome, self.changed.outcome
+        if before.query != after.query:
+            return before.query
+        return before.database
+
+
+def paired_intervals(
+    unchanged: QueryOutcomes, changed: QueryOutcomes, seed: int = 0
+) -> tuple[Interval, Interval]:
+    """Returns 95 % intervals of the kept shares of AUC and of R@1.
+
+    Args:
+        unchanged: of Q queries without the change.
+        changed: of the same queries with it, in the same order.
+        seed: of the bootstrap.
+
+    Returns:
+        Of AUC, of R@1; NaN if the numbers of queries differ or are zero.
+    """
+    if len(unchanged) != len(changed) or len(changed) == 0:
+        unknown = Interval(math.nan, math.nan)
+        return unknown, unknown
+    weights = resampled_weights(len(changed), seed)
+    before = resampled_metrics(unchanged, weights)
+    after = resampled_metrics(changed, weights)
+    auc, recall = (
+        percentile_interval(_share(one, other))
+        for one, other in zip(after, before, strict=True)
+    )
+    return auc, recall
+
+
+def _share(
+    changed: np.ndarray | float, unchanged: np.ndarray | float
+) -> np.ndarray:
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = np.divide(changed, unchanged)
+    return np.where(np.asarray(unchanged) > 0.0, share, math.nan)

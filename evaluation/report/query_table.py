@@ -1,0 +1,112 @@
+"""Every query of every pair and method: what the tables are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+import math
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from evaluation.recognition.recognition_result import RecognitionResult
+from evaluation.report.tables import Table
+
+_POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
+_HEADER = (
+    "map",
+    "db",
+    "query",
+    "method",
+    "correct",
+    "has_match",
+    "score",
+    "first_right_rank",
+    "places",
+    "query_drive",
+    "query_frame",
+    "query_stamp_ns",
+    *(f"query_{name}" for name in _POSE),
+    "match_drive",
+    "match_frame",
+    "match_stamp_ns",
+    *(f"match_{name}" for name in _POSE),
+    "distance",
+)
+
+
+@dataclass(frozen=True)
+class DriveTrack:
+    """When and where the sensor was.
+
+    Attributes:
+        stamps_ns: (N,) int64 of all frames.
+        X_WS: (N, 4, 4) poses there.
+    """
+
+    stamps_ns: np.ndarray
+    X_WS: np.ndarray
+
+
+def query_table(
+    results: Iterable[tuple[tuple[str, str, str], RecognitionResult]],
+    tracks: Mapping[str, DriveTrack],
+) -> Table:
+    """Returns one row for each pair, method and query, as it is asked.
+
+    Args:
+        results: each with the map, database and query that it stands for.
+        tracks: drive -> its track, of all that occur.
+    """
+    rows = tuple(
+        row for pair, result in results for row in _rows(pair, result, tracks)
+    )
+    return Table(_HEADER, rows)
+
+
+def _rows(
+    pair: tuple[str, str, str],
+    result: RecognitionResult,
+    tracks: Mapping[str, DriveTrack],
+) -> Iterator[tuple[object, ...]]:
+    outcome = result.outcome
+    retrieval, outcomes = outcome.retrieval, outcome.outcomes
+    scores = np.where(np.isnan(retrieval.scores), -np.inf, retrieval.scores)
+    asking, known = tracks[outcome.query], tracks[outcome.database]
+    nothing = (None,) * (2 + len(_POSE))
+    for query, frame in enumerate(retrieval.query_frames.tolist()):
+        score = float(outcomes.best_scores[query])
+        rank = float(outcomes.first_right_ranks[query])
+        match: tuple[object, ...] = nothing
+        distance = math.nan
+        if not math.isnan(score):
+            # As in `judge`: of equal scores the first place is the best.
+            place = int(scores[query].argmax())
+            match = _moment(known, int(retrieval.database_frames[place]))
+            distance = float(retrieval.distances[query, place])
+        yield (
+            *pair,
+            result.method,
+            int(outcomes.is_right[query]),
+            int(outcomes.has_match[query]),
+            score,
+            int(rank) if math.isfinite(rank) else None,
+            outcomes.num_places,
+            outcome.query,
+            *_moment(asking, frame),
+            outcome.database,
+            *match,
+            distance,
+        )
+
+
+def _moment(track: DriveTrack, frame: int) -> tuple[object, ...]:
+    """Returns frame, stamp, position and quaternion of the sensor."""
+    X_WS = track.X_WS[frame]
+    quat_xyzw = Rotation.from_matrix(X_WS[:3, :3]).as_quat()
+    return (
+        frame,
+        int(track.stamps_ns[frame]),
+        *X_WS[:3, 3].tolist(),
+        *quat_xyzw.tolist(),
+    )

@@ -1,0 +1,170 @@
+"""Tables of what structural change leaves of each method."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import math
+
+import numpy as np
+
+from evaluation.recognition.survival import Kept, Survival
+from evaluation.report.result_tables import in_paper_order, title
+from evaluation.report.tables import MISSING, Table
+
+NO_CONTROL = "no control"
+SURVIVAL_CAPTION = (
+    "What is left of AUC (mode all) and R@1 where the city has changed."
+    " Without change: the same routes through one stage, with a control drive"
+    " in place of one of the two. Kept: the share, with its 95 % interval"
+    " (bootstrap over queries, the same ones with and without the change)."
+)
+
+
+def by_pair(
+    survivals: Sequence[Survival],
+) -> dict[tuple[str, str, str], list[Survival]]:
+    """Returns (map, database, query) -> methods in the paper's order."""
+    groups: dict[tuple[str, str, str], list[Survival]] = {}
+    for one in survivals:
+        groups.setdefault(one.pair, []).append(one)
+    return {
+        pair: [
+            one
+            for method in in_paper_order(s.method for s in group)
+            for one in group
+            if one.method == method
+        ]
+        for pair, group in groups.items()
+    }
+
+
+def percent(share: float) -> str:
+    """Returns a share as text."""
+    return MISSING if math.isnan(share) else f"{100.0 * share:.0f} %"
+
+
+def interval_text(kept: Kept) -> str:
+    """Returns the interval of a kept share as text; empty without one."""
+    low, high = kept.interval.low, kept.interval.high
+    if math.isnan(low):
+        return ""
+    return f"{100.0 * low:.0f}–{100.0 * high:.0f}"
+
+
+def survival_numbers(survivals: Sequence[Survival]) -> Table:
+    """Returns all numbers, as `survival.csv` has them."""
+    header = (
+        "map",
+        "db",
+        "query",
+        "method",
+        "auc_unchanged",
+        "auc_changed",
+        "kept",
+        "kept_low",
+        "kept_high",
+        "r1_unchanged",
+        "r1_changed",
+        "r1_kept",
+        "r1_kept_low",
+        "r1_kept_high",
+        "control",
+    )
+    rows = tuple(
+        (
+            *one.pair,
+            one.method,
+            *_numbers(one.auc),
+            *_numbers(one.recall_at_1),
+            one.control,
+        )
+        for one in survivals
+    )
+    return Table(header, rows)
+
+
+def survival_table(survivals: Sequence[Survival]) -> Table:
+    """Returns the table for print: a row for each pair and method."""
+    rows = tuple(
+        (
+            pair[0],
+            " → ".join(pair[1:]),
+            title(one.method),
+            *_cells(one, one.auc),
+            *_cells(one, one.recall_at_1),
+        )
+        for pair, group in by_pair(survivals).items()
+        for one in group
+    )
+    return Table(
+        (
+            "map",
+            "DB → query",
+            "method",
+            *("without change", "with change", "kept") * 2,
+        ),
+        rows,
+        groups=(("", 3), ("AUC", 3), ("R@1", 3)),
+        caption=SURVIVAL_CAPTION,
+    )
+
+
+def survival_summary(survivals: Sequence[Survival]) -> str:
+    """Returns one sentence, or two, on who keeps how much of its AUC."""
+    known = [one for one in survivals if one.unchanged is not None]
+    pairs = dict.fromkeys(one.pair for one in survivals)
+    without = len(pairs) - len({one.pair for one in known})
+    parts = []
+    if known:
+        shares = {
+            method: float(
+                np.nanmedian(
+                    [one.auc.share for one in known if one.method == method]
+                )
+            )
+            for method in in_paper_order(one.method for one in known)
+            if any(
+                not math.isnan(one.auc.share)
+                for one in known
+                if one.method == method
+            )
+        }
+        listed = ", ".join(
+            f"{title(method)} {percent(shares[method])}"
+            for method in sorted(shares, key=lambda m: -shares[m])
+        )
+        number = len(pairs) - without
+        over = f"median of {number} pairs" if number > 1 else "one pair"
+        if listed:
+            parts.append(
+                f"Of its AUC without change each method keeps ({over}):"
+                f" {listed}."
+            )
+    if without:
+        which = f"For {without} of {len(pairs)} pairs" if known else "Here"
+        parts.append(
+            f"{which} no control was driven (the route of one drive through"
+            " the stage of the other), so what the change alone costs is not"
+            " known."
+        )
+    return " ".join(parts)
+
+
+def _numbers(kept: Kept) -> tuple[float, ...]:
+    return (
+        kept.unchanged,
+        kept.changed,
+        kept.share,
+        kept.interval.low,
+        kept.interval.high,
+    )
+
+
+def _cells(one: Survival, kept: Kept) -> tuple[object, ...]:
+    if one.unchanged is None:
+        return NO_CONTROL, kept.changed, None
+    interval = interval_text(kept)
+    text = percent(kept.share)
+    if interval:
+        text += f" ({interval})"
+    return kept.unchanged, kept.changed, text

@@ -1,0 +1,75 @@
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from evaluation.recognition.metrics import QueryOutcomes
+from evaluation.recognition.survival import Kept, paired_intervals
+
+
+def outcomes(is_right, has_match=None):
+    """Of queries whose best places have one score: then AUC is R@1."""
+    right = np.array(is_right, dtype=bool)
+    match = np.ones(len(right), bool) if has_match is None else has_match
+    return QueryOutcomes(
+        np.ones(len(right)),
+        right,
+        np.array(match),
+        np.where(right, 1.0, np.inf),
+        5,
+    )
+
+
+def test_the_same_queries_are_drawn_with_and_without_the_change():
+    # Half of them are right, and the change does nothing: whichever queries
+    # a sample holds, all is kept.
+    right = np.arange(40) % 2 == 0
+    for interval in paired_intervals(outcomes(right), outcomes(right)):
+        assert (interval.low, interval.high) == (1.0, 1.0)
+
+
+def test_intervals_of_a_binomial():
+    # All are right without the change: what a sample keeps is how many it
+    # holds of those that still are.
+    number, kept = 60, 45
+    changed = outcomes(np.arange(number) < kept)
+    low, high = binom.ppf([0.025, 0.975], number, kept / number) / number
+    before = outcomes(np.ones(number))
+    for interval in paired_intervals(before, changed):
+        assert interval.low == pytest.approx(low, abs=1.1 / number)
+        assert interval.high == pytest.approx(high, abs=1.1 / number)
+
+
+def test_pairs_are_closer_than_their_parts():
+    # Every query that is still right was right before; of 80, 40 and 36.
+    before = outcomes(np.arange(80) < 40)
+    after = outcomes(np.arange(80) < 36)
+    for interval in paired_intervals(before, after):
+        # Given 40 right ones in a sample, 36 of them on average are kept.
+        low, high = binom.ppf([0.025, 0.975], 40, 0.9) / 40
+        assert interval.low == pytest.approx(low, abs=0.05)
+        assert interval.high == pytest.approx(high, abs=0.05)
+
+
+def test_equal_seeds_draw_equal_queries():
+    before, after = outcomes(np.ones(30)), outcomes(np.arange(30) < 20)
+    first, again, other = (
+        paired_intervals(before, after, seed) for seed in (0, 0, 1)
+    )
+    assert first == again != other
+
+
+def test_what_has_no_partner_has_no_interval():
+    for before, after in (([1, 1], [1, 0, 1]), ([], [])):
+        for interval in paired_intervals(outcomes(before), outcomes(after)):
+            assert math.isnan(interval.low)
+            assert math.isnan(interval.high)
+
+
+def test_share():
+    (interval, _) = paired_intervals(outcomes([0, 0]), outcomes([1, 0]))
+    assert math.isnan(interval.low)
+    assert math.isnan(Kept(0.0, 0.5, interval).share)
+    assert Kept(0.8, 0.2, interval).share == pytest.approx(0.25)
+    assert Kept(0.8, 0.0, interval).share == 0.0

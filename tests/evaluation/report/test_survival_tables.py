@@ -1,0 +1,118 @@
+import math
+from types import SimpleNamespace
+
+import pytest
+
+from evaluation.recognition.metrics import Interval
+from evaluation.recognition.survival import Kept
+from evaluation.report import survival_figure
+from evaluation.report.page_survival import survival_section
+from evaluation.report.survival_figure import draw_survival
+from evaluation.report.survival_tables import (
+    survival_numbers,
+    survival_summary,
+    survival_table,
+)
+
+
+def make(method, database, before, after, interval=(0.25, 0.75)):
+    kept = Kept(before, after, Interval(*interval))
+    has_control = not math.isnan(before)
+    return SimpleNamespace(
+        pair=("town", database, "03"),
+        method=method,
+        unchanged=SimpleNamespace() if has_control else None,
+        control=f"town_{database}_stage_03" if has_control else None,
+        auc=kept,
+        recall_at_1=Kept(before, before, Interval(*interval)),
+    )
+
+
+SOME = [
+    make("btc", "01", 0.8, 0.4),
+    make("btc", "02", 0.8, 0.6),
+    make("solid", "01", 0.5, 0.05),
+    make("solid", "02", 0.0, 0.0, (math.nan, math.nan)),
+]
+NO_CONTROL = make("btc", "00", math.nan, 0.5, (math.nan, math.nan))
+
+
+def test_numbers():
+    table = survival_numbers([SOME[0], NO_CONTROL])
+    rows = [dict(zip(table.header, row, strict=True)) for row in table.rows]
+    names = "map,db,query,method,auc_unchanged,auc_changed,kept"
+    assert ",".join(table.header).startswith(names)
+    assert rows[0]["kept"] == pytest.approx(0.5)
+    assert (rows[0]["kept_low"], rows[0]["kept_high"]) == (0.25, 0.75)
+    assert rows[0]["r1_kept"] == 1.0
+    first, last = table.to_csv().splitlines()[1:]
+    assert first.startswith("town,01,03,btc,0.8,0.4,0.5,0.25,0.75,")
+    assert first.endswith(",town_01_stage_03")
+    # Without a control, nothing but what was measured.
+    assert last.startswith("town,00,03,btc,,0.5,,,,,")
+    assert last.endswith(",")
+
+
+def test_table_for_print():
+    table = survival_table([*SOME, NO_CONTROL])
+    # Pair by pair, methods in the paper's order.
+    assert [row[1:3] for row in table.rows] == [
+        ("01 → 03", "SOLiD"),
+        ("01 → 03", "BTC"),
+        ("02 → 03", "SOLiD"),
+        ("02 → 03", "BTC"),
+        ("00 → 03", "BTC"),
+    ]
+    assert table.rows[1][3:6] == (0.8, 0.4, "50 % (25–75)")
+    assert table.rows[2][5] == "–"
+    assert table.rows[4][3:6] == ("no control", 0.5, None)
+    assert r"50 \% (25--75)" in table.to_latex()
+
+
+def test_summary():
+    assert survival_summary(SOME) == (
+        "Of its AUC without change each method keeps (median of 2 pairs):"
+        " BTC 62 %, SOLiD 10 %."
+    )
+    assert survival_summary(SOME[:1]).endswith("(one pair): BTC 50 %.")
+    assert "For 1 of 3 pairs no control was" in (
+        survival_summary([*SOME, NO_CONTROL])
+    )
+    assert survival_summary([NO_CONTROL]).startswith("Here no control was")
+    assert survival_summary([]) == ""
+
+
+def test_section_of_the_page():
+    assert survival_section([], "") == ""
+    text = survival_section([make("a<b", "01", 0.8, 0.4)], "<svg/>")
+    assert "<svg/>" in text
+    assert "a&lt;b" in text
+    assert "<td>0.800</td><td>0.400</td><td><b>50 %</b>" in text
+
+
+def test_figure_shows_the_pairs_that_have_a_control(monkeypatch, tmp_path):
+    drawn = []
+    monkeypatch.setattr(
+        survival_figure, "save", lambda figure, stem, kind: drawn.append(figure)
+    )
+    draw_survival([*SOME, NO_CONTROL], tmp_path / "survival")
+    (axes,) = drawn[0].axes
+    texts = [text.get_text() for text in axes.texts]
+    assert texts == [
+        "town 01 → 03",
+        "10 %",
+        "50 %",
+        "town 02 → 03",
+        "–",
+        "75 %",
+        "kept",
+    ]
+    names = [label.get_text() for label in axes.get_yticklabels()]
+    assert names == ["SOLiD", "BTC"] * 2
+    lines = [line.get_xdata() for line in axes.lines]
+    assert [list(x) for x in lines if len(x) == 2] == [
+        [0.5, 0.05],
+        [0.8, 0.4],
+        [0.0, 0.0],
+        [0.8, 0.6],
+    ]

@@ -1,0 +1,169 @@
+"""Each number of the tables, computed anew from the rows of the queries."""
+
+from collections import defaultdict
+import csv
+import math
+
+import pytest
+from small_towns import drive
+import studies
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory):
+    """Of a city that the paper has in both directions, with a control."""
+    folder = tmp_path_factory.mktemp("recordings")
+    drive(folder / "riverside_01", "01", "a", city="riverside")
+    drive(folder / "riverside_02", "02", "b", city="riverside")
+    drive(folder / "riverside_01_stage_02", "02", "a", city="riverside")
+    output = tmp_path_factory.mktemp("report")
+    studies.report(folder, output)
+    return output
+
+
+def read(path):
+    with path.open(newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def read_queries(path):
+    """Returns (map, db, query, method) -> its rows."""
+    groups = defaultdict(list)
+    for row in read(path):
+        key = tuple(row[name] for name in ("map", "db", "query", "method"))
+        groups[key].append(row)
+    return groups
+
+
+def count(rows, threshold):
+    """Returns TP, FP and FN."""
+    accepted = [r for r in rows if r["score"] and score(r) >= threshold]
+    tp = sum(r["correct"] == "1" for r in accepted)
+    with_match = sum(r["has_match"] == "1" for r in rows)
+    found = sum(r["has_match"] == "1" for r in accepted)
+    return tp, len(accepted) - tp, with_match - found
+
+
+def score(row):
+    return float(row["score"])
+
+
+def area(rows):
+    total, at = 0.0, None
+    for threshold in sorted({score(r) for r in rows if r["score"]})[::-1]:
+        tp, fp, fn = count(rows, threshold)
+        precision, recall = tp / (tp + fp), tp / max(tp + fn, 1)
+        last, height = at or (0.0, precision)
+        total += (recall - last) * (height + precision) / 2.0
+        at = recall, precision
+    return total
+
+
+def recall_at(rows, rank):
+    ranks = [
+        float(r["first_right_rank"] or "inf")
+        for r in rows
+        if r["has_match"] == "1"
+    ]
+    return sum(one <= rank for one in ranks) / len(ranks)
+
+
+def best_f1(rows):
+    values = [0.0]
+    for row in rows:
+        if row["score"]:
+            tp, fp, fn = count(rows, score(row))
+            values.append(2 * tp / (2 * tp + fp + fn))
+    return max(values)
+
+
+def test_place_recognition(report):
+    groups = read_queries(report / "queries.csv")
+    table = read(report / "place_recognition.csv")
+    assert len(table) == 2 * len(groups) == 16
+    for row in table:
+        pair = row["DB → query"].split(" → ")
+        rows = groups[(row["map"], *pair, row["method"])]
+        assert len(rows) == int(row["queries"])
+        counted = rows
+        if row["mode"] == "filtered":
+            counted = [r for r in rows if r["has_match"] == "1"]
+        places = int(rows[0]["places"])
+        expected = {
+            "AUC": area(counted),
+            "F1max": best_f1(counted),
+            "R@1": recall_at(rows, 1),
+            "R@5": recall_at(rows, 5),
+            "R@25": recall_at(rows, 25),
+            "R@1%": recall_at(rows, max(1, round(places / 100))),
+            "N (with a match)": sum(r["has_match"] == "1" for r in rows),
+            "TP of R@1": sum(r["correct"] == "1" for r in rows),
+        }
+        for name, value in expected.items():
+            assert float(row[name]) == pytest.approx(value, abs=1e-12), name
+
+
+def test_survival(report):
+    changed = read_queries(report / "queries.csv")
+    unchanged = read_queries(report / "queries_unchanged.csv")
+    assert changed.keys() == unchanged.keys()
+    table = read(report / "survival.csv")
+    assert len(table) == len(changed)
+    some_lost = False
+    for row in table:
+        key = tuple(row[name] for name in ("map", "db", "query", "method"))
+        for rows, when in ((unchanged, "unchanged"), (changed, "changed")):
+            expected = pytest.approx(area(rows[key]), abs=1e-12)
+            assert float(row[f"auc_{when}"]) == expected
+            expected = pytest.approx(recall_at(rows[key], 1), abs=1e-12)
+            assert float(row[f"r1_{when}"]) == expected
+        before = area(unchanged[key])
+        if before == 0.0:
+            assert row["kept"] == row["kept_low"] == ""
+            continue
+        kept = float(row["kept"])
+        assert kept == pytest.approx(area(changed[key]) / before, abs=1e-12)
+        assert float(row["kept_low"]) <= kept <= float(row["kept_high"])
+        some_lost |= kept < 0.9
+    assert some_lost
+
+
+def test_the_control_takes_the_place_of_the_earlier_drive(report):
+    for key, rows in read_queries(report / "queries_unchanged.csv").items():
+        drives = {(r["match_drive"], r["query_drive"]) for r in rows}
+        control = ("riverside_01_stage_02", "riverside_02")
+        assert drives == {control if key[1] == "01" else control[::-1]}
+    for row in read(report / "survival.csv"):
+        assert row["control"] == "riverside_01_stage_02"
+
+
+def test_where_and_when(report):
+    found = 0
+    for row in read(report / "queries.csv"):
+        sign = -1.0 if row["query"] == "02" else 1.0
+        frame = int(row["query_frame"])
+        assert float(row["query_x"]) == pytest.approx(10.0 * frame)
+        assert float(row["query_y"]) == pytest.approx(sign * 2.0)
+        # The drives look 0.05 rad to the left.
+        turn = [float(row[f"query_q{axis}"]) for axis in "xyzw"]
+        expected = [0.0, 0.0, math.sin(0.025), math.cos(0.025)]
+        assert turn == pytest.approx(expected)
+        if not row["score"]:
+            assert row["match_frame"] == row["distance"] == ""
+            assert row["correct"] == "0"
+            continue
+        found += 1
+        away = math.dist(
+            *(
+                [float(row[f"{what}_{axis}"]) for axis in "xyz"]
+                for what in ("query", "match")
+            )
+        )
+        assert float(row["distance"]) == pytest.approx(away)
+        assert row["correct"] == str(int(away <= 7.5))
+        span = int(row["match_stamp_ns"]) - int(row["query_stamp_ns"])
+        frames = int(row["match_frame"]) - frame
+        assert span == frames * 50_000_000
+    assert found > 20
