@@ -28,10 +28,12 @@ def survival_section(survivals: Sequence[Survival], figure: str) -> str:
     if not survivals:
         return ""
     auc = _table(survivals, "AUC", lambda one: one.auc)
+    # A line never begins with the sign of per cent.
+    summary = html.escape(survival_summary(survivals)).replace(" %", "&nbsp;%")
     recall = _table(survivals, "R@1", lambda one: one.recall_at_1)
     return (
         "<h2>Which method survives the change?</h2>"
-        f"<p>{html.escape(survival_summary(survivals))}</p>"
+        f"<p>{summary}</p>"
         f'<div class="survival">{figure}{auc}</div>'
         f"<p>{html.escape(SURVIVAL_CAPTION)}</p>"
         f"<details><summary>The same of R@1</summary>{recall}</details>"

@@ -258,6 +258,13 @@ def test_other_places_and_pairs(reader):
     assert reader.evaluate('byId("query").max') == "9"
 
 
+def test_a_pair_opens_at_a_query_that_has_a_place(reader):
+    reader.evaluate("data.pairs[1].matches[0] = data.pairs[1].matches[1] = []")
+    choose(reader, "pair", "1")
+    shown(reader, 1, 0, 2, 0)
+    assert "Query 3 of 10" in status(reader)
+
+
 def test_address_leads_to_a_query(reader, address):
     choose(reader, "method", "1")
     reader.press("ArrowRight")
