@@ -45,6 +45,14 @@ def export(
         str | None,
         typer.Option(metavar="NAME", help="Which LiDAR, if there are several."),
     ] = None,
+    absent_in: Annotated[
+        str | None,
+        typer.Option(
+            metavar="STAGE",
+            help="Label points on what this stage of the map lacks as "
+            "SemanticKITTI labels what moves (252 to 259); with kitti.",
+        ),
+    ] = None,
 ) -> None:
     """Export a recording to a common layout."""
     with uninterrupted():
@@ -57,6 +65,7 @@ def export(
             layout.value,
             output,
             lidar=sensor,
+            absent_in=absent_in,
             on_frame=count_progress(progress, task),
         )
     typer.echo(drive)

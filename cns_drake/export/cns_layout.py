@@ -105,4 +105,5 @@ CNS = Layout(
     inner_files=_inner_files,
     scan_files=_scan_files,
     shared_outer_files=True,
+    has_labels=False,
 )

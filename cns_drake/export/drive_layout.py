@@ -36,6 +36,7 @@ class Layout:
             where nothing is.
         shared_outer_files: whether those outside the folder are one for all
             drives, so that they must agree.
+        has_labels: whether points have them.
     """
 
     files: dict[str, str]
@@ -44,6 +45,7 @@ class Layout:
     inner_files: Callable[[McapSequence], dict[str, str]]
     scan_files: Callable[[int, int, np.ndarray], dict[str, bytes]] | None
     shared_outer_files: bool
+    has_labels: bool
 
 
 def checked_name(sequence: McapSequence, text: str) -> str:

@@ -37,6 +37,7 @@ def export_sequence(
     output: Path,
     *,
     lidar: str | None = None,
+    absent_in: str | None = None,
     on_frame: Callable[[int, int], None] = lambda done, total: None,
 ) -> Path:
     """Exports a recording.
@@ -47,6 +48,8 @@ def export_sequence(
         output: the folder of drives; new, empty, or one that this function
             has written drives of the same format to.
         lidar: whose scans, if the recording has several LiDARs.
+        absent_in: another stage of the recording's map; points of what is
+            absent there get the labels of `MarkedSequence`.
         on_frame: is told how many frames of how many are done.
 
     Returns:
@@ -54,13 +57,21 @@ def export_sequence(
 
     Raises:
         InputError: if the recording cannot be read, the folder is of
-            another origin or has this drive already, or the files cannot be
-            written.
+            another origin or has this drive already, the files cannot be
+            written, or there is nothing to compare, or to put labels.
     """
     layout = _LAYOUTS[format_name]
+    if absent_in is not None and not layout.has_labels:
+        raise InputError(f"--absent-in: {format_name} has no labels; use kitti")
     if not holds_mcap(recording):
         raise InputError(f"{recording}: no recording (.mcap) there")
-    sequence = McapSequence(recording, lidar)
+    if absent_in is None:
+        sequence = McapSequence(recording, lidar)
+    else:
+        # Drake takes a while to load, and only this needs it.
+        from cns_drake.export.marked_sequence import MarkedSequence
+
+        sequence = MarkedSequence(recording, lidar, absent_in)
     drive = output / layout.drive_folder(sequence)
     outer = {
         output / name: text

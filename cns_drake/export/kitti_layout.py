@@ -99,11 +99,13 @@ KITTI = Layout(
         "sequences/<NN>/velodyne/<frame>.bin": "x, y, z [m] and intensity,"
         " float32, in the LiDAR's frame",
         "sequences/<NN>/labels/<frame>.label": "uint32 a point: class (id of"
-        " SemanticKITTI) + 65536 * instance",
+        " SemanticKITTI) + 65536 * instance; 252 to 259 for what is absent in"
+        " another stage, where structures.json says so",
         "sequences/<NN>/first_pose.txt": "upper 3 x 4 of the LiDAR's pose in"
         " the world at the first scan, the same world for all drives of a"
         " map",
-        "sequences/<NN>/structures.json": "what the instances are",
+        "sequences/<NN>/structures.json": "what the instances are, and in"
+        " which other stage they are absent, if asked for",
         "sequences/<NN>/scenario.yaml": "what was simulated",
     },
     drive_folder=_drive_folder,
@@ -111,4 +113,5 @@ KITTI = Layout(
     inner_files=_inner_files,
     scan_files=_scan_files,
     shared_outer_files=False,
+    has_labels=True,
 )

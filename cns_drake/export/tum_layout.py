@@ -58,4 +58,5 @@ TUM = Layout(
     inner_files=_inner_files,
     scan_files=None,
     shared_outer_files=False,
+    has_labels=False,
 )

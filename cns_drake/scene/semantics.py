@@ -25,6 +25,16 @@ CLASS_IDS = {
     "other-object": 99,
 }
 
+# SemanticKITTI's ids of what moves, by our class; all that it knows no moving
+# kind of goes with its "moving-other-vehicle".
+MOVING_IDS = {
+    "car": 252,
+    "person": 254,
+    "bus": 257,
+    "truck": 258,
+}
+OTHER_MOVING_ID = 259
+
 # Colours by class for pictures and the 3-D page, chosen to differ in
 # lightness as well as in hue.
 CLASS_RGB = {

@@ -251,6 +251,7 @@ RECIPES = {
             "kitti/poses/02.txt",
             "tum/town_02/base_link.tum",
             "tum/town_02/lidar.tum",
+            "changed/sequences/02/labels/000000.label",
         ),
     ),
     "scenario": Recipe("map: town ", file="drive.yaml"),

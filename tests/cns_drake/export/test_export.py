@@ -6,7 +6,6 @@ import subprocess
 import sys
 
 from bent_drive import NUM_SCANS, P_BS, QUAT_BS, write_drive
-from drive_files import make_scan
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -14,7 +13,6 @@ import yaml
 
 from cns_drake.export.exporting import export_sequence
 from evaluation import sequences
-from evaluation.clouds.cloud_writing import encode_labels
 from evaluation.study.collection import find_recordings, group_cities
 from evaluation.support.errors import InputError
 from evaluation.support.errors import InputError as ReadingError
@@ -149,12 +147,6 @@ def test_labels_as_semantic_kitti_has_them(drive, kitti):
         )
         np.testing.assert_array_equal(stored & 0xFFFF, scan["label"])
         np.testing.assert_array_equal(stored >> 16, scan["instance"])
-
-
-def test_largest_label_and_instance():
-    scan = make_scan(np.zeros((1, 3)))
-    scan["label"], scan["instance"] = 255, 65535
-    assert encode_labels(scan) == bytes([255, 0, 255, 255])
 
 
 def test_camera_axes_are_right_down_forward(kitti):

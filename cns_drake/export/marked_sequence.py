@@ -1,0 +1,134 @@
+"""A recording whose points tell which of them another stage lacks."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from cns_drake.scenarios.shipped import shipped_maps
+from cns_drake.scene.semantics import MOVING_IDS, OTHER_MOVING_ID
+from cns_drake.scene.structure_table import load_structure_table
+from cns_drake.scene.world import load_world, structures_in
+from evaluation.sequences.mcap_sequence import McapSequence
+from evaluation.support.errors import InputError
+
+
+class MarkedSequence(McapSequence):
+    """A recording compared with another stage of its map.
+
+    A structure is absent there if no visual of that stage is part of it; a
+    lower building is present. Labels of points on what is absent are those
+    of SemanticKITTI for what moves; all other labels are as recorded. The
+    table of structures says `"absent_in": <stage>` of what is absent.
+    """
+
+    def __init__(self, path: Path, lidar: str | None, stage: str):
+        """Opens a recording and loads the other stage.
+
+        Args:
+            path: the .mcap file, or the folder that holds it.
+            lidar: see `McapSequence`.
+            stage: the other stage's name, as in `stage_<stage>.sdf`.
+
+        Raises:
+            InputError: if the recording cannot be read, was not taken in a
+                map's stage or has no structures, the map is not there any
+                more, has other structures by now, or lacks that stage.
+        """
+        super().__init__(path, lidar)
+        self._stage = stage
+        recorded = super().instances
+        if recorded is None:
+            raise InputError(f"{path}: has no list of structures")
+        folder = self._map_folder()
+        self._check_structures(folder / "structures.csv", recorded)
+        standing = structures_in(load_world(_world_file(folder, stage)))
+        self._absent = {
+            instance: entry
+            for instance, entry in recorded.items()
+            if entry.get("name") not in standing
+        }
+
+    @property
+    def instances(self) -> Mapping[int, Mapping]:
+        recorded = super().instances or {}
+        return {
+            instance: {**entry, "absent_in": self._stage}
+            if instance in self._absent
+            else entry
+            for instance, entry in recorded.items()
+        }
+
+    def scan(self, index: int) -> np.ndarray:
+        """Reads scan i; its labels are uint16."""
+        recorded = super().scan(index)
+        names = recorded.dtype.names or ()
+        if not {"label", "instance"} <= set(names):
+            raise InputError(
+                f"{self._path}: {self._lidar_topic}: scan {index}: no field "
+                "label, or no field instance"
+            )
+        points = np.empty(
+            len(recorded),
+            [
+                (name, np.uint16 if name == "label" else recorded.dtype[name])
+                for name in names
+            ],
+        )
+        for name in names:
+            points[name] = recorded[name]
+        for label, instances in self._absent_by_label.items():
+            points["label"][np.isin(points["instance"], instances)] = label
+        return points
+
+    @cached_property
+    def _absent_by_label(self) -> dict[int, list[int]]:
+        groups = defaultdict(list)
+        for instance, entry in self._absent.items():
+            label = MOVING_IDS.get(entry.get("class", ""), OTHER_MOVING_ID)
+            groups[label].append(instance)
+        return groups
+
+    def _map_folder(self) -> Path:
+        place = (self.scenario or {}).get("map")
+        if not isinstance(place, str):
+            raise InputError(
+                f"{self._path}: was not recorded in a stage of a map"
+            )
+        folder = shipped_maps().get(place, Path(place))
+        if not folder.is_dir():
+            raise InputError(f"{self._path}: map: {place}: no such folder")
+        return folder
+
+    def _check_structures(
+        self, table: Path, recorded: Mapping[int, Mapping]
+    ) -> None:
+        """Checks that names stand for what they did when it was recorded."""
+        for listed in load_structure_table(table):
+            entry = recorded.get(listed.instance, {})
+            if (entry.get("name"), entry.get("class")) != (
+                listed.name,
+                listed.semantic_class,
+            ):
+                raise InputError(
+                    f"{table}: {listed.name}: not the structure "
+                    f"{listed.instance} of {self.name}: the map has changed "
+                    "since"
+                )
+
+
+def _world_file(folder: Path, stage: str) -> Path:
+    files = {
+        path.stem.removeprefix("stage_"): path
+        for path in sorted(folder.glob("stage_*.sdf"))
+    }
+    if stage not in files:
+        raise InputError(
+            f"{folder}: no stage '{stage}'; it has: "
+            f"{', '.join(files) or 'none'}"
+        )
+    return files[stage]
