@@ -43,9 +43,9 @@ def trend(
     jobs: Jobs = None,
     scheduler: Scheduler = None,
 ) -> None:
-    """AUC over TCR_sym on a family of drives, none of them recorded.
+    """AUC over TCR_sym, of a family of drives.
 
-    Writes the table and the figure that `cns-eval trend` makes of recordings.
+    None of them is recorded. Writes trend.csv and a figure with 95 % bands.
     Interrupted, the same command goes on where it was.
     """
     with uninterrupted():
