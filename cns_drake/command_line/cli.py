@@ -54,8 +54,8 @@ app.command(
 )(reproduce)
 app.command(
     epilog=example(
-        "cns-drake trend --vary family.yaml --query riverside_02 \\",
-        "    --output trend",
+        "cns-drake trend --vary family.yaml \\",
+        "    --query riverside_02 --output trend",
     )
 )(trend)
 app.command(
