@@ -18,7 +18,7 @@ from small_city import PLAN, ROADS, STAGES
 from small_map import box_visual, world_text
 import yaml
 
-from cns_drake.city.generation.city_structures import make_city
+from cns_drake.city.generation.city_structures import make_city, meshes_of
 from cns_drake.city.plan.city_plan import load_plan
 from cns_drake.city.plan.stages import load_stages
 from cns_drake.export.exporting import export_sequence
@@ -171,7 +171,7 @@ def _load_stages(folder: Path) -> None:
 
 
 def _lay_out(folder: Path) -> None:
-    make_city(folder).meshes()
+    meshes_of(make_city(folder).structures)
 
 
 def _scan(folder: Path) -> None:

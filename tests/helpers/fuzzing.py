@@ -255,7 +255,14 @@ def _work(pipe, folder: Path, find, refusals) -> None:
             name, seed, begin, end = pipe.recv()
             _limit_memory(None)
             if name not in benches:
-                benches[name] = Bench(find(name), folder / name)
+                try:
+                    benches[name] = Bench(find(name), folder / name)
+                except BaseException:
+                    # Whole files are not read: damaged ones tell nothing.
+                    pipe.send(traceback.format_exc())
+                    pipe.recv()
+                    pipe.send(None)
+                    continue
             bench = benches[name]
             _limit_memory(_MEMORY_BYTES)
             for number in range(begin, end):
