@@ -331,6 +331,12 @@ def _difference(
     return frozenset(difference)
 
 
+def _is_on_a_lot(row: Mapping[str, str]) -> bool:
+    """Whether a structure stands on a lot only until that is built on."""
+    tags = (row.get("tags") or "").split()
+    return "_lot_" in row["name"] and "lot" in tags
+
+
 def _decay_order(
     table: Path, seed: int, removable: Set[str] | None
 ) -> list[str]:
@@ -350,7 +356,7 @@ def _decay_order(
         row
         for _, row in read_records(table, ("name", "class"))
         if (
-            row["class"] in _REMOVABLE
+            row["class"] in _REMOVABLE and not _is_on_a_lot(row)
             if removable is None
             else row["name"] in removable
         )

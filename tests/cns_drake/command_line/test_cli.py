@@ -182,7 +182,6 @@ def test_output_that_cannot_be_written(files, capfd, command):
     [
         (["{files}/none"], "none/roads.yaml: "),
         (["{files}", "--seed", "-1"], "--seed"),
-        (["{files}", "--target", "0.2"], "--target: only with --calibrate"),
         (["{files}", "--calibrate", "01", "77"], "sequence_01.yaml: no such"),
     ],
 )

@@ -13,10 +13,11 @@ from cns_drake.scenarios.shipped import shipped_maps
 # Figures of CARLA's towns: extents of the centrelines in x and y [m], length
 # between junctions and lanes on it [m], junctions by number of arms, lane
 # and sidewalk width [m]. Downtown has one arm and one dead end more: a stub
-# of 10 m that the original's junction does not count.
+# of 10 m that the original's junction does not count. Riverside's lanes are
+# 4 m wide in the original: here two cars pass each other at a greater distance.
 FACTS = {
     "riverside": (
-        (-0.1, 394.4), (-328.6, 0.0), 2480, 4960, {3: 12}, 4.0, 4.0
+        (-0.1, 394.4), (-328.6, 0.0), 2480, 4960, {3: 12}, 4.5, 4.0
     ),
     "suburbia": (
         (-5.5, 191.7), (-304.6, -107.4), 1056, 2112, {3: 8}, 4.0, 4.0
