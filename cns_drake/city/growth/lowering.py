@@ -7,6 +7,8 @@ building's own.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import shapely
 from shapely.geometry import MultiPolygon, Polygon, box
@@ -56,15 +58,15 @@ def lowered(model: Model, height: float, name: str, seed: int) -> Model:
         A building with the same footprint; the model itself where less than
         a storey of it lies above `height`, or nothing there is enclosed.
     """
-    if top_of(model) < height + _STOREY:
+    placed = [(part, part_mesh(part, model.meshes)) for part in model.parts]
+    if _top(placed) < height + _STOREY:
         return model
     ground = box(*model.footprint.bounds)
     site = Site(ground, f"{name}_at_{round(10 * height)}")
-    assembly = Assembly(site, np.random.default_rng(seed), _wall_rgb(model))
+    assembly = Assembly(site, np.random.default_rng(seed), _wall_rgb(placed))
     parts: list[Part] = []
     edges: list[np.ndarray] = []
-    for part in model.parts:
-        mesh = part_mesh(part, model.meshes)
+    for part, mesh in placed:
         low, high = mesh.vertices[:, 2].min(), mesh.vertices[:, 2].max()
         if high <= height:
             parts.append(part)
@@ -89,9 +91,13 @@ def lowered(model: Model, height: float, name: str, seed: int) -> Model:
 
 def top_of(model: Model) -> float:
     """Returns the height of a building without equipment on its roof [m]."""
+    return _top([(part, part_mesh(part, model.meshes)) for part in model.parts])
+
+
+def _top(placed: Sequence[tuple[Part, Mesh]]) -> float:
     return max(
-        float(part_mesh(part, model.meshes).vertices[:, 2].max())
-        for part in model.parts
+        float(mesh.vertices[:, 2].max())
+        for part, mesh in placed
         if not _is_shared(part)
     )
 
@@ -126,9 +132,8 @@ def cut_at(mesh: Mesh, height: float) -> tuple[Mesh, np.ndarray]:
             piece, ring = ring[:4], np.delete(ring, (1, 2), axis=0)
             faces.append(tuple(range(len(corners), len(corners) + len(piece))))
             corners.extend(piece)
-    return Mesh(np.array(corners).reshape(-1, 3), tuple(faces)), np.array(
-        edges
-    ).reshape(-1, 2, 2)
+    below = Mesh(np.array(corners).reshape(-1, 3), tuple(faces))
+    return below, np.array(edges).reshape(-1, 2, 2)
 
 
 def _clipped(
@@ -224,12 +229,11 @@ def _is_shared(part: Part) -> bool:
     return isinstance(shape, MeshShape) and shape.mesh.startswith("roof_")
 
 
-def _wall_rgb(model: Model) -> Rgb | None:
+def _wall_rgb(placed: Sequence[tuple[Part, Mesh]]) -> Rgb | None:
     """Returns the colour of the building's largest part that is no glass."""
 
-    def extent(part: Part) -> float:
-        vertices = part_mesh(part, model.meshes).vertices
-        return float(np.prod(np.ptp(vertices, axis=0)))
+    def extent(one: tuple[Part, Mesh]) -> float:
+        return float(np.prod(np.ptp(one[1].vertices, axis=0)))
 
-    walls = [part for part in model.parts if "glass" not in part.name]
-    return max(walls, key=extent).rgb
+    walls = [one for one in placed if "glass" not in one[0].name]
+    return max(walls, key=extent)[0].rgb
