@@ -43,6 +43,7 @@ class PageContent:
 
     Attributes:
         findings: of the paper, judged.
+        aims: how near the numbers come to the paper's.
         changes: TCR of all pairs.
         change: Table I.
         recognition: Table II in its forms, that of mode all last but one.
@@ -56,6 +57,7 @@ class PageContent:
     """
 
     findings: Sequence[Finding]
+    aims: Sequence[Finding]
     changes: Sequence[ChangeResult]
     change: Table
     recognition: Sequence[Table]
@@ -144,22 +146,31 @@ def _summary(content: PageContent) -> str:
     parts = ['<h2>Summary</h2><ul class="facts">']
     parts += [f"<li>{what} <b>{n}</b></li>" for what, n in facts]
     parts.append("</ul>")
-    if content.findings:
-        parts.append('<dl class="findings">')
-        for one in content.findings:
-            kind = one.verdict.replace(" ", "-")
-            parts.append(
-                f"<dt>{html.escape(one.claim)}"
-                f' <span class="verdict {kind}">{one.verdict}</span></dt>'
-                f"<dd>{html.escape(one.evidence)}</dd>"
-            )
-        parts.append("</dl>")
+    parts.append(_judged(content.findings))
+    if content.aims:
+        parts.append("<h3>How near to the paper's numbers</h3>")
+        parts.append(_judged(content.aims))
     if content.pages:
         parts.append('<h3>Recordings to look around in</h3><p class="links">')
         parts += [
             _link(address, name) for name, address in content.pages.items()
         ]
         parts.append("</p>")
+    return "".join(parts)
+
+
+def _judged(found: Sequence[Finding]) -> str:
+    if not found:
+        return ""
+    parts = ['<dl class="findings">']
+    for one in found:
+        kind = one.verdict.replace(" ", "-")
+        parts.append(
+            f"<dt>{html.escape(one.claim)}"
+            f' <span class="verdict {kind}">{one.verdict}</span></dt>'
+            f"<dd>{html.escape(one.evidence)}</dd>"
+        )
+    parts.append("</dl>")
     return "".join(parts)
 
 

@@ -13,6 +13,7 @@ from evaluation.change.change_result import (
 from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.recognition.survival import Survival
 from evaluation.report import page
+from evaluation.report.aims import aims
 from evaluation.report.curve_figures import (
     draw_auc_over_change,
     draw_pr_curves,
@@ -161,6 +162,7 @@ def _write_all(
 ) -> Path:
     changes, recognitions = collected.changes, collected.recognitions
     found = findings(recognitions, changes)
+    aimed = aims(recognitions, changes)
     change = change_table(changes)
     recognition = recognition_tables(recognitions, changes)
     audit = audit_table(recognitions)
@@ -179,6 +181,7 @@ def _write_all(
         path,
         page.PageContent(
             findings=found,
+            aims=aimed,
             changes=changes,
             change=change,
             recognition=recognition,
@@ -196,6 +199,7 @@ def _write_all(
             survival_summary(collected.survivals),
             survival,
             found,
+            aimed,
             change,
             recognition,
             audit,
@@ -221,6 +225,7 @@ def _to_markdown(
     summary: str,
     survival: Table,
     found: list[Finding],
+    aimed: list[Finding],
     change: Table,
     recognition: list[Table],
     audit: Table,
@@ -230,13 +235,17 @@ def _to_markdown(
     if survival.rows:
         parts.append("## Which method survives the change?\n")
         parts += [f"{summary}\n", _captioned(survival)]
-    if found:
-        parts.append("## The paper's findings\n")
-        parts += [
-            f"- **{one.claim}** This {one.verdict}. {one.evidence}"
-            for one in found
-        ]
-        parts.append("")
+    for heading, judged in (
+        ("The paper's findings", found),
+        ("How near to the paper's numbers", aimed),
+    ):
+        if judged:
+            parts.append(f"## {heading}\n")
+            parts += [
+                f"- **{one.claim}** This {one.verdict}. {one.evidence}"
+                for one in judged
+            ]
+            parts.append("")
     if change.rows:
         parts += ["## Table I: temporal change ratio\n", _captioned(change)]
     if audit.rows:

@@ -39,6 +39,7 @@ def make_content(folder, **changed):
     without_change = _result("scan-context++", [0, 1, 4, 6, 3])
     values = {
         "findings": [Finding("A < B & C.", "does not hold", "1 of 2.")],
+        "aims": [Finding("C > D.", "is missed", "3 of 4.")],
         "changes": [],
         "change": change_table([]),
         "recognition": [

@@ -1,0 +1,79 @@
+"""The aims, judged on the paper's own numbers and on ones beside them."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from evaluation.report import paper
+from evaluation.report.aims import MET, MISSED, aims
+
+
+def make_results(change=lambda key: 0.0):
+    """Returns the paper's own values, each changed by some function."""
+    results = []
+    for key, value in paper.recognition_values().items():
+        metrics = SimpleNamespace(auc=value.auc + change(key))
+        results.append(
+            SimpleNamespace(
+                pair=key[:3], method=key[3], metrics={key[4]: metrics}
+            )
+        )
+    return results
+
+
+def make_changes(offset=0.0):
+    return [
+        SimpleNamespace(
+            map_name=city,
+            stages=stages,
+            report=SimpleNamespace(
+                change=SimpleNamespace(symmetric=value + offset)
+            ),
+        )
+        for (city, *stages), value in paper.tcr_values().items()
+        if city in paper.city_names()
+    ]
+
+
+def verdicts(results, changes):
+    return [one.verdict for one in aims(results, changes)]
+
+
+def test_the_papers_own_numbers_meet_every_aim():
+    assert verdicts(make_results(), make_changes()) == [MET] * 6
+
+
+@pytest.mark.parametrize(
+    ("offset", "verdict"), [(0.0149, MET), (0.0151, MISSED)]
+)
+def test_change_is_judged_by_its_limit(offset, verdict):
+    for sign in (-1.0, 1.0):
+        found = aims(make_results(), make_changes(sign * offset))
+        assert [one.verdict for one in found] == [verdict] + [MET] * 5
+    assert f"on {8 if verdict == MET else 0}." in found[0].evidence
+
+
+def test_who_is_best_and_near():
+    cities = [("suburbia", "01", "02"), ("suburbia", "02", "01")]
+
+    def falls(key):
+        return -0.5 if key[:3] in cities and key[3] == "ring++" else 0.0
+
+    found = aims(make_results(falls), make_changes())
+    assert found[1].verdict == MISSED
+    assert found[1].evidence.startswith("It is so on 8. ")
+    # Eight of ten are as near as can be.
+    assert found[2].verdict == MET
+    assert [one.verdict for one in found[3:]] == [MET] * 3
+
+
+def test_the_mean_difference():
+    for offset, verdict in ((0.149, MET), (0.151, MISSED)):
+        found = aims(make_results(lambda key, o=offset: -o), make_changes())
+        assert found[-1].verdict == verdict
+        assert f"It is {offset:.3f}." in found[-1].evidence
+
+
+def test_nothing_is_said_of_a_part_or_of_another_city():
+    assert aims([], []) == []
+    assert aims(make_results()[1:], make_changes()) == []
