@@ -9,13 +9,13 @@ from __future__ import annotations
 import numpy as np
 
 from cns_drake.ray_casting.ray_groups import RayGroup
-from cns_drake.scene.perception_geometry import (
+from cns_drake.scene.surface_merging import tessellate
+from cns_drake.scene.surfaces import (
     CapsuleSurface,
     CylinderSurface,
     EllipsoidSurface,
     TriangleSurface,
 )
-from cns_drake.scene.surface_merging import tessellate
 from evaluation.support.compiled import compiled
 
 CurvedSurface = EllipsoidSurface | CylinderSurface | CapsuleSurface

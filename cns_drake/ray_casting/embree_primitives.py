@@ -13,13 +13,13 @@ from pydrake.math import RigidTransform
 from cns_drake.ray_casting import embree
 from cns_drake.ray_casting.curved_proxies import circumscribe
 from cns_drake.ray_casting.ray_groups import Member
-from cns_drake.scene.perception_geometry import (
+from cns_drake.scene.surface_merging import merge_triangles
+from cns_drake.scene.surfaces import (
     CapsuleSurface,
     CylinderSurface,
     EllipsoidSurface,
     TriangleSurface,
 )
-from cns_drake.scene.surface_merging import merge_triangles
 
 # Which rays hit a geometry: all do hit solids, some also hit proxies.
 SOLID, PROXY = 1, 2

@@ -9,11 +9,8 @@ import numpy as np
 from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
 
-from cns_drake.scene.perception_geometry import (
-    EllipsoidSurface,
-    PerceptionGeometry,
-    Surface,
-)
+from cns_drake.scene.perception_geometry import PerceptionGeometry
+from cns_drake.scene.surfaces import EllipsoidSurface, Surface
 
 # What is built into one scene: index of a geometry, its pose, its surface.
 Member = tuple[int, RigidTransform, Surface]

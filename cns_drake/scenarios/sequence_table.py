@@ -158,10 +158,8 @@ def _measure(path: Path, stage: str, checksum: str) -> SequenceRow:
     # Slow to import, and rarely needed.
     from cns_drake.scenarios.scenario import load_scenario
     from cns_drake.scenarios.sequence_facts import sequence_facts
-    from cns_drake.scene.perception_geometry import (
-        TriangleSurface,
-        read_perception_geometry,
-    )
+    from cns_drake.scene.perception_geometry import read_perception_geometry
+    from cns_drake.scene.surfaces import TriangleSurface
     from cns_drake.scene.world import load_world
 
     scenario = load_scenario(path)

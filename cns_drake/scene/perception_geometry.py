@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from pydrake.geometry import (
@@ -15,7 +14,6 @@ from pydrake.geometry import (
     FrameId,
     GeometryId,
     Mesh,
-    ReadObjToTriangleSurfaceMesh,
     Role,
     SceneGraphInspector,
     Shape,
@@ -23,8 +21,16 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform
 
-from cns_drake.scene.drake_errors import PARSER_ERRORS, told_by_drake
 from cns_drake.scene.foreign_meshes import ForeignMeshes
+from cns_drake.scene.mesh_files import MeshFiles
+from cns_drake.scene.surfaces import (
+    LARGEST_SIZE,
+    CapsuleSurface,
+    CylinderSurface,
+    EllipsoidSurface,
+    Surface,
+    TriangleSurface,
+)
 from evaluation.support.errors import InputError
 
 # The corners of a unit cube and its faces, counter-clockwise from outside.
@@ -37,53 +43,6 @@ _CUBE_TRIANGLES = np.array(
         (2, 6, 7), (2, 7, 3), (0, 4, 6), (0, 6, 2), (1, 3, 7), (1, 7, 5),
     ]
 )  # fmt: skip
-# Rays are cast in single precision: beyond this they tell no metre from the
-# next [m].
-_LARGEST = 1e7
-
-
-@dataclass(frozen=True)
-class TriangleSurface:
-    """Triangles in the geometry frame G.
-
-    Attributes:
-        p_GVset: (N, 3) float64 vertex positions [m].
-        triangles: (M, 3) int32 vertex indices, counter-clockwise seen from
-            outside.
-    """
-
-    p_GVset: np.ndarray
-    triangles: np.ndarray
-
-
-@dataclass(frozen=True)
-class EllipsoidSurface:
-    """An ellipsoid (or sphere) centred on G with semi-axes along G's."""
-
-    semi_axes: tuple[float, float, float]
-
-    @property
-    def is_sphere(self) -> bool:
-        return len(set(self.semi_axes)) == 1
-
-
-@dataclass(frozen=True)
-class CylinderSurface:
-    """A closed cylinder centred on G, its axis along z of G."""
-
-    radius: float
-    length: float
-
-
-@dataclass(frozen=True)
-class CapsuleSurface:
-    """A capsule centred on G; `length` is that of the cylindrical part."""
-
-    radius: float
-    length: float
-
-
-Surface = TriangleSurface | EllipsoidSurface | CylinderSurface | CapsuleSurface
 
 
 @dataclass(frozen=True)
@@ -139,8 +98,8 @@ def check_shape(name: str, shape: Shape) -> None:
             f"geometry '{name}': a LiDAR cannot see a {type(shape).__name__}; "
             "use a box, sphere, cylinder, capsule, ellipsoid or mesh"
         )
-    if not np.max(_dimensions(shape)) <= _LARGEST:
-        raise InputError(f"geometry '{name}': larger than {_LARGEST:g} m")
+    if not np.max(_dimensions(shape)) <= LARGEST_SIZE:
+        raise InputError(f"geometry '{name}': larger than {LARGEST_SIZE:g} m")
 
 
 def _dimensions(shape: Shape) -> Sequence[float]:
@@ -170,13 +129,13 @@ def read_perception_geometry(
             mesh file is missing or cannot be read; the geometry is named.
     """
     with ForeignMeshes() as foreign:
-        return _read_geometry(inspector, keep_frame, _MeshFiles(foreign))
+        return _read_geometry(inspector, keep_frame, MeshFiles(foreign))
 
 
 def _read_geometry(
     inspector: SceneGraphInspector,
     keep_frame: Callable[[FrameId], bool],
-    meshes: _MeshFiles,
+    meshes: MeshFiles,
 ) -> tuple[PerceptionGeometry, ...]:
     geometries = []
     for geometry_id in inspector.GetAllGeometryIds(Role.kPerception):
@@ -207,7 +166,7 @@ def _diffuse_rgb(
     return (rgba.r(), rgba.g(), rgba.b())
 
 
-def _surface(name: str, shape: Shape, meshes: _MeshFiles) -> Surface:
+def _surface(name: str, shape: Shape, meshes: MeshFiles) -> Surface:
     check_shape(name, shape)
     if isinstance(shape, Mesh):
         return meshes.read(name, shape)
@@ -220,61 +179,3 @@ def _surface(name: str, shape: Shape, meshes: _MeshFiles) -> Surface:
     if isinstance(shape, Cylinder):
         return CylinderSurface(shape.radius(), shape.length())
     return CapsuleSurface(shape.radius(), shape.length())
-
-
-class _MeshFiles:
-    """Reads mesh files, each once however many geometries refer to it."""
-
-    def __init__(self, foreign: ForeignMeshes):
-        self._foreign = foreign
-        self._unscaled: dict[Path, TriangleSurface] = {}
-
-    def read(self, name: str, shape: Mesh) -> TriangleSurface:
-        with told_by_drake():  # Beside an error, no warning.
-            return self._read(name, shape)
-
-    def _read(self, name: str, shape: Mesh) -> TriangleSurface:
-        if not shape.source().is_path():
-            raise InputError(f"geometry '{name}': its mesh is not a file")
-        path = Path(shape.source().path())
-        surface = self._unscaled.get(path)
-        if surface is None:
-            surface = self._unscaled[path] = self._read_file(name, path)
-        triangles = surface.triangles
-        scale = shape.scale3()
-        if np.prod(scale) < 0.0:  # A reflection turns the faces inside out.
-            triangles = triangles[:, ::-1]
-        with np.errstate(over="ignore", invalid="ignore"):
-            p_GVset = surface.p_GVset * scale
-            is_small = np.abs(p_GVset).max() <= _LARGEST  # False for NaN.
-        if not is_small:
-            raise InputError(
-                f"{path}: geometry '{name}': larger than {_LARGEST:g} m"
-            )
-        return TriangleSurface(p_GVset, triangles)
-
-    def _read_file(self, name: str, path: Path) -> TriangleSurface:
-        if not path.is_file():
-            raise InputError(f"{path}: geometry '{name}': no such mesh file")
-        is_obj = path.suffix.lower() == ".obj"
-        read = _read_obj if is_obj else self._foreign.read
-        try:
-            p_GVset, triangles = read(path)
-            if len(triangles) == 0:
-                raise ValueError("holds no triangles")
-            # Drake warns of it and goes on; a ray caster reads foreign memory.
-            if not 0 <= triangles.min() <= triangles.max() < len(p_GVset):
-                raise ValueError("a face has a vertex that is not there")
-        except PARSER_ERRORS as error:
-            fault = " ".join(str(error).split())
-            raise InputError(f"{path}: geometry '{name}': {fault}") from error
-        return TriangleSurface(p_GVset, triangles)
-
-
-def _read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    mesh = ReadObjToTriangleSurfaceMesh(path)
-    triangles = [[t.vertex(k) for k in range(3)] for t in mesh.triangles()]
-    return (
-        np.asarray(mesh.vertices(), dtype=float).reshape(-1, 3),
-        np.asarray(triangles, dtype=np.int32).reshape(-1, 3),
-    )

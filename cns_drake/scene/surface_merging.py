@@ -8,11 +8,11 @@ import numpy as np
 from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
 
-from cns_drake.scene.perception_geometry import (
+from cns_drake.scene.perception_geometry import PerceptionGeometry
+from cns_drake.scene.surfaces import (
     CapsuleSurface,
     CylinderSurface,
     EllipsoidSurface,
-    PerceptionGeometry,
     Surface,
     TriangleSurface,
 )

@@ -13,10 +13,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 
 from cns_drake.scene.drake_errors import PARSER_ERRORS, told_by_drake
-from cns_drake.scene.perception_geometry import (
-    check_shape,
-    structure_name,
-)
+from cns_drake.scene.perception_geometry import check_shape, structure_name
 from cns_drake.scene.structure_table import (
     StructureTable,
     load_structure_table,

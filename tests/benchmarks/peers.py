@@ -47,10 +47,8 @@ from pydrake.systems.sensors import CameraInfo
 from stages import interleaved, read_stage, sensor_poses, still
 
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.scene.perception_geometry import (
-    PerceptionGeometry,
-    TriangleSurface,
-)
+from cns_drake.scene.perception_geometry import PerceptionGeometry
+from cns_drake.scene.surfaces import TriangleSurface
 from cns_drake.sensors.beam_pattern import make_beam_pattern
 
 REACH = 120.0

@@ -20,9 +20,9 @@ from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import load_scenario
 from cns_drake.scene.perception_geometry import (
     PerceptionGeometry,
-    TriangleSurface,
     read_perception_geometry,
 )
+from cns_drake.scene.surfaces import TriangleSurface
 from cns_drake.scene.world import load_world
 
 

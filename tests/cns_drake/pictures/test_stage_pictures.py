@@ -10,10 +10,8 @@ from cns_drake.pictures.rendering import look_at, render
 from cns_drake.pictures.stage_pictures import draw_stages, load_views
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.scenarios.shipped import shipped_maps
-from cns_drake.scene.perception_geometry import (
-    EllipsoidSurface,
-    PerceptionGeometry,
-)
+from cns_drake.scene.perception_geometry import PerceptionGeometry
+from cns_drake.scene.surfaces import EllipsoidSurface
 from evaluation.support.errors import InputError
 
 

@@ -12,11 +12,11 @@ from cns_drake.ray_casting.curved_proxies import (
 )
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.ray_casting.ray_groups import RayGroup
-from cns_drake.scene.perception_geometry import (
+from cns_drake.scene.perception_geometry import PerceptionGeometry
+from cns_drake.scene.surfaces import (
     CapsuleSurface,
     CylinderSurface,
     EllipsoidSurface,
-    PerceptionGeometry,
     TriangleSurface,
 )
 

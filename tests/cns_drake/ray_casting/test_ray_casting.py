@@ -7,11 +7,11 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.scene.perception_geometry import (
+from cns_drake.scene.perception_geometry import PerceptionGeometry
+from cns_drake.scene.surfaces import (
     CapsuleSurface,
     CylinderSurface,
     EllipsoidSurface,
-    PerceptionGeometry,
     TriangleSurface,
 )
 

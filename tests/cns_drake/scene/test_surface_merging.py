@@ -3,14 +3,14 @@ from pydrake.geometry import FrameId, GeometryId
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
-from cns_drake.scene.perception_geometry import (
+from cns_drake.scene.perception_geometry import PerceptionGeometry
+from cns_drake.scene.surface_merging import merge_surfaces, tessellate
+from cns_drake.scene.surfaces import (
     CapsuleSurface,
     CylinderSurface,
     EllipsoidSurface,
-    PerceptionGeometry,
     TriangleSurface,
 )
-from cns_drake.scene.surface_merging import merge_surfaces, tessellate
 
 CURVED = {
     "sphere": (EllipsoidSurface((2.0, 2.0, 2.0)), 4 / 3 * np.pi * 8.0),
