@@ -10,6 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import DTypeLike
 
+# No LiDAR sees that far [m]: numbers beyond are no coordinates of a return.
+FARTHEST_RETURN = 10_000.0
+
 
 def xyz(points: np.ndarray, dtype: DTypeLike = np.float64) -> np.ndarray:
     """Returns the coordinates of a cloud as a new (N, 3) array.
@@ -19,9 +22,35 @@ def xyz(points: np.ndarray, dtype: DTypeLike = np.float64) -> np.ndarray:
         dtype: type of the result.
     """
     coordinates = np.empty((len(points), 3), dtype=dtype)
-    for axis, name in enumerate("xyz"):
-        coordinates[:, axis] = points[name]
+    # There are NaN whose mere conversion is worth a warning to NumPy.
+    with np.errstate(invalid="ignore"):
+        for axis, name in enumerate("xyz"):
+            coordinates[:, axis] = points[name]
     return coordinates
+
+
+def check_near(points: np.ndarray, limit: float) -> None:
+    """Refuses coordinates that are none: bytes of something else.
+
+    What is not finite passes: many sensors say so of a beam that met nothing.
+
+    Args:
+        points: (N,) structured array.
+        limit: what no coordinate reaches [m].
+
+    Raises:
+        ValueError: if one does.
+    """
+    for name in "xyz":
+        # Half precision ends before some limits, and calls that an overflow.
+        with np.errstate(over="ignore", invalid="ignore"):
+            far = (np.abs(points[name]) >= limit) & np.isfinite(points[name])
+        if far.any():
+            first = int(far.argmax())
+            raise ValueError(
+                f"{name}: point {first} of {len(points)} is at"
+                f" {points[name][first]:g} m"
+            )
 
 
 def from_xyz(coordinates: np.ndarray) -> np.ndarray:

@@ -9,35 +9,31 @@ ends with, so that opening a file of gigabytes reads a few kilobytes.
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 import contextlib
-from dataclasses import dataclass
-import itertools
 import os
 from pathlib import Path
 import struct
-from typing import BinaryIO, TypeVar
+from typing import BinaryIO
 
-from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.reader import SeekingReader
-from mcap.records import Chunk, ChunkIndex
+from mcap.records import Channel, ChunkIndex
 import numpy as np
 import zstandard
 
 from evaluation.sequences.mcap_records import (
+    CHUNK_LIMIT_BYTES,
     MAGIC,
     RECORD_HEADER,
-    RECORD_LIMIT_BYTES,
+    SUMMARY_LIMIT_BYTES,
     check_summary,
     read_attachment,
-    uncompress,
+    read_chunk,
 )
 from evaluation.support.errors import InputError
 from evaluation.support.processors import num_cores
-
-_Parsed = TypeVar("_Parsed")
 
 # Of a message, after its record header: channel id, sequence, two times.
 _MESSAGE_HEADER = struct.Struct("<HIQQ")
@@ -46,23 +42,18 @@ _INDEX_HEADER = struct.Struct("<HI")
 _INDEX_ENTRY = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
 # The frame that is being read, and its neighbour when two of them interleave.
 _CHUNKS_KEPT = 2
-
-
-@dataclass(frozen=True)
-class Location:
-    """Where a message lies.
-
-    Attributes:
-        chunk: number of the chunk in the file's index.
-        offset: of the message record in the uncompressed chunk [bytes].
-        log_time_ns: when the message was logged [ns].
-        channel_id: of its topic.
-    """
-
-    chunk: int
-    offset: int
-    log_time_ns: int
-    channel_id: int
+# Where a message lies: the number of its chunk in the file's index, the place
+# of its record in the uncompressed chunk [bytes]; when it was logged [ns]; the
+# channel of its topic. An array, since a long drive has millions.
+LOCATION = np.dtype(
+    [
+        ("chunk", "<u4"),
+        ("offset", "<u8"),
+        ("log_time_ns", "<u8"),
+        ("channel_id", "<u2"),
+    ]
+)
+_ORDER = ("log_time_ns", "chunk", "offset")
 
 
 class McapFile:
@@ -70,6 +61,9 @@ class McapFile:
 
     The file is opened for each access only; two uncompressed chunks (of
     1 MiB as a rule) are kept, since messages are mostly read in order.
+
+    All channels of a topic are one stream of messages, as when several nodes
+    publish on it.
     """
 
     def __init__(self, path: Path):
@@ -84,7 +78,7 @@ class McapFile:
             self._check_ends(stream)
             check_summary(stream)
             summary = SeekingReader(
-                stream, record_size_limit=RECORD_LIMIT_BYTES
+                stream, record_size_limit=SUMMARY_LIMIT_BYTES
             ).get_summary()
         if summary is None or not summary.chunk_indexes:
             raise InputError(f"{self.path}: the MCAP file has no chunk index")
@@ -93,28 +87,29 @@ class McapFile:
             self._summary.chunk_indexes,
             key=lambda chunk: chunk.chunk_start_offset,
         )
-        self._channels = {
-            channel.topic: channel
-            for channel in self._summary.channels.values()
-        }
-        self._locations: dict[str, list[Location]] = {}
+        self._channels: dict[str, list[Channel]] = {}
+        for _, channel in sorted(self._summary.channels.items()):
+            self._channels.setdefault(channel.topic, []).append(channel)
+        self._check_channels()
+        self._locations: dict[str, np.ndarray] = {}
         self._chunks: OrderedDict[int, memoryview] = OrderedDict()
 
     @property
-    def topics(self) -> dict[str, str]:
-        """Topic -> message type."""
+    def topics(self) -> dict[str, list[str]]:
+        """Topic -> kinds of its messages: `<type> in <encoding>`, sorted.
+
+        Of a sound recording it is one kind.
+        """
         return {
-            topic: self._summary.schemas[channel.schema_id].name
-            for topic, channel in self._channels.items()
-            if channel.schema_id in self._summary.schemas
+            topic: sorted({self._kind(channel) for channel in channels})
+            for topic, channels in self._channels.items()
         }
 
-    def encoding(self, topic: str) -> str:
-        """Returns how the topic's messages are serialised, e.g. `cdr`."""
-        return self._channels[topic].message_encoding
-
-    def locate(self, topic: str) -> list[Location]:
+    def locate(self, topic: str) -> np.ndarray:
         """Returns where a topic's messages lie, in the order of time.
+
+        Returns:
+            (N,) of `LOCATION`.
 
         Raises:
             InputError: if the index cannot be read.
@@ -123,129 +118,181 @@ class McapFile:
             self._locations[topic] = self._read_locations(topic)
         return self._locations[topic]
 
-    def read(self, location: Location) -> memoryview:
+    def read(self, location: np.void) -> memoryview:
         """Returns the serialised message at a location.
 
         Raises:
             InputError: if the chunk is damaged.
         """
-        return self._message(self._chunk(location.chunk), location)
+        return self._message(self._chunk(int(location["chunk"])), location)
 
-    def parse_each(
+    def visit(
         self,
-        locations: Sequence[Location],
-        parse: Callable[[int, memoryview], _Parsed],
-    ) -> list[_Parsed]:
-        """Parses many messages, unpacking each chunk once.
+        locations: np.ndarray,
+        take: Callable[[int, memoryview], None],
+    ) -> None:
+        """Shows many messages, unpacking each chunk once.
 
         Chunks are unpacked on all cores, which zstd leaves Python free to
-        do; what `parse` returns must not refer to the chunk, or all of them
-        stay in memory.
+        do, as far as a few megabytes of memory go.
 
         Args:
-            locations: where the messages lie.
-            parse: of a position in `locations` and its serialised message;
-                called from several threads.
-
-        Returns:
-            What `parse` returned, in the order of `locations`.
+            locations: (N,) of `LOCATION`: where the messages lie.
+            take: is shown a position in `locations` and its serialised
+                message; called from several threads. What it keeps must not
+                refer to the message, or all chunks stay in memory.
 
         Raises:
-            InputError: if a chunk is damaged, or as `parse` does.
+            InputError: if a chunk is damaged, or as `take` does.
         """
-        order = sorted(
-            range(len(locations)),
-            key=lambda i: (locations[i].chunk, locations[i].offset),
-        )
-        groups = [
-            list(group)
-            for _, group in itertools.groupby(
-                order, key=lambda i: locations[i].chunk
-            )
-        ]
+        order = np.lexsort((locations["offset"], locations["chunk"]))
+        chunks = locations["chunk"][order]
+        groups = np.split(order, np.flatnonzero(np.diff(chunks)) + 1)
 
-        def parse_chunk(group: list[int]) -> list[_Parsed]:
-            chunk = self._unpack(locations[group[0]].chunk)
-            return [parse(i, self._message(chunk, locations[i])) for i in group]
+        def visit_chunk(group: np.ndarray) -> None:
+            chunk = self._unpack(int(locations[group[0]]["chunk"]))
+            for i in group.tolist():
+                take(i, self._message(chunk, locations[i]))
 
-        parsed: list = [None] * len(locations)
-        pool = ThreadPoolExecutor(num_cores())
+        largest = max(one.uncompressed_size for one in self._chunk_indexes)
+        at_once = CHUNK_LIMIT_BYTES // max(largest, 1)
+        pool = ThreadPoolExecutor(min(num_cores(), max(at_once, 1)))
         try:
-            for group, values in zip(
-                groups, pool.map(parse_chunk, groups), strict=True
-            ):
-                for i, value in zip(group, values, strict=True):
-                    parsed[i] = value
+            for _ in pool.map(visit_chunk, groups if len(order) else ()):
+                pass
         finally:
             # After a fault the other chunks are of no interest.
             pool.shutdown(cancel_futures=True)
-        return parsed
 
     def attachment(self, name: str) -> bytes | None:
-        """Returns the content of the attachment of this name, if any."""
-        for index in self._summary.attachment_indexes:
-            if index.name == name:
-                with self._reading() as stream:
-                    stream.seek(index.offset)
-                    return read_attachment(stream).data
-        return None
+        """Returns the content of the attachment of this name, if any.
 
-    def _read_locations(self, topic: str) -> list[Location]:
-        channel_id = self._channels[topic].id
-        locations: list[Location] = []
+        Raises:
+            InputError: if it cannot be read, or others of this name differ.
+        """
+        content = None
+        for index in self._summary.attachment_indexes:
+            if index.name != name:
+                continue
+            with self._reading() as stream:
+                stream.seek(index.offset)
+                data = read_attachment(stream).data
+            if content not in (None, data):
+                raise InputError(
+                    f"{self.path}: attachment {name}: there are two, which"
+                    " differ"
+                )
+            content = data
+        return content
+
+    def _kind(self, channel: Channel) -> str:
+        schema = self._summary.schemas.get(channel.schema_id)
+        name = "a message without a type" if schema is None else schema.name
+        return f"{name} in {channel.message_encoding}"
+
+    def _read_locations(self, topic: str) -> np.ndarray:
+        parts = [np.empty(0, LOCATION)]
         with self._reading() as stream:
-            for number, chunk in enumerate(self._chunk_indexes):
-                offset = chunk.message_index_offsets.get(channel_id)
-                if offset is None:
-                    continue
-                stream.seek(offset + RECORD_HEADER.size)
-                _, length = _INDEX_HEADER.unpack(
-                    stream.read(_INDEX_HEADER.size)
-                )
-                entries = np.frombuffer(stream.read(length), _INDEX_ENTRY)
-                locations.extend(
-                    Location(number, message_offset, log_time, channel_id)
-                    for log_time, message_offset in entries.tolist()
-                )
-            self._check_count(channel_id, len(locations))
-        # Stable, so that messages of one time keep the file's order.
-        return sorted(locations, key=lambda location: location.log_time_ns)
+            # Many indexes in one place would be more than the file holds.
+            left = stream.seek(0, os.SEEK_END)
+            for channel in self._channels[topic]:
+                found = 0
+                for number, chunk in enumerate(self._chunk_indexes):
+                    offset = chunk.message_index_offsets.get(channel.id)
+                    if offset is None:
+                        continue
+                    part = self._read_index(stream, offset, left)
+                    part["chunk"], part["channel_id"] = number, channel.id
+                    left -= len(part) * _INDEX_ENTRY.itemsize
+                    found += len(part)
+                    parts.append(part)
+                self._check_count(channel.id, found)
+        locations = np.concatenate(parts)
+        places = np.sort(locations[["chunk", "offset"]])
+        if (places[1:] == places[:-1]).any():
+            raise InputError(
+                f"{self.path}: {topic}: the index lists a message twice"
+            )
+        # Those of one time keep the file's order.
+        return locations[np.lexsort([locations[key] for key in _ORDER[::-1]])]
+
+    @staticmethod
+    def _read_index(stream: BinaryIO, offset: int, left: int) -> np.ndarray:
+        """Returns where a chunk has a channel's messages; see `LOCATION`.
+
+        Args:
+            stream: the file.
+            offset: of the record of the index in it [bytes].
+            left: how long the index may be [bytes].
+        """
+        stream.seek(offset + RECORD_HEADER.size)
+        _, length = _INDEX_HEADER.unpack(stream.read(_INDEX_HEADER.size))
+        if length > left:
+            raise ValueError("the indexes of the chunks overlap")
+        entries = np.frombuffer(stream.read(length), _INDEX_ENTRY)
+        part = np.zeros(len(entries), LOCATION)
+        part["offset"] = entries["offset"]
+        part["log_time_ns"] = entries["log_time"]
+        return part
 
     def _chunk(self, number: int) -> memoryview:
         """Returns an uncompressed chunk, of which the last are kept."""
         if number in self._chunks:
             self._chunks.move_to_end(number)
             return self._chunks[number]
-        data = self._unpack(number)
-        self._chunks[number] = data
-        if len(self._chunks) > _CHUNKS_KEPT:
+        new = self._chunk_indexes[number].uncompressed_size
+        while self._chunks and (
+            len(self._chunks) >= _CHUNKS_KEPT
+            or new + sum(map(len, self._chunks.values())) > CHUNK_LIMIT_BYTES
+        ):
             self._chunks.popitem(last=False)
-        return data
+        self._chunks[number] = self._unpack(number)
+        return self._chunks[number]
 
     def _unpack(self, number: int) -> memoryview:
         """Reads and uncompresses a chunk whose checksum is right."""
+        index = self._chunk_indexes[number]
         with self._reading() as stream:
-            stream.seek(
-                self._chunk_indexes[number].chunk_start_offset
-                + RECORD_HEADER.size
-            )
-            return memoryview(uncompress(Chunk.read(ReadDataStream(stream))))
+            stream.seek(index.chunk_start_offset)
+            return memoryview(read_chunk(stream, index.uncompressed_size))
 
-    def _message(self, chunk: memoryview, location: Location) -> memoryview:
+    def _message(self, chunk: memoryview, location: np.void) -> memoryview:
+        _, offset, expected_time_ns, expected_channel_id = location.item()
         with self._faults():
-            start = location.offset + RECORD_HEADER.size
-            _, length = RECORD_HEADER.unpack(chunk[location.offset : start])
+            start = offset + RECORD_HEADER.size
+            _, length = RECORD_HEADER.unpack(chunk[offset:start])
             body = chunk[start : start + length]
             if len(body) != length:
                 raise EOFError("a message ends behind its chunk")
             channel_id, _, log_time_ns, _ = _MESSAGE_HEADER.unpack_from(body)
             # Nothing else would tell that a message index is damaged.
             if (channel_id, log_time_ns) != (
-                location.channel_id,
-                location.log_time_ns,
+                expected_channel_id,
+                expected_time_ns,
             ):
                 raise ValueError("a message is not where the index says")
         return body[_MESSAGE_HEADER.size :]
+
+    def _check_channels(self) -> None:
+        """Refuses messages of a channel that the summary does not name.
+
+        Raises:
+            InputError: that tells its number.
+        """
+        used = {
+            number
+            for chunk in self._chunk_indexes
+            for number in chunk.message_index_offsets
+        }
+        statistics = self._summary.statistics
+        if statistics is not None:
+            used |= statistics.channel_message_counts.keys()
+        unknown = used - self._summary.channels.keys()
+        if unknown:
+            raise InputError(
+                f"{self.path}: messages of channel {min(unknown)}, of which"
+                " the summary says nothing"
+            )
 
     def _check_count(self, channel_id: int, found: int) -> None:
         """Refuses an index that lists not all messages of a channel.
@@ -296,6 +343,8 @@ class McapFile:
             struct.error,
             zstandard.ZstdError,
         ) as error:
+            # Some of them come without a word.
+            fault = str(error) or type(error).__name__
             raise InputError(
-                f"{self.path}: damaged MCAP file ({error})"
+                f"{self.path}: damaged MCAP file ({fault})"
             ) from error

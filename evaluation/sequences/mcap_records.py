@@ -20,9 +20,14 @@ import zstandard
 MAGIC = b"\x89MCAP0\r\n"
 # Opcode and length.
 RECORD_HEADER = struct.Struct("<BQ")
-# A broken or hostile length must not be taken for the size of a buffer.
-RECORD_LIMIT_BYTES = 1 << 30
-_CHUNK_LIMIT_BYTES = 1 << 28
+# A broken or hostile length must not be taken for the size of a buffer. A
+# chunk holds a few scans; an index or a table of structures a few megabytes,
+# of which Python makes a hundred times as much.
+CHUNK_LIMIT_BYTES = 1 << 26
+SUMMARY_LIMIT_BYTES = 1 << 25
+_ATTACHMENT_LIMIT_BYTES = 1 << 23
+# What a chunk's record holds besides its data.
+_CHUNK_FIELDS_BYTES = 1 << 10
 # The last record: its header, where the summary begins, its offsets, its
 # checksum.
 _FOOTER = struct.Struct("<BQQQI")
@@ -39,6 +44,8 @@ def check_summary(stream: BinaryIO) -> None:
     _, _, start, _, checksum = _FOOTER.unpack(stream.read(_FOOTER.size))
     if start > end:
         raise ValueError("the summary begins behind its end")
+    if start > 0 and end - start > SUMMARY_LIMIT_BYTES:
+        raise ValueError(f"a summary of {end - start} bytes")
     if start > 0 and checksum > 0:
         stream.seek(start)
         # Up to the checksum itself.
@@ -54,10 +61,7 @@ def read_attachment(stream: BinaryIO) -> Attachment:
     Raises:
         ValueError: if its checksum is wrong, or the record too large.
     """
-    _, length = RECORD_HEADER.unpack(stream.read(RECORD_HEADER.size))
-    if length > RECORD_LIMIT_BYTES:
-        raise ValueError(f"an attachment of {length} bytes")
-    body = stream.read(length)
+    body = _read_body(stream, _ATTACHMENT_LIMIT_BYTES, "an attachment")
     # The checksum of all that precedes it ends the record; 0 is none.
     checksum = int.from_bytes(body[-4:], "little")
     if checksum not in (0, zlib.crc32(body[:-4])):
@@ -65,7 +69,41 @@ def read_attachment(stream: BinaryIO) -> Attachment:
     return Attachment.read(ReadDataStream(io.BytesIO(body)))
 
 
-def uncompress(chunk: Chunk) -> bytes:
+def read_chunk(stream: BinaryIO, size: int) -> bytes:
+    """Returns the records of the chunk at the stream's position.
+
+    Args:
+        stream: the file.
+        size: of the records, as the file's index has it [bytes].
+
+    Raises:
+        ValueError: if it is damaged, too large or of unknown compression.
+        RuntimeError: if lz4 finds it damaged.
+        zstandard.ZstdError: likewise.
+    """
+    limit = CHUNK_LIMIT_BYTES + _CHUNK_FIELDS_BYTES
+    body = _read_body(stream, limit, "a chunk")
+    chunk = Chunk.read(ReadDataStream(io.BytesIO(body)))
+    if chunk.uncompressed_size != size:
+        raise ValueError(
+            f"a chunk of {chunk.uncompressed_size} bytes, of {size} by the"
+            " index"
+        )
+    return _uncompress(chunk)
+
+
+def _read_body(stream: BinaryIO, limit: int, what: str) -> bytes:
+    """Returns the content of the record at the stream's position."""
+    _, length = RECORD_HEADER.unpack(stream.read(RECORD_HEADER.size))
+    if length > limit:
+        raise ValueError(f"{what} of {length} bytes")
+    body = stream.read(length)
+    if len(body) != length:
+        raise EOFError(f"{what} ends behind the file")
+    return body
+
+
+def _uncompress(chunk: Chunk) -> bytes:
     """Returns a chunk's records; a small file cannot fill the memory.
 
     Raises:
@@ -74,7 +112,7 @@ def uncompress(chunk: Chunk) -> bytes:
         zstandard.ZstdError: likewise.
     """
     size = chunk.uncompressed_size
-    if size > _CHUNK_LIMIT_BYTES:
+    if size > CHUNK_LIMIT_BYTES:
         raise ValueError(f"a chunk of {size} bytes")
     if chunk.compression == "zstd":
         # The library reserves what the data says of itself.

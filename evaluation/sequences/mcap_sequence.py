@@ -6,14 +6,15 @@ from collections.abc import Mapping
 from functools import cached_property
 import json
 from pathlib import Path
-import struct
 from typing import Any
 
 import numpy as np
-from rosbags.typesys import Stores, get_typestore
 
+from evaluation.geometry import points as point_arrays
 from evaluation.geometry import poses
-from evaluation.sequences.mcap_file import Location, McapFile
+from evaluation.sequences import mcap_messages
+from evaluation.sequences.mcap_file import McapFile
+from evaluation.sequences.mcap_messages import xyz, xyzw
 from evaluation.sequences.motion import IMU_DTYPE, ODOMETRY_DTYPE
 from evaluation.sequences.point_cloud2 import to_points
 from evaluation.sequences.sequence import Sequence, index_instances
@@ -23,13 +24,6 @@ _LIDAR_TOPIC = "/lidar/points"
 _ODOMETRY_TOPIC = "/odometry"
 _IMU_TOPIC = "/imu/data"
 _TF_STATIC_TOPIC = "/tf_static"
-
-_POINT_CLOUD = "sensor_msgs/msg/PointCloud2"
-_ODOMETRY = "nav_msgs/msg/Odometry"
-_IMU = "sensor_msgs/msg/Imu"
-_TF = "tf2_msgs/msg/TFMessage"
-
-_TYPESTORE = get_typestore(Stores.ROS2_HUMBLE)
 
 
 class McapSequence(Sequence):
@@ -41,6 +35,9 @@ class McapSequence(Sequence):
     that of the `/odometry` message with exactly the same stamp, composed
     with the sensor's place on the vehicle from `/tf_static`; nothing is
     interpolated.
+
+    What contradicts itself is refused: two poses for one stamp, two mounts of
+    a sensor, a frame that changes on the way.
 
     Opening reads the file's index. Stamps and poses take one pass over the
     file when they are first asked for; a scan takes one chunk.
@@ -62,12 +59,12 @@ class McapSequence(Sequence):
         self.name = _sequence_name(Path(path))
         self._lidar_topic = self._find_lidar_topic(lidar)
         self._message_types = {
-            self._lidar_topic: _POINT_CLOUD,
-            _ODOMETRY_TOPIC: _ODOMETRY,
-            _TF_STATIC_TOPIC: _TF,
+            self._lidar_topic: mcap_messages.POINT_CLOUD,
+            _ODOMETRY_TOPIC: mcap_messages.ODOMETRY,
+            _TF_STATIC_TOPIC: mcap_messages.TF,
         }
         if _IMU_TOPIC in self._file.topics:
-            self._message_types[_IMU_TOPIC] = _IMU
+            self._message_types[_IMU_TOPIC] = mcap_messages.IMU
         for topic, message_type in self._message_types.items():
             self._check_topic(topic, message_type)
         self._scans = self._file.locate(self._lidar_topic)
@@ -85,8 +82,7 @@ class McapSequence(Sequence):
 
     @property
     def world_frame(self) -> str:  # type: ignore[override]  # Read late.
-        first = self._file.locate(_ODOMETRY_TOPIC)[0]
-        return self._message(_ODOMETRY_TOPIC, first).header.frame_id
+        return self._first(_ODOMETRY_TOPIC).header.frame_id
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -123,10 +119,13 @@ class McapSequence(Sequence):
             raise IndexError(f"scan {index} of {len(self)}")
         message = self._message(self._lidar_topic, self._scans[index])
         try:
-            return to_points(message)
+            points = to_points(message)
+            point_arrays.check_near(points, point_arrays.FARTHEST_RETURN)
+            return points
         except ValueError as error:
             raise InputError(
-                f"{self._path}: {self._lidar_topic}: scan {index}: {error}"
+                f"{self._path}: {self._lidar_topic}: scan {index} at"
+                f" {mcap_messages.stamp_ns(message.header)} ns: {error}"
             ) from error
 
     @property
@@ -137,24 +136,27 @@ class McapSequence(Sequence):
     def imu(self) -> np.ndarray | None:
         if _IMU_TOPIC not in self._message_types:
             return None
-        messages = self._file.parse_each(
-            self._file.locate(_IMU_TOPIC), lambda _, data: bytes(data)
-        )
-        return np.array(
-            [_imu_row(self._decode(_IMU_TOPIC, data)) for data in messages],
-            dtype=IMU_DTYPE,
-        )
+        rows = np.zeros(len(self._file.locate(_IMU_TOPIC)), IMU_DTYPE)
+        first = self._first(_IMU_TOPIC).header
+
+        def take(position: int, data: memoryview) -> None:
+            message = self._decode(_IMU_TOPIC, data)
+            self._check_frame(
+                _IMU_TOPIC,
+                mcap_messages.stamp_ns(message.header),
+                message.header.frame_id,
+                first.frame_id,
+            )
+            rows[position] = mcap_messages.imu_row(message)
+
+        self._file.visit(self._file.locate(_IMU_TOPIC), take)
+        self._check_agreement(_IMU_TOPIC, rows)
+        return rows
 
     @cached_property
     def _track(self) -> tuple[np.ndarray, np.ndarray]:
         """Stamps (N,) [ns] and poses (N, 4, 4) of the scans."""
         stamps_ns, odometry = self._stamps_and_odometry
-        disorder = np.flatnonzero(np.diff(stamps_ns) <= 0)
-        if len(disorder):
-            raise InputError(
-                f"{self._path}: {self._lidar_topic}: the stamp of scan"
-                f" {disorder[0] + 1} is not later than the one before"
-            )
         rows = {stamp: i for i, stamp in enumerate(odometry["stamp_ns"])}
         missing = [
             index for index, stamp in enumerate(stamps_ns) if stamp not in rows
@@ -173,64 +175,95 @@ class McapSequence(Sequence):
     def _stamps_and_odometry(self) -> tuple[np.ndarray, np.ndarray]:
         """Stamps (N,) of the scans, and the odometry, in one pass."""
         num_scans = len(self)
+        places = self._file.locate(_ODOMETRY_TOPIC)
+        stamps_ns = np.zeros(num_scans, np.int64)
+        odometry = np.zeros(len(places), ODOMETRY_DTYPE)
+        lidar_frame = self._first(self._lidar_topic).header.frame_id
+        vehicle_frames = _vehicle_frames(self._first(_ODOMETRY_TOPIC))
 
-        def parse(position: int, data: memoryview) -> tuple[int, bytes]:
+        def take(position: int, data: memoryview) -> None:
             if position < num_scans:
-                return self._scan_stamp_ns(data), b""
-            return 0, bytes(data)
+                header = self._cloud_header(data)
+                stamps_ns[position] = header.stamp_ns
+                topic, frame, first = (
+                    self._lidar_topic,
+                    header.frame_id,
+                    lidar_frame,
+                )
+                stamp_ns = header.stamp_ns
+            else:
+                message = self._decode(_ODOMETRY_TOPIC, data)
+                row = mcap_messages.odometry_row(message)
+                odometry[position - num_scans] = row
+                topic, frame, first = (
+                    _ODOMETRY_TOPIC,
+                    _vehicle_frames(message),
+                    vehicle_frames,
+                )
+                stamp_ns = row[0]
+            self._check_frame(topic, stamp_ns, frame, first)
 
-        parsed = self._file.parse_each(
-            self._scans + self._file.locate(_ODOMETRY_TOPIC), parse
-        )
-        rows = [
-            _odometry_row(self._decode(_ODOMETRY_TOPIC, data))
-            for _, data in parsed[num_scans:]
-        ]
-        return (
-            np.array([stamp for stamp, _ in parsed[:num_scans]], np.int64),
-            np.array(rows, dtype=ODOMETRY_DTYPE),
-        )
+        self._file.visit(np.concatenate([self._scans, places]), take)
+        disorder = np.flatnonzero(np.diff(stamps_ns) <= 0)
+        if len(disorder):
+            raise InputError(
+                f"{self._path}: {self._lidar_topic}: the stamp of scan"
+                f" {disorder[0] + 1} is not later than the one before"
+            )
+        self._check_agreement(_ODOMETRY_TOPIC, odometry)
+        return stamps_ns, odometry
 
     @cached_property
     def X_BS(self) -> np.ndarray:
         """Pose of the LiDAR on the vehicle B, (4, 4), from /tf_static."""
-        return self._mount(self._message(self._lidar_topic, self._scans[0]))
+        return self._mount(self._first(self._lidar_topic))
 
     @cached_property
     def X_BI(self) -> np.ndarray | None:
         """Pose of the IMU on the vehicle B, (4, 4); None without an IMU."""
         if _IMU_TOPIC not in self._message_types:
             return None
-        first = self._file.locate(_IMU_TOPIC)[0]
-        return self._mount(self._message(_IMU_TOPIC, first))
+        return self._mount(self._first(_IMU_TOPIC))
 
     def _mount(self, message: Any) -> np.ndarray:
         """Returns the pose of a sensor's frame, that of its message, in B."""
-        first = self._file.locate(_ODOMETRY_TOPIC)[0]
-        base = self._message(_ODOMETRY_TOPIC, first).child_frame_id
+        base = self._first(_ODOMETRY_TOPIC).child_frame_id
         sensor = message.header.frame_id
-        parents = {}
-        for place in self._file.locate(_TF_STATIC_TOPIC):
-            for edge in self._message(_TF_STATIC_TOPIC, place).transforms:
-                parents[edge.child_frame_id] = edge
         X_CS = np.eye(4)
         child = sensor
-        for _ in range(len(parents) + 1):
+        for _ in range(len(self._edges) + 1):
             if child == base:
                 return X_CS
-            if child not in parents:
+            if child not in self._edges:
                 break
-            edge = parents[child]
-            X_PC = self._to_poses(
-                np.array(_xyz(edge.transform.translation)),
-                np.array(_xyzw(edge.transform.rotation)),
-            )
-            X_CS = X_PC @ X_CS
-            child = edge.header.frame_id
+            child, p_PC, quat_PC = self._edges[child]
+            X_CS = self._to_poses(np.array(p_PC), np.array(quat_PC)) @ X_CS
         raise InputError(
             f"{self._path}: {_TF_STATIC_TOPIC}: no transform from {base} to"
             f" {sensor}"
         )
+
+    @cached_property
+    def _edges(self) -> dict[str, tuple]:
+        """Frame C -> its parent P, p_PC, quat_xyzw_PC, from /tf_static."""
+        edges: dict[str, tuple] = {}
+        for place in self._file.locate(_TF_STATIC_TOPIC):
+            for edge in self._message(_TF_STATIC_TOPIC, place).transforms:
+                child, transform = edge.child_frame_id, edge.transform
+                new = (
+                    edge.header.frame_id,
+                    xyz(transform.translation),
+                    xyzw(transform.rotation),
+                )
+                # Repeated, it says nothing new.
+                old = edges.setdefault(child, new)
+                if old != new:
+                    raise InputError(
+                        f"{self._path}: {_TF_STATIC_TOPIC}: {child}: at"
+                        f" {mcap_messages.stamp_ns(edge.header)} ns {new},"
+                        f" before {old}"
+                    )
+        return edges
 
     def _to_poses(self, p: np.ndarray, quat_xyzw: np.ndarray) -> np.ndarray:
         """Returns poses (..., 4, 4) of positions and quaternions."""
@@ -246,36 +279,55 @@ class McapSequence(Sequence):
             raise InputError(f"{self._path}: a pose has {error}") from error
         return poses.make_pose(R, p)
 
-    def _message(self, topic: str, place: Location) -> Any:
+    def _first(self, topic: str) -> Any:
+        return self._message(topic, self._file.locate(topic)[0])
+
+    def _message(self, topic: str, place: np.void) -> Any:
         return self._decode(topic, self._file.read(place))
 
-    def _decode(self, topic: str, data: bytes | memoryview) -> Any:
+    def _decode(self, topic: str, data: memoryview) -> Any:
         try:
-            return _TYPESTORE.deserialize_cdr(data, self._message_types[topic])
-        except Exception as error:
-            # rosbags raises whatever its generated code trips over.
+            return mcap_messages.decode(data, self._message_types[topic])
+        except ValueError as error:
+            raise InputError(f"{self._path}: {topic}: {error}") from error
+
+    def _cloud_header(self, data: memoryview) -> mcap_messages.CloudHeader:
+        try:
+            return mcap_messages.read_cloud_header(data)
+        except ValueError as error:
             raise InputError(
-                f"{self._path}: {topic}: a message cannot be decoded"
-                f" ({type(error).__name__}: {error})"
+                f"{self._path}: {self._lidar_topic}: {error}"
             ) from error
 
-    def _scan_stamp_ns(self, data: memoryview) -> int:
-        """Reads a scan's stamp, which leads the message, and no more."""
-        try:
-            order = "<" if data[1] & 1 else ">"
-            sec, nanosec = struct.unpack_from(f"{order}iI", data, 4)
-        except (struct.error, IndexError) as error:
+    def _check_frame(
+        self, topic: str, stamp_ns: int, frame: str, first: str
+    ) -> None:
+        """Refuses a message that is of another frame than the first."""
+        if frame != first:
             raise InputError(
-                f"{self._path}: {self._lidar_topic}: a message is cut off"
-            ) from error
-        return sec * 1_000_000_000 + nanosec
+                f"{self._path}: {topic}: at {stamp_ns} ns in frame {frame!r},"
+                f" at first in {first!r}"
+            )
+
+    def _check_agreement(self, topic: str, rows: np.ndarray) -> None:
+        """Refuses two different messages with one stamp."""
+        order = np.argsort(rows["stamp_ns"], kind="stable")
+        twice = np.flatnonzero(np.diff(rows["stamp_ns"][order]) == 0)
+        for one, other in zip(order[twice], order[twice + 1], strict=True):
+            for name in rows.dtype.names or ():
+                old, new = rows[name][one], rows[name][other]
+                if not np.array_equal(old, new, equal_nan=True):
+                    raise InputError(
+                        f"{self._path}: {topic}: {name} at"
+                        f" {rows['stamp_ns'][one]} ns: {old} and {new}"
+                    )
 
     def _find_lidar_topic(self, lidar: str | None) -> str:
         """Returns the named LiDAR's topic, /lidar/points, or the only one."""
         clouds = [
             topic
-            for topic, message_type in self._file.topics.items()
-            if message_type == _POINT_CLOUD
+            for topic, kinds in self._file.topics.items()
+            if any(kind.startswith(mcap_messages.POINT_CLOUD) for kind in kinds)
         ]
         if lidar is not None:
             wanted = f"/{lidar}/points"
@@ -294,13 +346,12 @@ class McapSequence(Sequence):
         found = self._file.topics.get(topic)
         if found is None:
             raise InputError(f"{self._path}: no topic {topic}")
-        if found != message_type or self._file.encoding(topic) != "cdr":
+        if found != [f"{message_type} in cdr"]:
             raise InputError(
-                f"{self._path}: {topic}: {found} in"
-                f" {self._file.encoding(topic)} instead of {message_type} in"
-                " cdr"
+                f"{self._path}: {topic}: {' and '.join(found)} instead of"
+                f" {message_type} in cdr"
             )
-        if not self._file.locate(topic):
+        if len(self._file.locate(topic)) == 0:
             raise InputError(f"{self._path}: {topic}: no message")
 
     def _json(self, name: str) -> Any:
@@ -339,33 +390,5 @@ def _sequence_name(path: Path) -> str:
     )
 
 
-def _stamp_ns(header: Any) -> int:
-    return header.stamp.sec * 1_000_000_000 + header.stamp.nanosec
-
-
-def _odometry_row(message: Any) -> tuple:
-    pose, twist = message.pose.pose, message.twist.twist
-    return (
-        _stamp_ns(message.header),
-        _xyz(pose.position),
-        _xyzw(pose.orientation),
-        _xyz(twist.linear),
-        _xyz(twist.angular),
-    )
-
-
-def _imu_row(message: Any) -> tuple:
-    return (
-        _stamp_ns(message.header),
-        _xyzw(message.orientation),
-        _xyz(message.angular_velocity),
-        _xyz(message.linear_acceleration),
-    )
-
-
-def _xyz(v: Any) -> tuple[float, float, float]:
-    return v.x, v.y, v.z
-
-
-def _xyzw(q: Any) -> tuple[float, float, float, float]:
-    return q.x, q.y, q.z, q.w
+def _vehicle_frames(message: Any) -> str:
+    return f"{message.header.frame_id} -> {message.child_frame_id}"

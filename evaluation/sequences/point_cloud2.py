@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -31,12 +32,13 @@ def to_points(message: Any) -> np.ndarray:
 
     Raises:
         ValueError: if the message contradicts itself, or has no scalar
-            floating-point `x`, `y` and `z`.
+            floating-point `x`, `y` and `z` beside each other.
     """
     dtype = _record_type(message)
     for name in "xyz":
         if name not in (dtype.names or ()) or dtype[name].kind != "f":
             raise ValueError(f"the point cloud has no field {name} of floats")
+    _check_apart(dtype)
     data = np.frombuffer(message.data, dtype=np.uint8)
     if message.row_step < message.width * message.point_step:
         raise ValueError("the point cloud's rows overlap")
@@ -50,8 +52,27 @@ def to_points(message: Any) -> np.ndarray:
     return np.ascontiguousarray(used).reshape(-1).view(dtype)
 
 
+def _check_apart(dtype: np.dtype) -> None:
+    """Refuses coordinates that share bytes.
+
+    Raises:
+        ValueError: if so.
+    """
+    assert dtype.fields is not None  # There are x, y and z.
+    places = sorted((dtype.fields[n][1], n, dtype[n].itemsize) for n in "xyz")
+    for (start, name, size), (following, other, _) in itertools.pairwise(
+        places
+    ):
+        if start + size > following:
+            raise ValueError(
+                f"the point cloud's fields {name} at byte {start} and {other}"
+                f" at byte {following} overlap"
+            )
+
+
 def _record_type(message: Any) -> np.dtype:
     order = ">" if message.is_bigendian else "<"
+    names: list[str] = []
     formats = []
     for field in message.fields:
         if field.datatype not in _DATATYPES:
@@ -60,11 +81,16 @@ def _record_type(message: Any) -> np.dtype:
                 f" datatype {field.datatype}"
             )
         scalar = order + _DATATYPES[field.datatype]
+        if field.name in names:
+            raise ValueError(
+                f"the point cloud's field {field.name} is there twice"
+            )
+        names.append(field.name)
         # Some writers leave the count of a scalar at zero.
         formats.append((scalar, (field.count,)) if field.count > 1 else scalar)
     return np.dtype(
         {
-            "names": [field.name for field in message.fields],
+            "names": names,
             "formats": formats,
             "offsets": [field.offset for field in message.fields],
             "itemsize": message.point_step,

@@ -9,6 +9,7 @@ import re
 
 import numpy as np
 
+from evaluation.geometry.points import FARTHEST_RETURN
 from evaluation.sequences.sequence import Sequence
 from evaluation.sequences.text_tables import (
     check_increasing,
@@ -19,8 +20,6 @@ from evaluation.support.yaml_files import parse_yaml
 
 # A drive's name also names files.
 _NAME = re.compile(r"\w[\w.-]*")
-# No LiDAR sees that far [m]: numbers beyond are no coordinates.
-_FARTHEST = 10_000.0
 
 
 class FileSequence(Sequence):
@@ -214,8 +213,9 @@ def _returns(points: np.ndarray) -> np.ndarray:
     """
     is_return = np.zeros(len(points), dtype=bool)
     for name in "xyz":
-        # A comparison with NaN is false.
-        bad = ~(np.abs(points[name]) < _FARTHEST)
+        # A comparison with NaN is false, and with some worth a warning.
+        with np.errstate(over="ignore", invalid="ignore"):
+            bad = ~(np.abs(points[name]) < FARTHEST_RETURN)
         if bad.any():
             first = int(np.flatnonzero(bad)[0])
             raise ValueError(

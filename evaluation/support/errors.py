@@ -50,8 +50,9 @@ def one_line(message: object) -> str:
     What it quotes of a file may hold anything: line breaks, and what steers
     a terminal.
     """
-    text = "".join(c if c.isprintable() else " " for c in str(message))
-    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
+    text = str(message)
+    shown = "".join(c if c.isprintable() else " " for c in text[:_LONGEST])
+    return shown if len(text) <= _LONGEST else f"{shown} ..."
 
 
 def describe_validation_error(source: object, error: ValidationError) -> str:

@@ -1,0 +1,118 @@
+"""Messages of a recording: decoded, and refused where they say too much."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import struct
+from typing import Any
+
+from rosbags.typesys import Stores, get_typestore
+
+POINT_CLOUD = "sensor_msgs/msg/PointCloud2"
+ODOMETRY = "nav_msgs/msg/Odometry"
+IMU = "sensor_msgs/msg/Imu"
+TF = "tf2_msgs/msg/TFMessage"
+
+_TYPESTORE = get_typestore(Stores.ROS2_HUMBLE)
+# More than a message of a type can need [bytes]: the rest is padding, which a
+# few kilobytes of a file can hold gigabytes of. A cloud has a chunk at most.
+_LONGEST = {ODOMETRY: 1 << 12, IMU: 1 << 12, TF: 1 << 20}
+_MOST_FIELDS = 256
+_LONGEST_NAME = 1 << 10
+# Of CDR: what tells the order of bytes.
+_ENCAPSULATION_BYTES = 4
+
+
+@dataclass(frozen=True)
+class CloudHeader:
+    """What leads a point cloud.
+
+    Attributes:
+        stamp_ns: when it was taken [ns].
+        frame_id: in which frame.
+    """
+
+    stamp_ns: int
+    frame_id: str
+
+
+def decode(data: bytes | memoryview, message_type: str) -> Any:
+    """Returns a message of its serialised form.
+
+    Raises:
+        ValueError: if it is none, or longer than such a message can be.
+    """
+    if len(data) > _LONGEST.get(message_type, len(data)):
+        raise ValueError(
+            f"a message of {len(data)} bytes, more than one of its type holds"
+        )
+    if message_type == POINT_CLOUD:
+        read_cloud_header(data)
+    try:
+        return _TYPESTORE.deserialize_cdr(data, message_type)
+    except Exception as error:
+        # rosbags raises whatever its generated code trips over.
+        raise ValueError(
+            f"a message cannot be decoded ({type(error).__name__}: {error})"
+        ) from error
+
+
+def read_cloud_header(data: bytes | memoryview) -> CloudHeader:
+    """Reads what leads a serialised PointCloud2, and no more of it.
+
+    Raises:
+        ValueError: if it is cut off, or claims more than makes sense.
+    """
+    try:
+        order = "<" if data[1] & 1 else ">"
+        body = data[_ENCAPSULATION_BYTES:]
+        sec, nanosec, length = struct.unpack_from(f"{order}iII", body)
+        if length > _LONGEST_NAME:
+            raise ValueError(f"a name of a frame of {length} bytes")
+        # Strings end with a zero; numbers begin at multiples of four.
+        (text,) = struct.unpack_from(f"{length}s", body, 12)
+        behind = 12 + -(-length // 4) * 4
+        _, _, num_fields = struct.unpack_from(f"{order}III", body, behind)
+    except (struct.error, IndexError) as error:
+        raise ValueError("a message is cut off") from error
+    if num_fields > _MOST_FIELDS:
+        raise ValueError(f"a point cloud of {num_fields} fields")
+    frame_id = text.rstrip(b"\0").decode("utf-8", "backslashreplace")
+    return CloudHeader(sec * 1_000_000_000 + nanosec, frame_id)
+
+
+def stamp_ns(header: Any) -> int:
+    """Returns the time of a message's header [ns]."""
+    return header.stamp.sec * 1_000_000_000 + header.stamp.nanosec
+
+
+def odometry_row(message: Any) -> tuple:
+    """Returns a message as a record of `ODOMETRY_DTYPE`."""
+    pose, twist = message.pose.pose, message.twist.twist
+    return (
+        stamp_ns(message.header),
+        xyz(pose.position),
+        xyzw(pose.orientation),
+        xyz(twist.linear),
+        xyz(twist.angular),
+    )
+
+
+def imu_row(message: Any) -> tuple:
+    """Returns a message as a record of `IMU_DTYPE`."""
+    return (
+        stamp_ns(message.header),
+        xyzw(message.orientation),
+        xyz(message.angular_velocity),
+        xyz(message.linear_acceleration),
+    )
+
+
+def xyz(v: Any) -> tuple[float, float, float]:
+    """Returns the numbers of a vector."""
+    return v.x, v.y, v.z
+
+
+def xyzw(q: Any) -> tuple[float, float, float, float]:
+    """Returns the numbers of a quaternion."""
+    return q.x, q.y, q.z, q.w

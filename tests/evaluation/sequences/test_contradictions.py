@@ -1,0 +1,134 @@
+"""Recordings of sound parts that contradict each other are refused."""
+
+import subprocess
+import sys
+
+import bent_drive
+from lies import LIES, read_told, write_told
+import numpy as np
+import pytest
+
+from evaluation.sequences import open_sequence
+from evaluation.support.errors import InputError
+
+
+@pytest.fixture
+def recording(tmp_path):
+    """Path of a recording; what it holds."""
+    bent_drive.write_drive(tmp_path / "town_07")
+    path = tmp_path / "town_07" / "town_07_0.mcap"
+    return path, *read_told(path.read_bytes())
+
+
+def read_all(path):
+    sequence = open_sequence(path)
+    return (
+        sequence.X_WS.tolist(),
+        sequence.odometry.tobytes(),
+        [scan.tobytes() for scan in sequence],
+    )
+
+
+@pytest.mark.parametrize("name", LIES)
+def test_a_lie_is_refused_by_what_it_says(recording, name):
+    path, told, attachments = recording
+    lie, fault = LIES[name]
+    # Scan 3 has no point that a lie could be told of.
+    rng = np.random.default_rng(1)
+    lie(told, rng)
+    path.write_bytes(write_told(told, attachments))
+    with pytest.raises(InputError, match=fault) as refusal:
+        read_all(path)
+    assert str(refusal.value).startswith(f"{path}: /")
+
+
+def test_all_channels_of_a_topic_are_one_stream(recording):
+    path, told, attachments = recording
+    whole = read_all(path)
+    for number, one in enumerate(told):
+        told[number] = one.copy(channel=number % 3)
+    path.write_bytes(write_told(told, attachments))
+    assert read_all(path) == whole
+
+
+def test_what_is_said_again_says_nothing_new(recording):
+    path, told, attachments = recording
+    whole = open_sequence(path)
+    X_WS, mount = whole.X_WS, whole.X_BS
+    again = [
+        one.copy(channel=1)
+        for one in told
+        if one.topic in ("/odometry", "/tf_static")
+    ]
+    path.write_bytes(write_told(told + again, attachments))
+    sequence = open_sequence(path)
+    np.testing.assert_array_equal(sequence.X_WS, X_WS)
+    np.testing.assert_array_equal(sequence.X_BS, mount)
+    assert len(sequence.odometry) == 2 * len(whole.odometry)
+
+
+def test_two_attachments_of_a_name_that_differ(recording):
+    path, told, attachments = recording
+    one = attachments[0]
+    assert one.name == "scenario.json"
+    path.write_bytes(write_told(told, [*attachments, one]))
+    assert open_sequence(path).scenario["map"] == "town"
+    other = type(one)(**{**vars(one), "data": b'{"map": "village"}'})
+    path.write_bytes(write_told(told, [*attachments, other]))
+    with pytest.raises(InputError, match=r"scenario\.json: there are two"):
+        _ = open_sequence(path).scenario
+
+
+def test_messages_of_a_channel_that_nobody_names(recording, monkeypatch):
+    path, told, attachments = recording
+    data = write_told(told, attachments)
+    path.write_bytes(data)
+    from mcap.reader import SeekingReader
+
+    read = SeekingReader.get_summary
+
+    def forget(reader):
+        summary = read(reader)
+        summary.channels.pop(max(summary.channels), None)
+        return summary
+
+    monkeypatch.setattr(SeekingReader, "get_summary", forget)
+    with pytest.raises(InputError, match="of which the summary says nothing"):
+        open_sequence(path)
+
+
+_READ = """
+import resource, sys
+from evaluation.sequences import open_sequence
+from evaluation.support.errors import InputError
+try:
+    sequence = open_sequence(sys.argv[1])
+    sequence.X_WS, sequence.imu, [len(scan) for scan in sequence]
+    print("read")
+except InputError as error:
+    print(error)
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("topic", ["/odometry", "/lidar/points", "/tf_static"])
+def test_a_small_file_takes_little_memory(recording, topic):
+    """Messages that are nearly all padding, of which zstd leaves nothing."""
+    path, told, attachments = recording
+    place = next(k for k, one in enumerate(told) if one.topic == topic)
+    padded = told[place].copy()
+    (getattr(padded.body, "transforms", None) or [padded.body])[
+        0
+    ].header.frame_id += " " * (30 << 20)
+    more = [padded.copy(log_time=padded.log_time + k) for k in range(20)]
+    path.write_bytes(write_told(told + more, attachments))
+    assert path.stat().st_size < 1_000_000
+    output = subprocess.run(
+        [sys.executable, "-c", _READ, str(path)],
+        check=True,
+        capture_output=True,
+        text=True,
+    ).stdout.splitlines()
+    assert output[0].startswith(str(path))
+    assert int(output[1]) * 1024 < 500_000_000

@@ -1,0 +1,240 @@
+"""Recordings of well-formed parts that contradict each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import copy
+from dataclasses import dataclass, replace
+import io
+from pathlib import Path
+from typing import Any
+
+from drive_files import TYPES
+from mcap.reader import make_reader
+from mcap.writer import Writer
+import numpy as np
+
+_LIDAR, _ODOMETRY, _IMU, _MOUNTS = (
+    "/lidar/points",
+    "/odometry",
+    "/imu/data",
+    "/tf_static",
+)
+
+
+@dataclass(frozen=True)
+class Told:
+    """A message, and how it is recorded.
+
+    Attributes:
+        topic: of its channel.
+        kind: its type.
+        body: the message.
+        log_time: when it was logged [ns].
+        channel: channels of one topic differ in it.
+        encoding: that its channel claims.
+    """
+
+    topic: str
+    kind: str
+    body: Any
+    log_time: int
+    channel: int = 0
+    encoding: str = "cdr"
+
+    def copy(self, **changes) -> Told:
+        return replace(self, body=copy.deepcopy(self.body), **changes)
+
+
+def read_told(data: bytes) -> tuple[list[Told], list]:
+    """Returns the messages of a recording, and its attachments."""
+    reader = make_reader(io.BytesIO(data))
+    told = [
+        Told(
+            channel.topic,
+            schema.name,
+            TYPES.deserialize_cdr(message.data, schema.name),
+            message.log_time,
+        )
+        for schema, channel, message in reader.iter_messages()
+    ]
+    return told, list(reader.iter_attachments())
+
+
+def write_told(told: list[Told], attachments: list) -> bytes:
+    """Returns a recording."""
+    stream = io.BytesIO()
+    writer = Writer(stream, chunk_size=4000)
+    writer.start(profile="ros2", library="test")
+    for one in attachments:
+        writer.add_attachment(
+            one.create_time, one.log_time, one.name, one.media_type, one.data
+        )
+    channels: dict[tuple, int] = {}
+    for number, one in enumerate(told):
+        key = (one.topic, one.kind, one.channel, one.encoding)
+        if key not in channels:
+            text, _ = TYPES.generate_msgdef(one.kind, ros_version=2)
+            schema = writer.register_schema(one.kind, "ros2msg", text.encode())
+            channels[key] = writer.register_channel(
+                one.topic, one.encoding, schema
+            )
+        data = bytes(TYPES.serialize_cdr(one.body, one.kind))
+        writer.add_message(
+            channels[key], one.log_time, data, one.log_time, number
+        )
+    writer.finish()
+    return stream.getvalue()
+
+
+def _some(told: list[Told], topic: str, rng, later: bool = False) -> int:
+    """Returns the place of a message of a topic, not the first if `later`."""
+    places = [k for k, one in enumerate(told) if one.topic == topic]
+    if not places:
+        return _some(told, _ODOMETRY, rng, later)
+    places = places[1:] if later and len(places) > 1 else places
+    return places[int(rng.integers(len(places)))]
+
+
+def _changed(change: Callable[[Any, Any], None], topic: str, later=True):
+    """Returns the lie that is a change of a topic's message."""
+
+    def lie(told: list[Told], rng) -> None:
+        place = _some(told, topic, rng, later)
+        new = told[place].copy()
+        change(new.body, rng)
+        told[place] = new
+
+    return lie
+
+
+def _said_twice(change: Callable[[Any, Any], None], topic: str):
+    """Returns the lie that is a message and, later, a changed copy."""
+
+    def lie(told: list[Told], rng) -> None:
+        place = _some(told, topic, rng)
+        new = told[place].copy(channel=int(rng.integers(2)))
+        change(new.body, rng)
+        told.insert(int(rng.integers(place + 1, len(told) + 1)), new)
+
+    return lie
+
+
+def _move(message, rng) -> None:
+    axis = "xyz"[int(rng.integers(3))]
+    position = message.pose.pose.position
+    step = float(rng.choice([1e-3, 1.0, -20.0, 1e5]))
+    setattr(position, axis, getattr(position, axis) + step)
+
+
+def _turn(message, rng) -> None:
+    message.pose.pose.orientation.x += 0.3
+
+
+def _move_mount(message, rng) -> None:
+    message.transforms[-1].transform.translation.z += 0.5
+
+
+def _other_parent(message, rng) -> None:
+    message.transforms[-1].header.frame_id = "base_link"
+
+
+def _rename(message, rng) -> None:
+    message.header.frame_id += str(rng.choice(["2", "_raw", "/x"]))
+
+
+def _rename_child(message, rng) -> None:
+    message.child_frame_id += "_rear"
+
+
+def _pad(message, rng) -> None:
+    message.header.frame_id += " " * int(rng.choice([5_000, 2_000_000]))
+
+
+def _overlap(message, rng) -> None:
+    one, other = rng.choice(3, 2, replace=False)
+    by = int(rng.integers(-3, 4))
+    message.fields[one].offset = max(message.fields[other].offset + by, 0)
+
+
+def _name_twice(message, rng) -> None:
+    message.fields[3].name = "xyz"[int(rng.integers(3))]
+
+
+def _many_fields(message, rng) -> None:
+    message.fields = message.fields * 10_000
+
+
+def _far_point(message, rng) -> None:
+    step, width = message.point_step, message.width
+    data = message.data.copy()
+    place = int(rng.integers(width)) * step + 4 * int(rng.integers(3))
+    far = np.array([rng.choice([1e7, -1e5, 3e38])], "<f4")
+    data[place : place + 4] = far.view(np.uint8)
+    message.data = data
+
+
+def _other_size(message, rng) -> None:
+    message.width += int(rng.choice([-1, 1, 1000]))
+
+
+def _more_rows(message, rng) -> None:
+    message.height += 1
+
+
+def _add_channel(**changes):
+    """Returns the lie that is a channel that does not belong to its topic."""
+
+    def lie(told: list[Told], rng) -> None:
+        topic = (_LIDAR, _ODOMETRY, _MOUNTS)[int(rng.integers(3))]
+        place = _some(told, topic, rng)
+        told.insert(place, told[place].copy(channel=1, **changes))
+
+    return lie
+
+
+def _another_type(told: list[Told], rng) -> None:
+    topics = [_LIDAR, _ODOMETRY, _MOUNTS]
+    one, other = rng.choice(3, 2, replace=False)
+    stranger = told[_some(told, topics[other], rng)]
+    told.insert(int(rng.integers(len(told))), stranger.copy(topic=topics[one]))
+
+
+def _drop_pose(told: list[Told], rng) -> None:
+    del told[_some(told, _ODOMETRY, rng)]
+
+
+def _scan_again(told: list[Told], rng) -> None:
+    place = _some(told, _LIDAR, rng)
+    told.insert(place, told[place].copy(channel=int(rng.integers(2))))
+
+
+# Name -> lie, and what the refusal says of it.
+LIES: dict[str, tuple[Callable[[list[Told], Any], None], str]] = {
+    "two poses": (_said_twice(_move, _ODOMETRY), r"position at \d+ ns: \["),
+    "two attitudes": (_said_twice(_turn, _ODOMETRY), "quat_xyzw at"),
+    "two mounts": (_said_twice(_move_mount, _MOUNTS), "lidar: at .* before"),
+    "two parents": (_said_twice(_other_parent, _MOUNTS), "lidar: at .* before"),
+    "another sensor frame": (_changed(_rename, _LIDAR), "in frame 'lidar"),
+    "another world": (_changed(_rename, _ODOMETRY), "in frame 'map.*'map -"),
+    "another vehicle": (_changed(_rename_child, _ODOMETRY), "base_link_rear"),
+    "long odometry": (_changed(_pad, _ODOMETRY, False), "a message of .* byt"),
+    "many fields": (_changed(_many_fields, _LIDAR), "of 80000 fields"),
+    "overlapping fields": (_changed(_overlap, _LIDAR), "overlap"),
+    "a field twice": (_changed(_name_twice, _LIDAR), "field"),
+    "a far point": (_changed(_far_point, _LIDAR, False), r"at \d+ ns: [xyz]:"),
+    "another width": (_changed(_other_size, _LIDAR), "bytes|overlap"),
+    "another height": (_changed(_more_rows, _LIDAR), "bytes instead of"),
+    "another encoding": (_add_channel(encoding="json"), "in cdr and .* json"),
+    "another type": (_another_type, "and .* instead of"),
+    "no pose": (_drop_pose, "no pose with the stamp|no topic|no message"),
+    "a scan again": (_scan_again, "not later"),
+}
+
+
+def lie_about(path: Path, data: bytes, rng) -> bytes:
+    """Returns a recording with a lie in it."""
+    told, attachments = read_told(data)
+    names = sorted(LIES)
+    LIES[names[int(rng.integers(len(names)))]][0](told, rng)
+    return write_told(told, attachments)
