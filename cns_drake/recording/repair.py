@@ -31,6 +31,7 @@ from cns_drake.recording.rosbag2_metadata import (
 )
 from evaluation.support.errors import InputError
 from evaluation.support.files import (
+    check_regular,
     check_writable,
     complete_part,
     part_path,
@@ -133,6 +134,7 @@ def _default_output(path: Path) -> Path:
 def _read(
     path: Path, on_position: Callable[[int], None]
 ) -> Iterator[McapRecord | Fault]:
+    check_regular(path)
     with user_errors(path), open(path, "rb") as stream:
         for record in read_records(stream):
             on_position(stream.tell())

@@ -19,7 +19,7 @@ from cns_drake.scene.structure_table import (
     load_structure_table,
 )
 from evaluation.support.errors import InputError
-from evaluation.support.files import user_errors
+from evaluation.support.files import read_bytes
 
 
 @dataclass(frozen=True)
@@ -160,8 +160,7 @@ def _parse(parser: Parser, path: Path) -> list[ModelInstanceIndex]:
     if not path.is_file():
         raise InputError(f"{path}: no such file")
     # Drake itself stumbles over what it would quote of it.
-    with user_errors(path):
-        content = path.read_bytes()
+    content = read_bytes(path)
     try:
         content.decode("utf-8")
     except UnicodeDecodeError:

@@ -22,12 +22,12 @@ from evaluation.change.tcr import (
     covered,
     temporal_change,
 )
-from evaluation.clouds.cloud_files import is_cloud, read_cloud
+from evaluation.clouds.cloud_files import is_cloud, read_blocks
 from evaluation.maps.voxel_maps import (
     VOXEL_SIZE,
+    VoxelAccumulator,
     VoxelMap,
     map_sequence,
-    voxelise,
 )
 from evaluation.sequences import (
     Placed,
@@ -253,8 +253,10 @@ def _survey(source: Sequence | Path, track: Track) -> Surveyed:
     if isinstance(source, Sequence):
         voxels = map_sequence(source, VOXEL_SIZE, track)
         return survey_sequence(source, voxels)
-    voxels, _ = voxelise(read_cloud(source))
-    return Surveyed(source.name, voxels)
+    accumulator = VoxelAccumulator(VOXEL_SIZE)
+    for points in read_blocks(source):
+        accumulator.add(points)
+    return Surveyed(source.name, accumulator.to_map())
 
 
 def _same_stage_partner(

@@ -2,51 +2,83 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+import contextlib
+import math
 from pathlib import Path
 
 import numpy as np
 
 from evaluation.clouds.pcd import read_pcd
 from evaluation.clouds.ply import read_ply
+from evaluation.clouds.record_blocks import check_size, read_binary
 from evaluation.geometry import points as point_arrays
+from evaluation.geometry.points import check_near
 from evaluation.geometry.poses import FARTHEST
 from evaluation.support.errors import InputError
+from evaluation.support.files import check_regular
+
+# Of a file and how many points to yield at once.
+_Reader = Callable[[Path, int], Iterator[np.ndarray]]
+_BIN = np.dtype([(name, "<f4") for name in ("x", "y", "z", "intensity")])
+# Points of a map that are read at once.
+_BLOCK = 1 << 18
+# No LiDAR fills that in a turn [bytes].
+SCAN_LIMIT_BYTES = 1 << 27
 
 
 def read_cloud(path: Path) -> np.ndarray:
-    """Reads one point cloud; its name's ending tells the format.
+    """Reads one point cloud into memory; its name's ending tells the format.
 
     `.pcd` and `.ply` in all their encodings; `.npy` holds N x 3 or N x 4
     numbers or a structured array; `.bin` is KITTI's sequence of float32
     x y z intensity.
 
     Args:
-        path: an existing file.
+        path: an existing file, of a scan rather than a map.
 
     Returns:
         Structured array of shape (N,) with fields `x`, `y`, `z` of floating
-        point and whatever else the file holds. It may be mapped from the
-        file rather than read, so that its size is no matter.
+        point and whatever else the file holds.
 
     Raises:
-        InputError: if there is no such file, or it is not what its name
-            says.
+        InputError: if there is no such file, it is not what its name says,
+            or it is too large for a scan.
     """
     path = Path(path)
-    reader = _READERS.get(path.suffix.lower())
-    if reader is None:
-        raise InputError(
-            f"{path}: unknown kind of point cloud (known: {' '.join(_READERS)})"
-        )
-    try:
-        points = reader(path)
-        _check_coordinates(points)
-        return points
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}") from error
-    except (ValueError, EOFError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: {error}") from error
+    _find_reader(path)
+    with _faults(path):
+        size = path.stat().st_size
+        if size > SCAN_LIMIT_BYTES:
+            raise ValueError(f"{size} bytes is too large for a scan")
+    # All of it, of whatever size.
+    (points,) = read_blocks(path, block=SCAN_LIMIT_BYTES)
+    return points
+
+
+def read_blocks(path: Path, block: int = _BLOCK) -> Iterator[np.ndarray]:
+    """Reads a point cloud of any size in parts; see `read_cloud`.
+
+    Args:
+        path: an existing file.
+        block: how many points a part has.
+
+    Yields:
+        At least one part, maybe empty.
+
+    Raises:
+        InputError: as `read_cloud`; also late, as if the file is cut off
+            meanwhile.
+    """
+    path = Path(path)
+    reader = _find_reader(path)
+    with _faults(path):
+        check_regular(path)
+        read = 0
+        for points in reader(path, block):
+            check_near(points, FARTHEST, first=read)
+            read += len(points)
+            yield points
 
 
 def is_cloud(path: Path) -> bool:
@@ -54,25 +86,52 @@ def is_cloud(path: Path) -> bool:
     return path.suffix.lower() in _READERS
 
 
-def _check_coordinates(points: np.ndarray) -> None:
-    """Refuses coordinates that are none: bytes of something else.
-
-    What is not finite passes: many sensors say so of a beam that met nothing.
-
-    Raises:
-        ValueError: if a coordinate is out of this world.
-    """
-    for name in "xyz":
-        far = (np.abs(points[name]) >= FARTHEST) & np.isfinite(points[name])
-        if far.any():
-            first = int(far.argmax())
-            raise ValueError(
-                f"{name}: point {first} of {len(points)} is at"
-                f" {points[name][first]:g} m"
-            )
+def _find_reader(path: Path) -> _Reader:
+    reader = _READERS.get(path.suffix.lower())
+    if reader is None:
+        raise InputError(
+            f"{path}: unknown kind of point cloud (known: {' '.join(_READERS)})"
+        )
+    return reader
 
 
-def _read_npy(path: Path) -> np.ndarray:
+@contextlib.contextmanager
+def _faults(path: Path) -> Iterator[None]:
+    """Turns what readers raise into one line that names the file."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from error
+    except (ValueError, EOFError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def _read_npy(path: Path, block: int) -> Iterator[np.ndarray]:
+    dtype, shape, by_column, offset = _read_npy_header(path)
+    count = math.prod(shape)
+    check_size(path, offset + count * dtype.itemsize, exactly=True)
+    if dtype.names is not None:
+        for name in "xyz":
+            if name not in dtype.names or dtype[name].kind not in "fiu":
+                raise ValueError(f"the records have no number {name}")
+        return read_binary(path, dtype, offset, count, block)
+    if len(shape) != 2 or shape[1] not in (3, 4):
+        raise ValueError(f"an array of shape {shape} instead of N x 3 or N x 4")
+    if dtype.kind not in "fiu":
+        raise ValueError(f"{dtype} is no type of coordinates")
+    if by_column:
+        return _read_columns(path, dtype, shape, offset, block)
+    rows = np.dtype((dtype, shape[1:]))
+    return (
+        _to_cloud(part)
+        for part in read_binary(path, rows, offset, shape[0], block)
+    )
+
+
+def _read_npy_header(
+    path: Path,
+) -> tuple[np.dtype, tuple[int, ...], bool, int]:
+    """Returns type, shape, whether column after column, and the offset."""
     try:
         values = np.load(path, mmap_mode="r", allow_pickle=False)
     except OSError:
@@ -82,39 +141,44 @@ def _read_npy(path: Path) -> np.ndarray:
         raise ValueError(
             f"no NumPy array ({type(error).__name__}: {error})"
         ) from error
-    if not isinstance(values, np.ndarray):
+    if not isinstance(values, np.memmap):
         values.close()
         raise ValueError("an archive instead of one array")
-    if values.dtype.names is not None:
-        for name in "xyz":
-            field = values.dtype.fields.get(name)
-            if field is None or field[0].kind not in "fiu":
-                raise ValueError(f"the records have no number {name}")
-        return values.reshape(-1)
-    if values.ndim != 2 or values.shape[1] not in (3, 4):
-        raise ValueError(
-            f"an array of shape {values.shape} instead of N x 3 or N x 4"
+    # Mapped, but never looked at: that could end the process.
+    by_column = not values.flags.c_contiguous
+    return values.dtype, values.shape, by_column, values.offset
+
+
+def _read_columns(
+    path: Path, dtype: np.dtype, shape: tuple[int, ...], offset: int, block: int
+) -> Iterator[np.ndarray]:
+    count, width = shape
+    columns = [
+        read_binary(
+            path, dtype, offset + k * count * dtype.itemsize, count, block
         )
-    if values.dtype.kind not in "fiu":
-        raise ValueError(f"{values.dtype} is no type of coordinates")
+        for k in range(width)
+    ]
+    for parts in zip(*columns, strict=True):
+        yield _to_cloud(np.stack(parts, axis=1))
+
+
+def _to_cloud(values: np.ndarray) -> np.ndarray:
     if values.dtype.kind != "f":
         values = values.astype(np.float64)
     return point_arrays.from_xyz(values)
 
 
-def _read_bin(path: Path) -> np.ndarray:
+def _read_bin(path: Path, block: int) -> Iterator[np.ndarray]:
     size = path.stat().st_size
-    if size % 16:
+    if size % _BIN.itemsize:
         raise ValueError(
             f"{size} bytes is no whole number of points of four float32"
         )
-    if size == 0:
-        return point_arrays.from_xyz(np.empty((0, 4), dtype="<f4"))
-    values = np.memmap(path, dtype="<f4", mode="r").reshape(-1, 4)
-    return point_arrays.from_xyz(values)
+    return read_binary(path, _BIN, 0, size // _BIN.itemsize, block)
 
 
-_READERS: dict[str, Callable[[Path], np.ndarray]] = {
+_READERS: dict[str, _Reader] = {
     ".pcd": read_pcd,
     ".ply": read_ply,
     ".npy": _read_npy,

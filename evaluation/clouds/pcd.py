@@ -2,24 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
+from evaluation.clouds.record_blocks import check_size, read_binary, read_text
 from evaluation.geometry.points import store
 from evaluation.support.compiled import compiled
 
 _KINDS = {"F": "f", "I": "i", "U": "u"}
 # A header is some hundred bytes; a file without one is not searched further.
 _HEADER_LIMIT_BYTES = 1 << 16
+# LZF makes 264 bytes of three at most. Whole files of it are unpacked in
+# memory; larger ones had better not be compressed.
+_LZF_RATIO = 88
+_UNPACKED_LIMIT_BYTES = 1 << 27
 
 
-def read_pcd(path: Path) -> np.ndarray:
+def read_pcd(path: Path, block: int) -> Iterator[np.ndarray]:
     """Reads an ascii, binary or binary_compressed PCD file.
 
-    Returns:
-        Structured array of shape (N,) under the file's field names; padding
-        fields (named `_`) are left out.
+    Args:
+        path: the file.
+        block: how many points to yield at once.
+
+    Yields:
+        Structured arrays of shape (N,) under the file's field names, at least
+        one; padding (fields named `_`) has names of its own.
 
     Raises:
         ValueError: if the file is not PCD, contradicts itself or is cut off.
@@ -29,14 +39,16 @@ def read_pcd(path: Path) -> np.ndarray:
     dtype, count = _describe(header)
     encoding = header["DATA"][0].lower() if header["DATA"] else ""
     if encoding == "ascii":
-        return _read_ascii(path, offset, dtype, count)
+        # A point takes a byte at the very least: no buffer for more of them.
+        check_size(path, offset + count, exactly=False)
+        return read_text(
+            path, offset, count, block, lambda rows: _to_points(rows, dtype)
+        )
     if encoding == "binary":
-        _check_size(path, offset + count * dtype.itemsize)
-        if count == 0:
-            return np.empty(0, dtype=dtype)
-        return np.memmap(path, dtype, mode="r", offset=offset, shape=count)
+        check_size(path, offset + count * dtype.itemsize, exactly=True)
+        return read_binary(path, dtype, offset, count, block)
     if encoding == "binary_compressed":
-        return _read_compressed(path, offset, dtype, count)
+        return _read_compressed(path, offset, dtype, count, block)
     raise ValueError(f"unknown PCD encoding {encoding!r}")
 
 
@@ -63,10 +75,11 @@ def _describe(header: dict[str, list[str]]) -> tuple[np.dtype, int]:
         sizes = [int(size) for size in header["SIZE"]]
         kinds = [_KINDS[kind.upper()] for kind in header["TYPE"]]
         counts = [int(n) for n in header.get("COUNT", ["1"] * len(names))]
+        numbers = []
         if "POINTS" in header:
-            number = int(header["POINTS"][0])
-        else:
-            number = int(header["WIDTH"][0]) * int(header["HEIGHT"][0])
+            numbers.append(int(header["POINTS"][0]))
+        if "WIDTH" in header or not numbers:
+            numbers.append(int(header["WIDTH"][0]) * int(header["HEIGHT"][0]))
     except (KeyError, IndexError, ValueError) as error:
         raise ValueError(f"PCD header: {error} is missing or wrong") from error
     if not len(names) == len(sizes) == len(kinds) == len(counts):
@@ -87,29 +100,28 @@ def _describe(header: dict[str, list[str]]) -> tuple[np.dtype, int]:
     for name in "xyz":
         if name not in names or dtype[name].kind != "f":
             raise ValueError(f"PCD header: no field {name} of type F")
+    number = numbers[0]
+    if numbers[-1] != number:
+        raise ValueError(
+            f"PCD header: POINTS {number} against {numbers[-1]} of WIDTH x"
+            " HEIGHT"
+        )
     if number < 0:
         raise ValueError("PCD header: a negative number of points")
     return dtype, number
 
 
-def _read_ascii(
-    path: Path, offset: int, dtype: np.dtype, count: int
-) -> np.ndarray:
-    if count == 0:
-        return np.empty(0, dtype=dtype)
-    # A point takes a byte at the very least: no buffer for more of them.
-    _check_size(path, offset + count)
-    with open(path, "rb") as stream:
-        stream.seek(offset)
-        values = np.loadtxt(stream, dtype=np.float64, ndmin=2, max_rows=count)
+def _to_points(values: np.ndarray, dtype: np.dtype) -> np.ndarray:
+    """Returns points of rows of numbers."""
+    if len(values) == 0:
+        return np.empty(0, dtype)
     names = dtype.names or ()
     widths = [_width(dtype, name) for name in names]
-    if values.shape != (count, sum(widths)):
+    if values.shape[1] != sum(widths):
         raise ValueError(
-            f"PCD: {values.shape[0]} x {values.shape[1]} numbers instead of"
-            f" {count} x {sum(widths)}"
+            f"PCD: {values.shape[1]} numbers in a row instead of {sum(widths)}"
         )
-    points = np.empty(count, dtype=dtype)
+    points = np.empty(len(values), dtype=dtype)
     columns = np.split(values, np.cumsum(widths)[:-1], axis=1)
     for name, column in zip(names, columns, strict=True):
         store(points, name, column.reshape(points[name].shape))
@@ -117,30 +129,45 @@ def _read_ascii(
 
 
 def _read_compressed(
-    path: Path, offset: int, dtype: np.dtype, count: int
-) -> np.ndarray:
+    path: Path, offset: int, dtype: np.dtype, count: int, block: int
+) -> Iterator[np.ndarray]:
     with open(path, "rb") as stream:
         stream.seek(offset)
-        sizes = np.frombuffer(stream.read(8), dtype="<u4")
-        if len(sizes) != 2:
+        head = stream.read(8)
+        if len(head) != 8:
             raise ValueError("PCD: the file is cut off")
-        packed = np.frombuffer(stream.read(int(sizes[0])), dtype=np.uint8)
-    if len(packed) != sizes[0]:
-        raise ValueError("PCD: the file is cut off")
-    if sizes[1] != count * dtype.itemsize:
-        raise ValueError("PCD: the compressed size does not fit the header")
-    plain = np.empty(int(sizes[1]), dtype=np.uint8)
+        num_packed, num_plain = np.frombuffer(head, dtype="<u4").tolist()
+        if num_plain != count * dtype.itemsize:
+            raise ValueError("PCD: the compressed size does not fit the header")
+        if num_plain > _LZF_RATIO * num_packed:
+            raise ValueError(
+                f"PCD: {num_packed} bytes cannot hold {num_plain} of them"
+            )
+        if max(num_packed, num_plain) > _UNPACKED_LIMIT_BYTES:
+            raise ValueError(
+                f"PCD: {num_plain} bytes compressed in one piece are more than"
+                f" {_UNPACKED_LIMIT_BYTES} (save it as binary)"
+            )
+        check_size(path, offset + 8 + num_packed, exactly=True)
+        packed = np.frombuffer(stream.read(num_packed), dtype=np.uint8)
+    plain = np.empty(num_plain, dtype=np.uint8)
     if not _decompress_lzf(packed, plain):
         raise ValueError("PCD: the compressed data is damaged")
-    # Stored field by field: all x, then all y, ...
-    points = np.empty(count, dtype=dtype)
+    for start in range(0, max(count, 1), block):
+        yield _interleaved(plain, dtype, count, slice(start, start + block))
+
+
+def _interleaved(
+    plain: np.ndarray, dtype: np.dtype, count: int, part: slice
+) -> np.ndarray:
+    """Returns some points of `count`, stored field by field."""
+    points = np.empty(len(range(count)[part]), dtype=dtype)
     start = 0
     for name in dtype.names or ():
         scalar = dtype[name]
         end = start + count * scalar.itemsize
-        points[name] = (
-            plain[start:end].view(scalar.base).reshape(count, *scalar.shape)
-        )
+        column = plain[start:end].view(scalar.base)
+        points[name] = column.reshape(count, *scalar.shape)[part]
         start = end
     return points
 
@@ -148,12 +175,6 @@ def _read_compressed(
 def _width(dtype: np.dtype, name: str) -> int:
     """Returns how many numbers a field holds."""
     return int(np.prod(dtype[name].shape))
-
-
-def _check_size(path: Path, needed: int) -> None:
-    size = path.stat().st_size
-    if size < needed:
-        raise ValueError(f"PCD: cut off at {size} of {needed} bytes")
 
 
 @compiled

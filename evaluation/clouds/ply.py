@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
+from evaluation.clouds.record_blocks import check_size, read_binary, read_text
 from evaluation.geometry.points import store
 
 _TYPES = {
@@ -30,34 +32,41 @@ _ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": "<"}
 _HEADER_LIMIT_BYTES = 1 << 16
 
 
-def read_ply(path: Path) -> np.ndarray:
+def read_ply(path: Path, block: int) -> Iterator[np.ndarray]:
     """Reads the vertices of an ascii or binary PLY file.
 
     Faces and other elements are ignored; they must follow the vertices.
 
-    Returns:
-        Structured array of shape (N,) under the file's property names.
+    Args:
+        path: the file.
+        block: how many vertices to yield at once.
+
+    Yields:
+        Structured arrays of shape (N,) under the file's property names, at
+        least one.
 
     Raises:
         ValueError: if the file is not PLY, contradicts itself or is cut off.
         OSError: if it cannot be read.
     """
-    encoding, dtype, count, offset = _read_header(path)
-    if count == 0:
-        return np.empty(0, dtype=dtype)
-    is_text = encoding == "ascii"
-    # As text, a vertex takes a byte at the very least.
-    needed = offset + count * (1 if is_text else dtype.itemsize)
-    size = path.stat().st_size
-    if size < needed:
-        raise ValueError(f"PLY: cut off at {size} of {needed} bytes")
-    if is_text:
-        return _read_ascii(path, offset, dtype, count)
-    return np.memmap(path, dtype, mode="r", offset=offset, shape=count)
+    encoding, dtype, count, alone, offset = _read_header(path)
+    if encoding == "ascii":
+        # A vertex takes a byte at the very least.
+        check_size(path, offset + count, exactly=False)
+        return read_text(
+            path,
+            offset,
+            count,
+            block,
+            lambda rows: _to_vertices(rows, dtype),
+            more=not alone,
+        )
+    check_size(path, offset + count * dtype.itemsize, exactly=alone)
+    return read_binary(path, dtype, offset, count, block)
 
 
-def _read_header(path: Path) -> tuple[str, np.dtype, int, int]:
-    """Returns encoding, type and number of vertices, their offset."""
+def _read_header(path: Path) -> tuple[str, np.dtype, int, bool, int]:
+    """Returns encoding, type and number of vertices, if alone, their offset."""
     lines = []
     with open(path, "rb") as stream:
         if stream.readline(8).strip() != b"ply":
@@ -78,7 +87,8 @@ def _read_header(path: Path) -> tuple[str, np.dtype, int, int]:
     if encoding not in _ORDERS:
         raise ValueError(f"PLY header: unknown format {encoding!r}")
     dtype, count = _describe_vertices(lines, _ORDERS[encoding])
-    return encoding, dtype, count, offset
+    alone = sum(words[0] == "element" for words in lines) == 1
+    return encoding, dtype, count, alone, offset
 
 
 def _describe_vertices(
@@ -106,19 +116,16 @@ def _describe_vertices(
     return dtype, count
 
 
-def _read_ascii(
-    path: Path, offset: int, dtype: np.dtype, count: int
-) -> np.ndarray:
-    with open(path, "rb") as stream:
-        stream.seek(offset)
-        values = np.loadtxt(stream, dtype=np.float64, ndmin=2, max_rows=count)
+def _to_vertices(values: np.ndarray, dtype: np.dtype) -> np.ndarray:
+    """Returns vertices of rows of numbers."""
     names = dtype.names or ()
-    if values.shape != (count, len(names)):
+    vertices = np.empty(len(values), dtype=dtype)
+    if len(values) and values.shape[1] != len(names):
         raise ValueError(
-            f"PLY: {values.shape[0]} x {values.shape[1]} numbers instead of"
-            f" {count} x {len(names)}"
+            f"PLY: {values.shape[1]} numbers in a row instead of {len(names)}"
         )
-    vertices = np.empty(count, dtype=dtype)
+    if len(values) == 0:
+        return vertices
     for column, name in enumerate(names):
         store(vertices, name, values[:, column])
     return vertices

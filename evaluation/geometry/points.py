@@ -29,7 +29,7 @@ def xyz(points: np.ndarray, dtype: DTypeLike = np.float64) -> np.ndarray:
     return coordinates
 
 
-def check_near(points: np.ndarray, limit: float) -> None:
+def check_near(points: np.ndarray, limit: float, first: int = 0) -> None:
     """Refuses coordinates that are none: bytes of something else.
 
     What is not finite passes: many sensors say so of a beam that met nothing.
@@ -37,6 +37,7 @@ def check_near(points: np.ndarray, limit: float) -> None:
     Args:
         points: (N,) structured array.
         limit: what no coordinate reaches [m].
+        first: the number that the first point has in its file.
 
     Raises:
         ValueError: if one does.
@@ -46,10 +47,9 @@ def check_near(points: np.ndarray, limit: float) -> None:
         with np.errstate(over="ignore", invalid="ignore"):
             far = (np.abs(points[name]) >= limit) & np.isfinite(points[name])
         if far.any():
-            first = int(far.argmax())
+            place = int(far.argmax())
             raise ValueError(
-                f"{name}: point {first} of {len(points)} is at"
-                f" {points[name][first]:g} m"
+                f"{name}: point {first + place} is at {points[name][place]:g} m"
             )
 
 

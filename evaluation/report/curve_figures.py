@@ -15,7 +15,7 @@ from evaluation.recognition.metrics import (
 )
 from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.report import paper
-from evaluation.report.drawing import method_style, save
+from evaluation.report.drawing import method_style, plain, save
 from evaluation.report.result_tables import in_paper_order, title
 
 # A line is not fitted through fewer.
@@ -46,7 +46,8 @@ def draw_pr_curves(
             # A phone shows one panel at a time.
             axes.tick_params(labelleft=True)
             axes.set_title(
-                f"{map_name} {' → '.join(pair[1:])}, {mode} queries", fontsize=9
+                plain(f"{map_name} {' → '.join(pair[1:])}, {mode} queries"),
+                fontsize=9,
             )
             axes.grid(alpha=0.3)
             axes.legend(fontsize=7, framealpha=0.8)
@@ -125,7 +126,7 @@ def _draw_curve(
         marker=marker,
         markersize=4,
         markevery=0.2,
-        label=f"{title(method)} {metrics.auc:.3f}",
+        label=plain(f"{title(method)} {metrics.auc:.3f}"),
     )
 
 
@@ -155,7 +156,7 @@ def _draw_points(
         linestyle="none",
         capsize=2,
         linewidth=1.0,
-        label=title(method),
+        label=plain(title(method)),
     )
     _draw_line(axes, x, y, colour, style)
 

@@ -48,6 +48,11 @@ def unit(rgb: tuple[int, int, int]) -> tuple[float, float, float]:
     return red / 255.0, green / 255.0, blue / 255.0
 
 
+def plain(text: str) -> str:
+    """Returns text of a drawing in which no dollar begins a formula."""
+    return text.replace("$", r"\$")
+
+
 def save(figure: Figure, stem: Path, page_kind: str) -> None:
     """Writes a figure as PDF, as PNG, and for the page.
 

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 from evaluation.change.tcr import TAU, TemporalChange
 from evaluation.geometry.hull import in_convex_hull
 from evaluation.maps.voxel_maps import VoxelMap
-from evaluation.report.drawing import Legend, save, unit
+from evaluation.report.drawing import Legend, plain, save, unit
 from evaluation.report.point_rendering import (
     Picture,
     View,
@@ -142,7 +142,7 @@ def draw_routes(map_name: str, routes: Sequence[SeenRoute], stem: Path) -> None:
     for axes, route in zip(grid, routes, strict=True):
         _show(axes, route.view)
         _draw_route(axes, route.view.project(route.positions))
-        axes.set_title(f"{map_name} {route.name}", fontsize=9)
+        axes.set_title(plain(f"{map_name} {route.name}"), fontsize=9)
     save(figure, stem, "webp")
 
 
@@ -212,7 +212,7 @@ def _draw_absent(
     )
     for axes, picture, text in zip(grid, pictures, titles, strict=True):
         _show(axes, picture)
-        axes.set_title(text, fontsize=9)
+        axes.set_title(plain(text), fontsize=9)
     _show_legend(figure, CHANGE_LEGEND)
     save(figure, stem, "webp")
 
@@ -247,7 +247,7 @@ def _draw_sets(
     )
     for axes, picture, text in zip(grid, pictures, titles, strict=True):
         _show(axes, picture)
-        axes.set_title(f"{map_name} {text}", fontsize=9)
+        axes.set_title(plain(f"{map_name} {text}"), fontsize=9)
     _show_legend(figure, SETS_LEGEND)
     save(figure, stem, "webp")
 

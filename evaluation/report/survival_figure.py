@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from evaluation.recognition.survival import Survival
-from evaluation.report.drawing import method_style, save
+from evaluation.report.drawing import method_style, plain, save
 from evaluation.report.result_tables import title
 from evaluation.report.survival_tables import by_pair, percent
 
@@ -46,14 +46,14 @@ def draw_survival(survivals: Sequence[Survival], stem: Path) -> None:
         axes.text(
             0.0,
             height - 0.8,
-            f"{map_name} {' → '.join(stages)}",
+            plain(f"{map_name} {' → '.join(stages)}"),
             fontsize=_FONT_SIZE,
             fontweight="bold",
             va="center",
         )
         for one in group:
             _draw_row(axes, one, height)
-            ticks.append((height, title(one.method)))
+            ticks.append((height, plain(title(one.method))))
             height += 1.0
     axes.set_yticks(*zip(*ticks, strict=True), fontsize=_FONT_SIZE)
     axes.set(xlim=(0.0, 1.0), ylim=(height - 0.2, 0.0))

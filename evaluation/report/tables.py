@@ -8,10 +8,17 @@ from dataclasses import dataclass
 import html
 import io
 import math
+import re
 
 MISSING = "–"
 
 _LATEX = {
+    "\\": r"\textbackslash{}",
+    "{": r"\{",
+    "}": r"\}",
+    "$": r"\$",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
     "&": r"\&",
     "%": r"\%",
     "#": r"\#",
@@ -21,6 +28,11 @@ _LATEX = {
     "↔": r"$\leftrightarrow$",
     "–": "--",
     "·": r"$\cdot$",
+}
+# What makes a table, a link, a picture or a tag of text.
+_MARKDOWN = {ord(c): f"\\{c}" for c in "\\`*_[]|"} | {
+    ord("<"): "&lt;",
+    ord(">"): "&gt;",
 }
 
 
@@ -87,7 +99,7 @@ class Table:
         The paper's values follow in brackets.
         """
         header = [
-            f"{group} {name}".strip()
+            escape_markdown(f"{group} {name}".strip())
             for group, name in zip(
                 self._group_of_each(), self.header, strict=True
             )
@@ -182,9 +194,16 @@ def to_text(value: object) -> str:
     return f"{value:.4f}" if isinstance(value, float) else str(value)
 
 
+def escape_markdown(text: str) -> str:
+    """Returns text that Markdown shows as it is."""
+    named = re.sub(r"&(?=#?\w+;)", "&amp;", text)
+    # An underscore within a word is one.
+    return re.sub(r"(?<=\w)\\_(?=\w)", "_", named.translate(_MARKDOWN))
+
+
 def _to_markdown(value: object) -> str:
     if not isinstance(value, Cell):
-        return to_text(value)
+        return escape_markdown(to_text(value))
     text = to_text(value.value)
     if value.rank == 1:
         text = f"**{text}**"

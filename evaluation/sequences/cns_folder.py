@@ -35,6 +35,7 @@ from evaluation.sequences.scan_files import (
 )
 from evaluation.sequences.text_tables import read_stamped_rows
 from evaluation.support.errors import InputError
+from evaluation.support.files import read_bytes
 from evaluation.support.yaml_files import parse_yaml
 
 _POSES = "gt.csv"
@@ -127,12 +128,10 @@ def _read_mount(path: Path | None) -> np.ndarray:
     if path is None:
         return poses.make_pose(np.eye(3), np.array([0.0, 0.0, _LIDAR_HEIGHT]))
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_bytes(path).decode("utf-8")
         # OpenCV begins its files with a directive that YAML does not know.
         lines = [x for x in text.splitlines() if not x.startswith("%")]
         X_BS = _find_pose(parse_yaml("\n".join(lines), _Loader), path)
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}") from error
     except ValueError as error:
         raise InputError(f"{path}: {error}") from error
     if X_BS is None:

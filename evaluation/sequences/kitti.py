@@ -20,7 +20,6 @@ and, as cns-drake exports a drive,
 from __future__ import annotations
 
 from collections.abc import Mapping
-import json
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +38,8 @@ from evaluation.sequences.text_tables import (
     read_numbers,
 )
 from evaluation.support.errors import InputError
+from evaluation.support.files import read_bytes
+from evaluation.support.json_text import parse_json
 
 _SCANS = "velodyne"
 _LABELS = "labels"
@@ -110,10 +111,8 @@ class KittiSequence(FileSequence):
         if not path.is_file():
             return None
         try:
-            table = json.loads(path.read_text(encoding="utf-8"))
-        except OSError as error:
-            raise InputError(f"{path}: {error.strerror or error}") from error
-        except (ValueError, RecursionError) as error:
+            table = parse_json(read_bytes(path))
+        except ValueError as error:
             raise InputError(f"{path}: {error}") from error
         return index_instances(table, str(path))
 
@@ -179,9 +178,7 @@ def _read_poses(path: Path) -> np.ndarray:
 def _read_calibration(path: Path) -> np.ndarray:
     """Returns X_CS (4, 4), the pose of the LiDAR in the camera's frame."""
     try:
-        lines = path.read_text(encoding="ascii").splitlines()
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}") from error
+        lines = read_bytes(path).decode("ascii").splitlines()
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: not a text file") from error
     for line in lines:

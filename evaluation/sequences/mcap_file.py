@@ -33,6 +33,7 @@ from evaluation.sequences.mcap_records import (
     read_chunk,
 )
 from evaluation.support.errors import InputError
+from evaluation.support.files import check_regular
 from evaluation.support.processors import num_cores
 
 # Of a message, after its record header: channel id, sequence, two times.
@@ -74,6 +75,7 @@ class McapFile:
                 indexed MCAP file.
         """
         self.path = Path(path)
+        check_regular(self.path)
         with self._reading() as stream:
             self._check_ends(stream)
             check_summary(stream)

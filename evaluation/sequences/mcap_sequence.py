@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-import json
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,7 @@ from evaluation.sequences.motion import IMU_DTYPE, ODOMETRY_DTYPE
 from evaluation.sequences.point_cloud2 import to_points
 from evaluation.sequences.sequence import Sequence, index_instances
 from evaluation.support.errors import InputError
+from evaluation.support.json_text import parse_json
 
 _LIDAR_TOPIC = "/lidar/points"
 _ODOMETRY_TOPIC = "/odometry"
@@ -359,7 +359,7 @@ class McapSequence(Sequence):
         if data is None:
             return None
         try:
-            return json.loads(data)
+            return parse_json(data)
         except ValueError as error:
             raise InputError(
                 f"{self._path}: attachment {name}: {error}"

@@ -9,6 +9,7 @@ import re
 
 import numpy as np
 
+from evaluation.clouds.cloud_files import SCAN_LIMIT_BYTES
 from evaluation.geometry.points import FARTHEST_RETURN
 from evaluation.sequences.sequence import Sequence
 from evaluation.sequences.text_tables import (
@@ -16,6 +17,7 @@ from evaluation.sequences.text_tables import (
     parse_stamps_ns,
 )
 from evaluation.support.errors import InputError
+from evaluation.support.files import read_bytes
 from evaluation.support.yaml_files import parse_yaml
 
 # A drive's name also names files.
@@ -111,9 +113,7 @@ def read_scenario(folder: Path) -> Mapping | None:
     if not path.is_file():
         return None
     try:
-        scenario = parse_yaml(path.read_bytes())
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}") from error
+        scenario = parse_yaml(read_bytes(path))
     except ValueError as error:
         raise InputError(f"{path}: {error}") from error
     if not isinstance(scenario, dict):
@@ -179,9 +179,9 @@ def read_packed(path: Path, dtype: np.dtype) -> np.ndarray:
 
     Raises:
         ValueError: if it is no whole number of them.
-        OSError: if it cannot be read.
+        InputError: if it cannot be read, or is too large for a scan.
     """
-    data = path.read_bytes()
+    data = read_bytes(path, SCAN_LIMIT_BYTES)
     if len(data) % dtype.itemsize:
         raise ValueError(
             f"{len(data)} bytes is no whole number of points of"

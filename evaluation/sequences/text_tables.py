@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from decimal import Decimal, InvalidOperation
+import io
 from pathlib import Path
 import warnings
 
 import numpy as np
 
 from evaluation.support.errors import InputError
+from evaluation.support.files import read_bytes
 
 _NS_PER_S = 1_000_000_000
+# Hours of an IMU [bytes].
+_TABLE_LIMIT_BYTES = 1 << 26
 
 
 def read_stamped_rows(
@@ -61,12 +65,11 @@ def read_numbers(
             another form.
     """
     try:
-        with open(path, encoding="utf-8-sig") as stream:
-            lines = [line for line in stream if line.strip()]
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}") from error
+        text = read_bytes(path, _TABLE_LIMIT_BYTES).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: not a text file") from error
+    # No more than a file's line ends ends a line.
+    lines = [line for line in io.StringIO(text, newline=None) if line.strip()]
     if lines and not _begins_with_number(lines[0]):
         lines = lines[1:]
     if not lines:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from urllib.parse import quote
 
 from evaluation.change.change_result import (
     ChangeResult,
@@ -33,7 +34,7 @@ from evaluation.report.survival_tables import (
     survival_summary,
     survival_table,
 )
-from evaluation.report.tables import Table
+from evaluation.report.tables import Table, escape_markdown
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.collection import (
     City,
@@ -234,7 +235,7 @@ def _to_markdown(
     parts = ["# Structural change and place recognition\n"]
     if survival.rows:
         parts.append("## Which method survives the change?\n")
-        parts += [f"{summary}\n", _captioned(survival)]
+        parts += [f"{escape_markdown(summary)}\n", _captioned(survival)]
     for heading, judged in (
         ("The paper's findings", found),
         ("How near to the paper's numbers", aimed),
@@ -242,7 +243,8 @@ def _to_markdown(
         if judged:
             parts.append(f"## {heading}\n")
             parts += [
-                f"- **{one.claim}** This {one.verdict}. {one.evidence}"
+                f"- **{escape_markdown(one.claim)}** This {one.verdict}."
+                f" {escape_markdown(one.evidence)}"
                 for one in judged
             ]
             parts.append("")
@@ -254,13 +256,14 @@ def _to_markdown(
         parts += ["## All numbers\n", _captioned(audit)]
     parts.append("## Figures\n")
     for one in shown:
-        name = one.stem.name
-        parts.append(f"![{one.title}](figures/{name}.png)\n\n{one.title}\n")
+        name = quote(one.stem.name)
+        title = escape_markdown(one.title)
+        parts.append(f"![{title}](figures/{name}.png)\n\n{title}\n")
     return "\n".join(parts)
 
 
 def _captioned(table: Table) -> str:
-    return f"{table.caption}\n\n{table.to_markdown()}"
+    return f"{escape_markdown(table.caption)}\n\n{table.to_markdown()}"
 
 
 def _write(path: Path, text: str) -> None:

@@ -10,7 +10,7 @@ import re
 from evaluation.report import paper
 from evaluation.sequences import open_sequence
 from evaluation.study.drive_source import DriveSource, RecordedDrive
-from evaluation.support.errors import InputError
+from evaluation.support.errors import InputError, one_line
 
 _NAME = re.compile(r"(?P<map>.+)_(?P<stage>[^_]+)")
 _UNPLACED = "neither a scenario nor a name <map>_<stage> tells map and stage"
@@ -202,8 +202,8 @@ def _place(path: Path) -> RecordingInfo | None:
     # A city has lanes to follow, any other world has waypoints.
     route = scenario.get("route") or scenario.get("waypoints")
     if {"map", "stage"} <= set(scenario):
-        map_name = Path(str(scenario["map"])).name
-        stage = str(scenario["stage"])
+        map_name = one_line(Path(str(scenario["map"])).name)
+        stage = one_line(scenario["stage"])
         return RecordingInfo(sequence.name, path, map_name, stage, route)
     match = _NAME.fullmatch(sequence.name)
     if match is None:

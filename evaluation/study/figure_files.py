@@ -8,11 +8,12 @@ from evaluation.report.figures import CHANGE_LEGEND, SETS_LEGEND
 from evaluation.report.page_data import Illustration
 from evaluation.study.collection import City, RecordingInfo
 from evaluation.study.views import PAGE_KIND
+from evaluation.support.files import file_name
 
 
 def routes_stem(city: City) -> str:
     """Returns the name of the figure of a city's routes, without ending."""
-    return f"routes_{city.name}"
+    return file_name(f"routes_{city.name}")
 
 
 def change_stems(
@@ -21,14 +22,15 @@ def change_stems(
     """Returns the names of the figures of a change: points, and sets."""
     earlier, later = (one.stage for one in pair)
     change, sets = (
-        f"{kind}_{city.name}_{earlier}_{later}" for kind in ("change", "sets")
+        file_name(f"{kind}_{city.name}_{earlier}_{later}")
+        for kind in ("change", "sets")
     )
     return change, sets
 
 
 def curves_stem(city: City) -> str:
     """Returns the name of the figure of a city's precision and recall."""
-    return f"pr_{city.name}"
+    return file_name(f"pr_{city.name}")
 
 
 def illustrations(city: City, folder: Path) -> list[Illustration]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from urllib.parse import quote
 
 from evaluation.study.chosen_methods import MethodChoice
+from evaluation.support.files import file_name
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class SurveyFiles:
 
     def described(self, method: MethodChoice) -> Path:
         """Of (`PlacedDrive`, `DescribedDrive`)."""
-        return self.folder / f"described_{_safe(method.name)}.data"
+        return self.folder / f"described_{file_name(method.name)}.data"
 
 
 @dataclass(frozen=True)
@@ -56,37 +56,30 @@ class StudyFiles:
         return self.output / "parts"
 
     def survey(self, recording: str) -> SurveyFiles:
-        return SurveyFiles(self._parts / "surveys" / _safe(recording))
+        return SurveyFiles(self._parts / "surveys" / file_name(recording))
 
     def change(self, earlier: str, later: str) -> Path:
         """Of the `ChangeResult` of two recordings."""
-        name = f"{_safe(earlier)},{_safe(later)}.data"
+        name = f"{file_name(earlier)},{file_name(later)}.data"
         return self._parts / "changes" / name
 
     def recognition(
         self, database: str, query: str, method: MethodChoice
     ) -> Path:
         """Of the `RecognitionResult` of two recordings and a method."""
-        name = f"{_safe(database)},{_safe(query)},{_safe(method.name)}.data"
+        pair = f"{file_name(database)},{file_name(query)}"
+        name = f"{pair},{file_name(method.name)}.data"
         return self._parts / "recognition" / name
 
     def page_drives(self, city: str) -> Path:
         """Of the `PageDrive`s of a city's stages, by name."""
-        return self._parts / "pages" / f"{_safe(city)}.data"
+        return self._parts / "pages" / f"{file_name(city)}.data"
 
     def trend_points(self, database: str, query: str) -> Path:
         """Of the `TrendPoint`s of two recordings."""
-        name = f"{_safe(database)},{_safe(query)}.data"
+        name = f"{file_name(database)},{file_name(query)}.data"
         return self._parts / "trend" / name
 
     def drawn(self, stem: str) -> Path:
         """Says what a figure was drawn of."""
-        return self._parts / "figures" / f"{_safe(stem)}.data"
-
-
-def _safe(name: str) -> str:
-    """Returns a name that is a file name; different ones stay different.
-
-    What joins several of them, a comma, is in none.
-    """
-    return quote(name, safe="+ ")
+        return self._parts / "figures" / f"{file_name(stem)}.data"

@@ -15,7 +15,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 import numpy as np
 
-from evaluation.report.drawing import method_style, save
+from evaluation.report.drawing import method_style, plain, save
 from evaluation.report.result_tables import in_paper_order, title
 from evaluation.study.trend_points import TrendPoint
 from evaluation.support.files import completing, make_folder
@@ -66,13 +66,17 @@ def draw_trend(points: Sequence[TrendPoint], stem: Path) -> None:
         ).T
         axes.plot(x, y, marker, color=colour, markersize=3.5, alpha=0.55, mew=0)
         if len(x) < _LEAST_POINTS or np.ptp(x) == 0.0:
-            axes.plot([], [], style, color=colour, label=title(method))
+            axes.plot([], [], style, color=colour, label=plain(title(method)))
             continue
         grid = np.linspace(x[0], x[-1], _GRID)
         low, high = smooth_band(x, y, grid)
         axes.fill_between(grid, low, high, color=colour, alpha=0.18, lw=0)
         axes.plot(
-            grid, smooth(x, y, grid), style, color=colour, label=title(method)
+            grid,
+            smooth(x, y, grid),
+            style,
+            color=colour,
+            label=plain(title(method)),
         )
     axes.set(xlabel=r"TCR$_\mathrm{sym}$", ylabel="AUC", ylim=(0.0, 1.02))
     axes.grid(alpha=0.3)

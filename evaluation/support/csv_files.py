@@ -7,7 +7,7 @@ import csv
 from pathlib import Path
 
 from evaluation.support.errors import InputError
-from evaluation.support.files import user_errors
+from evaluation.support.files import read_bytes
 
 
 def read_rows(path: Path) -> list[tuple[int, list[str]]]:
@@ -18,8 +18,7 @@ def read_rows(path: Path) -> list[tuple[int, list[str]]]:
     Raises:
         InputError: the file cannot be read or is not CSV in UTF-8.
     """
-    with user_errors(path):
-        content = path.read_bytes()
+    content = read_bytes(path)
     try:
         reader = csv.reader(
             content.decode("utf-8-sig").splitlines(), skipinitialspace=True

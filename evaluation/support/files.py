@@ -5,10 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 import contextlib
 import fcntl
+import hashlib
 import os
 from pathlib import Path
+import stat
 
 from evaluation.support.errors import InputError
+
+_WRITTEN_BYTES = 1 << 26
+# Some file systems allow 255; there are endings, and names of several parts.
+_LONGEST_NAME_BYTES = 120
+_KEPT_CHARACTERS = 20
 
 
 def part_path(path: Path) -> Path:
@@ -48,6 +55,65 @@ def completing(path: Path) -> Iterator[Path]:
     finally:
         with contextlib.suppress(OSError):
             part.unlink(missing_ok=True)
+
+
+def check_regular(path: Path) -> None:
+    """Refuses what is no file: a device never ends, a pipe may never begin.
+
+    Raises:
+        InputError: if it is another thing, or there is none.
+    """
+    with user_errors(path):
+        mode = path.stat().st_mode
+    if stat.S_ISDIR(mode):
+        raise InputError(f"{path}: Is a directory")
+    if not stat.S_ISREG(mode):
+        raise InputError(f"{path}: not a regular file")
+
+
+def read_bytes(path: Path, limit: int = _WRITTEN_BYTES) -> bytes:
+    """Reads a whole file, unless it is too large.
+
+    Args:
+        path: the file.
+        limit: how long it may be [bytes]; by default what is written by hand
+            or by a program for people.
+
+    Raises:
+        InputError: if it cannot be read, is none or is too large.
+    """
+    check_regular(path)
+    with user_errors(path), open(path, "rb") as stream:
+        content = stream.read(limit + 1)
+    if len(content) > limit:
+        raise InputError(f"{path}: larger than {limit} bytes")
+    return content
+
+
+def file_name(text: str) -> str:
+    """Returns a name that is that of a file, and leads nowhere else.
+
+    Names that a recording holds, of its map, its stage or itself, become
+    parts of paths only by this. Usual names stay as they are; others keep
+    what is harmless of them, and different ones stay different.
+
+    Args:
+        text: any.
+    """
+    name = "".join(
+        c if c.isalnum() or c in "_-+ " or (c == "." and k) else _escaped(c)
+        for k, c in enumerate(text)
+    )
+    if not name or len(name.encode()) > _LONGEST_NAME_BYTES:
+        digest = hashlib.sha256(text.encode("utf-8", "surrogatepass"))
+        # Behind a percent sign never else.
+        name = f"{name[:_KEPT_CHARACTERS]}%~{digest.hexdigest()[:32]}"
+    return name
+
+
+def _escaped(character: str) -> str:
+    octets = character.encode("utf-8", "surrogatepass")
+    return "".join(f"%{octet:02X}" for octet in octets)
 
 
 def write_part(path: Path, text: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+import contextlib
 from importlib import metadata
 import json
 import math
@@ -89,8 +90,10 @@ def run(app: typer.Typer, program: str) -> NoReturn:
         program: the name under which errors are reported.
     """
     message: str | None = None
+    _open_standard_streams()
     try:
         interrupt_on_termination()
+        _check_arguments()
         status = app(prog_name=program, standalone_mode=False) or 0
         if status == INTERRUPTED:  # Typer has caught the interrupt itself.
             message = "interrupted"
@@ -102,9 +105,8 @@ def run(app: typer.Typer, program: str) -> NoReturn:
     except (KeyboardInterrupt, typer.Abort):
         message, status = "interrupted", INTERRUPTED
     except BrokenPipeError:
-        # Whoever read the results has seen enough of them. Python flushes
-        # once more at its end, which must not fail again.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        # Whoever read the results has seen enough of them.
+        _forget_results()
         status = 0
     except MemoryError:
         message, status = "error: not enough memory for this input", 2
@@ -112,6 +114,10 @@ def run(app: typer.Typer, program: str) -> NoReturn:
         where = error.filename or "standard output"
         message = f"error: {where}: {error.strerror or error}"
         status = 2
+        if error.filename is None:
+            _forget_results()
+    except UnicodeError as error:
+        message, status = f"error: a name that is no text ({error})", 2
     # What the command does is done; nothing is left to interrupt.
     ignore_interrupts()
     if message is not None:
@@ -119,6 +125,47 @@ def run(app: typer.Typer, program: str) -> NoReturn:
     if status == INTERRUPTED:
         end_interrupted()
     raise SystemExit(status)
+
+
+def _open_standard_streams() -> None:
+    """Gives a process that was started without them its three streams.
+
+    The next file to be opened would take their places, and what is printed
+    would end up in it.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(number)
+        except OSError:
+            # For reading, so that a result that is lost is an error; what is
+            # told to people beside it may be lost.
+            writes = os.O_WRONLY if name == "stderr" else os.O_RDONLY
+            opened = os.open(os.devnull, writes)
+            if opened != number:
+                os.dup2(opened, number)
+                os.close(opened)
+            if name != "stdin":
+                setattr(sys, name, os.fdopen(number, "w", closefd=False))
+
+
+def _check_arguments() -> None:
+    """Refuses arguments that could be neither printed nor recorded."""
+    for word in sys.argv[1:]:
+        try:
+            word.encode()
+        except UnicodeEncodeError:
+            text = os.fsencode(word).decode(errors="replace")
+            raise InputError(f"{text}: not UTF-8 text") from None
+
+
+def _forget_results() -> None:
+    """Sends what is still to be printed nowhere.
+
+    Python flushes once more at its end, which must not fail again.
+    """
+    # In a test it is no file.
+    with contextlib.suppress(OSError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def track(items: Iterable[Any], description: str, total: int) -> Iterable[Any]:

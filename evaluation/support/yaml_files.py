@@ -8,7 +8,7 @@ from typing import Any
 import yaml
 
 from evaluation.support.errors import InputError
-from evaluation.support.files import user_errors
+from evaluation.support.files import read_bytes
 
 # Data that are written by hand are far from either.
 _DEEPEST = 50
@@ -22,8 +22,7 @@ def read_yaml(path: Path) -> Any:
         InputError: the file cannot be read, is not YAML, stands for more
             than it should or has a key twice.
     """
-    with user_errors(path):
-        text = path.read_bytes()
+    text = read_bytes(path)
     try:
         return parse_yaml(text)
     except ValueError as error:

@@ -1,7 +1,10 @@
+import os
+import warnings
+
 import numpy as np
 import pytest
 
-from evaluation.clouds.cloud_files import is_cloud, read_cloud
+from evaluation.clouds.cloud_files import is_cloud, read_blocks, read_cloud
 from evaluation.clouds.pcd import _decompress_lzf
 from evaluation.geometry.points import from_xyz, xyz
 from evaluation.support.errors import InputError
@@ -26,6 +29,8 @@ HEADER = {
     "VIEWPOINT": "0 0 0 1 0 0 0",
     "POINTS": 500,
 }
+ONE = {"WIDTH": 1, "POINTS": 1}
+HUGE = {"WIDTH": 10**15, "POINTS": 10**15}
 
 
 @pytest.mark.parametrize("compressed", [False, True])
@@ -181,9 +186,13 @@ def faulty_files(folder):
     yield "cut.npy", (folder / "cut.npy").read_bytes()[:-8], "."
     pcds = {
         "cut.pcd": ({"DATA": "binary"}, bytes(5999), "cut off"),
-        "cut_ascii.pcd": ({"DATA": "ascii"}, b"1 2 3\n" * 499, "499 x 3 num"),
-        "large.pcd": ({"POINTS": 1, "DATA": "ascii"}, b"1 2 1e39", "z: a num"),
-        "huge.pcd": ({"POINTS": 10**15, "DATA": "ascii"}, b"1 2 3", "cut off"),
+        "cut_ascii.pcd": (
+            {"DATA": "ascii"},
+            b"1 2 3\n" * 499,
+            "499 instead of 500 rows",
+        ),
+        "large.pcd": (ONE | {"DATA": "ascii"}, b"1 2 1e39", "z: a num"),
+        "huge.pcd": (HUGE | {"DATA": "ascii"}, b"1 2 3", "cut off"),
         "words.pcd": ({"DATA": "ascii"}, b"a b c\n" * 500, "convert"),
         "odd.pcd": ({"DATA": "zip"}, b"", "unknown PCD encoding"),
         "fields.pcd": ({"SIZE": "4 4", "DATA": "binary"}, b"", "differ"),
@@ -191,12 +200,12 @@ def faulty_files(folder):
         "ints.pcd": ({"TYPE": "I F F", "DATA": "binary"}, b"", "field x"),
         "packed.pcd": (
             {"DATA": "binary_compressed"},
-            np.array([4, 6000], dtype="<u4").tobytes() + b"\xff\xff\xff\xff",
+            np.array([70, 6000], dtype="<u4").tobytes() + b"\xff" * 70,
             "damaged",
         ),
         "packed_cut.pcd": (
             {"DATA": "binary_compressed"},
-            np.array([4, 6000], dtype="<u4").tobytes(),
+            np.array([70, 6000], dtype="<u4").tobytes(),
             "cut off",
         ),
         "packed_size.pcd": (
@@ -225,7 +234,11 @@ def faulty_files(folder):
         (header % (b"ascii", b"float")).replace(b"2", b"-2"),
         "negative number",
     )
-    yield "cut_ascii.ply", header % (b"ascii", b"float") + b"1 2 3", "1 x 3"
+    yield (
+        "cut_ascii.ply",
+        header % (b"ascii", b"float") + b"1 2 3",
+        "1 instead of 2 rows",
+    )
     yield "odd.ply", header % (b"binary", b"float"), "unknown format"
     yield "type.ply", header % (b"ascii", b"quad"), "'quad'"
     yield "ints.ply", header % (b"ascii", b"int"), "property z"
@@ -290,7 +303,7 @@ def test_coordinates_out_of_this_world(tmp_path, z, fine):
     if fine:
         assert len(read_cloud(tmp_path / "map.npy")) == 3
         return
-    with pytest.raises(InputError, match=r"z: point 1 of 3 is at 1.01e\+08 m"):
+    with pytest.raises(InputError, match=r"z: point 1 is at 1.01e\+08 m"):
         read_cloud(tmp_path / "map.npy")
 
 
@@ -301,3 +314,135 @@ def test_unknown_or_missing_files(tmp_path):
         read_cloud(tmp_path / "a.pcd")
     assert is_cloud(tmp_path / "A.PCD")
     assert not is_cloud(tmp_path / "a.txt")
+
+
+def write_clouds(folder):
+    """Yields paths of a cloud in every kind of file, 500 points in each."""
+    for encoding, data in (
+        ("binary", POINTS.tobytes()),
+        ("ascii", b"1 2 3\n" * 500),
+    ):
+        path = folder / f"{encoding}.pcd"
+        write_pcd(path, HEADER | {"DATA": encoding}, data)
+        yield path
+    for name, data in (
+        ("ascii", b"1 2 3\n" * 500),
+        ("binary_little_endian", POINTS.tobytes()),
+    ):
+        header = f"ply\nformat {name} 1.0\nelement vertex 500\n"
+        header += "".join(f"property float {axis}\n" for axis in "xyz")
+        path = folder / f"{name}.ply"
+        path.write_bytes(header.encode() + b"end_header\n" + data)
+        yield path
+    path = folder / "points.bin"
+    path.write_bytes(np.zeros((500, 4), "<f4").tobytes())
+    yield path
+    for name, values in (
+        ("rows", POINTS),
+        ("columns", np.asfortranarray(POINTS)),
+        ("records", from_xyz(POINTS)),
+    ):
+        np.save(folder / f"{name}.npy", values)
+        yield folder / f"{name}.npy"
+
+
+def test_blocks_are_parts_of_the_whole(tmp_path):
+    for path in write_clouds(tmp_path):
+        parts = list(read_blocks(path, block=70))
+        assert [len(part) for part in parts] == [70] * 7 + [10]
+        whole = read_cloud(path)
+        np.testing.assert_array_equal(np.concatenate(parts), whole)
+        assert len(whole) == 500
+
+
+def test_a_file_that_is_cut_while_it_is_read(tmp_path):
+    for path in write_clouds(tmp_path):
+        size = path.stat().st_size
+        parts = read_blocks(path, block=10)
+        next(parts)
+        # A stream holds some of what follows.
+        os.truncate(path, size // 10)
+        with pytest.raises(InputError, match=f"^{path}: .*(cut off|instead)"):
+            list(parts) and list(read_blocks(path))
+
+
+def test_more_than_the_header_says(tmp_path):
+    for path in write_clouds(tmp_path):
+        if path.suffix == ".bin":
+            continue
+        is_text = path.stem == "ascii"
+        with open(path, "ab") as stream:
+            stream.write(b"7 8 9\n" if is_text else bytes(12))
+        with pytest.raises(InputError, match=f"^{path}: .*more than the"):
+            read_cloud(path)
+
+
+@pytest.mark.parametrize(
+    ("changes", "fault"),
+    [
+        ({"WIDTH": 400}, "POINTS 500 against 400"),
+        ({"HEIGHT": 2}, "POINTS 500 against 1000"),
+        ({"POINTS": 499}, "POINTS 499 against 500"),
+    ],
+)
+def test_two_numbers_of_points(tmp_path, changes, fault):
+    path = tmp_path / "a.pcd"
+    header = HEADER | changes | {"DATA": "binary"}
+    write_pcd(path, header, POINTS.tobytes())
+    with pytest.raises(InputError, match=f"^{path}: PCD header: {fault}"):
+        read_cloud(path)
+
+
+def test_what_a_compressed_file_cannot_hold(tmp_path):
+    path = tmp_path / "a.pcd"
+    claimed = (1 << 32) - 16
+    header = HEADER | {"DATA": "binary_compressed"}
+    for name in ("WIDTH", "POINTS"):
+        header[name] = claimed // 12
+    sizes = np.array([100, claimed // 12 * 12], "<u4").tobytes()
+    write_pcd(path, header, sizes + bytes(100))
+    with pytest.raises(InputError, match="100 bytes cannot hold 4294967280"):
+        read_cloud(path)
+    sizes = np.array([1 << 30, claimed // 12 * 12], "<u4").tobytes()
+    write_pcd(path, header, sizes + bytes(100))
+    with pytest.raises(InputError, match="save it as binary"):
+        read_cloud(path)
+
+
+def test_a_scan_of_many_gigabytes(tmp_path):
+    path = tmp_path / "a.bin"
+    path.touch()
+    os.truncate(path, 16 << 32)
+    with pytest.raises(InputError, match="too large for a scan"):
+        read_cloud(path)
+    assert len(next(read_blocks(path))) < 1_000_000
+
+
+def test_what_is_no_file(tmp_path):
+    path = tmp_path / "a.bin"
+    os.mkfifo(path)
+    with pytest.raises(InputError, match=f"^{path}: not a regular file"):
+        read_cloud(path)
+    (tmp_path / "b.bin").symlink_to("/dev/zero")
+    with pytest.raises(InputError, match="not a regular file"):
+        list(read_blocks(tmp_path / "b.bin"))
+
+
+def test_a_line_without_an_end(tmp_path):
+    path = tmp_path / "a.pcd"
+    write_pcd(path, HEADER | {"DATA": "ascii"}, b"1 2 " * 100_000)
+    with pytest.raises(InputError, match="a line is too long"):
+        read_cloud(path)
+
+
+def test_odd_floats_without_a_word(tmp_path):
+    """Half precision, which ends at 65504, and NaN that signal."""
+    np.save(tmp_path / "half.npy", np.array([[1, 2, 3], [np.inf, 0, 0]], "f2"))
+    signalling = np.zeros((4, 3), "<f4")
+    signalling.view("<u4")[1] = 0x7F800001
+    np.save(tmp_path / "signalling.npy", signalling)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for name, finite in (("half", 1), ("signalling", 3)):
+            points = xyz(read_cloud(tmp_path / f"{name}.npy"))
+            assert np.isfinite(points).all(axis=1).sum() == finite

@@ -219,7 +219,7 @@ def test_scans_that_cannot_be_used(tmp_path):
     path = drive / "pcd" / f"{T0_NS}.pcd"
     whole = path.read_bytes()
     write_bytes(path, whole[:-5])
-    with pytest.raises(InputError, match=f"^{path}: PCD: cut off"):
+    with pytest.raises(InputError, match=f"^{path}: cut off"):
         open_sequence(drive).scan(0)
     write_bytes(path, b"\x00" * 64)
     with pytest.raises(InputError, match=f"^{path}: not a PCD file"):

@@ -7,6 +7,7 @@ from evaluation.support.files import (
     check_writable,
     complete_part,
     part_path,
+    read_bytes,
     user_errors,
     write_part,
 )
@@ -73,3 +74,24 @@ def test_check_refuses_what_cannot_be_written(tmp_path):
         check_writable(file / "page.html")
     with pytest.raises(InputError, match="there is a folder"):
         check_writable(tmp_path)
+
+
+def test_what_is_no_file_is_not_read(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "zero").symlink_to("/dev/zero")
+    for name, fault in (
+        ("pipe", "not a regular file"),
+        ("zero", "not a regular file"),
+        (".", "Is a directory"),
+        ("none", "No such file"),
+    ):
+        with pytest.raises(InputError, match=fault):
+            read_bytes(tmp_path / name)
+
+
+def test_a_file_that_is_too_large(tmp_path):
+    path = tmp_path / "a"
+    path.write_bytes(b"12345")
+    assert read_bytes(path, limit=5) == b"12345"
+    with pytest.raises(InputError, match=f"^{path}: larger than 4 bytes"):
+        read_bytes(path, limit=4)

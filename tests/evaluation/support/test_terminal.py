@@ -1,6 +1,8 @@
 """What the commands show: one line for each task, however narrow."""
 
 import io
+import subprocess
+import sys
 
 import pytest
 from rich.console import Console
@@ -92,3 +94,35 @@ def test_what_an_earlier_run_did_is_no_speed(monkeypatch):
     line = paper.file.getvalue().splitlines()[0]
     assert "drive: 1100/1200 frames, 55.0 s simulated" in line
     assert "0.5 x real time, 10 s left" in line
+
+
+@pytest.mark.parametrize("program", ["cns_drake", "evaluation"])
+@pytest.mark.parametrize(
+    ("closed", "status"), [((), 0), ((1,), 2), ((0, 2), 0), ((0, 1, 2), 2)]
+)
+def test_streams_that_are_closed(tmp_path, program, closed, status):
+    """As by `>&-`: what is opened next must not take their places."""
+    words = [sys.executable, "-m", program, "--version"]
+    redirections = " ".join(f"{number}>&-" for number in closed)
+    result = subprocess.run(
+        ["sh", "-c", f'exec "$@" {redirections}', "sh", *words],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert result.returncode == status
+    assert "Traceback" not in result.stderr
+    if closed == (1,):
+        assert result.stderr.endswith("standard output: Bad file descriptor\n")
+        assert result.stderr.count("\n") == 1
+
+
+def test_an_argument_that_is_no_text(tmp_path):
+    result = subprocess.run(
+        [sys.executable, "-m", "evaluation", "tcr", b"\xff.npy", "b.npy"],
+        capture_output=True,
+        check=False,
+    )
+    assert result.returncode == 2
+    assert result.stderr.count(b"\n") == 1
+    assert b"not UTF-8 text" in result.stderr

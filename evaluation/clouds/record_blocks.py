@@ -1,0 +1,114 @@
+"""Records of a file, read block by block into memory of our own.
+
+Mapping a file instead would end the process without a word (SIGBUS) when
+somebody cuts the file meanwhile.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import itertools
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+# A number as text has some tens of characters, a row some tens of numbers.
+_LONGEST_LINE_BYTES = 1 << 16
+
+
+def read_binary(
+    path: Path, dtype: np.dtype, offset: int, count: int, block: int
+) -> Iterator[np.ndarray]:
+    """Yields the records of a file in blocks; at least one, maybe empty.
+
+    Args:
+        path: the file.
+        dtype: of a record.
+        offset: where they begin [bytes].
+        count: how many there are.
+        block: how many to yield at once.
+
+    Raises:
+        ValueError: if the file ends too early.
+        OSError: if it cannot be read.
+    """
+    with open(path, "rb") as stream:
+        stream.seek(offset)
+        for start in range(0, max(count, 1), block):
+            wanted = min(block, count - start)
+            records = np.fromfile(stream, dtype, wanted)
+            if len(records) < wanted:
+                raise ValueError(
+                    f"cut off behind {start + len(records)} of {count} points"
+                )
+            yield records
+
+
+def read_text(
+    path: Path,
+    offset: int,
+    count: int,
+    block: int,
+    convert: Callable[[np.ndarray], np.ndarray],
+    more: bool = False,
+) -> Iterator[np.ndarray]:
+    """Yields rows of numbers as records; like `read_binary`.
+
+    Args:
+        path: the file.
+        offset: where the rows begin [bytes].
+        count: how many there are.
+        block: how many to yield at once.
+        convert: makes (N,) records of (N, K) float64.
+        more: whether something else follows.
+
+    Raises:
+        ValueError: if the file ends too early or goes on, or as `convert`
+            does.
+        OSError: if it cannot be read.
+    """
+    with open(path, "rb") as stream:
+        stream.seek(offset)
+        lines = _lines(stream)
+        for start in range(0, count, block):
+            wanted = min(block, count - start)
+            texts = list(itertools.islice(lines, wanted))
+            if len(texts) < wanted:
+                raise ValueError(
+                    f"{start + len(texts)} instead of {count} rows of numbers"
+                )
+            yield convert(np.loadtxt(texts, np.float64, ndmin=2))
+        if not more and next(lines, None) is not None:
+            raise ValueError(f"more than the {count} rows of the header")
+    if count == 0:
+        yield convert(np.empty((0, 0)))
+
+
+def check_size(path: Path, needed: int, exactly: bool) -> None:
+    """Refuses a file that cannot hold what its header says.
+
+    Args:
+        path: the file.
+        needed: how long it is [bytes].
+        exactly: or else, how long at the very least.
+
+    Raises:
+        ValueError: if it is not.
+    """
+    size = path.stat().st_size
+    if size < needed:
+        raise ValueError(f"cut off at {size} of {needed} bytes")
+    if exactly and size > needed:
+        raise ValueError(
+            f"{size - needed} bytes more than the points of the header"
+        )
+
+
+def _lines(stream: BinaryIO) -> Iterator[bytes]:
+    """Yields the lines that are not blank."""
+    while line := stream.readline(_LONGEST_LINE_BYTES):
+        if len(line) == _LONGEST_LINE_BYTES:
+            raise ValueError("a line is too long for a row of numbers")
+        if line.strip() and not line.lstrip().startswith(b"#"):
+            yield line
