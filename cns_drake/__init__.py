@@ -34,7 +34,8 @@ if TYPE_CHECKING:
         make_beam_pattern,
     )
     from cns_drake.sensors.imu import Imu, add_imu
-    from cns_drake.sensors.lidar import Lidar, add_lidar
+    from cns_drake.sensors.lidar import Lidar
+    from cns_drake.sensors.lidar_adding import add_lidar
     from cns_drake.sensors.measurement import MeasurementModel
     from cns_drake.sensors.odometry import Odometry, add_odometry
     from cns_drake.simulation.simulation import Run, simulate
@@ -90,7 +91,8 @@ _HOMES = {
         "make_beam_pattern",
     ),
     "sensors.imu": ("Imu", "add_imu"),
-    "sensors.lidar": ("Lidar", "add_lidar"),
+    "sensors.lidar": ("Lidar",),
+    "sensors.lidar_adding": ("add_lidar",),
     "sensors.measurement": ("MeasurementModel",),
     "sensors.odometry": ("Odometry", "add_odometry"),
     "simulation.simulation": ("Run", "simulate"),

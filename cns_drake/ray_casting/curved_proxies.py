@@ -14,6 +14,7 @@ from cns_drake.scene.surfaces import (
     CapsuleSurface,
     CylinderSurface,
     EllipsoidSurface,
+    HalfSpaceSurface,
     TriangleSurface,
 )
 from evaluation.support.compiled import compiled
@@ -53,7 +54,7 @@ class NearCurvedShapes:
         """Takes the shapes of a group."""
         rows = []
         for _, X_LG, surface in group.members:
-            if isinstance(surface, TriangleSurface):
+            if isinstance(surface, TriangleSurface | HalfSpaceSurface):
                 continue
             if isinstance(surface, EllipsoidSurface):
                 half, radius = 0.0, max(surface.semi_axes)

@@ -54,11 +54,13 @@ def load() -> ctypes.CDLL:
     size = ctypes.c_size_t
     for name, result, arguments in [
         ("rtcNewDevice", pointer, [ctypes.c_char_p]),
+        ("rtcRetainDevice", None, [pointer]),
         ("rtcReleaseDevice", None, [pointer]),
         ("rtcGetDeviceError", integer, [pointer]),
         ("rtcNewScene", pointer, [pointer]),
         ("rtcSetSceneFlags", None, [pointer, integer]),
         ("rtcCommitScene", None, [pointer]),
+        ("rtcRetainScene", None, [pointer]),
         ("rtcReleaseScene", None, [pointer]),
         ("rtcNewGeometry", pointer, [pointer, integer]),
         ("rtcCommitGeometry", None, [pointer]),

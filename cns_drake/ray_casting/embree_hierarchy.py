@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 import ctypes
+from typing import NamedTuple
 import weakref
 
 import numpy as np
@@ -16,8 +17,20 @@ from cns_drake.ray_casting.embree_packets import (
     cast_packets,
 )
 from cns_drake.ray_casting.embree_primitives import ALL, Primitives
-from cns_drake.ray_casting.ray_groups import RayGroup
+from cns_drake.ray_casting.ray_groups import Member, RayGroup
 from cns_drake.ray_casting.rays import Hits, Rays
+
+
+class _Built(NamedTuple):
+    """What was built of a group.
+
+    Attributes:
+        scene: the RTCScene, 0 if there is nothing in it.
+        owners: `Primitives.owners` of each of its geometries.
+    """
+
+    scene: int
+    owners: tuple[np.ndarray, ...]
 
 
 class EmbreeHierarchy:
@@ -31,16 +44,18 @@ class EmbreeHierarchy:
     def __init__(
         self,
         groups: Sequence[RayGroup],
-        primitives: Mapping[int, Sequence[Primitives]],
+        merge: Callable[[Sequence[Member]], Iterable[Primitives]],
         num_threads: int = 1,
+        previous: EmbreeHierarchy | None = None,
     ):
         """Builds the hierarchy.
 
         Args:
             groups: all groups, placed.
-            primitives: row of a group -> what it holds, for those that hold
-                something.
+            merge: makes primitives of what a group holds; none is allowed.
             num_threads: how many threads share the rays of a cast.
+            previous: a hierarchy of the same primitives, from which what was
+                built of the same groups is taken over.
 
         Raises:
             MemoryError: Embree cannot build it.
@@ -50,19 +65,31 @@ class EmbreeHierarchy:
         # Threads start when they are first needed.
         self._helpers = ThreadPoolExecutor(max(1, num_threads - 1))
         self._lib = embree.load()
-        self._device = self._lib.rtcNewDevice(None)
+        if previous is None:
+            self._device = self._lib.rtcNewDevice(None)
+        else:
+            self._device = previous._device
+            self._lib.rtcRetainDevice(self._device)
         self._scenes: list[int] = []
         weakref.finalize(self, _release, self._lib, self._device, self._scenes)
-        fixed = [row for row in primitives if groups[row].is_merged_world]
-        moving = [row for row in primitives if row not in fixed]
-        scenes = {
-            row: self._build_scene(parts) for row, parts in primitives.items()
-        }
+        known = {} if previous is None else previous._built_of()
+        self._built: dict[int, _Built] = {}
+        for row, group in enumerate(groups):
+            built = known.get(id(group))
+            if built is None:
+                built = self._build(list(merge(group.members)))
+            elif built.scene:
+                self._lib.rtcRetainScene(built.scene)
+                self._scenes.append(built.scene)
+            self._built[row] = built
+        fixed = [row for row in self.rows if groups[row].is_merged_world]
+        moving = [row for row in self.rows if row not in fixed]
         self._top, self._instances = 0, {}
         if moving:
             self._top = self._new_scene()
             self._instances = {
-                row: self._new_instance(scenes[row]) for row in moving
+                row: self._new_instance(self._built[row].scene)
+                for row in moving
             }
             self.place(moving)
         error = self._lib.rtcGetDeviceError(self._device)
@@ -77,13 +104,27 @@ class EmbreeHierarchy:
         )
         address = ctypes.cast(self._lib.rtcIntersect16, ctypes.c_void_p).value
         assert address is not None
+        nothing = _Built(0, ())
         self._tree = Tree(
             address,
-            scenes[fixed[0]] if fixed else 0,
+            self._built[fixed[0]].scene if fixed else 0,
             self._top,
             ctypes.addressof(self._arguments),
-            *_list_owners([primitives.get(row, ()) for row in rows]),
+            *_list_owners(
+                [self._built.get(row, nothing).owners for row in rows]
+            ),
         )
+
+    @property
+    def rows(self) -> list[int]:
+        """The rows of the groups of which it holds anything."""
+        return [row for row, built in self._built.items() if built.scene]
+
+    def _built_of(self) -> dict[int, _Built]:
+        """Returns what was built of each group, by the group's `id`."""
+        return {
+            id(self._groups[row]): built for row, built in self._built.items()
+        }
 
     def place(self, rows: Collection[int]) -> None:
         """Moves groups to where their `X_OL` says."""
@@ -132,7 +173,9 @@ class EmbreeHierarchy:
         self._scenes.append(scene)
         return scene
 
-    def _build_scene(self, parts: Sequence[Primitives]) -> int:
+    def _build(self, parts: Sequence[Primitives]) -> _Built:
+        if not parts:
+            return _Built(0, ())
         scene = self._new_scene()
         for part in parts:
             handle = self._lib.rtcNewGeometry(self._device, part.kind)
@@ -148,7 +191,7 @@ class EmbreeHierarchy:
             self._lib.rtcAttachGeometry(scene, handle)
             self._lib.rtcReleaseGeometry(handle)
         self._lib.rtcCommitScene(scene)
-        return scene
+        return _Built(scene, tuple(part.owners for part in parts))
 
     def _new_instance(self, scene: int) -> int:
         handle = self._lib.rtcNewGeometry(self._device, embree.INSTANCE)
@@ -160,7 +203,7 @@ class EmbreeHierarchy:
 
 
 def _list_owners(
-    scenes: Collection[Sequence[Primitives]],
+    scenes: Collection[Sequence[np.ndarray]],
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns `Tree.first_primitive` and `Tree.owner_of_primitive`."""
     first = np.zeros((len(scenes), max(1, *map(len, scenes))), np.int64)
@@ -169,8 +212,8 @@ def _list_owners(
     for row, parts in enumerate(scenes):
         for k, part in enumerate(parts):
             first[row, k] = count
-            owners.append(part.owners)
-            count += len(part.owners)
+            owners.append(part)
+            count += len(part)
     return first, np.concatenate(owners)
 
 

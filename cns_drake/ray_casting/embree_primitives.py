@@ -18,6 +18,7 @@ from cns_drake.scene.surfaces import (
     CapsuleSurface,
     CylinderSurface,
     EllipsoidSurface,
+    HalfSpaceSurface,
     TriangleSurface,
 )
 
@@ -60,7 +61,7 @@ def merge_flat(members: Sequence[Member]) -> Iterator[Primitives]:
     curved = [
         (PROXY_OWNER, X_LG, circumscribe(surface))
         for _, X_LG, surface in members
-        if not isinstance(surface, TriangleSurface)
+        if not isinstance(surface, TriangleSurface | HalfSpaceSurface)
     ]
     for surfaces, mask in ((flat, SOLID), (curved, PROXY)):
         if surfaces:
@@ -101,7 +102,7 @@ def merge_curved(members: Sequence[Member]) -> Iterator[Primitives]:
     spheres: list[tuple[int, ArrayLike]] = []
     discs: list[tuple[int, ArrayLike, ArrayLike]] = []
     for index, X_LG, surface in members:
-        if isinstance(surface, TriangleSurface):
+        if isinstance(surface, TriangleSurface | HalfSpaceSurface):
             continue
         if isinstance(surface, EllipsoidSurface):
             radius = surface.semi_axes[0]

@@ -29,34 +29,45 @@ from cns_drake.ray_casting.rays import Hits, Rays
 class EmbreeScene:
     """A bounding volume hierarchy over groups; see `RayCastingScene`."""
 
-    def __init__(self, groups: Sequence[RayGroup], num_threads: int):
+    def __init__(
+        self,
+        groups: Sequence[RayGroup],
+        num_threads: int,
+        previous: EmbreeScene | None = None,
+    ):
         """Builds the scene of groups that are placed.
+
+        Args:
+            groups: what it holds.
+            num_threads: how many threads share the rays of a cast.
+            previous: a scene from which what was built of the same groups is
+                taken over.
 
         Raises:
             MemoryError: Embree cannot build it.
         """
-        flat, curved = (
-            {
-                row: parts
-                for row, group in enumerate(groups)
-                if (parts := list(merge(group.members)))
-            }
-            for merge in (merge_flat, merge_curved)
+        flat, curved = None, None
+        if previous is not None:
+            flat, curved = previous._flat, previous._curved
+        self._flat: EmbreeHierarchy = EmbreeHierarchy(
+            groups, merge_flat, num_threads, flat
         )
-        self._flat = EmbreeHierarchy(groups, flat, num_threads)
-        self._curved = EmbreeHierarchy(groups, curved) if curved else None
-        self._near = [NearCurvedShapes(groups[row]) for row in curved]
+        self._curved: EmbreeHierarchy = EmbreeHierarchy(
+            groups, merge_curved, 1, curved
+        )
+        self._near = [
+            NearCurvedShapes(groups[row]) for row in self._curved.rows
+        ]
 
     def place(self, rows: Collection[int]) -> None:
         """Moves groups to where their `X_OL` says."""
         self._flat.place(rows)
-        if self._curved is not None:
-            self._curved.place(rows)
+        self._curved.place(rows)
 
     def cast_rays(self, rays: Rays, with_normals: bool) -> Hits:
         """Casts rays."""
         hits = self._flat.cast(rays, with_normals=with_normals)
-        if self._curved is None:
+        if not self._near:
             return hits
         again = np.flatnonzero(hits.owner == PROXY_OWNER)
         if any(shapes.contain(rays.p_OSset) for shapes in self._near):

@@ -1,4 +1,4 @@
-"""Casting rays on perception geometry.
+"""Casting rays on geometry of a SceneGraph's.
 
 The only module that knows the ray-casting library: Embree, or Open3D on
 platforms for which there is no wheel of Embree's C library.
@@ -9,13 +9,19 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 import importlib.util
+import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
 from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
 
-from cns_drake.ray_casting.ray_groups import RayGroup, group_geometries
+from cns_drake.ray_casting.half_spaces import cast_on_planes
+from cns_drake.ray_casting.ray_groups import (
+    RayGroup,
+    group_geometries,
+    take_over,
+)
 from cns_drake.ray_casting.rays import Hits, Rays
 from cns_drake.scene.perception_geometry import PerceptionGeometry
 
@@ -45,13 +51,14 @@ class RayHits:
 
 
 class RayCastingScene:
-    """A bounding volume hierarchy over perception geometry.
+    """A bounding volume hierarchy over geometry.
 
     Geometry on frames that never move is merged, in world coordinates; the
     geometry of every other frame is an instance that `set_frame_poses`
-    places. Coordinates are kept relative to a point O in the middle of the
-    merged geometry, so that float32 resolves 1e-5 m within 200 m of it
-    wherever the world's origin may be.
+    places; half spaces are planes in closed form. Coordinates are kept
+    relative to a point O in the middle of the merged geometry, so that
+    float32 resolves 1e-5 m within 200 m of it wherever the world's origin may
+    be.
     """
 
     def __init__(
@@ -61,6 +68,7 @@ class RayCastingScene:
         calc_X_WF: Callable[[FrameId], RigidTransform],
         *,
         num_threads: int = 1,
+        previous: RayCastingScene | None = None,
     ):
         """Builds the scene.
 
@@ -70,13 +78,30 @@ class RayCastingScene:
             calc_X_WF: gives the pose of a frame in the world.
             num_threads: how many threads share the rays of a cast; hits do
                 not depend on it.
+            previous: a scene of much the same geometry, given up for this
+                one: of frames whose geometries are still the same objects,
+                nothing is built anew.
         """
+        self._geometries = tuple(geometries)
+        self._slots = _assign_slots(self._geometries, previous)
+        slots = [self._slots[id(geometry)] for geometry in self._geometries]
+        # Slots -> indices; the last entry is what a miss, -1, finds.
+        self._index_of_slot = np.full(max(slots, default=-1) + 2, -1, np.int32)
+        self._index_of_slot[slots] = np.arange(len(slots))
         self._p_WO, self._groups = group_geometries(
-            geometries, anchored_frames, calc_X_WF
+            zip(slots, self._geometries, strict=True),
+            anchored_frames,
+            calc_X_WF,
         )
+        if previous is not None:
+            take_over(self._groups, previous._groups)
         for group in self._groups:
             group.place(self._p_WO, calc_X_WF)
-        self._scene = _make_scene(self._groups, num_threads)
+        solid = [group for group in self._groups if not group.is_half_space]
+        self._planes = dict(list(enumerate(self._groups))[len(solid) :])
+        self._scene: EmbreeScene | Open3dScene = _make_scene(
+            solid, num_threads, None if previous is None else previous._scene
+        )
         self._moving = [
             row
             for row, group in enumerate(self._groups)
@@ -130,10 +155,14 @@ class RayCastingScene:
             np.ascontiguousarray(d_Sset, dtype=float),
         )
         hits = self._scene.cast_rays(rays, with_normals)
+        if self._planes:
+            cast_on_planes(self._planes, rays, hits)
         normals_W = hits.normals
         if with_normals:
             normals_W = self._face_rays(hits, rays)
-        return RayHits(hits.ranges, hits.owner, normals_W)
+        return RayHits(
+            hits.ranges, self._index_of_slot.take(hits.owner), normals_W
+        )
 
     def _face_rays(self, hits: Hits, rays: Rays) -> np.ndarray:
         """Returns unit world normals, turned towards the rays' origins."""
@@ -150,13 +179,35 @@ class RayCastingScene:
         return normals
 
 
+def _assign_slots(
+    geometries: Sequence[PerceptionGeometry], previous: RayCastingScene | None
+) -> dict[int, int]:
+    """Returns a number for each geometry's `id`, the same as before.
+
+    What is built refers to geometries by these numbers, whatever their order
+    is now.
+    """
+    ids = [id(geometry) for geometry in geometries]
+    before = {} if previous is None else previous._slots
+    slots = {key: before[key] for key in ids if key in before}
+    taken = set(slots.values())
+    free = (slot for slot in itertools.count() if slot not in taken)
+    for key in ids:
+        if key not in slots:
+            slots[key] = next(free)
+    return slots
+
+
 def _make_scene(
-    groups: Sequence[RayGroup], num_threads: int
+    groups: Sequence[RayGroup],
+    num_threads: int,
+    previous: EmbreeScene | Open3dScene | None,
 ) -> EmbreeScene | Open3dScene:
     if importlib.util.find_spec(_EMBREE_PACKAGE) is not None:
         from cns_drake.ray_casting.embree_scene import EmbreeScene
 
-        return EmbreeScene(groups, num_threads)
+        assert previous is None or isinstance(previous, EmbreeScene)
+        return EmbreeScene(groups, num_threads, previous)
     from cns_drake.ray_casting.open3d_scene import Open3dScene
 
     return Open3dScene(groups, num_threads)

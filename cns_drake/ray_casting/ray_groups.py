@@ -1,8 +1,8 @@
-"""Perception geometry in groups that move as one, for the ray casters."""
+"""Geometry in groups that move as one, for the ray casters."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,7 +10,12 @@ from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
 
 from cns_drake.scene.perception_geometry import PerceptionGeometry
-from cns_drake.scene.surfaces import EllipsoidSurface, Surface
+from cns_drake.scene.surfaces import (
+    EllipsoidSurface,
+    HalfSpaceSurface,
+    Surface,
+    TriangleSurface,
+)
 
 # What is built into one scene: index of a geometry, its pose, its surface.
 Member = tuple[int, RigidTransform, Surface]
@@ -24,7 +29,8 @@ class RayGroup:
         frame_id: the frame F it is fixed to; None for the world.
         X_FL: (4, 4) affine map from L to F; not rigid for an ellipsoid,
             which in L is the unit sphere.
-        members: what the group holds, posed in L.
+        members: what the group holds, posed in L. A half space is alone in
+            its group, and in L bounded by z = 0.
         is_merged_world: whether L is the world, moved to O.
         X_OL: (3, 4) affine map from L to the scene's origin; there is none
             before `place`.
@@ -35,6 +41,10 @@ class RayGroup:
     members: list[Member]
     is_merged_world: bool = False
     X_OL: np.ndarray = field(init=False)
+
+    @property
+    def is_half_space(self) -> bool:
+        return isinstance(self.members[0][2], HalfSpaceSurface)
 
     def place(
         self,
@@ -48,26 +58,61 @@ class RayGroup:
         self.X_OL = X_WL[:3].copy()
         self.X_OL[:, 3] -= p_WO
 
+    def holds_the_same(self, other: RayGroup) -> bool:
+        """Tells whether another group has the same members, placed alike."""
+        return (
+            self.frame_id == other.frame_id
+            and self.is_merged_world == other.is_merged_world
+            and len(self.members) == len(other.members)
+            and np.array_equal(self.X_FL, other.X_FL)
+            and all(
+                index == other_index
+                and _is_same(surface, other_surface)
+                and X_LG.IsExactlyEqualTo(other_X_LG)
+                for (index, X_LG, surface), (
+                    other_index,
+                    other_X_LG,
+                    other_surface,
+                ) in zip(self.members, other.members, strict=True)
+            )
+        )
+
+
+def _is_same(surface: Surface, other: Surface) -> bool:
+    if surface is other:
+        return True
+    # Whether triangles are equal is not worth a look at all of them.
+    return not isinstance(surface, TriangleSurface) and surface == other
+
 
 def group_geometries(
-    geometries: Sequence[PerceptionGeometry],
+    geometries: Iterable[tuple[int, PerceptionGeometry]],
     anchored_frames: Collection[FrameId],
     calc_X_WF: Callable[[FrameId], RigidTransform],
 ) -> tuple[np.ndarray, list[RayGroup]]:
-    """Returns p_WO and the groups, the world's first if there is one.
+    """Returns p_WO and the groups.
+
+    The world's is the first if there is one; half spaces are the last.
 
     Args:
-        geometries: what rays can hit; members give indices into it.
+        geometries: what rays can hit, each with the index that its member
+            gets.
         anchored_frames: the frames that never move.
         calc_X_WF: gives the pose of a frame in the world.
     """
     by_frame: dict[FrameId | None, list[Member]] = {}
-    for index, geometry in enumerate(geometries):
+    half_spaces = []
+    for index, geometry in geometries:
         frame_id, X_FG = geometry.frame_id, geometry.X_FG
         if frame_id in anchored_frames:
             frame_id, X_FG = None, calc_X_WF(frame_id) @ X_FG
-        member = (index, X_FG, geometry.surface)
-        by_frame.setdefault(frame_id, []).append(member)
+        if isinstance(geometry.surface, HalfSpaceSurface):
+            alone: Member = (index, RigidTransform(), geometry.surface)
+            half_spaces.append(RayGroup(frame_id, X_FG.GetAsMatrix4(), [alone]))
+            continue
+        by_frame.setdefault(frame_id, []).append(
+            (index, X_FG, geometry.surface)
+        )
 
     p_WO = np.zeros(3)
     world = by_frame.pop(None, [])
@@ -99,4 +144,23 @@ def group_geometries(
             groups.append(
                 RayGroup(frame_id, X_FL.GetAsMatrix4(), rest, frame_id is None)
             )
-    return p_WO, groups + ellipsoids
+    return p_WO, groups + ellipsoids + half_spaces
+
+
+def take_over(groups: list[RayGroup], previous: Iterable[RayGroup]) -> None:
+    """Replaces groups by previous ones that hold the same.
+
+    Args:
+        groups: to compare, in place.
+        previous: what was built before.
+    """
+    known = {_key(group): group for group in previous}
+    for row, group in enumerate(groups):
+        old = known.get(_key(group))
+        if old is not None and old.holds_the_same(group):
+            groups[row] = old
+
+
+def _key(group: RayGroup) -> tuple:
+    index, _, surface = group.members[0]
+    return group.frame_id, index, type(surface)

@@ -75,7 +75,14 @@ def _serve() -> None:
             path = pickle.load(sys.stdin.buffer)
         except EOFError:
             return
-        mesh = open3d.io.read_triangle_mesh(path)
+        if path.lower().endswith(".dae"):
+            # Only its reader of models knows the format.
+            parts = open3d.io.read_triangle_model(path).meshes
+            mesh = open3d.geometry.TriangleMesh()
+            for part in parts:
+                mesh += part.mesh
+        else:
+            mesh = open3d.io.read_triangle_mesh(path)
         triangles = np.asarray(mesh.triangles, np.int32)
         pickle.dump((np.asarray(mesh.vertices), triangles), answers)
         answers.flush()

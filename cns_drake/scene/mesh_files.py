@@ -1,65 +1,144 @@
-"""Surfaces of mesh files."""
+"""Surfaces of meshes, from files or from memory."""
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
+import tempfile
 
 import numpy as np
-from pydrake.geometry import Mesh, ReadObjToTriangleSurfaceMesh
+from pydrake.geometry import (
+    Convex,
+    Mesh,
+    MeshSource,
+    ReadObjToTriangleSurfaceMesh,
+)
 
 from cns_drake.scene.drake_errors import PARSER_ERRORS, told_by_drake
 from cns_drake.scene.foreign_meshes import ForeignMeshes
 from cns_drake.scene.surfaces import LARGEST_SIZE, TriangleSurface
+from cns_drake.scene.vtk_meshes import read_vtk
 from evaluation.support.errors import InputError
+
+# Formats whose y axis points up. Drake turns them, so that z does.
+_Y_UP = (".gltf", ".glb", ".dae")
 
 
 class MeshFiles:
-    """Reads mesh files, each once however many geometries refer to it."""
+    """Reads meshes, each once however many geometries refer to it."""
 
     def __init__(self, foreign: ForeignMeshes):
         self._foreign = foreign
-        self._unscaled: dict[Path, TriangleSurface] = {}
+        self._unscaled: dict[object, TriangleSurface] = {}
 
-    def read(self, name: str, shape: Mesh) -> TriangleSurface:
-        with told_by_drake():  # Beside an error, no warning.
-            return self._read(name, shape)
+    def read(self, name: str, shape: Mesh | Convex) -> TriangleSurface:
+        """Returns the surface of a shape in G.
 
-    def _read(self, name: str, shape: Mesh) -> TriangleSurface:
-        if not shape.source().is_path():
-            raise InputError(f"geometry '{name}': its mesh is not a file")
-        path = Path(shape.source().path())
-        surface = self._unscaled.get(path)
+        Args:
+            name: of the geometry.
+            shape: a mesh, or what has the convex hull of one.
+
+        Raises:
+            InputError: the mesh is missing, cannot be read, or is too large;
+                the geometry is named.
+        """
+        where = _describe(name, shape.source())
+        try:
+            with told_by_drake():  # Beside an error, no warning.
+                if isinstance(shape, Convex):
+                    return _check_size(_read_hull(shape))
+                return _check_size(self._read_mesh(shape))
+        except PARSER_ERRORS as error:
+            fault = " ".join(str(error).split())
+            raise InputError(f"{where}: {fault}") from error
+
+    def _read_mesh(self, shape: Mesh) -> TriangleSurface:
+        source = shape.source()
+        key = mesh_key(source)
+        surface = self._unscaled.get(key)
         if surface is None:
-            surface = self._unscaled[path] = self._read_file(name, path)
+            surface = self._unscaled[key] = self._read_source(source)
         triangles = surface.triangles
         scale = shape.scale3()
         if np.prod(scale) < 0.0:  # A reflection turns the faces inside out.
             triangles = triangles[:, ::-1]
         with np.errstate(over="ignore", invalid="ignore"):
-            p_GVset = surface.p_GVset * scale
-            is_small = np.abs(p_GVset).max() <= LARGEST_SIZE  # False for NaN.
-        if not is_small:
-            raise InputError(
-                f"{path}: geometry '{name}': larger than {LARGEST_SIZE:g} m"
-            )
+            return TriangleSurface(surface.p_GVset * scale, triangles)
+
+    def _read_source(self, source: MeshSource) -> TriangleSurface:
+        if source.is_path():
+            return self._read_file(Path(source.path()))
+        # Readers want files.
+        mesh = source.in_memory()
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder, f"mesh{source.extension()}")
+            path.write_bytes(mesh.mesh_file.contents())
+            for uri, file in mesh.supporting_files.items():
+                target = Path(folder, uri)
+                if not target.resolve().is_relative_to(Path(folder).resolve()):
+                    raise ValueError(f"'{uri}' is not beside the mesh")
+                target.parent.mkdir(parents=True, exist_ok=True)
+                target.write_bytes(
+                    file.read_bytes()
+                    if isinstance(file, Path)
+                    else file.contents()
+                )
+            return self._read_file(path)
+
+    def _read_file(self, path: Path) -> TriangleSurface:
+        if not path.is_file():
+            raise ValueError("no such mesh file")
+        ending = path.suffix.lower()
+        read = _READERS.get(ending, self._foreign.read)
+        p_GVset, triangles = read(path)
+        if len(triangles) == 0:
+            raise ValueError("holds no triangles")
+        # Drake warns of it and goes on; a ray caster reads foreign memory.
+        if not 0 <= triangles.min() <= triangles.max() < len(p_GVset):
+            raise ValueError("a face has a vertex that is not there")
+        if ending in _Y_UP:
+            x, y, z = p_GVset.T
+            p_GVset = np.stack([x, -z, y], axis=1)
         return TriangleSurface(p_GVset, triangles)
 
-    def _read_file(self, name: str, path: Path) -> TriangleSurface:
-        if not path.is_file():
-            raise InputError(f"{path}: geometry '{name}': no such mesh file")
-        is_obj = path.suffix.lower() == ".obj"
-        read = _read_obj if is_obj else self._foreign.read
-        try:
-            p_GVset, triangles = read(path)
-            if len(triangles) == 0:
-                raise ValueError("holds no triangles")
-            # Drake warns of it and goes on; a ray caster reads foreign memory.
-            if not 0 <= triangles.min() <= triangles.max() < len(p_GVset):
-                raise ValueError("a face has a vertex that is not there")
-        except PARSER_ERRORS as error:
-            fault = " ".join(str(error).split())
-            raise InputError(f"{path}: geometry '{name}': {fault}") from error
-        return TriangleSurface(p_GVset, triangles)
+
+def mesh_key(source: MeshSource) -> object:
+    """Returns what two sources have in common if they are the same mesh."""
+    if source.is_path():
+        return Path(source.path())
+    mesh = source.in_memory()
+    files = {"": mesh.mesh_file, **mesh.supporting_files}
+    return tuple(
+        (uri, f if isinstance(f, Path) else f.sha256().to_string())
+        for uri, f in sorted(files.items())
+    )
+
+
+def _describe(name: str, source: MeshSource) -> str:
+    file = f"{source.path()}: " if source.is_path() else ""
+    return f"{file}geometry '{name}'"
+
+
+def _check_size(surface: TriangleSurface) -> TriangleSurface:
+    # False for NaN.
+    if not np.abs(surface.p_GVset).max() <= LARGEST_SIZE:
+        raise ValueError(f"larger than {LARGEST_SIZE:g} m")
+    return surface
+
+
+def _read_hull(shape: Convex) -> TriangleSurface:
+    """Returns Drake's own convex hull, which has the scale in it."""
+    hull = shape.GetConvexHull()
+    vertices = [hull.vertex(k) for k in range(hull.num_vertices())]
+    triangles = []
+    for k in range(hull.num_faces()):
+        face = hull.element(k)
+        corners = [face.vertex(i) for i in range(face.num_vertices())]
+        for second, third in pairwise(corners[1:]):
+            triangles.append((corners[0], second, third))
+    return TriangleSurface(
+        np.array(vertices, dtype=float), np.array(triangles, dtype=np.int32)
+    )
 
 
 def _read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
@@ -69,3 +148,6 @@ def _read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
         np.asarray(mesh.vertices(), dtype=float).reshape(-1, 3),
         np.asarray(triangles, dtype=np.int32).reshape(-1, 3),
     )
+
+
+_READERS = {".obj": _read_obj, ".vtk": read_vtk}

@@ -1,19 +1,23 @@
-"""What a LiDAR can see: the perception geometry that a SceneGraph holds."""
+"""What a LiDAR can see: the geometry of one role that a SceneGraph holds."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from pydrake.geometry import (
     Box,
     Capsule,
+    Convex,
     Cylinder,
     Ellipsoid,
     FrameId,
     GeometryId,
+    HalfSpace,
     Mesh,
+    MeshcatCone,
     Role,
     SceneGraphInspector,
     Shape,
@@ -22,12 +26,13 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform
 
 from cns_drake.scene.foreign_meshes import ForeignMeshes
-from cns_drake.scene.mesh_files import MeshFiles
+from cns_drake.scene.mesh_files import MeshFiles, mesh_key
 from cns_drake.scene.surfaces import (
     LARGEST_SIZE,
     CapsuleSurface,
     CylinderSurface,
     EllipsoidSurface,
+    HalfSpaceSurface,
     Surface,
     TriangleSurface,
 )
@@ -43,11 +48,13 @@ _CUBE_TRIANGLES = np.array(
         (2, 6, 7), (2, 7, 3), (0, 4, 6), (0, 6, 2), (1, 3, 7), (1, 7, 5),
     ]
 )  # fmt: skip
+# Sides of a cone, so that it is within 0.03 % of its radius.
+_CONE_SIDES = 128
 
 
 @dataclass(frozen=True)
 class PerceptionGeometry:
-    """One geometry of `Role.kPerception`.
+    """One geometry that rays can meet.
 
     Attributes:
         geometry_id: its id in the SceneGraph.
@@ -84,35 +91,19 @@ def structure_name(geometry_name: str) -> str:
 
 
 def check_shape(name: str, shape: Shape) -> None:
-    """Checks that rays can be cast on a shape, and that its size is sane.
+    """Checks that the size of a shape is sane; of a mesh its file tells.
 
     Args:
         name: of the geometry.
         shape: its shape.
 
     Raises:
-        InputError: they cannot; the geometry is named.
+        InputError: it is not; the geometry is named.
     """
-    if not isinstance(shape, (Box, Sphere, Ellipsoid, Cylinder, Capsule, Mesh)):
-        raise InputError(
-            f"geometry '{name}': a LiDAR cannot see a {type(shape).__name__}; "
-            "use a box, sphere, cylinder, capsule, ellipsoid or mesh"
-        )
+    if isinstance(shape, Mesh | Convex | HalfSpace):
+        return
     if not np.max(_dimensions(shape)) <= LARGEST_SIZE:
         raise InputError(f"geometry '{name}': larger than {LARGEST_SIZE:g} m")
-
-
-def _dimensions(shape: Shape) -> Sequence[float]:
-    """Returns what a shape's size is given by; of a mesh its file tells."""
-    if isinstance(shape, Mesh):
-        return (0.0,)
-    if isinstance(shape, Box):
-        return shape.size()
-    if isinstance(shape, Sphere):
-        return (shape.radius(),)
-    if isinstance(shape, Ellipsoid):
-        return (shape.a(), shape.b(), shape.c())
-    return (shape.radius(), shape.length())
 
 
 def read_perception_geometry(
@@ -121,55 +112,140 @@ def read_perception_geometry(
 ) -> tuple[PerceptionGeometry, ...]:
     """Reads every geometry of `Role.kPerception` on the frames to keep.
 
-    The order is that of `GetAllGeometryIds`, which Drake documents as
-    stable; the result depends on nothing but the model.
-
     Raises:
-        InputError: a shape is of a kind that no ray can be cast on, or a
-            mesh file is missing or cannot be read; the geometry is named.
+        InputError: see `GeometryReader.read`.
     """
-    with ForeignMeshes() as foreign:
-        return _read_geometry(inspector, keep_frame, MeshFiles(foreign))
+    reader = GeometryReader(Role.kPerception)
+    frames = {
+        frame_id
+        for frame_id in inspector.GetAllFrameIds()
+        if not keep_frame(frame_id)
+    }
+    hidden = {
+        geometry_id
+        for frame_id in frames
+        for geometry_id in inspector.GetGeometries(frame_id, Role.kPerception)
+    }
+    return reader.read(inspector, hidden)
 
 
-def _read_geometry(
-    inspector: SceneGraphInspector,
-    keep_frame: Callable[[FrameId], bool],
-    meshes: MeshFiles,
-) -> tuple[PerceptionGeometry, ...]:
-    geometries = []
-    for geometry_id in inspector.GetAllGeometryIds(Role.kPerception):
-        frame_id = inspector.GetFrameId(geometry_id)
-        if not keep_frame(frame_id):
-            continue
+class _Record(NamedTuple):
+    """What a SceneGraph tells of a geometry, for comparison."""
+
+    name: str
+    frame_id: FrameId
+    pose: bytes
+    shape: tuple
+    rgb: tuple[float, float, float] | None
+
+
+class GeometryReader:
+    """Reads the geometry of a role, and again what changed of it."""
+
+    def __init__(self, role: Role):
+        """Nothing is read yet.
+
+        Args:
+            role: of the geometry to read.
+        """
+        self._role = role
+        self._known: dict[GeometryId, tuple[_Record, PerceptionGeometry]] = {}
+
+    def read(
+        self,
+        inspector: SceneGraphInspector,
+        hidden: Collection[GeometryId] = frozenset(),
+    ) -> tuple[PerceptionGeometry, ...]:
+        """Reads every geometry of the role that is not hidden.
+
+        The order is that of `GetAllGeometryIds`, which Drake documents as
+        stable; the result depends on nothing but the SceneGraph. What is as
+        it was when it was last read is the same object.
+
+        Raises:
+            InputError: a geometry is deformable, a mesh file is missing or
+                cannot be read, or a size is not sane; the geometry is named.
+        """
+        known, self._known = self._known, {}
+        with ForeignMeshes() as foreign:
+            meshes = MeshFiles(foreign)
+            for geometry_id in inspector.GetAllGeometryIds(self._role):
+                if geometry_id in hidden:
+                    continue
+                record = self._record(inspector, geometry_id)
+                entry = known.get(geometry_id)
+                if entry is None or entry[0] != record:
+                    shape = inspector.GetShape(geometry_id)
+                    entry = (
+                        record,
+                        PerceptionGeometry(
+                            geometry_id=geometry_id,
+                            name=record.name,
+                            frame_id=record.frame_id,
+                            X_FG=inspector.GetPoseInFrame(geometry_id),
+                            surface=_surface(record.name, shape, meshes),
+                            rgb=record.rgb,
+                        ),
+                    )
+                self._known[geometry_id] = entry
+        return tuple(geometry for _, geometry in self._known.values())
+
+    def _record(
+        self, inspector: SceneGraphInspector, geometry_id: GeometryId
+    ) -> _Record:
         name = inspector.GetName(geometry_id)
-        geometries.append(
-            PerceptionGeometry(
-                geometry_id=geometry_id,
-                name=name,
-                frame_id=frame_id,
-                X_FG=inspector.GetPoseInFrame(geometry_id),
-                surface=_surface(name, inspector.GetShape(geometry_id), meshes),
-                rgb=_diffuse_rgb(inspector, geometry_id),
+        if inspector.IsDeformableGeometry(geometry_id):
+            raise InputError(
+                f"geometry '{name}': a LiDAR cannot see deformable geometry; "
+                "hide it, or remove its role"
             )
+        return _Record(
+            name,
+            inspector.GetFrameId(geometry_id),
+            inspector.GetPoseInFrame(geometry_id).GetAsMatrix34().tobytes(),
+            _shape_key(inspector.GetShape(geometry_id)),
+            self._diffuse_rgb(inspector, geometry_id),
         )
-    return tuple(geometries)
+
+    def _diffuse_rgb(
+        self, inspector: SceneGraphInspector, geometry_id: GeometryId
+    ) -> tuple[float, float, float] | None:
+        properties = inspector.GetProperties(geometry_id, self._role)
+        if not properties.HasProperty("phong", "diffuse"):
+            return None
+        rgba = properties.GetProperty("phong", "diffuse")
+        return (rgba.r(), rgba.g(), rgba.b())
 
 
-def _diffuse_rgb(
-    inspector: SceneGraphInspector, geometry_id: GeometryId
-) -> tuple[float, float, float] | None:
-    properties = inspector.GetPerceptionProperties(geometry_id)
-    if not properties.HasProperty("phong", "diffuse"):
-        return None
-    rgba = properties.GetProperty("phong", "diffuse")
-    return (rgba.r(), rgba.g(), rgba.b())
+def _shape_key(shape: Shape) -> tuple:
+    """Returns what only equal shapes have in common."""
+    if isinstance(shape, Mesh | Convex):
+        scale = tuple(shape.scale3())
+        return type(shape), mesh_key(shape.source()), scale
+    if isinstance(shape, HalfSpace):
+        return (HalfSpace,)
+    return type(shape), *_dimensions(shape)
+
+
+def _dimensions(shape: Shape) -> Sequence[float]:
+    """Returns what the size of a shape is given by."""
+    if isinstance(shape, Box):
+        return shape.size()
+    if isinstance(shape, Sphere):
+        return (shape.radius(),)
+    if isinstance(shape, Ellipsoid):
+        return (shape.a(), shape.b(), shape.c())
+    if isinstance(shape, MeshcatCone):
+        return (shape.a(), shape.b(), shape.height())
+    return (shape.radius(), shape.length())
 
 
 def _surface(name: str, shape: Shape, meshes: MeshFiles) -> Surface:
     check_shape(name, shape)
-    if isinstance(shape, Mesh):
+    if isinstance(shape, Mesh | Convex):
         return meshes.read(name, shape)
+    if isinstance(shape, HalfSpace):
+        return HalfSpaceSurface()
     if isinstance(shape, Box):
         return TriangleSurface(_CUBE_CORNERS * shape.size(), _CUBE_TRIANGLES)
     if isinstance(shape, Sphere):
@@ -178,4 +254,27 @@ def _surface(name: str, shape: Shape, meshes: MeshFiles) -> Surface:
         return EllipsoidSurface((shape.a(), shape.b(), shape.c()))
     if isinstance(shape, Cylinder):
         return CylinderSurface(shape.radius(), shape.length())
-    return CapsuleSurface(shape.radius(), shape.length())
+    if isinstance(shape, Capsule):
+        return CapsuleSurface(shape.radius(), shape.length())
+    return _cone(shape)
+
+
+def _cone(shape: MeshcatCone) -> TriangleSurface:
+    """Returns a pyramid for a cone, whose point is the origin."""
+    angle = 2.0 * np.pi * np.arange(_CONE_SIDES) / _CONE_SIDES
+    corners = np.zeros((2 + _CONE_SIDES, 3))
+    corners[1:, 2] = shape.height()
+    corners[2:, 0] = shape.a() * np.cos(angle)
+    corners[2:, 1] = shape.b() * np.sin(angle)
+    first = 2 + np.arange(_CONE_SIDES)
+    second = np.roll(first, -1)
+    point, middle = np.zeros_like(first), np.ones_like(first)
+    return TriangleSurface(
+        corners,
+        np.concatenate(
+            [
+                np.column_stack([point, second, first]),
+                np.column_stack([middle, first, second]),
+            ]
+        ).astype(np.int32),
+    )

@@ -13,12 +13,19 @@ from cns_drake.scene.surfaces import (
     CapsuleSurface,
     CylinderSurface,
     EllipsoidSurface,
+    HalfSpaceSurface,
     Surface,
     TriangleSurface,
 )
 
 # Sides of a round shape in pictures; lamp posts are many and thin.
 _SIDES = 12
+# What is shown of a plane, which has no end.
+_PLANE_CORNERS = np.array(
+    [(-100.0, -100.0, 0.0), (100.0, -100.0, 0.0),
+     (100.0, 100.0, 0.0), (-100.0, 100.0, 0.0)]
+)  # fmt: skip
+_PLANE_TRIANGLES = np.array([(0, 1, 2), (0, 2, 3)], np.int32)
 
 
 def merge_surfaces(
@@ -75,12 +82,14 @@ def tessellate(surface: Surface, sides: int = _SIDES) -> TriangleSurface:
     """Returns triangles for any surface, inscribed where it is curved.
 
     Args:
-        surface: the shape.
+        surface: the shape; of a plane, a square of 200 m about G.
         sides: of a circle about the z axis of G; a half sphere has half as
             many parallels.
     """
     if isinstance(surface, TriangleSurface):
         return surface
+    if isinstance(surface, HalfSpaceSurface):
+        return TriangleSurface(_PLANE_CORNERS, _PLANE_TRIANGLES)
     if isinstance(surface, EllipsoidSurface):
         radius, z = _arc(sides // 2)
         unit = _revolve(

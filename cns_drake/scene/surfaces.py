@@ -52,4 +52,15 @@ class CapsuleSurface:
     length: float
 
 
-Surface = TriangleSurface | EllipsoidSurface | CylinderSurface | CapsuleSurface
+@dataclass(frozen=True)
+class HalfSpaceSurface:
+    """The plane z = 0 of G, which bounds a half space."""
+
+
+Surface = (
+    TriangleSurface
+    | EllipsoidSurface
+    | CylinderSurface
+    | CapsuleSurface
+    | HalfSpaceSurface
+)

@@ -20,7 +20,7 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.shipped import vehicle_file
 from cns_drake.scene.world import World, load_world
 from cns_drake.sensors.imu import add_imu
-from cns_drake.sensors.lidar import add_lidar
+from cns_drake.sensors.lidar_adding import add_lidar
 from cns_drake.sensors.odometry import add_odometry
 
 
@@ -71,6 +71,10 @@ def make_station(
     plant = world.plant
     base = plant.GetBodyByName("base_link", world.vehicle)
 
+    vehicle = [
+        plant.get_body(index) for index in plant.GetBodyIndices(world.vehicle)
+    ]
+
     builder = DiagramBuilder()
     scene_graph = builder.AddNamedSystem("scene_graph", world.scene_graph)
     motion = builder.AddNamedSystem(
@@ -96,6 +100,7 @@ def make_station(
             config.pattern(),
             name=name,
             measurement=config.measurement(name, scenario.seed),
+            unseen=vehicle,
             with_sweep=config.motion_distortion,
             structures=world.structures,
             anchored_frames=world.anchored_frames(),

@@ -8,6 +8,7 @@ from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
 from cns_drake.scene.world import World
 from cns_drake.sensors.lidar import Lidar
+from cns_drake.sensors.lidar_adding import connect_lidar
 
 
 def make_still_world(world: World, lidar: Lidar) -> Diagram:
@@ -34,8 +35,5 @@ def make_still_world(world: World, lidar: Lidar) -> Diagram:
         to_pose.get_output_port(),
         scene_graph.get_source_pose_port(plant.get_source_id()),
     )
-    builder.Connect(
-        scene_graph.get_query_output_port(),
-        lidar.GetInputPort("geometry_query"),
-    )
+    connect_lidar(builder, scene_graph, lidar)
     return builder.Build()

@@ -37,7 +37,6 @@ def test_static_models_are_anchored_and_the_vehicle_is_not(small_map):
 @pytest.mark.parametrize(
     ("geometry", "fault"),
     [
-        ("<plane><normal>0 0 1</normal></plane>", "'city::thing'.*HalfSpace"),
         (MESH.format("missing.obj"), r"missing\.obj"),
         ("<sphere><radius>1e8</radius></sphere>", "larger than 1e"),
         ("<box><size>1 1 2e7</size></box>", "larger than 1e"),

@@ -1,0 +1,80 @@
+"""Rays on the planes that bound half spaces, in closed form."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from evaluation.support.compiled import compiled
+
+if TYPE_CHECKING:
+    from cns_drake.ray_casting.ray_groups import RayGroup
+    from cns_drake.ray_casting.rays import Hits, Rays
+
+
+class Planes(NamedTuple):
+    """Planes, each with the group that it is.
+
+    Attributes:
+        equations: (H, 4) float64; a point p_O on plane h fulfils
+            equations[h, :3] @ p_O = equations[h, 3].
+        owners: (H,) int32 index of the geometry.
+        groups: (H,) int32 row of the group.
+    """
+
+    equations: np.ndarray
+    owners: np.ndarray
+    groups: np.ndarray
+
+
+def cast_on_planes(
+    groups: Mapping[int, RayGroup], rays: Rays, hits: Hits
+) -> None:
+    """Puts into `hits` what rays meet on planes before all else.
+
+    A plane is met from both sides, as the surface of any other shape is.
+
+    Args:
+        groups: row -> group of one half space, placed.
+        rays: N of them.
+        hits: what they met so far.
+    """
+    normals = np.array([group.X_OL[:, 2] for group in groups.values()])
+    origins = np.array([group.X_OL[:, 3] for group in groups.values()])
+    offsets = np.einsum("hi,hi->h", normals, origins)
+    planes = Planes(
+        np.column_stack([normals, offsets]),
+        np.array([group.members[0][0] for group in groups.values()], np.int32),
+        np.array(list(groups), np.int32),
+    )
+    _cast(planes, rays, hits)
+
+
+@compiled
+def _cast(planes: Planes, rays: Rays, hits: Hits) -> None:
+    for ray in range(len(rays.d_Sset)):
+        p = rays.p_OSset[ray % len(rays.p_OSset)]
+        R = rays.R_OSset[ray % len(rays.R_OSset)]
+        d = rays.d_Sset[ray]
+        reach = rays.max_ranges[ray % len(rays.max_ranges)]
+        for h in range(len(planes.equations)):
+            toward, height = 0.0, planes.equations[h, 3]
+            for axis in range(3):
+                n = planes.equations[h, axis]
+                height -= n * p[axis]
+                toward += n * (
+                    R[axis, 0] * d[0] + R[axis, 1] * d[1] + R[axis, 2] * d[2]
+                )
+            # Along the plane, nothing is met.
+            if toward == 0.0:
+                continue
+            distance = height / toward
+            if 0.0 <= distance <= reach and distance < hits.ranges[ray]:
+                hits.ranges[ray] = distance
+                hits.owner[ray] = planes.owners[h]
+                hits.group[ray] = planes.groups[h]
+                for axis in range(hits.normals.shape[1]):
+                    # In L, the plane is z = 0.
+                    hits.normals[ray, axis] = 1.0 if axis == 2 else 0.0

@@ -1,0 +1,49 @@
+"""Noticing that a SceneGraph's geometry has changed."""
+
+from __future__ import annotations
+
+import itertools
+
+from pydrake.common.value import AbstractValue, Value
+from pydrake.geometry import SceneGraph
+from pydrake.systems.framework import (
+    AbstractParameterIndex,
+    Context,
+    OutputPort,
+)
+
+_PORT = "geometry_revision"
+_revisions = itertools.count(1)
+
+
+def geometry_revision_port(scene_graph: SceneGraph) -> OutputPort:
+    """Returns a port whose value changes when geometry does, and only then.
+
+    SceneGraph's own `geometry_version` tells of perception geometry only what
+    a render engine accepted, and to compare all geometries takes longer than
+    a scan. But a Context keeps the geometry as a parameter, which Drake's
+    cache tracks: a port that depends on nothing else is computed anew when
+    geometry was added, removed, replaced, reshaped, renamed or given another
+    role, however that came about. The SceneGraph gets the port at the first
+    call, so before a Diagram is built of it.
+
+    Returns:
+        An abstract port; its value is an int that no other geometry, also of
+        another Context, has had in this process.
+
+    Raises:
+        RuntimeError: the SceneGraph is already part of a Diagram.
+    """
+    if scene_graph.HasOutputPort(_PORT):
+        return scene_graph.GetOutputPort(_PORT)
+    return scene_graph.DeclareAbstractOutputPort(
+        _PORT,
+        lambda: Value(object()),
+        _calc_revision,
+        # The only parameter that a SceneGraph has.
+        {scene_graph.abstract_parameter_ticket(AbstractParameterIndex(0))},
+    )
+
+
+def _calc_revision(context: Context, output: AbstractValue) -> None:
+    output.set_value(next(_revisions))

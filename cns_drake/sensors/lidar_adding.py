@@ -1,0 +1,124 @@
+"""Adding a LiDAR to a diagram."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import Any
+
+from pydrake.geometry import FrameId, GeometryId, SceneGraph
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Frame, RigidBody, WeldJoint
+from pydrake.systems.framework import DiagramBuilder
+
+from cns_drake.scene.geometry_revision import geometry_revision_port
+from cns_drake.sensors.beam_pattern import BeamPattern, make_beam_pattern
+from cns_drake.sensors.lidar import Lidar
+
+
+def add_lidar(
+    builder: DiagramBuilder,
+    scene_graph: SceneGraph,
+    body: RigidBody | Frame | FrameId,
+    X_PS: RigidTransform,
+    pattern: BeamPattern | str,
+    *,
+    name: str = "lidar",
+    unseen: Collection[RigidBody | FrameId | GeometryId] | None = None,
+    **options: Any,
+) -> Lidar:
+    """Adds a LiDAR to a diagram and connects it to the SceneGraph.
+
+    Args:
+        builder: of the diagram that holds `scene_graph`.
+        scene_graph: what the LiDAR sees.
+        body: P, a body or a frame fixed on one, of a finalized plant that is
+            registered with `scene_graph`; or a frame that any other source
+            has registered there.
+        X_PS: pose of the sensor S in P.
+        pattern: the beams, or the name of a preset, of which a turn then
+            takes 0.05 s.
+        name: of the system.
+        unseen: what the LiDAR does not see; by default the body that it is
+            fixed to and what is welded to that, but for the world.
+        options: further arguments of `Lidar`.
+
+    Returns:
+        The system, with the ports `scan`, `point_cloud_S`, `point_cloud_W`
+        and `X_WS`.
+
+    Raises:
+        KeyError: there is no preset of that name.
+        RuntimeError: the body is not registered with a SceneGraph.
+
+    Example:
+        from cns_drake import add_lidar
+
+        lidar = add_lidar(builder, scene_graph, body, X_BS, "os1-64")
+        builder.ExportOutput(lidar.GetOutputPort("scan"), "scan")
+    """
+    if isinstance(body, Frame):
+        X_PS = body.GetFixedPoseInBodyFrame() @ X_PS
+        body = body.body()
+    if isinstance(pattern, str):
+        pattern = make_beam_pattern(pattern, 0.05)
+    if isinstance(body, RigidBody):
+        plant = body.GetParentPlant()
+        frame_id = plant.GetBodyFrameIdOrThrow(body.index())
+        if unseen is None:
+            unseen = _welded_to(body)
+        options.setdefault("anchored_frames", _anchored_frames(plant))
+    else:
+        frame_id = body
+    if unseen is not None:
+        options["unseen"] = [
+            _frame_of(place) if isinstance(place, RigidBody) else place
+            for place in unseen
+        ]
+    lidar = builder.AddNamedSystem(
+        name, Lidar(frame_id, X_PS, pattern, **options)
+    )
+    connect_lidar(builder, scene_graph, lidar)
+    return lidar
+
+
+def connect_lidar(
+    builder: DiagramBuilder, scene_graph: SceneGraph, lidar: Lidar
+) -> None:
+    """Connects what a LiDAR wants to know of a SceneGraph."""
+    for source, target in (
+        (scene_graph.get_query_output_port(), "geometry_query"),
+        (geometry_revision_port(scene_graph), "geometry_revision"),
+    ):
+        builder.Connect(source, lidar.GetInputPort(target))
+
+
+def _welded_to(body: RigidBody) -> list[RigidBody]:
+    """Returns a body and what is welded to it, but not by way of the world."""
+    plant = body.GetParentPlant()
+    world = plant.world_body().index()
+    neighbours: dict[int, list[RigidBody]] = {}
+    for index in plant.GetJointIndices():
+        joint = plant.get_joint(index)
+        if isinstance(joint, WeldJoint):
+            ends = joint.parent_body(), joint.child_body()
+            for one, other in (ends, ends[::-1]):
+                neighbours.setdefault(int(one.index()), []).append(other)
+    found: dict[int, RigidBody] = {}
+    rest = [] if body.index() == world else [body]
+    while rest:
+        place = rest.pop()
+        if int(place.index()) in found or place.index() == world:
+            continue
+        found[int(place.index())] = place
+        rest += neighbours.get(int(place.index()), [])
+    return list(found.values())
+
+
+def _anchored_frames(plant: MultibodyPlant) -> list[FrameId]:
+    """Returns the frames that can only move if the model is changed."""
+    return [_frame_of(b) for b in plant.GetBodiesWeldedTo(plant.world_body())]
+
+
+def _frame_of(body: RigidBody) -> FrameId:
+    return body.GetParentPlant().GetBodyFrameIdOrThrow(body.index())

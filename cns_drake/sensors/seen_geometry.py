@@ -1,0 +1,136 @@
+"""What a LiDAR sees of a SceneGraph, ready for casting rays."""
+
+from __future__ import annotations
+
+from operator import is_
+from typing import NamedTuple
+
+import numpy as np
+from pydrake.geometry import (
+    FrameId,
+    GeometryId,
+    QueryObject,
+    Role,
+    SceneGraphInspector,
+)
+from pydrake.math import RigidTransform
+
+from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
+from cns_drake.scene.perception_geometry import (
+    GeometryReader,
+    PerceptionGeometry,
+)
+from cns_drake.scene.structure_table import StructureTable
+
+
+class Sight(NamedTuple):
+    """What a LiDAR sees, whatever is there.
+
+    Attributes:
+        role: of the geometry that it sees.
+        parent_frame_id: the frame that carries it.
+        unseen: frames and geometries of it that it does not see; None for
+            the frame that carries it, unless that is the world's.
+        structures: gives labels and instance ids.
+        anchored_frames: frames that never move, besides the world's; that
+            is worth knowing, but not relied on.
+        num_threads: how many threads share the rays of a cast.
+    """
+
+    role: Role
+    parent_frame_id: FrameId
+    unseen: frozenset[FrameId | GeometryId] | None
+    structures: StructureTable
+    anchored_frames: frozenset[FrameId]
+    num_threads: int
+
+
+class SeenGeometry:
+    """What a LiDAR sees in a Context, kept as long as nothing changes.
+
+    Of a cloned Context it is empty at first: a scene in which something moves
+    cannot be shared.
+
+    Attributes:
+        scene: casts rays, None before the first update; its geometry indices
+            select from:
+        label: (num_geometries,) uint8 class of each geometry.
+        instance: (num_geometries,) uint16 structure of each geometry.
+    """
+
+    def __init__(self, sight: Sight):
+        self._sight = sight
+        self._reader = GeometryReader(sight.role)
+        self._geometries: tuple[PerceptionGeometry, ...] = ()
+        self._revision: int | None = None
+        self._built: tuple[PerceptionGeometry, ...] = ()
+        self._X_WAs: dict[FrameId, RigidTransform] = {}
+        self.scene: RayCastingScene | None = None
+
+    def __deepcopy__(self, memo: dict) -> SeenGeometry:
+        return SeenGeometry(self._sight)
+
+    def update(self, query_object: QueryObject, revision: int | None) -> None:
+        """Moves what moves, and builds anew what changed.
+
+        Args:
+            query_object: of the Context.
+            revision: of the geometry (`geometry_revision_port`), None if it
+                is not known. Then all geometries are looked at.
+
+        Raises:
+            InputError: see `GeometryReader.read`.
+        """
+        if self.scene is None or revision is None or revision != self._revision:
+            self._read(query_object.inspector())
+        if self.scene is None or not self._is_built(query_object):
+            self._build(query_object)
+        else:
+            self.scene.set_frame_poses(query_object.GetPoseInWorld)
+        self._revision = revision
+
+    def _read(self, inspector: SceneGraphInspector) -> None:
+        unseen = self._sight.unseen
+        if unseen is None:
+            unseen = frozenset([self._sight.parent_frame_id])
+            unseen -= {inspector.world_frame_id()}
+        hidden = set(unseen)
+        for frame_id in inspector.GetAllFrameIds():
+            if frame_id in unseen:
+                hidden |= set(
+                    inspector.GetGeometries(frame_id, self._sight.role)
+                )
+        self._geometries = self._reader.read(inspector, hidden)
+
+    def _is_built(self, query_object: QueryObject) -> bool:
+        """Tells whether the scene is of what there is."""
+        if self._built is not self._geometries and (
+            len(self._built) != len(self._geometries)
+            or not all(map(is_, self._built, self._geometries))
+        ):
+            return False
+        return all(
+            X_WA.IsExactlyEqualTo(query_object.GetPoseInWorld(frame_id))
+            for frame_id, X_WA in self._X_WAs.items()
+        )
+
+    def _build(self, query_object: QueryObject) -> None:
+        names = [geometry.structure for geometry in self._geometries]
+        table = self._sight.structures.completed(names)
+        self.label = np.array([table[n].label for n in names], np.uint8)
+        self.instance = np.array([table[n].instance for n in names], np.uint16)
+        world = query_object.inspector().world_frame_id()
+        anchored = self._sight.anchored_frames | {world}
+        self._X_WAs = {
+            frame_id: query_object.GetPoseInWorld(frame_id)
+            for frame_id in {g.frame_id for g in self._geometries}
+            if frame_id in anchored and frame_id != world
+        }
+        self.scene = RayCastingScene(
+            self._geometries,
+            anchored,
+            query_object.GetPoseInWorld,
+            num_threads=self._sight.num_threads,
+            previous=self.scene,
+        )
+        self._built = self._geometries
