@@ -182,7 +182,10 @@ class GeometryReader:
                             geometry_id=geometry_id,
                             name=record.name,
                             frame_id=record.frame_id,
-                            X_FG=inspector.GetPoseInFrame(geometry_id),
+                            # A copy: Drake gives references.
+                            X_FG=RigidTransform(
+                                inspector.GetPoseInFrame(geometry_id)
+                            ),
                             surface=_surface(record.name, shape, meshes),
                             rgb=record.rgb,
                         ),

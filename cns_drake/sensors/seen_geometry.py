@@ -121,8 +121,9 @@ class SeenGeometry:
         self.instance = np.array([table[n].instance for n in names], np.uint16)
         world = query_object.inspector().world_frame_id()
         anchored = self._sight.anchored_frames | {world}
+        # Copies: Drake gives references to what goes on changing.
         self._X_WAs = {
-            frame_id: query_object.GetPoseInWorld(frame_id)
+            frame_id: RigidTransform(query_object.GetPoseInWorld(frame_id))
             for frame_id in {g.frame_id for g in self._geometries}
             if frame_id in anchored and frame_id != world
         }

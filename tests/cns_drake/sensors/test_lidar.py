@@ -10,10 +10,7 @@ from pydrake.geometry import (
     Sphere,
 )
 from pydrake.math import RigidTransform, RollPitchYaw
-from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
-from pydrake.multibody.tree import FixedOffsetFrame, SpatialInertia
 from pydrake.perception import PointCloud
-from pydrake.systems.framework import DiagramBuilder
 import pytest
 
 from cns_drake.motion.sweep import Sweep
@@ -26,7 +23,6 @@ from cns_drake.sensors.beam_pattern import (
     POINT_DTYPE,
     make_beam_pattern,
 )
-from cns_drake.sensors.lidar_adding import add_lidar
 from cns_drake.sensors.measurement import MeasurementModel
 
 
@@ -309,42 +305,3 @@ def test_resolution_rounds_coordinates_and_intensity():
     assert 0 < error.max() <= 2.0**-13 + 1e-7
     for name in ("ring", "t", "label", "instance"):
         np.testing.assert_array_equal(rounded[name], exact[name])
-
-
-def test_it_is_added_to_a_body_or_a_frame():
-    builder = DiagramBuilder()
-    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
-    body = plant.AddRigidBody(
-        "robot",
-        plant.AddModelInstance("robot"),
-        SpatialInertia.SolidBoxWithDensity(1000.0, 1.0, 1.0, 1.0),
-    )
-    mast = plant.AddFrame(
-        FixedOffsetFrame("mast", body, RigidTransform([1.0, 0.0, 0.0]))
-    )
-    plant.RegisterVisualGeometry(
-        plant.world_body(),
-        RigidTransform([8.0, 0.0, 0.0]),
-        Box(2.0, 4.0, 4.0),
-        "wall",
-        [1.0, 1.0, 1.0, 1.0],
-    )
-    plant.Finalize()
-    X_PS = RigidTransform([0.5, 0.0, 0.0])
-    lidars = [
-        add_lidar(builder, scene_graph, place, X_PS, pattern, name=name)
-        for place, pattern, name in (
-            (body, FORWARD, "on_body"),
-            (mast, FORWARD, "on_mast"),
-            (body, "vlp-16", "preset"),
-        )
-    ]
-    diagram = builder.Build()
-    context = diagram.CreateDefaultContext()
-    scans = [
-        lidar.GetOutputPort("scan").Eval(lidar.GetMyContextFromRoot(context))
-        for lidar in lidars
-    ]
-    assert [scan["x"].tolist() for scan in scans[:2]] == [[6.5], [5.5]]
-    assert lidars[2].pattern == make_beam_pattern("vlp-16", 0.05)
-    np.testing.assert_allclose(scans[2]["x"], 6.5, rtol=1e-6)

@@ -1,0 +1,83 @@
+"""Small meshes in every format that Drake reads."""
+
+import base64
+import json
+
+import numpy as np
+
+# A prism with an L for a base: not convex, and no symmetry in it.
+_BASE = [(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]
+L_VERTICES = np.array(
+    [(x, y, z) for z in (0.0, 1.5) for x, y in _BASE], dtype=np.float32
+)
+_CAP = [(0, 1, 2), (0, 2, 3), (0, 3, 5), (3, 4, 5)]
+L_TRIANGLES = np.array(
+    [(c, b, a) for a, b, c in _CAP]
+    + [(a + 6, b + 6, c + 6) for a, b, c in _CAP]
+    + [(k, (k + 1) % 6, (k + 1) % 6 + 6) for k in range(6)]
+    + [(k, (k + 1) % 6 + 6, k + 6) for k in range(6)],
+    dtype=np.uint16,
+)
+
+
+def obj_text():
+    """The prism, without normals."""
+    lines = ["v {} {} {}".format(*p) for p in L_VERTICES]
+    lines += ["f {} {} {}".format(*(t + 1)) for t in L_TRIANGLES]
+    return "\n".join(lines) + "\n"
+
+
+def gltf_text(nodes=({"mesh": 0},), uri=None):
+    """The prism, its y up, flat shaded."""
+    vertices = L_VERTICES[L_TRIANGLES].reshape(-1, 3)
+    a, b, c = vertices[0::3], vertices[1::3], vertices[2::3]
+    normals = np.cross(b - a, c - a)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = np.repeat(normals, 3, axis=0).astype(np.float32)
+    data = vertices.tobytes() + normals.tobytes()
+    text = base64.b64encode(data).decode()
+    inline = f"data:application/octet-stream;base64,{text}"
+    views = [
+        {"buffer": 0, "byteOffset": start, "byteLength": vertices.nbytes}
+        for start in (0, vertices.nbytes)
+    ]
+    accessor = {"componentType": 5126, "count": len(vertices), "type": "VEC3"}
+    limits = {
+        "min": vertices.min(axis=0).tolist(),
+        "max": vertices.max(axis=0).tolist(),
+    }
+    attributes = {"POSITION": 0, "NORMAL": 1}
+    gltf = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": list(nodes),
+        "meshes": [{"primitives": [{"attributes": attributes}]}],
+        "accessors": [
+            {"bufferView": 0, **accessor, **limits},
+            {"bufferView": 1, **accessor},
+        ],
+        "bufferViews": views,
+        "buffers": [{"byteLength": len(data), "uri": uri or inline}],
+    }
+    return json.dumps(gltf), data
+
+
+def vtk_text():
+    """Six tetrahedra that fill a box of 1 x 2 x 3 m with a corner at zero."""
+    corners = [(x, y, z) for z in (0, 3) for y in (0, 2) for x in (0, 1)]
+    tetrahedra = []
+    # Along each way from one corner to the opposite one.
+    for steps in ((1, 2), (1, 4), (2, 1), (2, 4), (4, 1), (4, 2)):
+        cell = [0, steps[0], sum(steps), 7]
+        p = np.array([corners[k] for k in cell], dtype=float)
+        if np.linalg.det(p[1:] - p[0]) < 0.0:
+            cell[1], cell[2] = cell[2], cell[1]
+        tetrahedra.append(cell)
+    lines = ["# vtk DataFile Version 3.0", "box", "ASCII"]
+    lines += ["DATASET UNSTRUCTURED_GRID", "POINTS 8 double"]
+    lines += ["{} {} {}".format(*p) for p in corners]
+    lines += ["CELLS 6 30"]
+    lines += ["4 {} {} {} {}".format(*cell) for cell in tetrahedra]
+    lines += ["CELL_TYPES 6", *["10"] * 6]
+    return "\n".join(lines) + "\n"
