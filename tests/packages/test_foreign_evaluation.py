@@ -27,8 +27,8 @@ LIBRARY = """
 import sys
 import numpy as np
 from cns_drake import InputError, Lidar, evaluation, load_scenario
-from cns_drake.sensors import lidar
-assert lidar.InputError is InputError is evaluation.InputError
+from cns_drake.scene import world
+assert world.InputError is InputError is evaluation.InputError
 points = np.random.default_rng(1).uniform(size=(9, 3))
 assert evaluation.temporal_change(points, points).symmetric == 0.0
 try:
