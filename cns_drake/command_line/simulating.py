@@ -21,6 +21,7 @@ from cns_drake.command_line.options import (
 )
 from evaluation.support.errors import InputError
 from evaluation.support.interrupts import uninterrupted
+from evaluation.support.terminal import note
 
 
 def simulate(
@@ -78,6 +79,7 @@ def scan(
         from pydrake.math import RigidTransform, RollPitchYaw
 
         from cns_drake.scenarios.scenario import make_lidar_config
+        from cns_drake.scene.surfaces import LARGEST_SIZE
         from cns_drake.scene.world import load_world
         from cns_drake.simulation.scanning import (
             check_ending,
@@ -87,10 +89,15 @@ def scan(
 
     if not np.isfinite(pose).all():
         raise InputError("--pose: not finite")
+    if max(map(abs, pose)) > LARGEST_SIZE:
+        raise InputError(f"--pose: {pose} is beyond {LARGEST_SIZE:g} m or rad")
     check_ending(output)
     pattern = make_lidar_config(lidar).pattern()
     X_WS = RigidTransform(RollPitchYaw(*pose[3:]), pose[:3])
-    points = scan_world(load_world(world), X_WS, pattern)
+    loaded = load_world(world)
+    for text in loaded.notes:
+        note(text)
+    points = scan_world(loaded, X_WS, pattern)
     save_scan(points, output)
     typer.echo(f"{output}: {len(points)} points")
 

@@ -7,8 +7,15 @@ import contextlib
 import logging
 
 # Besides Drake's own, exceptions of the C++ library come through: of numbers
-# that are none or too large, of what is too long.
-PARSER_ERRORS = (RuntimeError, ValueError, LookupError, OverflowError)
+# that are none or too large, of what is too long. Where a condition fails,
+# Drake asks Python to end.
+PARSER_ERRORS = (
+    RuntimeError,
+    ValueError,
+    LookupError,
+    OverflowError,
+    SystemExit,
+)
 
 
 @contextlib.contextmanager

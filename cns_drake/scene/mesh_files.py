@@ -16,6 +16,7 @@ from pydrake.geometry import (
 
 from cns_drake.scene.drake_errors import PARSER_ERRORS, told_by_drake
 from cns_drake.scene.foreign_meshes import ForeignMeshes
+from cns_drake.scene.obj_check import check_obj
 from cns_drake.scene.surfaces import LARGEST_SIZE, TriangleSurface
 from cns_drake.scene.vtk_meshes import read_vtk
 from evaluation.support.errors import InputError
@@ -142,6 +143,7 @@ def _read_hull(shape: Convex) -> TriangleSurface:
 
 
 def _read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    check_obj(path)
     mesh = ReadObjToTriangleSurfaceMesh(path)
     triangles = [[t.vertex(k) for k in range(3)] for t in mesh.triangles()]
     return (

@@ -13,6 +13,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 
 from cns_drake.scene.drake_errors import PARSER_ERRORS, told_by_drake
+from cns_drake.scene.model_check import check_model
 from cns_drake.scene.perception_geometry import check_shape, structure_name
 from cns_drake.scene.structure_table import (
     StructureTable,
@@ -32,6 +33,7 @@ class World:
         vehicle: the vehicle's model instance, None where there is none.
         structures: class and instance id of every structure in the world,
             also of those that no table lists.
+        notes: what a user should know about them.
 
     Example:
         from cns_drake import load_world
@@ -44,6 +46,7 @@ class World:
     plant: MultibodyPlant
     vehicle: ModelInstanceIndex | None
     structures: StructureTable
+    notes: tuple[str, ...] = ()
 
     def anchored_frames(self) -> frozenset[FrameId]:
         """Returns the geometry frames that can never move."""
@@ -111,15 +114,37 @@ def load_world(
     plant.Finalize()
 
     table = structures or sdf.parent / "structures.csv"
+    found = set(map(structure_name, names))
+    notes: tuple[str, ...] = ()
     if structures is not None or table.is_file():
         entries = load_structure_table(table)
+        notes = _mismatches(table, {entry.name for entry in entries}, found)
     else:
         entries = StructureTable(())
     try:
-        entries = entries.completed(map(structure_name, names))
+        entries = entries.completed(found)
     except InputError as error:
         raise InputError(f"{sdf}: {error}") from None
-    return World(scene_graph, plant, vehicle_model, entries)
+    return World(scene_graph, plant, vehicle_model, entries, notes)
+
+
+def _mismatches(
+    table: Path, listed: set[str], found: set[str]
+) -> tuple[str, ...]:
+    """Returns a note if structures are not in the table that others are in.
+
+    Rows alone may well be of structures that stand in another stage.
+    """
+    unlabelled, unused = sorted(found - listed), sorted(listed - found)
+    if not (unlabelled and unused):
+        return ()
+    return (
+        f"{table}: {len(unused)} of {len(listed)} rows match nothing (such as"
+        f" {unused[0]}), and {len(unlabelled)} of {len(found)} structures have"
+        f" no row and are unlabeled (such as {unlabelled[0]}); a visual named"
+        " <structure>/<part> is of <structure>, one without a slash of its"
+        " model",
+    )
 
 
 def _check_names(scene_graph: SceneGraph, sdf: Path) -> None:
@@ -165,6 +190,7 @@ def _parse(parser: Parser, path: Path) -> list[ModelInstanceIndex]:
         content.decode("utf-8")
     except UnicodeDecodeError:
         raise InputError(f"{path}: not UTF-8 text") from None
+    check_model(path)
     with told_by_drake() as errors:
         try:
             models = parser.AddModels(str(path))
@@ -179,12 +205,14 @@ def _parse(parser: Parser, path: Path) -> list[ModelInstanceIndex]:
 
 def _parse_fault(path: Path, *texts: str) -> InputError:
     """Returns the error that tells the first two of what Drake told."""
-    # Drake and libsdformat begin with the path, a severity and a code.
+    # Drake and libsdformat begin with the path, which Drake makes absolute, a
+    # severity and a code.
+    names = "|".join(re.escape(str(p)) for p in (path.absolute(), path))
     faults = [" ".join(text.split()) for text in texts[:2]]
     faults = [re.sub(r"^SDFormat Error .*?Msg: ", "", f) for f in faults]
     faults = [
         re.sub(
-            rf"/*{re.escape(str(path))}:(?:(\d+):)? error: ",
+            rf"/*(?:{names}):(?:(\d+):)? (?:error|ERROR): (?:ERROR: )?",
             lambda match: f"line {match[1]}: " if match[1] else "",
             fault,
         )

@@ -111,7 +111,8 @@ def simulate(
         num_threads: how many threads cast the rays of a LiDAR; the recording
             does not depend on it.
         on_frame: is told about progress.
-        on_note: is told what was found of an interrupted run.
+        on_note: is told what was found of an interrupted run, and of the
+            world's table of structures.
 
     Raises:
         InputError: the scenario cannot be run or its output not be written.
@@ -134,6 +135,8 @@ def simulate(
                 check_writable(file)
         files.check(overwrite)
         drive = _load(scenario)
+        for text in drive.world.notes:
+            on_note(text)
         strike()
         bag = _make_bag(files.path, topics, drive, overwrite)
         page = None if page_file is None else _make_page(drive)

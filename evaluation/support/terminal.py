@@ -116,6 +116,11 @@ def run(app: typer.Typer, program: str) -> NoReturn:
         status = 2
         if error.filename is None:
             _forget_results()
+    except SystemExit as error:
+        # Drake's C++ asks Python to end where a condition of its own fails.
+        status = error.code if isinstance(error.code, int) else 2
+        if isinstance(error.code, str):
+            message = f"error: {error.code}"
     except UnicodeError as error:
         message, status = f"error: a name that is no text ({error})", 2
     # What the command does is done; nothing is left to interrupt.

@@ -1,5 +1,7 @@
 """Loading SDF worlds, and the faults they may have."""
 
+from pathlib import Path
+
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
@@ -69,7 +71,7 @@ def test_files_that_are_no_world(tmp_path, text):
     ("old", "new", "fault"),
     [
         ('version="1.9"', 'version="#"', "cannot be parsed"),
-        ("<pose>1", "<pose>one", "Unable to set value"),
+        ("<pose>1", "<pose>", "must have 6 values"),
         ("body", "b\udca5dy", "not UTF-8"),
     ],
 )
@@ -82,6 +84,19 @@ def test_faults_that_drake_tells_in_several_ways(
     with pytest.raises(InputError, match=rf"broken\.sdf: .*{fault}"):
         load_world(path)
     assert capfd.readouterr() == ("", "")
+
+
+def test_a_fault_names_the_file_once(tmp_path, monkeypatch):
+    text = world_text([box_visual("body", (1, 2, 3, 0, 0, 0), (4, 5, 6))])
+    (tmp_path / "a.sdf").write_text(text.replace("<pose>1", "<pose>"))
+    monkeypatch.chdir(tmp_path)
+    for path in (tmp_path / "a.sdf", Path("a.sdf"), Path("./x/../a.sdf")):
+        (tmp_path / "x").mkdir(exist_ok=True)
+        with pytest.raises(InputError) as refusal:
+            load_world(path)
+        told = str(refusal.value)
+        assert told.startswith(f"{path}: cannot be parsed: line 8: At XML path")
+        assert told.count("a.sdf") == 1
 
 
 def test_a_mesh_that_is_no_mesh(tmp_path, capfd):

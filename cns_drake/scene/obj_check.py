@@ -1,0 +1,59 @@
+"""Faces of OBJ files, checked before Drake's reader gets them.
+
+It reads memory of others, and may end the process, where a face names a
+vertex that is not there.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+import re
+
+import numpy as np
+
+from evaluation.support.files import read_bytes
+
+_LIMIT_BYTES = 1 << 28
+_VERTEX = re.compile(rb"^[ \t]*v[ \t]", re.MULTILINE)
+_FACE = re.compile(rb"^[ \t]*f[ \t]([^\n#]*)", re.MULTILINE)
+# Of texture and normals a ray caster knows nothing; Drake checks them.
+_OTHER_INDICES = re.compile(rb"/[^\s]*")
+_NO_INDICES = re.compile(rb"[^-\d\s]|\d-|\d{10}")
+
+
+def check_obj(path: Path) -> None:
+    """Refuses an OBJ file with a face that has not the vertices it names.
+
+    Args:
+        path: an existing file.
+
+    Raises:
+        ValueError: that names the line.
+        InputError: if it cannot be read.
+    """
+    # Drake ends a line at either.
+    content = read_bytes(path, _LIMIT_BYTES).replace(b"\r", b"\n")
+    num_vertices = len(_VERTEX.findall(content))
+    faces = b" \n".join(_FACE.findall(content))
+    if b"/" in faces:
+        faces = _OTHER_INDICES.sub(b"", faces)
+    if _are_indices(faces, num_vertices):
+        return
+    for number, line in enumerate(content.split(b"\n"), start=1):
+        face = _FACE.match(line)
+        indices = _OTHER_INDICES.sub(b"", face[1]) if face else b""
+        if not _are_indices(indices, num_vertices):
+            raise ValueError(
+                f"line {number}: a face has a vertex that is not there (of"
+                f" {num_vertices})"
+            )
+
+
+def _are_indices(text: bytes, num_vertices: int) -> bool:
+    """Returns whether a text is of numbers of vertices, from 1 or from -1."""
+    if not text.strip():
+        return True
+    if _NO_INDICES.search(text):
+        return False
+    values = np.fromstring(text, dtype=np.int64, sep=" ")
+    return bool(((values != 0) & (np.abs(values) <= num_vertices)).all())
