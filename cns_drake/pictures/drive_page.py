@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Iterable, Iterator, Sequence
 import contextlib
 from dataclasses import dataclass, field
 import logging
@@ -18,25 +18,29 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform
 
+from cns_drake.pictures.city_parts import Part, compare_parts, read_parts
+from cns_drake.pictures.daylight import set_view
+from cns_drake.pictures.drive_panel import CHANGE_RGB, make_panel, template
 from cns_drake.pictures.meshcat_drawing import (
     draw_body,
     draw_marker,
+    draw_parts,
     draw_points,
     draw_route,
-    draw_structures,
-    set_view,
 )
 from cns_drake.pictures.static_page import make_static_page
-from cns_drake.scene.perception_geometry import (
-    PerceptionGeometry,
-    read_perception_geometry,
-)
+from cns_drake.scene.perception_geometry import read_perception_geometry
 from cns_drake.scene.world import World
 
-_ABSENT = "/stage_difference/absent"
-_ADDITIONAL = "/stage_difference/additional"
-_ABSENT_RGBA = Rgba(0.85, 0.05, 0.15, 0.5)
-_ADDITIONAL_RGBA = Rgba(0.10, 0.60, 0.65)
+# What is not there is seen through, hidden by what is there in its place, and
+# casts no shadow.
+_OPACITY = 0.45
+_UNREAL = {
+    "castShadow": False,
+    "material.polygonOffset": True,
+    "material.polygonOffsetFactor": 1.0,
+    "material.polygonOffsetUnits": 4.0,
+}
 
 # How far above the vehicle's origin the arrow's tip is [m].
 _MARKER_ALTITUDE = 3.0
@@ -65,37 +69,49 @@ def make_drive_page(
     world: World,
     *,
     other_stage: World | None = None,
+    other_name: str = "the other stage",
     title: str = "cns-drake",
 ) -> str:
     """Returns a page with the city, the drive and its scans.
 
-    The layers of the page, each to be switched in its Scene panel and on
-    when it opens:
+    The layers of the page, each to be switched in its Scene panel:
 
-    - `/city/<class>`: the structures of the stage, coloured by class,
+    - `/city/<class>`: the structures of the stage in their own colours,
     - `/vehicle/<body>`, `/moving/<body>`: what moves, as it moved,
     - `/route`: a ribbon from red (start) to blue (end),
     - `/scans/<k>`: LiDAR points coloured by height, as soon as measured,
-    - `/stage_difference/absent/<class>`: what the other stage has and this
-      one lacks, translucent red,
-    - `/stage_difference/additional/<class>`: what this stage has and the
-      other one lacks; teal, and not in `/city` as well.
+    - `/stage_difference/additional/<class>`: what of the city is not in the
+      other stage, or rises above it there; not in `/city` as well,
+    - `/stage_difference/absent/<class>`: structures of the other stage that
+      this one lacks, translucent red, off when the page opens,
+    - `/stage_difference/lower/<class>`: what rises higher in the other stage
+      than here, translucent orange, off when the page opens.
+
+    A panel has the title and a legend; buttons play the drive, let the camera
+    follow the car, switch points off, and switch on what changed: then the
+    additional is teal.
 
     Args:
         drive: what happened.
         world: the stage, with the vehicle.
         other_stage: the stage to show the difference to.
+        other_name: what the page calls it.
         title: of the page.
     """
     with _quiet():
         meshcat = Meshcat(MeshcatParams(host="localhost", port=0))
-    _draw_city(meshcat, world, other_stage)
+    changes = _draw_city(meshcat, world, other_stage)
     if len(drive.X_WBs) > 1:
         draw_route(meshcat, "/route", drive.X_WBs)
     _animate(meshcat, drive, world)
     p_WBset = np.array([X_WB.translation() for X_WB in drive.X_WBs])
     set_view(meshcat, p_WBset.min(axis=0), p_WBset.max(axis=0))
-    return make_static_page(meshcat, title)
+    return make_static_page(
+        meshcat,
+        title,
+        body=make_panel(title, drive.X_WBs, drive.period, changes, other_name),
+        script=template("drive.js"),
+    )
 
 
 def moving_frames(world: World) -> tuple[FrameId, ...]:
@@ -111,40 +127,28 @@ def moving_frames(world: World) -> tuple[FrameId, ...]:
 
 def _draw_city(
     meshcat: Meshcat, world: World, other_stage: World | None
-) -> None:
-    """Draws what stands still, and how that differs from another stage."""
-    own = _by_structure(world)
-    other = own if other_stage is None else _by_structure(other_stage)
-    common = own.keys() & other.keys()
-    more, less = own.keys() - common, other.keys() - common
-    _draw_layer(meshcat, "/city", world, own, common)
-    _draw_layer(meshcat, _ADDITIONAL, world, own, more, _ADDITIONAL_RGBA)
-    if other_stage is not None:
-        _draw_layer(meshcat, _ABSENT, other_stage, other, less, _ABSENT_RGBA)
+) -> set[str]:
+    """Draws what stands still; returns which layers of change there are."""
+    own = read_parts(world)
+    other = own if other_stage is None else read_parts(other_stage)
+    difference = compare_parts(own, other)
+    draw_parts(meshcat, "/city", difference.common)
+    draw_parts(meshcat, "/stage_difference/additional", difference.additional)
+    _draw_missing(meshcat, "absent", difference.absent)
+    _draw_missing(meshcat, "lower", difference.lower)
+    return {name for name in CHANGE_RGB if getattr(difference, name)}
 
 
-def _draw_layer(
-    meshcat: Meshcat,
-    path: str,
-    stage: World,
-    by_structure: Mapping[str, Sequence[PerceptionGeometry]],
-    names: Set[str],
-    rgba: Rgba | None = None,
-) -> None:
-    if names:
-        draw_structures(
-            meshcat,
-            path,
-            [
-                geometry
-                for name, group in by_structure.items()
-                if name in names
-                for geometry in group
-            ],
-            _anchored_poses(stage),
-            stage.structures.completed(names),
-            rgba,
-        )
+def _draw_missing(meshcat: Meshcat, name: str, parts: Sequence[Part]) -> None:
+    """Draws what only the other stage has; off at first."""
+    if not parts:
+        return
+    path = f"/stage_difference/{name}"
+    draw_parts(meshcat, path, parts, Rgba(*CHANGE_RGB[name], _OPACITY))
+    for semantic_class in {part.semantic_class for part in parts}:
+        for key, value in _UNREAL.items():
+            meshcat.SetProperty(f"{path}/{semantic_class}/<object>", key, value)
+    meshcat.SetProperty(path, "visible", False)
 
 
 def _animate(meshcat: Meshcat, drive: Drive, world: World) -> None:
@@ -197,28 +201,6 @@ def _moving_paths(
             path = f"/vehicle/{body.name()}"
         paths[path] = frame_id
     return paths
-
-
-def _by_structure(world: World) -> dict[str, list[PerceptionGeometry]]:
-    """Returns what never moves, by the structure that it belongs to."""
-    by_structure: dict[str, list[PerceptionGeometry]] = {}
-    for geometry in read_perception_geometry(
-        world.scene_graph.model_inspector(),
-        world.anchored_frames().__contains__,
-    ):
-        by_structure.setdefault(geometry.structure, []).append(geometry)
-    return by_structure
-
-
-def _anchored_poses(world: World) -> Callable[[FrameId], RigidTransform]:
-    plant = world.plant
-    context = plant.CreateDefaultContext()
-
-    def calc_X_WF(frame_id: FrameId) -> RigidTransform:
-        body = plant.GetBodyFromFrameId(frame_id)
-        return plant.EvalBodyPoseInWorld(context, body)
-
-    return calc_X_WF
 
 
 @contextlib.contextmanager

@@ -19,7 +19,7 @@ from cns_drake.pictures.drive_page import (
 from cns_drake.scene.world import World
 from evaluation.support.files import complete_part, write_part
 
-# Together they keep a page well below 40 MB, however long the drive.
+# Together they keep a page below 25 MB, however long the drive.
 _MAX_SCANS = 160
 _MAX_POINTS_PER_SCAN = 3000
 # One point for each cube of this size [m]: without that, nearly all points
@@ -54,6 +54,7 @@ class MeshcatRecorder(LeafSystem):
         X_BSs: Mapping[str, RigidTransform],
         period: float,
         other_stage: World | None = None,
+        other_name: str = "the other stage",
         scan_spacing: float = 15.0,
     ):
         """Declares the ports and the schedule.
@@ -63,11 +64,13 @@ class MeshcatRecorder(LeafSystem):
             X_BSs: LiDAR name -> pose of its frame S in B.
             period: time between frames [s].
             other_stage: the stage to show the difference to.
+            other_name: what the page calls it.
             scan_spacing: way between two scans that are shown [m].
         """
         super().__init__()
         self._world = world
         self._other_stage = other_stage
+        self._other_name = other_name
         self._X_BSs = dict(X_BSs)
         self._scan_spacing = scan_spacing
         self._way_to_scan = 0.0
@@ -104,6 +107,7 @@ class MeshcatRecorder(LeafSystem):
             self.drive,
             self._world,
             other_stage=self._other_stage,
+            other_name=self._other_name,
             title=title,
         )
         write_part(path, html)

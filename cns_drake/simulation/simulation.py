@@ -242,11 +242,13 @@ def _resume(
 
 
 def _make_page(drive: _Drive) -> MeshcatRecorder:
+    other_stage, other_name = _other_stage(drive.scenario)
     return MeshcatRecorder(
         drive.world,
         X_BSs=_lidar_poses(drive.scenario),
         period=FRAME_PERIOD,
-        other_stage=_other_stage(drive.scenario),
+        other_stage=other_stage,
+        other_name=other_name,
     )
 
 
@@ -302,19 +304,20 @@ def _structure_list(world: World) -> list[dict]:
     ]
 
 
-def _other_stage(scenario: Scenario) -> World | None:
-    """Returns the stage to compare with: the last, or else the first.
+def _other_stage(scenario: Scenario) -> tuple[World | None, str]:
+    """Returns the stage to compare with, and what it is called.
 
-    Where structures are left out, it is the same world with them.
+    It is the last stage, or else the first. Where structures are left out, it
+    is the same stage with them.
     """
     if scenario.without:
-        return load_stage(scenario.model_copy(update={"without": ()}))
-    if scenario.stage is None:
-        return None
+        whole = scenario.model_copy(update={"without": ()})
+        return load_stage(whole), "the whole city"
     stages = sorted(scenario.map_folder.glob("stage_*.sdf"))
-    last = stages[-1] if stages[-1] != scenario.world_file else stages[0]
-    if last == scenario.world_file:
-        return None
-    return load_stage(
-        scenario.model_copy(update={"stage": last.stem.removeprefix("stage_")})
-    )
+    others = [path for path in stages if path != scenario.world_file]
+    if scenario.stage is None or not others:
+        return None, ""
+    last = others[-1] if stages[-1] in others else others[0]
+    stage = last.stem.removeprefix("stage_")
+    other = scenario.model_copy(update={"stage": stage})
+    return load_stage(other), f"stage {stage}"

@@ -28,7 +28,7 @@ def has_chromium() -> bool:
 
 
 @contextmanager
-def chromium(profile: Path):
+def chromium(profile: Path, *options: str):
     """Yields a `Browser`; ends its process afterwards."""
     # Higher than the numbers that they get in the process.
     child_in, ours_out = (_high(fd) for fd in os.pipe())
@@ -47,6 +47,7 @@ def chromium(profile: Path):
             "--hide-scrollbars",
             "--remote-debugging-pipe",
             f"--user-data-dir={profile}",
+            *options,
         ],
         preexec_fn=connect,
         pass_fds=(_IN, _OUT),

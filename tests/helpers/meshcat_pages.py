@@ -10,10 +10,25 @@ import numpy as np
 
 def read_commands(html):
     """Returns the decoded commands of a page, in their order."""
+    return [_Decoder(data).value() for data in read_messages(html)]
+
+
+def read_messages(html):
+    """Returns the bytes of each command of a page, in their order."""
     return [
-        _Decoder(zlib.decompress(base64.b64decode(data))).value()
-        for data in re.findall(r'enqueue\("([A-Za-z0-9+/=]*)"\)', html)
+        _unfiltered(zlib.decompress(base64.b64decode(data)), length)
+        for data, length in re.findall(
+            r'enqueue\("([A-Za-z0-9+/=]*)"(?:, (\d+))?\)', html
+        )
     ]
+
+
+def _unfiltered(data, length):
+    """Sums up rows of 12 bytes, which come column by column."""
+    if not length:
+        return data
+    columns = np.frombuffer(data, np.uint8).reshape(12, -1)
+    return np.cumsum(columns, axis=1, dtype=np.uint8).T.tobytes()[: int(length)]
 
 
 def objects(commands):
@@ -28,6 +43,20 @@ def objects(commands):
 def vertices(geometry):
     """Returns the (N, 3) positions of a buffer geometry."""
     return geometry["data"]["attributes"]["position"]["array"].reshape(-1, 3)
+
+
+def colors(geometry):
+    """Returns the (N, 3) colours of a buffer geometry, linear light."""
+    return geometry["data"]["attributes"]["color"]["array"].reshape(-1, 3)
+
+
+def properties(commands):
+    """Returns (path, property) -> the value that it was given last."""
+    return {
+        (command["path"], command["property"]): command["value"]
+        for command in commands
+        if command["type"] == "set_property"
+    }
 
 
 def tracks(commands):

@@ -1,0 +1,146 @@
+"""What stands still in a stage, and how that differs from another stage."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from cns_drake.scene.perception_geometry import read_perception_geometry
+from cns_drake.scene.semantics import CLASS_RGB
+from cns_drake.scene.surface_merging import merge_surfaces
+from cns_drake.scene.surfaces import TriangleSurface
+from cns_drake.scene.world import World
+
+# Two stages of a structure are equally high up to this [m].
+_HEIGHT_TOLERANCE = 0.5
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of a structure, of one colour.
+
+    Attributes:
+        semantic_class: of the structure.
+        rgb: sRGB, each from 0 to 1.
+        surface: in the world.
+    """
+
+    semantic_class: str
+    rgb: tuple[float, float, float]
+    surface: TriangleSurface
+
+    def top(self) -> float:
+        """Returns the height of the highest vertex [m]."""
+        return float(self.surface.p_GVset[:, 2].max())
+
+
+@dataclass(frozen=True)
+class StageDifference:
+    """A stage beside another one.
+
+    Attributes:
+        common: of this stage, what the other one has as well.
+        additional: of this stage, structures that the other one lacks, and
+            what of a structure rises above its height there.
+        absent: of the other stage, structures that this one lacks.
+        lower: of the other stage, what of a structure rises above its height
+            here.
+    """
+
+    common: list[Part] = field(default_factory=list)
+    additional: list[Part] = field(default_factory=list)
+    absent: list[Part] = field(default_factory=list)
+    lower: list[Part] = field(default_factory=list)
+
+
+def read_parts(world: World) -> dict[str, list[Part]]:
+    """Returns what never moves, by the structure that it belongs to."""
+    plant = world.plant
+    context = plant.CreateDefaultContext()
+    geometries = read_perception_geometry(
+        world.scene_graph.model_inspector(),
+        world.anchored_frames().__contains__,
+    )
+    structures = world.structures.completed(
+        {geometry.structure for geometry in geometries}
+    )
+    X_WFs = {
+        frame_id: plant.EvalBodyPoseInWorld(
+            context, plant.GetBodyFromFrameId(frame_id)
+        )
+        for frame_id in {geometry.frame_id for geometry in geometries}
+    }
+    parts: dict[str, list[Part]] = {}
+    for geometry in geometries:
+        semantic_class = structures[geometry.structure].semantic_class
+        parts.setdefault(geometry.structure, []).append(
+            Part(
+                semantic_class,
+                geometry.rgb or CLASS_RGB[semantic_class],
+                merge_surfaces([geometry], X_WFs.__getitem__),
+            )
+        )
+    return parts
+
+
+def compare_parts(
+    own: Mapping[str, Sequence[Part]], other: Mapping[str, Sequence[Part]]
+) -> StageDifference:
+    """Compares a stage with another one, structure by structure.
+
+    A structure that was moved, or has another shape of the same height, is
+    common to both.
+
+    Args:
+        own: structure -> its parts in this stage.
+        other: structure -> its parts in the other stage.
+    """
+    difference = StageDifference()
+    for name, parts in own.items():
+        if name not in other:
+            difference.additional.extend(parts)
+            continue
+        height, height_there = _top(parts), _top(other[name])
+        if height > height_there + _HEIGHT_TOLERANCE:
+            below, above = _split(parts, height_there)
+            difference.common.extend(below)
+            difference.additional.extend(above)
+            continue
+        difference.common.extend(parts)
+        if height_there > height + _HEIGHT_TOLERANCE:
+            difference.lower.extend(_split(other[name], height)[1])
+    for name, parts in other.items():
+        if name not in own:
+            difference.absent.extend(parts)
+    return difference
+
+
+def _top(parts: Sequence[Part]) -> float:
+    return max(part.top() for part in parts)
+
+
+def _split(
+    parts: Sequence[Part], height: float
+) -> tuple[list[Part], list[Part]]:
+    """Returns what lies below a height, and what reaches above it [m].
+
+    Triangles are kept whole.
+    """
+    below: list[Part] = []
+    above: list[Part] = []
+    for part in parts:
+        surface = part.surface
+        reaches = (surface.p_GVset[surface.triangles, 2] > height).any(axis=1)
+        for group, chosen in ((below, ~reaches), (above, reaches)):
+            if chosen.any():
+                used, renumbered = np.unique(
+                    surface.triangles[chosen], return_inverse=True
+                )
+                piece = TriangleSurface(
+                    surface.p_GVset[used],
+                    renumbered.reshape(-1, 3).astype(np.int32),
+                )
+                group.append(replace(part, surface=piece))
+    return below, above

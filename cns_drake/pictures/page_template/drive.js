@@ -1,0 +1,133 @@
+// The panels over the scene. `viewer` is Meshcat's; `commands` is a promise of
+// all that the page holds.
+
+const byId = (id) => document.getElementById(id);
+const node = (...path) => viewer.scene_tree.find(path);
+const car = node("vehicle", "base_link").object;
+const animator = viewer.animator;
+const UP = new MeshCat.THREE.Vector3(0, 1, 0);
+
+// Pose of the car when it was last looked at; null: nobody follows it.
+let followed = null;
+// Where the camera stood before.
+let overview = null;
+
+function show(...path) {
+  return (on) => viewer.set_property(path, "visible", on);
+}
+
+// In the world of three.js, y is up.
+function carPose() {
+  car.updateWorldMatrix(true, false);
+  const m = car.matrixWorld.elements;
+  return {
+    position: new MeshCat.THREE.Vector3(m[12], m[13], m[14]),
+    heading: Math.atan2(-m[2], m[0]),
+  };
+}
+
+function look(position, target) {
+  viewer.camera.position.copy(position);
+  viewer.controls.target.copy(target);
+  viewer.camera.lookAt(target);
+  viewer.set_dirty();
+}
+
+// Camera and target move and turn with the car: a reader can go around it.
+function follow() {
+  const now = carPose();
+  const moved = (point) => point.clone().sub(followed.position)
+    .applyAxisAngle(UP, now.heading - followed.heading).add(now.position);
+  look(moved(viewer.camera.position), moved(viewer.controls.target));
+  followed = now;
+}
+
+function setFollowing(on) {
+  // What helps from afar is in the way near by, and points look smaller.
+  show("vehicle", "marker")(!on);
+  viewer.set_property(["route"], "opacity", on ? 0.4 : 1);
+  node("scans").object.traverse(({material}) => {
+    if (material) material.size = on ? 4 : 2;
+  });
+  if (on) {
+    overview = [viewer.camera.position.clone(), viewer.controls.target.clone()];
+    followed = carPose();
+    const fromCar = (x, y) => new MeshCat.THREE.Vector3(x, y, 0)
+      .applyAxisAngle(UP, followed.heading).add(followed.position);
+    look(fromCar(-14, 7), fromCar(8, 3));
+  } else {
+    followed = null;
+    look(...overview);
+  }
+}
+
+function setChanged(on) {
+  document.body.classList.toggle("changed", on);
+  for (const name of ["absent", "lower"]) show("stage_difference", name)(on);
+  node("stage_difference", "additional").object.traverse(({material}) => {
+    if (!material) return;
+    material.vertexColors = !on;
+    material.color.set(on ? byId("change").dataset.additional : "white");
+    material.needsUpdate = true;
+  });
+  viewer.set_dirty();
+}
+
+function connectSwitch(id, set) {
+  byId(id)?.addEventListener("click", (event) => {
+    const on = event.target.ariaPressed !== "true";
+    event.target.ariaPressed = on;
+    set(on);
+  });
+}
+
+function setTime(time) {
+  // What has come to its end would stay there.
+  for (const action of animator.actions) action.paused = false;
+  animator.seek(time);
+  animator.display_progress(time);
+}
+
+function tell() {
+  const minutes = (s) =>
+    `${Math.floor(s / 60)}:${String(Math.floor(s % 60)).padStart(2, "0")}`;
+  byId("time").value = animator.time;
+  byId("clock").value =
+    `${minutes(animator.time)} / ${minutes(animator.duration)}`;
+  byId("play").textContent = animator.playing ? "Pause" : "Play";
+}
+
+// Meshcat calls it before it draws a picture.
+viewer.render_callback = () => {
+  if (followed) follow();
+  tell();
+};
+
+// Colours as they are, instead of a film's.
+viewer.renderer.toneMapping = MeshCat.THREE.NeutralToneMapping;
+
+// Pictures of half a city would only make loading slow.
+const drawPicture = viewer.animate;
+viewer.animate = () => {};
+
+commands.then(() => {
+  viewer.animate = drawPicture;
+  byId("loading").remove();
+  byId("time").max = animator.duration;
+  byId("time").addEventListener("input", (event) => {
+    setTime(Number(event.target.value));
+  });
+  byId("play").addEventListener("click", () => {
+    if (animator.playing) animator.pause();
+    else animator.play();
+    tell();
+  });
+  connectSwitch("follow", setFollowing);
+  connectSwitch("change", setChanged);
+  connectSwitch("points", show("scans"));
+  // On a narrow screen the city fits from farther away.
+  const {camera, controls} = viewer;
+  const farther = Math.max(1, 1.2 / camera.aspect);
+  look(camera.position.clone().sub(controls.target).multiplyScalar(farther)
+    .add(controls.target), controls.target.clone());
+});

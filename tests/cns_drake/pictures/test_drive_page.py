@@ -1,0 +1,271 @@
+"""The page of a drive, as someone who opens it sees it."""
+
+import json
+import re
+
+from browser import chromium, has_chromium
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.systems.analysis import Simulator
+import pytest
+
+from cns_drake import load_scenario
+from cns_drake.pictures.drive_page import (
+    Drive,
+    make_drive_page,
+    moving_frames,
+)
+from cns_drake.pictures.meshcat_recording import MeshcatRecorder
+from cns_drake.recording.frame_clock import FRAME_PERIOD
+from cns_drake.scenarios.planning import count_frames, plan_drive
+from cns_drake.scene.world import load_world
+from cns_drake.simulation.station import load_stage, make_station
+
+PERIOD = 0.5
+NUM_FRAMES = 21
+PHONE, DESKTOP = (390, 844), (1440, 900)
+VEHICLE = """<sdf version="1.9"><model name="vehicle"><link name="base_link">
+<visual name="body"><geometry><box><size>4 2 1</size></box></geometry></visual>
+</link></model></sdf>"""
+
+
+def visual(name, place, size, rgb):
+    return (
+        f'<visual name="{name}"><pose>{place} 0 0 0</pose><geometry><box>'
+        f"<size>{size}</size></box></geometry><material><diffuse>{rgb} 1"
+        "</diffuse></material></visual>"
+    )
+
+
+GROUND = visual("ground/slab", "0 0 -0.1", "80 80 0.2", "0.4 0.5 0.3")
+HALL = visual("hall/wall", "-15 12 3", "8 4 6", "0.8 0.5 0.2")
+HIGHER_HALL = visual("hall/wall", "-15 12 6", "8 4 12", "0.8 0.5 0.2")
+KIOSK = visual("kiosk/wall", "12 -12 2", "4 4 4", "0.2 0.6 0.3")
+TOWER = visual("tower/wall", "15 15 10", "6 6 20", "0.7 0.7 0.7")
+
+
+def stage(folder, name, *visuals, **arguments):
+    path = folder / f"{name}.sdf"
+    path.write_text(
+        '<sdf version="1.9"><world name="w"><model name="town">'
+        f'<static>true</static><link name="city">{"".join(visuals)}</link>'
+        "</model></world></sdf>"
+    )
+    return load_world(path, **arguments)
+
+
+def X_WB_at(frame):
+    """A left turn of 90 degrees on the way."""
+    yaw = np.pi / 2 * frame / (NUM_FRAMES - 1)
+    place = [20.0 * np.sin(yaw), 20.0 * (1.0 - np.cos(yaw)), 0.5]
+    return RigidTransform(RollPitchYaw(0.0, 0.0, yaw), place)
+
+
+def make_page(folder, other_stage=None):
+    vehicle = folder / "vehicle.sdf"
+    vehicle.write_text(VEHICLE)
+    world = stage(folder, "here", GROUND, HALL, KIOSK, vehicle=vehicle)
+    X_WBs = [X_WB_at(frame) for frame in range(NUM_FRAMES)]
+    grid = np.stack(np.meshgrid(*[np.arange(6.0)] * 3), axis=-1)
+    drive = Drive(
+        PERIOD,
+        X_WBs,
+        dict.fromkeys(moving_frames(world), X_WBs),
+        [(0, grid.reshape(-1, 3)), (10, grid.reshape(-1, 3) + 10.0)],
+    )
+    return make_drive_page(
+        drive,
+        world,
+        other_stage=other_stage,
+        other_name="stage <02>",
+        title="a < b",
+    )
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("page")
+    other = stage(folder, "there", GROUND, HIGHER_HALL, TOWER)
+    path = folder / "page.html"
+    path.write_text(make_page(folder, other))
+    return path
+
+
+def test_page_has_title_length_and_legend(page):
+    text = page.read_text()
+    assert "<title>a &lt; b</title>" in text
+    assert "<h1>a &lt; b</h1>" in text
+    # A quarter of a circle of 20 m, in 20 steps of half a second.
+    assert "<p>0.03 km in 0 min 10 s</p>" in text
+    for line in (
+        "LiDAR points, 0 to 25 m high",
+        "route, from start to end",
+        "not here, but in stage &lt;02&gt;",
+        "higher in stage &lt;02&gt;",
+        "not in stage &lt;02&gt;, or lower there",
+    ):
+        assert f">{line}</dd>" in text
+    assert not re.search(r"\{\{\w+\}\}", text)
+
+
+def test_page_says_that_it_loads_before_the_city_comes(page):
+    text = page.read_text()
+    assert "Loading the city" in text[: text.index("<script")]
+
+
+def test_without_another_stage_nothing_is_said_of_change(tmp_path):
+    text = make_page(tmp_path)
+    assert 'id="change"' not in text
+    assert 'class="change"' not in text
+
+
+@pytest.mark.slow
+def test_page_of_a_shipped_drive_is_small(tmp_path):
+    scenario = load_scenario("downtown_01")  # It has the largest page.
+    world, trajectory = load_stage(scenario), plan_drive(scenario)
+    X_BSs = {name: lidar.pose() for name, lidar in scenario.lidars.items()}
+    recorder = MeshcatRecorder(
+        world,
+        X_BSs=X_BSs,
+        period=FRAME_PERIOD,
+        other_stage=load_world(scenario.map_folder / "stage_04.sdf"),
+    )
+    diagram = make_station(
+        scenario, world=world, trajectory=trajectory, page=recorder
+    )
+    num_frames = count_frames(scenario, trajectory)
+    Simulator(diagram).AdvanceTo((num_frames - 1) * FRAME_PERIOD)
+    recorder.save(tmp_path / "page.html")
+    assert 15e6 < (tmp_path / "page.html").stat().st_size < 25e6
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    profile = tmp_path_factory.mktemp("profile")
+    software = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+    with chromium(profile, *software) as browser:
+        yield browser
+
+
+@pytest.fixture(params=[DESKTOP, PHONE], ids=["desktop", "phone"])
+def reader(browser, page, request):
+    """The page at the drive's start, standing still."""
+    browser.open(page.as_uri(), *request.param)
+    browser.wait_for('!document.getElementById("loading")')
+    if browser.evaluate("viewer.animator.playing"):
+        click(browser, "play")
+    go_to(browser, 0.0)
+    yield browser
+    # Software that draws complains of its own slowness.
+    assert not [c for c in browser.complaints if "'rendering'" not in c]
+
+
+def click(browser, name):
+    """Clicks where a button is seen, as a finger would."""
+    x, y = browser.evaluate(
+        f"""(() => {{
+          const box = document.getElementById("{name}").getBoundingClientRect();
+          return [box.x + box.width / 2, box.y + box.height / 2];
+        }})()"""
+    )
+    browser.click(x, y)
+
+
+def go_to(browser, time):
+    """Moves the slider to a time [s], and draws the picture."""
+    browser.evaluate(
+        f"""(() => {{
+          const slider = document.getElementById("time");
+          slider.value = {time};
+          slider.dispatchEvent(new Event("input"));
+          viewer.render();
+        }})()"""
+    )
+
+
+def is_visible(browser, *path):
+    find = f"viewer.scene_tree.find({json.dumps(path)})"
+    return browser.evaluate(f"{find}.object.visible")
+
+
+def p_WC(browser):
+    """Returns where the camera is [m]."""
+    x, y, z = browser.evaluate("viewer.camera.position.toArray()")
+    return np.array([x, -z, y])  # In three.js y is up.
+
+
+slow_in_chromium = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not has_chromium(), reason="no chromium"),
+]
+
+
+@pytest.mark.usefixtures("reader")
+class TestInChromium:
+    pytestmark = slow_in_chromium
+
+    def test_panels_fit_the_screen(self, reader):
+        assert not reader.evaluate(
+            """[...document.querySelectorAll(".panel, .panel *")].filter(
+              (one) => {
+                const box = one.getBoundingClientRect();
+                return box.left < 0 || box.right > innerWidth ||
+                  box.top < 0 || box.bottom > innerHeight;
+              }).map((one) => one.outerHTML)"""
+        )
+
+    def test_change_is_off_until_the_button_is_pressed(self, reader):
+        legend = 'document.querySelector("dd.change").checkVisibility()'
+        color = (
+            'viewer.scene_tree.find(["stage_difference", "additional",'
+            ' "unlabeled", "<object>"]).object.material.color.getHexString()'
+        )
+        additional = reader.evaluate(
+            'document.getElementById("change").dataset.additional'
+        )
+        for is_on in (False, True, False):
+            for layer in ("absent", "lower"):
+                assert is_visible(reader, "stage_difference", layer) is is_on
+            assert is_visible(reader, "stage_difference", "additional")
+            assert reader.evaluate(legend) is is_on
+            tint = additional if is_on else "#ffffff"
+            assert "#" + reader.evaluate(color) == tint
+            click(reader, "change")
+
+    def test_camera_follows_the_car(self, reader):
+        before = p_WC(reader)
+        click(reader, "follow")
+        p_BCs = []
+        for time in (0.0, 2.5, 10.0):
+            go_to(reader, time)
+            X_WB = X_WB_at(round(time / PERIOD))
+            p_BCs.append(X_WB.inverse() @ p_WC(reader))
+        # Behind the car and above it, at all times.
+        assert p_BCs[0][0] < -5.0
+        assert abs(p_BCs[0][1]) < 1e-6
+        assert p_BCs[0][2] > 2.0
+        np.testing.assert_allclose(p_BCs, [p_BCs[0]] * 3, atol=1e-6)
+        click(reader, "follow")
+        np.testing.assert_allclose(p_WC(reader), before, atol=1e-6)
+        go_to(reader, 0.0)
+        np.testing.assert_allclose(p_WC(reader), before, atol=1e-6)
+
+    def test_slider_goes_forth_and_back(self, reader):
+        clock = 'document.getElementById("clock").value'
+        for time, text in ((10.0, "0:10"), (2.0, "0:02"), (6.0, "0:06")):
+            go_to(reader, time)
+            assert reader.evaluate(clock) == f"{text} / 0:10"
+            assert is_visible(reader, "scans", "001") is (time >= 5.0)
+
+    def test_drive_plays(self, reader):
+        click(reader, "play")
+        reader.wait_for("viewer.animator.time > 0.2")
+        click(reader, "play")
+        label = reader.evaluate('document.getElementById("play").textContent')
+        assert label == "Play"
+        assert reader.evaluate("viewer.animator.playing") is False
+
+    def test_points_can_be_hidden(self, reader):
+        for is_on in (True, False, True):
+            assert is_visible(reader, "scans") is is_on
+            click(reader, "points")
