@@ -36,8 +36,10 @@ if TYPE_CHECKING:
     from cns_drake.sensors.imu import Imu, add_imu
     from cns_drake.sensors.lidar import Lidar
     from cns_drake.sensors.lidar_adding import add_lidar
+    from cns_drake.sensors.lidar_view import add_lidar_view
     from cns_drake.sensors.measurement import MeasurementModel
     from cns_drake.sensors.odometry import Odometry, add_odometry
+    from cns_drake.simulation.sensor_recording import add_mcap_recorder
     from cns_drake.simulation.simulation import Run, simulate
     from cns_drake.simulation.station import make_station
     import evaluation
@@ -62,6 +64,8 @@ __all__ = [
     "__version__",
     "add_imu",
     "add_lidar",
+    "add_lidar_view",
+    "add_mcap_recorder",
     "add_odometry",
     "evaluation",
     "load_scenario",
@@ -93,8 +97,10 @@ _HOMES = {
     "sensors.imu": ("Imu", "add_imu"),
     "sensors.lidar": ("Lidar",),
     "sensors.lidar_adding": ("add_lidar",),
+    "sensors.lidar_view": ("add_lidar_view",),
     "sensors.measurement": ("MeasurementModel",),
     "sensors.odometry": ("Odometry", "add_odometry"),
+    "simulation.sensor_recording": ("add_mcap_recorder",),
     "simulation.simulation": ("Run", "simulate"),
     "simulation.station": ("make_station",),
 }

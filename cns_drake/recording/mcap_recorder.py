@@ -4,16 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context, EventStatus, LeafSystem
+from pydrake.systems.framework import (
+    Context,
+    EventStatus,
+    InputPort,
+    LeafSystem,
+)
+from pydrake.systems.sensors import (
+    CameraInfo,
+    ImageDepth32F,
+    ImageLabel16I,
+    ImageRgba8U,
+)
 
 from cns_drake.recording import messages
 from cns_drake.recording.background_writer import BackgroundWriter
 from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.frame_clock import frame_stamp_ns
+from cns_drake.recording.image_messages import (
+    CAMERA_INFO,
+    ENCODINGS,
+    IMAGE,
+    make_camera_info,
+    make_image,
+)
 from cns_drake.recording.rosbag2_metadata import Topic
 
 _TF_STATIC = Topic("/tf_static", messages.TF, latched=True)
@@ -24,6 +42,25 @@ _IMU = Topic("/imu/data", messages.IMU)
 # Events of a periodic schedule come at exact multiples of the period; only
 # the rounding of that product separates their times from a frame's.
 _FRAME_TOLERANCE = 1e-6
+
+_IMAGES = {
+    "color": ImageRgba8U,
+    "depth": ImageDepth32F,
+    "label": ImageLabel16I,
+}
+
+
+class RecordedCamera(NamedTuple):
+    """A camera as a recording wants to know it.
+
+    Attributes:
+        info: its intrinsics.
+        X_BC: pose of its optical frame C (z ahead, y down) in the sensor's
+            frame B, of which the port `<camera>_pose` tells.
+    """
+
+    info: CameraInfo
+    X_BC: RigidTransform
 
 
 class McapRecorder(LeafSystem):
@@ -37,14 +74,24 @@ class McapRecorder(LeafSystem):
         - specific_force
         - angular_velocity
         - <lidar>_scan (one for each LiDAR)
+        - <lidar>_pose (for each LiDAR without a fixed place)
+        - <camera>_color (one for each camera)
+        - <camera>_depth
+        - <camera>_label
+        - <camera>_pose
 
-    Frames: map W, vehicle B (`base_link`), imu I, LiDAR S.
+    Frames: map W, vehicle B (`base_link`), imu I, LiDAR S, camera C.
 
     - `odometry`: abstract, an object with `X_WB` (RigidTransform) and
       `V_WB_B` (SpatialVelocity expressed in B).
     - `specific_force`: of I, expressed in I, vector of size 3 [m/s^2].
     - `angular_velocity`: w_WI_I, vector of size 3 [rad/s].
     - `<lidar>_scan`: abstract, structured array of points expressed in S.
+    - `<lidar>_pose`: abstract, X_WS.
+    - `<camera>_color`, `_depth`, `_label`: images as Drake's RgbdSensor gives
+      them; `<camera>_pose`: abstract, the pose of that sensor.
+
+    What is not connected is not recorded.
 
     The system has no state. Frame i is what the inputs show at i * period;
     it is written by a periodic publish event from time zero on, or by a
@@ -64,24 +111,31 @@ class McapRecorder(LeafSystem):
         self,
         bag: BagWriter | BackgroundWriter,
         *,
-        X_BSs: Mapping[str, RigidTransform],
-        X_BI: RigidTransform,
+        X_BSs: Mapping[str, RigidTransform | None],
+        X_BI: RigidTransform | None = None,
+        cameras: Mapping[str, RecordedCamera] | None = None,
         period: float,
-        start_ns: int,
+        start_ns: int = 0,
     ):
         """Declares the ports and the schedule.
 
         Args:
-            bag: an open bag with the topics of `recording_topics`.
-            X_BSs: LiDAR name -> pose of its frame S in B.
-            X_BI: pose of the imu frame I in B.
+            bag: a bag with the topics of `recording_topics`, open when the
+                first frame comes.
+            X_BSs: LiDAR name -> pose of its frame S in B, None if it has no
+                fixed place there.
+            X_BI: pose of the imu frame I in B, None if it has none.
+            cameras: camera name -> camera.
             period: time between frames [s].
             start_ns: the stamp of frame 0 [ns].
         """
         super().__init__()
         self._bag = bag
-        self._X_BSs = dict(X_BSs)
+        self._X_BCs = {name: X for name, X in X_BSs.items() if X is not None}
+        if X_BI is not None:
+            self._X_BCs[messages.IMU_FRAME] = X_BI
         self._X_BI = X_BI
+        self._cameras = dict(cameras or {})
         self._period = period
         self._start_ns = start_ns
 
@@ -94,46 +148,97 @@ class McapRecorder(LeafSystem):
         )
         self._scans = {
             name: self.DeclareAbstractInputPort(f"{name}_scan", Value(object()))
-            for name in self._X_BSs
+            for name in X_BSs
         }
+        # Frame on the map -> the port that tells its pose, and from there.
+        self._poses = {
+            name: (self._declare_pose(name), RigidTransform())
+            for name, X_BS in X_BSs.items()
+            if X_BS is None
+        }
+        self._images: dict[str, dict[str, InputPort]] = {}
+        for name, camera in self._cameras.items():
+            self._images[name] = {
+                kind: self.DeclareAbstractInputPort(
+                    f"{name}_{kind}", Value(image())
+                )
+                for kind, image in _IMAGES.items()
+            }
+            self._poses[name] = (self._declare_pose(name), camera.X_BC)
         self.DeclarePeriodicPublishEvent(
             period_sec=period, offset_sec=0.0, publish=self._publish
         )
         self.DeclareForcedPublishEvent(self._publish)
+
+    def _declare_pose(self, name: str) -> InputPort:
+        return self.DeclareAbstractInputPort(
+            f"{name}_pose", Value(RigidTransform())
+        )
 
     def _publish(self, context: Context) -> EventStatus:
         frame = self._frame_index(context.get_time())
         stamp_ns = frame_stamp_ns(
             frame, start_ns=self._start_ns, period=self._period
         )
-        odometry = self._odometry.Eval(context)
-        if frame == 0:
+        odometry = _eval(self._odometry, context)
+        if frame == 0 and self._X_BCs:
             # Latched, hence once; in the first frame rather than before it,
             # so that the recorder needs no memory of having written it.
-            self._write(_TF_STATIC, self._make_tf_static(stamp_ns), stamp_ns, 0)
-        outgoing = {
-            _TF: messages.make_tf(
-                messages.MAP_FRAME,
-                {messages.BASE_FRAME: odometry.X_WB},
-                stamp_ns,
-            ),
-            _ODOMETRY: messages.make_odometry(
-                odometry.X_WB, odometry.V_WB_B, stamp_ns
-            ),
-            _IMU: messages.make_imu(
-                odometry.X_WB.rotation() @ self._X_BI.rotation(),
-                self._angular_velocity.Eval(context),
-                self._specific_force.Eval(context),
-                stamp_ns,
-            ),
+            tf = messages.make_tf(messages.BASE_FRAME, self._X_BCs, stamp_ns)
+            self._write(_TF_STATIC, tf, stamp_ns, 0)
+        outgoing: dict[Topic, Any] = {}
+        X_WCs = {
+            name: port.Eval(context) @ X_PC
+            for name, (port, X_PC) in self._poses.items()
+            if port.HasValue(context)
         }
-        for name, scan in self._scans.items():
-            outgoing[_points_topic(name)] = messages.make_point_cloud(
-                scan.Eval(context), name, stamp_ns
+        if odometry is not None:
+            X_WCs = {messages.BASE_FRAME: odometry.X_WB, **X_WCs}
+        if X_WCs:
+            outgoing[_TF] = messages.make_tf(
+                messages.MAP_FRAME, X_WCs, stamp_ns
             )
+        if odometry is not None:
+            outgoing[_ODOMETRY] = messages.make_odometry(
+                odometry.X_WB, odometry.V_WB_B, stamp_ns
+            )
+        angular_velocity = _eval(self._angular_velocity, context)
+        specific_force = _eval(self._specific_force, context)
+        if angular_velocity is not None or specific_force is not None:
+            R_WI = None
+            if odometry is not None and self._X_BI is not None:
+                R_WI = odometry.X_WB.rotation() @ self._X_BI.rotation()
+            outgoing[_IMU] = messages.make_imu(
+                R_WI, angular_velocity, specific_force, stamp_ns
+            )
+        for name, port in self._scans.items():
+            scan = _eval(port, context)
+            if scan is not None:
+                outgoing[_points_topic(name)] = messages.make_point_cloud(
+                    scan, name, stamp_ns
+                )
+        for name in self._cameras:
+            outgoing |= self._photograph(context, name, stamp_ns)
         for topic, message in outgoing.items():
             self._write(topic, message, stamp_ns, frame)
         return EventStatus.Succeeded()
+
+    def _photograph(
+        self, context: Context, name: str, stamp_ns: int
+    ) -> dict[Topic, Any]:
+        """Returns the messages of a camera."""
+        outgoing = {}
+        for kind, port in self._images[name].items():
+            image = _eval(port, context)
+            if image is not None:
+                outgoing[_image_topic(name, kind)] = make_image(
+                    image.data, ENCODINGS[kind], name, stamp_ns
+                )
+        if outgoing:
+            outgoing[_camera_info_topic(name)] = make_camera_info(
+                self._cameras[name].info, name, stamp_ns
+            )
+        return outgoing
 
     def _write(
         self, topic: Topic, message: Any, stamp_ns: int, sequence: int
@@ -141,10 +246,6 @@ class McapRecorder(LeafSystem):
         self._bag.write(
             topic.name, stamp_ns, messages.serialize(message), sequence
         )
-
-    def _make_tf_static(self, stamp_ns: int) -> Any:
-        X_BCs = {**self._X_BSs, messages.IMU_FRAME: self._X_BI}
-        return messages.make_tf(messages.BASE_FRAME, X_BCs, stamp_ns)
 
     def _frame_index(self, time: float) -> int:
         frame = round(time / self._period)
@@ -157,39 +258,72 @@ class McapRecorder(LeafSystem):
         return frame
 
 
-def recording_topics(lidar_names: Iterable[str]) -> tuple[Topic, ...]:
-    """Returns the topics of a recording with LiDARs of these names.
+def _eval(port: InputPort, context: Context) -> Any:
+    """Returns what an input shows, None if nothing is connected."""
+    return port.Eval(context) if port.HasValue(context) else None
+
+
+def recording_topics(
+    lidar_names: Iterable[str],
+    *,
+    camera_names: Iterable[str] = (),
+    with_imu: bool = True,
+    with_odometry: bool = True,
+) -> tuple[Topic, ...]:
+    """Returns the topics of a recording.
+
+    Args:
+        lidar_names: of its LiDARs.
+        camera_names: of its cameras.
+        with_imu: whether it has an IMU.
+        with_odometry: whether it has odometry.
 
     Example:
         from cns_drake import recording_topics
 
         topics = recording_topics(["lidar"])
     """
-    points = tuple(_points_topic(name) for name in lidar_names)
-    return (*points, _IMU, _ODOMETRY, _TF, _TF_STATIC)
+    topics = [_points_topic(name) for name in lidar_names]
+    for name in camera_names:
+        topics += [_image_topic(name, kind) for kind in ENCODINGS]
+        topics.append(_camera_info_topic(name))
+    topics += [_IMU] if with_imu else []
+    topics += [_ODOMETRY] if with_odometry else []
+    return (*topics, _TF, _TF_STATIC)
 
 
 def make_calibration(
-    X_BSs: Mapping[str, RigidTransform], X_BI: RigidTransform
+    X_BSs: Mapping[str, RigidTransform], X_BI: RigidTransform | None
 ) -> dict:
     """Returns the sensor frames as a JSON value, for an attachment.
 
     Args:
         X_BSs: LiDAR name -> pose of its frame S in the vehicle frame B.
-        X_BI: pose of the imu frame I in B.
+        X_BI: pose of the imu frame I in B, None if there is none.
 
     Returns:
         Frame name -> parent frame, `translation` [m] and `quat_xyzw`.
     """
+    X_BCs = dict(X_BSs)
+    if X_BI is not None:
+        X_BCs[messages.IMU_FRAME] = X_BI
     return {
         name: {
             "parent": messages.BASE_FRAME,
             "translation": [float(x) for x in X_BC.translation()],
             "quat_xyzw": list(messages.to_quat_xyzw(X_BC.rotation())),
         }
-        for name, X_BC in {**X_BSs, messages.IMU_FRAME: X_BI}.items()
+        for name, X_BC in X_BCs.items()
     }
 
 
 def _points_topic(lidar_name: str) -> Topic:
     return Topic(f"/{lidar_name}/points", messages.POINT_CLOUD)
+
+
+def _image_topic(camera_name: str, kind: str) -> Topic:
+    return Topic(f"/{camera_name}/{kind}", IMAGE)
+
+
+def _camera_info_topic(camera_name: str) -> Topic:
+    return Topic(f"/{camera_name}/camera_info", CAMERA_INFO)

@@ -71,7 +71,7 @@ def make_point_cloud(points: np.ndarray, frame_id: str, stamp_ns: int) -> Any:
         ray without a return.
     """
     packed = np.zeros(len(points), dtype=points.dtype)
-    point_field = _message_class("sensor_msgs/msg/PointField")
+    point_field = message_class("sensor_msgs/msg/PointField")
     fields = []
     for name, (dtype, offset, *_) in (points.dtype.fields or {}).items():
         packed[name] = points[name]
@@ -83,8 +83,8 @@ def make_point_cloud(points: np.ndarray, frame_id: str, stamp_ns: int) -> Any:
                 count=1,
             )
         )
-    return _message_class(POINT_CLOUD)(
-        header=_make_header(frame_id, stamp_ns),
+    return message_class(POINT_CLOUD)(
+        header=make_header(frame_id, stamp_ns),
         height=1,
         width=len(packed),
         fields=fields,
@@ -97,9 +97,9 @@ def make_point_cloud(points: np.ndarray, frame_id: str, stamp_ns: int) -> Any:
 
 
 def make_imu(
-    R_WI: RotationMatrix,
-    angular_velocity: np.ndarray,
-    specific_force: np.ndarray,
+    R_WI: RotationMatrix | None,
+    angular_velocity: np.ndarray | None,
+    specific_force: np.ndarray | None,
     stamp_ns: int,
 ) -> Any:
     """Returns an Imu message of an ideal sensor.
@@ -112,17 +112,30 @@ def make_imu(
         stamp_ns: the time of the measurement [ns].
 
     Returns:
-        The message; its covariances are zero, since nothing is uncertain.
+        The message; its covariances are zero, since nothing is uncertain,
+        but begin with -1 for what is None, as ROS has it.
     """
-    return _message_class(IMU)(
-        header=_make_header(IMU_FRAME, stamp_ns),
-        orientation=_make_quaternion(R_WI),
-        orientation_covariance=np.zeros(9),
-        angular_velocity=_make_vector(angular_velocity),
-        angular_velocity_covariance=np.zeros(9),
-        linear_acceleration=_make_vector(specific_force),
-        linear_acceleration_covariance=np.zeros(9),
+    zero = np.zeros(3)
+    return message_class(IMU)(
+        header=make_header(IMU_FRAME, stamp_ns),
+        orientation=_make_quaternion(R_WI or RotationMatrix()),
+        orientation_covariance=_certainty(R_WI),
+        angular_velocity=_make_vector(
+            zero if angular_velocity is None else angular_velocity
+        ),
+        angular_velocity_covariance=_certainty(angular_velocity),
+        linear_acceleration=_make_vector(
+            zero if specific_force is None else specific_force
+        ),
+        linear_acceleration_covariance=_certainty(specific_force),
     )
+
+
+def _certainty(value: object) -> np.ndarray:
+    """Returns the covariance of what is exact, or None."""
+    covariance = np.zeros(9)
+    covariance[0] = -1.0 if value is None else 0.0
+    return covariance
 
 
 def make_odometry(
@@ -138,21 +151,21 @@ def make_odometry(
     Returns:
         The message; its covariances are zero, since nothing is uncertain.
     """
-    pose = _message_class("geometry_msgs/msg/Pose")(
+    pose = message_class("geometry_msgs/msg/Pose")(
         position=_make_point(X_WB.translation()),
         orientation=_make_quaternion(X_WB.rotation()),
     )
-    twist = _message_class("geometry_msgs/msg/Twist")(
+    twist = message_class("geometry_msgs/msg/Twist")(
         linear=_make_vector(V_WB_B.translational()),
         angular=_make_vector(V_WB_B.rotational()),
     )
-    return _message_class(ODOMETRY)(
-        header=_make_header(MAP_FRAME, stamp_ns),
+    return message_class(ODOMETRY)(
+        header=make_header(MAP_FRAME, stamp_ns),
         child_frame_id=BASE_FRAME,
-        pose=_message_class("geometry_msgs/msg/PoseWithCovariance")(
+        pose=message_class("geometry_msgs/msg/PoseWithCovariance")(
             pose=pose, covariance=np.zeros(36)
         ),
-        twist=_message_class("geometry_msgs/msg/TwistWithCovariance")(
+        twist=message_class("geometry_msgs/msg/TwistWithCovariance")(
             twist=twist, covariance=np.zeros(36)
         ),
     )
@@ -168,12 +181,12 @@ def make_tf(
         X_PCs: name of each child frame C -> its pose in P.
         stamp_ns: the time of all of them [ns].
     """
-    transform = _message_class("geometry_msgs/msg/Transform")
-    transform_stamped = _message_class("geometry_msgs/msg/TransformStamped")
-    return _message_class(TF)(
+    transform = message_class("geometry_msgs/msg/Transform")
+    transform_stamped = message_class("geometry_msgs/msg/TransformStamped")
+    return message_class(TF)(
         transforms=[
             transform_stamped(
-                header=_make_header(parent, stamp_ns),
+                header=make_header(parent, stamp_ns),
                 child_frame_id=child,
                 transform=transform(
                     translation=_make_vector(X_PC.translation()),
@@ -196,30 +209,32 @@ def to_quat_xyzw(R: RotationMatrix) -> tuple[float, float, float, float]:
     )
 
 
-def _message_class(message_type: str) -> type:
+def message_class(message_type: str) -> type:
+    """Returns the class of a type of messages."""
     return _TYPESTORE.types[message_type]
 
 
-def _make_header(frame_id: str, stamp_ns: int) -> Any:
+def make_header(frame_id: str, stamp_ns: int) -> Any:
+    """Returns the header of a message."""
     sec, nanosec = divmod(stamp_ns, 1_000_000_000)
-    time = _message_class("builtin_interfaces/msg/Time")
-    return _message_class("std_msgs/msg/Header")(
+    time = message_class("builtin_interfaces/msg/Time")
+    return message_class("std_msgs/msg/Header")(
         stamp=time(sec=sec, nanosec=nanosec), frame_id=frame_id
     )
 
 
 def _make_quaternion(R: RotationMatrix) -> Any:
     x, y, z, w = to_quat_xyzw(R)
-    return _message_class("geometry_msgs/msg/Quaternion")(x=x, y=y, z=z, w=w)
+    return message_class("geometry_msgs/msg/Quaternion")(x=x, y=y, z=z, w=w)
 
 
 def _make_vector(xyz: np.ndarray) -> Any:
-    return _message_class("geometry_msgs/msg/Vector3")(
+    return message_class("geometry_msgs/msg/Vector3")(
         x=float(xyz[0]), y=float(xyz[1]), z=float(xyz[2])
     )
 
 
 def _make_point(xyz: np.ndarray) -> Any:
-    return _message_class("geometry_msgs/msg/Point")(
+    return message_class("geometry_msgs/msg/Point")(
         x=float(xyz[0]), y=float(xyz[1]), z=float(xyz[2])
     )

@@ -174,6 +174,14 @@ class Lidar(LeafSystem):
     def pattern(self) -> BeamPattern:
         return self._pattern
 
+    @property
+    def parent_frame_id(self) -> FrameId:
+        return self._parent_frame_id
+
+    @property
+    def X_PS(self) -> RigidTransform:
+        return self._X_PS
+
     def _calc_seen(self, context: Context, value: AbstractValue) -> None:
         self._update(context, value.get_value())
 

@@ -13,6 +13,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from cns_drake.scene.geometry_revision import geometry_revision_port
 from cns_drake.sensors.beam_pattern import BeamPattern, make_beam_pattern
+from cns_drake.sensors.body_motion import body_and_pose
 from cns_drake.sensors.lidar import Lidar
 
 
@@ -57,9 +58,8 @@ def add_lidar(
         lidar = add_lidar(builder, scene_graph, body, X_BS, "os1-64")
         builder.ExportOutput(lidar.GetOutputPort("scan"), "scan")
     """
-    if isinstance(body, Frame):
-        X_PS = body.GetFixedPoseInBodyFrame() @ X_PS
-        body = body.body()
+    if not isinstance(body, FrameId):
+        body, X_PS = body_and_pose(body, X_PS)
     if isinstance(pattern, str):
         pattern = make_beam_pattern(pattern, 0.05)
     if isinstance(body, RigidBody):

@@ -115,10 +115,10 @@ def make_station(
                 sweep.GetOutputPort("sweep"), lidar.GetInputPort("sweep")
             )
         measured[f"{name}_scan"] = lidar.GetOutputPort("scan")
-    accelerometer, gyroscope = add_imu(builder, plant, motion, base, X_BI)
+    accelerometer, gyroscope = add_imu(builder, base, X_BI, motion=motion)
     measured["specific_force"] = accelerometer.get_measurement_output_port()
     measured["angular_velocity"] = gyroscope.get_measurement_output_port()
-    odometry = add_odometry(builder, motion, base)
+    odometry = add_odometry(builder, base, motion=motion)
     measured["odometry"] = odometry.GetOutputPort("odometry")
 
     recorders = {"meshcat_recorder": page}

@@ -36,8 +36,8 @@ class Station:
         motion = builder.AddNamedSystem(
             "vehicle_motion", VehicleMotion(plant, vehicle, trajectory)
         )
-        self.imu = add_imu(builder, plant, motion, base, X_BI, "roof_imu")
-        self.odometry = add_odometry(builder, motion, base)
+        self.imu = add_imu(builder, base, X_BI, motion=motion, name="roof_imu")
+        self.odometry = add_odometry(builder, base, motion=motion)
         self.diagram = builder.Build()
         self._context = self.diagram.CreateDefaultContext()
 
