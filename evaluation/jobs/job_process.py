@@ -33,6 +33,8 @@ from evaluation.support.interrupts import (
 PATIENCE = 30.0
 # How often a job tells of its progress at most [s].
 _TELL_INTERVAL = 0.5
+# Where what a job prints goes, whatever stands for it in this process.
+_STDERR = 2
 # How often a parent looks whether its job is still wanted [s].
 _LOOK_INTERVAL = 0.2
 
@@ -110,7 +112,7 @@ def run_process(
         env={**os.environ, **_ALLOCATION},
         pass_fds=[theirs.fileno()],
         stdin=subprocess.DEVNULL,
-        stdout=sys.stderr.fileno(),
+        stdout=_STDERR,
         start_new_session=True,
     )
     theirs.close()  # So that the pipe ends with the process.

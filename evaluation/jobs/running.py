@@ -14,18 +14,18 @@ import graphlib
 import pickle
 import queue
 import time
-from typing import TYPE_CHECKING, Any
-import uuid
+from typing import TYPE_CHECKING
 
 from evaluation.jobs.cluster import Cluster
+from evaluation.jobs.dask_workers import LostSchedulerError
 from evaluation.jobs.job_process import (
     PATIENCE,
     JobError,
     ProcessDiedError,
     Tell,
     nothing_left,
-    run_process,
 )
+from evaluation.jobs.workers import Workers
 from evaluation.support.errors import (
     FailedJobsError,
     InputError,
@@ -35,16 +35,12 @@ from evaluation.support.errors import (
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from distributed import Client, Future
-
     from evaluation.jobs.job_progress import JobProgress
 
 __all__ = ["Job", "Tell", "run_jobs"]
 
 # How often a job is started again after its process has died.
 _RETRIES = 2
-# What Dask calls all jobs.
-_KIND = "job"
 # How often the display shows the time anew [s].
 _REFRESH_INTERVAL = 0.5
 
@@ -100,11 +96,14 @@ def run_jobs(jobs: Iterable[Job], cluster: Cluster) -> None:
         return
     from evaluation.jobs.job_progress import JobProgress
 
+    messages: queue.SimpleQueue = queue.SimpleQueue()
     with (
-        cluster.connect() as client,
         JobProgress({job.name: job.cost for job in by_name.values()}) as shown,
+        cluster.connect(lambda *message: messages.put(message)) as workers,
     ):
-        run = _Run(by_name, done, urgency, client, shown, cluster.slots)
+        run = _Run(
+            by_name, done, urgency, workers, messages, shown, cluster.slots
+        )
         run.run()
     run.raise_faults()
 
@@ -154,26 +153,27 @@ def _ordered(jobs: Mapping[str, Job]) -> list[str]:
 
 
 class _Run:
-    """One run of jobs on a cluster, seen from the client."""
+    """One run of jobs on workers."""
 
     def __init__(
         self,
         jobs: Mapping[str, Job],
         done: Set[str],
         urgency: Mapping[str, float],
-        client: Client,
+        workers: Workers,
+        messages: queue.SimpleQueue,
         shown: JobProgress,
         slots: int | None,
     ):
         self._jobs = jobs
         self._slots = slots
         self._urgency = urgency
-        self._client = client
+        self._workers = workers
+        self._messages = messages
         self._shown = shown
-        self._id = uuid.uuid4().hex
-        self._messages: queue.SimpleQueue = queue.SimpleQueue()
         self._waiting = dict(jobs)
-        self._futures: dict[str, Future] = {}
+        # Those of which the result is not known.
+        self._submitted: set[str] = set()
         # Those that have a process, as far as is known here.
         self._running: set[str] = set()
         self._done = set(done)
@@ -182,16 +182,9 @@ class _Run:
 
     def run(self) -> None:
         """Runs until nothing more can be done."""
-        self._client.subscribe_topic(
-            self._id, lambda event: self._messages.put(event[1])
-        )
         self._submit_ready()
-        if not self._client.nthreads():
-            self._shown.note(
-                f"{self._client.scheduler.address}: no workers yet, waiting"
-            )
         try:
-            while self._futures:
+            while self._submitted:
                 self._take_in(_REFRESH_INTERVAL)
         except KeyboardInterrupt:
             self._stop()
@@ -218,30 +211,19 @@ class _Run:
             key=lambda job: -self._urgency[job.name],
         )
         if self._slots is not None:
-            # What Dask has it gives to a worker at once, busy or not.
-            ready = ready[: max(self._slots - len(self._futures), 0)]
+            ready = ready[: max(self._slots - len(self._submitted), 0)]
         for job in ready:
             del self._waiting[job.name]
             self._submit(job)
 
     def _submit(self, job: Job) -> None:
-        death = self._deaths[job.name]
-        future = self._client.submit(
-            work,
+        self._submitted.add(job.name)
+        self._workers.submit(
             job.name,
             pickle.dumps(
                 (job.function, job.arguments, job.output, job.is_done)
             ),
-            self._id,
-            # Up to the first "-", what Dask knows the duration of: only then
-            # it moves jobs from a worker to an idle one.
-            key=f"{_KIND}-{job.name} {death}-{self._id}",
-            priority=self._urgency[job.name],
-            pure=False,
-        )
-        self._futures[job.name] = future
-        future.add_done_callback(
-            lambda future: self._messages.put(("future", job.name))
+            self._urgency[job.name],
         )
 
     def _take_in(self, timeout: float) -> None:
@@ -250,9 +232,11 @@ class _Run:
         except queue.Empty:
             self._shown.refresh()
             return
-        if kind == "future":
-            if name in self._futures:
-                self._take_result(name, self._futures.pop(name))
+        if kind == "result":
+            # Not of those that were ended.
+            if name in self._submitted:
+                self._submitted.remove(name)
+                self._take_result(name, *values)
         elif kind == "started":
             self._running.add(name)
             self._shown.start(name)
@@ -263,24 +247,15 @@ class _Run:
         else:
             self._shown.note(*values)
 
-    def _take_result(self, name: str, future: Future) -> None:
+    def _take_result(self, name: str, error: Exception | None) -> None:
         self._running.discard(name)
-        if future.status == "finished":
+        if error is None:
             self._done.add(name)
             self._shown.end(name)
             self._submit_ready()
             return
-        if future.status == "lost":
-            # Done, but its worker went before that was noticed here. Who does
-            # it again finds it done.
-            error = ProcessDiedError("its worker died")
-        elif future.status == "error":
-            error = future.exception()
-        else:
-            raise InputError(
-                f"{self._client.scheduler.address}: the connection to the "
-                "scheduler was lost; the same command goes on from here"
-            )
+        if isinstance(error, LostSchedulerError):
+            raise error
         if (
             isinstance(error, ProcessDiedError)
             and self._deaths[name] < _RETRIES
@@ -292,59 +267,19 @@ class _Run:
         self._faults[name] = _describe(error)
         self._shown.end(name, fault=True)
         self._submit_ready()
-        if self._futures:
+        if self._submitted:
             self._shown.note(f"{name}: failed: {self._faults[name]}")
 
     def _stop(self) -> None:
         """Ends what is running, and waits until it has closed its files."""
-        self._client.cancel(list(self._futures.values()), force=True)
-        self._futures.clear()
+        self._submitted.clear()
+        self._workers.stop()
         deadline = time.monotonic() + PATIENCE
         while self._running and (left := deadline - time.monotonic()) > 0:
             self._take_in(min(left, _REFRESH_INTERVAL))
 
 
-def _describe(error: Any) -> str:
-    if isinstance(error, JobError | ProcessDiedError):
+def _describe(error: Exception) -> str:
+    if isinstance(error, InputError | JobError | ProcessDiedError):
         return str(error)
-    from distributed.scheduler import KilledWorker
-
-    if isinstance(error, KilledWorker):
-        return "every worker that ran it died"
     return one_line(f"{type(error).__name__}: {error}")
-
-
-def work(name: str, job: bytes, topic: str) -> None:
-    """Runs a job; what a worker of Dask does.
-
-    Args:
-        name: of the job.
-        job: see `run_process`.
-        topic: under which the client hears of it.
-
-    Raises:
-        JobError: see `run_process`.
-        ProcessDiedError: see `run_process`.
-    """
-    from distributed import Status, get_worker
-
-    worker = get_worker()
-    key = worker.get_current_task()
-
-    def tell(kind: str, *values: object) -> None:
-        worker.log_event(topic, (kind, name, *values))
-
-    def is_wanted() -> bool:
-        # A client that goes, or no longer wants it, is noticed here only.
-        task = worker.state.tasks.get(key)
-        return (
-            worker.status in (Status.running, Status.paused)
-            and task is not None
-            and task.state != "cancelled"
-        )
-
-    tell("started")
-    try:
-        run_process(job, tell, is_wanted)
-    finally:
-        tell("ended")

@@ -17,7 +17,10 @@ from evaluation.sequences import open_sequence
 PAGES = documents.pages()
 CODES = [piece.text for page in PAGES for piece in documents.inline(page)]
 # Of tools that are not this project's.
-FOREIGN_OPTIONS = {"--nthreads", "--nworkers"}
+FOREIGN_OPTIONS = {
+    *("--nthreads", "--nworkers"),
+    *("--tls-ca-file", "--tls-cert", "--tls-key"),
+}
 
 
 def commands():

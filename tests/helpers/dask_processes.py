@@ -18,13 +18,18 @@ class DaskProcesses:
         workers: the processes, one thread each and nobody to restart them.
     """
 
-    def __init__(self, folder):
+    def __init__(self, folder, security=None, options=()):
+        """Takes what clients need to reach it, and what it is told itself."""
         self._folder = folder
+        self._security = security
+        self._options = options
         self.workers = []
 
     def __enter__(self):
         self._scheduler = self._start(
-            "dask_scheduler", "--host", "127.0.0.1", "--port", "0"
+            "dask_scheduler",
+            *("--port", "0", "--no-dashboard", *self._options),
+            *("--host", "tls://127.0.0.1" if self._options else "127.0.0.1"),
         )
         for line in self._scheduler.stderr:
             if "Scheduler at:" in line:
@@ -49,11 +54,14 @@ class DaskProcesses:
                 self.address,
                 *("--nthreads", "1", "--no-nanny", "--no-dashboard"),
                 *("--memory-limit", "0", "--local-directory", self._folder),
+                *self._options,
                 quiet=True,
             )
             self.workers.append(worker)
         alive = sum(worker.poll() is None for worker in self.workers)
-        with Client(self.address, set_as_default=False) as client:
+        with Client(
+            self.address, set_as_default=False, security=self._security
+        ) as client:
             client.wait_for_workers(alive, timeout=600)
 
     def job_processes(self):

@@ -1,6 +1,7 @@
 """Jobs on a real scheduler and its workers, which are killed."""
 
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -8,6 +9,7 @@ import sys
 
 from bag_recordings import contents
 from dask_processes import DaskProcesses
+from distributed import Security
 from generation import Generation
 import job_functions
 import psutil
@@ -15,7 +17,7 @@ import pytest
 from tiny_drive import tiny_scenario, write_scenario
 
 from cns_drake.simulation.simulation import simulate
-from evaluation.jobs import cluster
+from evaluation.jobs import dask_workers
 from evaluation.jobs.cluster import Cluster
 from evaluation.jobs.running import Job, run_jobs
 from evaluation.support.errors import InputError
@@ -123,20 +125,89 @@ def test_a_worker_that_dies_each_time_is_a_fault(dask, tmp_path):
     ["tcp://127.0.0.1:1", "nonsense://here", "nonsense", "tls://127.0.0.1:1"],
 )
 def test_a_scheduler_that_is_not_there(monkeypatch, address):
-    monkeypatch.setattr(cluster, "_ANSWER_TIMEOUT", 0.5)
+    monkeypatch.setattr(dask_workers, "_ANSWER_TIMEOUT", 0.5)
     with (
         pytest.raises(InputError, match=f"^--scheduler: {address}: no answer"),
-        Cluster(scheduler=address).connect(),
+        Cluster(scheduler=address).connect(print),
     ):
         pass
 
 
+@pytest.fixture(scope="module")
+def certificates(tmp_path_factory):
+    """Options of TLS -> files, signed by an authority for this test."""
+    folder = tmp_path_factory.mktemp("certificates")
+
+    def openssl(*words):
+        subprocess.run(
+            ["openssl", *words], cwd=folder, check=True, capture_output=True
+        )
+
+    new = ("req", "-newkey", "rsa:2048", "-nodes", "-subj")
+    openssl(*new, "/CN=test", "-x509", "-keyout", "ca.key", "-out", "ca.pem")
+    openssl(*new, "/CN=me", "-keyout", "me.key", "-out", "me.csr")
+    openssl(
+        *("x509", "-req", "-in", "me.csr", "-CA", "ca.pem"),
+        *("-CAkey", "ca.key", "-CAcreateserial", "-out", "me.pem"),
+    )
+    files = {"ca-file": "ca.pem", "cert": "me.pem", "key": "me.key"}
+    return {name: str(folder / file) for name, file in files.items()}
+
+
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="no openssl")
+def test_a_scheduler_that_asks_for_certificates(certificates, tmp_path):
+    """As Dask's configuration names them, in the environment of a command."""
+    ca_file, cert, key = (certificates[k] for k in ("ca-file", "cert", "key"))
+    security = Security(
+        tls_ca_file=ca_file,
+        tls_client_cert=cert,
+        tls_client_key=key,
+        require_encryption=True,
+    )
+    options = [f"--tls-{k}={path}" for k, path in certificates.items()]
+    prefix = "DASK_DISTRIBUTED__COMM__TLS__"
+    variables = {
+        f"{prefix}CA_FILE": ca_file,
+        f"{prefix}CLIENT__CERT": cert,
+        f"{prefix}CLIENT__KEY": key,
+    }
+    with DaskProcesses(tmp_path, security, options) as processes:
+        assert processes.address.startswith("tls://")
+        processes.add_workers(1)
+        script = (
+            "import sys\n"
+            "from pathlib import Path\n"
+            "import job_functions\n"
+            "from evaluation.jobs.cluster import Cluster\n"
+            "from evaluation.jobs.running import Job, run_jobs\n"
+            "address, path = sys.argv[1:]\n"
+            "arguments = [], Path(path)\n"
+            "run_jobs([Job('a', job_functions.join, arguments)],"
+            " Cluster(scheduler=address))\n"
+        )
+        for environment, done in ((variables, True), ({}, False)):
+            path = tmp_path / f"result_{done}"
+            result = subprocess.run(
+                [sys.executable, "-c", script, processes.address, path],
+                env={
+                    **os.environ,
+                    **environment,
+                    "PYTHONPATH": os.pathsep.join(sys.path),
+                },
+                check=False,
+                capture_output=True,
+                text=True,
+            )
+            assert path.is_file() == done, result.stderr
+        assert "--scheduler: tls://" in result.stderr
+
+
 def test_a_scheduler_that_says_nothing(monkeypatch):
-    monkeypatch.setattr(cluster, "_ANSWER_TIMEOUT", 0.5)
+    monkeypatch.setattr(dask_workers, "_ANSWER_TIMEOUT", 0.5)
     with socket.create_server(("127.0.0.1", 0)) as server:
         address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
         with (
             pytest.raises(InputError, match="no answer"),
-            Cluster(scheduler=address).connect(),
+            Cluster(scheduler=address).connect(print),
         ):
             pass

@@ -13,6 +13,7 @@ import psutil
 import pytest
 
 from evaluation.jobs.cluster import Cluster, choose_cluster
+from evaluation.jobs.dask_workers import DaskWorkers, LostSchedulerError
 from evaluation.jobs.job_process import (
     JobError,
     ProcessDiedError,
@@ -123,7 +124,7 @@ def test_what_is_needed_is_there_and_faults_stay_alone(tmp_path, capsys):
     # A process and a session of its own, for which Ctrl-C is not meant.
     pid, parent, session = map(int, process.read_text().split())
     assert pid == session
-    assert parent not in (os.getpid(), pid)
+    assert parent == os.getpid() != pid
     told = capsys.readouterr().err
     assert "here I am" in told
     assert "ZeroDivisionError" in told
@@ -131,47 +132,38 @@ def test_what_is_needed_is_there_and_faults_stay_alone(tmp_path, capsys):
 
 
 class ScriptedCluster:
-    """Has a client whose futures end as they are told, one after the other.
+    """Has workers whose jobs end as they are told, one after the other.
 
     Attributes:
         slots: see `Cluster`.
-        keys: of what was submitted.
+        names: of what was submitted.
     """
 
-    scheduler = SimpleNamespace(address="tcp://scripted:1")
-
-    def __init__(self, *statuses, slots=None):
-        self._statuses = iter(statuses)
+    def __init__(self, *errors, slots=None):
+        self._errors = iter(errors)
         self.slots = slots
-        self.keys = []
+        self.names = []
 
     @contextlib.contextmanager
-    def connect(self):
+    def connect(self, listener):
+        self._listener = listener
         yield self
 
-    def subscribe_topic(self, topic, handler):
-        pass
+    def submit(self, name, job, priority):
+        self.names.append(name)
+        self._listener("result", name, next(self._errors))
 
-    def nthreads(self):
-        return {"worker": 1}
 
-    def submit(self, function, *arguments, key, **options):
-        self.keys.append(key)
-        return SimpleNamespace(
-            status=next(self._statuses), add_done_callback=lambda take: take(0)
-        )
+DIED = ProcessDiedError("its worker died")
 
 
 def test_what_is_lost_with_its_worker_is_asked_for_again(capsys):
-    cluster = ScriptedCluster("lost", "lost", "finished")
+    cluster = ScriptedCluster(DIED, DIED, None)
     run_jobs([job("a", job_functions.refuse)], cluster)
-    # Under a new name each time: the old one stands for the old result.
-    assert len(set(cluster.keys)) == 3
+    assert cluster.names == ["a"] * 3
     assert "a: its worker died; it starts again" in capsys.readouterr().err
     with pytest.raises(FailedJobsError, match=r"^a: its worker died$"):
-        run_jobs(
-            [job("a", job_functions.refuse)], ScriptedCluster(*["lost"] * 3)
-        )
+        run_jobs([job("a", job_functions.refuse)], ScriptedCluster(*[DIED] * 3))
 
 
 @pytest.mark.parametrize(
@@ -186,24 +178,70 @@ def test_a_free_worker_gets_what_is_most_urgent_then(slots, order):
         job("c needs b", job_functions.refuse, needs=["b first"], cost=4.0),
         job("d", job_functions.refuse, cost=2.0),
     ]
-    cluster = ScriptedCluster(*["finished"] * 4, slots=slots)
+    cluster = ScriptedCluster(*[None] * 4, slots=slots)
     run_jobs(jobs, cluster)
-    names = [key.split("-")[1].removesuffix(" 0") for key in cluster.keys]
-    assert "; ".join(names) == order
+    assert "; ".join(cluster.names) == order
 
 
 def test_a_fault_makes_room_for_the_next(capsys):
-    cluster = ScriptedCluster("lost", "lost", "lost", "finished", slots=1)
+    cluster = ScriptedCluster(DIED, DIED, DIED, None, slots=1)
     jobs = [job(name, job_functions.refuse) for name in "ab"]
     with pytest.raises(FailedJobsError, match=r"^a: its worker died$"):
         run_jobs(jobs, cluster)
-    assert len(cluster.keys) == 4
+    assert len(cluster.names) == 4
     assert "a: failed: its worker died" in capsys.readouterr().err
 
 
 def test_a_scheduler_that_is_lost():
+    """As its client tells; what was done under a key is not asked again."""
+    told, keys = [], []
+    statuses = iter(["cancelled", "lost", "finished"])
+
+    def submit(function, *arguments, key, **options):
+        keys.append(key)
+        future = SimpleNamespace(status=next(statuses))
+        future.add_done_callback = lambda take: take(future)
+        return future
+
+    client = SimpleNamespace(
+        scheduler=SimpleNamespace(address="tcp://scripted:1"),
+        nthreads=dict,
+        subscribe_topic=lambda topic, handler: None,
+        submit=submit,
+    )
+    workers = DaskWorkers(client, lambda *message: told.append(message))
+    for _ in range(3):
+        workers.submit("a", b"", 1.0)
+    note, lost, died, done = told
+    assert note == ("note", "", "tcp://scripted:1: no workers yet, waiting")
+    assert isinstance(lost[2], LostSchedulerError)
+    assert str(lost[2]).startswith("tcp://scripted:1: the connection")
+    assert isinstance(died[2], ProcessDiedError)
+    assert done == ("result", "a", None)
+    assert len(set(keys)) == 3
     with pytest.raises(InputError, match=r"^tcp://scripted:1: the connection"):
-        run_jobs([job("a", job_functions.refuse)], ScriptedCluster("cancelled"))
+        run_jobs([job("a", job_functions.refuse)], ScriptedCluster(lost[2]))
+
+
+def test_nobody_else_can_reach_local_jobs(tmp_path):
+    """No port is open, here or in the process of a job."""
+    path = tmp_path / "ports"
+    script = (
+        "import sys\n"
+        "from pathlib import Path\n"
+        "import job_functions\n"
+        "from evaluation.jobs.cluster import Cluster\n"
+        "from evaluation.jobs.running import Job, run_jobs\n"
+        "function, path = job_functions.note_ports, Path(sys.argv[1])\n"
+        "run_jobs([Job('notes', function, (path,))], Cluster(2))\n"
+        "assert 'distributed' not in sys.modules\n"
+    )
+    subprocess.run(
+        [sys.executable, "-c", script, path],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        check=True,
+    )
+    assert path.read_text() == "processes 2, ports []"
 
 
 def test_nothing_to_do_starts_nothing():
