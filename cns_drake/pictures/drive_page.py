@@ -89,7 +89,7 @@ def make_drive_page(
 
     A panel has the title and a legend; buttons play the drive, let the camera
     follow the car, switch points off, and switch on what changed: then the
-    additional is teal.
+    additional is violet.
 
     Args:
         drive: what happened.

@@ -23,7 +23,7 @@ Rgb = tuple[float, float, float]
 CHANGE_RGB: dict[str, Rgb] = {
     "absent": (0.86, 0.08, 0.20),
     "lower": (0.96, 0.50, 0.05),
-    "additional": (0.05, 0.62, 0.68),
+    "additional": (0.60, 0.42, 0.92),
 }
 _CHANGES = {
     "absent": "not here, but in {other}",
