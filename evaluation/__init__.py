@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         evaluate,
         judge,
     )
+    from evaluation.recognition.protocol import RetrievalProtocol
     from evaluation.recognition.retrieval import Retrieval, retrieve
     from evaluation.sequences import Sequence, open_sequence
     from evaluation.support.errors import InputError
@@ -37,6 +38,7 @@ __all__ = [
     "PlaceRecognitionMetrics",
     "QueryOutcomes",
     "Retrieval",
+    "RetrievalProtocol",
     "Sequence",
     "TemporalChange",
     "VoxelMap",
@@ -70,6 +72,7 @@ _HOMES = {
         "evaluate",
         "judge",
     ),
+    "recognition.protocol": ("RetrievalProtocol",),
     "recognition.retrieval": ("Retrieval", "retrieve"),
     "sequences": ("Sequence", "open_sequence"),
     "support.errors": ("InputError",),

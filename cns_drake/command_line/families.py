@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cns_drake.command_line.options import Jobs, Output, Scheduler
+from evaluation.command_line.protocol_options import with_protocol
+from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.support.interrupts import uninterrupted
 
 if TYPE_CHECKING:
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
     from evaluation.jobs.cluster import Cluster
 
 
+@with_protocol
 def trend(
     *,
     vary: Annotated[
@@ -42,10 +45,13 @@ def trend(
     ] = None,
     jobs: Jobs = None,
     scheduler: Scheduler = None,
+    protocol: RetrievalProtocol,
 ) -> None:
     """AUC over TCR_sym, of a family of drives.
 
-    None of them is recorded. Writes trend.csv and a figure with 95 % bands.
+    None of them is recorded. Writes trend.csv and a figure with 95 % bands:
+    AUC, and the share of it that is kept. Without change is the same route
+    through the city of the query.
     Interrupted, the same command goes on where it was.
     """
     with uninterrupted():
@@ -54,21 +60,56 @@ def trend(
         from evaluation.jobs.cluster import choose_cluster
         from evaluation.study.chosen_methods import choose_methods
         from evaluation.study.trend import write_trend
-        from evaluation.study.trend_points import measure_drives
+        from evaluation.study.trend_points import Asked, measure_drives
 
     cluster = choose_cluster(jobs, scheduler)
     methods = choose_methods(method or ())
     asking = load_scenario(query)
     members = family_members(vary, output, cluster)
+    controls = family_controls(members, asking)
     points = measure_drives(
         asking.name,
         SimulatedDrive(asking),
-        {member.name: SimulatedDrive(member) for member in members},
+        {
+            member.name: Asked(
+                SimulatedDrive(member), controls[member.name].name
+            )
+            for member in members
+        },
+        {one.name: SimulatedDrive(one) for one in controls.values()},
         output,
         cluster,
         methods,
+        protocol,
     )
     print(write_trend(points, output))
+
+
+def family_controls(
+    members: Sequence[Scenario], asking: Scenario
+) -> dict[str, Scenario]:
+    """Returns member -> its drive through the city of the drive that asks.
+
+    Members that differ by nothing but their city share one.
+
+    Args:
+        members: of a family.
+        asking: the drive that asks them.
+    """
+    city = {
+        name: getattr(asking, name)
+        for name in ("map", "stage", "world", "without")
+    }
+    kinds: list[dict] = []
+    controls = {}
+    for member in members:
+        drive = member.model_copy(update={**city, "name": "", "title": ""})
+        kind = drive.model_dump()
+        if kind not in kinds:
+            kinds.append(kind)
+        name = f"{asking.name}_unchanged_{kinds.index(kind) + 1}"
+        controls[member.name] = drive.model_copy(update={"name": name})
+    return controls
 
 
 def family_members(

@@ -19,6 +19,8 @@ from cns_drake.command_line.options import (
     Recording,
     Scheduler,
 )
+from evaluation.command_line.protocol_options import Costs, with_protocol
+from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.support.errors import InputError
 from evaluation.support.interrupts import uninterrupted
 from evaluation.support.terminal import note
@@ -150,6 +152,7 @@ def generate(
         typer.echo(output / scenario.name)
 
 
+@with_protocol
 def reproduce(
     maps: Annotated[
         list[str] | None,
@@ -177,6 +180,8 @@ def reproduce(
             help="The report alone: simulate without recording.",
         ),
     ] = False,
+    costs: Costs = True,
+    protocol: RetrievalProtocol,
 ) -> None:
     """Simulate a map, evaluate it and report."""
     with uninterrupted():
@@ -187,6 +192,12 @@ def reproduce(
     if quick and pages:
         raise InputError("--quick and --pages: give one of them")
     report = reproduce_maps(
-        maps, output, cluster, with_pages=pages is not False, quick=quick
+        maps,
+        output,
+        cluster,
+        with_pages=pages is not False,
+        quick=quick,
+        protocol=protocol,
+        with_costs=costs,
     )
     typer.echo(report)

@@ -21,7 +21,11 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.simulation.simulated_drive import SimulatedDrive
 from evaluation.jobs.cluster import Cluster
 from evaluation.study.chosen_methods import choose_methods
-from evaluation.study.trend_points import TrendPoint, measure_drives
+from evaluation.study.trend_points import (
+    Asked,
+    TrendPoint,
+    measure_drives,
+)
 from evaluation.support.errors import InputError
 
 _AS_IT_IS = "as_it_is"
@@ -67,7 +71,11 @@ def knob_effects(
         points = measure_drives(
             later.name,
             SimulatedDrive(later),
-            {name: SimulatedDrive(drive) for name, drive in drives.items()},
+            {
+                name: Asked(SimulatedDrive(drive))
+                for name, drive in drives.items()
+            },
+            {},
             Path(scratch) / "study",
             cluster,
             choose_methods(),

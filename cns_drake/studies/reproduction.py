@@ -16,6 +16,10 @@ from cns_drake.studies.recording_jobs import (
 )
 from evaluation.jobs.cluster import Cluster
 from evaluation.jobs.running import run_jobs
+from evaluation.recognition.protocol import (
+    PAPER_PROTOCOL,
+    RetrievalProtocol,
+)
 from evaluation.study.assembly import assemble
 from evaluation.study.collection import RecordingInfo
 from evaluation.study.plan import plan_study
@@ -30,6 +34,8 @@ def reproduce_maps(
     *,
     with_pages: bool = True,
     quick: bool = False,
+    protocol: RetrievalProtocol = PAPER_PROTOCOL,
+    with_costs: bool = False,
 ) -> Path:
     """Records the sequences of maps, evaluates them and reports.
 
@@ -46,6 +52,8 @@ def reproduce_maps(
         with_pages: whether the web pages are made.
         quick: make the report alone, of the same frames: what is not
             recorded yet is evaluated while it is simulated, and not recorded.
+        protocol: of place recognition.
+        with_costs: measure what the methods cost, too.
 
     Returns:
         The path of the report's page.
@@ -86,13 +94,22 @@ def reproduce_maps(
     recordings.sort(key=lambda recording: recording.name)
     report = output / "report"
     make_folder(output)
-    run_jobs([*jobs, *plan_study(recordings, report), *pictures], cluster)
+    study = plan_study(
+        recordings, report, protocol=protocol, with_costs=with_costs
+    )
+    run_jobs([*jobs, *study, *pictures], cluster)
     addresses = {
         name: f"../pages/{page.name}"
         for name, page in pages.items()
         if page.is_file()
     }
-    return assemble(recordings, report, pages=addresses)
+    return assemble(
+        recordings,
+        report,
+        pages=addresses,
+        protocol=protocol,
+        with_costs=with_costs,
+    )
 
 
 def _sequences(folder: Path) -> list[Scenario]:

@@ -29,6 +29,8 @@ _TURN = np.radians(12.0)
 _BASELINE = 20.0
 _MOST_TRIALS = 3000
 _NUM_GUESSES = 5
+# Of the points of a scan, along each axis [m].
+_MAX_RANGE = 100.0
 _SEED = 11
 
 
@@ -71,7 +73,7 @@ def find_candidates(
     """Finds keyframes of two drives that look alike."""
     method = ScanContext()
     places = [
-        method.describe_place(gather(target.sequence, frame, 1))
+        method.describe_place(gather(target.sequence, frame, 1, _MAX_RANGE))
         for frame in track(
             target.frames, f"describing {target.name}", len(target)
         )
@@ -82,7 +84,7 @@ def find_candidates(
         range(len(source)), f"recognising {source.name}", len(source)
     ):
         frame = int(source.frames[k])
-        query = method.describe(gather(source.sequence, frame, 1))
+        query = method.describe(gather(source.sequence, frame, 1, _MAX_RANGE))
         scores = np.nan_to_num(method.score(query, database), nan=-np.inf)
         for place in np.argsort(-scores, kind="stable")[:_CANDIDATES]:
             if not np.isfinite(scores[place]):

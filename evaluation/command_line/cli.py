@@ -6,21 +6,20 @@ comes at once.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from evaluation.command_line.protocol_options import Costs, with_protocol
+from evaluation.command_line.result_rows import change_rows, recognition_rows
+from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.support import terminal
 from evaluation.support.terminal import example
 
 if TYPE_CHECKING:
-    from evaluation.change.drive_change import ChangeReport
     from evaluation.methods.method import Method
-    from evaluation.recognition.metrics import Interval
-    from evaluation.recognition.place_recognition import PlaceRecognition
     from evaluation.sequences.sequence import Sequence
 
 app = terminal.make_program(
@@ -143,7 +142,7 @@ def tcr(
     if json:
         terminal.print_json(report.to_json())
     else:
-        terminal.print_rows(_change_rows(report))
+        terminal.print_rows(change_rows(report))
 
 
 @app.command(
@@ -152,6 +151,7 @@ def tcr(
         "    --method scan-context++",
     )
 )
+@with_protocol
 def pr(
     database: Annotated[Path, typer.Argument(metavar="DATABASE")],
     query: Annotated[Path, typer.Argument(metavar="QUERY")],
@@ -164,6 +164,8 @@ def pr(
     sensor_height: _SensorHeight = 1.6,
     align: _Align = AlignName.AUTO,
     json: _Json = False,
+    *,
+    protocol: RetrievalProtocol,
 ) -> None:
     """Place recognition of one drive in another.
 
@@ -174,7 +176,14 @@ def pr(
     from evaluation.alignment import in_one_world
     from evaluation.recognition import place_recognition
     from evaluation.sequences import open_sequence
+    from evaluation.support.errors import InputError
 
+    is_itself = database.resolve() == query.resolve()
+    if protocol.exclude_recent is not None and not is_itself:
+        raise InputError(
+            f"--exclude-recent: {query} is not {database} (it is for a drive"
+            " against itself)"
+        )
     chosen = _make_method(method, parameter, sensor_height)
     places, asking = open_sequence(database), open_sequence(query)
     for drive in (places, asking):
@@ -184,12 +193,17 @@ def pr(
         places, asking = alignment.first, alignment.second
         terminal.note(alignment.report.to_text())
     result = place_recognition.run(
-        places, asking, chosen, mode.value, terminal.track
+        places, asking, chosen, mode.value, protocol, terminal.track
     )
+    if protocol.exclude_recent is None and is_itself:
+        terminal.note(
+            f"{query}: every scan finds itself (--exclude-recent leaves out"
+            " what was just passed)"
+        )
     if json:
         terminal.print_json(result.to_json())
     else:
-        terminal.print_rows(_recognition_rows(result))
+        terminal.print_rows(recognition_rows(result))
 
 
 @app.command(
@@ -225,12 +239,16 @@ def scores(
 
 
 @app.command(epilog=example("cns-eval report drives --output report"))
+@with_protocol
 def report(
     recordings: Annotated[Path, typer.Argument(metavar="DIR")],
     output: Annotated[Path, typer.Option(help="Folder to write.")],
     method: _OwnMethods = None,
     jobs: _Jobs = None,
     scheduler: _Scheduler = None,
+    costs: Costs = True,
+    *,
+    protocol: RetrievalProtocol,
 ) -> None:
     """Report on all recordings in a folder.
 
@@ -242,7 +260,13 @@ def report(
 
     cluster = choose_cluster(jobs, scheduler)
     path = reporting.write_report(
-        recordings, output, cluster, method or (), on_note=terminal.note
+        recordings,
+        output,
+        cluster,
+        method or (),
+        protocol,
+        on_note=terminal.note,
+        with_costs=costs,
     )
     print(path)
 
@@ -253,13 +277,23 @@ def report(
         "    --query family/riverside_02 --output trend",
     )
 )
+@with_protocol
 def trend(
     databases: Annotated[list[Path], typer.Argument(metavar="DATABASE")],
     query: Annotated[Path, typer.Option(help="The drive that asks.")],
     output: Annotated[Path, typer.Option(help="Folder to write.")],
+    control: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="A drive on the route of databases through the stage of the"
+            " query: what is kept is drawn too; may be repeated."
+        ),
+    ] = None,
     method: _OwnMethods = None,
     jobs: _Jobs = None,
     scheduler: _Scheduler = None,
+    *,
+    protocol: RetrievalProtocol,
 ) -> None:
     """AUC over TCR_sym, of many databases.
 
@@ -271,7 +305,15 @@ def trend(
     from evaluation.study.trend_points import measure_trend
 
     cluster = choose_cluster(jobs, scheduler)
-    points = measure_trend(query, databases, output, cluster, method or ())
+    points = measure_trend(
+        query,
+        databases,
+        output,
+        cluster,
+        method or (),
+        protocol,
+        control or (),
+    )
     print(write_trend(points, output))
 
 
@@ -301,70 +343,3 @@ def _make_method(
     if name.endswith(".py"):
         name = load_method(Path(name)).name
     return make_method(name, parameters)
-
-
-def _change_rows(report: ChangeReport) -> Iterator[tuple[str, str]]:
-    change = report.change
-    pair = f"{report.source} <-> {report.target}"
-    yield "pair", pair
-    yield "TCR_sym", terminal.number(change.symmetric)
-    if change.undefined_because:
-        yield "  because", change.undefined_because
-    for label, names, side in (
-        ("TCR", (report.source, report.target), change.source_to_target),
-        ("TCR", (report.target, report.source), change.target_to_source),
-    ):
-        counts = f"({side.num_unchanged} of {side.num_in_hull} unchanged)"
-        yield (
-            f"{label} {names[0]} -> {names[1]}",
-            f"{terminal.number(side.ratio)}  {counts}",
-        )
-    if report.masked is not None:
-        yield (
-            "TCR_sym where both drove",
-            terminal.number(report.masked.symmetric),
-        )
-    if report.control is not None and report.control_names is not None:
-        value = terminal.number(report.control.symmetric)
-        yield (
-            "TCR_sym of the routes alone",
-            f"{value}  ({' <-> '.join(report.control_names)})",
-        )
-
-
-def _recognition_rows(result: PlaceRecognition) -> Iterator[tuple[str, str]]:
-    metrics = result.metrics
-    yield "method", result.method
-    yield "database -> query", f"{result.database} -> {result.query}"
-    yield "mode", metrics.mode
-    yield (
-        "queries, with a match (N)",
-        f"{metrics.num_queries}, {metrics.num_with_match}",
-    )
-    yield (
-        "R@1",
-        f"{terminal.number(metrics.recall_at_1)}"
-        f"  {_interval_text(metrics.recall_at_1_interval)}"
-        f"  (TP {metrics.num_right} of N {metrics.num_with_match})",
-    )
-    for rank in (5, 10, 25):
-        yield f"R@{rank}", terminal.number(metrics.recall_at_n[rank - 1])
-    yield "R@1%", terminal.number(metrics.recall_at_1_percent)
-    yield (
-        "AUC",
-        f"{terminal.number(metrics.auc)}"
-        f"  {_interval_text(metrics.auc_interval)}",
-    )
-    f1 = terminal.number(metrics.f1_max)
-    if metrics.f1_max_index is not None:
-        index = metrics.f1_max_index
-        f1 += (
-            f"  (TP {metrics.curve.true_positives[index]},"
-            f" T {metrics.curve.counted[index]})"
-        )
-    yield "F1max", f1
-
-
-def _interval_text(interval: Interval) -> str:
-    low, high = terminal.number(interval.low), terminal.number(interval.high)
-    return f"[{low}, {high}]"

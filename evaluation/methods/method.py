@@ -42,7 +42,17 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         Config: type of its parameters.
         scans_per_place: how many consecutive scans are merged, in the frame
             of the first, into the cloud that is described.
+        point_fields: further fields of points that it wants, such as
+            intensity, ring, t or label.
+        batch_size: how many clouds `describe_batch` is handed at once.
+        rerank_best: how many of the best places a second stage, `rerank`,
+            compares by their points; 0 without one.
         config: the parameters in use.
+
+    A cloud is (N, 3) float64, finite, in the frame of the LiDAR, or of the
+    first of the merged scans [m]. If the method names `point_fields`, it is
+    a structured array (N,) instead, of float64 `x`, `y` and `z` and those
+    fields in the types of the recording.
 
     Example:
         from evaluation import make_method
@@ -55,22 +65,32 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     name: ClassVar[str]
     Config: ClassVar[type[MethodConfig]] = MethodConfig
     scans_per_place: ClassVar[int] = 1
+    point_fields: ClassVar[tuple[str, ...]] = ()
+    batch_size: ClassVar[int] = 1
+    rerank_best: ClassVar[int] = 0
 
     def __init__(self, config: MethodConfig | None = None):
         self.config = self.Config() if config is None else config
 
     @abc.abstractmethod
     def describe(self, points: np.ndarray) -> Descriptor:
-        """Describes the scan of a query.
-
-        Args:
-            points: (N, 3) float64, finite, in the frame of the LiDAR (or of
-                the first of the merged scans) [m].
-        """
+        """Describes the cloud of a query."""
 
     def describe_place(self, points: np.ndarray) -> Descriptor:
-        """Describes a scan of the database, where that differs."""
+        """Describes a cloud of the database, where that differs."""
         return self.describe(points)
+
+    def describe_batch(
+        self, clouds: Sequence[np.ndarray], *, of_places: bool
+    ) -> list[Descriptor]:
+        """Describes some clouds, for methods that are faster with several.
+
+        Args:
+            clouds: up to `batch_size` of them.
+            of_places: describe them as of the database, not as queries.
+        """
+        one = self.describe_place if of_places else self.describe
+        return [one(cloud) for cloud in clouds]
 
     @property
     def describes_alike(self) -> bool:
@@ -97,6 +117,46 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
             (D,) float64, higher is more similar; NaN for a place that is no
             candidate.
         """
+
+    def score_in_sequence(
+        self,
+        queries: Sequence[Descriptor],
+        database: Database,
+        *,
+        exhaustive: bool = False,
+    ) -> np.ndarray:
+        """Compares the last of some queries, for methods that match sequences.
+
+        Args:
+            queries: of a drive, from its first to the one that asks.
+            database: see `score`.
+            exhaustive: see `score`.
+
+        Returns:
+            What `score` returns.
+        """
+        return self.score(queries[-1], database, exhaustive=exhaustive)
+
+    def rerank(
+        self,
+        query: np.ndarray,
+        places: Sequence[np.ndarray],
+        scores: np.ndarray,
+    ) -> np.ndarray:
+        """Scores the best places anew: a second stage, by points.
+
+        All other places are then no candidates.
+
+        Args:
+            query: cloud of the query.
+            places: clouds of K places, K at most `rerank_best`.
+            scores: (K,) what `score` gave them, decreasing.
+
+        Returns:
+            (K,) float64, higher is more similar; NaN for no candidate.
+        """
+        del query, places
+        return scores
 
     def relative_pose(
         self, query: Descriptor, database: Database, place: int

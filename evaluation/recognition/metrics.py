@@ -126,6 +126,11 @@ class PrCurve:
         """
         return float(_area(self.precision[None], self.recall[None])[0])
 
+    @property
+    def recall_at_full_precision(self) -> float:
+        """Greatest recall at which nothing accepted is false; 0 if none."""
+        return float(self.recall[self.false_positives == 0].max(initial=0.0))
+
 
 @dataclass(frozen=True)
 class Interval:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 import math
 
 from evaluation.methods.method import Method
@@ -14,11 +14,12 @@ from evaluation.recognition.metrics import (
     evaluate,
     judge,
 )
-from evaluation.recognition.retrieval import (
-    MATCH_RADIUS,
-    Retrieval,
-    retrieve,
+from evaluation.recognition.pose_errors import PoseMetrics, pose_metrics
+from evaluation.recognition.protocol import (
+    PAPER_PROTOCOL,
+    RetrievalProtocol,
 )
+from evaluation.recognition.retrieval import Retrieval, retrieve
 from evaluation.sequences.sequence import Sequence
 from evaluation.support.errors import InputError
 from evaluation.support.progress import Track, silent
@@ -36,6 +37,8 @@ class PlaceRecognition:
         retrieval: scores and truth of all pairs.
         outcomes: what became of each query.
         metrics: the numbers.
+        pose: how good the poses are that come with the places.
+        protocol: that it ran by; nothing in it is left to the method.
     """
 
     method: str
@@ -45,6 +48,8 @@ class PlaceRecognition:
     retrieval: Retrieval
     outcomes: QueryOutcomes
     metrics: PlaceRecognitionMetrics
+    pose: PoseMetrics
+    protocol: RetrievalProtocol
 
     def counting(self, mode: Mode) -> PlaceRecognition:
         """Returns the same outcome with its numbers in a mode."""
@@ -54,6 +59,7 @@ class PlaceRecognition:
         """Returns all numbers; NaN becomes None."""
         metrics = self.metrics
         index = metrics.f1_max_index
+        pose = asdict(self.pose)
         return {
             "method": self.method,
             "mode": metrics.mode,
@@ -63,8 +69,10 @@ class PlaceRecognition:
             "auc_interval_95": _interval(metrics.auc_interval),
             "recall_at_1": _number(metrics.recall_at_1),
             "recall_at_1_interval_95": _interval(metrics.recall_at_1_interval),
-            "recall_at_n": [_number(value) for value in metrics.recall_at_n],
-            "recall_at_1_percent": _number(metrics.recall_at_1_percent),
+            "recall_at_n": [
+                _number(float(value)) for value in metrics.recall_at_n
+            ],
+            "recall_at_1_percent": _number(float(metrics.recall_at_1_percent)),
             "f1_max": metrics.f1_max,
             "f1_max_true_positives": (
                 0 if index is None else int(metrics.curve.true_positives[index])
@@ -76,7 +84,10 @@ class PlaceRecognition:
             "queries_with_match": metrics.num_with_match,
             "true_positives": metrics.num_right,
             "places": len(self.retrieval.database_frames),
+            "recall_at_100_precision": metrics.curve.recall_at_full_precision,
+            "pose": {key: _number(value) for key, value in pose.items()},
             "parameters": self.parameters,
+            "protocol": self.protocol.to_json(),
         }
 
 
@@ -85,16 +96,19 @@ def run(
     query: Sequence,
     method: Method,
     mode: Mode = "all",
+    protocol: RetrievalProtocol = PAPER_PROTOCOL,
     track: Track = silent,
 ) -> PlaceRecognition:
     """Runs a method on a pair of drives.
 
     Raises:
         InputError: if a sequence cannot be read, the two are not of the same
-            world, or no query has a match.
+            world, the method fails, or no query has a match.
     """
-    retrieval = retrieve(database, query, method, track)
-    return judge_retrieval(method, database.name, query.name, retrieval, mode)
+    retrieval = retrieve(database, query, method, protocol, track)
+    return judge_retrieval(
+        method, database.name, query.name, retrieval, protocol, mode
+    )
 
 
 def judge_retrieval(
@@ -102,6 +116,7 @@ def judge_retrieval(
     database: str,
     query: str,
     retrieval: Retrieval,
+    protocol: RetrievalProtocol,
     mode: Mode = "all",
 ) -> PlaceRecognition:
     """Returns the numbers of what a method retrieved.
@@ -111,18 +126,25 @@ def judge_retrieval(
         database: name of the drive whose places are known.
         query: name of the drive that asks.
         retrieval: scores and truth.
+        protocol: by which it was asked.
         mode: which queries count.
 
     Raises:
         InputError: if no query has a match.
     """
     if not retrieval.matches.any():
+        if protocol.exclude_recent is not None and database == query:
+            raise InputError(
+                f"{query}: never within {protocol.radius:g} m of where it was"
+                f" {protocol.exclude_recent:g} s or more before"
+            )
         nearest = retrieval.distances.min()
         raise InputError(
-            f"{query}: no query lies within {MATCH_RADIUS} m of a place"
+            f"{query}: no query lies within {protocol.radius:g} m of a place"
             f" of {database} (the nearest at {nearest:.1f} m)"
         )
     outcomes = judge(retrieval.scores, retrieval.matches)
+    metrics = evaluate(outcomes)
     return PlaceRecognition(
         method=method.name,
         parameters=method.config.model_dump(mode="json"),
@@ -130,7 +152,9 @@ def judge_retrieval(
         query=query,
         retrieval=retrieval,
         outcomes=outcomes,
-        metrics=evaluate(outcomes, mode),
+        metrics=metrics if mode == "all" else evaluate(outcomes, mode),
+        pose=pose_metrics(retrieval.pose_errors, outcomes, metrics),
+        protocol=protocol.of(method),
     )
 
 
@@ -139,5 +163,4 @@ def _interval(interval: Interval) -> list[float | None]:
 
 
 def _number(value: float) -> float | None:
-    value = float(value)
     return None if math.isnan(value) else value

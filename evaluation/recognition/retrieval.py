@@ -1,34 +1,32 @@
 """Place recognition between two drives: what is asked, and what is right.
 
-The protocol of the paper: queries every 10 m, database every 5 m, a match
-lies within 7.5 m, points limited to [-100, 100] m. What it leaves open is
-fixed as follows.
-
-- "Every d metres" and "limited" are as in `evaluation.sequences.sampling`.
-- Distances between query and database are between the positions of the
-  sensor, in three dimensions, limit included.
+Distances between query and database are between the positions of the sensor,
+in three dimensions.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Set
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from evaluation.methods.method import Method
-from evaluation.sequences.sampling import CROP, gather, sample_frames
+from evaluation.recognition.description import (
+    DescribedDrive,
+    describe_drive,
+)
+from evaluation.recognition.pose_errors import (
+    PoseErrors,
+    checked_pose,
+    pose_error,
+)
+from evaluation.recognition.protocol import (
+    PAPER_PROTOCOL,
+    RetrievalProtocol,
+)
+from evaluation.recognition.scoring import rerank_places, score_places
 from evaluation.sequences.sequence import Sequence, check_same_world
-from evaluation.support.errors import InputError
 from evaluation.support.progress import Track, silent
-
-QUERY_SPACING = 10.0
-DATABASE_SPACING = 5.0
-MATCH_RADIUS = 7.5
-
-# What a drive is described for.
-Role = Literal["places", "queries"]
 
 
 @dataclass(frozen=True)
@@ -41,6 +39,8 @@ class Retrieval:
         scores: (Q, D) float64, higher is more similar, NaN for a place that
             the method does not consider.
         distances: (Q, D) float64 between the sensor positions [m].
+        matches: (Q, D) bool, which place is a true match of which query.
+        pose_errors: of the best place of each query.
 
     Example:
         from evaluation import retrieve
@@ -53,40 +53,22 @@ class Retrieval:
     database_frames: np.ndarray
     scores: np.ndarray
     distances: np.ndarray
+    matches: np.ndarray
+    pose_errors: PoseErrors
 
     @property
-    def matches(self) -> np.ndarray:
-        """(Q, D) bool, which place is a true match of which query."""
-        return self.distances <= MATCH_RADIUS
-
-
-@dataclass(frozen=True)
-class DescribedDrive:
-    """What a method keeps of a drive.
-
-    Attributes:
-        name: of the drive.
-        place_frames: (D,) frames at which it has places.
-        p_WPs: (D, 3) the positions of the sensor there [m].
-        places: D descriptors; empty if it is no database.
-        query_frames: (Q,) frames at which it asks.
-        p_WQs: (Q, 3) likewise [m].
-        queries: Q descriptors; empty if it does not ask.
-    """
-
-    name: str
-    place_frames: np.ndarray
-    p_WPs: np.ndarray
-    places: list
-    query_frames: np.ndarray
-    p_WQs: np.ndarray
-    queries: list
+    def best_places(self) -> np.ndarray:
+        """(Q,) best place of each query, the first of equal ones; -1: none."""
+        candidate = ~np.isnan(self.scores)
+        best = np.where(candidate, self.scores, -np.inf).argmax(axis=1)
+        return np.where(candidate.any(axis=1), best, -1)
 
 
 def retrieve(
     database: Sequence,
     query: Sequence,
     method: Method,
+    protocol: RetrievalProtocol = PAPER_PROTOCOL,
     track: Track = silent,
 ) -> Retrieval:
     """Asks for every query which places of the database look like it.
@@ -95,11 +77,12 @@ def retrieve(
         database: the drive whose places are known.
         query: the drive that asks; in the same world frame.
         method: describes and compares.
+        protocol: what is asked.
         track: reports progress.
 
     Raises:
-        InputError: if a sequence cannot be read, or the two are not of the
-            same world.
+        InputError: if a sequence cannot be read, the two are not of the same
+            world, or the method returns what it must not.
 
     Example:
         from evaluation import make_method, open_sequence, retrieve
@@ -108,89 +91,16 @@ def retrieve(
         found = retrieve(database, query, make_method("solid", {}))
     """
     check_same_world(database, query)
-    (places,) = describe_drive(database, [method], {"places"}, track)
-    (queries,) = describe_drive(query, [method], {"queries"}, track)
-    return compare(method, places, queries, track)
-
-
-def describe_drive(
-    sequence: Sequence,
-    methods: Iterable[Method],
-    roles: Set[Role],
-    track: Track = silent,
-    visit: Callable[[int, np.ndarray], None] | None = None,
-) -> list[DescribedDrive]:
-    """Describes the places and queries of a drive, each cloud once.
-
-    Queries are taken at every other place, so that a method which describes
-    both alike does so once. Clouds are shared between methods.
-
-    Args:
-        sequence: the drive.
-        methods: that describe it.
-        roles: what it serves as.
-        track: reports progress.
-        visit: is also shown each described frame and its single scan (N, 3),
-            cropped, in the frame of the sensor.
-
-    Returns:
-        What each method made of it.
-
-    Raises:
-        InputError: if the sequence cannot be read, or no described cloud has
-            a point within the limits of the protocol.
-    """
-    methods = list(methods)
-    positions = sequence.X_WS[:, :3, 3]
-    frames = {
-        "places": sample_frames(positions, DATABASE_SPACING),
-        "queries": sample_frames(positions, QUERY_SPACING),
-    }
-    members = {role: set(frames[role].tolist()) for role in roles}
-    described = [
-        DescribedDrive(
-            sequence.name,
-            frames["places"],
-            positions[frames["places"]],
-            [],
-            frames["queries"],
-            positions[frames["queries"]],
-            [],
-        )
-        for _ in methods
-    ]
-    sizes = {method.scans_per_place for method in methods}
-    if visit is not None:
-        sizes.add(1)
-    wanted = sorted(set().union(*members.values()))
-    num_points = 0
-    for frame in track(wanted, f"describing {sequence.name}", len(wanted)):
-        clouds = {size: gather(sequence, frame, size) for size in sizes}
-        num_points += max(map(len, clouds.values()))
-        if visit is not None:
-            visit(frame, clouds[1])
-        for method, result in zip(methods, described, strict=True):
-            cloud = clouds[method.scans_per_place]
-            place = None
-            if frame in members.get("places", ()):
-                place = method.describe_place(cloud)
-                result.places.append(place)
-            if frame in members.get("queries", ()):
-                if place is None or not method.describes_alike:
-                    place = method.describe(cloud)
-                result.queries.append(place)
-    if num_points == 0:
-        raise InputError(
-            f"{sequence.name}: no finite point within {CROP:g} m of the LiDAR"
-            f" in any of {len(wanted)} scans"
-        )
-    return described
+    (places,) = describe_drive(database, [method], {"places"}, protocol, track)
+    (queries,) = describe_drive(query, [method], {"queries"}, protocol, track)
+    return compare(method, places, queries, protocol, track)
 
 
 def compare(
     method: Method,
     database: DescribedDrive,
     query: DescribedDrive,
+    protocol: RetrievalProtocol = PAPER_PROTOCOL,
     track: Track = silent,
 ) -> Retrieval:
     """Scores the queries of one drive against the places of another.
@@ -199,21 +109,69 @@ def compare(
         method: that described both.
         database: with its places described.
         query: with its queries described; in the same world frame.
+        protocol: that both were described by.
         track: reports progress.
+
+    Raises:
+        InputError: if the method returns what it must not.
     """
-    places = method.build_database(database.places)
-    scores = np.empty((len(query.queries), len(database.places)))
-    numbered = track(
-        list(enumerate(query.queries)),
+    places, queries = database.places, query.queries
+    is_known = _known_places(database, query, protocol)
+    indexed = method.build_database(places.descriptors)
+    scores = np.empty(is_known.shape)
+    errors = PoseErrors.unknown(len(queries.frames))
+    asking = track(
+        range(len(queries.frames)),
         f"querying {query.name}",
-        len(query.queries),
+        len(queries.frames),
     )
-    for row, descriptor in numbered:
-        scores[row] = method.score(descriptor, places)
-    offsets = query.p_WQs[:, None, :] - database.p_WPs[None, :, :]
+    for row in asking:
+        found = score_places(
+            method,
+            queries.descriptors[: row + 1],
+            indexed,
+            len(places.frames),
+            # A search for the best few places of all would find those that
+            # are not known yet.
+            exhaustive=not is_known[row].all(),
+        )
+        found = np.where(is_known[row], found, np.nan)
+        if method.rerank_best:
+            found = rerank_places(
+                method, found, queries.clouds[row], places.clouds
+            )
+        scores[row] = found
+        if np.isnan(found).all():
+            continue
+        best = int(np.nanargmax(found))
+        X_PQ = checked_pose(
+            method,
+            method.relative_pose(queries.descriptors[row], indexed, best),
+        )
+        if X_PQ is not None:
+            errors.translation[row], errors.rotation_deg[row] = pose_error(
+                X_PQ, places.X_WS[best], queries.X_WS[row]
+            )
+    offsets = queries.p_WSs[:, None, :] - places.p_WSs[None, :, :]
+    distances = np.linalg.norm(offsets, axis=2)
     return Retrieval(
-        query_frames=query.query_frames,
-        database_frames=database.place_frames,
+        query_frames=queries.frames,
+        database_frames=places.frames,
         scores=scores,
-        distances=np.linalg.norm(offsets, axis=2),
+        distances=distances,
+        matches=(distances <= protocol.radius) & is_known,
+        pose_errors=errors,
     )
+
+
+def _known_places(
+    database: DescribedDrive,
+    query: DescribedDrive,
+    protocol: RetrievalProtocol,
+) -> np.ndarray:
+    """Returns which places each query can know, (Q, D) bool."""
+    asked, told = query.queries.stamps_ns, database.places.stamps_ns
+    if protocol.exclude_recent is None or database.name != query.name:
+        return np.ones((len(asked), len(told)), dtype=bool)
+    age_ns = asked[:, None] - told[None, :]
+    return age_ns >= protocol.exclude_recent * 1e9

@@ -10,7 +10,9 @@ import numpy as np
 from evaluation.clouds.cloud_files import is_cloud, read_cloud
 from evaluation.geometry import points as point_arrays
 from evaluation.methods.method import Method
-from evaluation.sequences.sampling import crop
+from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition.scoring import rerank_places, score_places
+from evaluation.sequences.sampling import select
 from evaluation.support.errors import InputError
 from evaluation.support.files import completing
 from evaluation.support.progress import Track, silent
@@ -27,7 +29,8 @@ def write_scores(
 
     Columns `query`, `database` (file stems) and `score`, which is empty
     where the method finds no candidate; rows by query, then by place, both
-    by name. The file appears under its name only when it is complete.
+    by name. The file appears under its name only when it is complete. For
+    methods that match sequences the queries are one, in the order of names.
 
     Args:
         method: describes and compares.
@@ -47,12 +50,15 @@ def write_scores(
     place_files = _scan_files(database)
     query_files = _scan_files(query)
     num_ignored = 0
-    descriptors = []
+    descriptors, clouds = [], []
     for path in track(place_files, "describing places", len(place_files)):
-        points, ignored = _read(path)
-        descriptors.append(method.describe_place(points))
+        cloud, ignored = _read(path, method)
+        descriptors.append(method.describe_place(cloud))
+        if method.rerank_best:
+            clouds.append(cloud)
         num_ignored += ignored
     places = method.build_database(descriptors)
+    queries: list = []
     with (
         completing(output) as part,
         open(part, "w", newline="", encoding="utf-8") as stream,
@@ -60,22 +66,27 @@ def write_scores(
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(["query", "database", "score"])
         for path in track(query_files, "querying", len(query_files)):
-            points, ignored = _read(path)
+            cloud, ignored = _read(path, method)
             num_ignored += ignored
-            values = method.score(
-                method.describe(points), places, exhaustive=True
+            queries.append(method.describe(cloud))
+            values = score_places(
+                method, queries, places, len(place_files), exhaustive=True
             )
+            if method.rerank_best:
+                values = rerank_places(method, values, cloud, clouds)
             for place, value in zip(place_files, values, strict=True):
                 text = "" if np.isnan(value) else repr(float(value))
                 writer.writerow([path.stem, place.stem, text])
     return num_ignored
 
 
-def _read(path: Path) -> tuple[np.ndarray, int]:
-    """Returns a cropped scan (N, 3), N > 0, and how many are not finite."""
-    points = point_arrays.xyz(read_cloud(path))
+def _read(path: Path, method: Method) -> tuple[np.ndarray, int]:
+    """Returns a cropped cloud of N > 0 points, and how many are not finite."""
+    scan = read_cloud(path)
+    points = point_arrays.xyz(scan)
     num_finite = int(np.isfinite(points).all(axis=1).sum())
-    cropped = crop(points)
+    max_range = RetrievalProtocol.max_range
+    cropped = select(scan, points, max_range, method.point_fields, str(path))
     if len(cropped) == 0:
         raise InputError(f"{path}: no finite point within range")
     return cropped, len(points) - num_finite

@@ -20,6 +20,7 @@ from evaluation.recognition.metrics import (
     resampled_metrics,
     resampled_weights,
 )
+from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.recognition_result import RecognitionResult
 
 
@@ -94,6 +95,11 @@ class Survival:
     def pair(self) -> tuple[str, str, str]:
         """Map, database, query."""
         return self.changed.pair
+
+    @property
+    def protocol(self) -> RetrievalProtocol:
+        """By which both were found."""
+        return self.changed.outcome.protocol
 
     @property
     def control(self) -> str | None:

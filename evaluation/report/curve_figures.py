@@ -16,7 +16,11 @@ from evaluation.recognition.metrics import (
 from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.report import paper
 from evaluation.report.drawing import method_style, plain, save
-from evaluation.report.result_tables import in_paper_order, title
+from evaluation.report.result_tables import (
+    in_paper_order,
+    shows_paper,
+    title,
+)
 
 # A line is not fitted through fewer.
 _LEAST_POINTS = 5
@@ -101,11 +105,6 @@ def draw_auc_over_change(
     panels[0].set_ylabel("AUC")
     panels[0].legend(fontsize=7, framealpha=0.8)
     save(figure, stem, "svg")
-
-
-def shows_paper(results: Sequence[RecognitionResult]) -> bool:
-    """Tells whether a map of the paper is among the results."""
-    return any(result.pair[0] in paper.city_names() for result in results)
 
 
 def _draw_curve(

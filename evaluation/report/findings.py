@@ -15,7 +15,11 @@ from evaluation.change.change_result import (
 from evaluation.recognition.metrics import MODES
 from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.report import paper
-from evaluation.report.result_tables import in_paper_order, title
+from evaluation.report.result_tables import (
+    in_paper_order,
+    is_of_paper,
+    title,
+)
 
 # A trend is not judged from fewer pairs.
 _FEWEST_PAIRS = 5
@@ -70,13 +74,14 @@ def findings(
 ) -> list[Finding]:
     """Judges the paper's findings; those of which nothing is known left out.
 
-    Only the paper's maps are judged by them.
+    Only the paper's maps and methods are judged by them, and only by its
+    protocol.
 
     Args:
         results: place recognition of all pairs.
         changes: TCR of all pairs.
     """
-    results = [r for r in results if r.pair[0] in paper.city_names()]
+    results = [r for r in results if is_of_paper(r)]
     changes = [c for c in changes if c.map_name in paper.city_names()]
     tcr = symmetric_changes(changes)
     methods = in_paper_order(result.method for result in results)

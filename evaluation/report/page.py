@@ -18,7 +18,6 @@ from evaluation.change.change_result import (
 from evaluation.recognition.metrics import MODES
 from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.recognition.survival import Survival
-from evaluation.report.curve_figures import shows_paper
 from evaluation.report.findings import Finding
 from evaluation.report.page_data import (
     Illustration,
@@ -28,6 +27,7 @@ from evaluation.report.page_data import (
 )
 from evaluation.report.page_routes import route_legend, route_picture
 from evaluation.report.page_survival import survival_section
+from evaluation.report.result_tables import shows_paper
 from evaluation.report.tables import Table
 from evaluation.support.files import completing
 
@@ -48,6 +48,8 @@ class PageContent:
         change: Table I.
         recognition: Table II in its forms, that of mode all last but one.
         audit: all numbers.
+        poses: how good the poses are that come with the places.
+        costs: of the methods; without rows if they were not measured.
         illustrations: figures, already written.
         recognitions: place recognition of all pairs.
         survivals: the same with their controls.
@@ -62,6 +64,8 @@ class PageContent:
     change: Table
     recognition: Sequence[Table]
     audit: Table
+    poses: Table
+    costs: Table
     illustrations: Sequence[Illustration]
     recognitions: Sequence[RecognitionResult]
     survivals: Sequence[Survival]
@@ -244,6 +248,11 @@ def _recognition(content: PageContent) -> str:
             "</details>"
         )
     parts.append(_figures(content.illustrations, "recognition"))
+    parts.append("<h2>Pose, not only place</h2>")
+    parts.append(_scrolling(content.poses, "grouped"))
+    if content.costs.rows:
+        parts.append("<h2>What the methods cost</h2>")
+        parts.append(_scrolling(content.costs, "plain"))
     return "".join(parts)
 
 

@@ -16,7 +16,6 @@ import numpy as np
 from evaluation.maps.thumbnails import CELL, HEIGHT_STEP, MAX_POINTS
 from evaluation.recognition.metrics import MODES
 from evaluation.recognition.recognition_result import RecognitionResult
-from evaluation.recognition.retrieval import MATCH_RADIUS
 from evaluation.report.drawing import Legend
 from evaluation.report.point_rendering import Picture
 from evaluation.report.result_tables import in_paper_order, title
@@ -145,7 +144,7 @@ def browser_data(
     num_scans = sum(len(drives[name].frames) for name in used)
     num_points = min(MAX_POINTS, _POINTS_OF_A_PAGE // max(num_scans, 1))
     return {
-        "radius": MATCH_RADIUS,
+        "radius": recognitions[0].outcome.protocol.radius,
         "cell": CELL,
         "heightStep": HEIGHT_STEP,
         "drives": {

@@ -9,6 +9,10 @@ import math
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from evaluation.recognition.protocol import (
+    PROTOCOL_COLUMNS,
+    protocol_values,
+)
 from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.report.tables import Table
 
@@ -32,6 +36,9 @@ _HEADER = (
     "match_stamp_ns",
     *(f"match_{name}" for name in _POSE),
     "distance",
+    "translation_error",
+    "rotation_error_deg",
+    *PROTOCOL_COLUMNS,
 )
 
 
@@ -71,7 +78,9 @@ def _rows(
 ) -> Iterator[tuple[object, ...]]:
     outcome = result.outcome
     retrieval, outcomes = outcome.retrieval, outcome.outcomes
-    scores = np.where(np.isnan(retrieval.scores), -np.inf, retrieval.scores)
+    best_places = retrieval.best_places.tolist()
+    errors = retrieval.pose_errors
+    protocol = protocol_values(outcome.protocol)
     asking, known = tracks[outcome.query], tracks[outcome.database]
     nothing = (None,) * (2 + len(_POSE))
     for query, frame in enumerate(retrieval.query_frames.tolist()):
@@ -79,9 +88,8 @@ def _rows(
         rank = float(outcomes.first_right_ranks[query])
         match: tuple[object, ...] = nothing
         distance = math.nan
-        if not math.isnan(score):
-            # As in `judge`: of equal scores the first place is the best.
-            place = int(scores[query].argmax())
+        place = best_places[query]
+        if place >= 0:
             match = _moment(known, int(retrieval.database_frames[place]))
             distance = float(retrieval.distances[query, place])
         yield (
@@ -97,6 +105,9 @@ def _rows(
             outcome.database,
             *match,
             distance,
+            float(errors.translation[query]),
+            float(errors.rotation_deg[query]),
+            *protocol,
         )
 
 

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from evaluation.change.change_result import ChangeResult, symmetric_changes
 from evaluation.recognition.metrics import (
     MODES,
     Mode,
+)
+from evaluation.recognition.protocol import (
+    PROTOCOL_COLUMNS,
+    protocol_values,
 )
 from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.report import paper
@@ -36,6 +41,27 @@ def in_paper_order(methods: Iterable[str]) -> list[str]:
     )
 
 
+def protocol_text(results: Sequence[RecognitionResult]) -> str:
+    """Returns what was asked; how many scans a place is, is each method's."""
+    if not results:
+        return ""
+    return replace(results[0].outcome.protocol, scans_per_place=None).to_text()
+
+
+def is_of_paper(result: RecognitionResult) -> bool:
+    """Tells whether the paper has such a number: map, method and protocol."""
+    return (
+        result.pair[0] in paper.city_names()
+        and result.method in _TITLES
+        and paper.is_protocol(result.method, result.outcome.protocol)
+    )
+
+
+def shows_paper(results: Iterable[RecognitionResult]) -> bool:
+    """Tells whether one of the results has the paper's beside it."""
+    return any(map(is_of_paper, results))
+
+
 def paper_mode(method: str) -> Mode:
     """Returns the mode that the paper seems to have counted a method in."""
     for key in paper.recognition_values():
@@ -47,7 +73,12 @@ def paper_mode(method: str) -> Mode:
 def paper_values(
     result: RecognitionResult, mode: Mode
 ) -> paper.PaperRecognition | None:
-    """Returns the paper's values, if it counted in this mode."""
+    """Returns the paper's values, if it counted in this mode.
+
+    None for numbers that were found by another protocol than the paper's.
+    """
+    if not paper.is_protocol(result.method, result.outcome.protocol):
+        return None
     return paper.recognition_values().get((*result.pair, result.method, mode))
 
 
@@ -108,7 +139,7 @@ def recognition_tables(
     in each mode.
     """
     modes: list[Mode | None] = list(MODES)
-    if any(result.map_name in paper.city_names() for result in results):
+    if shows_paper(results):
         modes.insert(0, None)
     return [recognition_table(results, changes, mode) for mode in modes]
 
@@ -157,8 +188,8 @@ def recognition_table(
         ("map", "DB → query", "TCR_sym", *names * len(methods)),
         tuple(rows),
         groups=(("", 3), *((title(method), 3) for method in methods)),
-        caption=f"{captions[mode]}. In brackets or small: the paper's value."
-        " Bold: best of a row; underlined: second.",
+        caption=f"{captions[mode]}. {protocol_text(results)} In brackets or"
+        " small: the paper's value. Bold: best of a row; underlined: second.",
     )
 
 
@@ -187,6 +218,7 @@ def audit_table(results: Sequence[RecognitionResult]) -> Table:
         "TP of R@1",
         "TP of F1max",
         "T of F1max",
+        *PROTOCOL_COLUMNS,
     )
     rows = []
     for result in results:
@@ -219,6 +251,7 @@ def audit_table(results: Sequence[RecognitionResult]) -> Table:
                     metrics.num_right,
                     None if index is None else int(curve.true_positives[index]),
                     None if index is None else int(curve.counted[index]),
+                    *protocol_values(result.outcome.protocol),
                 )
             )
     return Table(

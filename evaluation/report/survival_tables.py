@@ -7,6 +7,10 @@ import math
 
 import numpy as np
 
+from evaluation.recognition.protocol import (
+    PROTOCOL_COLUMNS,
+    protocol_values,
+)
 from evaluation.recognition.survival import Kept, Survival
 from evaluation.report.result_tables import in_paper_order, title
 from evaluation.report.tables import MISSING, Table
@@ -69,6 +73,7 @@ def survival_numbers(survivals: Sequence[Survival]) -> Table:
         "r1_kept_low",
         "r1_kept_high",
         "control",
+        *PROTOCOL_COLUMNS,
     )
     rows = tuple(
         (
@@ -77,6 +82,7 @@ def survival_numbers(survivals: Sequence[Survival]) -> Table:
             *_numbers(one.auc),
             *_numbers(one.recall_at_1),
             one.control,
+            *protocol_values(one.protocol),
         )
         for one in survivals
     )

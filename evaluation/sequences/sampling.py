@@ -2,7 +2,7 @@
 
 - Places d metres apart: frame i is one when the length of the path so far
   first reaches a multiple of d. The first frame is one.
-- Points are limited to [-100, 100] m, as the paper has it: each of x, y, z in
+- Points are limited to a range, 100 m as the paper has it: each of x, y, z in
   the frame of the sensor.
 """
 
@@ -13,9 +13,7 @@ import numpy as np
 from evaluation.geometry import points as point_arrays
 from evaluation.geometry import poses
 from evaluation.sequences.sequence import Sequence
-
-# [m]
-CROP = 100.0
+from evaluation.support.errors import InputError
 
 
 def sample_frames(positions: np.ndarray, spacing: float) -> np.ndarray:
@@ -34,17 +32,28 @@ def sample_frames(positions: np.ndarray, spacing: float) -> np.ndarray:
     return np.flatnonzero(np.diff(passed, prepend=-1) > 0)
 
 
-def crop(points: np.ndarray) -> np.ndarray:
-    """Returns the finite points (N, 3) within the limits of the protocol."""
+def within_range(points: np.ndarray, max_range: float) -> np.ndarray:
+    """Returns which points (N, 3) are finite and within a range, (N,) bool.
+
+    Args:
+        points: in the frame of the sensor [m].
+        max_range: greatest absolute value of each coordinate [m].
+    """
     kept = np.ones(len(points), dtype=bool)
     # By column: NumPy is slow in reducing along the shorter axis.
     for coordinates in points.T:
         # A comparison with NaN is false.
-        kept &= np.abs(coordinates) <= CROP
-    return points.compress(kept, axis=0)
+        kept &= np.abs(coordinates) <= max_range
+    return kept
 
 
-def gather(sequence: Sequence, frame: int, num_scans: int) -> np.ndarray:
+def gather(
+    sequence: Sequence,
+    frame: int,
+    num_scans: int,
+    max_range: float,
+    fields: tuple[str, ...] = (),
+) -> np.ndarray:
     """Returns the cloud that a method describes at a frame.
 
     Args:
@@ -52,17 +61,67 @@ def gather(sequence: Sequence, frame: int, num_scans: int) -> np.ndarray:
         frame: the first scan.
         num_scans: how many consecutive scans are merged; fewer at the end
             of the drive.
+        max_range: see `within_range`.
+        fields: of the points, beside their coordinates.
 
     Returns:
-        (N, 3) float64, cropped, in the sensor frame of the first scan.
+        (N, 3) float64, in the sensor frame of the first scan; with fields,
+        a structured array (N,) of float64 x, y, z and the fields.
+
+    Raises:
+        InputError: if the scans lack a field.
     """
     last = min(frame + num_scans, len(sequence))
     X_WS = sequence.X_WS
     X_S0W = poses.inverse(X_WS[frame])
     clouds = []
     for index in range(frame, last):
-        cloud = point_arrays.xyz(sequence.scan(index))
+        scan = sequence.scan(index)
+        cloud = point_arrays.xyz(scan)
         if index > frame:
             cloud = poses.transform(X_S0W @ X_WS[index], cloud)
-        clouds.append(cloud)
-    return crop(np.concatenate(clouds))
+        clouds.append(select(scan, cloud, max_range, fields, sequence.name))
+    return np.concatenate(clouds)
+
+
+def select(
+    scan: np.ndarray,
+    p_S: np.ndarray,
+    max_range: float,
+    fields: tuple[str, ...],
+    source: str,
+) -> np.ndarray:
+    """Returns the points of a scan that a method describes.
+
+    Args:
+        scan: structured array (N,).
+        p_S: (N, 3) float64, where its points are [m].
+        max_range: see `within_range`.
+        fields: of the points, beside their coordinates.
+        source: of the scan, for messages.
+
+    Returns:
+        See `gather`.
+
+    Raises:
+        InputError: if the scan lacks a field.
+    """
+    kept = within_range(p_S, max_range)
+    p_S = p_S.compress(kept, axis=0)
+    if not fields:
+        return p_S
+    known = scan.dtype.names or ()
+    for name in fields:
+        if name not in known:
+            raise InputError(
+                f"{source}: its points have no field {name!r} (they have"
+                f" {', '.join(known)})"
+            )
+    dtype = [(axis, np.dtype(np.float64)) for axis in "xyz"]
+    dtype += [(name, scan.dtype[name]) for name in fields]
+    result = np.empty(len(p_S), dtype)
+    for axis, coordinates in zip("xyz", p_S.T, strict=True):
+        result[axis] = coordinates
+    for name in fields:
+        result[name] = scan[name].compress(kept)
+    return result

@@ -11,22 +11,29 @@ from evaluation.change.change_result import (
     ChangeResult,
     symmetric_changes,
 )
+from evaluation.recognition.costs import Cost
+from evaluation.recognition.protocol import (
+    PAPER_PROTOCOL,
+    RetrievalProtocol,
+)
 from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.recognition.survival import Survival
 from evaluation.report import page
 from evaluation.report.aims import aims
+from evaluation.report.cost_table import cost_numbers, cost_table
 from evaluation.report.curve_figures import (
     draw_auc_over_change,
     draw_pr_curves,
-    shows_paper,
 )
 from evaluation.report.findings import Finding, findings
 from evaluation.report.page_data import Illustration, PageDrive
+from evaluation.report.pose_tables import pose_numbers, pose_table
 from evaluation.report.query_table import DriveTrack, query_table
 from evaluation.report.result_tables import (
     audit_table,
     change_table,
     recognition_tables,
+    shows_paper,
 )
 from evaluation.report.survival_figure import draw_survival
 from evaluation.report.survival_tables import (
@@ -61,10 +68,7 @@ class _Collected:
     tracks: dict[str, DriveTrack] = field(default_factory=dict)
     illustrations: list[Illustration] = field(default_factory=list)
     drives: dict[str, PageDrive] = field(default_factory=dict)
-
-    @property
-    def recognitions(self) -> list[RecognitionResult]:
-        return [one.changed for one in self.survivals]
+    recognitions: list[RecognitionResult] = field(default_factory=list)
 
 
 def assemble(
@@ -72,11 +76,15 @@ def assemble(
     output: Path,
     methods: Sequence[MethodChoice] | None = None,
     pages: Mapping[str, str] | None = None,
+    *,
+    protocol: RetrievalProtocol = PAPER_PROTOCOL,
+    with_costs: bool = False,
 ) -> Path:
     """Writes the report of a study whose jobs are done.
 
     Files: `report.html`, which holds everything; `report.md`; `survival`,
-    `tcr` and `place_recognition`, each as .csv (all numbers), .md and .tex;
+    `tcr`, `place_recognition` and `poses`, and with costs `costs`, each as
+    .csv (all numbers), .md and .tex;
     `queries.csv` and `queries_unchanged.csv`, every query of the pairs and of
     their controls; and what is missing in the folder `figures`.
 
@@ -86,6 +94,8 @@ def assemble(
         methods: likewise.
         pages: recording -> address, relative to the page, of what shows it
             in 3-D, for those that have one.
+        protocol: likewise.
+        with_costs: likewise.
 
     Returns:
         The path of `report.html`.
@@ -97,8 +107,10 @@ def assemble(
     chosen = choose_methods() if methods is None else methods
     make_folder(files.figures)
     collected = _Collected()
-    for city in group_cities(recordings):
-        _collect(city, files, chosen, collected)
+    cities = group_cities(recordings)
+    for city in cities:
+        _collect(city, files, chosen, protocol, collected)
+    pairs = [pair for city in cities for pair in city.recognition_pairs()]
     if collected.recognitions:
         shown = auc_illustration(
             files.figures, shows_paper(collected.recognitions)
@@ -113,23 +125,33 @@ def assemble(
         shown = survival_illustration(files.figures)
         draw_survival(collected.survivals, shown.stem)
         collected.illustrations.insert(0, shown)
-    return _write_all(collected, output, pages or {})
+    costs = read_part(files.costs) if with_costs and pairs else []
+    return _write_all(collected, output, pages or {}, costs)
 
 
 def _collect(
     city: City,
     files: StudyFiles,
     methods: Sequence[MethodChoice],
+    protocol: RetrievalProtocol,
     collected: _Collected,
 ) -> None:
     for earlier, later in city.change_pairs():
         change = read_part(files.change(earlier.name, later.name))
         collected.changes.append(change)
-    survivals = []
-    for pair in city.recognition_pairs():
+    survivals, closures = [], []
+    pairs = city.recognition_pairs(
+        with_itself=protocol.exclude_recent is not None
+    )
+    for pair in pairs:
         control = city.unchanged_pair(*pair)
         for method in methods:
             changed = _read_recognition(pair, method, files)
+            if pair[0] is pair[1]:
+                if changed is not None:
+                    closures.append(changed)
+                continue
+            assert changed is not None  # Only loops may be missing.
             unchanged = None
             if control is not None:
                 unchanged = _read_recognition(control, method, files)
@@ -141,10 +163,12 @@ def _collect(
             collected.tracks[drive.name] = DriveTrack(
                 survey.stamps_ns, survey.X_WS
             )
-    if survivals:
+    compared = [*(one.changed for one in survivals), *closures]
+    if compared:
         stem = files.figures / curves_stem(city)
-        draw_pr_curves(city.name, [one.changed for one in survivals], stem)
+        draw_pr_curves(city.name, compared, stem)
     collected.survivals += survivals
+    collected.recognitions += compared
     collected.drives.update(read_part(files.page_drives(city.name)))
     collected.illustrations += illustrations(city, files.figures)
 
@@ -153,13 +177,17 @@ def _read_recognition(
     pair: tuple[RecordingInfo, RecordingInfo],
     method: MethodChoice,
     files: StudyFiles,
-) -> RecognitionResult:
+) -> RecognitionResult | None:
+    """Returns a result; None of a drive that never comes back."""
     database, query = pair
     return read_part(files.recognition(database.name, query.name, method))
 
 
 def _write_all(
-    collected: _Collected, output: Path, pages: Mapping[str, str]
+    collected: _Collected,
+    output: Path,
+    pages: Mapping[str, str],
+    costs: Sequence[Cost],
 ) -> Path:
     changes, recognitions = collected.changes, collected.recognitions
     found = findings(recognitions, changes)
@@ -168,12 +196,17 @@ def _write_all(
     recognition = recognition_tables(recognitions, changes)
     audit = audit_table(recognitions)
     survival = survival_table(collected.survivals)
+    poses, cost = pose_table(recognitions), cost_table(costs)
     _write_queries(collected, output)
-    for name, shown, numbers in (
+    written = [
         ("survival", [survival], survival_numbers(collected.survivals)),
         ("tcr", [change], change),
         ("place_recognition", recognition, audit),
-    ):
+        ("poses", [poses], pose_numbers(recognitions)),
+    ]
+    if costs:
+        written.append(("costs", [cost], cost_numbers(costs)))
+    for name, shown, numbers in written:
         _write(output / f"{name}.csv", numbers.to_csv())
         _write(output / f"{name}.md", "\n".join(map(_captioned, shown)))
         _write(output / f"{name}.tex", "\n".join(t.to_latex() for t in shown))
@@ -187,6 +220,8 @@ def _write_all(
             change=change,
             recognition=recognition,
             audit=audit,
+            poses=poses,
+            costs=cost,
             illustrations=collected.illustrations,
             recognitions=recognitions,
             survivals=collected.survivals,
@@ -204,6 +239,8 @@ def _write_all(
             change,
             recognition,
             audit,
+            poses,
+            cost,
             collected.illustrations,
         ),
     )
@@ -211,7 +248,7 @@ def _write_all(
 
 
 def _write_queries(collected: _Collected, output: Path) -> None:
-    pairs = [(one.pair, one.changed) for one in collected.survivals]
+    pairs = [(one.pair, one) for one in collected.recognitions]
     controls = [
         (one.pair, one.unchanged)
         for one in collected.survivals
@@ -230,6 +267,8 @@ def _to_markdown(
     change: Table,
     recognition: list[Table],
     audit: Table,
+    poses: Table,
+    cost: Table,
     shown: list[Illustration],
 ) -> str:
     parts = ["# Structural change and place recognition\n"]
@@ -253,7 +292,10 @@ def _to_markdown(
     if audit.rows:
         parts.append("## Table II: place recognition\n")
         parts += [_captioned(table) for table in recognition]
+        parts += ["## Pose, not only place\n", _captioned(poses)]
         parts += ["## All numbers\n", _captioned(audit)]
+    if cost.rows:
+        parts += ["## What the methods cost\n", _captioned(cost)]
     parts.append("## Figures\n")
     for one in shown:
         name = quote(one.stem.name)

@@ -7,6 +7,10 @@ from pathlib import Path
 
 from evaluation.jobs.cluster import Cluster
 from evaluation.jobs.running import run_jobs
+from evaluation.recognition.protocol import (
+    PAPER_PROTOCOL,
+    RetrievalProtocol,
+)
 from evaluation.study.assembly import assemble
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import find_recordings
@@ -19,7 +23,10 @@ def write_report(
     output: Path,
     cluster: Cluster,
     own_methods: Iterable[Path] = (),
+    protocol: RetrievalProtocol = PAPER_PROTOCOL,
     on_note: Callable[[str], None] = lambda text: None,
+    *,
+    with_costs: bool = False,
 ) -> Path:
     """Measures all recordings in a folder; writes tables, figures, a page.
 
@@ -33,7 +40,9 @@ def write_report(
         cluster: where the work is done.
         own_methods: Python files with one method each, to run besides those
             of this package.
+        protocol: of place recognition.
         on_note: is told which recordings are left out.
+        with_costs: measure what the methods cost, too.
 
     Returns:
         The path of `report.html`.
@@ -44,7 +53,9 @@ def write_report(
     """
     methods = choose_methods(own_methods)
     found = find_recordings(recordings, on_note)
-    jobs = plan_study(found, output, methods)
+    jobs = plan_study(found, output, methods, protocol, with_costs=with_costs)
     make_folder(output)
     run_jobs(jobs, cluster)
-    return assemble(found, output, methods)
+    return assemble(
+        found, output, methods, protocol=protocol, with_costs=with_costs
+    )

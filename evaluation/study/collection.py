@@ -65,11 +65,16 @@ class City:
         *earlier, last = (self.stages[key] for key in sorted(self.stages))
         return [(recording, last) for recording in earlier]
 
-    def recognition_pairs(self) -> list[tuple[RecordingInfo, RecordingInfo]]:
+    def recognition_pairs(
+        self, *, with_itself: bool = False
+    ) -> list[tuple[RecordingInfo, RecordingInfo]]:
         """Returns pairs of database and query.
 
         Every earlier stage is a database for the last one; the other way
         round where the paper has it.
+
+        Args:
+            with_itself: also each stage with itself, for loop closure.
         """
         pairs = []
         for earlier, last in self.change_pairs():
@@ -79,6 +84,8 @@ class City:
                 for key in paper.recognition_values()
             ):
                 pairs.append((last, earlier))
+        if with_itself:
+            pairs += [(one, one) for one in self.stages.values()]
         return pairs
 
     def control(
@@ -102,8 +109,10 @@ class City:
 
         A drive on the route of one, in the stage of the other, takes the
         place of the one; rather of the database, so that the very same scans
-        ask.
+        ask. A drive against itself has none.
         """
+        if database is query:
+            return None
         for replaced, kept in ((database, query), (query, database)):
             for other in self.others:
                 if (

@@ -9,6 +9,7 @@ from evaluation.change.drive_change import Surveyed
 from evaluation.change.drive_change import compare as compare_maps
 from evaluation.jobs.running import Tell
 from evaluation.recognition.place_recognition import judge_retrieval
+from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.recognition.retrieval import compare as score
 from evaluation.sequences import check_same_world
@@ -82,16 +83,20 @@ def recognise_places(
     stages: tuple[str, str],
     surveys: tuple[SurveyFiles, SurveyFiles],
     method: MethodChoice,
+    protocol: RetrievalProtocol,
     result: Path,
     tell: Tell,
 ) -> None:
     """Writes the `RecognitionResult` of two drives and a method: a job.
+
+    Of a drive that is asked about itself and closes no loop, it is None.
 
     Args:
         map_name: of the city.
         stages: of the database, and of the query.
         surveys: likewise.
         method: that described both.
+        protocol: by which it did.
         result: to write.
         tell: is told how far it is.
 
@@ -99,14 +104,21 @@ def recognise_places(
         InputError: if the drives are of different worlds, no query has a
             match, or a file cannot be read or written.
     """
-    inputs = _recognition_inputs(map_name, stages, surveys, method)
+    inputs = _recognition_inputs(map_name, stages, surveys, method, protocol)
     parts = [survey.described(method) for survey in surveys]
     # The method comes first: what it kept may be of a type of its own.
     comparing = method.make()
     (placed, database), (placed_query, query) = map(read_part, parts)
     check_same_world(placed, placed_query)
-    retrieval = score(comparing, database, query, tracking(tell))
-    outcome = judge_retrieval(comparing, database.name, query.name, retrieval)
+    retrieval = score(comparing, database, query, protocol, tracking(tell))
+    if database.name == query.name and not retrieval.matches.any():
+        # A route need not close a loop.
+        tell.note(f"{query.name}: it never comes back to where it was")
+        write_part(result, inputs, None)
+        return
+    outcome = judge_retrieval(
+        comparing, database.name, query.name, retrieval, protocol
+    )
     write_part(result, inputs, RecognitionResult.of(map_name, stages, outcome))
 
 
@@ -115,10 +127,11 @@ def are_recognised(
     stages: tuple[str, str],
     surveys: tuple[SurveyFiles, SurveyFiles],
     method: MethodChoice,
+    protocol: RetrievalProtocol,
     result: Path,
 ) -> bool:
     """Tells whether there is nothing to do; see `recognise_places`."""
-    inputs = _recognition_inputs(map_name, stages, surveys, method)
+    inputs = _recognition_inputs(map_name, stages, surveys, method, protocol)
     return is_current(result, inputs)
 
 
@@ -127,12 +140,14 @@ def _recognition_inputs(
     stages: tuple[str, str],
     surveys: tuple[SurveyFiles, SurveyFiles],
     method: MethodChoice,
+    protocol: RetrievalProtocol,
 ) -> dict:
     parts = [survey.described(method) for survey in surveys]
     return {
         "map": map_name,
         "stages": stages,
         "method": method.inputs(),
+        "protocol": protocol.to_json(),
         "drives": [part_digest(part) for part in parts],
         "code": measuring_code(),
     }

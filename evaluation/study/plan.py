@@ -6,7 +6,11 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from evaluation.jobs.running import Job
-from evaluation.recognition.retrieval import Role
+from evaluation.recognition.description import Role
+from evaluation.recognition.protocol import (
+    PAPER_PROTOCOL,
+    RetrievalProtocol,
+)
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.collection import (
     City,
@@ -18,6 +22,7 @@ from evaluation.study.measurements import (
     are_recognised,
     recognise_places,
 )
+from evaluation.study.method_costs import are_costs_measured, measure_costs
 from evaluation.study.study_layout import StudyFiles
 from evaluation.study.surveys import START_COST, survey_job, survey_name
 from evaluation.study.views import (
@@ -31,6 +36,7 @@ from evaluation.study.views import (
 # and 150 queries.
 _CHANGE_COST = 6.0
 _CITY_COST = 4.0
+_COSTS_COST = 8.0
 _RECOGNITION_COST = {
     "ring++": 4.0,
     "btc": 1.5,
@@ -44,6 +50,9 @@ def plan_study(
     recordings: Iterable[RecordingInfo],
     output: Path,
     methods: Sequence[MethodChoice] | None = None,
+    protocol: RetrievalProtocol = PAPER_PROTOCOL,
+    *,
+    with_costs: bool = False,
 ) -> list[Job]:
     """Returns the jobs that leave what `assemble` makes a report of.
 
@@ -55,21 +64,33 @@ def plan_study(
             serve as same-stage controls.
         output: folder to write.
         methods: those of this package if left out.
+        protocol: of place recognition.
+        with_costs: measure what the methods cost, too, when all else is
+            done.
 
     Raises:
         InputError: if two recordings claim the same place.
     """
     files = StudyFiles(output.absolute())
     chosen = choose_methods() if methods is None else tuple(methods)
-    return [
+    cities = group_cities(recordings)
+    jobs = [
         job
-        for city in group_cities(recordings)
-        for job in _plan_city(city, files, chosen)
+        for city in cities
+        for job in _plan_city(city, files, chosen, protocol)
     ]
+    pairs = [pair for city in cities for pair in city.recognition_pairs()]
+    if with_costs and pairs:
+        others = tuple(job.name for job in jobs)
+        jobs.append(_cost_job(pairs[0], files, chosen, protocol, others))
+    return jobs
 
 
 def _plan_city(
-    city: City, files: StudyFiles, methods: tuple[MethodChoice, ...]
+    city: City,
+    files: StudyFiles,
+    methods: tuple[MethodChoice, ...],
+    protocol: RetrievalProtocol,
 ) -> list[Job]:
     jobs = [
         survey_job(
@@ -77,10 +98,11 @@ def _plan_city(
             recording.source,
             roles,
             methods,
+            protocol,
             files.survey(recording.name),
             recording.needs,
         )
-        for recording, roles in _roles(city)
+        for recording, roles in _roles(city, protocol)
     ]
     stages = city.stages.values()
     jobs.append(
@@ -102,21 +124,23 @@ def _plan_city(
     )
     jobs += [_change_job(city, pair, files) for pair in city.change_pairs()]
     jobs += [
-        _recognition_job(city, pair, name, method, files)
-        for name, pair in _compared_pairs(city).items()
+        _recognition_job(city, pair, name, method, protocol, files)
+        for name, pair in _compared_pairs(city, protocol).items()
         for method in methods
     ]
     return jobs
 
 
 def _compared_pairs(
-    city: City,
+    city: City, protocol: RetrievalProtocol
 ) -> dict[str, tuple[RecordingInfo, RecordingInfo]]:
     """Returns all pairs of database and query, and their controls, by name.
 
     Two pairs may share a control.
     """
-    pairs = city.recognition_pairs()
+    pairs = city.recognition_pairs(
+        with_itself=protocol.exclude_recent is not None
+    )
     named = {f"{city.name} {d.stage} > {q.stage}": (d, q) for d, q in pairs}
     for pair in pairs:
         control = city.unchanged_pair(*pair)
@@ -127,7 +151,9 @@ def _compared_pairs(
     return named
 
 
-def _roles(city: City) -> list[tuple[RecordingInfo, set[Role]]]:
+def _roles(
+    city: City, protocol: RetrievalProtocol
+) -> list[tuple[RecordingInfo, set[Role]]]:
     """Returns all drives that are needed, with what they serve as."""
     roles: dict[str, tuple[RecordingInfo, set[Role]]] = {}
 
@@ -140,7 +166,7 @@ def _roles(city: City) -> list[tuple[RecordingInfo, set[Role]]]:
         control = city.control(*pair)
         if control is not None:
             need(control)
-    for database, query in _compared_pairs(city).values():
+    for database, query in _compared_pairs(city, protocol).values():
         need(database, "places")
         need(query, "queries")
     return list(roles.values())
@@ -175,6 +201,7 @@ def _recognition_job(
     pair: tuple[RecordingInfo, RecordingInfo],
     name: str,
     method: MethodChoice,
+    protocol: RetrievalProtocol,
     files: StudyFiles,
 ) -> Job:
     database, query = pair
@@ -188,12 +215,39 @@ def _recognition_job(
             (database.stage, query.stage),
             (files.survey(database.name), files.survey(query.name)),
             method,
+            protocol,
             result,
         ),
         needs=_survey_names(pair),
         cost=START_COST + cost,
         output=result,
         is_done=are_recognised,
+    )
+
+
+def _cost_job(
+    pair: tuple[RecordingInfo, RecordingInfo],
+    files: StudyFiles,
+    methods: tuple[MethodChoice, ...],
+    protocol: RetrievalProtocol,
+    others: tuple[str, ...],
+) -> Job:
+    """Returns the job that waits for all others, to have the machine alone."""
+    database, query = pair
+    return Job(
+        name="costs of the methods",
+        function=measure_costs,
+        arguments=(
+            query.source,
+            (files.survey(database.name), files.survey(query.name)),
+            methods,
+            protocol,
+            files.costs,
+        ),
+        needs=others,
+        cost=START_COST + _COSTS_COST,
+        output=files.costs,
+        is_done=are_costs_measured,
     )
 
 

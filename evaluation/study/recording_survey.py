@@ -12,10 +12,14 @@ from evaluation.maps.mapped_sequence import MappedSequence
 from evaluation.maps.thumbnails import thumbnail
 from evaluation.maps.voxel_maps import VoxelMap
 from evaluation.methods import Method, MethodConfig
-from evaluation.recognition.retrieval import (
+from evaluation.recognition.description import (
     DescribedDrive,
     Role,
     describe_drive,
+)
+from evaluation.recognition.protocol import (
+    PAPER_PROTOCOL,
+    RetrievalProtocol,
 )
 from evaluation.sequences import PlacedDrive, Sequence
 from evaluation.support.errors import InputError
@@ -73,6 +77,7 @@ def survey_recording(
     recording: Sequence,
     roles: Set[Role],
     methods: Several[Method],
+    protocol: RetrievalProtocol = PAPER_PROTOCOL,
     track: Track = silent,
 ) -> RecordingSurvey:
     """Maps a recording and describes its places and queries.
@@ -83,6 +88,7 @@ def survey_recording(
         recording: the drive.
         roles: what it serves as in place recognition; may be empty.
         methods: that describe it; may be none.
+        protocol: where it has places and queries.
         track: reports progress.
 
     Raises:
@@ -91,7 +97,7 @@ def survey_recording(
     frames, thumbnails = [], []
     sequence = MappedSequence(
         recording,
-        kept=max((method.scans_per_place for method in methods), default=1),
+        kept=max(map(protocol.scans, methods), default=1),
     )
 
     def keep_thumbnail(frame: int, cloud: np.ndarray) -> None:
@@ -102,7 +108,7 @@ def survey_recording(
     described = {}
     if roles:
         drives = describe_drive(
-            sequence, methods, roles, track, visit=keep_thumbnail
+            sequence, methods, roles, protocol, track, visit=keep_thumbnail
         )
         described = {
             method.name: drive

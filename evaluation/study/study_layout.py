@@ -71,6 +71,11 @@ class StudyFiles:
         name = f"{pair},{file_name(method.name)}.data"
         return self._parts / "recognition" / name
 
+    @property
+    def costs(self) -> Path:
+        """Of the list of `Cost`."""
+        return self._parts / "costs" / "costs.data"
+
     def page_drives(self, city: str) -> Path:
         """Of the `PageDrive`s of a city's stages, by name."""
         return self._parts / "pages" / f"{file_name(city)}.data"

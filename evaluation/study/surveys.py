@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from evaluation.jobs.running import Job, Tell
-from evaluation.recognition.retrieval import Role
+from evaluation.recognition.description import Role
+from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.code_digest import measuring_code
 from evaluation.study.drive_source import DriveSource
@@ -28,6 +29,7 @@ def survey_job(
     source: DriveSource,
     roles: Iterable[Role],
     methods: tuple[MethodChoice, ...],
+    protocol: RetrievalProtocol,
     files: SurveyFiles,
     needs: tuple[str, ...] = (),
 ) -> Job:
@@ -38,6 +40,7 @@ def survey_job(
         source: opens it.
         roles: what it serves as in place recognition; may be empty.
         methods: that describe its places and queries.
+        protocol: where it has these.
         files: to write.
         needs: names of the jobs that make it.
     """
@@ -45,7 +48,7 @@ def survey_job(
     return Job(
         name=survey_name(name),
         function=survey_drive,
-        arguments=(source, roles, methods, files),
+        arguments=(source, roles, methods, protocol, files),
         needs=needs,
         cost=START_COST + _MAP_COST + sum(_ROLE_COST[r] for r in roles),
         output=files.folder,
@@ -62,6 +65,7 @@ def survey_drive(
     source: DriveSource,
     roles: frozenset[Role],
     methods: tuple[MethodChoice, ...],
+    protocol: RetrievalProtocol,
     files: SurveyFiles,
     tell: Tell,
 ) -> None:
@@ -71,18 +75,23 @@ def survey_drive(
         source: opens the drive.
         roles: what it serves as in place recognition; may be empty.
         methods: that describe its places and queries.
+        protocol: where it has these.
         files: to write.
         tell: is told how far it is.
 
     Raises:
         InputError: if the drive cannot be read, or a file not be written.
     """
-    inputs = survey_inputs(source, roles)
+    inputs = survey_inputs(source, roles, protocol)
     missing, maps = _missing(inputs, methods if roles else (), files)
     if not missing and not maps:
         return
     survey = survey_recording(
-        source(), roles, [method.make() for method in missing], tracking(tell)
+        source(),
+        roles,
+        [method.make() for method in missing],
+        protocol,
+        tracking(tell),
     )
     for method in missing:
         # Each is let go when it is written.
@@ -100,10 +109,11 @@ def is_surveyed(
     source: DriveSource,
     roles: frozenset[Role],
     methods: tuple[MethodChoice, ...],
+    protocol: RetrievalProtocol,
     files: SurveyFiles,
 ) -> bool:
     """Tells whether nothing is missing; see `survey_drive`."""
-    inputs = survey_inputs(source, roles)
+    inputs = survey_inputs(source, roles, protocol)
     return _missing(inputs, methods if roles else (), files) == ([], {})
 
 
@@ -126,11 +136,14 @@ def _missing(
     }
 
 
-def survey_inputs(source: DriveSource, roles: frozenset[Role]) -> dict:
+def survey_inputs(
+    source: DriveSource, roles: frozenset[Role], protocol: RetrievalProtocol
+) -> dict:
     """Returns what the maps and thumbnails of a drive depend on."""
     return {
         "drive": source.identity(),
         "roles": sorted(roles),
+        "protocol": protocol.described() if roles else None,
         "code": measuring_code(),
     }
 

@@ -6,15 +6,20 @@ in turn: every pair gives a TCR_sym and, for each method, an AUC.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import csv
-from dataclasses import astuple, fields
 import io
+import math
 from pathlib import Path
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 import numpy as np
 
+from evaluation.recognition.protocol import (
+    PROTOCOL_COLUMNS,
+    protocol_values,
+)
 from evaluation.report.drawing import method_style, plain, save
 from evaluation.report.result_tables import in_paper_order, title
 from evaluation.study.trend_points import TrendPoint
@@ -26,6 +31,20 @@ _BANDWIDTH = 0.15
 _RESAMPLES = 1000
 _LEAST_POINTS = 5
 _GRID = 60
+# Columns of the table, apart from those of the protocol.
+_NUMBERS = (
+    "database",
+    "method",
+    "tcr_sym",
+    "auc",
+    "auc_low",
+    "auc_high",
+    "recall_at_1",
+    "queries",
+    "with_match",
+    "auc_unchanged",
+    "kept",
+)
 
 
 def write_trend(points: Sequence[TrendPoint], folder: Path) -> Path:
@@ -38,11 +57,11 @@ def write_trend(points: Sequence[TrendPoint], folder: Path) -> Path:
     path = folder / "trend.csv"
     out = io.StringIO()
     table = csv.writer(out, lineterminator="\n")
-    table.writerow(field.name for field in fields(TrendPoint))
+    table.writerow([*_NUMBERS, *PROTOCOL_COLUMNS])
     for point in points:
+        values = [getattr(point, name) for name in _NUMBERS]
         table.writerow(
-            f"{value:.6f}" if isinstance(value, float) else value
-            for value in astuple(point)
+            [*map(_to_csv, values), *protocol_values(point.protocol)]
         )
     with completing(path) as part:
         part.write_text(out.getvalue(), encoding="utf-8")
@@ -50,20 +69,57 @@ def write_trend(points: Sequence[TrendPoint], folder: Path) -> Path:
     return path
 
 
+def _to_csv(value: object) -> object:
+    if not isinstance(value, float):
+        return value
+    return "" if math.isnan(value) else f"{value:.6f}"
+
+
 def draw_trend(points: Sequence[TrendPoint], stem: Path) -> None:
     """Draws AUC over TCR_sym: points, a smooth line and its 95 % band.
+
+    Beside it, where databases have controls, the share of AUC that is kept.
 
     Args:
         points: of all databases and methods.
         stem: path to write, without ending.
     """
-    figure = Figure(figsize=(6.4, 4.4), layout="constrained")
-    axes = figure.subplots()
+    survives = any(not math.isnan(point.kept) for point in points)
+    figure = Figure(
+        figsize=(12.0 if survives else 6.4, 4.4), layout="constrained"
+    )
+    panels = figure.subplots(1, 2 if survives else 1, squeeze=False)[0]
+    _draw_panel(panels[0], points, "AUC", lambda point: point.auc)
+    panels[0].set_ylim(0.0, 1.02)
+    if survives:
+        _draw_panel(
+            panels[1],
+            points,
+            "share of AUC that is kept",
+            lambda point: point.kept,
+        )
+        panels[1].set_ylim(bottom=0.0)
+        panels[1].axhline(1.0, color="gray", linewidth=0.8)
+    panels[0].legend(fontsize=8, framealpha=0.8)
+    save(figure, stem, "svg")
+
+
+def _draw_panel(
+    axes: Axes,
+    points: Sequence[TrendPoint],
+    label: str,
+    value: Callable[[TrendPoint], float],
+) -> None:
     for method in in_paper_order(point.method for point in points):
         colour, style, marker = method_style(method)
-        x, y = np.array(
-            sorted((p.tcr_sym, p.auc) for p in points if p.method == method)
-        ).T
+        known = sorted(
+            (p.tcr_sym, value(p))
+            for p in points
+            if p.method == method and not math.isnan(value(p))
+        )
+        if not known:
+            continue
+        x, y = np.array(known).T
         axes.plot(x, y, marker, color=colour, markersize=3.5, alpha=0.55, mew=0)
         if len(x) < _LEAST_POINTS or np.ptp(x) == 0.0:
             axes.plot([], [], style, color=colour, label=plain(title(method)))
@@ -78,10 +134,8 @@ def draw_trend(points: Sequence[TrendPoint], stem: Path) -> None:
             color=colour,
             label=plain(title(method)),
         )
-    axes.set(xlabel=r"TCR$_\mathrm{sym}$", ylabel="AUC", ylim=(0.0, 1.02))
+    axes.set(xlabel=r"TCR$_\mathrm{sym}$", ylabel=label)
     axes.grid(alpha=0.3)
-    axes.legend(fontsize=8, framealpha=0.8)
-    save(figure, stem, "svg")
 
 
 def smooth(x: np.ndarray, y: np.ndarray, grid: np.ndarray) -> np.ndarray:

@@ -6,14 +6,20 @@ Every database is a job of its own.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+import math
 from pathlib import Path
 
 from evaluation.change.tcr import temporal_change
 from evaluation.jobs.cluster import Cluster
 from evaluation.jobs.running import Job, Tell, run_jobs
 from evaluation.recognition.place_recognition import judge_retrieval
+from evaluation.recognition.protocol import (
+    PAPER_PROTOCOL,
+    RetrievalProtocol,
+)
 from evaluation.recognition.retrieval import compare as score
+from evaluation.sequences import Sequence as Recorded
 from evaluation.sequences import check_same_world, open_sequence
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.drive_source import DriveSource, RecordedDrive
@@ -44,6 +50,8 @@ class TrendPoint:
         auc, auc_low, auc_high: with its 95 % interval over queries.
         recall_at_1: over queries with a match.
         queries, with_match: how many.
+        protocol: by which they asked.
+        auc_unchanged: of the database's control; NaN without one.
     """
 
     database: str
@@ -55,6 +63,29 @@ class TrendPoint:
     recall_at_1: float
     queries: int
     with_match: int
+    protocol: RetrievalProtocol
+    auc_unchanged: float = math.nan
+
+    @property
+    def kept(self) -> float:
+        """Share of AUC that the change leaves; NaN where it is unknown."""
+        if not self.auc_unchanged > 0.0:
+            return math.nan
+        return self.auc / self.auc_unchanged
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A drive that is asked, and what tells the change from the route.
+
+    Attributes:
+        source: opens it.
+        control: name of the drive on its route through the city of the
+            query; None if there is none.
+    """
+
+    source: DriveSource
+    control: str | None = None
 
 
 def measure_trend(
@@ -63,6 +94,8 @@ def measure_trend(
     output: Path,
     cluster: Cluster,
     own_methods: Iterable[Path] = (),
+    protocol: RetrievalProtocol = PAPER_PROTOCOL,
+    controls: Sequence[Path] = (),
 ) -> list[TrendPoint]:
     """Returns the points of all databases and methods.
 
@@ -77,42 +110,74 @@ def measure_trend(
         cluster: where the work is done.
         own_methods: Python files with one method each, to run besides those
             of this package.
+        protocol: of place recognition.
+        controls: drives on the routes of databases through the stage of the
+            query; each serves the databases whose route it has.
 
     Raises:
-        InputError: a recording cannot be read, two have one name, or a
-            database is of another world or shares no place with the query.
+        InputError: a recording cannot be read, two have one name, a control
+            serves no database, or a database is of another world or shares
+            no place with the query.
     """
     methods = choose_methods(own_methods)
     asking = open_sequence(query)
-    sources: dict[str, DriveSource] = {}
-    for path in databases:
+    names = {asking.name}
+    if protocol.exclude_recent is not None:
+        # A drive may be asked about itself then.
+        names = set()
+    opened: dict[Path, Recorded] = {}
+    for path in (*databases, *controls):
         sequence = open_sequence(path)
-        if sequence.name in sources or sequence.name == asking.name:
+        if sequence.name in names:
             raise InputError(f"{path}: {sequence.name} is there twice")
-        sources[sequence.name] = _recorded(path)
+        names.add(sequence.name)
         check_same_world(sequence, asking)
+        opened[path] = sequence
+    serving = [opened[path] for path in controls]
+    asked = {}
+    for path in databases:
+        route = _route(opened[path])
+        same = [c.name for c in serving if route and _route(c) == route]
+        asked[opened[path].name] = Asked(
+            _recorded(path), same[0] if same else None
+        )
+    used = {one.control for one in asked.values()}
+    for path in controls:
+        if opened[path].name not in used:
+            raise InputError(f"--control: {path}: no database has its route")
     return measure_drives(
-        asking.name, _recorded(query), sources, output, cluster, methods
+        asking.name,
+        _recorded(query),
+        asked,
+        {opened[path].name: _recorded(path) for path in controls},
+        output,
+        cluster,
+        methods,
+        protocol,
     )
 
 
 def measure_drives(
     asking: str,
     query: DriveSource,
-    databases: Mapping[str, DriveSource],
+    databases: Mapping[str, Asked],
+    controls: Mapping[str, DriveSource],
     output: Path,
     cluster: Cluster,
     methods: tuple[MethodChoice, ...],
+    protocol: RetrievalProtocol = PAPER_PROTOCOL,
 ) -> list[TrendPoint]:
     """Returns the points of drives that need not be recorded.
 
     Args:
         asking: name of the drive that asks.
         query: opens it.
-        databases: name -> what opens a drive that is asked.
+        databases: name -> a drive that is asked.
+        controls: name -> what opens a control of databases.
         output: folder for intermediate results, made if needed.
         cluster: where the work is done.
         methods: to run.
+        protocol: of place recognition.
 
     Raises:
         InputError: see `measure_trend`.
@@ -120,28 +185,41 @@ def measure_drives(
     files = StudyFiles(output.absolute())
     make_folder(output)
     survey = files.survey(asking)
-    jobs = [survey_job(asking, query, {"queries"}, methods, survey)]
-    points = {name: files.trend_points(name, asking) for name in databases}
+    jobs = [survey_job(asking, query, {"queries"}, methods, protocol, survey)]
+    sources = {name: one.source for name, one in databases.items()}
+    sources |= controls
+    parts = {name: files.trend_points(name, asking) for name in sources}
     jobs += [
         Job(
             name=f"measure {name}",
             function=measure_database,
-            arguments=(databases[name], survey, methods, result),
+            arguments=(sources[name], survey, methods, protocol, result),
             needs=(jobs[0].name,),
             cost=_COST,
             output=result,
             is_done=is_database_measured,
         )
-        for name, result in points.items()
+        for name, result in parts.items()
     ]
     run_jobs(jobs, cluster)
-    return [point for path in points.values() for point in read_part(path)]
+    points: list[TrendPoint] = []
+    for name, one in databases.items():
+        unchanged = {}
+        if one.control is not None:
+            measured = read_part(parts[one.control])
+            unchanged = {point.method: point.auc for point in measured}
+        points += [
+            replace(point, auc_unchanged=unchanged.get(point.method, math.nan))
+            for point in read_part(parts[name])
+        ]
+    return points
 
 
 def measure_database(
     source: DriveSource,
     query: SurveyFiles,
     methods: tuple[MethodChoice, ...],
+    protocol: RetrievalProtocol,
     result: Path,
     tell: Tell,
 ) -> None:
@@ -151,6 +229,7 @@ def measure_database(
         source: opens the database.
         query: survey of the drive that asks.
         methods: to run.
+        protocol: of place recognition.
         result: to write.
         tell: is told how far it is.
 
@@ -158,9 +237,11 @@ def measure_database(
         InputError: if the database cannot be read, no query has a match, or
             a file cannot be read or written.
     """
-    inputs = _inputs(source, query, methods)
+    inputs = _inputs(source, query, methods, protocol)
     running = [method.make() for method in methods]
-    database = survey_recording(source(), {"places"}, running, tracking(tell))
+    database = survey_recording(
+        source(), {"places"}, running, protocol, tracking(tell)
+    )
     asking = read_part(query.drive)
     check_same_world(database.drive.placed, asking.placed)
     change = temporal_change(
@@ -170,9 +251,14 @@ def measure_database(
     for choice, method in zip(methods, running, strict=True):
         _, queries = read_part(query.described(choice))
         places = database.described[method.name]
-        metrics = judge_retrieval(
-            method, places.name, queries.name, score(method, places, queries)
-        ).metrics
+        found = judge_retrieval(
+            method,
+            places.name,
+            queries.name,
+            score(method, places, queries, protocol),
+            protocol,
+        )
+        metrics = found.metrics
         points.append(
             TrendPoint(
                 database=places.name,
@@ -184,6 +270,7 @@ def measure_database(
                 recall_at_1=float(metrics.recall_at_1),
                 queries=metrics.num_queries,
                 with_match=metrics.num_with_match,
+                protocol=found.protocol,
             )
         )
     write_part(result, inputs, points)
@@ -193,21 +280,37 @@ def is_database_measured(
     source: DriveSource,
     query: SurveyFiles,
     methods: tuple[MethodChoice, ...],
+    protocol: RetrievalProtocol,
     result: Path,
 ) -> bool:
     """Tells whether there is nothing to do; see `measure_database`."""
-    return is_current(result, _inputs(source, query, methods))
+    return is_current(result, _inputs(source, query, methods, protocol))
 
 
 def _inputs(
-    source: DriveSource, query: SurveyFiles, methods: tuple[MethodChoice, ...]
+    source: DriveSource,
+    query: SurveyFiles,
+    methods: tuple[MethodChoice, ...],
+    protocol: RetrievalProtocol,
 ) -> dict:
     return {
-        **survey_inputs(source, frozenset({"places"})),
+        **survey_inputs(source, frozenset({"places"}), protocol),
+        "retrieval": protocol.to_json(),
         "query": part_digest(query.drive),
         "queries": [part_digest(query.described(one)) for one in methods],
         "methods": [method.inputs() for method in methods],
     }
+
+
+def _route(sequence: Recorded) -> dict | None:
+    """Returns where a drive leads; None if it does not say."""
+    scenario = sequence.scenario or {}
+    route = {
+        name: scenario[name]
+        for name in ("route", "waypoints", "aside")
+        if scenario.get(name) is not None
+    }
+    return route or None
 
 
 def _recorded(path: Path) -> RecordedDrive:

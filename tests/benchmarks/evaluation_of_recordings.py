@@ -54,7 +54,7 @@ def main() -> None:
     )
     print(f"{len(fine)} points for pictures")
     method = make_method("scan-context++", {})
-    clouds = [gather(sequence, i, 1) for i in range(0, number, 20)]
+    clouds = [gather(sequence, i, 1, 100.0) for i in range(0, number, 20)]
     places = measure(
         "describe places",
         lambda: [method.describe_place(cloud) for cloud in clouds],

@@ -33,7 +33,9 @@ def commands():
         group = typer.main.get_command(app)
         for name, command in group.commands.items():
             found[f"{program} {name}"] = {
-                option for each in command.params for option in each.opts
+                option
+                for each in command.params
+                for option in (*each.opts, *each.secondary_opts)
             }
     return found
 

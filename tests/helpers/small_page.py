@@ -4,14 +4,19 @@ import numpy as np
 
 from evaluation.maps.thumbnails import thumbnail
 from evaluation.methods import make_method
+from evaluation.recognition.costs import Cost
 from evaluation.recognition.place_recognition import judge_retrieval
+from evaluation.recognition.pose_errors import PoseErrors
+from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.recognition.retrieval import Retrieval
 from evaluation.recognition.survival import Survival
+from evaluation.report.cost_table import cost_table
 from evaluation.report.figures import top_view
 from evaluation.report.findings import Finding
 from evaluation.report.page import PageContent
 from evaluation.report.page_data import Illustration, make_drive
+from evaluation.report.pose_tables import pose_table
 from evaluation.report.result_tables import (
     audit_table,
     change_table,
@@ -47,6 +52,10 @@ def make_content(folder, **changed):
             for mode in (None, "all", "filtered")
         ],
         "audit": audit_table(results),
+        "poses": pose_table(results),
+        "costs": cost_table(
+            [Cost("ring++", 1, 2000.0, 1.5, 20.25, 10, 12345.0)]
+        ),
         "illustrations": [
             Illustration(folder / "pr", 'curves "P" < R', "svg"),
             Illustration(
@@ -104,9 +113,16 @@ def _result(method, best, back=False):
             row[place] = 0.9
     distances = np.hypot(queries[:, None] - places, 2.0)
     retrieval = Retrieval(
-        np.arange(len(queries)), np.arange(len(places)), scores, distances
+        np.arange(len(queries)),
+        np.arange(len(places)),
+        scores,
+        distances,
+        distances <= PAPER_PROTOCOL.radius,
+        PoseErrors.unknown(len(queries)),
     )
     stages = ("04", "01") if back else ("01", "04")
     names = [f"{MAP}_{stage}" for stage in stages]
-    outcome = judge_retrieval(make_method(method, {}), *names, retrieval)
+    outcome = judge_retrieval(
+        make_method(method, {}), *names, retrieval, PAPER_PROTOCOL
+    )
     return RecognitionResult.of(MAP, stages, outcome)

@@ -10,10 +10,12 @@ AUC in all its rows.
 from __future__ import annotations
 
 import csv
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
 from typing import TYPE_CHECKING
+
+from evaluation.recognition.protocol import RetrievalProtocol
 
 if TYPE_CHECKING:
     from evaluation.recognition.metrics import Mode
@@ -26,6 +28,18 @@ class PaperRecognition:
     auc: float
     recall_at_1: float
     f1_max: float
+
+
+def is_protocol(method: str, protocol: RetrievalProtocol) -> bool:
+    """Tells whether the paper ran a method by a protocol.
+
+    Args:
+        method: its name.
+        protocol: that it ran by, its number of scans included.
+    """
+    scans = 10 if method == "btc" else 1
+    asked = replace(protocol, exclude_recent=None)
+    return asked == RetrievalProtocol(scans_per_place=scans)
 
 
 @cache

@@ -13,11 +13,7 @@ from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import make_scenario
 from cns_drake.scenarios.sequence_facts import sequence_facts
 from cns_drake.scenarios.shipped import shipped_sequences
-from evaluation.recognition.retrieval import (
-    DATABASE_SPACING,
-    MATCH_RADIUS,
-    QUERY_SPACING,
-)
+from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.sequences.sampling import sample_frames
 
 pytestmark = pytest.mark.slow
@@ -219,9 +215,9 @@ def frames(drives):
 def _meeting(frames, database, query):
     """Returns distance and turn from each query to its nearest place."""
     positions, headings = frames[database]
-    places = sample_frames(positions, DATABASE_SPACING)
+    places = sample_frames(positions, PAPER_PROTOCOL.place_spacing)
     asked, heading = frames[query]
-    queries = sample_frames(asked, QUERY_SPACING)
+    queries = sample_frames(asked, PAPER_PROTOCOL.query_spacing)
     tree = cKDTree(positions[places])
     distances, nearest = tree.query(asked[queries])
     turns = heading[queries] - headings[places[nearest]]
@@ -231,7 +227,7 @@ def _meeting(frames, database, query):
 @pytest.mark.parametrize("pair", QUERIES_WITH_MATCH)
 def test_pairs_meet_as_often_as_the_papers(frames, pair):
     distances, turns = _meeting(frames, *pair)
-    matched = distances <= MATCH_RADIUS
+    matched = distances <= PAPER_PROTOCOL.radius
     wanted = QUERIES_WITH_MATCH[pair]
     assert np.count_nonzero(matched) == pytest.approx(wanted, rel=0.1)
     # They overlap in part only.

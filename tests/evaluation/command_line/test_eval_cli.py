@@ -8,6 +8,38 @@ import numpy as np
 import pytest
 
 
+def test_the_protocol_is_the_users(capsys, towns):
+    both = ["pr", towns / "town_01", towns / "town_02", "--method", "solid"]
+    _, out, _ = run(capsys, *both, "--json")
+    values = json.loads(out)
+    assert values["protocol"] == {
+        "radius": 7.5,
+        "query_spacing": 10.0,
+        "place_spacing": 5.0,
+        "max_range": 100.0,
+        "scans_per_place": 1,
+        "exclude_recent": None,
+    }
+    options = ["--radius", "2", "--query-spacing", "20", "--max-range", "30"]
+    options += ["--scans-per-place", "2", "--place-spacing", "10"]
+    status, out, _ = run(capsys, *both, *options, "--json")
+    assert status == 0
+    values = json.loads(out)
+    assert values["queries"] == 4
+    assert values["places"] == 8
+    assert values["protocol"] == {
+        "radius": 2.0,
+        "query_spacing": 20.0,
+        "place_spacing": 10.0,
+        "max_range": 30.0,
+        "scans_per_place": 2,
+        "exclude_recent": None,
+    }
+    _, out, _ = run(capsys, *both, *options)
+    assert "a match within 2 m" in out
+    assert "2 scans a place" in out
+
+
 def test_tcr_json(capsys, towns):
     status, out, err = run(
         capsys, "tcr", towns / "town_01", towns / "town_02", "--json"

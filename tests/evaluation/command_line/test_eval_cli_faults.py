@@ -130,3 +130,26 @@ def test_bad_folders_of_scans(capsys, towns, tmp_path):
     blocked = tmp_path / "a file" / "out.csv"
     blocked.parent.write_text("")
     assert_refused(capsys, scores(good, good, blocked), blocked)
+
+
+def test_a_protocol_that_cannot_be(capsys, towns):
+    both = ["pr", towns / "town_01", towns / "town_02", "--method", "solid"]
+    assert_refused(capsys, [*both, "--radius", "0"], "--radius", "0.0")
+    assert_refused(capsys, [*both, "--scans-per-place", "-1"], "--scans-per")
+    assert_refused(
+        capsys,
+        [*both, "--exclude-recent", "5"],
+        "--exclude-recent",
+        "a drive against itself",
+    )
+    itself = ["pr", towns / "town_01", towns / "town_01", "--method", "solid"]
+    assert_refused(
+        capsys, [*itself, "--exclude-recent", "60"], "town_01: never within"
+    )
+
+
+def test_a_drive_that_finds_itself_is_told(capsys, towns):
+    town = towns / "town_01"
+    _, out, err = run(capsys, "pr", town, town, "--method", "solid")
+    assert "every scan finds itself (--exclude-recent" in err
+    assert "1.0000" in out

@@ -6,7 +6,11 @@ from evaluation.methods import Method, MethodConfig, make_method
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.retrieval import retrieve
 from evaluation.sequences import open_sequence
-from evaluation.sequences.sampling import crop, gather, sample_frames
+from evaluation.sequences.sampling import (
+    gather,
+    sample_frames,
+    within_range,
+)
 from evaluation.support.errors import InputError
 
 
@@ -57,7 +61,10 @@ def test_crop_is_a_box_with_its_faces():
             [1.0, 2.0, 3.0],
         ]
     )
-    np.testing.assert_array_equal(crop(points), points[[0, 5]])
+    kept = within_range(points, 100.0)
+    assert np.flatnonzero(kept).tolist() == [0, 5]
+    assert within_range(points, 2.0).sum() == 0
+    assert within_range(points, 3.0).sum() == 1
 
 
 class OddOneOut(Method):
@@ -125,7 +132,7 @@ def test_merged_scans_are_in_the_frame_of_the_first(tmp_path):
     ]
     sequence = open_sequence(write_recording(tmp_path / "s", scans, X_WBs))
     for frame, number in ((0, 1), (1, 3), (3, 2), (3, 9)):
-        cloud = gather(sequence, frame, number)
+        cloud = gather(sequence, frame, number, 100.0)
         assert len(cloud) == min(number, 5 - frame)
         expected = (post - X_WBs[frame][:3, 3]) @ X_WBs[frame][:3, :3]
         expected -= [0.0, 0.0, 1.6]

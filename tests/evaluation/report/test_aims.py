@@ -4,8 +4,14 @@ from types import SimpleNamespace
 
 import pytest
 
+from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.report import paper
 from evaluation.report.aims import MET, MISSED, aims
+
+
+def asked(method):
+    scans = 10 if method == "btc" else 1
+    return SimpleNamespace(protocol=RetrievalProtocol(scans_per_place=scans))
 
 
 def make_results(change=lambda key: 0.0):
@@ -15,7 +21,10 @@ def make_results(change=lambda key: 0.0):
         metrics = SimpleNamespace(auc=value.auc + change(key))
         results.append(
             SimpleNamespace(
-                pair=key[:3], method=key[3], metrics={key[4]: metrics}
+                pair=key[:3],
+                method=key[3],
+                metrics={key[4]: metrics},
+                outcome=asked(key[3]),
             )
         )
     return results

@@ -8,6 +8,7 @@ import pytest
 
 from evaluation.geometry.points import from_xyz
 from evaluation.maps.voxel_maps import VoxelAccumulator, VoxelMap
+from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.report import curve_figures
 from evaluation.report.curve_figures import draw_auc_over_change
 from evaluation.report.drawing import save
@@ -58,6 +59,7 @@ def test_no_line_through_fewer_than_five_points(
     monkeypatch.setattr(
         curve_figures, "save", lambda figure, stem, kind: drawn.append(figure)
     )
+    protocol = RetrievalProtocol(scans_per_place=10)
     around = SimpleNamespace(low=0.4, high=0.6)
     metrics = SimpleNamespace(auc=0.5, auc_interval=around)
     pairs = [(city, f"{stage:02d}", "09") for stage in range(5)]
@@ -68,6 +70,7 @@ def test_no_line_through_fewer_than_five_points(
                 pair=pair,
                 method="btc",
                 metrics={"all": metrics, "filtered": metrics},
+                outcome=SimpleNamespace(protocol=protocol),
             )
             for pair in pairs[:known]
         ]

@@ -3,6 +3,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.report.findings import findings, paper_trend, trend
 
 MODES = ("all", "filtered")
@@ -12,6 +13,11 @@ def metrics(auc):
     return SimpleNamespace(auc=auc, recall_at_1=auc)
 
 
+def asked(method):
+    scans = 10 if method == "btc" else 1
+    return SimpleNamespace(protocol=RetrievalProtocol(scans_per_place=scans))
+
+
 def make_results(city="metropolis", **aucs):
     """Returns one result a method and pair; pairs are 01, 02, ... -> 09."""
     return [
@@ -19,6 +25,7 @@ def make_results(city="metropolis", **aucs):
             pair=(city, f"{i + 1:02d}", "09"),
             method=method.replace("ring", "ring++"),
             metrics={mode: metrics(value) for mode in MODES},
+            outcome=asked(method),
         )
         for method, values in aucs.items()
         for i, value in enumerate(values)

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 import pytest
 
 from evaluation.recognition.metrics import Interval
+from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.survival import Kept
 from evaluation.report import survival_figure
 from evaluation.report.page_survival import survival_section
@@ -25,6 +26,7 @@ def make(method, database, before, after, interval=(0.25, 0.75)):
         control=f"town_{database}_stage_03" if has_control else None,
         auc=kept,
         recall_at_1=Kept(before, before, Interval(*interval)),
+        protocol=RetrievalProtocol(radius=5.0, scans_per_place=10),
     )
 
 
@@ -47,10 +49,11 @@ def test_numbers():
     assert rows[0]["r1_kept"] == 1.0
     first, last = table.to_csv().splitlines()[1:]
     assert first.startswith("town,01,03,btc,0.8,0.4,0.5,0.25,0.75,")
-    assert first.endswith(",town_01_stage_03")
+    protocol = "5.0,10.0,5.0,100.0,10,"
+    assert first.endswith(f",town_01_stage_03,{protocol}")
     # Without a control, nothing but what was measured.
     assert last.startswith("town,00,03,btc,,0.5,,,,,")
-    assert last.endswith(",")
+    assert last.endswith(f",,{protocol}")
 
 
 def test_table_for_print():

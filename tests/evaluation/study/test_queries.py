@@ -4,6 +4,7 @@ from collections import defaultdict
 import csv
 import math
 
+import numpy as np
 import pytest
 from small_towns import drive
 import studies
@@ -128,6 +129,65 @@ def test_survival(report):
         assert float(row["kept_low"]) <= kept <= float(row["kept_high"])
         some_lost |= kept < 0.9
     assert some_lost
+
+
+def test_poses(report):
+    groups = read_queries(report / "queries.csv")
+    table = read(report / "poses.csv")
+    assert len(table) == len(groups)
+    some = 0
+    for row in table:
+        key = tuple(row[name] for name in ("map", "db", "query", "method"))
+        rows = groups[key]
+        curve = [(count(rows, score(r)), score(r)) for r in rows if r["score"]]
+        values = [2 * tp / (2 * tp + fp + fn) for (tp, fp, fn), _ in curve]
+        pure = [tp / max(tp + fn, 1) for (tp, fp, fn), _ in curve if fp == 0]
+        recall = float(row["recall_at_100_precision"])
+        assert recall == pytest.approx(max(pure, default=0.0))
+        # Of equal values that of the greatest score.
+        best = max(values, default=0.0)
+        least = max(
+            (s for (_, s), v in zip(curve, values, strict=True) if v == best),
+            default=math.inf,
+        )
+        accepted = [
+            r
+            for r in rows
+            if r["correct"] == "1" and r["score"] and score(r) >= least
+        ]
+        assert int(row["accepted_matches"]) == len(accepted)
+        for name in ("translation", "rotation"):
+            unit = "_deg" if name == "rotation" else ""
+            errors = [
+                float(r[f"{name}_error{unit}"])
+                for r in accepted
+                if r[f"{name}_error{unit}"]
+            ]
+            if not errors:
+                assert row[f"{name}_median{unit}"] == ""
+                continue
+            some += 1
+            for part, q in (("median", 50), ("90", 90)):
+                value = float(row[f"{name}_{part}{unit}"])
+                assert value == pytest.approx(np.percentile(errors, q))
+        asked = [r for r in rows if r["has_match"] == "1"]
+        near = [
+            r["translation_error"] != ""
+            and float(r["translation_error"]) <= 2.0
+            and float(r["rotation_error_deg"]) <= 5.0
+            for r in asked
+        ]
+        assert float(row["success"]) == pytest.approx(np.mean(near))
+    assert some > 8
+
+
+def test_the_protocol_stands_in_every_row(report):
+    for name in ("queries", "survival", "poses", "place_recognition"):
+        for row in read(report / f"{name}.csv"):
+            assert row["radius"] == "7.5"
+            number = "10" if row["method"] == "btc" else "1"
+            assert row["scans_per_place"] == number
+            assert row["exclude_recent"] == ""
 
 
 def test_the_control_takes_the_place_of_the_earlier_drive(report):

@@ -180,7 +180,7 @@ def test_figures_for_print_and_page(report):
 def test_report_is_the_same_whoever_works(recordings, report, tmp_path):
     write_report(recordings, tmp_path, Cluster(num_workers=2))
     files = studies.report_files(tmp_path)
-    assert len(files) == 13 + 18
+    assert len(files) == 16 + 18
     assert files == studies.report_files(report)
 
 

@@ -8,7 +8,8 @@ from small_towns import drive
 
 from evaluation.change.drive_change import survey
 from evaluation.jobs.running import Tell
-from evaluation.recognition.retrieval import describe_drive
+from evaluation.recognition.description import describe_drive
+from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.sequences import Sequence, open_sequence
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.drive_source import RecordedDrive
@@ -111,7 +112,7 @@ def files(tmp_path):
 
 def test_what_is_kept_is_what_was_found(recorded, source, files):
     choices = choose_methods()
-    survey_drive(source, BOTH, choices, files, Tell())
+    survey_drive(source, BOTH, choices, PAPER_PROTOCOL, files, Tell())
     methods = [choice.make() for choice in choices]
     found = survey_recording(recorded, BOTH, methods)
     assert_equal(read_part(files.drive), found.drive)
@@ -134,22 +135,25 @@ def test_maps_are_those_of_which_the_tcr_is_measured(folder, recorded, roles):
 
 def test_only_what_is_missing_or_of_something_else_is_found(source, files):
     *others, btc = sorted(choose_methods(), key=lambda one: one.name == "btc")
-    survey_drive(source, BOTH, tuple(others), files, Tell())
+    survey_drive(source, BOTH, tuple(others), PAPER_PROTOCOL, files, Tell())
     stamps = {path: path.stat().st_mtime_ns for path in files.folder.iterdir()}
-    survey_drive(source, BOTH, tuple(others), files, Tell())
+    survey_drive(source, BOTH, tuple(others), PAPER_PROTOCOL, files, Tell())
     assert len(source.opened) == 1
-    survey_drive(source, BOTH, (*others, btc), files, Tell())
+    survey_drive(source, BOTH, (*others, btc), PAPER_PROTOCOL, files, Tell())
     assert len(source.opened) == 2
     for method in others:
         path = files.described(method)
         assert path.stat().st_mtime_ns == stamps[path]
-    survey_drive(source, frozenset(), (*others, btc), files, Tell())
+    survey_drive(
+        source, frozenset(), (*others, btc), PAPER_PROTOCOL, files, Tell()
+    )
     assert len(source.opened) == 3
     assert len(read_part(files.drive).frames) == 0
     survey_drive(
         Source(source.recorded, 7, source.opened),
         frozenset(),
         (),
+        PAPER_PROTOCOL,
         files,
         Tell(),
     )
@@ -179,12 +183,20 @@ def test_drives_of_two_worlds_are_not_compared(tmp_path, recorded):
 
     (solid,) = (one for one in choose_methods() if one.name == "solid")
     surveys = (SurveyFiles(tmp_path / "a"), SurveyFiles(tmp_path / "b"))
-    survey_drive(Source(recorded), BOTH, (solid,), surveys[0], Tell())
+    survey_drive(
+        Source(recorded), BOTH, (solid,), PAPER_PROTOCOL, surveys[0], Tell()
+    )
     other = Source(Elsewhere(recorded))
-    survey_drive(other, BOTH, (solid,), surveys[1], Tell())
+    survey_drive(other, BOTH, (solid,), PAPER_PROTOCOL, surveys[1], Tell())
     result = tmp_path / "result.data"
     with pytest.raises(InputError, match="poses in frame 'utm'"):
         recognise_places(
-            "metropolis", ("01", "04"), surveys, solid, result, Tell()
+            "metropolis",
+            ("01", "04"),
+            surveys,
+            solid,
+            PAPER_PROTOCOL,
+            result,
+            Tell(),
         )
     assert not result.exists()

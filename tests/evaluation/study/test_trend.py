@@ -11,6 +11,7 @@ from evaluation.change.drive_change import compare, survey
 from evaluation.jobs.cluster import Cluster
 from evaluation.methods import known_methods, make_method
 from evaluation.recognition.place_recognition import run
+from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.sequences import open_sequence
 from evaluation.study import trend_points
 from evaluation.study.trend import smooth, smooth_band, write_trend
@@ -94,6 +95,50 @@ def test_processes_change_nothing_and_are_not_needed_twice(
         trend_points, "survey_recording", lambda *_: pytest.fail("again")
     )
     assert measure_trend(*arguments, Cluster()) == points
+
+
+def test_what_is_kept_is_told_by_the_control(folder, tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        trend_points, "run_jobs", lambda jobs, cluster: studies.do(jobs)
+    )
+    control = folder / "metropolis_04_control"
+    found = measure_trend(
+        folder / "metropolis_04",
+        [folder / "metropolis_01"],
+        tmp_path,
+        Cluster(),
+        protocol=RetrievalProtocol(radius=6.0),
+        controls=[control],
+    )
+    for point in found:
+        if point.method == "btc":
+            continue
+        unchanged = run(
+            open_sequence(control),
+            open_sequence(folder / "metropolis_04"),
+            make_method(point.method, {}),
+            protocol=RetrievalProtocol(radius=6.0),
+        )
+        assert point.auc_unchanged == unchanged.metrics.auc
+        assert point.kept == point.auc / point.auc_unchanged
+        assert point.protocol == unchanged.protocol
+    rows = list(csv.DictReader(write_trend(found, tmp_path).open()))
+    assert {row["radius"] for row in rows} == {"6.0"}
+    for row, point in zip(rows, found, strict=True):
+        kept = "" if np.isnan(point.kept) else f"{point.kept:.6f}"
+        assert row["kept"] == kept
+
+
+def test_a_control_that_serves_none(folder, tmp_path):
+    drive(tmp_path / "metropolis_04_b", "04", "b")
+    with pytest.raises(InputError, match=r"--control: .*_b: no database has"):
+        measure_trend(
+            folder / "metropolis_04",
+            [folder / "metropolis_01"],
+            tmp_path,
+            Cluster(),
+            controls=[tmp_path / "metropolis_04_b"],
+        )
 
 
 def test_a_drive_given_twice_is_named(folder, tmp_path):

@@ -1,0 +1,108 @@
+"""The options of the protocol, the same for every command that asks drives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import functools
+import inspect
+from typing import Annotated, Any
+
+import typer
+
+from evaluation.recognition.protocol import (
+    PAPER_PROTOCOL,
+    RetrievalProtocol,
+)
+
+_OPTIONS: dict[str, tuple[object, object]] = {
+    "radius": (
+        Annotated[
+            float,
+            typer.Option(help="A place is a match within this distance [m]."),
+        ],
+        PAPER_PROTOCOL.radius,
+    ),
+    "query_spacing": (
+        Annotated[
+            float, typer.Option(help="Between two queries, along the path [m].")
+        ],
+        PAPER_PROTOCOL.query_spacing,
+    ),
+    "place_spacing": (
+        Annotated[
+            float,
+            typer.Option(help="Between two places of the database [m]."),
+        ],
+        PAPER_PROTOCOL.place_spacing,
+    ),
+    "max_range": (
+        Annotated[
+            float, typer.Option(help="Points farther along an axis go [m].")
+        ],
+        PAPER_PROTOCOL.max_range,
+    ),
+    "scans_per_place": (
+        Annotated[
+            int | None,
+            typer.Option(
+                metavar="N",
+                help="Merge N scans for every method; each has its own number"
+                " if left out.",
+            ),
+        ],
+        None,
+    ),
+    "exclude_recent": (
+        Annotated[
+            float | None,
+            typer.Option(
+                metavar="S",
+                help="Loop closure: a drive is also asked about itself, of"
+                " places passed at least S seconds before.",
+            ),
+        ],
+        None,
+    ),
+}
+
+
+Costs = Annotated[
+    bool,
+    typer.Option(
+        "--costs/--no-costs",
+        help="Also measure what the methods cost, in time and room: all that"
+        " differs from run to run.",
+    ),
+]
+
+
+def with_protocol(command: Callable[..., None]) -> Callable[..., None]:
+    """Gives a command the options of the protocol.
+
+    Args:
+        command: has a keyword `protocol`, a `RetrievalProtocol`, in place of
+            which the options stand on the command line.
+    """
+
+    @functools.wraps(command)
+    def asking(**values: Any) -> None:
+        chosen = {name: values.pop(name) for name in _OPTIONS}
+        command(**values, protocol=RetrievalProtocol(**chosen))
+
+    signature = inspect.signature(command, eval_str=True)
+    own = [p for p in signature.parameters.values() if p.name != "protocol"]
+    added = [
+        inspect.Parameter(
+            name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=default,
+            annotation=annotation,
+        )
+        for name, (annotation, default) in _OPTIONS.items()
+    ]
+    parameters = [
+        one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in own
+    ] + added
+    asking.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+    asking.__annotations__ = {one.name: one.annotation for one in parameters}
+    return asking

@@ -1,0 +1,100 @@
+"""What a method costs: time to describe and to ask, and room for a place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+import pickle
+from time import process_time_ns
+from typing import Any
+
+import numpy as np
+
+from evaluation.methods.method import Method
+from evaluation.recognition.description import DescribedDrive
+from evaluation.recognition.scoring import rerank_places, score_places
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Of one method, on one core.
+
+    Times are of the processor, medians over some scans.
+
+    Attributes:
+        method: its name.
+        scans_per_place: how many scans were merged into a cloud.
+        points: in a cloud, in the mean.
+        describe_ms: to describe a cloud, as a query [ms].
+        query_ms: to compare a query with all places, a second stage and the
+            pose of the best place included [ms].
+        places: how many these are.
+        place_bytes: of a place's description, pickled, in the mean.
+    """
+
+    method: str
+    scans_per_place: int
+    points: float
+    describe_ms: float
+    query_ms: float
+    places: int
+    place_bytes: float
+
+
+def measure_cost(
+    method: Method,
+    clouds: Sequence[np.ndarray],
+    scans_per_place: int,
+    database: DescribedDrive,
+    query: DescribedDrive,
+) -> Cost:
+    """Measures a method.
+
+    Args:
+        method: to measure.
+        clouds: to describe, two or more; the first is not counted, since
+            what runs for the first time is loaded or compiled.
+        scans_per_place: that were merged into each.
+        database: with places.
+        query: with queries, of which as many are asked as there are clouds.
+    """
+    describing = [_cpu_ms(method.describe, cloud) for cloud in clouds]
+    places, queries = database.places, query.queries
+    indexed = method.build_database(places.descriptors)
+    number = len(places.frames)
+    rows = np.linspace(0, len(queries.frames) - 1, len(clouds)).astype(int)
+
+    def ask(row: int) -> None:
+        found = score_places(
+            method,
+            queries.descriptors[: row + 1],
+            indexed,
+            number,
+            exhaustive=False,
+        )
+        if method.rerank_best:
+            found = rerank_places(
+                method, found, queries.clouds[row], places.clouds
+            )
+        if not np.isnan(found).all():
+            best = int(np.nanargmax(found))
+            method.relative_pose(queries.descriptors[row], indexed, best)
+
+    asking = [_cpu_ms(ask, row) for row in rows.tolist()]
+    sizes = [len(pickle.dumps(one, protocol=5)) for one in places.descriptors]
+    return Cost(
+        method=method.name,
+        scans_per_place=scans_per_place,
+        points=float(np.mean([len(cloud) for cloud in clouds])),
+        describe_ms=float(np.median(describing[1:])),
+        query_ms=float(np.median(asking[1:])),
+        places=number,
+        place_bytes=float(np.mean(sizes)),
+    )
+
+
+def _cpu_ms(function: Callable[[Any], object], argument: object) -> float:
+    """Returns the time of the processor that a call takes [ms]."""
+    start = process_time_ns()
+    function(argument)
+    return (process_time_ns() - start) * 1e-6

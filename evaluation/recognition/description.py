@@ -1,0 +1,214 @@
+"""What methods keep of a drive: descriptions of its places and queries."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Set
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from evaluation.methods.method import Method
+from evaluation.recognition.protocol import (
+    PAPER_PROTOCOL,
+    RetrievalProtocol,
+)
+from evaluation.sequences.sampling import gather, sample_frames
+from evaluation.sequences.sequence import Sequence
+from evaluation.support.errors import InputError
+from evaluation.support.progress import Track, silent
+
+# What a drive is described for.
+Role = Literal["places", "queries"]
+
+
+@dataclass(frozen=True)
+class DescribedScans:
+    """Where a drive has places, or asks, and what a method keeps of these.
+
+    Attributes:
+        frames: (K,) of the drive.
+        stamps_ns: (K,) int64.
+        X_WS: (K, 4, 4) poses of the sensor.
+        descriptors: K; none if the drive does not serve as this.
+        clouds: K clouds that were described, for methods with a second
+            stage; else none.
+    """
+
+    frames: np.ndarray
+    stamps_ns: np.ndarray
+    X_WS: np.ndarray
+    descriptors: list = field(default_factory=list)
+    clouds: list[np.ndarray] = field(default_factory=list)
+
+    @property
+    def p_WSs(self) -> np.ndarray:
+        """(K, 3) positions of the sensor [m]."""
+        return self.X_WS[:, :3, 3]
+
+
+@dataclass(frozen=True)
+class DescribedDrive:
+    """What a method keeps of a drive.
+
+    Attributes:
+        name: of the drive.
+        places: for queries to find.
+        queries: that ask.
+    """
+
+    name: str
+    places: DescribedScans
+    queries: DescribedScans
+
+
+def describe_drive(
+    sequence: Sequence,
+    methods: Iterable[Method],
+    roles: Set[Role],
+    protocol: RetrievalProtocol = PAPER_PROTOCOL,
+    track: Track = silent,
+    visit: Callable[[int, np.ndarray], None] | None = None,
+) -> list[DescribedDrive]:
+    """Describes the places and queries of a drive, each cloud once.
+
+    Where a frame is both, a method that describes both alike does so once.
+    Clouds are shared between methods.
+
+    Args:
+        sequence: the drive.
+        methods: that describe it.
+        roles: what it serves as.
+        protocol: where it has places and queries, and what their clouds are.
+        track: reports progress.
+        visit: is also shown each described frame and its single scan (N, 3),
+            cropped, in the frame of the sensor.
+
+    Returns:
+        What each method made of it.
+
+    Raises:
+        InputError: if the sequence cannot be read, it lacks a field that a
+            method wants, or no described cloud has a point within range.
+    """
+    describing = [
+        _Describing(method, sequence, roles, protocol) for method in methods
+    ]
+    frames = {role: _frames(sequence, role, protocol) for role in roles}
+    wanted = np.unique(np.concatenate([*frames.values()])).tolist()
+    # How many scans a cloud merges, and fields of its points.
+    kinds = {one.kind for one in describing}
+    single: tuple[int, tuple[str, ...]] = (1, ())
+    if visit is not None:
+        kinds.add(single)
+    num_points = 0
+    for frame in track(wanted, f"describing {sequence.name}", len(wanted)):
+        clouds = {
+            (number, fields): gather(
+                sequence, frame, number, protocol.max_range, fields
+            )
+            for number, fields in kinds
+        }
+        num_points += max(map(len, clouds.values()))
+        if visit is not None:
+            visit(frame, clouds[single])
+        for one in describing:
+            one.add(frame, clouds[one.kind])
+    if num_points == 0:
+        raise InputError(
+            f"{sequence.name}: no finite point within {protocol.max_range:g} m"
+            f" of the LiDAR in any of {len(wanted)} scans"
+        )
+    return [one.finish() for one in describing]
+
+
+def _frames(
+    sequence: Sequence, role: Role, protocol: RetrievalProtocol
+) -> np.ndarray:
+    spacing = protocol.place_spacing
+    if role == "queries":
+        spacing = protocol.query_spacing
+    return sample_frames(sequence.X_WS[:, :3, 3], spacing)
+
+
+class _Describing:
+    """One method, at work on one drive."""
+
+    def __init__(
+        self,
+        method: Method,
+        sequence: Sequence,
+        roles: Set[Role],
+        protocol: RetrievalProtocol,
+    ):
+        self.kind = (protocol.scans(method), tuple(method.point_fields))
+        self._method = method
+        self._waiting: list[tuple[int, np.ndarray]] = []
+        scans = {}
+        for role in ("places", "queries"):
+            frames = _frames(sequence, role, protocol)
+            scans[role] = DescribedScans(
+                frames, sequence.stamps_ns[frames], sequence.X_WS[frames]
+            )
+        self._drive = DescribedDrive(sequence.name, **scans)
+        self._members = {
+            role: set(scans[role].frames.tolist()) if role in roles else set()
+            for role in scans
+        }
+
+    def add(self, frame: int, cloud: np.ndarray) -> None:
+        self._waiting.append((frame, cloud))
+        if len(self._waiting) >= self._method.batch_size:
+            self._flush()
+
+    def finish(self) -> DescribedDrive:
+        self._flush()
+        return self._drive
+
+    def _flush(self) -> None:
+        waiting, self._waiting = self._waiting, []
+        described = self._describe(waiting, self._members["places"], True)
+        self._keep(self._drive.places, described, waiting)
+        asking = self._members["queries"]
+        shared = described if self._method.describes_alike else {}
+        described = shared | self._describe(
+            waiting, asking - set(shared), False
+        )
+        described = {f: one for f, one in described.items() if f in asking}
+        self._keep(self._drive.queries, described, waiting)
+
+    def _describe(
+        self,
+        waiting: list[tuple[int, np.ndarray]],
+        members: set[int],
+        of_places: bool,
+    ) -> dict[int, object]:
+        """Returns frame -> descriptor of those that are members."""
+        chosen = [
+            (frame, cloud) for frame, cloud in waiting if frame in members
+        ]
+        if not chosen:
+            return {}
+        found = self._method.describe_batch(
+            [cloud for _, cloud in chosen], of_places=of_places
+        )
+        if len(found) != len(chosen):
+            raise InputError(
+                f"{self._method.name}: describe_batch returned {len(found)}"
+                f" descriptors of {len(chosen)} clouds"
+            )
+        return {
+            frame: one for (frame, _), one in zip(chosen, found, strict=True)
+        }
+
+    def _keep(
+        self,
+        scans: DescribedScans,
+        described: dict[int, object],
+        waiting: list[tuple[int, np.ndarray]],
+    ) -> None:
+        for frame, cloud in waiting:
+            if frame in described:
+                scans.descriptors.append(described[frame])
+                if self._method.rerank_best:
+                    scans.clouds.append(cloud)

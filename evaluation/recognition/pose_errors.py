@@ -1,0 +1,142 @@
+"""How wrong the relative poses are that a method finds with a place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+import numpy as np
+
+from evaluation.geometry import poses
+from evaluation.methods.method import Method
+from evaluation.recognition.metrics import (
+    PlaceRecognitionMetrics,
+    QueryOutcomes,
+)
+from evaluation.support.errors import InputError
+
+# A query is localised if its pose is no more wrong than this.
+SUCCESS_TRANSLATION = 2.0
+SUCCESS_ROTATION_DEG = 5.0
+
+
+@dataclass(frozen=True)
+class PoseErrors:
+    """Of the pose of each of Q queries relative to its best place.
+
+    Attributes:
+        translation: (Q,) distance to the true position [m]; NaN without a
+            candidate or a pose.
+        rotation_deg: (Q,) angle to the true orientation [deg]; likewise.
+    """
+
+    translation: np.ndarray
+    rotation_deg: np.ndarray
+
+    @classmethod
+    def unknown(cls, num_queries: int) -> PoseErrors:
+        """Returns those of a method that estimates no pose."""
+        return cls(np.full(num_queries, np.nan), np.full(num_queries, np.nan))
+
+
+@dataclass(frozen=True)
+class PoseMetrics:
+    """How good the poses of one method on one pair of drives are.
+
+    The errors are those of the accepted matches: queries whose best place is
+    a match, and whose score reaches the threshold of the greatest F1 (mode
+    all).
+
+    Attributes:
+        num_accepted: how many these are.
+        translation_median, translation_90: median and 90 % quantile [m]; NaN
+            without an accepted match that has a pose.
+        rotation_median_deg, rotation_90_deg: likewise [deg].
+        success: part of the queries with a match whose pose in the world is
+            wrong by at most 2 m and 5 deg, whatever the score; NaN if the
+            method estimates no pose or no query has a match.
+    """
+
+    num_accepted: int
+    translation_median: float
+    translation_90: float
+    rotation_median_deg: float
+    rotation_90_deg: float
+    success: float
+
+
+def pose_error(
+    X_PQ: np.ndarray, X_WP: np.ndarray, X_WQ: np.ndarray
+) -> tuple[float, float]:
+    """Returns how wrong a pose is, in metres and in degrees.
+
+    Args:
+        X_PQ: (4, 4) the query's sensor in that of the place, as estimated.
+        X_WP: (4, 4) truth.
+        X_WQ: (4, 4) truth.
+    """
+    X_error = poses.inverse(X_WQ) @ X_WP @ X_PQ
+    # From the sine and the cosine, which is exact for small and large angles.
+    R = X_error[:3, :3]
+    axis = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    angle = math.atan2(float(np.linalg.norm(axis)), float(np.trace(R)) - 1.0)
+    return float(np.linalg.norm(X_error[:3, 3])), math.degrees(angle)
+
+
+def checked_pose(method: Method, X_PQ: object) -> np.ndarray | None:
+    """Returns what `relative_pose` returned, if it is a pose or None.
+
+    Raises:
+        InputError: if it is not.
+    """
+    if X_PQ is None:
+        return None
+    pose = np.asarray(X_PQ)
+    if pose.shape != (4, 4) or pose.dtype.kind != "f":
+        raise InputError(
+            f"{method.name}: relative_pose returned {type(X_PQ).__name__} of"
+            f" shape {pose.shape} instead of (4, 4) floats or None"
+        )
+    return pose
+
+
+def pose_metrics(
+    errors: PoseErrors,
+    outcomes: QueryOutcomes,
+    metrics: PlaceRecognitionMetrics,
+) -> PoseMetrics:
+    """Sums errors up.
+
+    Args:
+        errors: of the queries.
+        outcomes: of the same.
+        metrics: of the same, in mode all.
+    """
+    accepted = np.zeros(len(outcomes), dtype=bool)
+    if metrics.f1_max_index is not None:
+        least = metrics.curve.thresholds[metrics.f1_max_index]
+        # A comparison with NaN is false.
+        accepted = outcomes.is_right & (outcomes.best_scores >= least)
+    known = ~np.isnan(errors.translation)
+    success = math.nan
+    # Who finds no place at all localises nothing, poses or not.
+    estimates = known.any() or np.isnan(outcomes.best_scores).all()
+    if estimates and outcomes.has_match.any():
+        is_near = (errors.translation <= SUCCESS_TRANSLATION) & (
+            errors.rotation_deg <= SUCCESS_ROTATION_DEG
+        )
+        success = float(is_near[outcomes.has_match].mean())
+    translation = errors.translation[accepted & known]
+    rotation_deg = errors.rotation_deg[accepted & known]
+    return PoseMetrics(
+        num_accepted=int(accepted.sum()),
+        translation_median=_quantile(translation, 0.5),
+        translation_90=_quantile(translation, 0.9),
+        rotation_median_deg=_quantile(rotation_deg, 0.5),
+        rotation_90_deg=_quantile(rotation_deg, 0.9),
+        success=success,
+    )
+
+
+def _quantile(values: np.ndarray, part: float) -> float:
+    return float(np.quantile(values, part)) if len(values) else math.nan

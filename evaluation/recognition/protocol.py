@@ -1,0 +1,104 @@
+"""What is asked of place recognition, and what counts as found."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, fields, replace
+import math
+from typing import TYPE_CHECKING
+
+from evaluation.support.errors import InputError
+
+if TYPE_CHECKING:
+    from evaluation.methods.method import Method
+
+
+@dataclass(frozen=True)
+class RetrievalProtocol:
+    """How a drive asks another; by default as the paper has it.
+
+    Attributes:
+        radius: within which a place is a match of a query, limit included
+            [m].
+        query_spacing: between two queries, along the path [m].
+        place_spacing: likewise between two places of the database [m].
+        max_range: points farther along x, y or z of the sensor's frame are
+            left out [m].
+        scans_per_place: how many consecutive scans are merged into the cloud
+            that is described; None for what each method asks for.
+        exclude_recent: of a drive that is asked about itself: only places
+            that it passed at least so long before are known [s]. None for
+            drives that ask others.
+
+    Raises:
+        InputError: if a value is not positive, with the option that it has
+            on the command line.
+
+    Example:
+        from evaluation import RetrievalProtocol
+
+        print(RetrievalProtocol(radius=10.0).to_text())
+    """
+
+    radius: float = 7.5
+    query_spacing: float = 10.0
+    place_spacing: float = 5.0
+    max_range: float = 100.0
+    scans_per_place: int | None = None
+    exclude_recent: float | None = None
+
+    def __post_init__(self) -> None:
+        for name, value in asdict(self).items():
+            if value is not None and not 0.0 < value < math.inf:
+                option = name.replace("_", "-")
+                raise InputError(f"--{option}: {value} is not positive")
+
+    def scans(self, method: Method) -> int:
+        """Returns how many scans a place of a method consists of."""
+        if self.scans_per_place is not None:
+            return self.scans_per_place
+        return method.scans_per_place
+
+    def of(self, method: Method) -> RetrievalProtocol:
+        """Returns what a method runs with: nothing is left to it."""
+        return replace(self, scans_per_place=self.scans(method))
+
+    def described(self) -> dict[str, float | int | None]:
+        """Returns what the descriptions of a drive depend on."""
+        values = asdict(self)
+        del values["radius"], values["exclude_recent"]
+        return values
+
+    def to_json(self) -> dict[str, float | int | None]:
+        return asdict(self)
+
+    def to_text(self) -> str:
+        """Returns a sentence."""
+        parts = [
+            f"A query every {self.query_spacing:g} m, a place every"
+            f" {self.place_spacing:g} m, a match within {self.radius:g} m,"
+            f" points within {self.max_range:g} m"
+        ]
+        if self.scans_per_place is not None:
+            number = self.scans_per_place
+            scans = "one scan" if number == 1 else f"{number} scans"
+            parts.append(f"{scans} a place")
+        if self.exclude_recent is not None:
+            parts.append(
+                "of a drive against itself places passed at least"
+                f" {self.exclude_recent:g} s before"
+            )
+        return f"{', '.join(parts)}."
+
+
+# The defaults, which are the paper's.
+PAPER_PROTOCOL = RetrievalProtocol()
+
+# Columns of a table of results: the options that they were found with.
+PROTOCOL_COLUMNS = tuple(one.name for one in fields(RetrievalProtocol))
+
+
+def protocol_values(
+    protocol: RetrievalProtocol,
+) -> tuple[float | int | None, ...]:
+    """Returns the values of `PROTOCOL_COLUMNS`."""
+    return tuple(asdict(protocol).values())

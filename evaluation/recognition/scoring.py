@@ -1,0 +1,86 @@
+"""Scores as a method returns them, checked: no other can reach a table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from evaluation.methods.method import Method
+from evaluation.support.errors import InputError
+
+
+def score_places(
+    method: Method,
+    queries: Sequence[Any],
+    database: Any,
+    num_places: int,
+    *,
+    exhaustive: bool,
+) -> np.ndarray:
+    """Returns what a method scores the last of some queries, (D,) float64.
+
+    Args:
+        method: that described queries and places.
+        queries: descriptors, from the first of the drive to the one that
+            asks.
+        database: that `build_database` made of the places.
+        num_places: D.
+        exhaustive: see `Method.score`.
+
+    Raises:
+        InputError: if the method returns anything else.
+    """
+    found = method.score_in_sequence(queries, database, exhaustive=exhaustive)
+    return _checked(method, "score", found, num_places)
+
+
+def rerank_places(
+    method: Method,
+    scores: np.ndarray,
+    query: np.ndarray,
+    places: Sequence[np.ndarray],
+) -> np.ndarray:
+    """Returns the scores (D,) after the second stage of a method.
+
+    Args:
+        method: that has one.
+        scores: (D,) of its first stage.
+        query: cloud of the query.
+        places: clouds of the D places.
+
+    Raises:
+        InputError: if the method returns what are no scores.
+    """
+    order = np.argsort(
+        np.where(np.isnan(scores), np.inf, -scores), kind="stable"
+    )
+    num_candidates = int((~np.isnan(scores)).sum())
+    best = order[: min(method.rerank_best, num_candidates)]
+    result = np.full(len(scores), np.nan)
+    if len(best):
+        clouds = [places[place] for place in best]
+        found = method.rerank(query, clouds, scores[best])
+        result[best] = _checked(method, "rerank", found, len(best))
+    return result
+
+
+def _checked(
+    method: Method, function: str, scores: object, number: int
+) -> np.ndarray:
+    """Returns scores (number,) as float64.
+
+    Raises:
+        InputError: if they are not that.
+    """
+    try:
+        values = np.asarray(scores, dtype=np.float64)
+    except (TypeError, ValueError):
+        values = np.empty(0)
+    if scores is None or values.shape != (number,):
+        raise InputError(
+            f"{method.name}: {function} returned {type(scores).__name__} of"
+            f" shape {np.shape(values)} instead of {number} numbers"
+        )
+    return values

@@ -1,0 +1,189 @@
+"""What a method may ask for beyond the coordinates of one scan."""
+
+from drive_files import make_scan, write_recording, yaw_pose
+import numpy as np
+import pytest
+
+from evaluation.methods import Method, MethodConfig
+from evaluation.recognition.place_recognition import run
+from evaluation.recognition.retrieval import retrieve
+from evaluation.recognition.scan_folders import write_scores
+from evaluation.sequences import open_sequence
+from evaluation.support.errors import InputError
+
+
+def record(folder, heights, y=0.0):
+    """Drives along x, 10 m a frame; the scan shows a point of that height."""
+    scans = [
+        make_scan(np.array([[5.0, 0.0, height], [9.0, 1.0, 0.0]]))
+        for height in heights
+    ]
+    X_WBs = [yaw_pose(10.0 * i, y, 0.0, 0.0) for i in range(len(heights))]
+    return open_sequence(write_recording(folder, scans, X_WBs))
+
+
+class Highest(Method):
+    """Compares heights."""
+
+    name = "highest"
+    Config = MethodConfig
+
+    def describe(self, points):
+        return float(points[:, 2].max())
+
+    def build_database(self, places):
+        return np.array(places)
+
+    def score(self, query, database, *, exhaustive=False):
+        return -np.abs(database - query)
+
+
+@pytest.fixture
+def drives(tmp_path):
+    return (
+        record(tmp_path / "a", [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]),
+        record(tmp_path / "b", [1.1, 2.1, 3.1, 4.1, 5.1, 6.1], y=1.0),
+    )
+
+
+def test_all_fields_of_the_points(drives):
+    class Rings(Highest):
+        point_fields = ("intensity", "ring")
+
+        def describe(self, points):
+            assert points.dtype.names == ("x", "y", "z", "intensity", "ring")
+            assert points["z"].dtype == np.float64
+            assert points["ring"].dtype == np.uint16
+            return float(points["z"].max() + 100.0 * points["ring"].max())
+
+    plain = retrieve(*drives, Highest()).scores
+    np.testing.assert_allclose(retrieve(*drives, Rings()).scores, plain)
+
+
+def test_fields_of_merged_scans_stay_with_their_points(drives):
+    class Merged(Highest):
+        scans_per_place = 2
+        point_fields = ("t",)
+
+        def describe(self, points):
+            # The second scan was taken 10 m farther on.
+            assert points["x"].tolist() in ([5, 9, 15, 19], [5, 9])
+            return float(len(points))
+
+    retrieve(*drives, Merged())
+
+
+def test_a_field_that_is_not_there(drives):
+    class Colour(Highest):
+        point_fields = ("colour",)
+
+    with pytest.raises(
+        InputError, match="a: its points have no field 'colour'"
+    ):
+        retrieve(*drives, Colour())
+
+
+def test_batches_are_as_large_as_wished_and_in_order(drives):
+    sizes = []
+
+    class Batches(Highest):
+        batch_size = 4
+
+        def describe_batch(self, clouds, *, of_places):
+            sizes.append((len(clouds), of_places))
+            return [self.describe(cloud) for cloud in clouds]
+
+    found = retrieve(*drives, Batches())
+    np.testing.assert_array_equal(
+        found.scores, retrieve(*drives, Highest()).scores
+    )
+    assert sizes == [(4, True), (2, True), (4, False), (2, False)]
+
+
+def test_a_batch_that_loses_one(drives):
+    class Loses(Highest):
+        def describe_batch(self, clouds, *, of_places):
+            return []
+
+    with pytest.raises(InputError, match="returned 0 descriptors of 1 clouds"):
+        retrieve(*drives, Loses())
+
+
+def test_places_described_in_another_way_stay_apart(drives):
+    class Apart(Highest):
+        batch_size = 3
+
+        def describe_place(self, points):
+            return self.describe(points) + 100.0
+
+    scores = retrieve(*drives, Apart()).scores
+    np.testing.assert_allclose(
+        scores, -np.abs(np.arange(101, 107) - np.arange(1.1, 7)[:, None]),
+        atol=1e-6,
+    )  # fmt: skip
+
+
+def test_queries_before_are_known(drives):
+    class Sequences(Highest):
+        def score_in_sequence(self, queries, database, *, exhaustive=False):
+            seen.append(len(queries))
+            return self.score(queries[0], database)
+
+    seen = []
+    scores = retrieve(*drives, Sequences()).scores
+    assert seen == [1, 2, 3, 4, 5, 6]
+    # All queries score as the first does.
+    np.testing.assert_array_equal(scores, np.tile(scores[0], (6, 1)))
+
+
+class TwoStages(Highest):
+    """A second stage that prefers what the first one likes less."""
+
+    rerank_best = 3
+
+    def rerank(self, query, places, scores):
+        assert (np.diff(scores) <= 0).all()
+        assert query.shape == (2, 3)
+        heights = [place[:, 2].max() for place in places]
+        np.testing.assert_allclose(
+            scores, -np.abs(np.array(heights) - query[:, 2].max()), atol=1e-6
+        )
+        return -scores
+
+
+def test_a_second_stage_sees_points(drives):
+    first = retrieve(*drives, Highest()).scores
+    second = retrieve(*drives, TwoStages()).scores
+    for one, other in zip(first, second, strict=True):
+        best = np.argsort(-one, kind="stable")[:3]
+        np.testing.assert_array_equal(other[best], -one[best])
+        assert np.isnan(np.delete(other, best)).all()
+
+
+def test_folders_of_scans_know_both_stages(drives, tmp_path):
+    for name, heights in (("db", [1.0, 2.0, 3.0, 4.0]), ("q", [1.2])):
+        (tmp_path / name).mkdir()
+        for k, height in enumerate(heights):
+            points = np.array([[5, 0, height], [9, 1, 0]], np.float32)
+            np.save(tmp_path / name / f"{k}.npy", points)
+    out = tmp_path / "scores.csv"
+    write_scores(TwoStages(), tmp_path / "db", tmp_path / "q", out)
+    values = [row.split(",")[2] for row in out.read_text().splitlines()[1:]]
+    np.testing.assert_allclose(
+        np.array(values[:3], float), [0.2, 0.8, 1.8], atol=1e-6
+    )
+    assert values[3] == ""
+
+
+@pytest.mark.parametrize(
+    "scores", [None, 1.0, [1.0], np.zeros((6, 1)), "abc", [None] * 7]
+)
+def test_scores_that_are_none(drives, scores):
+    class Wrong(Highest):
+        def score(self, query, database, *, exhaustive=False):
+            return scores
+
+    with pytest.raises(
+        InputError, match=r"highest: score returned .* instead of 6"
+    ):
+        run(*drives, Wrong())

@@ -1,0 +1,141 @@
+"""What is asked, and what counts, is the user's."""
+
+from drive_files import make_scan, write_recording, yaw_pose
+import numpy as np
+import pytest
+
+from evaluation.methods import Method, MethodConfig
+from evaluation.recognition.place_recognition import run
+from evaluation.recognition.protocol import (
+    PROTOCOL_COLUMNS,
+    RetrievalProtocol,
+    protocol_values,
+)
+from evaluation.recognition.retrieval import retrieve
+from evaluation.sequences import open_sequence
+from evaluation.support.errors import InputError
+
+
+class Means(Method):
+    """Compares the means of clouds; a quick search knows few places."""
+
+    name = "means"
+    Config = MethodConfig
+
+    def describe(self, points):
+        return np.append(points.mean(axis=0), len(points))
+
+    def build_database(self, places):
+        return np.array(places)
+
+    def score(self, query, database, *, exhaustive=False):
+        scores = -np.linalg.norm(database - query, axis=1)
+        if not exhaustive:
+            scores[np.argsort(-scores)[2:]] = np.nan
+        return scores
+
+
+def record(folder, xs):
+    """Drives along x, a frame each 50 ms; the scan at x shows its x."""
+    scans = [
+        make_scan(np.array([[5.0, 0.0, float(x)], [60.0, 0.0, 0.0]]))
+        for x in xs
+    ]
+    X_WBs = [yaw_pose(x, 0.0, 0.0, 0.0) for x in xs]
+    return open_sequence(write_recording(folder, scans, X_WBs))
+
+
+@pytest.fixture
+def drives(tmp_path):
+    database = record(tmp_path / "a", np.arange(0.0, 31.0, 1.0))
+    return database, record(tmp_path / "b", np.arange(0.5, 31.0, 1.0))
+
+
+def test_spacing_of_queries_and_places(drives):
+    found = retrieve(*drives, Means(), RetrievalProtocol(query_spacing=3.0))
+    assert found.query_frames.tolist() == [*range(0, 30, 3), 30]
+    found = retrieve(*drives, Means(), RetrievalProtocol(place_spacing=15.0))
+    assert found.database_frames.tolist() == [0, 15, 30]
+
+
+@pytest.mark.parametrize(("radius", "number"), [(0.5, 1), (0.499, 0), (5.5, 3)])
+def test_radius_includes_its_limit(drives, radius, number):
+    found = retrieve(*drives, Means(), RetrievalProtocol(radius=radius))
+    # The query at 10.5 m, of places that lie 5 m apart.
+    assert found.matches[1].sum() == number
+
+
+def test_range_limits_points(drives):
+    for max_range, number in ((59.9, 1), (60.0, 2)):
+        protocol = RetrievalProtocol(max_range=max_range)
+        seen = []
+
+        class Counting(Means):
+            def describe(self, points, seen=seen):
+                seen.append(len(points))
+                return super().describe(points)
+
+        retrieve(*drives, Counting(), protocol)
+        assert set(seen) == {number}
+
+
+def test_scans_are_merged_for_every_method(drives):
+    class Counting(Means):
+        scans_per_place = 2
+
+        def describe(self, points):
+            assert len(points) in sizes
+            return super().describe(points)
+
+    sizes = {4, 2}  # The last frame stands alone.
+    retrieve(*drives, Counting())
+    sizes = {6, 2}
+    protocol = RetrievalProtocol(scans_per_place=3)
+    outcome = run(*drives, Counting(), protocol=protocol)
+    assert outcome.protocol.scans_per_place == 3
+    assert run(*drives, Means()).protocol.scans_per_place == 1
+
+
+def test_a_drive_against_itself(tmp_path):
+    # There and back again: 40 m in 41 frames of 50 ms each way.
+    there = np.arange(0.0, 41.0)
+    drive = record(tmp_path / "loop", np.concatenate([there, there[::-1]]))
+    protocol = RetrievalProtocol(exclude_recent=0.5)
+    found = retrieve(drive, drive, Means(), protocol)
+    age = (found.query_frames[:, None] - found.database_frames) * 0.05
+    assert np.isnan(found.scores[age < 0.5 - 1e-9]).all()
+    # Of what is known every place has a score, not just a search's best.
+    assert not np.isnan(found.scores[age >= 0.5 - 1e-9]).any()
+    near = found.distances <= 7.5
+    np.testing.assert_array_equal(found.matches, near & (age >= 0.5 - 1e-9))
+    outcome = run(drive, drive, Means(), protocol=protocol)
+    # All queries of the way back, but those just after the turn.
+    assert outcome.metrics.num_with_match in (3, 4)
+    assert outcome.metrics.recall_at_1 == 1.0
+    with pytest.raises(InputError, match=r"loop: never within 7.5 m of where"):
+        run(drive, drive, Means(), protocol=RetrievalProtocol(exclude_recent=9))
+
+
+def test_others_are_asked_all_they_know(drives):
+    protocol = RetrievalProtocol(exclude_recent=1000.0)
+    found = retrieve(*drives, Means(), protocol)
+    np.testing.assert_array_equal(found.matches, found.distances <= 7.5)
+
+
+@pytest.mark.parametrize("name", PROTOCOL_COLUMNS)
+@pytest.mark.parametrize("value", [0, -1.0, np.nan, np.inf])
+def test_what_is_not_positive_is_refused(name, value):
+    option = name.replace("_", "-")
+    with pytest.raises(InputError, match=f"--{option}: .* is not positive"):
+        RetrievalProtocol(**{name: value})
+
+
+def test_it_is_told_with_every_number():
+    protocol = RetrievalProtocol(radius=3.0, scans_per_place=4)
+    values = dict(zip(PROTOCOL_COLUMNS, protocol_values(protocol), strict=True))
+    assert values == protocol.to_json()
+    assert protocol.of(Means()) == protocol
+    assert RetrievalProtocol().of(Means()).scans_per_place == 1
+    text = protocol.to_text()
+    assert "within 3 m" in text
+    assert "4 scans a place" in text

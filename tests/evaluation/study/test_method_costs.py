@@ -1,0 +1,50 @@
+"""Costs of methods, as the report has them."""
+
+import csv
+import pickle
+
+import pytest
+from small_towns import drive
+import studies
+
+from evaluation.methods import known_methods
+from evaluation.recognition import costs
+from evaluation.study.assembly import assemble
+from evaluation.study.collection import find_recordings
+from evaluation.study.parts import read_part
+from evaluation.study.plan import plan_study
+from evaluation.study.study_layout import StudyFiles
+
+pytestmark = pytest.mark.slow
+
+
+def test_costs_in_the_report(tmp_path, monkeypatch):
+    # A clock that advances 1 ms whenever it is looked at.
+    ticks = iter(range(0, 10**12, 10**6))
+    monkeypatch.setattr(costs, "process_time_ns", lambda: next(ticks))
+    for stage, route in (("01", "a"), ("02", "b")):
+        drive(tmp_path / "in" / f"town_{stage}", stage, route, city="town")
+    found = find_recordings(tmp_path / "in")
+    output = tmp_path / "out"
+    jobs = plan_study(found, output, with_costs=True)
+    # It has the machine alone.
+    assert set(jobs[-1].needs) == {job.name for job in jobs[:-1]}
+    studies.do(jobs)
+    assert jobs[-1].is_done(*jobs[-1].arguments)
+    path = assemble(found, output, with_costs=True)
+    with (output / "costs.csv").open(newline="") as stream:
+        rows = {row["method"]: row for row in csv.DictReader(stream)}
+    assert tuple(rows) == known_methods()
+    files = StudyFiles(output)
+    for name, row in rows.items():
+        assert float(row["describe_ms"]) == float(row["query_ms"]) == 1.0
+        assert row["scans_per_place"] == ("10" if name == "btc" else "1")
+        (job,) = (j for j in jobs if j.name == "survey town_01")
+        (choice,) = (m for m in job.arguments[2] if m.name == name)
+        _, described = read_part(files.survey("town_01").described(choice))
+        places = described.places.descriptors
+        sizes = [len(pickle.dumps(one, protocol=5)) for one in places]
+        assert float(row["place_bytes"]) == sum(sizes) / len(sizes)
+        assert int(row["places"]) == len(places)
+    for name in ("report.html", "report.md"):
+        assert "What the methods cost" in path.with_name(name).read_text()
