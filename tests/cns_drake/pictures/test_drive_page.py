@@ -214,6 +214,18 @@ class TestInChromium:
               }).map((one) => one.outerHTML)"""
         )
 
+    def test_bar_comes_when_the_city_is_there(self, reader):
+        is_seen = (
+            'document.getElementById("bar")'
+            ".checkVisibility({visibilityProperty: true})"
+        )
+        assert reader.evaluate(is_seen) is True
+        reader.evaluate(
+            'document.body.insertAdjacentHTML("afterbegin",'
+            " \"<div id='loading'></div>\")"
+        )
+        assert reader.evaluate(is_seen) is False
+
     def test_change_is_off_until_the_button_is_pressed(self, reader):
         legend = 'document.querySelector("dd.change").checkVisibility()'
         color = (
