@@ -28,17 +28,23 @@ if TYPE_CHECKING:
         make_scenario,
     )
     from cns_drake.scene.world import World, load_world
-    from cns_drake.sensors.beam_pattern import (
-        LIDAR_PRESETS,
-        BeamPattern,
-        make_beam_pattern,
+    from cns_drake.sensors.beam_pattern import BeamPattern
+    from cns_drake.sensors.free_patterns import (
+        DirectionPattern,
+        make_flash_pattern,
     )
     from cns_drake.sensors.imu import Imu, add_imu
     from cns_drake.sensors.lidar import Lidar
     from cns_drake.sensors.lidar_adding import add_lidar
+    from cns_drake.sensors.lidar_presets import LIDAR_PRESETS, make_beam_pattern
     from cns_drake.sensors.lidar_view import add_lidar_view
+    from cns_drake.sensors.livox_patterns import (
+        NoddingPattern,
+        RosettePattern,
+    )
     from cns_drake.sensors.measurement import MeasurementModel
     from cns_drake.sensors.odometry import Odometry, add_odometry
+    from cns_drake.sensors.spinning_pattern import SpinningPattern
     from cns_drake.simulation.sensor_recording import add_mcap_recorder
     from cns_drake.simulation.simulation import Run, simulate
     from cns_drake.simulation.station import make_station
@@ -51,14 +57,18 @@ __all__ = [
     "LIDAR_PRESETS",
     "BagWriter",
     "BeamPattern",
+    "DirectionPattern",
     "Imu",
     "InputError",
     "Lidar",
     "McapRecorder",
     "MeasurementModel",
+    "NoddingPattern",
     "Odometry",
+    "RosettePattern",
     "Run",
     "Scenario",
+    "SpinningPattern",
     "VehicleMotion",
     "World",
     "__version__",
@@ -71,6 +81,7 @@ __all__ = [
     "load_scenario",
     "load_world",
     "make_beam_pattern",
+    "make_flash_pattern",
     "make_scenario",
     "make_station",
     "plan_drive",
@@ -89,17 +100,17 @@ _HOMES = {
     "scenarios.planning": ("plan_drive",),
     "scenarios.scenario": ("Scenario", "load_scenario", "make_scenario"),
     "scene.world": ("World", "load_world"),
-    "sensors.beam_pattern": (
-        "LIDAR_PRESETS",
-        "BeamPattern",
-        "make_beam_pattern",
-    ),
+    "sensors.beam_pattern": ("BeamPattern",),
+    "sensors.free_patterns": ("DirectionPattern", "make_flash_pattern"),
     "sensors.imu": ("Imu", "add_imu"),
     "sensors.lidar": ("Lidar",),
     "sensors.lidar_adding": ("add_lidar",),
+    "sensors.lidar_presets": ("LIDAR_PRESETS", "make_beam_pattern"),
     "sensors.lidar_view": ("add_lidar_view",),
+    "sensors.livox_patterns": ("NoddingPattern", "RosettePattern"),
     "sensors.measurement": ("MeasurementModel",),
     "sensors.odometry": ("Odometry", "add_odometry"),
+    "sensors.spinning_pattern": ("SpinningPattern",),
     "simulation.sensor_recording": ("add_mcap_recorder",),
     "simulation.simulation": ("Run", "simulate"),
     "simulation.station": ("make_station",),

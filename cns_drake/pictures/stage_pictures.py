@@ -10,7 +10,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from cns_drake.pictures.stage_scene import StageScene, View
 from cns_drake.recording.frame_clock import FRAME_PERIOD
-from cns_drake.sensors.beam_pattern import make_beam_pattern
+from cns_drake.sensors.lidar_presets import make_beam_pattern
 from evaluation.support.errors import (
     InputError,
     describe_validation_error,
@@ -91,9 +91,9 @@ def _scan_seen_by(
     )
     p_WS = np.array([x, y, z - down.ranges[0] + _SENSOR_HEIGHT])
     pattern = make_beam_pattern("cns", FRAME_PERIOD)
-    hits = scene.cast_rays(p_WS, pattern.d_Sset, pattern.max_range)
+    hits = scene.cast_rays(p_WS, pattern.beams(0).d_Sset, pattern.max_range)
     hit = np.isfinite(hits.ranges)
     ranges = hits.ranges[hit]
-    points = p_WS + ranges[:, None] * pattern.d_Sset[hit]
+    points = p_WS + ranges[:, None] * pattern.beams(0).d_Sset[hit]
     pixels, seen = view.project(points, _WIDTH, _HEIGHT)
     return pixels, ranges[seen]

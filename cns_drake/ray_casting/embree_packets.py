@@ -77,6 +77,9 @@ def _call_intersect16(
 
 
 LANES = 16
+# Embree takes what is less for positive, whatever its sign. A packet with such
+# a ray among others that really go that way loses hits.
+_TINY = 1e-18
 # Rays that one thread casts before it leaves as many to the others: whole
 # packets, and few enough that all meet the same mixture of geometry.
 BLOCK = 1024
@@ -141,9 +144,10 @@ def _cast_block(
             valid[lane] = -1
             for axis in range(3):
                 packet[axis, lane] = p[axis]
-                packet[4 + axis, lane] = (
+                along = (
                     R[axis, 0] * d[0] + R[axis, 1] * d[1] + R[axis, 2] * d[2]
                 )
+                packet[4 + axis, lane] = along if abs(along) >= _TINY else 0.0
             packet[8, lane] = rays.max_ranges[reach]
             origin = origin + 1 if origin + 1 < num_origins else 0
             rotation = rotation + 1 if rotation + 1 < num_rotations else 0

@@ -29,11 +29,8 @@ from cns_drake.scenarios.shipped import (
     shipped_maps,
     shipped_sequences,
 )
-from cns_drake.sensors.beam_pattern import (
-    LIDAR_PRESETS,
-    BeamPattern,
-    make_beam_pattern,
-)
+from cns_drake.sensors.beam_pattern import BeamPattern
+from cns_drake.sensors.lidar_presets import LIDAR_PRESETS, make_beam_pattern
 from cns_drake.sensors.measurement import MeasurementModel
 from evaluation.support.errors import (
     InputError,
@@ -97,6 +94,8 @@ class LidarConfig(Mount):
 
     @model_validator(mode="after")
     def _returns_something(self) -> LidarConfig:
+        if self.columns and LIDAR_PRESETS[self.preset].num_columns is None:
+            raise ValueError(f"the preset '{self.preset}' has no columns")
         pattern = self.pattern()
         if pattern.min_range >= pattern.max_range:
             raise ValueError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -24,191 +25,175 @@ POINT_DTYPE = np.dtype(
 )
 
 
-@dataclass(frozen=True)
-class BeamPattern:
-    """The beams of one turn of a spinning multi-beam LiDAR.
+# Height of the bands in which beams without an order of their own are cast.
+_BAND_RAD = 0.03
 
-    In the sensor frame S (x forward, y left, z up) the turn starts at the
-    rear and goes clockwise seen from above, as Ouster's and Velodyne's units
-    turn: column k of n points at azimuth pi - 2 pi k / n. Ring 0 is the
-    highest beam. Beams are ordered as they fire: column by column, and from
-    ring 0 downwards in each.
+
+@dataclass(frozen=True, eq=False)
+class Beams:
+    """The N beams of one turn, in the order in which they fire.
 
     Attributes:
-        elevations_rad: elevation of each ring, descending [rad].
-        num_columns: columns in a turn.
-        min_range: nearest range that is measured [m].
-        max_range: farthest range that is measured [m].
-        period: duration of one turn [s].
-
-    Example:
-        from cns_drake import BeamPattern
-
-        pattern = BeamPattern((0.1, 0.0, -0.1), 1024, 0.5, 120.0, 0.1)
-        print(pattern.d_Sset.shape)
+        d_Sset: (N, 3) float64 unit directions, expressed in the sensor frame
+            S (x forward, y left, z up).
+        ring: (N,) uint16, which emitter each one comes from.
+        column: (N,) int, at which of the firing times it fires.
+        column_t_ns: (C,) uint32 firing times since the start of the turn,
+            rising.
+        packet_order: (N,) beams in the order in which to cast them:
+            neighbours in it point nearly the same way and meet the same
+            geometry, which packets of rays profit from.
     """
 
-    elevations_rad: tuple[float, ...]
-    num_columns: int
-    min_range: float
-    max_range: float
-    period: float
-
-    @property
-    def num_rings(self) -> int:
-        return len(self.elevations_rad)
-
-    @property
-    def num_beams(self) -> int:
-        return self.num_rings * self.num_columns
-
-    @cached_property
-    def d_Sset(self) -> np.ndarray:
-        """(num_beams, 3) float64 unit directions, expressed in S."""
-        column = np.arange(self.num_columns)
-        azimuth = (np.pi - 2.0 * np.pi * column / self.num_columns)[:, None]
-        elevation = np.asarray(self.elevations_rad)[None, :]
-        d = np.stack(
-            np.broadcast_arrays(
-                np.cos(elevation) * np.cos(azimuth),
-                np.cos(elevation) * np.sin(azimuth),
-                np.sin(elevation),
-            ),
-            axis=-1,
-        ).reshape(-1, 3)
-        d.flags.writeable = False
-        return d
-
-    @cached_property
-    def packet_order(self) -> np.ndarray:
-        """(num_beams,) beams in the order in which to cast them.
-
-        Ring by ring: neighbours in this order point nearly the same way
-        and meet the same geometry, which a packet of rays profits from (by
-        1.6 over the firing order, in Metropolis).
-        """
-        beams = np.arange(self.num_beams)
-        return beams.reshape(self.num_columns, self.num_rings).T.ravel()
-
-    @cached_property
-    def ring(self) -> np.ndarray:
-        """(num_beams,) uint16 ring of each beam."""
-        rings = np.arange(self.num_rings, dtype=np.uint16)
-        return np.tile(rings, self.num_columns)
-
-    @cached_property
-    def column(self) -> np.ndarray:
-        """(num_beams,) int column of each beam."""
-        return np.repeat(np.arange(self.num_columns), self.num_rings)
-
-    @cached_property
-    def column_t_ns(self) -> np.ndarray:
-        """(num_columns,) uint32 firing time since the start of the turn."""
-        column_ns = self.period * 1e9 / self.num_columns
-        columns = np.arange(self.num_columns)
-        return np.round(columns * column_ns).astype(np.uint32)
+    d_Sset: np.ndarray
+    ring: np.ndarray
+    column: np.ndarray
+    column_t_ns: np.ndarray
+    packet_order: np.ndarray
 
     @cached_property
     def t_ns(self) -> np.ndarray:
-        """(num_beams,) uint32 firing time since the start of the turn."""
+        """(N,) uint32 firing time since the start of the turn."""
         return self.column_t_ns[self.column]
 
-
-def _uniform_deg(
-    top: float, bottom: float, num_rings: int
-) -> tuple[float, ...]:
-    elevations = np.deg2rad(np.linspace(top, bottom, num_rings))
-    return tuple(float(elevation) for elevation in elevations)
-
-
-def _hdl_64e_elevations() -> tuple[float, ...]:
-    # Velodyne HDL-64E S2/S3 manual: an upper block of 32 lasers from +2 deg
-    # in steps of 1/3 deg, a lower block of 32 down to -24.8 deg in steps of
-    # about 1/2 deg.
-    upper = np.linspace(2.0, -8.33, 32)
-    lower = np.linspace(-8.83, -24.8, 32)
-    elevations = np.deg2rad(np.concatenate([upper, lower]))
-    return tuple(float(elevation) for elevation in elevations)
+    @cached_property
+    def cast_columns(self) -> np.ndarray | None:
+        """(N,) columns in packet order, None if they go round and round."""
+        columns = self.column[self.packet_order]
+        turns, rest = divmod(len(columns), max(len(self.column_t_ns), 1))
+        once = np.arange(len(self.column_t_ns))
+        if rest == 0 and np.array_equal(columns, np.tile(once, turns)):
+            return None
+        return columns
 
 
-@dataclass(frozen=True)
-class _Preset:
-    elevations_rad: tuple[float, ...]
-    num_columns: int
-    min_range: float
-    max_range: float
-    source: str
+def make_beams(d_Sset: np.ndarray, ring: np.ndarray, t_ns: np.ndarray) -> Beams:
+    """Returns beams that may point anywhere.
+
+    Args:
+        d_Sset: (N, 3) unit directions, in the order of firing.
+        ring: (N,).
+        t_ns: (N,) firing times, none before the one before it.
+    """
+    elevation = np.arcsin(np.clip(d_Sset[:, 2], -1.0, 1.0))
+    azimuth = np.arctan2(d_Sset[:, 1], d_Sset[:, 0])
+    bands = np.floor(elevation / _BAND_RAD)
+    column_t_ns, column = np.unique(t_ns, return_inverse=True)
+    return Beams(
+        d_Sset,
+        ring.astype(np.uint16),
+        column,
+        column_t_ns.astype(np.uint32),
+        np.lexsort((azimuth, bands)),
+    )
 
 
-LIDAR_PRESETS: dict[str, _Preset] = {
-    "cns": _Preset(
-        _uniform_deg(22.5, -22.5, 32),
-        1024,
-        0.8,
-        120.0,
-        "the CNS paper: 32 channels, +-22.5 deg, 120 m, after Ouster's OS1",
-    ),
-    "os1-32": _Preset(
-        _uniform_deg(22.5, -22.5, 32),
-        1024,
-        0.5,
-        120.0,
-        "Ouster OS1 data sheet rev. C, uniform 32-channel configuration",
-    ),
-    "os1-64": _Preset(
-        _uniform_deg(22.5, -22.5, 64),
-        1024,
-        0.5,
-        120.0,
-        "Ouster OS1 data sheet rev. C, uniform 64-channel configuration",
-    ),
-    "os1-128": _Preset(
-        _uniform_deg(22.5, -22.5, 128),
-        1024,
-        0.5,
-        120.0,
-        "Ouster OS1 data sheet rev. C, 128 channels",
-    ),
-    "vlp-16": _Preset(
-        _uniform_deg(15.0, -15.0, 16),
-        900,
-        0.5,
-        100.0,
-        "Velodyne VLP-16 data sheet: 2 deg steps, 0.4 deg columns at 20 Hz",
-    ),
-    "hdl-64e": _Preset(
-        _hdl_64e_elevations(),
-        1040,
-        0.9,
-        120.0,
-        "Velodyne HDL-64E S2/S3 manual: 0.346 deg columns at 20 Hz",
-    ),
-}
+class BeamPattern(ABC):
+    """The beams of a LiDAR, turn by turn.
 
+    What a turn is depends on the unit; it is what one scan holds. When beams
+    fire is the same in all turns, where they point need not be.
 
-def make_beam_pattern(
-    preset: str,
-    period: float,
-    *,
-    num_columns: int | None = None,
-    min_range: float | None = None,
-    max_range: float | None = None,
-) -> BeamPattern:
-    """Returns the pattern of a preset, with values of one's own if given.
-
-    Raises:
-        KeyError: there is no preset of that name.
+    Attributes:
+        min_range: nearest range that is measured [m].
+        max_range: farthest range that is measured [m].
+        period: duration of one turn [s].
+        repeats: whether all turns are alike.
 
     Example:
-        from cns_drake import LIDAR_PRESETS, make_beam_pattern
+        from cns_drake import make_beam_pattern
 
-        patterns = [make_beam_pattern(name, 0.1) for name in LIDAR_PRESETS]
+        pattern = make_beam_pattern("vlp-16").within(azimuths_deg=(-60, 60))
+        print(pattern.beams(0).d_Sset.shape)
     """
-    base = LIDAR_PRESETS[preset]
-    return BeamPattern(
-        elevations_rad=base.elevations_rad,
-        num_columns=base.num_columns if num_columns is None else num_columns,
-        min_range=base.min_range if min_range is None else min_range,
-        max_range=base.max_range if max_range is None else max_range,
-        period=period,
-    )
+
+    min_range: float
+    max_range: float
+    period: float
+    repeats: bool = True
+
+    @abstractmethod
+    def beams(self, frame: int) -> Beams:
+        """Returns the beams of a turn.
+
+        Args:
+            frame: its number.
+        """
+
+    @property
+    def num_beams(self) -> int:
+        return len(self.beams(0).column)
+
+    @property
+    def column_t_ns(self) -> np.ndarray:
+        """(C,) uint32 firing times since the start of a turn."""
+        return self.beams(0).column_t_ns
+
+    def within(
+        self,
+        azimuths_deg: tuple[float, float] = (-180.0, 180.0),
+        elevations_deg: tuple[float, float] = (-90.0, 90.0),
+    ) -> BeamPattern:
+        """Returns the pattern without the beams outside a field of view.
+
+        Args:
+            azimuths_deg: the limits, the first of which may be greater: then
+                the rear is in sight.
+            elevations_deg: the limits.
+
+        Raises:
+            ValueError: no beam is left.
+        """
+        return LimitedPattern(self, azimuths_deg, elevations_deg)
+
+
+class LimitedPattern(BeamPattern):
+    """A pattern of which only the beams in a field of view fire."""
+
+    def __init__(
+        self,
+        whole: BeamPattern,
+        azimuths_deg: tuple[float, float],
+        elevations_deg: tuple[float, float],
+    ):
+        """See `BeamPattern.within`."""
+        self.min_range, self.max_range = whole.min_range, whole.max_range
+        self.period, self.repeats = whole.period, whole.repeats
+        self._whole = whole
+        self._azimuths_deg = azimuths_deg
+        self._elevations_deg = elevations_deg
+        self._first = self._limit(0)
+        if len(self._first.column) == 0:
+            raise ValueError(
+                f"no beam within azimuths {azimuths_deg} and elevations "
+                f"{elevations_deg} [deg]"
+            )
+
+    def beams(self, frame: int) -> Beams:
+        if self.repeats or frame == 0:
+            return self._first
+        return self._limit(frame)
+
+    def _limit(self, frame: int) -> Beams:
+        beams = self._whole.beams(frame)
+        x, y, z = beams.d_Sset.T
+        azimuth = np.rad2deg(np.arctan2(y, x))
+        elevation = np.rad2deg(np.arcsin(np.clip(z, -1.0, 1.0)))
+        # What lies on a limit is in, whichever way it was rounded.
+        low, high = self._azimuths_deg[0] - 1e-9, self._azimuths_deg[1] + 1e-9
+        if low <= high:
+            kept = (azimuth >= low) & (azimuth <= high)
+        else:
+            kept = (azimuth >= low) | (azimuth <= high)
+        kept &= elevation >= self._elevations_deg[0] - 1e-9
+        kept &= elevation <= self._elevations_deg[1] + 1e-9
+        place = np.cumsum(kept) - 1
+        order = beams.packet_order[kept[beams.packet_order]]
+        # All firing times stay, so that they are those of every turn.
+        return Beams(
+            beams.d_Sset[kept],
+            beams.ring[kept],
+            beams.column[kept],
+            beams.column_t_ns,
+            place[order],
+        )

@@ -12,7 +12,7 @@ from pydrake.perception import PointCloud
 from pydrake.systems.framework import Context, LeafSystem, ValueProducer
 
 from cns_drake.scene.structure_table import StructureTable
-from cns_drake.sensors.beam_pattern import POINT_DTYPE, BeamPattern
+from cns_drake.sensors.beam_pattern import POINT_DTYPE, BeamPattern, Beams
 from cns_drake.sensors.measurement import IDEAL, MeasurementModel
 from cns_drake.sensors.point_assembly import BeamTable, assemble_points
 from cns_drake.sensors.seen_geometry import SeenGeometry, Sight
@@ -108,13 +108,8 @@ class Lidar(LeafSystem):
             frozenset(anchored_frames),
             num_threads,
         )
-        self._table = BeamTable(
-            pattern.d_Sset.astype(np.float32),
-            pattern.ring,
-            pattern.t_ns,
-            np.argsort(pattern.packet_order),
-        )
-        self._d_Sset_cast = pattern.d_Sset[pattern.packet_order]
+        self._first = _Turn(0, pattern.beams(0))
+        self._turn = self._first
 
         self._geometry_query = self.DeclareAbstractInputPort(
             "geometry_query", Value(QueryObject())
@@ -195,24 +190,29 @@ class Lidar(LeafSystem):
         seen = self._seen.Eval(context)
         if seen.scene is None:  # In a cloned Context.
             self._update(context, seen)
+        frame = self._frame(context)
+        turn = self._get_turn(frame)
         p_WSset, R_WSset = self._calc_poses(context)
+        columns = turn.beams.cast_columns
+        if len(p_WSset) > 1 and columns is not None:
+            p_WSset, R_WSset = p_WSset[columns], R_WSset[columns]
         hits = seen.scene.cast_rays(
             p_WSset,
-            self._d_Sset_cast,
+            turn.d_Sset_cast,
             self._measurement.reach(self._pattern.max_range),
             R_WSset=R_WSset,
         )
         beams, ranges, intensity = self._measurement.measure(
-            hits.ranges.take(self._table.place),
+            hits.ranges.take(turn.table.place),
             self._pattern.min_range,
             self._pattern.max_range,
-            round(context.get_time() / self._pattern.period),
+            frame,
         )
         # Zeros, so that the padding between fields is defined, too.
         scan = np.zeros(len(beams), POINT_DTYPE)
         assemble_points(
             scan,
-            self._table,
+            turn.table,
             beams,
             ranges,
             intensity,
@@ -222,6 +222,17 @@ class Lidar(LeafSystem):
             np.float32(self._measurement.resolution),
         )
         output.set_value(scan)
+
+    def _frame(self, context: Context) -> int:
+        return round(context.get_time() / self._pattern.period)
+
+    def _get_turn(self, frame: int) -> _Turn:
+        """Returns what a frame's beams are; the last one's are kept."""
+        if self._pattern.repeats:
+            return self._first
+        if self._turn.frame != frame:
+            self._turn = _Turn(frame, self._pattern.beams(frame))
+        return self._turn
 
     def _pose_prerequisites(self) -> set:
         if self._sweep is not None:
@@ -234,29 +245,23 @@ class Lidar(LeafSystem):
             self._revision.ticket(),
             *self._pose_prerequisites(),
         }
-        if self._measurement.is_random:
+        if self._measurement.is_random or not self._pattern.repeats:
             prerequisites.add(self.time_ticket())
         return prerequisites
 
     def _calc_poses(self, context: Context) -> tuple[np.ndarray, np.ndarray]:
-        """Returns positions and orientations of S: one, or each column's.
-
-        In packet order, which takes one column after the other for each
-        ring, beam i belongs to column i mod num_columns.
-        """
+        """Returns positions and orientations of S: one, or each column's."""
         if self._sweep is not None:
             sweep = self._sweep.Eval(context).of_frame(self._X_PS)
             return sweep.p_WPset, sweep.R_WPset
         query_object = self._geometry_query.Eval(context)
         X_WP = query_object.GetPoseInWorld(self._parent_frame_id)
         X_WS = X_WP @ self._X_PS
-        return X_WS.translation(), X_WS.rotation().matrix()
+        return X_WS.translation()[None], X_WS.rotation().matrix()[None]
 
     def _calc_X_WS(self, context: Context, output: AbstractValue) -> None:
         p_WSset, R_WSset = self._calc_poses(context)
-        R_WS = np.reshape(R_WSset, (-1, 3, 3))[0]
-        p_WS = np.reshape(p_WSset, (-1, 3))[0]
-        output.set_value(RigidTransform(RotationMatrix(R_WS), p_WS))
+        output.set_value(RigidTransform(RotationMatrix(R_WSset[0]), p_WSset[0]))
 
     def _calc_point_cloud_S(
         self, context: Context, output: AbstractValue
@@ -270,14 +275,28 @@ class Lidar(LeafSystem):
     ) -> None:
         scan = self._scan.Eval(context)
         p_WSset, R_WSset = self._calc_poses(context)
-        p_WSset, R_WSset = p_WSset.reshape(-1, 3), R_WSset.reshape(-1, 3, 3)
         # Of the columns, or one for all.
-        column = np.searchsorted(self._pattern.column_t_ns, scan["t"])
+        column = np.searchsorted(self._first.beams.column_t_ns, scan["t"])
         p_SRset = np.stack([scan["x"], scan["y"], scan["z"]], axis=1)
         p_WRset = p_WSset[column % len(p_WSset)] + np.einsum(
             "nij,nj->ni", R_WSset[column % len(R_WSset)], p_SRset
         )
         _fill(output.get_mutable_value(), p_WRset.T)
+
+
+class _Turn:
+    """The beams of a turn, ready for casting and assembling."""
+
+    def __init__(self, frame: int, beams: Beams):
+        self.frame = frame
+        self.beams = beams
+        self.d_Sset_cast = beams.d_Sset[beams.packet_order]
+        self.table = BeamTable(
+            beams.d_Sset.astype(np.float32),
+            beams.ring,
+            beams.t_ns,
+            np.argsort(beams.packet_order),
+        )
 
 
 def _fill(point_cloud: PointCloud, p_FRset: np.ndarray) -> None:

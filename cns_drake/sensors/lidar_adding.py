@@ -12,9 +12,10 @@ from pydrake.multibody.tree import Frame, RigidBody, WeldJoint
 from pydrake.systems.framework import DiagramBuilder
 
 from cns_drake.scene.geometry_revision import geometry_revision_port
-from cns_drake.sensors.beam_pattern import BeamPattern, make_beam_pattern
+from cns_drake.sensors.beam_pattern import BeamPattern
 from cns_drake.sensors.body_motion import body_and_pose
 from cns_drake.sensors.lidar import Lidar
+from cns_drake.sensors.lidar_presets import make_beam_pattern
 
 
 def add_lidar(
@@ -37,8 +38,8 @@ def add_lidar(
             registered with `scene_graph`; or a frame that any other source
             has registered there.
         X_PS: pose of the sensor S in P.
-        pattern: the beams, or the name of a preset, of which a turn then
-            takes 0.05 s.
+        pattern: the beams, or the name of a preset, which then turns as its
+            data sheet has it.
         name: of the system.
         unseen: what the LiDAR does not see; by default the body that it is
             fixed to and what is welded to that, but for the world.
@@ -61,7 +62,7 @@ def add_lidar(
     if not isinstance(body, FrameId):
         body, X_PS = body_and_pose(body, X_PS)
     if isinstance(pattern, str):
-        pattern = make_beam_pattern(pattern, 0.05)
+        pattern = make_beam_pattern(pattern)
     if isinstance(body, RigidBody):
         plant = body.GetParentPlant()
         frame_id = plant.GetBodyFrameIdOrThrow(body.index())

@@ -35,7 +35,7 @@ from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.scenarios.scenario import load_scenario
 from cns_drake.scene.perception_geometry import PerceptionGeometry
 from cns_drake.scene.surfaces import TriangleSurface
-from cns_drake.sensors.beam_pattern import BeamPattern
+from cns_drake.sensors.spinning_pattern import SpinningPattern
 from cns_drake.simulation.simulation import simulate
 
 POSES = 8
@@ -55,7 +55,7 @@ Series = list[tuple[int, float]]
 def beams(rings: int, columns: int) -> np.ndarray:
     """Returns beams over the elevations of the dataset's LiDAR."""
     elevations = np.deg2rad(np.linspace(22.5, -22.5, rings))
-    pattern = BeamPattern(tuple(elevations), columns, 0.8, REACH, 0.05)
+    pattern = SpinningPattern(tuple(elevations), columns, 0.8, REACH, 0.05)
     return pattern.d_Sset[pattern.packet_order]
 
 

@@ -39,7 +39,7 @@ from cns_drake.ray_casting.embree_primitives import (
 )
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.ray_casting.ray_groups import group_geometries
-from cns_drake.sensors.beam_pattern import make_beam_pattern
+from cns_drake.sensors.lidar_presets import make_beam_pattern
 
 SEQUENCES = ("metropolis_04", "downtown_04")
 POSES = 16

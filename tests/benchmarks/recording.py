@@ -93,7 +93,7 @@ class TakingTurns:
         self._drive = plan_drive(scenario)
         (lidar,) = scenario.lidars.values()
         self._X_BS = lidar.pose()
-        self._d_Sset = lidar.pattern().d_Sset
+        self._d_Sset = lidar.pattern().beams(0).d_Sset
         self._start = _clocks()
 
     def on_frame(self, done: int, total: int) -> None:

@@ -14,7 +14,7 @@ from cns_drake.motion.speed_profile import Speeds
 from cns_drake.roads import road_schema
 from cns_drake.roads.route import RouteLeg
 from cns_drake.scenarios import scenario, variation
-from cns_drake.sensors.beam_pattern import LIDAR_PRESETS
+from cns_drake.sensors.lidar_presets import LIDAR_PRESETS
 from evaluation.methods import MethodConfig, make_method, shipped_methods
 
 # Page, heading above the table, model, and a model whose fields are told of
@@ -144,13 +144,11 @@ def test_what_can_be_placed_is_listed(heading, registry):
 def test_lidar_presets():
     page = documents.read("docs/scenarios.md")
     rows = documents.table(page, "### LiDAR presets")
-    said = {
-        row[0].strip("`"): (int(row[1]), int(row[3]), row[4]) for row in rows
-    }
+    said = {row[0].strip("`"): (int(row[1]), row[3], row[4]) for row in rows}
     assert said == {
         name: (
-            len(preset.elevations_rad),
-            preset.num_columns,
+            preset.num_rings,
+            str(preset.num_columns or "-"),
             f"{preset.min_range:g} to {preset.max_range:g}",
         )
         for name, preset in LIDAR_PRESETS.items()

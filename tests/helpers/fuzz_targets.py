@@ -34,7 +34,7 @@ from cns_drake.scenarios.sequence_table import sequence_rows
 from cns_drake.scenarios.variation import load_family, write_scenarios
 from cns_drake.scene.perception_geometry import read_perception_geometry
 from cns_drake.scene.world import load_world
-from cns_drake.sensors.beam_pattern import make_beam_pattern
+from cns_drake.sensors.lidar_presets import make_beam_pattern
 from cns_drake.simulation.scanning import save_scan, scan_world
 from cns_drake.simulation.simulation import simulate
 from evaluation import sequences

@@ -12,12 +12,14 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.systems.framework import DiagramBuilder
 
-from cns_drake.sensors.beam_pattern import BeamPattern, make_beam_pattern
 from cns_drake.sensors.lidar import Lidar
 from cns_drake.sensors.lidar_adding import connect_lidar
+from cns_drake.sensors.lidar_presets import make_beam_pattern
+from cns_drake.sensors.spinning_pattern import SpinningPattern
 
 X_WS = RigidTransform(RollPitchYaw(0.11, -0.07, 2.3), [1.5, -0.8, 0.4])
-FORWARD = BeamPattern((0.0,), 4, 0.8, 120.0, 0.05)  # Rear, left, ahead, right.
+# Rear, left, ahead, right.
+FORWARD = SpinningPattern((0.0,), 4, 0.8, 120.0, 0.05)
 
 
 class Stage:

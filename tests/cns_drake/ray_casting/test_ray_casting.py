@@ -320,3 +320,24 @@ def test_poses_are_taken_in_turn(num_positions, num_frames):
     assert np.quantile(error, 0.98) < 2e-5
     cosine = np.einsum("ij,ij->i", hits.normals_W, expected.normals_W)[hit]
     assert np.quantile(cosine, 0.02) > 1 - 1e-5
+
+
+@pytest.mark.parametrize("tiny", [-5e-19, 5e-19, -1e-30, -0.0, 0.0])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_ray_that_hardly_leaves_a_plane(axis, tiny):
+    """It takes none of the others of its packet with it."""
+    walls = []
+    for k in range(3):
+        for side in (-1, 1):
+            size, place = np.full(3, 30.0), np.zeros(3)
+            size[k], place[k] = 1.0, side * 5.0
+            walls.append(geometry(box_surface(size), RigidTransform(place)))
+    scene = RayCastingScene(walls, {WORLD}, identity)
+    d = np.tile(np.roll([0.0, -0.8, 0.6], axis), (16, 1))
+    d[:, axis] = -0.01 * np.arange(16)
+    d[0, axis] = tiny
+    d /= np.linalg.norm(d, axis=1, keepdims=True)
+    p = np.array([0.7, 0.2, -0.4])
+    hits = scene.cast_rays(p, d, 100.0)
+    expected = box(p, d, (9.0, 9.0, 9.0))
+    np.testing.assert_allclose(hits.ranges, expected, rtol=1e-5)

@@ -35,13 +35,15 @@ import pytest
 
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.scene.perception_geometry import read_perception_geometry
-from cns_drake.sensors.beam_pattern import BeamPattern
 from cns_drake.sensors.lidar import Lidar
 from cns_drake.sensors.lidar_adding import connect_lidar
+from cns_drake.sensors.spinning_pattern import SpinningPattern
 from evaluation.support.errors import InputError
 
 X_WG = RigidTransform(RollPitchYaw(0.4, -0.3, 1.9), [-4.0, 2.5, 0.8])
-PATTERN = BeamPattern(tuple(np.linspace(0.5, -0.5, 24)), 180, 0.1, 60.0, 0.05)
+PATTERN = SpinningPattern(
+    tuple(np.linspace(0.5, -0.5, 24)), 180, 0.1, 60.0, 0.05
+)
 NODES = (
     {"children": [1], "translation": [0.5, 0.0, -1.0]},
     {"mesh": 0, "scale": [1.0, 2.0, 0.5], "rotation": [0.6, 0.0, 0.0, 0.8]},

@@ -18,11 +18,7 @@ from cns_drake.scene.structure_table import (
     StructureEntry,
     StructureTable,
 )
-from cns_drake.sensors.beam_pattern import (
-    LIDAR_PRESETS,
-    POINT_DTYPE,
-    make_beam_pattern,
-)
+from cns_drake.sensors.beam_pattern import POINT_DTYPE
 from cns_drake.sensors.measurement import MeasurementModel
 
 
@@ -250,34 +246,6 @@ def test_a_world_without_geometry_gives_an_empty_scan():
     stage = Stage().finish()
     assert stage.eval().tolist() == []
     assert stage.eval("point_cloud_W").size() == 0
-
-
-def test_cns_pattern():
-    pattern = make_beam_pattern("cns", 0.05)
-    assert pattern.num_beams == 32 * 1024
-    d = pattern.d_Sset.reshape(1024, 32, 3)
-    np.testing.assert_allclose(np.linalg.norm(d, axis=2), 1.0, atol=1e-15)
-    elevation = np.rad2deg(np.arcsin(d[..., 2]))
-    np.testing.assert_allclose(
-        elevation, np.broadcast_to(np.linspace(22.5, -22.5, 32), (1024, 32))
-    )
-    # The turn starts at the rear and goes clockwise: left comes first.
-    np.testing.assert_allclose(d[0, 0, 1], 0.0, atol=1e-12)
-    assert d[0, 0, 0] < 0
-    assert d[256, 0, 1] > 0.9
-    assert pattern.t_ns[0] == 0
-    assert pattern.t_ns[-1] == round(1023 * 0.05e9 / 1024)
-    assert (np.diff(pattern.t_ns.astype(int)) >= 0).all()
-
-
-@pytest.mark.parametrize("preset", LIDAR_PRESETS)
-def test_presets_make_usable_patterns(preset):
-    pattern = make_beam_pattern(preset, 0.05)
-    rings = {"cns": 32, "os1-32": 32, "os1-64": 64, "os1-128": 128}
-    rings |= {"vlp-16": 16, "hdl-64e": 64}
-    assert pattern.num_rings == rings[preset]
-    assert (np.diff(pattern.elevations_rad) < 0).all()
-    assert len(pattern.d_Sset) == len(pattern.ring) == len(pattern.t_ns)
 
 
 def test_point_layout_is_that_of_a_c_struct():

@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from cns_drake.sensors.beam_pattern import (
-    POINT_DTYPE,
-    make_beam_pattern,
-)
+from cns_drake.sensors.beam_pattern import POINT_DTYPE
+from cns_drake.sensors.lidar_presets import make_beam_pattern
 from cns_drake.sensors.point_assembly import BeamTable, assemble_points
 
 

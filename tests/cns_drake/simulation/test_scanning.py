@@ -6,7 +6,7 @@ import pytest
 from small_map import box_visual, world_text
 
 from cns_drake.scene.world import load_world
-from cns_drake.sensors.beam_pattern import make_beam_pattern
+from cns_drake.sensors.lidar_presets import make_beam_pattern
 from cns_drake.simulation.scanning import save_scan, scan_world
 from evaluation.support.errors import InputError
 

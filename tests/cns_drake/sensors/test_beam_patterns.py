@@ -1,0 +1,237 @@
+"""Beam patterns: fields of view, rates, and what they see, exactly."""
+
+from closed_forms import box
+from lidar_stage import Stage, positions
+import numpy as np
+from pydrake.geometry import Box
+from pydrake.math import RigidTransform
+import pytest
+
+from cns_drake.sensors.free_patterns import (
+    DirectionPattern,
+    make_flash_pattern,
+)
+from cns_drake.sensors.lidar_presets import LIDAR_PRESETS, make_beam_pattern
+from cns_drake.sensors.spinning_pattern import SpinningPattern
+
+LIVOX = ("mid-70", "avia", "mid-360")
+
+
+def angles_deg(d_Sset):
+    """Azimuths and elevations."""
+    x, y, z = d_Sset.T
+    return np.rad2deg(np.arctan2(y, x)), np.rad2deg(np.arcsin(z))
+
+
+def many(pattern, num_frames):
+    return np.concatenate([pattern.beams(k).d_Sset for k in range(num_frames)])
+
+
+def test_cns_pattern():
+    pattern = make_beam_pattern("cns", 0.05)
+    assert pattern.num_beams == 32 * 1024
+    d = pattern.d_Sset.reshape(1024, 32, 3)
+    np.testing.assert_allclose(np.linalg.norm(d, axis=2), 1.0, atol=1e-15)
+    elevation = np.rad2deg(np.arcsin(d[..., 2]))
+    np.testing.assert_allclose(
+        elevation, np.broadcast_to(np.linspace(22.5, -22.5, 32), (1024, 32))
+    )
+    # The turn starts at the rear and goes clockwise: left comes first.
+    np.testing.assert_allclose(d[0, 0, 1], 0.0, atol=1e-12)
+    assert d[0, 0, 0] < 0
+    assert d[256, 0, 1] > 0.9
+    assert pattern.t_ns[0] == 0
+    assert pattern.t_ns[-1] == round(1023 * 0.05e9 / 1024)
+    assert (np.diff(pattern.t_ns.astype(int)) >= 0).all()
+
+
+@pytest.mark.parametrize("preset", LIDAR_PRESETS)
+def test_presets_make_usable_patterns(preset):
+    pattern = make_beam_pattern(preset)
+    base = LIDAR_PRESETS[preset]
+    beams = pattern.beams(3)
+    assert len(np.unique(beams.ring)) == base.num_rings
+    assert pattern.period == base.period
+    assert 0.0 < pattern.min_range < pattern.max_range
+    assert len(beams.d_Sset) == len(beams.ring) == len(beams.t_ns)
+    assert len(beams.t_ns) == pattern.num_beams
+    np.testing.assert_allclose(
+        np.linalg.norm(beams.d_Sset, axis=1), 1.0, atol=1e-12
+    )
+    assert (np.diff(beams.t_ns.astype(int)) >= 0).all()
+    assert beams.t_ns[-1] < pattern.period * 1e9
+    assert (np.sort(beams.packet_order) == np.arange(pattern.num_beams)).all()
+    np.testing.assert_array_equal(beams.column_t_ns, pattern.column_t_ns)
+    assert len(base.source) > 20
+
+
+def test_no_preset_of_that_name():
+    with pytest.raises(KeyError, match="no LiDAR preset 'os1-65'; known: cns"):
+        make_beam_pattern("os1-65")
+    with pytest.raises(ValueError, match="'avia' has no columns"):
+        make_beam_pattern("avia", num_columns=100)
+
+
+def test_hokuyo():
+    """Of the specification: 1081 steps of 0.25 deg, in 3/4 of 25 ms."""
+    beams = make_beam_pattern("hokuyo-ust-20lx").beams(0)
+    azimuth, elevation = angles_deg(beams.d_Sset)
+    expected = -135.0 + 0.25 * np.arange(1081)
+    np.testing.assert_allclose(azimuth, expected, atol=1e-9)
+    np.testing.assert_allclose(elevation, 0.0, atol=1e-12)
+    assert beams.t_ns[-1] == pytest.approx(0.75 * 25e6)
+
+
+@pytest.mark.parametrize(
+    ("preset", "rate", "across", "up"),
+    [
+        ("mid-70", 100_000, (-35.2, 35.2), (-35.2, 35.2)),
+        ("avia", 240_000, (-35.2, 35.2), (-38.6, 38.6)),
+        ("mid-360", 200_000, (-180.0, 180.0), (-7.0, 52.0)),
+    ],
+)
+def test_livox_fields_of_view_and_rates(preset, rate, across, up):
+    pattern = make_beam_pattern(preset)
+    assert pattern.num_beams == pytest.approx(rate * pattern.period, rel=1e-3)
+    azimuth, elevation = angles_deg(many(pattern, 20))
+    found = (azimuth.min(), azimuth.max(), elevation.min(), elevation.max())
+    np.testing.assert_allclose(found, (*across, *up), atol=0.8)
+    assert elevation.min() > up[0] - 1e-6
+    assert elevation.max() < up[1] + 1e-6
+
+
+def test_a_mid_70_sees_a_disc():
+    """No beam farther than half the angle from x; most in the middle."""
+    d = many(make_beam_pattern("mid-70"), 10)
+    off_axis = np.rad2deg(np.arccos(d[:, 0]))
+    assert off_axis.max() == pytest.approx(35.2, abs=0.1)
+    inner = (off_axis < 10.0).sum() / (1 - np.cos(np.deg2rad(10.0)))
+    outer = ((off_axis > 20.0) & (off_axis < 30.0)).sum() / (
+        np.cos(np.deg2rad(20.0)) - np.cos(np.deg2rad(30.0))
+    )
+    assert inner > 3 * outer
+
+
+@pytest.mark.parametrize("preset", LIVOX)
+def test_frame_after_frame_fills_the_gaps(preset):
+    """What does not repeat covers more the longer it looks."""
+    pattern = make_beam_pattern(preset)
+
+    def cells(num_frames):
+        cells = np.floor(many(pattern, num_frames) / 0.008).astype(int)
+        return len(np.unique(cells, axis=0))
+
+    one, four = cells(1), cells(4)
+    assert four > 1.8 * one
+    first, again = pattern.beams(7), make_beam_pattern(preset).beams(7)
+    np.testing.assert_array_equal(first.d_Sset, again.d_Sset)
+
+
+def test_limits_of_the_field_of_view():
+    whole = make_beam_pattern("vlp-16", num_columns=360)
+    front = whole.within(azimuths_deg=(-30, 30), elevations_deg=(-5, 90))
+    azimuth, elevation = angles_deg(front.beams(0).d_Sset)
+    assert azimuth.min() == pytest.approx(-30.0)
+    assert azimuth.max() == pytest.approx(30.0)
+    assert np.unique(elevation.round(6)).tolist() == list(range(-5, 16, 2))
+    assert len(azimuth) == 61 * 11
+    rear = whole.within(azimuths_deg=(150, -150)).beams(0)
+    assert len(rear.column) == 61 * 16
+    assert (rear.d_Sset[:, 0] < 0).all()
+    np.testing.assert_array_equal(front.column_t_ns, whole.column_t_ns)
+    with pytest.raises(ValueError, match="no beam within"):
+        whole.within(elevations_deg=(20, 30))
+
+
+def test_limits_of_a_pattern_that_does_not_repeat():
+    half = make_beam_pattern("mid-360").within(azimuths_deg=(0, 180))
+    for frame in (0, 5):
+        beams = half.beams(frame)
+        assert (beams.d_Sset[:, 1] >= -1e-9).all()
+        assert len(beams.column) == pytest.approx(10_000, rel=0.02)
+        assert beams.t_ns.max() < 0.1e9
+
+
+def test_beams_in_any_directions():
+    pattern = DirectionPattern(
+        [[0, 2, 0], [3, 0, 4], [1, 1, 1]],
+        times=[0.02, 0.0, 0.01],
+        rings=[5, 6, 7],
+        min_range=0.1,
+        max_range=10.0,
+        period=0.1,
+    )
+    beams = pattern.beams(4)
+    np.testing.assert_allclose(
+        beams.d_Sset, [[0.6, 0, 0.8], [3**-0.5] * 3, [0, 1, 0]]
+    )
+    assert beams.ring.tolist() == [6, 7, 5]
+    assert beams.t_ns.tolist() == [0, 10_000_000, 20_000_000]
+
+
+@pytest.mark.parametrize(
+    ("directions", "options", "fault"),
+    [
+        ([], {}, "0 directions"),
+        ([[1, 0, 0]], {"times": [0, 1]}, "1 directions, 2 times"),
+        ([[0, 0, 0]], {}, "zero"),
+        ([[np.nan, 0, 0]], {}, "zero, or no number"),
+        ([[1, 0, 0]], {"times": [0.1]}, "not within the turn of 0.1 s"),
+    ],
+)
+def test_what_is_no_pattern(directions, options, fault):
+    with pytest.raises(ValueError, match=fault):
+        DirectionPattern(
+            directions, min_range=0.1, max_range=9.0, period=0.1, **options
+        )
+
+
+def test_a_flash_is_a_grid():
+    beams = make_flash_pattern(
+        4, 2, (80.0, 20.0), min_range=0.1, max_range=9.0, period=0.1
+    ).beams(0)
+    azimuth, elevation = angles_deg(beams.d_Sset)
+    np.testing.assert_allclose(azimuth, [30, 10, -10, -30] * 2)
+    np.testing.assert_allclose(elevation, [5] * 4 + [-5] * 4)
+    assert beams.ring.tolist() == [0] * 4 + [1] * 4
+    assert not beams.t_ns.any()
+
+
+PATTERNS = {
+    **{name: make_beam_pattern(name) for name in LIDAR_PRESETS},
+    "limited": make_beam_pattern("mid-360").within((100, -100), (0, 90)),
+    "one row": SpinningPattern((0.1,), 700, 0.1, 50.0, 0.1, (1.0, -2.0)),
+    "flash": make_flash_pattern(
+        90, 70, (100.0, 60.0), min_range=0.1, max_range=50.0, period=0.1
+    ),
+}
+
+
+@pytest.mark.parametrize("name", PATTERNS)
+def test_every_pattern_measures_a_room_exactly(name):
+    """Beam for beam, in the third frame, against the closed form."""
+    pattern = PATTERNS[name]
+    size, p_WS = (9.0, 8.0, 6.0), np.array([0.7, 0.2, -0.4])
+    stage = Stage()
+    for axis in range(3):
+        for side in (-1, 1):
+            wall = np.full(3, 30.0)
+            wall[axis] = 1.0
+            p = np.zeros(3)
+            p[axis] = side * (size[axis] / 2 + 0.5)
+            stage.add(f"room::{axis}{side}", Box(*wall), RigidTransform(p))
+    stage.finish(X_PS=RigidTransform(p_WS), pattern=pattern)
+    for frame in (0, 3):
+        stage.context.SetTime(frame * pattern.period)
+        beams = pattern.beams(frame)
+        expected = box(p_WS, beams.d_Sset, size)
+        seen = expected >= pattern.min_range
+        scan = stage.eval()
+        assert len(scan) == seen.sum()
+        np.testing.assert_allclose(
+            positions(scan),
+            (expected[:, None] * beams.d_Sset)[seen],
+            atol=1e-5,
+        )
+        np.testing.assert_array_equal(scan["t"], beams.t_ns[seen])
+        np.testing.assert_array_equal(scan["ring"], beams.ring[seen])
