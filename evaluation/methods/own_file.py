@@ -2,23 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+import contextlib
+import functools
 import importlib.util
+import inspect
 from pathlib import Path
 import sys
+import traceback
+from typing import Any
 
 from evaluation.methods.method import Method
 from evaluation.support.errors import InputError
 
+# What others call of a method, and its author may have written.
+_CALLED = (
+    *("__init__", "describe", "describe_place", "describe_batch"),
+    *("build_database", "score", "score_in_sequence", "rerank"),
+    "relative_pose",
+)
+
 
 def load_method(path: Path) -> type[Method]:
     """Runs a Python file and returns the method that it defines.
+
+    Whatever is raised in it, then and later, is one line for its author.
 
     Args:
         path: a file with one subclass of Method of its own, registered.
 
     Raises:
         InputError: if there is no such file, it fails, or it registers no
-            method or several.
+            method, several or one that is not whole.
     """
     if not path.is_file():
         raise InputError(f"--method: {path}: no such file")
@@ -30,10 +45,8 @@ def load_method(path: Path) -> type[Method]:
         raise InputError(f"--method: {path}: not a Python file")
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
-    try:
+    with _faults(path):
         spec.loader.exec_module(module)
-    except Exception as error:
-        raise InputError(f"{path}: {type(error).__name__}: {error}") from error
     found = [
         value
         for value in vars(module).values()
@@ -46,4 +59,47 @@ def load_method(path: Path) -> type[Method]:
         raise InputError(
             f"{path}: registers {len(found)} methods instead of one"
         )
-    return found[0]
+    method = found[0]
+    if inspect.isabstract(method):
+        missing = ", ".join(sorted(method.__abstractmethods__))
+        raise InputError(f"{path}: {method.__name__}: lacks {missing}")
+    scans = method.scans_per_place
+    if not isinstance(scans, int) or scans < 1:
+        raise InputError(
+            f"{path}: {method.__name__}: scans_per_place: {scans!r} is not a"
+            " positive whole number"
+        )
+    for name in _CALLED:
+        if name in vars(method):
+            setattr(method, name, _telling(getattr(method, name), path))
+    return method
+
+
+def _telling(function: Callable, path: Path) -> Callable:
+    """Returns a function that tells what is raised in it in one line."""
+
+    @functools.wraps(function)
+    def call(*arguments: Any, **options: Any) -> Any:
+        with _faults(path):
+            return function(*arguments, **options)
+
+    return call
+
+
+@contextlib.contextmanager
+def _faults(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except InputError:
+        raise
+    # A file that ends the program would end it as if all were well.
+    except (Exception, SystemExit) as error:
+        lines = [
+            frame.lineno
+            for frame in traceback.extract_tb(error.__traceback__)
+            if frame.filename == str(path)
+        ]
+        where = f"line {lines[-1]}: " if lines else ""
+        raise InputError(
+            f"{path}: {where}{type(error).__name__}: {error}"
+        ) from error

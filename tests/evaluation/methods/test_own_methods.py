@@ -53,3 +53,71 @@ def test_files_that_are_no_method(capsys, towns, tmp_path, text, fault):
     assert_refused(capsys, [*both, path], path, fault)
     nowhere = tmp_path / "nowhere.py"
     assert_refused(capsys, [*both, nowhere], nowhere, "no such file")
+
+
+_WHOLE = """
+import numpy as np
+
+from evaluation.methods import Method, register
+
+
+@register("own_{number}")
+class Own(Method):
+    def describe(self, points):
+        return len(points)
+
+    def build_database(self, places):
+        return np.array(places)
+
+    def score(self, query, database, *, exhaustive=False):
+        return -abs(database - query).astype(float)
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        ("return -abs", "-abs", "score returned NoneType of shape"),
+        ("-abs(database - query)", "np.zeros(1)", "of shape (1,) instead of"),
+        ("-abs(database - query)", "np.zeros(())", "of shape () instead of"),
+        (
+            "-abs(database - query)",
+            "np.zeros((len(database), 1))",
+            "1) instead of",
+        ),
+        (
+            "-abs(database - query).astype(float)",
+            "np.array(['a'] * len(database))",
+            "score returned ndarray",
+        ),
+        ("return len(points)", "1 / 0", "line 10: ZeroDivisionError: division"),
+        ("return len(points)", "raise SystemExit(0)", "line 10: SystemExit: 0"),
+        ("return np.array(places)", "places.x", "line 13: AttributeError"),
+        ("import numpy", "raise SystemExit(0)\nimport numpy", "line 2: System"),
+        ("    def score", "    def scare", "Own: lacks score"),
+        ("    def desc", "    scans_per_place = 0\n    def desc", "0 is not a"),
+        (
+            "    def desc",
+            "    def __init__(self, config=None):\n        exit(0)\n"
+            "    def desc",
+            "line 10: SystemExit",
+        ),
+    ],
+)
+@pytest.mark.parametrize("command", ["pr", "scores"])
+def test_faults_of_a_method_are_one_line(
+    capsys, towns, tmp_path, monkeypatch, command, old, new, fault
+):
+    monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
+    text = _WHOLE.replace("{number}", "a")
+    assert old in text
+    path = tmp_path / "own.py"
+    path.write_text(text.replace(old, new))
+    if command == "pr":
+        words = ["pr", towns / "town_01", towns / "town_02"]
+    else:
+        words = ["scores", "--database", towns / "town_01_scans"]
+        words += ["--query", towns / "town_02_scans"]
+        words += ["--output", tmp_path / "scores.csv"]
+    assert_refused(capsys, [*words, "--method", path], fault)
+    assert not (tmp_path / "scores.csv").exists()
