@@ -1,5 +1,7 @@
 from dataclasses import dataclass
 import pickle
+import struct
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from evaluation.study.parts import (
     read_part,
     write_part,
 )
+from evaluation.study.plain_values import decode, encode
 from evaluation.support.errors import InputError
 
 INPUTS = {"drive": ["a", 3], "roles": ("places",), "z": {"b": 1.5, "a": None}}
@@ -89,9 +92,99 @@ def test_damage_is_noticed_before_it_is_used(part, place):
         read_part(part)
 
 
-def test_what_cannot_be_pickled_leaves_the_part_as_it_was(part):
+def test_what_cannot_be_kept_leaves_the_part_as_it_was(part):
     whole = part.read_bytes()
-    with pytest.raises((AttributeError, pickle.PicklingError), match="lambda"):
+    with pytest.raises(InputError, match=r"function cannot be kept"):
         write_part(part, INPUTS, lambda: None)
     assert [path.name for path in part.parent.iterdir()] == ["values.data"]
     assert part.read_bytes() == whole
+
+
+def test_a_part_runs_nothing_of_what_it_names(tmp_path, monkeypatch):
+    """Neither imports nor constructors: it may be somebody else's."""
+    path = tmp_path / "ran"
+    (tmp_path / "evil_module.py").write_text(
+        f"from pathlib import Path\nPath({str(path)!r}).touch()\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    described = Description(*[np.zeros(1)] * 3)
+    data = encode(described)
+
+    def refuses(changed, fault):
+        (length,) = struct.unpack_from("<Q", data)
+        assert len(changed) != length or changed != data[8 : 8 + length]
+        with pytest.raises(ValueError, match=fault):
+            decode(
+                struct.pack("<Q", len(changed)) + changed + data[8 + length :]
+            )
+
+    module = __name__.encode()
+    (length,) = struct.unpack_from("<Q", data)
+    tree = data[8 : 8 + length]
+    assert module in tree
+    refuses(tree.replace(module, b"evil_module"), "evil_module")
+    refuses(tree.replace(module, b"evaluation.nothing.here"), "ModuleNotFound")
+    refuses(tree.replace(b'"Description"', b'"np"'), "no type")
+    refuses(tree.replace(b'"Description"', b'"Painter"'), "dataclass")
+    refuses(tree.replace(b'"empty"', b'"full"'), "other fields")
+    refuses(tree.replace(b":0", b":9"), "IndexError|other")
+    refuses(b"[" * 100_000, "RecursionError|Expecting")
+    refuses(b"\xff", "decode")
+    assert not path.exists()
+    # Whatever bytes a pickle has.
+    (tmp_path / "old.data").write_bytes(
+        b"cns-eval part 1\n{}\n" + pickle.dumps(described)
+    )
+    with pytest.raises(InputError, match="damaged"):
+        read_part(tmp_path / "old.data")
+
+
+class Painter:
+    def __init__(self):
+        raise AssertionError("run")
+
+
+class Pair(NamedTuple):
+    low: float
+    high: float
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        None,
+        True,
+        2**200,
+        -0.0,
+        float("inf"),
+        "\u00e9\n\0",
+        (),
+        [(), [], {}],
+        {("a", 1): {2: None}, "array": 3, "dict": [1]},
+        Pair(1.0, 2.5),
+        np.float32(0.1),
+        b"\0\xff",
+    ],
+)
+def test_plain_values_come_back(value):
+    again = decode(encode(value))
+    assert type(again) is type(value)
+    assert repr(again) == repr(value)
+
+
+def test_an_array_that_is_there_twice_is_stored_once():
+    array = np.arange(10_000)
+    value = [Description(array, array, array), array]
+    assert len(encode(value)) < 2 * array.nbytes
+    again = decode(encode(value))
+    assert again[0].spectrum is again[1]
+
+
+@pytest.mark.parametrize(
+    "value", [{1, 2}, object(), np.array([None]), [lambda: 0]]
+)
+def test_what_cannot_be_kept(tmp_path, value):
+    path = tmp_path / "a.data"
+    with pytest.raises(InputError, match=f"^{path}: .*cannot be kept"):
+        write_part(path, {}, value)
+    assert not list(tmp_path.iterdir())
