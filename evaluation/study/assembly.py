@@ -180,7 +180,9 @@ def _read_recognition(
 ) -> RecognitionResult | None:
     """Returns a result; None of a drive that never comes back."""
     database, query = pair
-    return read_part(files.recognition(database.name, query.name, method))
+    return read_part(
+        files.recognition(database.name, query.name).result(method)
+    )
 
 
 def _write_all(

@@ -22,7 +22,7 @@ from evaluation.study.parts import (
     write_part,
 )
 from evaluation.study.recording_survey import SurveyedDrive
-from evaluation.study.study_layout import SurveyFiles
+from evaluation.study.study_layout import RecognitionFiles, SurveyFiles
 from evaluation.study.surveys import tracking
 
 
@@ -82,29 +82,48 @@ def recognise_places(
     map_name: str,
     stages: tuple[str, str],
     surveys: tuple[SurveyFiles, SurveyFiles],
-    method: MethodChoice,
+    methods: tuple[MethodChoice, ...],
     protocol: RetrievalProtocol,
-    result: Path,
+    files: RecognitionFiles,
     tell: Tell,
 ) -> None:
-    """Writes the `RecognitionResult` of two drives and a method: a job.
+    """Writes the `RecognitionResult`s of two drives: a job.
 
-    Of a drive that is asked about itself and closes no loop, it is None.
+    Of a drive that is asked about itself and closes no loop, they are None.
 
     Args:
         map_name: of the city.
         stages: of the database, and of the query.
         surveys: likewise.
-        method: that described both.
-        protocol: by which it did.
-        result: to write.
+        methods: that described both.
+        protocol: by which they did.
+        files: to write.
         tell: is told how far it is.
 
     Raises:
         InputError: if the drives are of different worlds, no query has a
-            match, or a file cannot be read or written.
+            match, a method fails, or a file cannot be read or written.
     """
-    inputs = _recognition_inputs(map_name, stages, surveys, method, protocol)
+    for method in methods:
+        inputs = _recognition_inputs(
+            map_name, stages, surveys, method, protocol
+        )
+        result = files.result(method)
+        if not is_current(result, inputs):
+            found = _recognise(
+                map_name, stages, surveys, method, protocol, tell
+            )
+            write_part(result, inputs, found)
+
+
+def _recognise(
+    map_name: str,
+    stages: tuple[str, str],
+    surveys: tuple[SurveyFiles, SurveyFiles],
+    method: MethodChoice,
+    protocol: RetrievalProtocol,
+    tell: Tell,
+) -> RecognitionResult | None:
     parts = [survey.described(method) for survey in surveys]
     # The method comes first: what it kept may be of a type of its own.
     comparing = method.make()
@@ -114,25 +133,29 @@ def recognise_places(
     if database.name == query.name and not retrieval.matches.any():
         # A route need not close a loop.
         tell.note(f"{query.name}: it never comes back to where it was")
-        write_part(result, inputs, None)
-        return
+        return None
     outcome = judge_retrieval(
         comparing, database.name, query.name, retrieval, protocol
     )
-    write_part(result, inputs, RecognitionResult.of(map_name, stages, outcome))
+    return RecognitionResult.of(map_name, stages, outcome)
 
 
 def are_recognised(
     map_name: str,
     stages: tuple[str, str],
     surveys: tuple[SurveyFiles, SurveyFiles],
-    method: MethodChoice,
+    methods: tuple[MethodChoice, ...],
     protocol: RetrievalProtocol,
-    result: Path,
+    files: RecognitionFiles,
 ) -> bool:
     """Tells whether there is nothing to do; see `recognise_places`."""
-    inputs = _recognition_inputs(map_name, stages, surveys, method, protocol)
-    return is_current(result, inputs)
+    return all(
+        is_current(
+            files.result(method),
+            _recognition_inputs(map_name, stages, surveys, method, protocol),
+        )
+        for method in methods
+    )
 
 
 def _recognition_inputs(

@@ -124,9 +124,8 @@ def _plan_city(
     )
     jobs += [_change_job(city, pair, files) for pair in city.change_pairs()]
     jobs += [
-        _recognition_job(city, pair, name, method, protocol, files)
+        _recognition_job(city, pair, name, methods, protocol, files)
         for name, pair in _compared_pairs(city, protocol).items()
-        for method in methods
     ]
     return jobs
 
@@ -200,27 +199,30 @@ def _recognition_job(
     city: City,
     pair: tuple[RecordingInfo, RecordingInfo],
     name: str,
-    method: MethodChoice,
+    methods: tuple[MethodChoice, ...],
     protocol: RetrievalProtocol,
     files: StudyFiles,
 ) -> Job:
     database, query = pair
-    cost = _RECOGNITION_COST.get(method.name, _OTHER_RECOGNITION_COST)
-    result = files.recognition(database.name, query.name, method)
+    cost = sum(
+        _RECOGNITION_COST.get(method.name, _OTHER_RECOGNITION_COST)
+        for method in methods
+    )
+    results = files.recognition(database.name, query.name)
     return Job(
-        name=f"{name}, {method.name}",
+        name=name,
         function=recognise_places,
         arguments=(
             city.name,
             (database.stage, query.stage),
             (files.survey(database.name), files.survey(query.name)),
-            method,
+            methods,
             protocol,
-            result,
+            results,
         ),
         needs=_survey_names(pair),
         cost=START_COST + cost,
-        output=result,
+        output=results.folder,
         is_done=are_recognised,
     )
 

@@ -37,6 +37,21 @@ class SurveyFiles:
 
 
 @dataclass(frozen=True)
+class RecognitionFiles:
+    """The parts that hold what methods made of two recordings.
+
+    Attributes:
+        folder: in which they lie.
+    """
+
+    folder: Path
+
+    def result(self, method: MethodChoice) -> Path:
+        """Of the `RecognitionResult` of a method."""
+        return self.folder / f"{file_name(method.name)}.data"
+
+
+@dataclass(frozen=True)
 class StudyFiles:
     """The files of a study.
 
@@ -63,13 +78,9 @@ class StudyFiles:
         name = f"{file_name(earlier)},{file_name(later)}.data"
         return self._parts / "changes" / name
 
-    def recognition(
-        self, database: str, query: str, method: MethodChoice
-    ) -> Path:
-        """Of the `RecognitionResult` of two recordings and a method."""
-        pair = f"{file_name(database)},{file_name(query)}"
-        name = f"{pair},{file_name(method.name)}.data"
-        return self._parts / "recognition" / name
+    def recognition(self, database: str, query: str) -> RecognitionFiles:
+        name = f"{file_name(database)},{file_name(query)}"
+        return RecognitionFiles(self._parts / "recognition" / name)
 
     @property
     def costs(self) -> Path:

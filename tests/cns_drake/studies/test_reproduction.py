@@ -15,6 +15,7 @@ from cns_drake.studies.reproduction import (
     recording_info,
 )
 from evaluation.jobs.cluster import Cluster
+from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.study.collection import find_recordings, group_cities
 from evaluation.support.errors import InputError
 
@@ -59,7 +60,8 @@ def planned(monkeypatch):
         lambda jobs, cluster: runs.append({job.name: job for job in jobs}),
     )
 
-    def assemble(recordings, output, pages):
+    def assemble(recordings, output, pages, **options):
+        assert options == {"protocol": PAPER_PROTOCOL, "with_costs": False}
         runs[-1]["recordings"] = {one.name: one for one in recordings}
         runs[-1]["pages"] = pages
         return output / "report.html"
@@ -107,7 +109,7 @@ def test_everything_is_planned_before_anything_runs(
         assert jobs[name].needs == ()
         assert jobs[f"survey {name}"].needs == (name,)
     assert "picture town drives" in jobs
-    assert "town 01 > 04, solid" in jobs
+    assert "town 01 > 04" in jobs
     for job in jobs.values():
         assert jobs.keys() >= set(job.needs)
     # Each writes a place of its own, which workers anywhere find.
@@ -161,6 +163,7 @@ def test_quick_gives_the_same_tables(tmp_path):
     assert (tmp_path / "full" / "town_01_stage_04" / "metadata.yaml").is_file()
     for name in (
         "place_recognition.csv",
+        "poses.csv",
         "queries.csv",
         "queries_unchanged.csv",
         "survival.csv",

@@ -16,7 +16,7 @@ from evaluation.study.drive_source import RecordedDrive
 from evaluation.study.measurements import recognise_places
 from evaluation.study.parts import read_part
 from evaluation.study.recording_survey import survey_recording
-from evaluation.study.study_layout import SurveyFiles
+from evaluation.study.study_layout import RecognitionFiles, SurveyFiles
 from evaluation.study.surveys import survey_drive
 from evaluation.support.errors import InputError
 
@@ -188,15 +188,15 @@ def test_drives_of_two_worlds_are_not_compared(tmp_path, recorded):
     )
     other = Source(Elsewhere(recorded))
     survey_drive(other, BOTH, (solid,), PAPER_PROTOCOL, surveys[1], Tell())
-    result = tmp_path / "result.data"
+    files = RecognitionFiles(tmp_path / "results")
     with pytest.raises(InputError, match="poses in frame 'utm'"):
         recognise_places(
             "metropolis",
             ("01", "04"),
             surveys,
-            solid,
+            (solid,),
             PAPER_PROTOCOL,
-            result,
+            files,
             Tell(),
         )
-    assert not result.exists()
+    assert not files.folder.exists()
