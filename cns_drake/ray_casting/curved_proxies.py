@@ -76,10 +76,23 @@ class NearCurvedShapes:
             return False
         center = (p_OSset.min(axis=0) + p_OSset.max(axis=0)) / 2.0
         spread = np.linalg.norm(p_OSset - center, axis=1).max()
+        spread += self._travel()
         X_OL = self._group.X_OL
         R_LO = np.linalg.inv(X_OL[:, :3])
         p_LS = R_LO @ (center - X_OL[:, 3])
         return _is_near(self._shapes, p_LS, spread * np.linalg.norm(R_LO))
+
+    def _travel(self) -> float:
+        """Returns how far a shape goes at most during a turn."""
+        motion = self._group.motion
+        if motion is None or len(self._shapes) == 0:
+            return 0.0
+        stretch = np.linalg.norm(self._group.X_OL[:, :3], 2)
+        p_FG = np.linalg.norm(self._shapes[:, :3], axis=1) + self._shapes[:, 7]
+        arm = np.linalg.norm(self._group.X_FL[:3, 3]) + stretch * p_FG.max()
+        angle = np.linalg.norm(motion.w) * motion.duration
+        way = np.linalg.norm(motion.v) * motion.duration
+        return float(way + min(angle, 2.0) * arm)
 
 
 @compiled

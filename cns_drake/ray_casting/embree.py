@@ -69,6 +69,8 @@ def load() -> ctypes.CDLL:
         ("rtcSetGeometryMask", None, [pointer, uint]),
         ("rtcSetGeometryInstancedScene", None, [pointer, pointer]),
         ("rtcSetGeometryTransform", None, [pointer, uint, integer, pointer]),
+        ("rtcSetGeometryTransformQuaternion", None, [pointer, uint, pointer]),
+        ("rtcSetGeometryTimeStepCount", None, [pointer, uint]),
         (
             "rtcSetNewGeometryBuffer",
             pointer,

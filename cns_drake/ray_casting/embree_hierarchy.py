@@ -11,6 +11,7 @@ import weakref
 import numpy as np
 
 from cns_drake.ray_casting import embree
+from cns_drake.ray_casting.embree_motion import decompose_motion
 from cns_drake.ray_casting.embree_packets import (
     BLOCK,
     Tree,
@@ -85,6 +86,7 @@ class EmbreeHierarchy:
         fixed = [row for row in self.rows if groups[row].is_merged_world]
         moving = [row for row in self.rows if row not in fixed]
         self._top, self._instances = 0, {}
+        self._in_motion: set[int] = set()
         if moving:
             self._top = self._new_scene()
             self._instances = {
@@ -131,6 +133,12 @@ class EmbreeHierarchy:
         moved = [row for row in rows if row in self._instances]
         for row in moved:
             handle = self._instances[row]
+            if self._groups[row].motion is not None:
+                self._set_motion(row, handle)
+                continue
+            if row in self._in_motion:
+                self._lib.rtcSetGeometryTimeStepCount(handle, 1)
+                self._in_motion.remove(row)
             matrix = np.ascontiguousarray(self._groups[row].X_OL, np.float32)
             self._lib.rtcSetGeometryTransform(
                 handle, 0, embree.FLOAT3X4_ROW_MAJOR, matrix.ctypes.data
@@ -138,6 +146,17 @@ class EmbreeHierarchy:
             self._lib.rtcCommitGeometry(handle)
         if moved:
             self._lib.rtcCommitScene(self._top)
+
+    def _set_motion(self, row: int, handle: int) -> None:
+        """Tells Embree of a group that moves while rays are cast."""
+        steps = decompose_motion(self._groups[row])
+        self._lib.rtcSetGeometryTimeStepCount(handle, len(steps))
+        self._in_motion.add(row)
+        for k, step in enumerate(steps):
+            self._lib.rtcSetGeometryTransformQuaternion(
+                handle, k, step.ctypes.data
+            )
+        self._lib.rtcCommitGeometry(handle)
 
     def cast(
         self,

@@ -133,7 +133,7 @@ def _cast_block(
     num_ranges = len(rays.max_ranges)
     # Counted along: remainders would cost a tenth of the casting.
     origin, rotation = first % num_origins, first % num_rotations
-    reach = first % num_ranges
+    reach, time = first % num_ranges, first % len(rays.times)
     for begin in range(first, last, LANES):
         count = min(LANES, last - begin)
         valid[:] = 0
@@ -148,12 +148,13 @@ def _cast_block(
                     R[axis, 0] * d[0] + R[axis, 1] * d[1] + R[axis, 2] * d[2]
                 )
                 packet[4 + axis, lane] = along if abs(along) >= _TINY else 0.0
+            packet[7, lane] = rays.times[time]
             packet[8, lane] = rays.max_ranges[reach]
             origin = origin + 1 if origin + 1 < num_origins else 0
             rotation = rotation + 1 if rotation + 1 < num_rotations else 0
             reach = reach + 1 if reach + 1 < num_ranges else 0
+            time = time + 1 if time + 1 < len(rays.times) else 0
         packet[3] = 0.0
-        packet[7] = 0.0
         packet_id[9] = mask
         packet_id[10:12] = 0
         packet_id[18:20] = INVALID_ID

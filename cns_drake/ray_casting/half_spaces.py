@@ -18,8 +18,9 @@ class Planes(NamedTuple):
     """Planes, each with the group that it is.
 
     Attributes:
-        equations: (H, 4) float64; a point p_O on plane h fulfils
-            equations[h, :3] @ p_O = equations[h, 3].
+        equations: (T, H, 4) float64; a point p_O on plane h fulfils
+            equations[t, h, :3] @ p_O = equations[t, h, 3] at the t-th of the
+            rays' times, or always if T is 1.
         owners: (H,) int32 index of the geometry.
         groups: (H,) int32 row of the group.
     """
@@ -41,11 +42,14 @@ def cast_on_planes(
         rays: N of them.
         hits: what they met so far.
     """
-    normals = np.array([group.X_OL[:, 2] for group in groups.values()])
-    origins = np.array([group.X_OL[:, 3] for group in groups.values()])
-    offsets = np.einsum("hi,hi->h", normals, origins)
+    times = np.zeros(1)
+    if any(group.motion is not None for group in groups.values()):
+        times = rays.times
+    X_OLs = np.stack([group.X_OL_at(times) for group in groups.values()], 1)
+    normals, origins = X_OLs[..., 2], X_OLs[..., 3]
+    offsets = np.einsum("thi,thi->th", normals, origins)
     planes = Planes(
-        np.column_stack([normals, offsets]),
+        np.concatenate([normals, offsets[..., None]], axis=-1),
         np.array([group.members[0][0] for group in groups.values()], np.int32),
         np.array(list(groups), np.int32),
     )
@@ -59,10 +63,11 @@ def _cast(planes: Planes, rays: Rays, hits: Hits) -> None:
         R = rays.R_OSset[ray % len(rays.R_OSset)]
         d = rays.d_Sset[ray]
         reach = rays.max_ranges[ray % len(rays.max_ranges)]
-        for h in range(len(planes.equations)):
-            toward, height = 0.0, planes.equations[h, 3]
+        equations = planes.equations[ray % len(planes.equations)]
+        for h in range(len(equations)):
+            toward, height = 0.0, equations[h, 3]
             for axis in range(3):
-                n = planes.equations[h, axis]
+                n = equations[h, axis]
                 height -= n * p[axis]
                 toward += n * (
                     R[axis, 0] * d[0] + R[axis, 1] * d[1] + R[axis, 2] * d[2]

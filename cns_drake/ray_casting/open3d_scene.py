@@ -56,15 +56,17 @@ class Open3dScene:
         num_rays = len(rays.d_Sset)
         p_Oset, d_Oset = rays.p_Oset(), rays.d_Oset()
         max_ranges = rays.max_ranges_of(np.arange(num_rays))
+        times = rays.times[np.arange(num_rays) % len(rays.times)]
         result = Hits.misses(num_rays, with_normals)
         for row, group in enumerate(self._groups):
-            X_OL = np.vstack([group.X_OL, [0, 0, 0, 1]])
-            X_LO = np.linalg.inv(X_OL)
+            X_OL = group.X_OL_at(times[: None if group.motion else 1])
+            R_LO = np.linalg.inv(X_OL[:, :, :3])
             # Not of unit length in a stretched group: then distances along
             # the ray stay those in O.
             rays_L = np.empty((num_rays, 6), np.float32)
-            rays_L[:, :3] = p_Oset @ X_LO[:3, :3].T + X_LO[:3, 3]
-            rays_L[:, 3:] = d_Oset @ X_LO[:3, :3].T
+            p_OLset = p_Oset - X_OL[:, :, 3]
+            rays_L[:, :3] = np.einsum("nij,nj->ni", R_LO, p_OLset)
+            rays_L[:, 3:] = np.einsum("nij,nj->ni", R_LO, d_Oset)
             hits = self._scenes[row].cast_rays(
                 self._open3d.core.Tensor(rays_L), nthreads=self._num_threads
             )

@@ -6,7 +6,7 @@ platforms for which there is no wheel of Embree's C library.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 import importlib.util
 import itertools
@@ -16,8 +16,10 @@ import numpy as np
 from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
 
+from cns_drake.ray_casting.group_motion import Motion
 from cns_drake.ray_casting.half_spaces import cast_on_planes
 from cns_drake.ray_casting.ray_groups import (
+    NO_MOTIONS,
     RayGroup,
     group_geometries,
     take_over,
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
 # The package whose wheel holds Embree's C library.
 _EMBREE_PACKAGE = "embreex"
 _IDENTITY = np.eye(3)
+_AT_ONCE = np.zeros(1, np.float32)
 
 
 @dataclass(frozen=True)
@@ -109,11 +112,18 @@ class RayCastingScene:
         ]
 
     def set_frame_poses(
-        self, calc_X_WF: Callable[[FrameId], RigidTransform]
+        self,
+        calc_X_WF: Callable[[FrameId], RigidTransform],
+        motions: Mapping[FrameId, Motion] = NO_MOTIONS,
     ) -> None:
-        """Moves the geometry of the frames that are not anchored."""
+        """Moves the geometry of the frames that are not anchored.
+
+        Args:
+            calc_X_WF: gives the pose of a frame in the world.
+            motions: of the frames that go on moving while rays are cast.
+        """
         for row in self._moving:
-            self._groups[row].place(self._p_WO, calc_X_WF)
+            self._groups[row].place(self._p_WO, calc_X_WF, motions)
         if self._moving:
             self._scene.place(self._moving)
 
@@ -124,6 +134,7 @@ class RayCastingScene:
         max_range: float,
         *,
         R_WSset: np.ndarray = _IDENTITY,
+        times: np.ndarray = _AT_ONCE,
         with_normals: bool = False,
     ) -> RayHits:
         """Casts N rays, from one pose of a sensor S or from several.
@@ -135,16 +146,20 @@ class RayCastingScene:
             max_range: how far to look [m].
             R_WSset: (3, 3) or (L, 3, 3) orientations of S in the world, taken
                 in turn likewise.
-            with_normals: also return the normals of the surfaces.
+            times: (T,) when rays are cast, as parts of the turn from 0 to 1,
+                taken in turn likewise.
+            with_normals: also return the normals of the surfaces, as they
+                are at the start of the turn.
 
         Raises:
-            ValueError: N is not a multiple of K or of L.
+            ValueError: N is not a multiple of K, L or T.
         """
         p_OSset = np.atleast_2d(p_WSset) - self._p_WO
         R_WSset = np.reshape(R_WSset, (-1, 3, 3))
         for count, what in (
             (len(p_OSset), "origins"),
             (len(R_WSset), "frames"),
+            (len(times), "times"),
         ):
             if len(d_Sset) % max(count, 1) or (count == 0 and len(d_Sset)):
                 raise ValueError(f"{count} {what} for {len(d_Sset)} rays")
@@ -153,6 +168,7 @@ class RayCastingScene:
             np.ascontiguousarray(R_WSset, dtype=float),
             np.array([max_range], np.float32),
             np.ascontiguousarray(d_Sset, dtype=float),
+            np.ascontiguousarray(times, dtype=np.float32),
         )
         hits = self._scene.cast_rays(rays, with_normals)
         if self._planes:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
 
+from cns_drake.ray_casting.group_motion import Motion
 from cns_drake.scene.perception_geometry import PerceptionGeometry
 from cns_drake.scene.surfaces import (
     EllipsoidSurface,
@@ -17,6 +18,7 @@ from cns_drake.scene.surfaces import (
     TriangleSurface,
 )
 
+NO_MOTIONS: Mapping[FrameId, Motion] = {}
 # What is built into one scene: index of a geometry, its pose, its surface.
 Member = tuple[int, RigidTransform, Surface]
 
@@ -32,8 +34,9 @@ class RayGroup:
         members: what the group holds, posed in L. A half space is alone in
             its group, and in L bounded by z = 0.
         is_merged_world: whether L is the world, moved to O.
-        X_OL: (3, 4) affine map from L to the scene's origin; there is none
-            before `place`.
+        X_OL: (3, 4) affine map from L to the scene's origin, at the start of
+            a turn; there is none before `place`.
+        motion: of F during the turn, None if it stays.
     """
 
     frame_id: FrameId | None
@@ -41,6 +44,7 @@ class RayGroup:
     members: list[Member]
     is_merged_world: bool = False
     X_OL: np.ndarray = field(init=False)
+    motion: Motion | None = None
 
     @property
     def is_half_space(self) -> bool:
@@ -50,13 +54,28 @@ class RayGroup:
         self,
         p_WO: np.ndarray,
         calc_X_WF: Callable[[FrameId], RigidTransform],
+        motions: Mapping[FrameId, Motion] = NO_MOTIONS,
     ) -> None:
-        """Sets `X_OL` by the pose of the group's frame."""
+        """Sets `X_OL` and `motion` by those of the group's frame."""
         X_WL = self.X_FL
         if self.frame_id is not None:
             X_WL = calc_X_WF(self.frame_id).GetAsMatrix4() @ X_WL
+            self.motion = motions.get(self.frame_id)
         self.X_OL = X_WL[:3].copy()
         self.X_OL[:, 3] -= p_WO
+
+    def X_OL_at(self, times: np.ndarray) -> np.ndarray:
+        """Returns `X_OL` at parts of the turn, (N, 3, 4)."""
+        if self.motion is None:
+            return np.broadcast_to(self.X_OL, (len(times), 3, 4))
+        R_OL0, way_F = self.motion.at(times)
+        # L in axes of O about F's origin, which itself goes straight on.
+        p_FL = self.X_OL[:, :3] @ np.linalg.solve(
+            self.X_FL[:3, :3], self.X_FL[:3, 3]
+        )
+        X_OL = R_OL0 @ self.X_OL
+        X_OL[:, :, 3] = self.X_OL[:, 3] - p_FL + way_F + R_OL0 @ p_FL
+        return X_OL
 
     def holds_the_same(self, other: RayGroup) -> bool:
         """Tells whether another group has the same members, placed alike."""

@@ -13,19 +13,22 @@ import numpy as np
 class Rays(NamedTuple):
     """N rays from one pose of a sensor S or from several.
 
-    Ray i takes entry i mod length of the first three arrays.
+    Ray i takes entry i mod length of all arrays but the directions.
 
     Attributes:
         p_OSset: (K, 3) float32 origins [m].
         R_OSset: (L, 3, 3) float64 orientations of S.
         max_ranges: (M,) float32, how far to look [m].
         d_Sset: (N, 3) float64 unit directions.
+        times: (T,) float32 when each ray is cast, as a part of the turn from
+            0 to 1.
     """
 
     p_OSset: np.ndarray
     R_OSset: np.ndarray
     max_ranges: np.ndarray
     d_Sset: np.ndarray
+    times: np.ndarray
 
     def select(self, rows: np.ndarray, max_ranges: np.ndarray) -> Rays:
         """Returns the rays of some rows, each with a range of its own."""
@@ -34,6 +37,7 @@ class Rays(NamedTuple):
             self.R_OSset[rows % len(self.R_OSset)],
             max_ranges,
             self.d_Sset[rows],
+            self.times[rows % len(self.times)],
         )
 
     def max_ranges_of(self, rows: np.ndarray) -> np.ndarray:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
 from pydrake.geometry import FrameId, GeometryId, QueryObject, Role
 from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.math import SpatialVelocity
 from pydrake.perception import PointCloud
 from pydrake.systems.framework import Context, LeafSystem, ValueProducer
 
+from cns_drake.ray_casting.group_motion import Motion
 from cns_drake.scene.structure_table import StructureTable
 from cns_drake.sensors.beam_pattern import POINT_DTYPE, BeamPattern, Beams
 from cns_drake.sensors.measurement import IDEAL, MeasurementModel
@@ -28,6 +30,7 @@ class Lidar(LeafSystem):
         - geometry_query
         - geometry_revision (optional)
         - sweep (if it is declared)
+        - body_spatial_velocities (if it is declared)
         output_ports:
         - scan
         - point_cloud_S
@@ -51,6 +54,12 @@ class Lidar(LeafSystem):
     in the world. Other geometry that moves stays for the turn where it is at
     its start.
 
+    With the port `body_spatial_velocities` (a list over a plant's bodies of
+    V_WB, expressed in the world, as a MultibodyPlant gives it), P and all
+    other bodies of that plant keep their velocities for the turn: each beam
+    is cast at its own firing time, from where S is then, on what is where
+    then. Points are expressed in S at that time, too.
+
     Drake cannot cast rays, so the system reads shapes and poses from the
     QueryObject and casts on a hierarchy of its own, in which what changed is
     built anew. `geometry_revision` (from `geometry_revision_port`) tells when
@@ -71,6 +80,7 @@ class Lidar(LeafSystem):
         *,
         measurement: MeasurementModel = IDEAL,
         with_sweep: bool = False,
+        moving_bodies: Mapping[FrameId, int] | None = None,
         role: Role = Role.kPerception,
         unseen: Collection[FrameId | GeometryId] | None = None,
         structures: StructureTable | None = None,
@@ -85,6 +95,8 @@ class Lidar(LeafSystem):
             pattern: the beams.
             measurement: what it makes of true ranges.
             with_sweep: whether the port `sweep` tells its poses.
+            moving_bodies: frame -> index of the body of it in the port
+                `body_spatial_velocities`, which there is if this is given.
             role: of the geometry that it sees.
             unseen: frames and geometries that it does not see; by default
                 P, unless that is the world's frame.
@@ -110,6 +122,7 @@ class Lidar(LeafSystem):
         )
         self._first = _Turn(0, pattern.beams(0))
         self._turn = self._first
+        self._times = self._first.beams.column_t_ns / (pattern.period * 1e9)
 
         self._geometry_query = self.DeclareAbstractInputPort(
             "geometry_query", Value(QueryObject())
@@ -122,6 +135,16 @@ class Lidar(LeafSystem):
             self._sweep = self.DeclareAbstractInputPort(
                 "sweep", Value(object())
             )
+        self._velocities = None
+        self._moving_bodies = dict(moving_bodies or {})
+        if moving_bodies is not None:
+            self._velocities = self.DeclareAbstractInputPort(
+                "body_spatial_velocities",
+                AbstractValue.Make([SpatialVelocity()]),
+            )
+        motion_tickets = set()
+        if self._velocities is not None:
+            motion_tickets.add(self._velocities.ticket())
         # Kept as long as nothing changes in the SceneGraph.
         self._seen = self.DeclareCacheEntry(
             description="ray-casting scene",
@@ -132,6 +155,7 @@ class Lidar(LeafSystem):
             prerequisites_of_calc={
                 self._geometry_query.ticket(),
                 self._revision.ticket(),
+                *motion_tickets,
             },
         )
         scan = self.DeclareAbstractOutputPort(
@@ -184,7 +208,27 @@ class Lidar(LeafSystem):
         revision = None
         if self._revision.HasValue(context):
             revision = self._revision.Eval(context)
-        seen.update(self._geometry_query.Eval(context), revision)
+        seen.update(
+            self._geometry_query.Eval(context),
+            revision,
+            self._calc_motions(context),
+        )
+
+    def _calc_motions(self, context: Context) -> dict[FrameId, Motion]:
+        """Returns the motion of each frame that does not stay."""
+        if self._velocities is None:
+            return {}
+        V_WBs = self._velocities.Eval(context)
+        duration = self._pattern.period
+        motions = {
+            frame_id: Motion(
+                V_WBs[body].rotational(),
+                V_WBs[body].translational(),
+                duration,
+            )
+            for frame_id, body in self._moving_bodies.items()
+        }
+        return {f: m for f, m in motions.items() if m.w.any() or m.v.any()}
 
     def _calc_scan(self, context: Context, output: AbstractValue) -> None:
         seen = self._seen.Eval(context)
@@ -194,13 +238,17 @@ class Lidar(LeafSystem):
         turn = self._get_turn(frame)
         p_WSset, R_WSset = self._calc_poses(context)
         columns = turn.beams.cast_columns
-        if len(p_WSset) > 1 and columns is not None:
-            p_WSset, R_WSset = p_WSset[columns], R_WSset[columns]
+        times = self._times
+        if columns is not None:
+            times = times[columns]
+            if len(p_WSset) > 1:
+                p_WSset, R_WSset = p_WSset[columns], R_WSset[columns]
         hits = seen.scene.cast_rays(
             p_WSset,
             turn.d_Sset_cast,
             self._measurement.reach(self._pattern.max_range),
             R_WSset=R_WSset,
+            times=times,
         )
         beams, ranges, intensity = self._measurement.measure(
             hits.ranges.take(turn.table.place),
@@ -237,6 +285,8 @@ class Lidar(LeafSystem):
     def _pose_prerequisites(self) -> set:
         if self._sweep is not None:
             return {self._sweep.ticket()}
+        if self._velocities is not None:
+            return {self._geometry_query.ticket(), self._velocities.ticket()}
         return {self._geometry_query.ticket()}
 
     def _scan_prerequisites(self) -> set:
@@ -257,6 +307,14 @@ class Lidar(LeafSystem):
         query_object = self._geometry_query.Eval(context)
         X_WP = query_object.GetPoseInWorld(self._parent_frame_id)
         X_WS = X_WP @ self._X_PS
+        motion = self._calc_motions(context).get(self._parent_frame_id)
+        if motion is not None:
+            R_WW0, way_P = motion.at(self._times)
+            p_PS_W = X_WS.translation() - X_WP.translation()
+            return (
+                X_WP.translation() + way_P + R_WW0 @ p_PS_W,
+                R_WW0 @ X_WS.rotation().matrix(),
+            )
         return X_WS.translation()[None], X_WS.rotation().matrix()[None]
 
     def _calc_X_WS(self, context: Context, output: AbstractValue) -> None:

@@ -8,12 +8,12 @@ from typing import Any
 from pydrake.geometry import FrameId, GeometryId, SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import Frame, RigidBody, WeldJoint
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.multibody.tree import BodyIndex, Frame, RigidBody, WeldJoint
+from pydrake.systems.framework import DiagramBuilder, System
 
 from cns_drake.scene.geometry_revision import geometry_revision_port
 from cns_drake.sensors.beam_pattern import BeamPattern
-from cns_drake.sensors.body_motion import body_and_pose
+from cns_drake.sensors.body_motion import body_and_pose, connect_motion
 from cns_drake.sensors.lidar import Lidar
 from cns_drake.sensors.lidar_presets import make_beam_pattern
 
@@ -27,6 +27,8 @@ def add_lidar(
     *,
     name: str = "lidar",
     unseen: Collection[RigidBody | FrameId | GeometryId] | None = None,
+    motion_distortion: bool = False,
+    motion: System | None = None,
     **options: Any,
 ) -> Lidar:
     """Adds a LiDAR to a diagram and connects it to the SceneGraph.
@@ -43,6 +45,10 @@ def add_lidar(
         name: of the system.
         unseen: what the LiDAR does not see; by default the body that it is
             fixed to and what is welded to that, but for the world.
+        motion_distortion: whether the LiDAR and all other bodies of the plant
+            go on moving while it turns (see `Lidar`).
+        motion: the source of the bodies' velocities then, if that is not the
+            plant itself.
         options: further arguments of `Lidar`.
 
     Returns:
@@ -52,6 +58,7 @@ def add_lidar(
     Raises:
         KeyError: there is no preset of that name.
         RuntimeError: the body is not registered with a SceneGraph.
+        ValueError: motion distortion is wanted of what is no body.
 
     Example:
         from cns_drake import add_lidar
@@ -69,8 +76,15 @@ def add_lidar(
         if unseen is None:
             unseen = _welded_to(body)
         options.setdefault("anchored_frames", _anchored_frames(plant))
+        if motion_distortion:
+            options["moving_bodies"] = _moving_bodies(plant)
     else:
         frame_id = body
+        if motion_distortion:
+            raise ValueError(
+                "motion distortion needs a body of a plant, which knows its "
+                "velocity; a frame of another source does not"
+            )
     if unseen is not None:
         options["unseen"] = [
             _frame_of(place) if isinstance(place, RigidBody) else place
@@ -80,6 +94,9 @@ def add_lidar(
         name, Lidar(frame_id, X_PS, pattern, **options)
     )
     connect_lidar(builder, scene_graph, lidar)
+    if motion_distortion and isinstance(body, RigidBody):
+        port = "body_spatial_velocities"
+        connect_motion(builder, motion, body, {port: lidar.GetInputPort(port)})
     return lidar
 
 
@@ -119,6 +136,15 @@ def _welded_to(body: RigidBody) -> list[RigidBody]:
 def _anchored_frames(plant: MultibodyPlant) -> list[FrameId]:
     """Returns the frames that can only move if the model is changed."""
     return [_frame_of(b) for b in plant.GetBodiesWeldedTo(plant.world_body())]
+
+
+def _moving_bodies(plant: MultibodyPlant) -> dict[FrameId, int]:
+    """Returns the index of each body that a frame belongs to."""
+    frames = {
+        k: plant.GetBodyFrameIdIfExists(BodyIndex(k))
+        for k in range(plant.num_bodies())
+    }
+    return {frame: k for k, frame in frames.items() if frame is not None}
 
 
 def _frame_of(body: RigidBody) -> FrameId:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from operator import is_
 from typing import NamedTuple
 
@@ -15,7 +16,9 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform
 
+from cns_drake.ray_casting.group_motion import Motion
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
+from cns_drake.ray_casting.ray_groups import NO_MOTIONS
 from cns_drake.scene.perception_geometry import (
     GeometryReader,
     PerceptionGeometry,
@@ -70,13 +73,19 @@ class SeenGeometry:
     def __deepcopy__(self, memo: dict) -> SeenGeometry:
         return SeenGeometry(self._sight)
 
-    def update(self, query_object: QueryObject, revision: int | None) -> None:
+    def update(
+        self,
+        query_object: QueryObject,
+        revision: int | None,
+        motions: Mapping[FrameId, Motion] = NO_MOTIONS,
+    ) -> None:
         """Moves what moves, and builds anew what changed.
 
         Args:
             query_object: of the Context.
             revision: of the geometry (`geometry_revision_port`), None if it
                 is not known. Then all geometries are looked at.
+            motions: of the frames that move during the turn.
 
         Raises:
             InputError: see `GeometryReader.read`.
@@ -85,8 +94,12 @@ class SeenGeometry:
             self._read(query_object.inspector())
         if self.scene is None or not self._is_built(query_object):
             self._build(query_object)
+            is_placed = not motions
         else:
-            self.scene.set_frame_poses(query_object.GetPoseInWorld)
+            is_placed = False
+        assert self.scene is not None
+        if not is_placed:
+            self.scene.set_frame_poses(query_object.GetPoseInWorld, motions)
         self._revision = revision
 
     def _read(self, inspector: SceneGraphInspector) -> None:
