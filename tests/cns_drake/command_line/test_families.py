@@ -40,6 +40,9 @@ def test_simulated_and_recorded_families_agree(tmp_path):
             "frames": 120,
         }
         (town / f"sequence_{stage}.yaml").write_text(yaml.safe_dump(drive))
+        if stage == "01":
+            drive["stage"] = "02"
+            (town / "unchanged.yaml").write_text(yaml.safe_dump(drive))
     family = tmp_path / "family.yaml"
     family.write_text(
         yaml.safe_dump({"base": "town/sequence_01.yaml", "missing": [0.0, 0.5]})
@@ -49,10 +52,12 @@ def test_simulated_and_recorded_families_agree(tmp_path):
     varied = "--vary", family
     run(app, "trend", *varied, "--query", asking, "--output", simulated)
     run(app, "generate", asking, *varied, "--output", recorded)
+    run(app, "simulate", town / "unchanged.yaml", "--output", recorded)
     members = sorted(recorded.glob("town_01_m*"))
     run(
         evaluation_app,
         *("trend", *members, "--query", recorded / "town_02"),
+        *("--control", recorded / "unchanged"),
         *("--output", tmp_path / "trend"),
     )
     tables = [
@@ -62,4 +67,8 @@ def test_simulated_and_recorded_families_agree(tmp_path):
     assert tables[0] == tables[1]
     rows = list(csv.DictReader(tables[0].splitlines()))
     assert {row["database"] for row in rows} == {m.name for m in members}
+    # One control serves both, whose routes are one.
+    unchanged = {(row["method"], row["auc_unchanged"]) for row in rows}
+    assert len(unchanged) == len(rows) / 2
+    assert any(row["kept"] for row in rows)
     assert not list(simulated.glob("**/*.mcap"))
