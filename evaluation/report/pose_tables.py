@@ -9,7 +9,7 @@ from evaluation.recognition.protocol import (
     protocol_values,
 )
 from evaluation.recognition.recognition_result import RecognitionResult
-from evaluation.report.result_tables import title
+from evaluation.report.result_tables import by_pair_and_method, title
 from evaluation.report.tables import Table
 
 POSE_CAPTION = (
@@ -29,7 +29,7 @@ def pose_table(results: Sequence[RecognitionResult]) -> Table:
         results: of all pairs and methods.
     """
     rows = []
-    for result in results:
+    for result in by_pair_and_method(results):
         pose = result.outcome.pose
         rows.append(
             (

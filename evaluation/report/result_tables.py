@@ -62,6 +62,18 @@ def shows_paper(results: Iterable[RecognitionResult]) -> bool:
     return any(map(is_of_paper, results))
 
 
+def by_pair_and_method(
+    results: Sequence[RecognitionResult],
+) -> list[RecognitionResult]:
+    """Returns results pair by pair, methods in the paper's order."""
+    pairs = list(dict.fromkeys(result.pair for result in results))
+    methods = in_paper_order(result.method for result in results)
+    return sorted(
+        results,
+        key=lambda r: (pairs.index(r.pair), methods.index(r.method)),
+    )
+
+
 def paper_mode(method: str) -> Mode:
     """Returns the mode that the paper seems to have counted a method in."""
     for key in paper.recognition_values():
