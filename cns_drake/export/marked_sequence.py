@@ -14,6 +14,7 @@ from cns_drake.scene.semantics import MOVING_IDS, OTHER_MOVING_ID
 from cns_drake.scene.structure_table import load_structure_table
 from cns_drake.scene.world import load_world, structures_in
 from evaluation.sequences.mcap_sequence import McapSequence
+from evaluation.sequences.scan_files import read_scenario
 from evaluation.support.errors import InputError
 
 
@@ -99,9 +100,13 @@ class MarkedSequence(McapSequence):
             raise InputError(
                 f"{self._path}: was not recorded in a stage of a map"
             )
-        folder = shipped_maps().get(place, Path(place))
+        if place in shipped_maps():
+            return shipped_maps()[place]
+        # The recording has the map's name; the file beside it says where.
+        beside = read_scenario(self._path.parent) or {}
+        folder = self._path.parent / str(beside.get("map", place))
         if not folder.is_dir():
-            raise InputError(f"{self._path}: map: {place}: no such folder")
+            raise InputError(f"{self._path}: map: {folder}: no such folder")
         return folder
 
     def _check_structures(

@@ -254,6 +254,26 @@ class Scenario(_Model):
             raise ValueError(f"'{taken.pop()}' is the name of another frame")
         return lidars
 
+    def described(self, folder: Path | None = None) -> dict:
+        """Returns the fields that are given, ready for JSON.
+
+        Where a map, world or waypoints lie is no part of what is driven, and
+        what they hold has a digest.
+
+        Args:
+            folder: from which they are told by their way; without it, by
+                their names alone.
+        """
+        values = self.model_dump(mode="json", exclude_none=True)
+        for field in ("map", "world", "waypoints"):
+            place = values.get(field)
+            if place is None or place in shipped_maps():
+                continue
+            values[field] = Path(place).name
+            if folder is not None:
+                values[field] = os.path.relpath(place, folder.resolve())
+        return values
+
     def __eq__(self, other: object) -> bool:
         """Tells whether two are the same, wherever they were read from."""
         if not isinstance(other, Scenario):

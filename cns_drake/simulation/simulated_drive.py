@@ -127,7 +127,7 @@ class SimulatedSequence(Sequence):
 
     @property
     def scenario(self) -> Mapping:
-        return self._scenario.model_dump(mode="json", exclude_none=True)
+        return self._scenario.described()
 
     def scan(self, index: int) -> np.ndarray:
         context = self._lidar.GetMyMutableContextFromRoot(self._context)

@@ -257,7 +257,7 @@ def _make_bag(
 ) -> BagWriter:
     """Makes the recording of a drive, so far without messages."""
     scenario, inputs = drive.scenario, drive.inputs
-    described = scenario.model_dump(mode="json", exclude_none=True)
+    described = scenario.described()
     return BagWriter(
         folder,
         topics,
@@ -273,7 +273,8 @@ def _make_bag(
                 "inputs_sha256": inputs,
             },
         },
-        scenario=described,
+        # It can be simulated again, as long as all lies as it does.
+        scenario=scenario.described(folder),
         custom_data={
             "cns_drake_version": __version__,
             INPUTS_KEY: combined_digest(inputs),

@@ -1,5 +1,8 @@
 """A user's own SDF world, driven along waypoints."""
 
+import shutil
+
+from bag_recordings import contents
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
@@ -54,6 +57,30 @@ def test_a_world_and_waypoints_give_a_recording(yard, tmp_path):
         pose = reader.deserialize(data, odometry.msgtype).pose.pose
     position = [pose.position.x, pose.position.y, pose.position.z]
     np.testing.assert_allclose(position, [-10, 5, 0], atol=1e-9)
+
+
+def test_nothing_depends_on_where_it_lies(yard, tmp_path):
+    """The world, nor the recording; both moved, it is the very same."""
+    moved = tmp_path / "else" / "where"
+    shutil.copytree(yard, moved)
+    folders = [
+        simulate(load_scenario(path / "yard_01.yaml"), output).folder
+        for path, output in (
+            (yard, yard / "out"),
+            (moved, moved / "out"),
+            (moved, tmp_path / "deep" / "down" / "out"),
+        )
+    ]
+    first, second, third = map(contents, folders)
+    assert first == second
+    # Only its way to the world is another.
+    assert first.pop("scenario.yaml") != third.pop("scenario.yaml")
+    assert first == third
+    assert load_scenario(folders[2] / "scenario.yaml").world == str(
+        moved / "yard.sdf"
+    )
+    for data in first.values():
+        assert str(tmp_path).encode() not in data
 
 
 def test_waypoints_lead_through_a_map_as_well(yard, small_map):
