@@ -244,6 +244,8 @@ class Scenario(_Model):
             info.data["route"] is None
         ):
             raise ValueError("give either a route or waypoints")
+        if waypoints is not None and info.data.get("aside", 0.0) != 0.0:
+            raise ValueError("aside is of a route, waypoints lie where they do")
         return waypoints
 
     @field_validator("lidars")

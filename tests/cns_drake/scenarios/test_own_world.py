@@ -121,6 +121,7 @@ def test_the_drive_keeps_to_waypoints_and_speeds(yard):
         ),
         ({"stage": "04"}, r"stage: a map and its stage belong together"),
         ({"waypoints": None}, r"waypoints: give either a route or waypoints"),
+        ({"aside": 0.5}, r"waypoints: aside is of a route"),
         (
             {"route": [{"road": "a", "direction": "forward", "lane": 1}]},
             r"route: a world has no roads, give waypoints instead",
