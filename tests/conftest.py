@@ -17,7 +17,7 @@ def pytest_addoption(parser):
     parser.addoption(
         "--fuzz",
         type=int,
-        default=1300,
+        default=3000,
         help="how many files test_fuzz damages (default: %(default)s)",
     )
     parser.addoption(

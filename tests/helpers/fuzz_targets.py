@@ -10,6 +10,7 @@ import bent_drive
 import dataset_folders
 from fuzzing import Target
 import helipr_drive
+import lies
 from mcap.writer import CompressionType
 from mcap_bytes import write_mcap
 import mulran_drive
@@ -174,7 +175,7 @@ def _lay_out(folder: Path) -> None:
     meshes_of(make_city(folder).structures)
 
 
-def _scan(folder: Path) -> None:
+def _scan(folder: Path) -> bytes:
     from pydrake.math import RigidTransform
 
     world = load_world(folder / "stage_01.sdf")
@@ -182,6 +183,7 @@ def _scan(folder: Path) -> None:
     pattern = make_beam_pattern("vlp-16", FRAME_PERIOD, num_columns=8)
     points = scan_world(world, RigidTransform([0.0, 0.0, 2.0]), pattern)
     save_scan(points, folder / "out" / "scan.pcd")
+    return points.tobytes()
 
 
 def _write_recording(folder: Path, **options) -> None:
@@ -277,9 +279,8 @@ def _write_clouds(folder: Path) -> None:
     np.save(folder / "records.npy", np.zeros(20, dtype=record_type))
 
 
-def _read_clouds(folder: Path) -> None:
-    for path in sorted(folder.glob("*.*")):
-        read_cloud(path).tobytes()
+def _read_clouds(folder: Path) -> list[bytes]:
+    return [read_cloud(path).tobytes() for path in sorted(folder.glob("*.*"))]
 
 
 def _write_mulran(folder: Path) -> None:
@@ -342,6 +343,27 @@ TARGETS = (
     Target(
         "cns", 7, _export("cns"), ("cns/**/*",),
         lambda folder: _read_sequence(folder / "cns" / "Town" / "07"),
+    ),
+    # Well-formed parts that contradict each other.
+    Target(
+        "recording lies", 8, _write_recording, ("town_07/*.mcap",),
+        lambda folder: _read_sequence(folder / "town_07"),
+        exact=True, mutate=lies.lie_about,
+    ),
+    Target(
+        "cloud lies", 8, _write_clouds, ("*.*",), _read_clouds, exact=True,
+        mutate=lies.lie_about_cloud,
+    ),
+    Target(
+        "world lies", 2, _write_town, ("stage_01.sdf",), _scan, exact=True,
+        mutate=lies.lie_about_size,
+    ),
+    Target(
+        "kitti lies", 4, _export("kitti"),
+        ("kitti/**/*.label", "kitti/**/*.bin", "kitti/**/poses.txt",
+         "kitti/poses/*.txt", "kitti/**/times.txt"),
+        lambda folder: _read_sequence(folder / "kitti" / "sequences" / "07"),
+        exact=True, mutate=lies.lie_about_rows,
     ),
     Target("mulran", 6, _write_mulran, ("drive/**/*",), _read_drive),
     Target("helipr", 6, _write_helipr, ("drive/**/*",), _read_drive),

@@ -40,6 +40,7 @@ class Target:
         exact: whether it finds all damage: what it returns for a damaged
             file is what it returns for the whole one.
         only_bytes: whether to mutate bytes alone, once a case.
+        mutate: makes a mutated file of a whole one in some other way.
     """
 
     name: str
@@ -49,6 +50,7 @@ class Target:
     use: Callable[[Path], object]
     exact: bool = False
     only_bytes: bool = False
+    mutate: Callable[[Path, bytes, np.random.Generator], bytes] | None = None
 
 
 class Bench:
@@ -86,7 +88,9 @@ class Bench:
         rng = np.random.default_rng([seed, number])
         path = self._files[int(rng.integers(len(self._files)))]
         data = self._originals[path]
-        if self.target.only_bytes:
+        if self.target.mutate is not None:
+            path.write_bytes(self.target.mutate(path, data, rng))
+        elif self.target.only_bytes:
             path.write_bytes(mutate_bytes(data, rng))
         else:
             path.write_bytes(mutate(path, data, rng))

@@ -7,6 +7,7 @@ import copy
 from dataclasses import dataclass, replace
 import io
 from pathlib import Path
+import re
 from typing import Any
 
 from drive_files import TYPES
@@ -167,6 +168,9 @@ def _many_fields(message, rng) -> None:
 
 def _far_point(message, rng) -> None:
     step, width = message.point_step, message.width
+    if width == 0:
+        _other_size(message, rng)
+        return
     data = message.data.copy()
     place = int(rng.integers(width)) * step + 4 * int(rng.integers(3))
     far = np.array([rng.choice([1e7, -1e5, 3e38])], "<f4")
@@ -175,7 +179,8 @@ def _far_point(message, rng) -> None:
 
 
 def _other_size(message, rng) -> None:
-    message.width += int(rng.choice([-1, 1, 1000]))
+    # Fewer would be padding at the end of a row.
+    message.width += int(rng.choice([1, 2, 1000]))
 
 
 def _more_rows(message, rng) -> None:
@@ -238,3 +243,52 @@ def lie_about(path: Path, data: bytes, rng) -> bytes:
     names = sorted(LIES)
     LIES[names[int(rng.integers(len(names)))]][0](told, rng)
     return write_told(told, attachments)
+
+
+def lie_about_cloud(path: Path, data: bytes, rng) -> bytes:
+    """Returns a point cloud whose header and rows tell different numbers."""
+    more = int(rng.choice([1, 2, 7, 1000]))
+    is_text = path.stem in ("text", "ascii")
+    if path.suffix in (".npy", ".bin") or rng.random() < 0.3:
+        return data + (b"1 2 3 4\n" * more if is_text else bytes(16 * more - 3))
+    names = rb"WIDTH|HEIGHT|POINTS" if path.suffix == ".pcd" else rb"vertex"
+    places = list(re.finditer(rb"(?:%s) (\d+)" % names, data))
+    place = places[int(rng.integers(len(places)))]
+    number = max(int(place[1]) + more * int(rng.choice([-1, 1])), 0)
+    number += number == int(place[1])
+    return data[: place.start(1)] + b"%d" % number + data[place.end(1) :]
+
+
+def lie_about_size(path: Path, data: bytes, rng) -> bytes:
+    """Returns a world with a number that is none, or no size."""
+    text = data.decode()
+    places = list(re.finditer(r"<(radius|length|size|scale)>([^<]+)", text))
+    place = places[int(rng.integers(len(places)))]
+    numbers = place[2].split()
+    kind = rng.integers(4)
+    if kind == 0:
+        numbers[int(rng.integers(len(numbers)))] = str(
+            rng.choice(["nan", "abc", "1,5", "2m", "inf", "1e999", ".", "0x1"])
+        )
+    elif kind == 1:
+        numbers += ["1"]
+    elif kind == 2 or place[1] == "scale":
+        numbers[int(rng.integers(len(numbers)))] = "0"
+    else:
+        numbers[int(rng.integers(len(numbers)))] = "-3"
+    return (
+        f"{text[: place.start(2)]}{' '.join(numbers)}{text[place.end(2) :]}"
+    ).encode()
+
+
+def lie_about_rows(path: Path, data: bytes, rng) -> bytes:
+    """Returns a file of an exported drive with more or less in it."""
+    if path.suffix in (".label", ".bin"):
+        size = 4 if path.suffix == ".label" else 16
+        if rng.random() < 0.5 and len(data) > size:
+            return data[:-size]
+        return data + bytes(size - 1) + b"\x3f"
+    lines = data.splitlines(keepends=True)
+    if rng.random() < 0.5:
+        return b"".join(lines[:-1])
+    return data + lines[-1]
