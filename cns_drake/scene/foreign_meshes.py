@@ -15,6 +15,8 @@ import sys
 
 import numpy as np
 
+from evaluation.support.libraries import missing_library
+
 
 class ForeignMeshes:
     """Reads mesh files by Open3D; a context manager."""
@@ -36,7 +38,7 @@ class ForeignMeshes:
             file is no mesh.
 
         Raises:
-            ValueError: if Open3D crashes on it.
+            ValueError: if Open3D crashes on it, or cannot be loaded.
         """
         if self._process is None:
             self._process = subprocess.Popen(
@@ -51,10 +53,13 @@ class ForeignMeshes:
         try:
             pickle.dump(str(path), self._process.stdin)
             self._process.stdin.flush()
-            return pickle.load(self._process.stdout)
+            answer = pickle.load(self._process.stdout)
         except (OSError, EOFError, pickle.UnpicklingError) as error:
             self._end()
             raise ValueError("Open3D cannot read it") from error
+        if isinstance(answer, str):
+            raise ValueError(answer)
+        return answer
 
     def _end(self) -> None:
         if self._process is not None:
@@ -65,11 +70,14 @@ class ForeignMeshes:
 
 def _serve() -> None:
     """Reads the meshes that are asked for, until there are no more."""
-    import open3d
-
     # What a parser prints must not come between the answers.
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
+    try:
+        import open3d
+    except ImportError as error:
+        pickle.dump(missing_library(error) or str(error), answers)
+        return
     while True:
         try:
             path = pickle.load(sys.stdin.buffer)

@@ -28,6 +28,7 @@ from evaluation.support.interrupts import (
     interrupt_on_termination,
     uninterrupted,
 )
+from evaluation.support.libraries import missing_library
 
 # How long a process may take to close its files once it is asked to end [s].
 PATIENCE = 30.0
@@ -217,6 +218,9 @@ def _run(job: bytes, tell: Tell) -> tuple[str, str]:
     except InputError as error:
         return "fault", str(error)
     except Exception as error:
+        lacking = isinstance(error, ImportError) and missing_library(error)
+        if lacking:
+            return "fault", lacking
         tell.note(traceback.format_exc())
         return "fault", one_line(f"{type(error).__name__}: {error}")
     return "done", ""

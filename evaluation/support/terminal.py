@@ -21,6 +21,7 @@ from evaluation.support.interrupts import (
     ignore_interrupts,
     interrupt_on_termination,
 )
+from evaluation.support.libraries import missing_library
 from evaluation.support.progress import LINE_INTERVAL
 
 # All errors of usage are click's UsageError, which new versions of Typer
@@ -81,9 +82,9 @@ def run(app: typer.Typer, program: str) -> NoReturn:
     """Runs a command line; bad usage and bad input never show a traceback.
 
     Exits with 0 on success; with 2 and one line on stderr for bad usage or
-    input, for files that cannot be used and for lack of memory; with 1 for
-    jobs that failed; with 130 when interrupted, also by SIGTERM, so that open
-    files are closed.
+    input, for files that cannot be used, for lack of memory and of libraries
+    of the system; with 1 for jobs that failed; with 130 when interrupted,
+    also by SIGTERM, so that open files are closed.
 
     Args:
         app: the commands.
@@ -116,6 +117,11 @@ def run(app: typer.Typer, program: str) -> NoReturn:
         status = 2
         if error.filename is None:
             _forget_results()
+    except ImportError as error:
+        fault = missing_library(error)
+        if fault is None:
+            raise
+        message, status = f"error: {fault}", 2
     except SystemExit as error:
         # Drake's C++ asks Python to end where a condition of its own fails.
         status = error.code if isinstance(error.code, int) else 2
