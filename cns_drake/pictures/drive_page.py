@@ -99,7 +99,7 @@ def make_drive_page(
         title: of the page.
     """
     with _quiet():
-        meshcat = Meshcat(MeshcatParams(host="localhost", port=0))
+        meshcat = Meshcat(MeshcatParams(host="127.0.0.1", port=0))
     changes = _draw_city(meshcat, world, other_stage)
     if len(drive.X_WBs) > 1:
         draw_route(meshcat, "/route", drive.X_WBs)
