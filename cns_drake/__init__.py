@@ -16,6 +16,7 @@ if TYPE_CHECKING:
         run_sequence,
     )
     from cns_drake.motion.vehicle_motion import VehicleMotion
+    from cns_drake.pictures.static_page import save_meshcat_page
     from cns_drake.recording.bag_writer import BagWriter
     from cns_drake.recording.mcap_recorder import (
         McapRecorder,
@@ -88,6 +89,7 @@ __all__ = [
     "recording_topics",
     "run_script",
     "run_sequence",
+    "save_meshcat_page",
     "simulate",
 ]
 
@@ -95,6 +97,7 @@ __all__ = [
 _HOMES = {
     "command_line.sequence_script": ("run_script", "run_sequence"),
     "motion.vehicle_motion": ("VehicleMotion",),
+    "pictures.static_page": ("save_meshcat_page",),
     "recording.bag_writer": ("BagWriter",),
     "recording.mcap_recorder": ("McapRecorder", "recording_topics"),
     "scenarios.planning": ("plan_drive",),

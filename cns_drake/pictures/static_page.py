@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import base64
 from html import escape
+from pathlib import Path
 import re
 import zlib
 
 import numpy as np
 from pydrake.geometry import Meshcat
+
+from evaluation.support.files import complete_part, user_errors, write_part
 
 # Higher levels take many times as long for a few percent.
 _LEVEL = 6
@@ -86,6 +89,30 @@ def make_static_page(
     module = f'<script type="module">{script}</script>'
     rest = _replace(rest, "</body>", f"{module}\n</body>")
     return head + _QUEUE + rest
+
+
+def save_meshcat_page(
+    meshcat: Meshcat, path: Path, title: str = "Meshcat"
+) -> None:
+    """Saves what Meshcat shows as one page that opens without a server.
+
+    Args:
+        meshcat: holds the scene.
+        path: of the page.
+        title: of the page, plain text.
+
+    Raises:
+        InputError: the page cannot be written.
+
+    Example:
+        from cns_drake import save_meshcat_page
+
+        save_meshcat_page(meshcat, Path("scene.html"))
+    """
+    page = make_static_page(meshcat, title)
+    with user_errors(path):
+        write_part(path, page)
+    complete_part(path)
 
 
 def filter_rows(data: bytes) -> bytes:
