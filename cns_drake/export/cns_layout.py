@@ -16,6 +16,7 @@ from cns_drake.export.drive_layout import (
     checked_name,
     join_rows,
     scenario_files,
+    unit_quaternions,
 )
 from evaluation.clouds.cloud_writing import encode_pcd
 from evaluation.sequences.mcap_sequence import McapSequence
@@ -47,7 +48,7 @@ def _inner_files(sequence: McapSequence) -> dict[str, str]:
             zip(
                 poses["stamp_ns"].tolist(),
                 *poses["position"].T.tolist(),
-                *poses["quat_xyzw"].T.tolist(),
+                *unit_quaternions(sequence).T.tolist(),
                 strict=True,
             ),
             ",",

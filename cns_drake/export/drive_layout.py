@@ -16,6 +16,7 @@ from evaluation.support.errors import InputError
 
 # What may become the name of a folder: nothing that leads out of it.
 _NAME = re.compile(r"\w[\w.-]*")
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,30 @@ def structure_files(sequence: McapSequence) -> dict[str, str]:
         return {}
     table = list(sequence.instances.values())
     return {"structures.json": json.dumps(table, indent=1) + "\n"}
+
+
+def unit_quaternions(sequence: McapSequence) -> np.ndarray:
+    """Returns the orientations of the odometry, (M, 4) of unit length.
+
+    Those of a recording need a direction only; readers of text want a unit.
+
+    Raises:
+        InputError: if one has no direction.
+    """
+    quat_xyzw = sequence.odometry["quat_xyzw"]
+    with np.errstate(over="ignore", invalid="ignore"):
+        length = np.linalg.norm(quat_xyzw, axis=1, keepdims=True)
+    bad = ~(np.isfinite(length[:, 0]) & (length[:, 0] > 0.0))
+    if bad.any():
+        row = int(bad.argmax())
+        raise InputError(
+            f"{sequence.name}: the odometry at"
+            f" {sequence.odometry['stamp_ns'][row]} ns has the quaternion"
+            f" {quat_xyzw[row]}"
+        )
+    # What is one up to rounding stays as it is.
+    off = np.abs(length - 1.0) > _ROUNDING
+    return np.where(off, quat_xyzw / length, quat_xyzw)
 
 
 def seconds(stamp_ns: int) -> str:

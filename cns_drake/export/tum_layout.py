@@ -11,7 +11,12 @@ from pathlib import PurePosixPath
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cns_drake.export.drive_layout import Layout, checked_name, seconds
+from cns_drake.export.drive_layout import (
+    Layout,
+    checked_name,
+    seconds,
+    unit_quaternions,
+)
 from evaluation.sequences.mcap_sequence import McapSequence
 
 
@@ -25,7 +30,7 @@ def _inner_files(sequence: McapSequence) -> dict[str, str]:
     R_WS = Rotation.from_matrix(X_WS[:, :3, :3])
     return {
         "base_link.tum": _rows(
-            X_WB["stamp_ns"], X_WB["position"], X_WB["quat_xyzw"]
+            X_WB["stamp_ns"], X_WB["position"], unit_quaternions(sequence)
         ),
         "lidar.tum": _rows(
             sequence.stamps_ns, X_WS[:, :3, 3], R_WS.as_quat(canonical=True)

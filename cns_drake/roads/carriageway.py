@@ -8,7 +8,12 @@ import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
-from shapely import GEOSException, set_precision, unary_union
+from shapely import (
+    GEOSException,
+    make_valid,
+    set_precision,
+    unary_union,
+)
 from shapely.geometry import LineString, MultiPolygon, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
@@ -221,7 +226,11 @@ def _join(parts: Iterable[BaseGeometry]) -> BaseGeometry:
     grown = unary_union(
         [part.buffer(_SEAM, join_style="mitre") for part in parts]
     )
-    return grown.buffer(-_SEAM, join_style="mitre")
+    joined = grown.buffer(-_SEAM, join_style="mitre")
+    if joined.is_valid:
+        return joined
+    # At a sharp corner GEOS lets a mitre cross itself.
+    return make_valid(joined, method="structure", keep_collapsed=False)
 
 
 def _multi(area: BaseGeometry) -> MultiPolygon:

@@ -151,10 +151,10 @@ def check_finite(path: Path, values: np.ndarray) -> None:
 
 
 def _begins_with_number(line: str) -> bool:
-    word = line.replace(",", " ").split()[0]
+    words = line.replace(",", " ").split()
     try:
-        float(word)
-    except ValueError:
+        float(words[0])
+    except (IndexError, ValueError):
         return False
     return True
 

@@ -11,12 +11,15 @@ from pydantic import (
     ConfigDict,
     Field,
     ValidationError,
+    field_validator,
     model_validator,
 )
 
 from evaluation.support.errors import InputError, describe_validation_error
 from evaluation.support.yaml_files import read_yaml
 
+# Of a city [m]: what is generated grows with its area.
+_LARGEST_SIDE = 10_000.0
 Point = tuple[float, float]
 Line = Annotated[list[Point], Field(min_length=2)]
 Area = Annotated[list[Point], Field(min_length=3)]
@@ -272,6 +275,19 @@ class CityPlan(_Model):
     street: StreetPlan
     medians: StreetPlan | None = None
     districts: list[DistrictPlan] = Field(min_length=1)
+
+    @field_validator("bounds")
+    @classmethod
+    def _are_of_a_city(
+        cls, bounds: tuple[float, float, float, float]
+    ) -> tuple[float, float, float, float]:
+        x0, y0, x1, y1 = bounds
+        for side in (x1 - x0, y1 - y0):
+            if not 0.0 < side <= _LARGEST_SIDE:
+                raise ValueError(
+                    f"a side of {side:g} m, not of up to {_LARGEST_SIDE:g} m"
+                )
+        return bounds
 
     @model_validator(mode="after")
     def _names_are_unique(self) -> CityPlan:

@@ -166,6 +166,7 @@ def poses(city: City) -> list:
         ("relief: 1.5", "releif: 1.5", "districts.1.releif: Extra inputs"),
         ("height: [14, 20]", "height: [20, 14]", "20 is greater than 14"),
         ("bounds: [-60", "bounds: [-.inf", "bounds.0: "),
+        ("bounds: [-60", "bounds: [-1000000", "bounds: a side of 1"),
         ("line: [[6, -38], [94, -36]]", "line: [[6, -38]]", "patches.0.line"),
         ("seed: 3", "seed: [", "not readable as YAML"),
         (PLAN, "", "(top level)"),

@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 from bent_drive import NUM_SCANS, P_BS, QUAT_BS, write_drive
+from lies import read_told, write_told
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -391,6 +392,34 @@ def test_names_that_lead_elsewhere_are_refused(tmp_path):
             export_sequence(drive, "cns", tmp_path / "out" / "deep")
         shutil.rmtree(tmp_path / "recordings")
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("format_name", ["cns", "tum"])
+def test_quaternions_are_of_unit_length(tmp_path, format_name):
+    """Also where the source's are not: our own reader wants them so."""
+    recording = write_drive(tmp_path / "town_07")
+    path = recording / "town_07_0.mcap"
+    told, attachments = read_told(path.read_bytes())
+    whole = sequences.open(path).X_WS
+    for one in told:
+        if one.topic == "/odometry":
+            for name in "xyzw":
+                quat = one.body.pose.pose.orientation
+                setattr(quat, name, 3.0 * getattr(quat, name))
+    path.write_bytes(write_told(told, attachments))
+    folder = export_sequence(path, format_name, tmp_path / "out")
+    if format_name == "cns":
+        exported = sequences.open(folder)
+        np.testing.assert_allclose(exported.X_WS, whole, atol=1e-12)
+    else:
+        rows = np.loadtxt(folder / "base_link.tum")
+        np.testing.assert_allclose(np.linalg.norm(rows[:, 4:], axis=1), 1.0)
+    for name in "xyzw":
+        setattr(told[-2].body.pose.pose.orientation, name, 0.0)
+    path.write_bytes(write_told(told, attachments))
+    with pytest.raises(InputError, match="quaternion"):
+        export_sequence(path, format_name, tmp_path / "new")
+    assert not list((tmp_path / "new").glob("*/*"))
 
 
 def test_what_is_no_recording(kitti, tmp_path):

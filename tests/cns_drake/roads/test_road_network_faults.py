@@ -4,7 +4,10 @@ import copy
 
 import pytest
 from road_crossing import CROSS, load_network
+from shapely import unary_union
+from small_city import ROADS
 
+from cns_drake.roads.carriageway import road_strip
 from cns_drake.roads.network import load_road_network
 from evaluation.support.errors import InputError
 
@@ -125,6 +128,19 @@ roads:
   one: {{start: a, end: b, via: [{via}]}}
   two: {{start: a, end: b}}
 """
+
+
+def test_a_bend_beside_a_junction_has_a_carriageway(tmp_path):
+    """Where the corner of two kerbs is sharp."""
+    path = tmp_path / "roads.yaml"
+    text = ROADS.replace("[100, -50, 20]", "[100, -10, 20]")
+    assert text != ROADS
+    path.write_text(text)
+    network = load_road_network(path)
+    for area in (network.carriageway, network.sidewalks, network.medians):
+        assert area().is_valid
+    roads = unary_union([road_strip(one) for one in network.roads.values()])
+    assert roads.difference(network.carriageway()).area < 0.1
 
 
 @pytest.mark.filterwarnings("error")
