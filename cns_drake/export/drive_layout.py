@@ -11,6 +11,7 @@ import re
 import numpy as np
 
 from cns_drake.recording.rosbag2_metadata import to_yaml
+from evaluation.geometry.poses import FARTHEST
 from evaluation.sequences.mcap_sequence import McapSequence
 from evaluation.support.errors import InputError
 
@@ -82,18 +83,20 @@ def unit_quaternions(sequence: McapSequence) -> np.ndarray:
     Those of a recording need a direction only; readers of text want a unit.
 
     Raises:
-        InputError: if one has no direction.
+        InputError: if one has no direction, or a position is none.
     """
     quat_xyzw = sequence.odometry["quat_xyzw"]
     with np.errstate(over="ignore", invalid="ignore"):
         length = np.linalg.norm(quat_xyzw, axis=1, keepdims=True)
+    position = sequence.odometry["position"]
     bad = ~(np.isfinite(length[:, 0]) & (length[:, 0] > 0.0))
+    bad |= ~(np.abs(position) < FARTHEST).all(axis=1)  # NaN is not.
     if bad.any():
         row = int(bad.argmax())
         raise InputError(
             f"{sequence.name}: the odometry at"
-            f" {sequence.odometry['stamp_ns'][row]} ns has the quaternion"
-            f" {quat_xyzw[row]}"
+            f" {sequence.odometry['stamp_ns'][row]} ns has the position"
+            f" {position[row]} and the quaternion {quat_xyzw[row]}"
         )
     # What is one up to rounding stays as it is.
     off = np.abs(length - 1.0) > _ROUNDING

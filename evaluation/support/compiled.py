@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import os
+from pathlib import Path
 from typing import TypeVar
 
 import numba
@@ -13,13 +15,26 @@ _Function = TypeVar("_Function", bound=Callable)
 def compiled(function: _Function) -> _Function:
     """Compiles a function of arrays to machine code, on its first call.
 
-    The code is kept on disk between runs where a folder for it can be
-    written; an installation without one compiles in each process instead.
+    The code is kept between runs in the user's folder for such things, where
+    uninstalling need not find it; where none can be written, each process
+    compiles anew.
     """
     # What is kept names its module, but is found by its file: it is of no use
     # where this package goes by another name (see `cns_drake.isolation`).
     is_kept = "._" not in function.__module__
+    # Numba asks where to keep code while it decorates, and asks nobody else.
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = before or str(_cache_folder())
     try:
         return numba.njit(cache=is_kept, nogil=True)(function)
     except RuntimeError:
         return numba.njit(nogil=True)(function)
+    finally:
+        numba.config.CACHE_DIR = before
+
+
+def _cache_folder() -> Path:
+    """Returns where the XDG base directory specification has it."""
+    base = os.environ.get("XDG_CACHE_HOME", "")
+    folder = Path(base) if os.path.isabs(base) else Path("~/.cache")
+    return Path(os.path.expanduser(folder)) / "cns-drake" / "compiled"

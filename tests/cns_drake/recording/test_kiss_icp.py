@@ -5,6 +5,7 @@ odometry nor our frames: it would go astray on wrong axes, units, stamps or
 point layouts.
 """
 
+from mcap.reader import make_reader
 import numpy as np
 import pytest
 
@@ -65,6 +66,19 @@ def test_kiss_icp_finds_the_drive(recording, tmp_path, capsys):
     # exact they are. With os1-128 the angle is a tenth.
     assert errors.max() < 0.04 * length
     assert angle_deg < 3.0
+
+
+def test_definitions_have_the_constants_of_a_field(recording):
+    """KISS-ICP's reader of single files misses them; they are there."""
+    (mcap,) = recording.glob("*.mcap")
+    with open(mcap, "rb") as stream:
+        schemas = make_reader(stream).get_summary().schemas.values()
+    (text,) = (
+        schema.data.decode()
+        for schema in schemas
+        if schema.name == "sensor_msgs/msg/PointCloud2"
+    )
+    assert "\nuint8 FLOAT32=7\n" in text
 
 
 def test_a_frame_takes_less_than_300_kb(recording):

@@ -1,0 +1,54 @@
+"""Compiled code is kept where no installation is."""
+
+import os
+from pathlib import Path
+import shutil
+import subprocess
+import sys
+
+import documents
+import pytest
+
+_SCRIPT = """
+import numba
+import numpy as np
+before = numba.config.CACHE_DIR
+from evaluation.maps.voxel_maps import thin
+assert numba.config.CACHE_DIR == before
+print(len(thin(np.zeros((3, 3)), 1.0)))
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("is_there", [True, False])
+def test_nothing_is_kept_beside_the_code(tmp_path, is_there):
+    """Whether there is a user's folder, or none can be."""
+    ours = tmp_path / "installed"
+    shutil.copytree(
+        documents.ROOT / "evaluation",
+        ours / "evaluation",
+        ignore=shutil.ignore_patterns("__pycache__"),
+    )
+    cache = tmp_path / "cache"
+    if is_there:
+        cache.mkdir()
+    environment = {k: v for k, v in os.environ.items() if "NUMBA" not in k}
+    result = subprocess.run(
+        [sys.executable, "-c", _SCRIPT],
+        env={
+            **environment,
+            "PYTHONPATH": str(ours),
+            "PYTHONDONTWRITEBYTECODE": "1",
+            "XDG_CACHE_HOME": str(cache) if is_there else "not/absolute",
+            "HOME": str(tmp_path / "home"),
+        },
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert result.stdout == "1\n"
+    kept = {path.relative_to(tmp_path) for path in tmp_path.rglob("*.nb?")}
+    assert kept
+    inside = Path("cache" if is_there else "home/.cache") / "cns-drake"
+    assert all(path.is_relative_to(inside) for path in kept)
