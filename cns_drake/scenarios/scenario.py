@@ -39,7 +39,10 @@ from evaluation.support.errors import (
 from evaluation.support.yaml_files import read_yaml
 
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_]*$")]
-Triple = tuple[float, float, float]
+# On a vehicle nothing is farther, and rays are cast in single precision [m].
+Place = Annotated[float, Field(ge=-1000.0, le=1000.0)]
+Triple = tuple[Place, Place, Place]
+Angle = Annotated[float, Field(ge=-3600.0, le=3600.0)]
 
 
 class _Model(BaseModel):
@@ -55,7 +58,7 @@ class Mount(_Model):
     """
 
     xyz: Triple
-    rpy_deg: Triple = (0.0, 0.0, 0.0)
+    rpy_deg: tuple[Angle, Angle, Angle] = (0.0, 0.0, 0.0)
 
     def pose(self) -> RigidTransform:
         """Returns the sensor's pose in base_link."""

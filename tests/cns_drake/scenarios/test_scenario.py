@@ -107,6 +107,8 @@ def test_preset_replaces_the_lidar_where_it_is():
             {"lidars": {"a": {"xyz": [0, float("inf"), 0]}}},
             r"a.xyz.1: .*finite",
         ),
+        ({"lidars": {"a": {"xyz": [0, 1e39, 0]}}}, r"a.xyz.1: .*less"),
+        ({"imu": {"xyz": [0, 0, 0], "rpy_deg": [1e300, 0, 0]}}, r"rpy_deg.0"),
         ({"imu": {"xyz": [0, 0]}}, r"scenario.yaml: imu.xyz"),
         ({"route": []}, r"scenario.yaml: route: "),
         ({"route": [{"road": "x"}]}, r"scenario.yaml: route.0.direction"),
