@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from cns_drake.command_line.city import city
 from cns_drake.command_line.families import trend
+from cns_drake.command_line.importing import import_city
 from cns_drake.command_line.listing import list_sequences
 from cns_drake.command_line.recorded import export, repair
 from cns_drake.command_line.simulating import (
@@ -58,6 +59,13 @@ app.command(
         "    --query riverside_02 --output trend",
     )
 )(trend)
+app.command(
+    "import",
+    epilog=example(
+        "cns-drake import delft.city.jsonl \\",
+        "    --years 1930 1970 2000 2020 --output delft",
+    ),
+)(import_city)
 app.command(
     epilog=example(
         "cns-drake city town --start",

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from small_cityjson import write_blocks
 import yaml
 
 
@@ -96,6 +97,31 @@ RECIPES = {
             "output/pages/town_01.html",
             "town.html",
         ),
+    ),
+    "imported scenario": Recipe(
+        'map: .\nstage: "01"',
+        file="imported.yaml",
+        # What a reader has from elsewhere.
+        prepare=lambda folder: write_blocks(folder / "blocks.json"),
+    ),
+    "imports": Recipe(
+        ".venv/bin/cns-drake import delft",
+        changes=(
+            ("delft.city.jsonl --years 1930", "blocks.json --years 1930"),
+            (
+                "reproduce delft --output",
+                "simulate delft/sequence_01.yaml --frames 2 --output",
+            ),
+        ),
+        after=("imported scenario",),
+        prints=("stage 02 (1970)", "drive b", "delft_04"),
+        makes=("delft/from_above.png", "study/delft_01/metadata.yaml"),
+    ),
+    "table: import": Recipe(
+        "cns-drake import FILE",
+        changes=(("FILE", "blocks.json"), ("DIR", "imported")),
+        after=("imported scenario",),
+        prints=("stage 01",),
     ),
     "calibration": Recipe(
         _CITY + "town --calibrate",

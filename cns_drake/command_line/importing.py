@@ -1,0 +1,104 @@
+"""The command `cns-drake import`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cns_drake.imports.building_years import Undated
+from evaluation.support.errors import InputError
+from evaluation.support.interrupts import uninterrupted
+from evaluation.support.terminal import note, print_rows
+
+if TYPE_CHECKING:
+    from cns_drake.imports.import_map import ImportReport
+
+_SUFFIXES = (".json", ".jsonl")
+
+
+def import_city(
+    source: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="FILE",
+            help="CityJSON 1.0 to 2.0 (.json) or CityJSONSeq (.jsonl).",
+        ),
+    ],
+    output: Annotated[
+        Path, typer.Option(help="Map folder to write; its name is the map's.")
+    ],
+    years: Annotated[
+        list[int] | None,
+        typer.Option(
+            metavar="YEAR ...",
+            help="A stage for each year: what was built until then.",
+        ),
+    ] = None,
+    year_attribute: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Attribute that tells the year; one of the usual ones if "
+            "left out.",
+        ),
+    ] = None,
+    undated: Annotated[
+        Undated,
+        typer.Option(help="From which stage on what has no year is there."),
+    ] = Undated.FIRST,
+    lod: Annotated[
+        float | None,
+        typer.Option(
+            help="Level of detail; the highest of each object if left out."
+        ),
+    ] = None,
+) -> None:
+    """Make a map of a real city.
+
+    Writes its stages, two drives along its streets and a picture from above.
+    """
+    with uninterrupted():
+        from cns_drake.imports.import_map import (
+            ImportOptions,
+            import_cityjson,
+        )
+        from cns_drake.scenarios.sequence_table import write_table
+
+    # The years that follow the first of --years come as arguments.
+    paths = [word for word in source if not word.isdecimal()]
+    more = [int(word) for word in source if word.isdecimal()]
+    if len(paths) != 1 or (more and not years):
+        raise InputError(f"give one file, not {' '.join(source)}")
+    path = Path(paths[0])
+    if path.suffix not in _SUFFIXES:
+        raise InputError(f"{path}: not .json or .jsonl, as CityJSON files are")
+    stages = tuple(sorted([*(years or ()), *more]))
+    options = ImportOptions(stages, year_attribute, undated, lod)
+    report = import_cityjson(path, output, options, note)
+    write_table(output, note)
+    print_rows(_rows(report, options.years))
+    if not report.drives:
+        note(
+            f"{output}: no street wide and long enough was found; draw"
+            f" waypoints on {output / 'from_above.png'} (docs/imports.md)"
+        )
+
+
+def _rows(
+    report: ImportReport, years: tuple[int, ...]
+) -> Iterator[tuple[str, str]]:
+    for kind, number in report.kinds.items():
+        yield kind, str(number)
+    yield "triangles", str(report.triangles)
+    for k, (stage, number) in enumerate(report.stages.items()):
+        when = f" ({years[k]})" if years else ""
+        yield f"stage {stage}{when}", f"{number} structures"
+    if years:
+        yield "without a year", str(report.undated)
+    for letter, length in zip("ab", report.drives, strict=False):
+        yield f"drive {letter}", f"{length:.0f} m"
+    for kind, number, example in report.faults:
+        yield kind, f"{number}, such as {example}"

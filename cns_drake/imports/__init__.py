@@ -1,0 +1,1 @@
+"""Cities of others as maps: what their files hold, and drives through them."""

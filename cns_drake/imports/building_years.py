@@ -1,0 +1,98 @@
+"""When objects of a city were built, and the stages that follow."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from enum import Enum
+from itertools import pairwise
+import re
+from typing import Any
+
+from evaluation.support.errors import InputError
+
+# The usual attributes, small letters, most telling first: 3DBAG, CityGML,
+# 3D BAG's forerunners, OpenStreetMap.
+_USUAL = (
+    "oorspronkelijkbouwjaar",
+    "yearofconstruction",
+    "year_of_construction",
+    "dateofconstruction",
+    "constructionyear",
+    "construction_year",
+    "yearbuilt",
+    "year_built",
+    "bouwjaar",
+    "baujahr",
+    "start_date",
+)
+_YEAR = re.compile(r"(?<!\d)(\d{3,4})(?!\d)")
+
+
+class Undated(str, Enum):
+    """The stage from which on what has no year is there."""
+
+    FIRST = "first"
+    LAST = "last"
+    NEVER = "never"
+
+
+def construction_year(
+    attributes: Mapping[str, Any], attribute: str | None
+) -> int | None:
+    """Returns the year in which something was built, if it is told.
+
+    Args:
+        attributes: of the object.
+        attribute: that tells it; one of the usual ones if None.
+    """
+    if attribute is not None:
+        return _year(attributes.get(attribute))
+    lower = {name.lower(): value for name, value in attributes.items()}
+    for name in _USUAL:
+        year = _year(lower.get(name))
+        if year is not None:
+            return year
+    return None
+
+
+def _year(value: object) -> int | None:
+    if isinstance(value, bool) or value is None:
+        return None
+    if isinstance(value, (int, float)):
+        return int(value) if 1 <= value <= 9999 else None
+    match = _YEAR.search(str(value))
+    return int(match[1]) if match else None
+
+
+def stage_names(years: Sequence[int]) -> list[str]:
+    """Returns the name of each stage, from 01 on; one without years.
+
+    Raises:
+        InputError: if years do not increase.
+    """
+    if any(a >= b for a, b in pairwise(years)):
+        listed = " ".join(map(str, years))
+        raise InputError(
+            f"--years: {listed}: each must be after the one before"
+        )
+    return [f"{number:02d}" for number in range(1, max(len(years), 1) + 1)]
+
+
+def stands_at(
+    year: int | None, stage: int, years: Sequence[int], undated: Undated
+) -> bool:
+    """Tells whether something stands at a stage.
+
+    Args:
+        year: in which it was built; None if it is not known.
+        stage: number of the stage, from 0 on.
+        years: of the stages; without any, all stands.
+        undated: what becomes of it without a year.
+    """
+    if not years:
+        return True
+    if year is not None:
+        return year <= years[stage]
+    if undated is Undated.FIRST:
+        return True
+    return undated is Undated.LAST and stage == len(years) - 1

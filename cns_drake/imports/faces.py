@@ -1,0 +1,151 @@
+"""Polygons in space, with holes, as triangles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+from shapely.geometry import Polygon
+from shapely.validation import make_valid
+
+from cns_drake.city.geometry.triangulation import triangulate
+from cns_drake.imports.import_faults import ImportFaults
+
+# A face is no face if it has less area [m^2].
+_LEAST_AREA = 1e-5
+# Corners are told apart by millimetres.
+_MM = 1000.0
+
+
+def face_triangles(
+    rings: Sequence[np.ndarray], name: str, faults: ImportFaults
+) -> np.ndarray:
+    """Returns a face as (M, 3, 3) triangles [m], turned as its outer ring.
+
+    Args:
+        rings: (N, 3) corners of the outer ring, then of holes [m]; none is
+            told twice.
+        name: of the object, for the faults.
+        faults: is told what is repaired or left out.
+    """
+    rings = [_cleaned(ring, name, faults) for ring in rings]
+    if len(rings[0]) < 3:
+        faults.add("face without area, left out", name)
+        return np.zeros((0, 3, 3))
+    normal = _newell(rings[0])
+    if 0.5 * np.linalg.norm(normal) < _LEAST_AREA:
+        # Of a ring that crosses itself both halves may be equally large.
+        _, spread, axes = np.linalg.svd(rings[0] - rings[0].mean(axis=0))
+        normal = axes[2] if spread[1] ** 2 >= _LEAST_AREA else np.zeros(3)
+    if not normal.any():
+        faults.add("face without area, left out", name)
+        return np.zeros((0, 3, 3))
+    outer, *holes = rings
+    holes = [hole for hole in holes if len(hole) >= 3]
+    if len(outer) == 3 and not holes:
+        return outer[None]
+    if len(outer) == 4 and not holes and _is_convex(outer, normal):
+        return outer[[[0, 1, 2], [0, 2, 3]]]
+    return _filled(_Plane(normal, rings), outer, holes, name, faults)
+
+
+def _cleaned(ring: np.ndarray, name: str, faults: ImportFaults) -> np.ndarray:
+    """Returns a ring without corners that follow themselves."""
+    if len(ring) == 0:
+        return ring
+    # By plain numbers: most rings have four corners, too few for NumPy.
+    rounded = np.rint(ring * _MM).tolist()
+    kept = [k for k in range(len(ring)) if rounded[k] != rounded[k - 1]]
+    if len(kept) < len(ring):
+        twice = len(ring) - len(kept)
+        faults.add("corner told twice, left out", name, twice)
+        return ring[kept]
+    return ring
+
+
+def _newell(ring: np.ndarray) -> np.ndarray:
+    """Returns the normal of a ring, of twice its area's length."""
+    normal = [0.0, 0.0, 0.0]
+    corners = (ring - ring[0]).tolist()
+    for (ax, ay, az), (bx, by, bz) in zip(
+        corners, corners[1:] + corners[:1], strict=True
+    ):
+        normal[0] += ay * bz - az * by
+        normal[1] += az * bx - ax * bz
+        normal[2] += ax * by - ay * bx
+    return np.array(normal)
+
+
+class _Plane:
+    """Two of the three axes, along which a face is seen from outside."""
+
+    def __init__(self, normal: np.ndarray, rings: Sequence[np.ndarray]):
+        axis = int(np.abs(normal).argmax())
+        self._axes = [(axis + 1) % 3, (axis + 2) % 3]
+        if normal[axis] < 0.0:
+            self._axes.reverse()
+        self._axis = axis
+        self._normal = normal
+        self._origin = rings[0].mean(axis=0)
+        self._corners = {
+            tuple(key): corner
+            for ring in rings
+            for key, corner in zip(
+                np.rint(self.flat(ring) * _MM).astype(np.int64).tolist(),
+                ring,
+                strict=True,
+            )
+        }
+
+    def flat(self, points: np.ndarray) -> np.ndarray:
+        """Returns points (..., 3) as (..., 2)."""
+        return points[..., self._axes]
+
+    def lifted(self, xy: np.ndarray) -> np.ndarray:
+        """Returns points (N, 2) in space: corners where they are known."""
+        result = np.empty((len(xy), 3))
+        keys = np.rint(xy * _MM).astype(np.int64).tolist()
+        for row, key, point in zip(result, keys, xy, strict=True):
+            corner = self._corners.get(tuple(key))
+            if corner is not None:
+                row[:] = corner
+                continue
+            row[self._axes] = point
+            row[self._axis] = self._origin[self._axis]
+            offset = self._normal @ (row - self._origin)
+            row[self._axis] -= offset / self._normal[self._axis]
+        return result
+
+
+def _is_convex(ring: np.ndarray, normal: np.ndarray) -> bool:
+    """Tells whether all corners of a quadrilateral (4, 3) bulge outwards."""
+    halves = ring[[[3, 0, 1], [0, 1, 2], [1, 2, 3], [2, 3, 0]]]
+    return all(float(_newell(corner) @ normal) > 0.0 for corner in halves)
+
+
+def _filled(
+    plane: _Plane,
+    outer: np.ndarray,
+    holes: list[np.ndarray],
+    name: str,
+    faults: ImportFaults,
+) -> np.ndarray:
+    def flat(ring: np.ndarray) -> np.ndarray:
+        return np.rint(plane.flat(ring) * _MM) / _MM
+
+    polygon = Polygon(flat(outer), [flat(hole) for hole in holes])
+    if not polygon.is_valid:
+        faults.add("face that crosses itself, repaired", name)
+        repaired = shapely.set_precision(make_valid(polygon), 1.0 / _MM)
+    else:
+        repaired = polygon
+    parts = [np.zeros((0, 3, 2))]
+    for part in shapely.get_parts(repaired):
+        if isinstance(part, Polygon) and part.area >= _LEAST_AREA:
+            try:
+                parts.append(triangulate(part))
+            except ValueError:
+                faults.add("part of a face that fits no plane, left out", name)
+    triangles = np.concatenate(parts)
+    return plane.lifted(triangles.reshape(-1, 2)).reshape(-1, 3, 3)

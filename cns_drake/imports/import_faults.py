@@ -1,0 +1,33 @@
+"""What is wrong in a file of somebody else's, counted by kind."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+
+class ImportFaults:
+    """What was repaired or left out, with one example of each kind."""
+
+    def __init__(self) -> None:
+        self._counts: Counter[str] = Counter()
+        self._examples: dict[str, str] = {}
+
+    def add(self, kind: str, example: str, number: int = 1) -> None:
+        """Counts faults.
+
+        Args:
+            kind: what it is and what became of it, in words.
+            example: name of the object that has it.
+            number: how many.
+        """
+        self._counts[kind] += number
+        self._examples.setdefault(kind, example)
+
+    def rows(self) -> list[tuple[str, int, str]]:
+        """Returns kind, how many, and an example, most frequent first."""
+        return [
+            (kind, number, self._examples[kind])
+            for kind, number in sorted(
+                self._counts.items(), key=lambda item: (-item[1], item[0])
+            )
+        ]

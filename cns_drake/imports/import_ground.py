@@ -1,0 +1,89 @@
+"""The height of an imported city's ground, told or guessed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
+from scipy.ndimage import gaussian_filter
+
+from cns_drake.city.geometry.mesh import Mesh
+
+# Of the grid of a guessed ground, and how far it reaches beyond the city [m].
+CELL = 4.0
+MARGIN = 40.0
+# It is smoothed over so many cells, and lies so far below what stands on it,
+# so that pavements are seen and not it [m].
+_SMOOTHING = 1.5
+_DEPTH = 0.1
+
+
+class Ground:
+    """Heights on a grid.
+
+    Attributes:
+        xs, ys: (C,) and (R,) of the grid [m].
+        z: (R, C) heights there [m].
+    """
+
+    def __init__(self, xs: np.ndarray, ys: np.ndarray, z: np.ndarray):
+        self.xs, self.ys, self.z = xs, ys, z
+
+    def height(self, xy: np.ndarray) -> np.ndarray:
+        """Returns the height at places (N, 2), between those of the grid."""
+        column = np.clip(
+            (xy[:, 0] - self.xs[0]) / CELL, 0, len(self.xs) - 1.001
+        )
+        row = np.clip((xy[:, 1] - self.ys[0]) / CELL, 0, len(self.ys) - 1.001)
+        c, r = column.astype(int), row.astype(int)
+        u, v = column - c, row - r
+        z = self.z
+        return (
+            (1 - u) * (1 - v) * z[r, c]
+            + u * (1 - v) * z[r, c + 1]
+            + (1 - u) * v * z[r + 1, c]
+            + u * v * z[r + 1, c + 1]
+        )
+
+    def to_mesh(self) -> Mesh:
+        """Returns the surface, with two triangles a cell."""
+        x, y = np.meshgrid(self.xs, self.ys)
+        vertices = np.stack([x, y, self.z - _DEPTH], axis=-1).reshape(-1, 3)
+        number = np.arange(len(vertices)).reshape(self.z.shape)
+        a, b = number[:-1, :-1].ravel(), number[:-1, 1:].ravel()
+        c, d = number[1:, 1:].ravel(), number[1:, :-1].ravel()
+        faces = np.concatenate([np.c_[a, b, c], np.c_[a, c, d]])
+        return Mesh(vertices, tuple(map(tuple, faces.tolist())))
+
+
+def guess_ground(feet: np.ndarray, corners: np.ndarray) -> Ground:
+    """Returns a smooth ground through places whose height is known.
+
+    Args:
+        feet: (N, 3) places on the ground [m], one or more.
+        corners: (M, 3) of all that stands, which it reaches beyond [m].
+    """
+    low = np.floor((corners[:, :2].min(axis=0) - MARGIN) / CELL) * CELL
+    high = corners[:, :2].max(axis=0) + MARGIN
+    xs = np.arange(low[0], high[0] + CELL, CELL)
+    ys = np.arange(low[1], high[1] + CELL, CELL)
+    x, y = np.meshgrid(xs, ys)
+    z = NearestNDInterpolator(feet[:, :2], feet[:, 2])(x, y)
+    if len(feet) >= 4 and np.linalg.matrix_rank(feet[:, :2] - feet[0, :2]) == 2:
+        inside = LinearNDInterpolator(feet[:, :2], feet[:, 2])(x, y)
+        z = np.where(np.isnan(inside), z, inside)
+    return Ground(xs, ys, gaussian_filter(z, _SMOOTHING, mode="nearest"))
+
+
+def feet_of(solids: Sequence[np.ndarray]) -> np.ndarray:
+    """Returns the lowest corner of each solid, (N, 3).
+
+    Args:
+        solids: (M, 3, 3) triangles of each [m].
+    """
+    found = []
+    for triangles in solids:
+        corners = triangles.reshape(-1, 3)
+        found.append(corners[corners[:, 2].argmin()])
+    return np.array(found).reshape(-1, 3)

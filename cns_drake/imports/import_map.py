@@ -1,0 +1,310 @@
+"""A city of somebody else's as a map folder, with stages and drives."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+import os
+from pathlib import Path
+import re
+import shutil
+
+import numpy as np
+from shapely.geometry import Point
+import yaml
+
+from cns_drake.city.generation.generate import TABLE_NAME, structure_table
+from cns_drake.city.generation.sdf import MESH_FOLDER, stage_sdf
+from cns_drake.city.geometry.structures import (
+    MeshShape,
+    Model,
+    Part,
+    Structure,
+)
+from cns_drake.imports.building_years import (
+    Undated,
+    stage_names,
+    stands_at,
+)
+from cns_drake.imports.cityjson import CityFile, read_cityjson
+from cns_drake.imports.drive_search import FreeDrive, find_drives
+from cns_drake.imports.free_space import find_free_space
+from cns_drake.imports.import_ground import Ground, feet_of, guess_ground
+from cns_drake.imports.import_structures import Imported, import_structures
+from cns_drake.imports.overview import draw_overview
+from evaluation.support.errors import InputError
+from evaluation.support.files import part_path, user_errors
+
+# Instance ids are stored as uint16; 0 means no structure.
+_MAX_STRUCTURES = 2**16 - 1
+_SPEEDS = {
+    "cruise": 8.0,
+    "longitudinal_acceleration": 2.0,
+    "lateral_acceleration": 2.5,
+}
+# Of flat things on the ground every such corner helps to find its height.
+_EVERY_CORNER = 7
+
+
+@dataclass(frozen=True)
+class ImportOptions:
+    """What is taken of a file.
+
+    Attributes:
+        years: of the stages, increasing; one stage of all if there is none.
+        year_attribute: that tells when something was built; one of the usual
+            ones if None.
+        undated: what becomes of buildings without a year.
+        lod: level of detail; the highest of each object if None.
+    """
+
+    years: tuple[int, ...] = ()
+    year_attribute: str | None = None
+    undated: Undated = Undated.FIRST
+    lod: float | None = None
+
+
+@dataclass(frozen=True)
+class ImportReport:
+    """What came of a file.
+
+    Attributes:
+        kinds: type of object -> how many structures.
+        triangles: of all.
+        stages: stage -> how many structures stand.
+        undated: buildings without a year.
+        drives: lengths of the proposed drives [m].
+        faults: kind, how many, example.
+    """
+
+    kinds: dict[str, int]
+    triangles: int
+    stages: dict[str, int]
+    undated: int
+    drives: tuple[float, ...]
+    faults: list[tuple[str, int, str]]
+
+
+def import_cityjson(
+    source: Path,
+    output: Path,
+    options: ImportOptions,
+    progress: Callable[[str], None] = lambda line: None,
+) -> ImportReport:
+    """Writes a map folder of a CityJSON file.
+
+    Args:
+        source: the file.
+        output: the folder, which must not be there yet.
+        options: what is taken.
+        progress: takes one line at a time.
+
+    Raises:
+        InputError: if the file or the options cannot be used, or the folder
+            is there or cannot be written.
+    """
+    stages = stage_names(options.years)
+    if os.path.lexists(output):
+        raise InputError(f"{output}: is there already")
+    name = output.resolve().name
+    if not re.fullmatch(r"\w+", name, re.ASCII):
+        raise InputError(
+            f"--output: {name!r}: letters, digits and underscores only"
+        )
+    progress(f"reading {source}")
+    city = read_cityjson(source)
+    origin = _origin(city)
+    found = import_structures(city, origin, options.lod, options.year_attribute)
+    if not found:
+        raise InputError(f"{source}: no object has a surface")
+    standing = [_standing(found, k, options) for k in range(len(stages))]
+    kept = [one for one in found if any(one in some for some in standing)]
+    if len(kept) >= _MAX_STRUCTURES:
+        raise InputError(
+            f"{source}: {len(kept)} objects are more than instance ids can"
+            f" count ({_MAX_STRUCTURES})"
+        )
+    if not kept:
+        raise InputError(f"{source}: nothing stands at any stage")
+    progress(f"{len(kept)} structures; looking for streets")
+    ground = _ground(kept)
+    space = find_free_space(kept, ground)
+    drives = find_drives(space)
+    bottom = _bottom(kept, ground)
+    part = part_path(output)
+    draft = part / name
+    try:
+        with user_errors(output):
+            shutil.rmtree(part, ignore_errors=True)
+            (draft / MESH_FOLDER).mkdir(parents=True)
+            _write_world(
+                draft,
+                source,
+                [*bottom, *(one.structure for one in kept)],
+                {
+                    stage: [*bottom, *(one.structure for one in some)]
+                    for stage, some in zip(stages, standing, strict=True)
+                },
+            )
+            _write_facts(draft, source, city, origin, options, stages)
+            _write_drives(draft, stages, options.years, drives, ground)
+            draw_overview(draft / "from_above.png", kept, space, drives)
+            os.replace(draft, output)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+    return ImportReport(
+        kinds=dict(Counter(one.kind for one in kept)),
+        triangles=sum(len(one.triangles) for one in kept),
+        stages={
+            stage: len(some)
+            for stage, some in zip(stages, standing, strict=True)
+        },
+        undated=sum(one.year is None for one in found if _has_years(one)),
+        drives=tuple(drive.length for drive in drives),
+        faults=city.faults.rows(),
+    )
+
+
+def _origin(city: CityFile) -> np.ndarray:
+    """Returns where the map's world lies in the file's, whole metres."""
+    rings = [
+        ring
+        for one in city.objects.values()
+        for geometry in one.geometries
+        for face in geometry.faces
+        for ring in face
+    ]
+    points = np.concatenate(rings)
+    low, high = points.min(axis=0), points.max(axis=0)
+    return np.array([*np.round((low + high)[:2] / 2.0), np.floor(low[2])])
+
+
+def _has_years(one: Imported) -> bool:
+    """Tells whether a structure is of a kind that is built some day."""
+    return not one.is_ground
+
+
+def _standing(
+    found: Sequence[Imported], stage: int, options: ImportOptions
+) -> list[Imported]:
+    return [
+        one
+        for one in found
+        if not _has_years(one)
+        # Who has no years at all knows them of buildings alone.
+        or (one.year is None and not one.kind.startswith("Building"))
+        or stands_at(one.year, stage, options.years, options.undated)
+    ]
+
+
+def _ground(kept: Sequence[Imported]) -> Ground:
+    corners = np.concatenate([one.triangles.reshape(-1, 3) for one in kept])
+    terrain = [one for one in kept if one.kind == "TINRelief"]
+    if terrain:
+        feet = [one.triangles.reshape(-1, 3) for one in terrain]
+    else:
+        feet = [feet_of([o.triangles for o in kept if not o.is_ground])]
+        feet += [
+            one.triangles.reshape(-1, 3)[::_EVERY_CORNER]
+            for one in kept
+            if one.is_ground
+        ]
+    return guess_ground(np.concatenate(feet), corners)
+
+
+def _bottom(kept: Sequence[Imported], ground: Ground) -> list[Structure]:
+    """Returns the guessed ground, where the file has no terrain."""
+    if any(one.kind == "TINRelief" for one in kept):
+        return []
+    taken = {one.structure.name for one in kept}
+    name = "ground"
+    while name in taken:
+        name += "_"
+    model = Model(
+        (Part("surface", MeshShape(name)),),
+        {name: ground.to_mesh()},
+        Point(0.0, 0.0).buffer(1.0),
+    )
+    return [Structure(name, "terrain", model, (0.0, 0.0, 0.0))]
+
+
+def _write_world(
+    draft: Path,
+    source: Path,
+    structures: Sequence[Structure],
+    stages: dict[str, list[Structure]],
+) -> None:
+    (draft / TABLE_NAME).write_text(structure_table(structures), "utf-8")
+    for stage, some in stages.items():
+        text = stage_sdf(
+            f"{draft.name}_{stage}",
+            some,
+            comment=f"Imported by cns-drake from {source.name}.",
+        )
+        (draft / f"stage_{stage}.sdf").write_text(text, "utf-8")
+    for structure in structures:
+        for name, mesh in structure.model.meshes.items():
+            path = draft / MESH_FOLDER / f"{name}.obj"
+            path.write_text(mesh.to_obj(), "utf-8")
+
+
+def _write_facts(
+    draft: Path,
+    source: Path,
+    city: CityFile,
+    origin: np.ndarray,
+    options: ImportOptions,
+    stages: Iterable[str],
+) -> None:
+    """Writes where the map comes from, and where it lies."""
+    facts = {
+        "source": source.name,
+        "reference_system": city.reference_system or "not told",
+        "origin": [float(value) for value in origin],
+        "lod": options.lod if options.lod is not None else "highest",
+        "years": dict(zip(stages, options.years, strict=False)),
+        "left_out_or_repaired": {
+            kind: number for kind, number, _ in city.faults.rows()
+        },
+    }
+    comment = (
+        "# Where this map comes from. A place of the map plus the origin is"
+        " one of the\n# source [m].\n"
+    )
+    text = yaml.safe_dump(facts, sort_keys=False, allow_unicode=True)
+    (draft / "import.yaml").write_text(comment + text, "utf-8")
+
+
+def _write_drives(
+    draft: Path,
+    stages: Sequence[str],
+    years: Sequence[int],
+    drives: Sequence[FreeDrive],
+    ground: Ground,
+) -> None:
+    """Writes routes, and scenarios of each through every stage."""
+    for letter, drive in zip("ab", drives, strict=False):
+        z = ground.height(drive.waypoints)
+        rows = [
+            f"{x:.2f},{y:.2f},{height:.2f}"
+            for (x, y), height in zip(drive.waypoints, z, strict=True)
+        ]
+        text = "\n".join(["x,y,z", *rows, ""])
+        (draft / f"route_{letter}.csv").write_text(text, "utf-8")
+    for number, stage in enumerate(stages):
+        # The last stage asks, from another route than the others know.
+        letters = "ab"[: len(drives)]
+        if number < len(stages) - 1:
+            letters = letters[::-1]
+        when = f" in {years[number]}" if years else ""
+        for kind, letter in zip(("sequence", "other"), letters, strict=False):
+            scenario = {
+                "map": ".",
+                "stage": stage,
+                "title": f"Route {letter} through {draft.name}{when}",
+                "waypoints": f"route_{letter}.csv",
+                "speeds": _SPEEDS,
+            }
+            text = yaml.safe_dump(scenario, sort_keys=False)
+            (draft / f"{kind}_{stage}.yaml").write_text(text, "utf-8")

@@ -1,0 +1,240 @@
+"""Structures of the objects of a CityJSON file."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+import re
+
+import numpy as np
+from shapely.geometry import MultiPoint
+
+from cns_drake.city.geometry.mesh import Mesh
+from cns_drake.city.geometry.structures import (
+    MeshShape,
+    Model,
+    Part,
+    Structure,
+)
+from cns_drake.imports.building_years import construction_year
+from cns_drake.imports.cityjson import CityFile, CityGeometry, CityObject
+from cns_drake.imports.faces import face_triangles
+
+_RED_ROOF = (0.55, 0.30, 0.24)
+_WATER = (0.16, 0.34, 0.45)
+_LAWN = (0.42, 0.55, 0.30)
+# Type -> class, and colour where that of the class would mislead. A type that
+# begins with one of these is of its kind.
+_CLASSES: tuple[tuple[str, str, tuple[float, float, float] | None], ...] = (
+    ("Building", "building", None),
+    ("Bridge", "other-structure", None),
+    ("Tunnel", "other-structure", None),
+    ("OtherConstruction", "other-structure", None),
+    ("Road", "road", None),
+    ("Railway", "other-ground", None),
+    ("TransportSquare", "road", None),
+    ("Square", "road", None),
+    ("Track", "road", None),
+    ("Waterway", "other-ground", _WATER),
+    ("WaterBody", "other-ground", _WATER),
+    ("LandUse", "other-ground", None),
+    ("PlantCover", "terrain", _LAWN),
+    ("SolitaryVegetationObject", "vegetation", None),
+    ("TINRelief", "terrain", None),
+    ("CityFurniture", "other-object", None),
+    ("GenericCityObject", "other-structure", None),
+)
+_LONGEST_NAME = 80
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A structure of an imported city.
+
+    Attributes:
+        structure: in the world.
+        kind: type of its object.
+        year: in which it was built, if it is told.
+        triangles: (M, 3, 3) of all its parts, in the world [m].
+    """
+
+    structure: Structure
+    kind: str
+    year: int | None
+    triangles: np.ndarray
+
+    @property
+    def is_ground(self) -> bool:
+        """Whether one can drive over it, if it is flat."""
+        return self.structure.semantic_class in (
+            "road",
+            "other-ground",
+            "terrain",
+        )
+
+
+def import_structures(
+    city: CityFile,
+    origin: np.ndarray,
+    lod: float | None,
+    year_attribute: str | None,
+) -> list[Imported]:
+    """Returns a structure for each object that has a surface.
+
+    A building with its parts is one.
+
+    Args:
+        city: what was read; its faults are added to.
+        origin: (3,) of the world in the file's coordinates [m].
+        lod: level of detail to take; the highest of each object if None.
+        year_attribute: see `construction_year`.
+    """
+    groups = _families(city)
+    names = _unique_names(list(groups))
+    found = []
+    for root, members in groups.items():
+        one = _make(
+            names[root], root, members, city, origin, lod, year_attribute
+        )
+        if one is not None:
+            found.append(one)
+    return found
+
+
+def _families(city: CityFile) -> dict[str, list[CityObject]]:
+    """Returns the id of each topmost object -> it and all that it has."""
+    groups: dict[str, list[CityObject]] = {}
+    for name, one in city.objects.items():
+        root, seen = name, {name}
+        while True:
+            parents = [
+                p
+                for p in city.objects[root].parents
+                if p in city.objects
+                # A group is no larger whole: it may hold half a city.
+                and city.objects[p].kind != "CityObjectGroup"
+            ]
+            if not parents or parents[0] in seen:
+                break
+            root = parents[0]
+            seen.add(root)
+        groups.setdefault(root, []).append(one)
+    return groups
+
+
+def _unique_names(ids: list[str]) -> dict[str, str]:
+    """Returns id -> name of letters, digits, dots and dashes."""
+    plain = {
+        one: re.sub(r"[^\w.-]+", "_", one, flags=re.ASCII)[:_LONGEST_NAME]
+        or "object"
+        for one in ids
+    }
+    counts = Counter(plain.values())
+    taken: set[str] = set()
+    names = {}
+    for one in ids:
+        name = plain[one]
+        number = 1
+        while name in taken or (number == 1 and counts[plain[one]] > 1):
+            name = f"{plain[one]}_{number}"
+            number += 1
+        taken.add(name)
+        names[one] = name
+    return names
+
+
+def _make(
+    name: str,
+    root: str,
+    members: list[CityObject],
+    city: CityFile,
+    origin: np.ndarray,
+    lod: float | None,
+    year_attribute: str | None,
+) -> Imported | None:
+    chosen = _geometries(members, lod)
+    if not chosen:
+        kind = "object without a surface"
+        if any(one.geometries for one in members):
+            kind = f"object without level of detail {lod:g}"
+        city.faults.add(f"{kind}, left out", root)
+        return None
+    surfaces: dict[str, list[np.ndarray]] = {}
+    for geometry in chosen:
+        for kind, triangles in _triangles(geometry, root, city, origin):
+            surfaces.setdefault(kind, []).append(triangles)
+    parts, meshes, every = [], {}, []
+    first = city.objects[root]
+    semantic_class, rgb = _class_of(first.kind)
+    for kind in sorted(surfaces):
+        triangles = np.concatenate(surfaces[kind])
+        if len(triangles) == 0:
+            continue
+        every.append(triangles)
+        mesh = f"{name}_{kind}"
+        meshes[mesh] = _to_mesh(triangles)
+        colour = _RED_ROOF if kind == "roof" else rgb
+        parts.append(Part(kind, MeshShape(mesh), rgb=colour))
+    if not parts:
+        city.faults.add("object without a surface, left out", root)
+        return None
+    triangles = np.concatenate(every)
+    years = [construction_year(m.attributes, year_attribute) for m in members]
+    footprint = MultiPoint(triangles.reshape(-1, 3)[:, :2]).convex_hull
+    model = Model(tuple(parts), meshes, footprint)
+    structure = Structure(name, semantic_class, model, (0.0, 0.0, 0.0))
+    known = [year for year in years if year is not None]
+    year = known[0] if known else None
+    return Imported(structure, first.kind, year, triangles)
+
+
+def _geometries(
+    members: list[CityObject], lod: float | None
+) -> list[CityGeometry]:
+    """Returns what is shown of an object and its parts."""
+    chosen = []
+    for one in members:
+        usable = [g for g in one.geometries if lod is None or g.lod == lod]
+        if usable:
+            highest = max(g.lod for g in usable)
+            chosen += [g for g in usable if g.lod == highest]
+    # A footprint is no wall: it goes where anything better is there.
+    if any(g.lod >= 1.0 for g in chosen):
+        chosen = [g for g in chosen if g.lod >= 1.0]
+    return chosen
+
+
+def _triangles(
+    geometry: CityGeometry, name: str, city: CityFile, origin: np.ndarray
+) -> list[tuple[str, np.ndarray]]:
+    """Returns what a surface is of -> its triangles in the world."""
+    found = []
+    for face, kind in zip(geometry.faces, geometry.kinds, strict=True):
+        rings = [ring - origin for ring in face]
+        triangles = face_triangles(rings, name, city.faults)
+        found.append(("roof" if kind == "RoofSurface" else "body", triangles))
+    if geometry.is_solid and _volume([t for _, t in found]) < -1e-3:
+        city.faults.add("solid turned inside out, turned back", name)
+        found = [(kind, triangles[:, ::-1]) for kind, triangles in found]
+    return found
+
+
+def _volume(faces: list[np.ndarray]) -> float:
+    """Returns the volume that triangles (M, 3, 3) enclose [m^3]."""
+    triangles = np.concatenate([np.zeros((0, 3, 3)), *faces])
+    if len(triangles) == 0:
+        return 0.0
+    a, b, c = np.moveaxis(triangles - triangles[0, 0], 1, 0)
+    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
+
+
+def _to_mesh(triangles: np.ndarray) -> Mesh:
+    corners = np.arange(3 * len(triangles)).reshape(-1, 3)
+    return Mesh(triangles.reshape(-1, 3), tuple(map(tuple, corners.tolist())))
+
+
+def _class_of(kind: str) -> tuple[str, tuple[float, float, float] | None]:
+    for beginning, semantic_class, rgb in _CLASSES:
+        if kind.startswith(beginning):
+            return semantic_class, rgb
+    return "other-object", None

@@ -1,0 +1,75 @@
+"""An imported city from above, to see its streets and draw routes on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+import numpy as np
+
+from cns_drake.imports.drive_search import FreeDrive
+from cns_drake.imports.free_space import CELL, FreeSpace
+from cns_drake.imports.import_structures import Imported
+from cns_drake.scene.semantics import CLASS_RGB
+
+_DPI = 130
+_INCHES = 9.0
+_ROUTE_COLOURS = ("#d7191c", "#2c7bb6")
+
+
+def draw_overview(
+    path: Path,
+    structures: Sequence[Imported],
+    space: FreeSpace,
+    drives: Sequence[FreeDrive],
+) -> None:
+    """Draws what stands, where a car has room, and the drives [m].
+
+    Args:
+        path: the picture to write.
+        structures: of the whole city.
+        space: where a car has room.
+        drives: that were found.
+    """
+    rows, columns = space.clearance.shape
+    size = _INCHES * np.array([columns, rows]) / max(rows, columns)
+    figure = Figure(
+        figsize=(size[0] + 0.8, size[1] + 0.6), layout="constrained"
+    )
+    axes = figure.subplots()
+    for is_ground in (True, False):
+        alike: dict[tuple[float, float, float], list[np.ndarray]] = {}
+        for one in structures:
+            if one.is_ground == is_ground and one.kind != "TINRelief":
+                alike.setdefault(_colour(one), []).append(one.triangles)
+        for colour, triangles in alike.items():
+            axes.add_collection(
+                PolyCollection(
+                    list(np.concatenate(triangles)[:, :, :2]),
+                    facecolors=[colour],
+                    # Else fine lines show between triangles.
+                    edgecolors="face",
+                    linewidths=0.3,
+                )
+            )
+    left, low = space.low
+    extent = (left, left + CELL * columns, low, low + CELL * rows)
+    room = np.where(space.clearance >= space.least, 1.0, np.nan)
+    axes.imshow(
+        room, origin="lower", extent=extent, cmap="summer", alpha=0.35, vmax=1.2
+    )
+    for drive, line in zip(drives, _ROUTE_COLOURS, strict=False):
+        axes.plot(*drive.path.T, color=line, linewidth=2.0)
+        axes.plot(*drive.path[0], "o", color=line)
+        axes.plot(*drive.path[-1], "s", color=line)
+    axes.set(xlim=extent[:2], ylim=extent[2:], xlabel="x [m]", ylabel="y [m]")
+    axes.set_aspect("equal")
+    axes.grid(alpha=0.3)
+    figure.savefig(path, dpi=_DPI, metadata={"Software": None})
+
+
+def _colour(one: Imported) -> tuple[float, float, float]:
+    part = one.structure.model.parts[0]
+    return part.rgb or CLASS_RGB[one.structure.semantic_class]

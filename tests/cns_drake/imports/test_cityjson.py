@@ -1,0 +1,285 @@
+"""CityJSON files, right ones and wrong ones."""
+
+import json
+
+import numpy as np
+import pytest
+from small_cityjson import CityWriter
+
+from cns_drake.imports.cityjson import read_cityjson
+from cns_drake.imports.import_structures import import_structures
+from evaluation.support.errors import InputError
+
+ORIGIN = np.array([85000.0, 446000.0, 3.0])
+
+
+def structures(path, **options):
+    city = read_cityjson(path)
+    values = {"lod": None, "year_attribute": None} | options
+    return city, {
+        one.structure.name: one
+        for one in import_structures(city, ORIGIN, **values)
+    }
+
+
+def area(one):
+    a, b, c = np.moveaxis(one.triangles, 1, 0)
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+
+
+def volume(one):
+    a, b, c = np.moveaxis(one.triangles, 1, 0)
+    return np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6
+
+
+@pytest.mark.parametrize("version", ["1.0", "1.1", "2.0"])
+def test_a_box_is_where_it_is(tmp_path, version):
+    city = CityWriter(version)
+    city.box("a", 10.0, -5.0, (4.0, 3.0, 2.0), z=0.5)
+    _, found = structures(city.write(tmp_path / "city.json"))
+    corners = found["a"].triangles.reshape(-1, 3)
+    np.testing.assert_allclose(corners.min(axis=0), [10, -5, 0.5], atol=1e-9)
+    np.testing.assert_allclose(corners.max(axis=0), [14, -2, 2.5], atol=1e-9)
+    assert volume(found["a"]) == pytest.approx(24.0)
+    assert area(found["a"]) == pytest.approx(52.0)
+    parts = {p.name for p in found["a"].structure.model.parts}
+    assert parts == {"body", "roof"}
+    assert found["a"].structure.semantic_class == "building"
+
+
+def test_every_type_of_geometry(tmp_path):
+    city = CityWriter()
+    box = city.box_faces(0, 0, 0, (4, 4, 4))
+    hole = city.box_faces(1, 1, 1, (2, 2, 2))
+    far = city.box_faces(20, 0, 0, (1, 1, 1))
+    roof = city.ring([(0, 0, 9), (9, 0, 9), (9, 9, 9), (0, 9, 9)])
+    gap = city.ring([(1, 1, 9), (1, 2, 9), (2, 2, 9), (2, 1, 9)])
+    for name, kind, boundaries in (
+        ("surfaces", "MultiSurface", [[roof, gap]]),
+        ("composite", "CompositeSurface", box),
+        ("solid", "Solid", [box, hole]),
+        ("solids", "MultiSolid", [[box], [far]]),
+        ("joined", "CompositeSolid", [[box], [far]]),
+    ):
+        geometry = {"type": kind, "lod": 2, "boundaries": boundaries}
+        city.add(name, "Building", geometry)
+    line = {"type": "MultiLineString", "lod": 0, "boundaries": [roof]}
+    city.add("line", "Road", line)
+    read, found = structures(city.write(tmp_path / "city.json"))
+    assert area(found["surfaces"]) == pytest.approx(80.0)
+    assert area(found["composite"]) == pytest.approx(96.0)
+    # The inner shell belongs to it.
+    assert area(found["solid"]) == pytest.approx(96.0 + 24.0)
+    assert area(found["solids"]) == area(found["joined"])
+    assert area(found["joined"]) == pytest.approx(96.0 + 6.0)
+    assert "line" not in found
+    told = {kind for kind, _, _ in read.faults.rows()}
+    assert "geometry of type MultiLineString, left out" in told
+    assert "object without a surface, left out" in told
+
+
+def test_templates_are_placed(tmp_path):
+    city = CityWriter()
+    shape = CityWriter()
+    faces = shape.box_faces(0, 0, 0, (1, 1, 1))
+    city.templates = {
+        "templates": [{"type": "MultiSurface", "lod": 2, "boundaries": faces}],
+        "vertices-templates": [[v / 1000 for v in p] for p in shape.vertices],
+    }
+    turn = [[0, -2, 0, 5], [2, 0, 0, 0], [0, 0, 2, 0], [0, 0, 0, 1]]
+    instance = {
+        "type": "GeometryInstance",
+        "template": 0,
+        "boundaries": [city.vertex(100, 0, 0)],
+        "transformationMatrix": np.ravel(turn).tolist(),
+    }
+    city.add("tree", "SolitaryVegetationObject", instance)
+    _, found = structures(city.write(tmp_path / "city.json"))
+    corners = found["tree"].triangles.reshape(-1, 3)
+    np.testing.assert_allclose(corners.min(axis=0), [103, 0, 0], atol=1e-9)
+    np.testing.assert_allclose(corners.max(axis=0), [105, 2, 2], atol=1e-9)
+    assert found["tree"].structure.semantic_class == "vegetation"
+
+
+def test_a_building_and_its_parts_are_one_structure(tmp_path):
+    city = CityWriter()
+    flat = {
+        "type": "MultiSurface",
+        "lod": "0",
+        "boundaries": [[city.ring([(0, 0, 0), (9, 0, 0), (9, 9, 0)])]],
+    }
+    attributes = {"oorspronkelijkbouwjaar": 1931}
+    city.add(
+        "NL.1/2", "Building", flat, children=["p", "q"], attributes=attributes
+    )
+    city.box("p", 0, 0, (2, 2, 2), kind="BuildingPart", parents=["NL.1/2"])
+    city.box("q", 5, 0, (2, 2, 2), kind="BuildingPart", parents=["NL.1/2"])
+    _, found = structures(city.write(tmp_path / "city.json"))
+    (one,) = found.values()
+    assert one.structure.name == "NL.1_2"
+    assert one.year == 1931
+    # Its footprint is no wall where its parts are solids.
+    assert area(one) == pytest.approx(48.0)
+
+
+def test_levels_of_detail(tmp_path):
+    city = CityWriter()
+    city.box("a", 0, 0, (2, 2, 2))
+    low = {
+        "type": "Solid",
+        "lod": "1.2",
+        "boundaries": [city.box_faces(0, 0, 0, (2, 2, 1))],
+    }
+    city.objects["a"]["geometry"].append(low)
+    path = city.write(tmp_path / "city.json")
+    assert volume(structures(path)[1]["a"]) == pytest.approx(8.0)
+    assert volume(structures(path, lod=1.2)[1]["a"]) == pytest.approx(4.0)
+    read, found = structures(path, lod=3.0)
+    assert found == {}
+    told = {kind for kind, _, _ in read.faults.rows()}
+    assert told == {"object without level of detail 3, left out"}
+
+
+def test_a_solid_inside_out_is_turned_back(tmp_path):
+    city = CityWriter()
+    city.box("a", 0, 0, (2, 2, 2))
+    (shell,) = city.objects["a"]["geometry"][0]["boundaries"]
+    city.objects["a"]["geometry"][0]["boundaries"] = [
+        [[ring[::-1] for ring in face] for face in shell]
+    ]
+    read, found = structures(city.write(tmp_path / "city.json"))
+    assert volume(found["a"]) == pytest.approx(8.0)
+    assert "turned back" in read.faults.rows()[0][0]
+
+
+def test_a_sequence_has_vertices_of_each_feature(tmp_path):
+    lines = []
+    for k in range(3):
+        city = CityWriter()
+        city.box(f"a{k}", 10.0 * k, 0, (1, 1, 1 + k))
+        document = city.document()
+        if k == 0:
+            first = document | {"CityObjects": {}, "vertices": []}
+            lines.append(json.dumps(first))
+        lines.append(
+            json.dumps(
+                {
+                    "type": "CityJSONFeature",
+                    "id": f"a{k}",
+                    "CityObjects": document["CityObjects"],
+                    "vertices": document["vertices"],
+                }
+            )
+        )
+    path = tmp_path / "city.city.jsonl"
+    path.write_text("\n".join(lines) + "\n\n")
+    _, found = structures(path)
+    assert [volume(one) for one in found.values()] == pytest.approx([1, 2, 3])
+
+
+def broken(change):
+    city = CityWriter()
+    city.box("a", 0, 0, (2, 2, 2))
+    document = city.document()
+    change(document)
+    return json.dumps(document)
+
+
+def set_in(*keys):
+    *path, last, value = keys
+
+    def change(document):
+        for key in path:
+            document = document[key]
+        document[last] = value
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("{", "no JSON"),
+        ("[" * 200_000, "nested too deeply"),
+        ("[1]", "no JSON object"),
+        ('{"type": "Feature"}', "type 'Feature' is not CityJSON"),
+        (broken(set_in("version", "3.0")), "version '3.0'"),
+        (broken(set_in("CityObjects", [])), "CityObjects: not an object"),
+        (broken(set_in("CityObjects", {})), "no object in it"),
+        (broken(set_in("vertices", [[1, 2]])), "vertices: not three numbers"),
+        (broken(set_in("vertices", [[1e300, 0, 0]])), "beyond 1e+08 m"),
+        (broken(set_in("vertices", "abc")), "vertices: not three numbers"),
+        (
+            broken(set_in("transform", "scale", [1e300] * 3)),
+            "beyond 1e+08 m",
+        ),
+        (
+            broken(
+                set_in(
+                    "metadata", "referenceSystem", "urn:ogc:def:crs:EPSG::4326"
+                )
+            ),
+            "is in degrees; project it",
+        ),
+        (broken(set_in("CityObjects", "a", "geometry", [])), "no object has a"),
+    ],
+)
+def test_files_that_are_none(tmp_path, text, fault):
+    path = tmp_path / "city.json"
+    path.write_text(text)
+    with pytest.raises(InputError) as info:
+        read_cityjson(path)
+    assert str(info.value).startswith(str(path))
+    assert fault in str(info.value)
+    assert "\n" not in str(info.value)
+
+
+def test_degrees_without_a_word(tmp_path):
+    city = CityWriter(origin=(4.3, 52.0, 0.0))
+    city.metadata = {}
+    city.box("a", 0.001, 0.001, (0.01, 0.01, 30.0))
+    with pytest.raises(InputError, match="look like degrees"):
+        read_cityjson(city.write(tmp_path / "city.json"))
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (set_in("CityObjects", "a", "geometry", 0, "boundaries", 7), "is none"),
+        (set_in("CityObjects", "a", "geometry", 0, None), "is none"),
+        (
+            set_in(
+                "CityObjects", "a", "geometry", 0, "boundaries", 0, 0,
+                [[0, 1, 99999]],
+            ),
+            "unknown vertices",
+        ),
+        (
+            set_in(
+                "CityObjects", "a", "geometry", 0, "boundaries", 0, 0,
+                [[0, 1, -1]],
+            ),
+            "unknown vertices",
+        ),
+        (set_in("CityObjects", "b", {"type": 5}), "without a type"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_used_is_told(tmp_path, change, told):
+    city = CityWriter()
+    city.box("a", 0, 0, (2, 2, 2))
+    city.box("ok", 5, 5, (2, 2, 2))
+    document = city.document()
+    change(document)
+    path = tmp_path / "city.json"
+    path.write_text(json.dumps(document))
+    read, found = structures(path)
+    assert "ok" in found
+    assert any(told in kind for kind, _, _ in read.faults.rows())
+
+
+def test_parents_in_a_circle(tmp_path):
+    city = CityWriter()
+    city.box("a", 0, 0, (2, 2, 2), parents=["b"])
+    city.box("b", 5, 0, (2, 2, 2), parents=["a"])
+    _, found = structures(city.write(tmp_path / "city.json"))
+    assert sum(volume(one) for one in found.values()) == pytest.approx(16.0)

@@ -1,0 +1,269 @@
+"""A CityJSON file becomes a map: stages, drives, scans."""
+
+import csv
+import os
+from pathlib import Path
+import re
+
+import numpy as np
+import pytest
+from shapely.geometry import LineString, box
+from small_cityjson import CityWriter, write_blocks
+from typer.testing import CliRunner
+import yaml
+
+from cns_drake.command_line.cli import app
+from cns_drake.imports.building_years import Undated, construction_year
+from cns_drake.imports.import_map import ImportOptions, import_cityjson
+from cns_drake.scenarios.planning import plan_drive
+from cns_drake.scenarios.scenario import load_scenario
+from evaluation.clouds.cloud_files import read_cloud
+from evaluation.sequences import open_sequence
+from evaluation.support.errors import InputError
+
+pytestmark = pytest.mark.slow
+
+YEARS = (1915, 1945, 1980)
+HOUSES = [
+    box(52 * (k % 3) + 20 * i, 52 * (k // 3) + 20 * j,
+        52 * (k % 3) + 20 * i + 20, 52 * (k // 3) + 20 * j + 20)
+    for k in range(9) for i in (0, 1) for j in (0, 1)
+]  # fmt: skip
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+@pytest.fixture(scope="module")
+def blocks(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("imports")
+    source = write_blocks(folder / "blocks.json")
+    output = folder / "blocks"
+    report = import_cityjson(source, output, ImportOptions(years=YEARS))
+    return output, report
+
+
+def stage_names(folder, stage):
+    text = (folder / f"stage_{stage}.sdf").read_text()
+    return {
+        name.split("/")[0] for name in re.findall('visual name="([^"]+)', text)
+    }
+
+
+def test_stages_are_what_was_built_until_then(blocks):
+    folder, report = blocks
+    names = {
+        f"house.{k}.{h}": 1900 + 10 * k for k in range(8) for h in range(4)
+    }
+    undated = {f"house.8.{h}" for h in range(4)}
+    for stage, year in zip(("01", "02", "03"), YEARS, strict=True):
+        built = {name for name, when in names.items() if when <= year}
+        assert stage_names(folder, stage) == built | undated | {"ground"}
+    assert report.undated == 4
+    assert report.stages == {"01": 12, "02": 24, "03": 36}
+    with (folder / "structures.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert {row["name"] for row in rows} == {*names, *undated, "ground"}
+    assert rows[0]["class"] == "terrain"
+    facts = yaml.safe_load((folder / "import.yaml").read_text())
+    assert facts["years"] == {"01": 1915, "02": 1945, "03": 1980}
+    assert facts["origin"][:2] == [85072.0, 446072.0]
+
+
+@pytest.mark.parametrize(
+    ("undated", "numbers"),
+    [(Undated.FIRST, [12, 24, 36]), (Undated.LAST, [8, 20, 36]),
+     (Undated.NEVER, [8, 20, 32])],
+)  # fmt: skip
+def test_what_becomes_of_buildings_without_a_year(tmp_path, undated, numbers):
+    source = write_blocks(tmp_path / "blocks.json")
+    report = import_cityjson(
+        source, tmp_path / "out", ImportOptions(YEARS, undated=undated)
+    )
+    assert list(report.stages.values()) == numbers
+    assert report.undated == 4
+
+
+def test_drives_have_room_and_share_a_part(blocks):
+    folder, report = blocks
+    assert len(report.drives) == 2
+    origin = np.array([72.0, 72.0])
+    paths = {}
+    for letter, name in (("b", "sequence_01"), ("a", "sequence_03")):
+        scenario = load_scenario(folder / f"{name}.yaml")
+        assert scenario.waypoints.endswith(f"route_{letter}.csv")
+        trajectory = plan_drive(scenario)
+        times = np.arange(0.0, trajectory.duration, 0.2)
+        paths[letter] = LineString(trajectory.positions(times)[:, :2] + origin)
+    for letter, path in paths.items():
+        # A car is 1.9 m wide.
+        assert min(path.distance(house) for house in HOUSES) > 1.2
+        assert path.length > 80.0
+        assert path.is_simple, letter
+    shared = paths["a"].intersection(paths["b"].buffer(4.0)).length
+    assert 0.1 < shared / paths["a"].length < 0.9
+    others = {
+        load_scenario(folder / f"other_0{k}.yaml").waypoints for k in (1, 3)
+    }
+    assert {Path(one).name for one in others} == {"route_a.csv", "route_b.csv"}
+
+
+def test_a_scan_sees_the_walls(blocks, tmp_path):
+    folder, _ = blocks
+    out = tmp_path / "scan.pcd"
+    # In the middle of the street between the first two blocks.
+    pose = ["-26", "-52", "1.5", "0", "0", "0"]
+    for stage in ("01", "03"):
+        result = run(
+            "scan", folder / f"stage_{stage}.sdf", "--pose", *pose,
+            "--output", out,
+        )  # fmt: skip
+        assert result.exit_code == 0, result.output
+        cloud = read_cloud(out)
+        level = np.abs(cloud["z"]) < 1.0
+        left = level & (np.abs(cloud["y"]) < 10) & (cloud["x"] < 0)
+        np.testing.assert_allclose(cloud["x"][left], -6.0, atol=2e-3)
+        assert left.sum() > 100
+    right = level & (np.abs(cloud["y"]) < 10) & (cloud["x"] > 0)
+    np.testing.assert_allclose(cloud["x"][right], 6.0, atol=2e-3)
+
+
+def test_points_know_their_building(blocks, tmp_path):
+    folder, _ = blocks
+    scenario = folder / "sequence_03.yaml"
+    result = run("simulate", scenario, "--frames", "1", "--output", tmp_path)
+    assert result.exit_code == 0, result.output
+    scan = open_sequence(tmp_path / "blocks_03").scan(0)
+    assert set(np.unique(scan["label"])) == {50, 72}
+    with (folder / "structures.csv").open() as stream:
+        names = {int(r["instance"]): r["name"] for r in csv.DictReader(stream)}
+    seen = {names[instance] for instance in np.unique(scan["instance"])}
+    assert len(seen) > 4
+
+
+def test_the_same_file_gives_the_same_map(blocks, tmp_path):
+    folder, _ = blocks
+    source = folder.parent / "blocks.json"
+    again = tmp_path / "blocks"
+    import_cityjson(source, again, ImportOptions(years=YEARS))
+    for path in folder.rglob("*"):
+        if path.is_file():
+            twin = again / path.relative_to(folder)
+            assert twin.read_bytes() == path.read_bytes(), path
+
+
+def test_the_command_from_end_to_end(tmp_path):
+    source = write_blocks(tmp_path / "blocks.json")
+    output = tmp_path / "town"
+    result = run(
+        "import", source, "--years", "1915", "1945", "--output", output
+    )
+    assert result.exit_code == 0, result.output
+    assert re.search(r"stage 02 \(1945\) +24 structures", result.output)
+    assert re.search(r"without a year +4", result.output)
+    listed = run("list", output)
+    assert "town_01" in listed.output
+    assert "town_02" in listed.output
+    recorded = tmp_path / "recorded"
+    for stage in ("01", "02"):
+        result = run(
+            "simulate", output / f"sequence_{stage}.yaml",
+            "--frames", "3", "--output", recorded,
+        )  # fmt: skip
+        assert result.exit_code == 0, result.output
+    assert run("import", source, "--output", output).exit_code != 0
+
+
+def test_no_street_and_no_drive(tmp_path):
+    city = CityWriter()
+    city.box("a", 0, 0, (10, 10, 5))
+    source = city.write(tmp_path / "city.json")
+    result = run("import", source, "--output", tmp_path / "alone")
+    assert result.exit_code == 0, result.output
+    assert "draw waypoints on" in result.output
+    assert (tmp_path / "alone" / "from_above.png").stat().st_size > 3000
+    assert not list((tmp_path / "alone").glob("sequence_*"))
+
+
+def test_roads_are_driven_where_there_are_some(tmp_path):
+    city = CityWriter()
+    city.box("a", 0, 0, (10, 10, 5))
+    for k, (low, high) in enumerate(
+        [((0, 20), (150, 26)), ((100, 26), (106, 120))]
+    ):
+        corners = [low, (high[0], low[1]), high, (low[0], high[1])]
+        road = {
+            "type": "MultiSurface",
+            "lod": "1",
+            "boundaries": [[city.ring([(x, y, 0.0) for x, y in corners])]],
+        }
+        city.add(f"road{k}", "Road", road)
+    source = city.write(tmp_path / "city.json")
+    output = tmp_path / "roads"
+    report = import_cityjson(source, output, ImportOptions())
+    facts = yaml.safe_load((output / "import.yaml").read_text())
+    origin = np.array(facts["origin"][:2]) - [85000.0, 446000.0]
+    ways = box(0, 20, 150, 26).union(box(100, 26, 106, 120))
+    assert report.drives[0] > 120.0
+    scenario = load_scenario(output / "sequence_01.yaml")
+    trajectory = plan_drive(scenario)
+    times = np.arange(0.0, trajectory.duration, 0.2)
+    path = LineString(trajectory.positions(times)[:, :2] + origin)
+    # The inner corner has no kerb, and the wheels cut it a little.
+    assert path.within(ways)
+    assert path.buffer(0.8).difference(ways).area < 5.0
+
+
+@pytest.mark.parametrize(
+    ("options", "fault"),
+    [
+        (["--years", "1950", "1950"], "each must be after the one before"),
+        (["1950"], "give one file"),
+        (["--lod", "7"], "no object has a surface"),
+    ],
+)
+def test_options_that_cannot_be(tmp_path, capsys, options, fault):
+    source = write_blocks(tmp_path / "blocks.json")
+    result = run("import", source, *options, "--output", tmp_path / "out")
+    assert isinstance(result.exception, InputError)
+    assert fault in str(result.exception)
+    assert not (tmp_path / "out").exists()
+    assert not list(tmp_path.glob("out*"))
+
+
+@pytest.mark.parametrize(
+    ("attributes", "year"),
+    [
+        ({"oorspronkelijkbouwjaar": 1932}, 1932),
+        ({"yearOfConstruction": "1932"}, 1932),
+        ({"dateOfConstruction": "1932-05-01"}, 1932),
+        ({"year_built": 1932.0}, 1932),
+        ({"bouwjaar": None, "start_date": "about 1932"}, 1932),
+        ({"oorspronkelijkbouwjaar": 0}, None),
+        ({"oorspronkelijkbouwjaar": True}, None),
+        ({"height": 1932}, None),
+        ({"yearOfConstruction": "19321"}, None),
+    ],
+)
+def test_years_are_found(attributes, year):
+    assert construction_year(attributes, None) == year
+
+
+def test_a_year_of_one_s_own():
+    attributes = {"built": 1750, "bouwjaar": 1900}
+    assert construction_year(attributes, "built") == 1750
+    assert construction_year(attributes, "never") is None
+
+
+@pytest.mark.skipif(
+    "CNS_CITY_FILES" not in os.environ,
+    reason="CNS_CITY_FILES names no folder of real files",
+)
+def test_real_files(tmp_path):
+    folder = Path(os.environ["CNS_CITY_FILES"])
+    files = [*folder.glob("*.json"), *folder.glob("*.jsonl")]
+    assert files
+    for number, path in enumerate(files):
+        report = import_cityjson(path, tmp_path / f"m{number}", ImportOptions())
+        assert report.triangles > 0
