@@ -74,6 +74,14 @@ def scan(
         Path, typer.Option(help="Where to save: .pcd, .bin or .npy.")
     ],
     lidar: Annotated[str, LIDAR_OPTION] = "cns",
+    model_path: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="DIR",
+            help="Where to look for model://, before GZ_SIM_RESOURCE_PATH "
+            "and SDF_PATH; may be given many times.",
+        ),
+    ] = None,
 ) -> None:
     """Take one scan of any SDF world."""
     with uninterrupted():
@@ -96,7 +104,7 @@ def scan(
     check_ending(output)
     pattern = make_lidar_config(lidar).pattern()
     X_WS = RigidTransform(RollPitchYaw(*pose[3:]), pose[:3])
-    loaded = load_world(world)
+    loaded = load_world(world, model_paths=model_path or ())
     for text in loaded.notes:
         note(text)
     points = scan_world(loaded, X_WS, pattern)

@@ -13,6 +13,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 
 from cns_drake.scene.drake_errors import PARSER_ERRORS, told_by_drake
+from cns_drake.scene.gazebo_models import read_xml
+from cns_drake.scene.gazebo_worlds import is_gazebo_world, simplify_world
 from cns_drake.scene.model_check import check_model
 from cns_drake.scene.perception_geometry import check_shape, structure_name
 from cns_drake.scene.structure_table import (
@@ -63,8 +65,12 @@ def load_world(
     vehicle: Path | None = None,
     structures: Path | None = None,
     without: Collection[str] = (),
+    model_paths: Collection[Path] = (),
 ) -> World:
     """Parses a world and, in it, a vehicle.
+
+    Of a world for Gazebo, what is seen of it stays, where it is at the start;
+    the notes tell what was left out.
 
     Args:
         sdf: the world or model file.
@@ -72,6 +78,8 @@ def load_world(
         structures: table of structures; by default `structures.csv` beside
             the world, if there is one.
         without: names of structures to leave out.
+        model_paths: folders in which to look for `model://`, before those of
+            GZ_SIM_RESOURCE_PATH and SDF_PATH.
 
     Raises:
         InputError: a file is missing or cannot be parsed, a structure to
@@ -91,7 +99,7 @@ def load_world(
     plant = MultibodyPlant(time_step=0.0)
     plant.RegisterAsSourceForSceneGraph(scene_graph)
     parser = Parser(plant)
-    _parse(parser, sdf)
+    notes = _parse_world(parser, sdf, model_paths)
     _check_names(scene_graph, sdf)
     if without:
         _remove(scene_graph, plant.get_source_id(), set(without), sdf)
@@ -115,10 +123,9 @@ def load_world(
 
     table = structures or sdf.parent / "structures.csv"
     found = set(map(structure_name, names))
-    notes: tuple[str, ...] = ()
     if structures is not None or table.is_file():
         entries = load_structure_table(table)
-        notes = _mismatches(table, {entry.name for entry in entries}, found)
+        notes += _mismatches(table, {entry.name for entry in entries}, found)
     else:
         entries = StructureTable(())
     try:
@@ -181,15 +188,28 @@ def _remove(
         raise InputError(f"{sdf}: no structure {missing[0]} to leave out")
 
 
+def _parse_world(
+    parser: Parser, path: Path, model_paths: Collection[Path]
+) -> tuple[str, ...]:
+    """Parses a world, and returns notes of what was left out."""
+    _check_file(path)
+    root = None if path.suffix.lower() == ".urdf" else read_xml(path)
+    if root is None or not is_gazebo_world(root):
+        _parse(parser, path)
+        return ()
+    text, notes = simplify_world(path, root, model_paths)
+    with told_by_drake() as errors:
+        try:
+            parser.AddModelsFromString(text, "sdf")
+        except PARSER_ERRORS as error:
+            raise _parse_fault(path, str(error), *errors) from error
+        if errors:
+            raise _parse_fault(path, *errors)
+    return notes
+
+
 def _parse(parser: Parser, path: Path) -> list[ModelInstanceIndex]:
-    if not path.is_file():
-        raise InputError(f"{path}: no such file")
-    # Drake itself stumbles over what it would quote of it.
-    content = read_bytes(path)
-    try:
-        content.decode("utf-8")
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: not UTF-8 text") from None
+    _check_file(path)
     check_model(path)
     with told_by_drake() as errors:
         try:
@@ -201,6 +221,17 @@ def _parse(parser: Parser, path: Path) -> list[ModelInstanceIndex]:
     if not models:
         raise InputError(f"{path}: holds no model")
     return models
+
+
+def _check_file(path: Path) -> None:
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    # Drake itself stumbles over what it would quote of it.
+    content = read_bytes(path)
+    try:
+        content.decode("utf-8")
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not UTF-8 text") from None
 
 
 def _parse_fault(path: Path, *texts: str) -> InputError:

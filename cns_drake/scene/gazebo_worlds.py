@@ -1,0 +1,284 @@
+"""Gazebo's worlds as what a LiDAR sees of them, in SDF that Drake reads.
+
+Drake refuses much of what such worlds hold, and an endless collision plane
+among many others makes it crash. What stays is the visuals, where they are at
+the start: nothing in such a world moves here.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+import math
+from pathlib import Path
+from xml.etree import ElementTree
+
+from cns_drake.scene.gazebo_models import ModelFinder, model_file, read_xml
+from evaluation.support.errors import InputError
+
+# In a world, any of these makes it one for Gazebo.
+_SIGNS = (
+    "include", "light", "plugin", "actor", "scene", "gui", "state", "sensor",
+    "road", "population", "submesh",
+)  # fmt: skip
+_ENDLESS_COLLISION = ".//collision/geometry/plane"
+# What is left out with a note, and what of it is said.
+_SKIPPED = {
+    "light": "lights",
+    "plugin": "plugins",
+    "actor": "actors",
+    "sensor": "sensors",
+    "road": "roads",
+    "population": "populations",
+    "particle_emitter": "particle emitters",
+    "projector": "projectors",
+}
+_SHAPES = (
+    "box", "sphere", "cylinder", "capsule", "ellipsoid", "plane", "mesh",
+    "drake:capsule", "drake:ellipsoid",
+)  # fmt: skip
+# Gazebo's own models, which are at hand wherever it is.
+_SUN, _GROUND_PLANE = "model://sun", "model://ground_plane"
+_GROUND = """<model name="ground_plane"><link name="link"><visual name="visual">
+<geometry><plane><normal>0 0 1</normal></plane></geometry></visual></link>
+</model>"""
+_DEEPEST = 20
+
+
+def is_gazebo_world(root: ElementTree.Element) -> bool:
+    """Tells whether a world holds what is Gazebo's, and not ours."""
+    world = root.find("world")
+    return world is not None and (
+        world.find(_ENDLESS_COLLISION) is not None
+        or any(next(world.iter(sign), None) is not None for sign in _SIGNS)
+    )
+
+
+def simplify_world(
+    path: Path, root: ElementTree.Element, model_paths: Iterable[Path] = ()
+) -> tuple[str, tuple[str, ...]]:
+    """Returns a world of static models with visuals only, and notes.
+
+    Args:
+        path: of the world.
+        root: what it holds.
+        model_paths: where to look for models first.
+
+    Raises:
+        InputError: a model that is there cannot be read.
+    """
+    simplifier = _Simplifier(path, model_paths)
+    world = root.find("world")
+    assert world is not None
+    made = ElementTree.Element("sdf", version="1.9")
+    target = ElementTree.SubElement(
+        made, "world", name=_legal(world.get("name", "world"))
+    )
+    simplifier.add_models(world, target, path.absolute().parent, 0)
+    return ElementTree.tostring(made, "unicode"), simplifier.notes()
+
+
+class _Simplifier:
+    """One pass over a world and all that it includes."""
+
+    def __init__(self, path: Path, model_paths: Iterable[Path]):
+        self._path = path
+        self._finder = ModelFinder(path, model_paths)
+        self._skipped: Counter[str] = Counter()
+        self._missing: dict[str, Counter[str]] = {
+            "models": Counter(),
+            "meshes": Counter(),
+        }
+
+    def notes(self) -> tuple[str, ...]:
+        """Returns one line for each kind of what was left out."""
+        notes = [
+            f"{self._path}: {count} {what} ignored"
+            for what, count in sorted(self._skipped.items())
+            if count
+        ]
+        for what, uris in self._missing.items():
+            if uris:
+                some = ", ".join(list(uris)[:3])
+                some += ", ..." if len(uris) > 3 else ""
+                notes.append(
+                    f"{self._path}: {len(uris)} {what} not found, and left "
+                    f"out: {some}; --model-path tells where they are"
+                )
+        return tuple(notes)
+
+    def add_models(
+        self,
+        source: ElementTree.Element,
+        target: ElementTree.Element,
+        folder: Path,
+        depth: int,
+    ) -> None:
+        """Adds the models in a world or a model, included ones, too."""
+        if depth > _DEEPEST:
+            raise InputError(f"{self._path}: models include each other")
+        for element in source:
+            if element.tag in _SKIPPED:
+                self._skipped[_SKIPPED[element.tag]] += 1
+            elif element.tag == "include":
+                self._include(element, target, folder, depth)
+            elif element.tag == "model":
+                self._add_model(element, target, folder, depth)
+
+    def _include(
+        self,
+        include: ElementTree.Element,
+        target: ElementTree.Element,
+        folder: Path,
+        depth: int,
+    ) -> None:
+        uri = _local_uri((include.findtext("uri") or "").strip())
+        place = self._finder.find(uri, folder)
+        if place is not None:
+            file = model_file(place)
+            root = read_xml(file)
+            models, folder = root.findall("model"), file.parent
+            self._skipped["lights"] += len(root.findall("light"))
+            self._skipped["actors"] += len(root.findall("actor"))
+        elif uri.rstrip("/") == _SUN:
+            self._skipped["lights"] += 1
+            return
+        elif uri.rstrip("/") == _GROUND_PLANE:
+            models = [ElementTree.fromstring(_GROUND)]
+        else:
+            self._missing["models"][uri] += 1
+            return
+        for model in models[:1]:
+            name, pose = include.findtext("name"), include.find("pose")
+            if name:
+                model.set("name", name.strip())
+            if pose is not None:
+                for old in model.findall("pose"):
+                    model.remove(old)
+                model.append(pose)
+            self._add_model(model, target, folder, depth)
+
+    def _add_model(
+        self,
+        model: ElementTree.Element,
+        target: ElementTree.Element,
+        folder: Path,
+        depth: int,
+    ) -> None:
+        made = ElementTree.Element("model", name=_name(model, target))
+        if target.tag == "world":
+            ElementTree.SubElement(made, "static").text = "true"
+        _copy_pose(model, made)
+        self.add_models(model, made, folder, depth + 1)
+        for frame in model.findall("frame"):
+            made.append(frame)
+        for link in model.findall("link"):
+            self._add_link(link, made, folder)
+        if made.find("link") is not None or made.find("model") is not None:
+            target.append(made)
+
+    def _add_link(
+        self,
+        link: ElementTree.Element,
+        target: ElementTree.Element,
+        folder: Path,
+    ) -> None:
+        made = ElementTree.Element("link", name=_name(link, target))
+        _copy_pose(link, made)
+        for element in link:
+            if element.tag in _SKIPPED:
+                self._skipped[_SKIPPED[element.tag]] += 1
+            elif element.tag == "visual":
+                self._add_visual(element, made, folder)
+        # One that others are placed by stays, though nothing is seen of it.
+        target.append(made)
+
+    def _add_visual(
+        self,
+        visual: ElementTree.Element,
+        target: ElementTree.Element,
+        folder: Path,
+    ) -> None:
+        geometry = visual.find("geometry")
+        shapes = [] if geometry is None else list(geometry)
+        if not shapes or shapes[0].tag not in _SHAPES:
+            if shapes and shapes[0].tag != "empty":
+                self._skipped[f"visuals of type {shapes[0].tag}"] += 1
+            return
+        shape = shapes[0]
+        if shape.tag == "mesh":
+            uri = (shape.findtext("uri") or "").strip()
+            place = self._finder.find(uri, folder)
+            if place is None or not place.is_file():
+                self._missing["meshes"][uri] += 1
+                return
+            mesh = ElementTree.Element("mesh")
+            # Drake takes such a URI as it is, percent signs and all.
+            ElementTree.SubElement(mesh, "uri").text = f"file://{place}"
+            scale = shape.find("scale")
+            if scale is not None:
+                mesh.append(scale)
+            if shape.find("submesh") is not None:
+                self._skipped["choices of a part of a mesh"] += 1
+            shape = mesh
+        made = ElementTree.SubElement(
+            target, "visual", name=_name(visual, target)
+        )
+        _copy_pose(visual, made)
+        ElementTree.SubElement(made, "geometry").append(shape)
+        material = visual.find("material")
+        if material is not None:
+            self._add_material(material, made)
+
+    def _add_material(
+        self, material: ElementTree.Element, target: ElementTree.Element
+    ) -> None:
+        for tag in ("script", "pbr"):
+            if material.find(tag) is not None:
+                self._skipped["materials by script or texture"] += 1
+        numbers = (material.findtext("diffuse") or "").split()
+        try:
+            values = [float(number) for number in numbers]
+        except ValueError:
+            return
+        if len(values) in (3, 4) and all(map(math.isfinite, values)):
+            made = ElementTree.SubElement(target, "material")
+            text = " ".join([*numbers, "1"][:4])
+            ElementTree.SubElement(made, "diffuse").text = text
+
+
+def _local_uri(uri: str) -> str:
+    """Returns the name under which a model of a server's is at hand."""
+    if not uri.startswith(("http://", "https://")):
+        return uri
+    _, _, name = uri.rpartition("/models/")
+    return "model://" + name.split("/")[0].strip().lower().replace(" ", "_")
+
+
+def _copy_pose(
+    source: ElementTree.Element, target: ElementTree.Element
+) -> None:
+    pose = source.find("pose")
+    if pose is not None and (pose.text or "").strip():
+        # Before version 1.7, `frame` meant nothing.
+        pose.attrib.pop("frame", None)
+        target.append(pose)
+
+
+def _name(element: ElementTree.Element, target: ElementTree.Element) -> str:
+    """Returns an element's name, or one like it that is still free."""
+    wanted = _legal(element.get("name", element.tag))
+    taken = {sibling.get("name") for sibling in target}
+    name, count = wanted, 1
+    while name in taken:
+        count += 1
+        name = f"{wanted}_{count}"
+    return name
+
+
+def _legal(name: str) -> str:
+    """Returns a name without what SDF has reserved."""
+    legal = name.replace("::", "_").strip() or "unnamed"
+    if legal.startswith("__") or legal == "world":
+        legal = f"model_{legal.strip('_')}"
+    return legal
