@@ -35,7 +35,7 @@ from mcap.writer import MCAP0_MAGIC
 import zstandard
 
 # The largest record, compressed or not, that is taken for real [bytes].
-RECORD_LIMIT = 256 * 1024 * 1024
+RECORD_LIMIT = 64 * 1024 * 1024
 
 _RECORD_HEADER = struct.Struct("<BQ")
 _LAST_OPCODE = max(Opcode)

@@ -302,14 +302,16 @@ def test_more_definitions_than_a_recording_has(tmp_path):
         Opcode.SCHEMA,
         struct.pack("<HIII", 0, 0, 0, 2**20) + bytes(2**20),
     )
-    schemas = b"".join(
-        schema[:9] + struct.pack("<H", k + 1) + schema[11:] for k in range(70)
-    )
-    data = zstandard.compress(schemas)
+    chunks = b""
+    for first in (1, 36):
+        schemas = b"".join(
+            schema[:9] + struct.pack("<H", k) + schema[11:]
+            for k in range(first, first + 35)
+        )
+        data = zstandard.compress(schemas)
+        chunks += record_of(Opcode.CHUNK, chunk_of(data, size=len(schemas)))
     path = tmp_path / "many.mcap"
-    path.write_bytes(
-        MCAP0_MAGIC + record_of(Opcode.CHUNK, chunk_of(data, size=len(schemas)))
-    )
+    path.write_bytes(MCAP0_MAGIC + chunks)
     with pytest.raises(InputError, match=r"many\.mcap: more topics"):
         repair_mcap(path)
 
