@@ -16,15 +16,14 @@ from evaluation.support.terminal import note, print_rows
 if TYPE_CHECKING:
     from cns_drake.imports.import_map import ImportReport
 
-_SUFFIXES = (".json", ".jsonl")
-
 
 def import_city(
     source: Annotated[
         list[str],
         typer.Argument(
             metavar="FILE",
-            help="CityJSON 1.0 to 2.0 (.json) or CityJSONSeq (.jsonl).",
+            help="CityJSON 1.0 to 2.0 (.json), CityJSONSeq (.jsonl), or "
+            "OpenStreetMap (.osm, .pbf).",
         ),
     ],
     output: Annotated[
@@ -63,7 +62,9 @@ def import_city(
     with uninterrupted():
         from cns_drake.imports.import_map import (
             ImportOptions,
-            import_cityjson,
+        )
+        from cns_drake.imports.import_map import (
+            import_city as write_map,
         )
         from cns_drake.scenarios.sequence_table import write_table
 
@@ -73,11 +74,9 @@ def import_city(
     if len(paths) != 1 or (more and not years):
         raise InputError(f"give one file, not {' '.join(source)}")
     path = Path(paths[0])
-    if path.suffix not in _SUFFIXES:
-        raise InputError(f"{path}: not .json or .jsonl, as CityJSON files are")
     stages = tuple(sorted([*(years or ()), *more]))
     options = ImportOptions(stages, year_attribute, undated, lod)
-    report = import_cityjson(path, output, options, note)
+    report = write_map(path, output, options, note)
     write_table(output, note)
     print_rows(_rows(report, options.years))
     if not report.drives:

@@ -12,8 +12,8 @@ from scipy.ndimage import (
     label,
 )
 
+from cns_drake.imports.foreign_city import Imported
 from cns_drake.imports.import_ground import Ground
-from cns_drake.imports.import_structures import Imported
 
 CELL = 1.0  # [m]
 # A car passes below what hangs higher than this above the ground [m].

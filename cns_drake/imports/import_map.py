@@ -27,11 +27,12 @@ from cns_drake.imports.building_years import (
     stage_names,
     stands_at,
 )
-from cns_drake.imports.cityjson import CityFile, read_cityjson
 from cns_drake.imports.drive_search import FreeDrive, find_drives
+from cns_drake.imports.foreign_city import ForeignCity, Imported
 from cns_drake.imports.free_space import find_free_space
 from cns_drake.imports.import_ground import Ground, feet_of, guess_ground
-from cns_drake.imports.import_structures import Imported, import_structures
+from cns_drake.imports.import_structures import import_cityjson
+from cns_drake.imports.openstreetmap import import_openstreetmap
 from cns_drake.imports.overview import draw_overview
 from evaluation.support.errors import InputError
 from evaluation.support.files import part_path, user_errors
@@ -86,16 +87,16 @@ class ImportReport:
     faults: list[tuple[str, int, str]]
 
 
-def import_cityjson(
+def import_city(
     source: Path,
     output: Path,
     options: ImportOptions,
     progress: Callable[[str], None] = lambda line: None,
 ) -> ImportReport:
-    """Writes a map folder of a CityJSON file.
+    """Writes a map folder of a file.
 
     Args:
-        source: the file.
+        source: CityJSON (.json, .jsonl) or OpenStreetMap (.osm, .pbf).
         output: the folder, which must not be there yet.
         options: what is taken.
         progress: takes one line at a time.
@@ -113,13 +114,13 @@ def import_cityjson(
             f"--output: {name!r}: letters, digits and underscores only"
         )
     progress(f"reading {source}")
-    city = read_cityjson(source)
-    origin = _origin(city)
-    found = import_structures(city, origin, options.lod, options.year_attribute)
+    city = _read(source, options)
+    found = city.structures
     if not found:
         raise InputError(f"{source}: no object has a surface")
     standing = [_standing(found, k, options) for k in range(len(stages))]
-    kept = [one for one in found if any(one in some for some in standing)]
+    ever = {one for some in standing for one in some}
+    kept = [one for one in found if one in ever]
     if len(kept) >= _MAX_STRUCTURES:
         raise InputError(
             f"{source}: {len(kept)} objects are more than instance ids can"
@@ -147,7 +148,7 @@ def import_cityjson(
                     for stage, some in zip(stages, standing, strict=True)
                 },
             )
-            _write_facts(draft, source, city, origin, options, stages)
+            _write_facts(draft, source, city, options, stages)
             _write_drives(draft, stages, options.years, drives, ground)
             draw_overview(draft / "from_above.png", kept, space, drives)
             os.replace(draft, output)
@@ -166,18 +167,17 @@ def import_cityjson(
     )
 
 
-def _origin(city: CityFile) -> np.ndarray:
-    """Returns where the map's world lies in the file's, whole metres."""
-    rings = [
-        ring
-        for one in city.objects.values()
-        for geometry in one.geometries
-        for face in geometry.faces
-        for ring in face
-    ]
-    points = np.concatenate(rings)
-    low, high = points.min(axis=0), points.max(axis=0)
-    return np.array([*np.round((low + high)[:2] / 2.0), np.floor(low[2])])
+def _read(source: Path, options: ImportOptions) -> ForeignCity:
+    if source.suffix in (".json", ".jsonl"):
+        return import_cityjson(source, options.lod, options.year_attribute)
+    if source.suffix not in (".osm", ".pbf"):
+        raise InputError(
+            f"{source}: not CityJSON (.json, .jsonl) or OpenStreetMap (.osm,"
+            " .pbf)"
+        )
+    if options.lod is not None:
+        raise InputError(f"--lod: {source} has no levels of detail")
+    return import_openstreetmap(source, options.year_attribute)
 
 
 def _has_years(one: Imported) -> bool:
@@ -243,17 +243,21 @@ def _write_world(
             comment=f"Imported by cns-drake from {source.name}.",
         )
         (draft / f"stage_{stage}.sdf").write_text(text, "utf-8")
-    for structure in structures:
-        for name, mesh in structure.model.meshes.items():
-            path = draft / MESH_FOLDER / f"{name}.obj"
-            path.write_text(mesh.to_obj(), "utf-8")
+    # Trees of a kind share theirs.
+    meshes = {
+        name: mesh
+        for structure in structures
+        for name, mesh in structure.model.meshes.items()
+    }
+    for name, mesh in meshes.items():
+        path = draft / MESH_FOLDER / f"{name}.obj"
+        path.write_text(mesh.to_obj(), "utf-8")
 
 
 def _write_facts(
     draft: Path,
     source: Path,
-    city: CityFile,
-    origin: np.ndarray,
+    city: ForeignCity,
     options: ImportOptions,
     stages: Iterable[str],
 ) -> None:
@@ -261,7 +265,7 @@ def _write_facts(
     facts = {
         "source": source.name,
         "reference_system": city.reference_system or "not told",
-        "origin": [float(value) for value in origin],
+        "origin": list(city.origin),
         "lod": options.lod if options.lod is not None else "highest",
         "years": dict(zip(stages, options.years, strict=False)),
         "left_out_or_repaired": {

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from pathlib import Path
 import re
 
 import numpy as np
 from shapely.geometry import MultiPoint
 
-from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.structures import (
     MeshShape,
     Model,
@@ -17,8 +16,18 @@ from cns_drake.city.geometry.structures import (
     Structure,
 )
 from cns_drake.imports.building_years import construction_year
-from cns_drake.imports.cityjson import CityFile, CityGeometry, CityObject
+from cns_drake.imports.cityjson import (
+    CityFile,
+    CityGeometry,
+    CityObject,
+    read_cityjson,
+)
 from cns_drake.imports.faces import face_triangles
+from cns_drake.imports.foreign_city import (
+    ForeignCity,
+    Imported,
+    triangle_mesh,
+)
 
 _RED_ROOF = (0.55, 0.30, 0.24)
 _WATER = (0.16, 0.34, 0.45)
@@ -47,30 +56,32 @@ _CLASSES: tuple[tuple[str, str, tuple[float, float, float] | None], ...] = (
 _LONGEST_NAME = 80
 
 
-@dataclass(frozen=True)
-class Imported:
-    """A structure of an imported city.
+def import_cityjson(
+    path: Path, lod: float | None, year_attribute: str | None
+) -> ForeignCity:
+    """Reads a CityJSON file; its origin is the middle of its city.
 
-    Attributes:
-        structure: in the world.
-        kind: type of its object.
-        year: in which it was built, if it is told.
-        triangles: (M, 3, 3) of all its parts, in the world [m].
+    Raises:
+        InputError: if it cannot be used.
     """
-
-    structure: Structure
-    kind: str
-    year: int | None
-    triangles: np.ndarray
-
-    @property
-    def is_ground(self) -> bool:
-        """Whether one can drive over it, if it is flat."""
-        return self.structure.semantic_class in (
-            "road",
-            "other-ground",
-            "terrain",
-        )
+    city = read_cityjson(path)
+    points = np.concatenate(
+        [
+            ring
+            for one in city.objects.values()
+            for geometry in one.geometries
+            for face in geometry.faces
+            for ring in face
+        ]
+    )
+    low, high = points.min(axis=0), points.max(axis=0)
+    origin = np.array([*np.round((low + high)[:2] / 2.0), np.floor(low[2])])
+    return ForeignCity(
+        import_structures(city, origin, lod, year_attribute),
+        tuple(float(value) for value in origin),
+        city.reference_system,
+        city.faults,
+    )
 
 
 def import_structures(
@@ -172,7 +183,7 @@ def _make(
             continue
         every.append(triangles)
         mesh = f"{name}_{kind}"
-        meshes[mesh] = _to_mesh(triangles)
+        meshes[mesh] = triangle_mesh(triangles)
         colour = _RED_ROOF if kind == "roof" else rgb
         parts.append(Part(kind, MeshShape(mesh), rgb=colour))
     if not parts:
@@ -226,11 +237,6 @@ def _volume(faces: list[np.ndarray]) -> float:
         return 0.0
     a, b, c = np.moveaxis(triangles - triangles[0, 0], 1, 0)
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
-
-
-def _to_mesh(triangles: np.ndarray) -> Mesh:
-    corners = np.arange(3 * len(triangles)).reshape(-1, 3)
-    return Mesh(triangles.reshape(-1, 3), tuple(map(tuple, corners.tolist())))
 
 
 def _class_of(kind: str) -> tuple[str, tuple[float, float, float] | None]:

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 import numpy as np
 
 from cns_drake.imports.drive_search import FreeDrive
+from cns_drake.imports.foreign_city import Imported
 from cns_drake.imports.free_space import CELL, FreeSpace
-from cns_drake.imports.import_structures import Imported
 from cns_drake.scene.semantics import CLASS_RGB
 
 _DPI = 130

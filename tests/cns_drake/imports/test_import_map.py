@@ -14,7 +14,7 @@ import yaml
 
 from cns_drake.command_line.cli import app
 from cns_drake.imports.building_years import Undated, construction_year
-from cns_drake.imports.import_map import ImportOptions, import_cityjson
+from cns_drake.imports.import_map import ImportOptions, import_city
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import load_scenario
 from evaluation.clouds.cloud_files import read_cloud
@@ -40,7 +40,7 @@ def blocks(tmp_path_factory):
     folder = tmp_path_factory.mktemp("imports")
     source = write_blocks(folder / "blocks.json")
     output = folder / "blocks"
-    report = import_cityjson(source, output, ImportOptions(years=YEARS))
+    report = import_city(source, output, ImportOptions(years=YEARS))
     return output, report
 
 
@@ -78,7 +78,7 @@ def test_stages_are_what_was_built_until_then(blocks):
 )  # fmt: skip
 def test_what_becomes_of_buildings_without_a_year(tmp_path, undated, numbers):
     source = write_blocks(tmp_path / "blocks.json")
-    report = import_cityjson(
+    report = import_city(
         source, tmp_path / "out", ImportOptions(YEARS, undated=undated)
     )
     assert list(report.stages.values()) == numbers
@@ -146,7 +146,7 @@ def test_the_same_file_gives_the_same_map(blocks, tmp_path):
     folder, _ = blocks
     source = folder.parent / "blocks.json"
     again = tmp_path / "blocks"
-    import_cityjson(source, again, ImportOptions(years=YEARS))
+    import_city(source, again, ImportOptions(years=YEARS))
     for path in folder.rglob("*"):
         if path.is_file():
             twin = again / path.relative_to(folder)
@@ -201,7 +201,7 @@ def test_roads_are_driven_where_there_are_some(tmp_path):
         city.add(f"road{k}", "Road", road)
     source = city.write(tmp_path / "city.json")
     output = tmp_path / "roads"
-    report = import_cityjson(source, output, ImportOptions())
+    report = import_city(source, output, ImportOptions())
     facts = yaml.safe_load((output / "import.yaml").read_text())
     origin = np.array(facts["origin"][:2]) - [85000.0, 446000.0]
     ways = box(0, 20, 150, 26).union(box(100, 26, 106, 120))
@@ -265,5 +265,5 @@ def test_real_files(tmp_path):
     files = [*folder.glob("*.json"), *folder.glob("*.jsonl")]
     assert files
     for number, path in enumerate(files):
-        report = import_cityjson(path, tmp_path / f"m{number}", ImportOptions())
+        report = import_city(path, tmp_path / f"m{number}", ImportOptions())
         assert report.triangles > 0

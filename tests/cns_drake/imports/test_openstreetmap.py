@@ -1,0 +1,273 @@
+"""OpenStreetMap files, written here, and what becomes of them."""
+
+import math
+
+import numpy as np
+import pytest
+from shapely.geometry import Polygon
+
+from cns_drake.imports.extrusions import extruded
+from cns_drake.imports.import_faults import ImportFaults
+from cns_drake.imports.openstreetmap import import_openstreetmap
+from cns_drake.imports.osm_tags import (
+    heights,
+    length,
+    sidewalk_sides,
+    street_width,
+)
+from evaluation.support.errors import InputError
+
+LAT, LON = 52.0, 13.0
+
+
+class OsmWriter:
+    """Writes nodes and ways, given in metres about 52 N, 13 E."""
+
+    def __init__(self):
+        self.rows = []
+        self._next = 1
+
+    def node(self, x, y, **tags):
+        # The lengths of a degree, by the series for WGS 84.
+        phi = math.radians(LAT)
+        lat = 111132.954 - 559.822 * math.cos(2 * phi)
+        lat += 1.175 * math.cos(4 * phi)
+        lon = 111412.84 * math.cos(phi) - 93.5 * math.cos(3 * phi)
+        lon += 0.118 * math.cos(5 * phi)
+        number = self._number()
+        self.rows.append(
+            f'<node id="{number}" version="1" lat="{LAT + y / lat:.9f}"'
+            f' lon="{LON + x / lon:.9f}">{_tags(tags)}</node>'
+        )
+        return number
+
+    def way(self, points, closed=False, **tags):
+        nodes = [self.node(*point) for point in points]
+        if closed:
+            nodes.append(nodes[0])
+        number = self._number()
+        refs = "".join(f'<nd ref="{node}"/>' for node in nodes)
+        self.rows.append(
+            f'<way id="{number}" version="1">{refs}{_tags(tags)}</way>'
+        )
+        return number
+
+    def box(self, x, y, a, b, **tags):
+        corners = [(x, y), (x + a, y), (x + a, y + b), (x, y + b)]
+        return self.way(corners, closed=True, **tags)
+
+    def write(self, path):
+        rows = sorted(self.rows, key=lambda row: row.startswith("<way"))
+        text = "\n".join(rows)
+        path.write_text(f'<osm version="0.6">\n{text}\n</osm>\n')
+        return path
+
+    def _number(self):
+        self._next += 1
+        return self._next
+
+
+def _tags(tags):
+    return "".join(
+        f'<tag k="{key.replace("__", ":")}" v="{value}"/>'
+        for key, value in tags.items()
+    )
+
+
+def read(path, year_attribute=None):
+    city = import_openstreetmap(path, year_attribute)
+    return city, {one.structure.name: one for one in city.structures}
+
+
+def bounds(one):
+    corners = one.triangles.reshape(-1, 3)
+    return corners.min(axis=0), corners.max(axis=0)
+
+
+def volume(triangles):
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    return np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6
+
+
+def test_buildings_are_where_and_as_high_as_told(tmp_path):
+    osm = OsmWriter()
+    first = osm.box(-100, -50, 20, 10, building="yes", height="12.5 m")
+    last = osm.box(80, 40, 20, 10, building="house", start_date="1910")
+    city, found = read(osm.write(tmp_path / "city.osm"))
+    assert city.origin == (LAT, LON)
+    low, high = bounds(found[f"building_w{first}"])
+    # The origin is rounded to a millionth of a degree.
+    np.testing.assert_allclose(low, [-100, -50, 0], atol=0.06)
+    np.testing.assert_allclose(high, [-80, -40, 12.5], atol=0.06)
+    assert bounds(found[f"building_w{last}"])[1][2] == 6.0
+    assert found[f"building_w{last}"].year == 1910
+    assert found[f"building_w{first}"].year is None
+
+
+def test_a_building_with_parts_is_what_these_are(tmp_path):
+    osm = OsmWriter()
+    outline = osm.box(0, 0, 20, 20, building="yes", height="50")
+    osm.box(0, 0, 10, 20, building__part="yes", height="10")
+    osm.box(10, 0, 10, 20, building__part="yes", height="20", min_height="5")
+    _, found = read(osm.write(tmp_path / "city.osm"))
+    (one,) = found.values()
+    assert one.structure.name == f"building_w{outline}"
+    assert bounds(one)[1][2] == 20.0
+    # Not the outline's 50 m; and the raised part has an underside.
+    expected = 200.0 * 10.0 + 200.0 * 15.0
+    assert volume(one.triangles) == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("roof", "part"), [("flat", 1.0), ("gabled", 0.5), ("pyramidal", 1 / 3)]
+)
+@pytest.mark.parametrize("turned", [0, 1])
+def test_roofs_hold_their_volume(roof, part, turned):
+    corners = [(1, 1), (13, 1), (13, 7), (1, 7)]
+    polygon = Polygon(corners[turned:] + corners[:turned])
+    faults = ImportFaults()
+    walls, top = extruded(polygon, 0.0, 9.0, "a", faults, roof, 3.0)
+    if roof == "flat":
+        walls, top = extruded(polygon, 0.0, 9.0, "a", faults)
+    base = np.array([[(1, 1, 0), (13, 7, 0), (13, 1, 0)],
+                     [(1, 1, 0), (1, 7, 0), (13, 7, 0)]], float)  # fmt: skip
+    whole = np.concatenate([walls, top, base])
+    assert volume(whole) == pytest.approx(72.0 * (6.0 + 3.0 * part))
+    assert faults.rows() == []
+    normals = np.cross(top[:, 1] - top[:, 0], top[:, 2] - top[:, 0])
+    assert (normals[:, 2] > 0).all()
+
+
+def test_a_hipped_roof_slopes_on_four_sides():
+    polygon = Polygon([(0, 0), (12, 0), (12, 6), (0, 6)])
+    walls, top = extruded(polygon, 0, 9, "a", ImportFaults(), "hipped", 3.0)
+    assert walls[..., 2].max() == 6.0
+    assert top[..., 2].max() == 9.0
+    normals = np.cross(top[:, 1] - top[:, 0], top[:, 2] - top[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    assert (normals[:, 2] > 0.1).all()
+    assert len(np.unique(np.round(normals, 6), axis=0)) == 4
+
+
+def test_roofs_that_cannot_be_are_flat_and_told():
+    bent = Polygon([(0, 0), (9, 0), (9, 9), (5, 9), (5, 4), (0, 4)])
+    faults = ImportFaults()
+    _, top = extruded(bent, 0, 9, "a", faults, "gabled", 3.0)
+    assert (top[..., 2] == 9.0).all()
+    assert faults.rows() == [("roof of shape gabled, made flat", 1, "a")]
+
+
+def test_streets_have_width_and_sidewalks(tmp_path):
+    osm = OsmWriter()
+    osm.box(-60, 20, 120, 10, building="yes")
+    line = [(-50, 0), (50, 0)]
+    road = osm.way(line, highway="tertiary", lanes="2", sidewalk="left")
+    osm.way([(0, -50), (0, 15)], highway="footway", width="3")
+    osm.way([(-50, 8), (50, 8)], highway="primary", tunnel="yes")
+    osm.way([(-50, 9), (50, 9)], railway="rail")
+    _, found = read(osm.write(tmp_path / "city.osm"))
+    kinds = {one.kind for one in found.values()}
+    assert kinds == {"Building", "Road", "Sidewalk"}
+    low, high = bounds(found[f"road_w{road}"])
+    assert high[1] - low[1] == pytest.approx(6.5, abs=0.01)
+    middle = (high[1] + low[1]) / 2
+    strip_low, strip_high = bounds(found[f"walk_w{road}_l"])
+    assert strip_low[1] == pytest.approx(middle + 3.25, abs=0.01)
+    assert strip_high[1] == pytest.approx(middle + 5.25, abs=0.01)
+    # A path ends at the street that it crosses.
+    (path,) = (
+        one
+        for name, one in found.items()
+        if one.kind == "Sidewalk" and not name.endswith("_l")
+    )
+    xy = path.triangles.reshape(-1, 3)[:, 1] - middle
+    assert not ((xy > -3.2) & (xy < 3.2)).any()
+
+
+def test_trees_water_and_hedges(tmp_path):
+    osm = OsmWriter()
+    osm.box(0, 0, 10, 10, building="yes")
+    number = osm.node(30, 30, natural="tree", height="9")
+    water = osm.box(40, 0, 10, 10, natural="water")
+    hedge = osm.way([(-30, 0), (-30, 20)], barrier="hedge", height="1.5")
+    _, found = read(osm.write(tmp_path / "city.osm"))
+    tree = found[f"tree_n{number}"].structure
+    assert tree.semantic_class == "vegetation"
+    tops = [
+        tree.model.meshes[part.shape.mesh].vertices[:, 2].max()
+        * part.shape.scale[2]
+        for part in tree.model.parts
+    ]
+    assert max(tops) == pytest.approx(9.0, abs=0.02)
+    assert found[f"land_w{water}"].kind == "WaterBody"
+    assert bounds(found[f"hedge_w{hedge}"])[1][2] == 1.5
+
+
+@pytest.mark.parametrize(
+    ("text", "metres"),
+    [
+        ("12", 12.0),
+        ("12.5 m", 12.5),
+        ("12,5", 12.5),
+        ("40'", 12.192),
+        ("5'6\"", 1.6764),
+        ("tall", None),
+        ("1e300", None),
+        ("99999", None),
+        (None, None),
+    ],
+)
+def test_lengths(text, metres):
+    expected = metres if metres is None else pytest.approx(metres)
+    assert length(text) == expected
+
+
+def test_heights_widths_and_sides():
+    assert heights({"building:levels": "4"}) == (0.0, 12.0, 0.0)
+    roof = {"building:levels": "2", "roof:shape": "gabled"}
+    assert heights(roof) == (0.0, 9.0, 3.0)
+    assert heights({"height": "0"})[1] > 0.0
+    low, high, _ = heights({"height": "5", "min_height": "50"})
+    assert low < high
+    assert street_width({"highway": "residential", "oneway": "yes"}) < 6.5
+    assert street_width({"highway": "primary_link", "width": "5"}) == 5.0
+    assert street_width({"highway": "footway"}) is None
+    assert sidewalk_sides({"sidewalk": "right"}) == (False, True)
+
+
+BOMB = """<?xml version="1.0"?>
+<!DOCTYPE osm [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;">]>
+<osm version="0.6"><node id="1" lat="0" lon="0"><tag k="b" v="&b;"/></node>
+</osm>"""
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("", "city.osm: "),
+        ("<osm", "city.osm: "),
+        ('<osm version="0.6"></osm>', "no building in it"),
+        (BOMB, "city.osm: "),
+        ("\x00\x01", "city.osm: "),
+    ],
+)
+def test_files_that_are_none(tmp_path, text, fault):
+    path = tmp_path / "city.osm"
+    path.write_text(text)
+    with pytest.raises(InputError) as info:
+        import_openstreetmap(path, None)
+    assert fault in str(info.value)
+    assert "\n" not in str(info.value)
+
+
+def test_half_a_country_is_refused(tmp_path):
+    osm = OsmWriter()
+    osm.box(0, 0, 10, 10, building="yes")
+    osm.box(30_000, 0, 10, 10, building="yes")
+    with pytest.raises(InputError, match="30 km across"):
+        import_openstreetmap(osm.write(tmp_path / "city.osm"), None)
+
+
+def test_no_such_file(tmp_path):
+    with pytest.raises(InputError, match="no such file"):
+        import_openstreetmap(tmp_path / "none.osm", None)
