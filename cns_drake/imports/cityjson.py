@@ -18,6 +18,7 @@ import numpy as np
 
 from cns_drake.imports.import_faults import ImportFaults
 from evaluation.support.errors import InputError
+from evaluation.support.files import check_regular
 
 # A face: the corners (N, 3) of its outer ring, then those of its holes.
 Face = list[np.ndarray]
@@ -118,6 +119,7 @@ def read_cityjson(path: Path) -> CityFile:
 
 def _documents(path: Path) -> Iterator[tuple[int, dict]]:
     """Yields line number (0: the whole file) and JSON object."""
+    check_regular(path)
     try:
         if path.suffix == ".jsonl":
             with path.open(encoding="utf-8") as stream:
@@ -227,7 +229,8 @@ def _vertices(document: dict, transform: object, where: str) -> np.ndarray:
         move = _numbers(
             [transform.get("translate")], f"{where}: transform.translate"
         )
-        points = points * scale + move
+        with np.errstate(over="ignore", invalid="ignore"):
+            points = points * scale + move
     if not (np.abs(points) <= _FARTHEST).all():  # Nor is NaN a place.
         raise InputError(
             f"{where}: vertices: a coordinate beyond {_FARTHEST:g} m"
@@ -268,8 +271,9 @@ class _Templates:
         (reference,) = instance["boundaries"]
         X = np.array(instance["transformationMatrix"], dtype=np.float64)
         X = X.reshape(4, 4)
-        placed = self.points @ X[:3, :3].T + X[:3, 3]
-        if reference < 0 or not np.isfinite(placed).all():
+        with np.errstate(over="ignore", invalid="ignore"):
+            placed = self.points @ X[:3, :3].T + X[:3, 3]
+        if reference < 0 or not (np.abs(placed) <= _FARTHEST).all():
             raise ValueError
         return template, placed + self.vertices[reference]
 

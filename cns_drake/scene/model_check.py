@@ -21,6 +21,8 @@ from evaluation.support.files import read_bytes
 
 _MODELS = (".sdf", ".urdf")
 _LONGEST_NAME = 1000
+# As far as the parser of libsdformat goes.
+_DEEPEST = 100
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 # Shape -> what gives its size, and how many numbers each of these has.
 _SIZES = {
@@ -103,6 +105,8 @@ class _ModelCheck:
 
     def _start(self, name: str, attributes: dict[str, str]) -> None:
         line = self._parser.CurrentLineNumber
+        if len(self._open) >= _DEEPEST:
+            self._refuse(f"nested more than {_DEEPEST} deep")
         if self._open:
             self._open[-1].children[name] += 1
         self._open.append(_Element(name, line, dict(attributes)))

@@ -16,6 +16,7 @@ from mcap_bytes import write_mcap
 import mulran_drive
 import numpy as np
 from small_city import PLAN, ROADS, STAGES
+from small_cityjson import CityWriter
 from small_map import box_visual, world_text
 import yaml
 
@@ -23,6 +24,8 @@ from cns_drake.city.generation.city_structures import make_city, meshes_of
 from cns_drake.city.plan.city_plan import load_plan
 from cns_drake.city.plan.stages import load_stages
 from cns_drake.export.exporting import export_sequence
+from cns_drake.imports.cityjson import read_cityjson
+from cns_drake.imports.import_structures import import_structures
 from cns_drake.pictures.stage_pictures import load_views
 from cns_drake.recording.frame_clock import FRAME_PERIOD
 from cns_drake.recording.recording_folder import RecordingFolder
@@ -295,6 +298,18 @@ def _read_drive(folder: Path):
     return _read_sequence(folder / "drive")
 
 
+def _write_cityjson(folder: Path) -> None:
+    city = CityWriter("2.0")
+    city.box("a", 10.0, -5.0, (4.0, 3.0, 2.0), z=0.5)
+    city.box("b", 30.0, 8.0, (9.0, 5.0, 6.0))
+    city.write(folder / "city.json")
+
+
+def _read_cityjson(folder: Path) -> None:
+    city = read_cityjson(folder / "city.json")
+    import_structures(city, np.zeros(3), lod=None, year_attribute=None)
+
+
 _TOWN = ("roads.yaml", "stage_01.sdf", "structures.csv", "wedge.obj")
 
 TARGETS = (
@@ -344,6 +359,7 @@ TARGETS = (
         "cns", 7, _export("cns"), ("cns/**/*",),
         lambda folder: _read_sequence(folder / "cns" / "Town" / "07"),
     ),
+    Target("cityjson", 8, _write_cityjson, ("city.json",), _read_cityjson),
     # Well-formed parts that contradict each other.
     Target(
         "recording lies", 8, _write_recording, ("town_07/*.mcap",),

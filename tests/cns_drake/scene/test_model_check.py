@@ -105,6 +105,7 @@ def test_other_contradictions(tmp_path, geometry, fault):
         ("body", "b" * 100_000, "name of 100000 letters"),
         ('"city"', f'"{"c" * 100_000}"', "name of 100000 letters"),
         ("<sdf", "<!DOCTYPE a><sdf", "document type"),
+        ("</sdf>", "<a>" * 100_000 + "</a>" * 100_000 + "</sdf>", "nested"),
         ("</sdf>", "", "no element|unclosed|mismatched"),
     ],
 )
