@@ -46,6 +46,16 @@ class Ground:
             + u * v * z[r + 1, c + 1]
         )
 
+    def below(self, points: np.ndarray) -> Ground:
+        """Returns a ground that lies nowhere above some points (N, 3) [m]."""
+        z = self.z.copy()
+        c = ((points[:, 0] - self.xs[0]) // CELL).astype(int)
+        r = ((points[:, 1] - self.ys[0]) // CELL).astype(int)
+        for row in (r, r + 1):
+            for column in (c, c + 1):
+                np.minimum.at(z, (row, column), points[:, 2])
+        return Ground(self.xs, self.ys, z)
+
     def to_mesh(self) -> Mesh:
         """Returns the surface, with two triangles a cell."""
         x, y = np.meshgrid(self.xs, self.ys)

@@ -29,7 +29,7 @@ from cns_drake.imports.building_years import (
 )
 from cns_drake.imports.drive_search import FreeDrive, find_drives
 from cns_drake.imports.foreign_city import ForeignCity, Imported
-from cns_drake.imports.free_space import find_free_space
+from cns_drake.imports.free_space import find_free_space, surface_samples
 from cns_drake.imports.import_ground import Ground, feet_of, guess_ground
 from cns_drake.imports.import_structures import import_cityjson
 from cns_drake.imports.openstreetmap import import_openstreetmap
@@ -46,6 +46,8 @@ _SPEEDS = {
 }
 # Of flat things on the ground every such corner helps to find its height.
 _EVERY_CORNER = 7
+# Between the points of a surface that the ground must not hide [m].
+_SURFACE_SPACING = 2.0
 
 
 @dataclass(frozen=True)
@@ -221,9 +223,16 @@ def _bottom(kept: Sequence[Imported], ground: Ground) -> list[Structure]:
     name = "ground"
     while name in taken:
         name += "_"
+    # Streets and water are to be seen, and not the guess above them.
+    told = [
+        surface_samples(one.triangles, _SURFACE_SPACING)
+        for one in kept
+        if one.is_ground
+    ]
+    lowered = ground.below(np.concatenate([np.zeros((0, 3)), *told]))
     model = Model(
         (Part("surface", MeshShape(name)),),
-        {name: ground.to_mesh()},
+        {name: lowered.to_mesh()},
         Point(0.0, 0.0).buffer(1.0),
     )
     return [Structure(name, "terrain", model, (0.0, 0.0, 0.0))]
