@@ -6,6 +6,8 @@ the two: few rays then have to be cast on the shapes themselves.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from cns_drake.ray_casting.ray_groups import RayGroup
@@ -29,6 +31,7 @@ _MARGIN = 0.005
 _GAP = 1e-3
 
 
+@lru_cache(maxsize=1000)
 def circumscribe(surface: CurvedSurface) -> TriangleSurface:
     """Returns a polyhedron that contains a curved shape.
 

@@ -80,3 +80,10 @@ def load() -> ctypes.CDLL:
         function = getattr(embree, name)
         function.restype, function.argtypes = result, arguments
     return embree
+
+
+def address_of(function: object) -> int:
+    """Returns where a function of Embree's is, for compiled code."""
+    address = ctypes.cast(function, ctypes.c_void_p).value  # type: ignore[arg-type]  # A function is a pointer.
+    assert address is not None
+    return address

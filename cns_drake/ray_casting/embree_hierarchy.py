@@ -17,6 +17,7 @@ from cns_drake.ray_casting.embree_packets import (
     Tree,
     cast_packets,
 )
+from cns_drake.ray_casting.embree_placing import place_instances
 from cns_drake.ray_casting.embree_primitives import ALL, Primitives
 from cns_drake.ray_casting.ray_groups import Member, RayGroup
 from cns_drake.ray_casting.rays import Hits, Rays
@@ -104,11 +105,9 @@ class EmbreeHierarchy:
         self._arguments = embree.IntersectArguments(
             embree.COHERENT_RAYS, embree.INVALID_ID
         )
-        address = ctypes.cast(self._lib.rtcIntersect16, ctypes.c_void_p).value
-        assert address is not None
         nothing = _Built(0, ())
         self._tree = Tree(
-            address,
+            embree.address_of(self._lib.rtcIntersect16),
             self._built[fixed[0]].scene if fixed else 0,
             self._top,
             ctypes.addressof(self._arguments),
@@ -131,19 +130,21 @@ class EmbreeHierarchy:
     def place(self, rows: Collection[int]) -> None:
         """Moves groups to where their `X_OL` says."""
         moved = [row for row in rows if row in self._instances]
+        still = [row for row in moved if self._groups[row].motion is None]
         for row in moved:
             handle = self._instances[row]
             if self._groups[row].motion is not None:
                 self._set_motion(row, handle)
-                continue
-            if row in self._in_motion:
+            elif row in self._in_motion:
                 self._lib.rtcSetGeometryTimeStepCount(handle, 1)
                 self._in_motion.remove(row)
-            matrix = np.ascontiguousarray(self._groups[row].X_OL, np.float32)
-            self._lib.rtcSetGeometryTransform(
-                handle, 0, embree.FLOAT3X4_ROW_MAJOR, matrix.ctypes.data
+        if still:
+            place_instances(
+                embree.address_of(self._lib.rtcSetGeometryTransform),
+                embree.address_of(self._lib.rtcCommitGeometry),
+                np.array([self._instances[row] for row in still], np.uintp),
+                np.array([self._groups[row].X_OL for row in still], np.float32),
             )
-            self._lib.rtcCommitGeometry(handle)
         if moved:
             self._lib.rtcCommitScene(self._top)
 

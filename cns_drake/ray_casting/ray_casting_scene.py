@@ -22,6 +22,7 @@ from cns_drake.ray_casting.ray_groups import (
     NO_MOTIONS,
     RayGroup,
     group_geometries,
+    place_all,
     take_over,
 )
 from cns_drake.ray_casting.rays import Hits, Rays
@@ -110,6 +111,7 @@ class RayCastingScene:
             for row, group in enumerate(self._groups)
             if group.frame_id is not None
         ]
+        self._X_FLs = np.array([self._groups[row].X_FL for row in self._moving])
 
     def set_frame_poses(
         self,
@@ -122,9 +124,10 @@ class RayCastingScene:
             calc_X_WF: gives the pose of a frame in the world.
             motions: of the frames that go on moving while rays are cast.
         """
-        for row in self._moving:
-            self._groups[row].place(self._p_WO, calc_X_WF, motions)
         if self._moving:
+            groups = [self._groups[row] for row in self._moving]
+            X_FLs, p_WO = self._X_FLs, self._p_WO
+            place_all(groups, X_FLs, p_WO, calc_X_WF, motions)
             self._scene.place(self._moving)
 
     def cast_rays(

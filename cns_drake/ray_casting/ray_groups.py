@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -164,6 +164,35 @@ def group_geometries(
                 RayGroup(frame_id, X_FL.GetAsMatrix4(), rest, frame_id is None)
             )
     return p_WO, groups + ellipsoids + half_spaces
+
+
+def place_all(
+    groups: Sequence[RayGroup],
+    X_FLs: np.ndarray,
+    p_WO: np.ndarray,
+    calc_X_WF: Callable[[FrameId], RigidTransform],
+    motions: Mapping[FrameId, Motion] = NO_MOTIONS,
+) -> None:
+    """Does what `RayGroup.place` does for groups on frames, all at once.
+
+    Args:
+        groups: N of them.
+        X_FLs: (N, 4, 4) their `X_FL`.
+        p_WO: the scene's origin.
+        calc_X_WF: gives the pose of a frame in the world.
+        motions: of the frames that move during the turn.
+    """
+    frames = [group.frame_id for group in groups]
+    X_WFs = np.array(
+        [calc_X_WF(f).GetAsMatrix4() for f in frames if f is not None]
+    )
+    X_OLs = (X_WFs @ X_FLs)[:, :3]
+    X_OLs[:, :, 3] -= p_WO
+    for group, frame_id, X_OL in zip(groups, frames, X_OLs, strict=True):
+        group.X_OL = X_OL
+        group.motion = None
+        if motions and frame_id is not None:
+            group.motion = motions.get(frame_id)
 
 
 def take_over(groups: list[RayGroup], previous: Iterable[RayGroup]) -> None:

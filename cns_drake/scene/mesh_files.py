@@ -106,7 +106,7 @@ class MeshFiles:
 def mesh_key(source: MeshSource) -> object:
     """Returns what two sources have in common if they are the same mesh."""
     if source.is_path():
-        return Path(source.path())
+        return str(source.path())
     mesh = source.in_memory()
     files = {"": mesh.mesh_file, **mesh.supporting_files}
     return tuple(
