@@ -3,9 +3,9 @@
 A city that decays from a place outwards: each member of a family lacks the
 buildings and plants nearest to that place, a given part of them all; or of
 what an earlier stage lacks, which makes stages between the two. Members with
-more missing lack all that those with less lack. Other draws of the city,
-routes by lot and other LiDARs multiply the family. Every member is a scenario
-of its own.
+more missing lack all that those with less lack. Besides, structures of chosen
+classes may be missing here and there. Other draws of the city, routes by lot
+and other LiDARs multiply the family. Every member is a scenario of its own.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ import yaml
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import Route
 from cns_drake.roads.route_drawing import draw_route
+from cns_drake.scenarios.scattered_loss import draw_losses, is_on_a_lot
 from cns_drake.scenarios.scenario import LidarConfig, Scenario, load_scenario
 from cns_drake.scenarios.shipped import shipped_sequences
 from cns_drake.scene.world import load_world, structures_in
@@ -108,7 +109,10 @@ class Family(_Model):
         missing: parts of the buildings and plants, or of what `towards`
             lacks, that are missing, each from 0 to 1; or {from, to, count}
             for evenly spread ones.
-        seeds: for each of these, another place from which the city decays.
+        scattered: class -> part of its structures that is missing besides, by
+            lot.
+        seeds: for each of these, another place from which the city decays,
+            and another lot.
         city_seeds: for each of these, another draw of the city along the
             same streets, in place of the map as it is.
         routes: routes by lot in place of the base's.
@@ -121,6 +125,7 @@ class Family(_Model):
     missing: Annotated[tuple[_Part, ...], BeforeValidator(_spread)] = Field(
         default=(0.0,), min_length=1
     )
+    scattered: dict[str, _Part] = Field(default_factory=dict)
     seeds: tuple[_Seed, ...] = Field(default=(0,), min_length=1)
     city_seeds: Annotated[
         tuple[_Seed, ...], AfterValidator(_without_doubles)
@@ -209,6 +214,13 @@ def vary(
         for city_seed, city in cities.items()
         for seed in family.seeds
     }
+    losses = {
+        (city_seed, seed): draw_losses(
+            city.map_folder / "structures.csv", family.scattered, seed, source
+        )
+        for city_seed, city in cities.items()
+        for seed in family.seeds
+    }
     members = []
     for (city_seed, city), part, seed, (route_label, route), unit in product(
         cities.items(), family.missing, family.seeds, routes, units
@@ -217,14 +229,19 @@ def vary(
         labels = [base.name, f"m{round(1000 * part):03d}", f"s{seed}"]
         labels += [label for label in (route_label, preset) if label]
         title = f"{100 * part:.1f} % of {what} missing"
+        if family.scattered:
+            title += f", others by lot {seed}"
         if city_seed is not None:
             labels.insert(1, f"c{city_seed}")
             title += f", in the city as seed {city_seed} draws it"
         order = orders[city_seed, seed]
+        missing = losses[city_seed, seed].union(
+            order[: round(part * len(order))]
+        )
         update: dict[str, object] = {
             "name": "_".join(labels).replace("-", "_"),
             "stage": stage,
-            "without": tuple(sorted(order[: round(part * len(order))])),
+            "without": tuple(sorted(missing)),
             "title": title,
             "lidars": lidars,
         }
@@ -331,12 +348,6 @@ def _difference(
     return frozenset(difference)
 
 
-def _is_on_a_lot(row: Mapping[str, str]) -> bool:
-    """Whether a structure stands on a lot only until that is built on."""
-    tags = (row.get("tags") or "").split()
-    return "_lot_" in row["name"] and "lot" in tags
-
-
 def _decay_order(
     table: Path, seed: int, removable: Set[str] | None
 ) -> list[str]:
@@ -356,7 +367,7 @@ def _decay_order(
         row
         for _, row in read_records(table, ("name", "class"))
         if (
-            row["class"] in _REMOVABLE and not _is_on_a_lot(row)
+            row["class"] in _REMOVABLE and not is_on_a_lot(row)
             if removable is None
             else row["name"] in removable
         )

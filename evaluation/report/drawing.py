@@ -17,9 +17,9 @@ METHOD_STYLES = {
     "btc": ("#D55E00", "--", "s"),
     "scan-context++": ("#009E73", "-.", "^"),
     "solid": ("#CC79A7", ":", "D"),
+    "layered-overlap": ("#E69F00", "-", "v"),
 }
 _OTHER_STYLES = (
-    ("#E69F00", "-", "v"),
     ("#56B4E9", "--", "P"),
     ("#000000", "-.", "X"),
 )

@@ -18,12 +18,13 @@ from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.report import paper
 from evaluation.report.tables import Table, ranked
 
-# The order of the paper, and how it writes the names.
+# The order of the paper, and how it writes the names; ours after them.
 _TITLES = {
     "scan-context++": "Scan Context++",
     "solid": "SOLiD",
     "ring++": "RING++",
     "btc": "BTC",
+    "layered-overlap": "Layered overlap",
 }
 
 
@@ -52,7 +53,7 @@ def is_of_paper(result: RecognitionResult) -> bool:
     """Tells whether the paper has such a number: map, method and protocol."""
     return (
         result.pair[0] in paper.city_names()
-        and result.method in _TITLES
+        and result.method in paper.method_names()
         and paper.is_protocol(result.method, result.outcome.protocol)
     )
 
@@ -169,6 +170,8 @@ def recognition_table(
         mode: in which methods are counted; None for that which the paper
             seems to have used for each.
     """
+    if mode is None:
+        results = [r for r in results if r.method in paper.method_names()]
     methods = in_paper_order(result.method for result in results)
     names = ("AUC", "R@1", "F1")
     tcr = symmetric_changes(changes)

@@ -51,6 +51,7 @@ TABLES = [
             ("### SOLiD", "solid"),
             ("### RING++", "ring++"),
             ("### BTC", "btc"),
+            ("### Layered overlap", "layered-overlap"),
         ]
     ),
 ]

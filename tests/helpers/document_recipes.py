@@ -343,6 +343,20 @@ RECIPES = {
         after=("family trend",),
         prints=("simulated/trend.csv",),
     ),
+    "scattered losses": Recipe(
+        ".venv/bin/cns-drake generate --vary worlds/downtown/hard_database",
+        changes=(
+            ("worlds/downtown/hard_database.yaml", "family.yaml --frames 60"),
+            (
+                "--vary worlds/downtown/hard_query.yaml",
+                "town/sequence_02.yaml --frames 60",
+            ),
+            ("downtown_01_m000_s1", "town_01_m000_s0"),
+            ("downtown_04_m000_s2", "town_02"),
+        ),
+        after=("family", "start a city"),
+        prints=("hard/town_02", "AUC"),
+    ),
     "cleared city": Recipe(
         ".venv/bin/cns-drake generate worlds/metropolis/cleared_01.yaml",
         changes=(

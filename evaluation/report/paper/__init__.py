@@ -49,6 +49,12 @@ def city_names() -> frozenset[str]:
 
 
 @cache
+def method_names() -> frozenset[str]:
+    """Returns the methods that the paper ran."""
+    return frozenset(key[3] for key in recognition_values())
+
+
+@cache
 def tcr_values() -> dict[tuple[str, str, str], float]:
     """Returns (map, sequence, later sequence) -> TCR_sym."""
     return {

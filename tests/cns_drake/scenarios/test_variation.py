@@ -281,3 +281,34 @@ def test_a_map_without_a_plan_has_no_other_city(tmp_path, town, missing):
             city_seeds=[1],
         )
     assert "\n" not in str(error.value)
+
+
+def test_structures_missing_here_and_there(tmp_path):
+    parts = {"pole": 0.5, "building": 0.25}
+    one, other = family(tmp_path, scattered=parts, seeds=[0, 1])
+    (more,) = family(tmp_path, scattered={"pole": 0.75}, seeds=[0])
+    kinds = {name: kind for name, (kind, *_) in places().items()}
+    for kind, part in parts.items():
+        names = {n for n in kinds if kinds[n] == kind and "_lot_" not in n}
+        gone = [set(m.without) & names for m in (one, other)]
+        assert [len(g) for g in gone] == [round(part * len(names))] * 2
+        assert gone[0] != gone[1]
+    assert {kinds[name] for name in one.without} == set(parts)
+    # More of one class: all that less lacks of it, whatever else is missing.
+    poles = {name for name in one.without if kinds[name] == "pole"}
+    assert poles < set(more.without)
+
+
+def test_a_class_that_is_not_there(tmp_path):
+    with pytest.raises(InputError, match="scattered: no 'palm'"):
+        family(tmp_path, scattered={"palm": 0.5})
+
+
+@pytest.mark.parametrize("name", ["hard", "hard2"])
+def test_shipped_families_with_losses(name):
+    folder = shipped_maps()["downtown"]
+    (database,) = load_family(folder / f"{name}_database.yaml")
+    (query,) = load_family(folder / f"{name}_query.yaml")
+    assert (database.stage, query.stage) == ("04", "04")
+    assert set(database.without) - set(query.without)
+    assert set(query.without) - set(database.without)

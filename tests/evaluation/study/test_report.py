@@ -206,7 +206,14 @@ def test_own_method_beside_the_others(recordings, tmp_path, monkeypatch):
     studies.report(recordings, tmp_path / "out", choices)
     rows = read_csv(tmp_path / "out" / "place_recognition.csv")
     methods = list(dict.fromkeys(row["method"] for row in rows))
-    assert methods == ["btc", "ring++", "scan-context++", "solid", "counting"]
+    assert methods == [
+        "btc",
+        "layered-overlap",
+        "ring++",
+        "scan-context++",
+        "solid",
+        "counting",
+    ]
     for name in ("report.md", "report.html"):
         assert "counting" in (tmp_path / "out" / name).read_text()
 
@@ -230,7 +237,7 @@ def test_a_city_of_one_s_own_without_a_control(tmp_path):
         drive(tmp_path / "in" / f"town_{stage}", stage, route, city="town")
     path = studies.report(tmp_path / "in", tmp_path / "out")
     rows = read_csv(path.with_name("survival.csv"))
-    assert len(rows) == 4
+    assert len(rows) == 5
     for row in rows:
         assert row["auc_unchanged"] == row["kept"] == row["control"] == ""
         assert 0.0 <= float(row["auc_changed"]) <= 1.0

@@ -1,0 +1,49 @@
+"""Structures of a city that are missing here and there, by lot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from evaluation.support.csv_files import read_records
+from evaluation.support.errors import InputError
+
+
+def is_on_a_lot(row: Mapping[str, str]) -> bool:
+    """Whether a structure stands on a lot only until that is built on."""
+    tags = (row.get("tags") or "").split()
+    return "_lot_" in row["name"] and "lot" in tags
+
+
+def draw_losses(
+    table: Path, parts: Mapping[str, float], seed: int, source: object
+) -> frozenset[str]:
+    """Draws which structures are missing, each class by a lot of its own.
+
+    A part that is greater takes all that a smaller one takes.
+
+    Args:
+        table: of all structures.
+        parts: class -> part of its structures that is missing, 0 to 1.
+        seed: of the draw.
+        source: the file that errors name.
+
+    Raises:
+        InputError: the table cannot be read or has no structure of a class.
+    """
+    rows = [
+        row
+        for _, row in read_records(table, ("name", "class"))
+        if not is_on_a_lot(row)
+    ]
+    missing: set[str] = set()
+    for kind, part in parts.items():
+        names = sorted(row["name"] for row in rows if row["class"] == kind)
+        if not names:
+            raise InputError(f"{source}: scattered: no {kind!r} in {table}")
+        rng = np.random.default_rng([seed, *kind.encode()])
+        order = rng.permutation(len(names))
+        missing.update(names[k] for k in order[: round(part * len(names))])
+    return frozenset(missing)

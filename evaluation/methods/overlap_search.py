@@ -1,0 +1,190 @@
+"""Search for the pose at which two maps of bits overlap most.
+
+First on coarse maps, a word a row, of one query against many places; then
+cell by cell, of one query against one place.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from evaluation.methods.overlap_bits import UNIT_BITS, WORD, population
+from evaluation.methods.overlap_layers import GRID
+from evaluation.support.compiled import compiled
+
+
+@compiled
+def best_overlaps(
+    queries: np.ndarray,
+    places: np.ndarray,
+    weights: np.ndarray,
+    shifts: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns how much of a query places overlap at most, at each heading.
+
+    Args:
+        queries: (H, C, S, R) uint64: at H headings and C shifts along the
+            columns' axis, S maps of R rows.
+        places: (D, S, R + 2 m) uint64, m rows without bits on either side.
+        weights: (S,) int64 of the maps.
+        shifts: (K, 2) int64 to try: by 0 to 2 m rows, and which of the C.
+
+    Returns:
+        (D, H) int64 each: the weighted count of common bits, and at which
+        shift it is found first.
+    """
+    num_headings, _, num_maps, rows = queries.shape
+    counts = np.full((len(places), num_headings), -1, np.int64)
+    found = np.zeros((len(places), num_headings), np.int64)
+    for index in range(len(places)):
+        for heading in range(num_headings):
+            for k in range(len(shifts)):
+                first, column = shifts[k]
+                total = 0
+                for one in range(num_maps):
+                    query = queries[heading, column, one]
+                    place = places[index, one, first : first + rows]
+                    common = np.uint64(0)
+                    for row in range(rows):
+                        common += population(query[row] & place[row])
+                    total += weights[one] * np.int64(common)
+                if total > counts[index, heading]:
+                    counts[index, heading] = total
+                    found[index, heading] = k
+    return counts, found
+
+
+@compiled
+def overlaps_nearby(
+    queries: np.ndarray,
+    places: np.ndarray,
+    weights: np.ndarray,
+    starts: np.ndarray,
+    reach: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns how much of a query places overlap at most near some poses.
+
+    Args:
+        queries: (H, S, R) uint64: at headings of equal steps of a full turn.
+        places: (D, S, R + 2 m) uint64, m rows without bits on either side.
+        weights: (S,) int64 of the maps.
+        starts: (N, 4) int64: which place, heading, and shift of the query
+            along rows and along columns.
+        reach: (2,) int64: how far from there to look, of heading and shifts.
+
+    Returns:
+        (N,) int64 weighted counts of common bits, and (N, 3) where they are
+        found first: heading and shifts.
+    """
+    num_headings, num_maps, rows = queries.shape
+    margin = (places.shape[2] - rows) // 2
+    counts = np.full(len(starts), -1, np.int64)
+    poses = np.zeros((len(starts), 3), np.int64)
+    for n in range(len(starts)):
+        for dt in range(-reach[0], reach[0] + 1):
+            heading = (starts[n, 1] + dt) % num_headings
+            for right in range(
+                max(starts[n, 2] - reach[1], -margin),
+                min(starts[n, 2] + reach[1], margin) + 1,
+            ):
+                for up in range(
+                    starts[n, 3] - reach[1], starts[n, 3] + reach[1] + 1
+                ):
+                    left = np.uint64(max(up, 0))
+                    back = np.uint64(max(-up, 0))
+                    total = 0
+                    for one in range(num_maps):
+                        first = margin + right
+                        query = queries[heading, one]
+                        place = places[starts[n, 0], one, first : first + rows]
+                        common = np.uint64(0)
+                        for row in range(rows):
+                            common += population(
+                                (query[row] << left >> back) & place[row]
+                            )
+                        total += weights[one] * np.int64(common)
+                    if total > counts[n]:
+                        counts[n] = total
+                        poses[n] = heading, right, up
+    return counts, poses
+
+
+@compiled
+def climb(
+    cells: np.ndarray,
+    starts: np.ndarray,
+    place: np.ndarray,
+    weights: np.ndarray,
+    turns: np.ndarray,
+    start: np.ndarray,
+    steps: np.ndarray,
+) -> np.ndarray:
+    """Climbs to the pose at which a query overlaps a place most.
+
+    Of a pose and its 26 neighbours the best becomes the next one, until none
+    is better; then steps get smaller.
+
+    Args:
+        cells: (M,) uint16 of the query.
+        starts: (layers + 1,) where its layers begin.
+        place: (layers, GRID, words) uint64, with neighbours set.
+        weights: (layers,) int64.
+        turns: (H, 2) int64 cosines and sines of equal steps of a full turn.
+        start: (3,) int64: which turn, shift along rows and along columns in
+            half cells.
+        steps: (K, 2) int64: of the turn and of the shifts, coarse to fine.
+
+    Returns:
+        (3 + layers,) int64: the pose, and the query's cells that meet some
+        of the place, in each layer.
+    """
+    num_layers = len(weights)
+    best = np.zeros(3 + num_layers, np.int64)
+    best[:3] = start
+    best[3:] = _common(cells, starts, place, turns, best)
+    for level in range(len(steps)):
+        while True:
+            centre = best.copy()
+            for dt in range(-1, 2):
+                for dr in range(-1, 2):
+                    for dc in range(-1, 2):
+                        if dt == 0 and dr == 0 and dc == 0:
+                            continue
+                        pose = centre[:3].copy()
+                        pose[0] = (pose[0] + dt * steps[level, 0]) % len(turns)
+                        pose[1] += dr * steps[level, 1]
+                        pose[2] += dc * steps[level, 1]
+                        found = _common(cells, starts, place, turns, pose)
+                        if (found * weights).sum() > (best[3:] * weights).sum():
+                            best[:3], best[3:] = pose, found
+            if (best == centre).all():
+                break
+    return best
+
+
+@compiled
+def _common(
+    cells: np.ndarray,
+    starts: np.ndarray,
+    place: np.ndarray,
+    turns: np.ndarray,
+    pose: np.ndarray,
+) -> np.ndarray:
+    """Returns how many cells of each layer meet the place's, at a pose."""
+    num_layers = len(starts) - 1
+    counts = np.zeros(num_layers, np.int64)
+    c, s = turns[pose[0], 0], turns[pose[0], 1]
+    right, up = (pose[1] + GRID) << UNIT_BITS, (pose[2] + GRID) << UNIT_BITS
+    for layer in range(num_layers):
+        bits = place[layer]
+        count = 0
+        for i in range(starts[layer], starts[layer + 1]):
+            u = 2 * (np.int64(cells[i]) >> 8) + 1 - GRID
+            v = 2 * (np.int64(cells[i]) & 255) + 1 - GRID
+            row = (c * u - s * v + right) >> (UNIT_BITS + 1)
+            column = (s * u + c * v + up) >> (UNIT_BITS + 1)
+            if 0 <= row < GRID and 0 <= column < GRID:
+                word = bits[row, column // WORD]
+                count += (word >> np.uint64(column % WORD)) & np.uint64(1)
+        counts[layer] = np.int64(count)
+    return counts
