@@ -317,9 +317,12 @@ def _make_junction(
             ends.append((last[2] + np.pi, road_name, "end", width / 2))
     if (len(ends) == 1) != entry.dead_end or not ends:
         wanted = "exactly 1 at a dead end" if entry.dead_end else "at least 2"
+        advice = ""
+        if len(ends) == 1:
+            advice = "; where traffic cannot go on, write dead_end: true"
         raise InputError(
             f"{path}: junctions.{name}: {len(ends)} road(s) end here, "
-            f"{wanted} must"
+            f"{wanted} must{advice}"
         )
     ends = sorted((h % (2 * np.pi), road, end, w) for h, road, end, w in ends)
     arms = []

@@ -110,7 +110,9 @@ def read_roads_file(path: Path | str) -> RoadsFile:
     try:
         return RoadsFile.model_validate(_with_defaults(content))
     except ValidationError as error:
-        raise InputError(describe_validation_error(path, error)) from error
+        raise InputError(
+            describe_validation_error(path, error, RoadsFile)
+        ) from error
 
 
 def _with_defaults(content: Any) -> Any:

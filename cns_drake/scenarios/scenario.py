@@ -388,7 +388,9 @@ def make_scenario(values: dict, source: object) -> Scenario:
     try:
         return Scenario.model_validate(values)
     except ValidationError as error:
-        raise InputError(describe_validation_error(source, error)) from None
+        raise InputError(
+            describe_validation_error(source, error, Scenario)
+        ) from None
 
 
 def load_scenario(name_or_file: str | Path) -> Scenario:

@@ -152,7 +152,9 @@ def load_family(path: Path, redraw: Redraw | None = None) -> list[Scenario]:
     try:
         family = Family.model_validate(values)
     except ValidationError as error:
-        raise InputError(describe_validation_error(path, error)) from None
+        raise InputError(
+            describe_validation_error(path, error, Family)
+        ) from None
     base: str | Path = family.base
     if base not in shipped_sequences():
         base = path.parent / base

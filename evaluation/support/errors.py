@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from pydantic import ValidationError
+    from collections.abc import Mapping
+
+    from pydantic import BaseModel, ValidationError
 
 _LONGEST = 2000
 
@@ -55,17 +57,40 @@ def one_line(message: object) -> str:
     return shown if len(text) <= _LONGEST else f"{shown} ..."
 
 
-def describe_validation_error(source: object, error: ValidationError) -> str:
+def describe_validation_error(
+    source: object,
+    error: ValidationError,
+    model: type[BaseModel] | None = None,
+) -> str:
     """Returns one line for the first fault that pydantic found.
 
     Args:
         source: the file or object that was validated.
         error: a `pydantic.ValidationError`.
+        model: what it was to be, which tells how a misspelt field is written.
     """
     fault = error.errors()[0]
     field = ".".join(str(part) for part in fault["loc"]) or "(top level)"
     # pydantic puts this before what our own validators say.
     message = fault["msg"].removeprefix("Value error, ")
+    message += _advice(fault, model)
     more = error.error_count() - 1
     tail = f" (and {more} more)" if more else ""
     return f"{source}: {field}: {message}{tail}"
+
+
+def _advice(fault: Mapping[str, Any], model: type[BaseModel] | None) -> str:
+    """Returns what to write instead, where that is plain."""
+    place, given = fault["loc"], fault["input"]
+    if fault["type"] == "extra_forbidden" and model is not None and place:
+        # Slow to import, and rarely needed.
+        from evaluation.support.field_names import nearest_field
+
+        name = nearest_field(model, place)
+        return f"; did you mean {name}?" if name else ""
+    is_number = isinstance(given, int | float) and not isinstance(given, bool)
+    if fault["type"] == "string_type" and is_number and place:
+        # YAML takes 02 for the number 2.
+        text = f"{given:02d}" if place[-1] == "stage" else f"{given}"
+        return f'; quote it: {place[-1]}: "{text}"'
+    return ""

@@ -308,4 +308,6 @@ def load_plan(path: Path) -> CityPlan:
     try:
         return CityPlan.model_validate(content)
     except ValidationError as error:
-        raise InputError(describe_validation_error(path, error)) from error
+        raise InputError(
+            describe_validation_error(path, error, CityPlan)
+        ) from error

@@ -148,7 +148,9 @@ def load_stages(path: Path, structures: Collection[str]) -> Stages:
     try:
         stages = Stages.model_validate(content)
     except ValidationError as error:
-        raise InputError(describe_validation_error(path, error)) from error
+        raise InputError(
+            describe_validation_error(path, error, Stages)
+        ) from error
     _check(stages, path)
     stages = _resolved(stages, _Names(path, structures))
     _check_absent_once(stages, path)
