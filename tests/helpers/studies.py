@@ -6,6 +6,7 @@ tests; processes would only make these slow.
 
 from evaluation.jobs.job_process import nothing_left
 from evaluation.jobs.running import Tell
+from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.study.assembly import assemble
 from evaluation.study.collection import find_recordings
 from evaluation.study.plan import plan_study
@@ -18,11 +19,11 @@ def do(jobs):
             job.function(*job.arguments, Tell())
 
 
-def report(recordings, output, methods=None):
+def report(recordings, output, methods=None, protocol=PAPER_PROTOCOL):
     """Returns the path of the report on a folder of recordings."""
     found = find_recordings(recordings)
-    do(plan_study(found, output, methods))
-    return assemble(found, output, methods)
+    do(plan_study(found, output, methods, protocol))
+    return assemble(found, output, methods, protocol=protocol)
 
 
 def report_files(output):
