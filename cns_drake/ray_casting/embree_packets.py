@@ -6,15 +6,15 @@ packet would cost more than its rays.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 import numpy as np
 
 from cns_drake.ray_casting.embree import INVALID_ID
+from cns_drake.ray_casting.foreign_calls import POINTER, void_call
 from evaluation.support.compiled import compiled
 
 if TYPE_CHECKING:
@@ -52,28 +52,9 @@ def _call_intersect16(
     rays: types.Type,
     arguments: types.Type,
 ) -> tuple[Any, Callable[..., Any]]:
-    """Calls the C function at an address, from compiled code.
-
-    An address that is a value, unlike a ctypes function, lets numba keep the
-    compiled loop on disk, which saves a second at every start.
-    """
+    """Calls rtcIntersect16."""
     signature = types.void(function, valid, scene, rays, arguments)
-
-    def generate(
-        context: Any,
-        builder: ir.IRBuilder,
-        signature: Any,
-        values: Sequence[ir.Value],
-    ) -> Any:
-        pointer = ir.IntType(8).as_pointer()
-        function_type = ir.FunctionType(ir.VoidType(), [pointer] * 4)
-        builder.call(
-            builder.inttoptr(values[0], function_type.as_pointer()),
-            [builder.inttoptr(value, pointer) for value in values[1:]],
-        )
-        return context.get_dummy_value()
-
-    return signature, generate
+    return signature, void_call(POINTER, POINTER, POINTER, POINTER)
 
 
 LANES = 16

@@ -11,6 +11,7 @@ from cns_drake.ray_casting import (
 from cns_drake.ray_casting import (
     ray_casting_scene as ray_casting,
 )
+from cns_drake.ray_casting.group_motion import Motion
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.scene.perception_geometry import PerceptionGeometry
 from cns_drake.scene.surfaces import (
@@ -119,3 +120,25 @@ def test_the_farthest_range_is_the_same(monkeypatch):
         for reach, expected in ((9.999, np.inf), (10.001, 10.0)):
             hits = scene.cast_rays(np.zeros(3), np.eye(3)[:1], reach)
             np.testing.assert_allclose(hits.ranges, expected, atol=1e-5)
+
+
+def test_the_same_on_what_moves_meanwhile(monkeypatch):
+    rng = np.random.default_rng(11)
+    geometries = [
+        geometry(soup(rng, 30), RigidTransform([1.0, 2.0, 0.0]), CAR),
+        geometry(EllipsoidSurface((9.0, 4.0, 6.0)), X_WF, CAR),
+    ]
+    motion = Motion(np.array([1.0, -3.0, 2.0]), np.array([9.0, 0, -4.0]), 0.1)
+    p, d = rays(rng, 4000)
+    times = rng.uniform(size=len(p))
+    found = []
+    for scene in both(geometries, monkeypatch):
+        scene.set_frame_poses(pose_of, {CAR: motion})
+        found.append(scene.cast_rays(p, d, 60.0, times=times))
+    same = found[0].geometry == found[1].geometry
+    assert same.mean() > 0.99
+    hit = same & (found[0].geometry == 0)
+    assert hit.sum() > 100
+    np.testing.assert_allclose(
+        found[0].ranges[hit], found[1].ranges[hit], atol=2e-3
+    )
