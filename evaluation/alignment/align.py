@@ -87,6 +87,7 @@ def in_one_world(
     track: Track = silent,
     *,
     hold_first: bool = False,
+    across_maps: bool = False,
 ) -> Alignment | None:
     """Aligns two drives if that is wanted.
 
@@ -96,6 +97,7 @@ def in_one_world(
         when: "auto" aligns drives whose world frames differ by name.
         track: reports progress.
         hold_first: see `align`.
+        across_maps: they may be of maps of different names.
 
     Returns:
         None if the two are left as they are.
@@ -103,7 +105,8 @@ def in_one_world(
     Raises:
         InputError: if they are to be aligned and cannot be.
     """
-    check_same_map(first, second)
+    if not across_maps:
+        check_same_map(first, second)
     differ = first.world_frame != second.world_frame
     if when == "never" or (when == "auto" and not differ):
         return None

@@ -163,6 +163,14 @@ def pr(
     parameter: _Parameters = None,
     sensor_height: _SensorHeight = 1.6,
     align: _Align = AlignName.AUTO,
+    across_maps: Annotated[
+        bool,
+        typer.Option(
+            "--across-maps",
+            help="The drives may be of maps of different names, such as"
+            " another draw of a city along the same streets.",
+        ),
+    ] = False,
     json: _Json = False,
     *,
     protocol: RetrievalProtocol,
@@ -188,12 +196,24 @@ def pr(
     places, asking = open_sequence(database), open_sequence(query)
     for drive in (places, asking):
         _tell_notes(drive)
-    alignment = in_one_world(places, asking, align.value, terminal.track)
+    alignment = in_one_world(
+        places,
+        asking,
+        align.value,
+        terminal.track,
+        across_maps=across_maps,
+    )
     if alignment is not None:
         places, asking = alignment.first, alignment.second
         terminal.note(alignment.report.to_text())
     result = place_recognition.run(
-        places, asking, chosen, mode.value, protocol, terminal.track
+        places,
+        asking,
+        chosen,
+        mode.value,
+        protocol,
+        terminal.track,
+        across_maps=across_maps,
     )
     if protocol.exclude_recent is None and is_itself:
         terminal.note(

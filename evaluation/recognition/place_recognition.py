@@ -98,14 +98,27 @@ def run(
     mode: Mode = "all",
     protocol: RetrievalProtocol = PAPER_PROTOCOL,
     track: Track = silent,
+    *,
+    across_maps: bool = False,
 ) -> PlaceRecognition:
     """Runs a method on a pair of drives.
+
+    Args:
+        database: the drive whose places are known.
+        query: the drive that asks.
+        method: that runs.
+        mode: which queries count.
+        protocol: what is asked.
+        track: reports progress.
+        across_maps: the two may be of maps of different names.
 
     Raises:
         InputError: if a sequence cannot be read, the two are not of the same
             world, the method fails, or no query has a match.
     """
-    retrieval = retrieve(database, query, method, protocol, track)
+    retrieval = retrieve(
+        database, query, method, protocol, track, across_maps=across_maps
+    )
     return judge_retrieval(
         method, database.name, query.name, retrieval, protocol, mode
     )

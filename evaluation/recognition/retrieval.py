@@ -70,6 +70,8 @@ def retrieve(
     method: Method,
     protocol: RetrievalProtocol = PAPER_PROTOCOL,
     track: Track = silent,
+    *,
+    across_maps: bool = False,
 ) -> Retrieval:
     """Asks for every query which places of the database look like it.
 
@@ -79,6 +81,7 @@ def retrieve(
         method: describes and compares.
         protocol: what is asked.
         track: reports progress.
+        across_maps: the two may be of maps of different names.
 
     Raises:
         InputError: if a sequence cannot be read, the two are not of the same
@@ -90,7 +93,7 @@ def retrieve(
         database, query = map(open_sequence, ("cns/01", "cns/02"))
         found = retrieve(database, query, make_method("solid", {}))
     """
-    check_same_world(database, query)
+    check_same_world(database, query, across_maps=across_maps)
     (places,) = describe_drive(database, [method], {"places"}, protocol, track)
     (queries,) = describe_drive(query, [method], {"queries"}, protocol, track)
     return compare(method, places, queries, protocol, track)

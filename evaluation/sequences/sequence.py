@@ -164,8 +164,15 @@ class PlacedDrive:
         return cls(sequence.name, sequence.world_frame, scenario)
 
 
-def check_same_world(first: Placed, second: Placed) -> None:
+def check_same_world(
+    first: Placed, second: Placed, *, across_maps: bool = False
+) -> None:
     """Refuses two sequences whose poses cannot be compared.
+
+    Args:
+        first: a drive.
+        second: another one.
+        across_maps: their maps may differ, if they share a frame.
 
     Raises:
         InputError: if their world frames or their maps differ by name.
@@ -175,7 +182,8 @@ def check_same_world(first: Placed, second: Placed) -> None:
             f"{second.name}: poses in frame {second.world_frame!r}, those of"
             f" {first.name} in {first.world_frame!r}"
         )
-    check_same_map(first, second)
+    if not across_maps:
+        check_same_map(first, second)
 
 
 def check_same_map(first: Placed, second: Placed) -> None:

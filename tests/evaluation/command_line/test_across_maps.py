@@ -1,0 +1,17 @@
+"""Drives of two maps are compared when told so."""
+
+import json
+
+from eval_program import assert_refused, run
+from small_towns import drive
+
+
+def test_two_draws_of_a_city(capsys, tmp_path):
+    for city, stage, route in (("town", "01", "a"), ("town_c1", "02", "b")):
+        drive(tmp_path / f"{city}_{stage}", stage, route, city=city)
+    both = ["pr", tmp_path / "town_01", tmp_path / "town_c1_02"]
+    both += ["--method", "solid", "--json"]
+    assert_refused(capsys, both, "through town_c1", "through town")
+    status, out, err = run(capsys, *both, "--across-maps")
+    assert (status, err) == (0, "")
+    assert json.loads(out)["queries_with_match"] > 0
