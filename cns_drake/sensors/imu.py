@@ -1,7 +1,6 @@
 """An ideal IMU: Drake's accelerometer and gyroscope, wired."""
 
-from __future__ import annotations
-
+# No postponed hints: the reference resolves those of a NamedTuple nowhere.
 from typing import NamedTuple
 
 from pydrake.math import RigidTransform

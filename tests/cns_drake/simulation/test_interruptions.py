@@ -91,7 +91,8 @@ def runner(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def uninterrupted(runner, tmp_path_factory):
-    output = tmp_path_factory.mktemp("uninterrupted")
+    # As deep as the others: the way to the world is recorded.
+    output = tmp_path_factory.mktemp("uninterrupted") / "0" / "0"
     assert runner.run(output) == (FRAMES, False)
     return contents(output / "tiny_01")
 

@@ -5,9 +5,8 @@ import pickle
 import numpy as np
 import pytest
 from tiny_drive import FRAMES, tiny_scenario
-import yaml
 
-from cns_drake.scenarios.scenario import make_scenario
+from cns_drake.scenarios.scenario import load_scenario
 from cns_drake.simulation.simulated_drive import SimulatedDrive
 from cns_drake.simulation.simulation import simulate
 from evaluation.sequences import open_sequence
@@ -30,8 +29,7 @@ def check_same(simulated, recorded, frames):
 
 def test_scans_and_poses_are_those_of_a_recording(short_recording):
     recorded = open_sequence(short_recording)
-    values = yaml.safe_load((short_recording / "scenario.yaml").read_text())
-    source = SimulatedDrive(make_scenario(values, "test"))
+    source = SimulatedDrive(load_scenario(short_recording / "scenario.yaml"))
     simulated = pickle.loads(pickle.dumps(source))()
     check_same(simulated, recorded, [0, 1, 2, 17, 39])
     keys = ("map", "stage", "route")

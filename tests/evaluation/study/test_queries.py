@@ -9,6 +9,8 @@ import pytest
 from small_towns import drive
 import studies
 
+from evaluation.methods import known_methods
+
 pytestmark = pytest.mark.slow
 
 
@@ -83,7 +85,7 @@ def best_f1(rows):
 def test_place_recognition(report):
     groups = read_queries(report / "queries.csv")
     table = read(report / "place_recognition.csv")
-    assert len(table) == 2 * len(groups) == 16
+    assert len(table) == 2 * len(groups) == 4 * len(known_methods())
     for row in table:
         pair = row["DB → query"].split(" → ")
         rows = groups[(row["map"], *pair, row["method"])]

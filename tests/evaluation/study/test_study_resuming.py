@@ -6,12 +6,15 @@ import pytest
 from small_towns import drive
 import studies
 
+from evaluation.methods import known_methods
 from evaluation.study.collection import find_recordings
 from evaluation.study.measurements import recognise_places
 from evaluation.study.plan import plan_study
 from evaluation.study.surveys import survey_drive
 
 pytestmark = pytest.mark.slow
+
+METHODS = len(known_methods())
 
 
 def measuring_jobs(recordings, output):
@@ -37,8 +40,8 @@ def test_every_attempt_gets_further(tmp_path, monkeypatch):
     whole, broken = tmp_path / "whole", tmp_path / "broken"
     studies.do(measuring_jobs(tmp_path / "in", whole))
     expected = parts(whole)
-    # Of each drive two maps and four descriptions, and four results.
-    assert len(expected) == 2 * 6 + 4
+    # Of each drive two maps and, of each method, a description; and results.
+    assert len(expected) == 2 * (2 + METHODS) + METHODS
     replace = os.replace
 
     def replace_and_stop(source, target):
@@ -71,4 +74,4 @@ def test_a_new_recording_under_an_old_name(tmp_path):
     assert after.keys() == before.keys()
     kept = {path for path in after if after[path] == before[path]}
     assert {path.parent.name for path in kept} == {"metropolis_04"}
-    assert len(kept) == 6
+    assert len(kept) == 2 + METHODS
