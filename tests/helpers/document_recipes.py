@@ -429,6 +429,12 @@ RECIPES = {
         after=("exports",),
         prints=("TCR_sym", "ring++"),
     ),
+    "own data, layered overlap": Recipe(
+        ".venv/bin/cns-eval pr kitti",
+        changes=(("sequences/04", "sequences/02"),),
+        after=("exports",),
+        prints=("layered-overlap", "AUC"),
+    ),
 }
 
 # What cannot run here: how it begins, and why.
