@@ -73,7 +73,7 @@ _SensorHeight = Annotated[
 _OwnMethods = Annotated[
     list[Path] | None,
     typer.Option(
-        help="Python file that registers a method, to run besides the four;"
+        help="Python file that registers a method, to run besides the shipped ones;"
         " may be repeated."
     ),
 ]
