@@ -149,9 +149,9 @@ def effect_lines(effects: Sequence[Effect]) -> Iterator[str]:
     """Yields a table of TCR_sym, and of AUC and R@1 of each method."""
     methods = [point.method for point in effects[0].points]
     yield "  ".join(
-        [f"{'AUC/R@1':<44} TCR_sym", *(f"{m:>14}" for m in methods)]
+        [f"{'AUC/R@1':<44} TCR_sym", *(f"{m:>15}" for m in methods)]
     )
     for effect in effects:
-        numbers = [f"{p.auc:>9.3f}/{p.recall_at_1:.2f}" for p in effect.points]
+        numbers = [f"{p.auc:>10.3f}/{p.recall_at_1:.2f}" for p in effect.points]
         change = effect.points[0].tcr_sym
         yield "  ".join([f"{effect.title:<44}  {change:.4f}", *numbers])

@@ -73,7 +73,8 @@ _SensorHeight = Annotated[
 _OwnMethods = Annotated[
     list[Path] | None,
     typer.Option(
-        help="Python file that registers a method, to run besides the shipped ones;"
+        help="Python file that registers a method, to run besides the"
+        " shipped ones;"
         " may be repeated."
     ),
 ]
