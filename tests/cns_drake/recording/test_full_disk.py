@@ -68,7 +68,7 @@ def test_disks_of_any_size(tmpfs, whole):
         assert all(path.suffix == ".part" for path in folder.iterdir())
         tmpfs.filler.unlink()
         record(folder)
-        assert recorded(folder) == whole
+        assert contents(folder) == whole
         for path in folder.iterdir():
             path.unlink()
         folder.rmdir()
@@ -87,12 +87,12 @@ def test_limits_of_any_size(tmp_path, whole):
             resource.setrlimit(resource.RLIMIT_FSIZE, limits)
         assert [path.suffix for path in folder.iterdir()] == [".part"]
         assert record(folder) in {0, 16, 32, 48, BAG_FRAMES}
-        assert recorded(folder) == whole
+        assert contents(folder) == whole
     assert record(folder, BAG_FRAMES, overwrite=True) == 0
 
 
 def recorded(folder):
-    """Returns a recording's files, but that which tells the way to its world."""
+    """Returns files, but that which tells the way to the world."""
     files = contents(folder)
     del files["scenario.yaml"]
     return files
