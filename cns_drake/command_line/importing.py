@@ -60,12 +60,7 @@ def import_city(
     Writes its stages, two drives along its streets and a picture from above.
     """
     with uninterrupted():
-        from cns_drake.imports.import_map import (
-            ImportOptions,
-        )
-        from cns_drake.imports.import_map import (
-            import_city as write_map,
-        )
+        from cns_drake.imports import import_map
         from cns_drake.scenarios.sequence_table import write_table
 
     # The years that follow the first of --years come as arguments.
@@ -75,8 +70,8 @@ def import_city(
         raise InputError(f"give one file, not {' '.join(source)}")
     path = Path(paths[0])
     stages = tuple(sorted([*(years or ()), *more]))
-    options = ImportOptions(stages, year_attribute, undated, lod)
-    report = write_map(path, output, options, note)
+    options = import_map.ImportOptions(stages, year_attribute, undated, lod)
+    report = import_map.import_city(path, output, options, note)
     write_table(output, note)
     print_rows(_rows(report, options.years))
     if not report.drives:

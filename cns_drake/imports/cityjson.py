@@ -87,6 +87,22 @@ class CityFile:
     reference_system: str = ""
     faults: ImportFaults = field(default_factory=ImportFaults)
 
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Returns the least and the greatest coordinates, (3,) each [m].
+
+        Some object has a face.
+        """
+        points = np.concatenate(
+            [
+                ring
+                for one in self.objects.values()
+                for geometry in one.geometries
+                for face in geometry.faces
+                for ring in face
+            ]
+        )
+        return points.min(axis=0), points.max(axis=0)
+
 
 def read_cityjson(path: Path) -> CityFile:
     """Reads a file.
@@ -164,17 +180,13 @@ def _reference_system(document: dict, where: str) -> str:
 
 
 def _check_metres(city: CityFile, path: Path) -> None:
-    corners = [
-        ring
+    if not any(
+        geometry.faces
         for one in city.objects.values()
         for geometry in one.geometries
-        for face in geometry.faces
-        for ring in face
-    ]
-    if not corners:
+    ):
         raise InputError(f"{path}: no object has a surface")
-    points = np.concatenate(corners)
-    low, high = points.min(axis=0), points.max(axis=0)
+    low, high = city.bounds()
     within = (np.abs([low, high]) <= [180.0, 90.0, np.inf]).all()
     if within and (high - low)[:2].max() < 1.0 < (high - low)[2]:
         raise InputError(

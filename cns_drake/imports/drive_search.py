@@ -65,7 +65,7 @@ class _Graph:
         number = np.full(wide.shape, -1)
         number[wide] = np.arange(len(self.row))
         clearance = space.clearance[wide]
-        # Twice as dear at the wall as in the middle of a street.
+        # The nearer a wall, the dearer, up to four times.
         price = 1.0 + (1.0 - np.minimum(clearance / _COMFORT, 1.0)) * 3.0
         starts, ends = [], []
         for down, right in ((0, 1), (1, 0), (1, 1), (1, -1)):

@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from shapely.geometry import MultiPoint
 
 from cns_drake.city.geometry.mesh import Mesh
-from cns_drake.city.geometry.structures import Structure
+from cns_drake.city.geometry.structures import (
+    MeshShape,
+    Model,
+    Part,
+    Structure,
+)
 from cns_drake.imports.import_faults import ImportFaults
+
+Rgb = tuple[float, float, float]
+
+RED_ROOF: Rgb = (0.55, 0.30, 0.24)
+WATER: Rgb = (0.16, 0.34, 0.45)
+LAWN: Rgb = (0.42, 0.55, 0.30)
 
 
 # By identity: a city has thousands, with meshes that take long to compare.
@@ -58,7 +71,39 @@ class ForeignCity:
     faults: ImportFaults
 
 
-def triangle_mesh(triangles: np.ndarray) -> Mesh:
-    """Returns triangles (M, 3, 3) as a mesh."""
+def make_imported(
+    name: str,
+    semantic_class: str,
+    kind: str,
+    surfaces: Mapping[str, np.ndarray],
+    colours: Mapping[str, Rgb | None],
+    year: int | None = None,
+) -> Imported:
+    """Returns a structure of triangles in the world.
+
+    Args:
+        name: unique in the city.
+        semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
+        kind: type of its object.
+        surfaces: part -> its triangles (M, 3, 3) [m]; empty parts are left
+            out, not all are empty.
+        colours: part -> diffuse colour; that of the class where it has none.
+        year: in which it was built, if it is told.
+    """
+    filled = {part: some for part, some in surfaces.items() if len(some)}
+    triangles = np.concatenate(list(filled.values()))
+    model = Model(
+        tuple(
+            Part(part, MeshShape(f"{name}_{part}"), rgb=colours.get(part))
+            for part in filled
+        ),
+        {f"{name}_{part}": _to_mesh(some) for part, some in filled.items()},
+        MultiPoint(triangles.reshape(-1, 3)[:, :2]).convex_hull,
+    )
+    structure = Structure(name, semantic_class, model, (0.0, 0.0, 0.0))
+    return Imported(structure, kind, year, triangles)
+
+
+def _to_mesh(triangles: np.ndarray) -> Mesh:
     corners = np.arange(3 * len(triangles)).reshape(-1, 3)
     return Mesh(triangles.reshape(-1, 3), tuple(map(tuple, corners.tolist())))

@@ -14,7 +14,11 @@ import numpy as np
 from shapely.geometry import Point
 import yaml
 
-from cns_drake.city.generation.generate import TABLE_NAME, structure_table
+from cns_drake.city.generation.generate import (
+    MAX_STRUCTURES,
+    TABLE_NAME,
+    structure_table,
+)
 from cns_drake.city.generation.sdf import MESH_FOLDER, stage_sdf
 from cns_drake.city.geometry.structures import (
     MeshShape,
@@ -37,8 +41,6 @@ from cns_drake.imports.overview import draw_overview
 from evaluation.support.errors import InputError
 from evaluation.support.files import part_path, user_errors
 
-# Instance ids are stored as uint16; 0 means no structure.
-_MAX_STRUCTURES = 2**16 - 1
 _SPEEDS = {
     "cruise": 8.0,
     "longitudinal_acceleration": 2.0,
@@ -123,10 +125,10 @@ def import_city(
     standing = [_standing(found, k, options) for k in range(len(stages))]
     ever = {one for some in standing for one in some}
     kept = [one for one in found if one in ever]
-    if len(kept) >= _MAX_STRUCTURES:
+    if len(kept) >= MAX_STRUCTURES:
         raise InputError(
             f"{source}: {len(kept)} objects are more than instance ids can"
-            f" count ({_MAX_STRUCTURES})"
+            f" count ({MAX_STRUCTURES})"
         )
     if not kept:
         raise InputError(f"{source}: nothing stands at any stage")

@@ -7,14 +7,7 @@ from pathlib import Path
 import re
 
 import numpy as np
-from shapely.geometry import MultiPoint
 
-from cns_drake.city.geometry.structures import (
-    MeshShape,
-    Model,
-    Part,
-    Structure,
-)
 from cns_drake.imports.building_years import construction_year
 from cns_drake.imports.cityjson import (
     CityFile,
@@ -24,17 +17,18 @@ from cns_drake.imports.cityjson import (
 )
 from cns_drake.imports.faces import face_triangles
 from cns_drake.imports.foreign_city import (
+    LAWN,
+    RED_ROOF,
+    WATER,
     ForeignCity,
     Imported,
-    triangle_mesh,
+    Rgb,
+    make_imported,
 )
 
-_RED_ROOF = (0.55, 0.30, 0.24)
-_WATER = (0.16, 0.34, 0.45)
-_LAWN = (0.42, 0.55, 0.30)
 # Type -> class, and colour where that of the class would mislead. A type that
 # begins with one of these is of its kind.
-_CLASSES: tuple[tuple[str, str, tuple[float, float, float] | None], ...] = (
+_CLASSES: tuple[tuple[str, str, Rgb | None], ...] = (
     ("Building", "building", None),
     ("Bridge", "other-structure", None),
     ("Tunnel", "other-structure", None),
@@ -44,10 +38,10 @@ _CLASSES: tuple[tuple[str, str, tuple[float, float, float] | None], ...] = (
     ("TransportSquare", "road", None),
     ("Square", "road", None),
     ("Track", "road", None),
-    ("Waterway", "other-ground", _WATER),
-    ("WaterBody", "other-ground", _WATER),
+    ("Waterway", "other-ground", WATER),
+    ("WaterBody", "other-ground", WATER),
     ("LandUse", "other-ground", None),
-    ("PlantCover", "terrain", _LAWN),
+    ("PlantCover", "terrain", LAWN),
     ("SolitaryVegetationObject", "vegetation", None),
     ("TINRelief", "terrain", None),
     ("CityFurniture", "other-object", None),
@@ -65,16 +59,7 @@ def import_cityjson(
         InputError: if it cannot be used.
     """
     city = read_cityjson(path)
-    points = np.concatenate(
-        [
-            ring
-            for one in city.objects.values()
-            for geometry in one.geometries
-            for face in geometry.faces
-            for ring in face
-        ]
-    )
-    low, high = points.min(axis=0), points.max(axis=0)
+    low, high = city.bounds()
     origin = np.array([*np.round((low + high)[:2] / 2.0), np.floor(low[2])])
     return ForeignCity(
         import_structures(city, origin, lod, year_attribute),
@@ -174,29 +159,22 @@ def _make(
     for geometry in chosen:
         for kind, triangles in _triangles(geometry, root, city, origin):
             surfaces.setdefault(kind, []).append(triangles)
-    parts, meshes, every = [], {}, []
-    first = city.objects[root]
-    semantic_class, rgb = _class_of(first.kind)
-    for kind in sorted(surfaces):
-        triangles = np.concatenate(surfaces[kind])
-        if len(triangles) == 0:
-            continue
-        every.append(triangles)
-        mesh = f"{name}_{kind}"
-        meshes[mesh] = triangle_mesh(triangles)
-        colour = _RED_ROOF if kind == "roof" else rgb
-        parts.append(Part(kind, MeshShape(mesh), rgb=colour))
-    if not parts:
+    whole = {kind: np.concatenate(surfaces[kind]) for kind in sorted(surfaces)}
+    if not any(len(triangles) for triangles in whole.values()):
         city.faults.add("object without a surface, left out", root)
         return None
-    triangles = np.concatenate(every)
+    first = city.objects[root]
+    semantic_class, rgb = _class_of(first.kind)
     years = [construction_year(m.attributes, year_attribute) for m in members]
-    footprint = MultiPoint(triangles.reshape(-1, 3)[:, :2]).convex_hull
-    model = Model(tuple(parts), meshes, footprint)
-    structure = Structure(name, semantic_class, model, (0.0, 0.0, 0.0))
     known = [year for year in years if year is not None]
-    year = known[0] if known else None
-    return Imported(structure, first.kind, year, triangles)
+    return make_imported(
+        name,
+        semantic_class,
+        first.kind,
+        whole,
+        {"body": rgb, "roof": RED_ROOF},
+        known[0] if known else None,
+    )
 
 
 def _geometries(
@@ -239,7 +217,7 @@ def _volume(faces: list[np.ndarray]) -> float:
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
 
 
-def _class_of(kind: str) -> tuple[str, tuple[float, float, float] | None]:
+def _class_of(kind: str) -> tuple[str, Rgb | None]:
     for beginning, semantic_class, rgb in _CLASSES:
         if kind.startswith(beginning):
             return semantic_class, rgb

@@ -18,19 +18,17 @@ from shapely.geometry.base import BaseGeometry
 from shapely.strtree import STRtree
 from shapely.validation import make_valid
 
-from cns_drake.city.geometry.structures import (
-    MeshShape,
-    Model,
-    Part,
-    Structure,
-)
+from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.plants.vegetation import tree
 from cns_drake.imports.building_years import construction_year
 from cns_drake.imports.extrusions import extruded, flat_surface
 from cns_drake.imports.foreign_city import (
+    LAWN,
+    RED_ROOF,
+    WATER,
     ForeignCity,
     Imported,
-    triangle_mesh,
+    make_imported,
 )
 from cns_drake.imports.import_faults import ImportFaults
 from cns_drake.imports.osm_tags import (
@@ -53,9 +51,6 @@ _KERB = 0.12
 _LEAST_AREA = 0.01  # [m^2]
 _HEDGE = (0.8, 1.2)
 _WALL = (0.2, 1.6)
-_RED_ROOF = (0.55, 0.30, 0.24)
-_WATER = (0.16, 0.34, 0.45)
-_LAWN = (0.42, 0.55, 0.30)
 # A file of a whole country would not end.
 _LARGEST = 20_000.0  # [m]
 
@@ -202,28 +197,6 @@ def _sound(polygon: Polygon, name: str, faults: ImportFaults) -> list[Polygon]:
     return list(_parts(shapely.set_precision(geometry, 0.001)))
 
 
-def _structure(
-    name: str,
-    semantic_class: str,
-    surfaces: Mapping[str, np.ndarray],
-    kind: str,
-    colours: Mapping[str, tuple[float, float, float]] | None = None,
-    year: int | None = None,
-) -> Imported:
-    meshes, parts = {}, []
-    for part, triangles in surfaces.items():
-        if len(triangles):
-            mesh = f"{name}_{part}"
-            meshes[mesh] = triangle_mesh(triangles)
-            colour = (colours or {}).get(part)
-            parts.append(Part(part, MeshShape(mesh), rgb=colour))
-    every = np.concatenate(list(surfaces.values()))
-    footprint = Point(0.0, 0.0).buffer(1.0)
-    model = Model(tuple(parts), meshes, footprint)
-    structure = Structure(name, semantic_class, model, (0.0, 0.0, 0.0))
-    return Imported(structure, kind, year, every)
-
-
 def _buildings(
     told: Iterable[tuple[str, Tags, list[Polygon]]],
     local: _Local,
@@ -272,12 +245,12 @@ def _buildings(
             roofs.append(top)
         taken[name] = taken.get(name, 0) + 1
         number = f"_{taken[name]}" if taken[name] > 1 else ""
-        yield _structure(
+        yield make_imported(
             f"building_{name}{number}",
             "building",
-            {"body": np.concatenate(walls), "roof": np.concatenate(roofs)},
             "Building",
-            {"roof": _RED_ROOF},
+            {"body": np.concatenate(walls), "roof": np.concatenate(roofs)},
+            {"roof": RED_ROOF},
             construction_year(tags, year_attribute),
         )
 
@@ -320,11 +293,12 @@ def _streets(
                 for polygon in _sound(part, name, faults)
             ]
             if surface:
-                yield _structure(
+                yield make_imported(
                     f"{names}_{name}",
                     semantic_class,
-                    {"surface": np.concatenate(surface)},
                     "Road" if is_road else "Sidewalk",
+                    {"surface": np.concatenate(surface)},
+                    {},
                 )
 
 
@@ -344,14 +318,13 @@ def _lands(
             for one in _sound(local.polygon(polygon), name, faults)
         ]
         if surface:
-            colours = {"WaterBody": _WATER, "LandUse": _LAWN}
-            colour = {"surface": colours[kind]} if kind in colours else None
-            yield _structure(
+            colours = {"WaterBody": WATER, "LandUse": LAWN}
+            yield make_imported(
                 f"land_{name}",
                 semantic_class,
-                {"surface": np.concatenate(surface)},
                 kind,
-                colour,
+                {"surface": np.concatenate(surface)},
+                {"surface": colours.get(kind)},
             )
 
 
@@ -376,11 +349,12 @@ def _barriers(
             for polygon in _sound(part, name, faults)
         ]
         if solids:
-            yield _structure(
+            yield make_imported(
                 f"{kind}_{name}",
                 semantic_class,
-                {"body": np.concatenate(solids)},
                 "Barrier",
+                {"body": np.concatenate(solids)},
+                {},
             )
 
 

@@ -23,7 +23,7 @@ from evaluation.support.errors import InputError
 
 TABLE_NAME = "structures.csv"
 # Instance ids are stored as uint16; 0 means no structure.
-_MAX_STRUCTURES = 2**16 - 1
+MAX_STRUCTURES = 2**16 - 1
 
 
 def render_city(
@@ -74,11 +74,11 @@ def render_stages(
             cannot be, or the city has too many structures.
     """
     growing = GrowingCity(city.structures, stages, city.cars)
-    if len(growing.structures) > _MAX_STRUCTURES:
+    if len(growing.structures) > MAX_STRUCTURES:
         raise InputError(
             f"{source.parent / 'city.yaml'}: {len(growing.structures)} "
             "structures are more than instance ids can count "
-            f"({_MAX_STRUCTURES})"
+            f"({MAX_STRUCTURES})"
         )
     files = {TABLE_NAME: structure_table(growing.structures)}
     used: list[Structure] = []
