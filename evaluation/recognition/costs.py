@@ -12,7 +12,7 @@ import numpy as np
 
 from evaluation.methods.method import Method
 from evaluation.recognition.description import DescribedDrive
-from evaluation.recognition.scoring import rerank_places, score_places
+from evaluation.recognition.scoring import score_places
 
 
 @dataclass(frozen=True)
@@ -61,21 +61,18 @@ def measure_cost(
     describing = [_cpu_ms(method.describe, cloud) for cloud in clouds]
     places, queries = database.places, query.queries
     indexed = method.build_database(places.descriptors)
-    number = len(places.frames)
+    is_known = np.ones(len(places.frames), dtype=bool)
     rows = np.linspace(0, len(queries.frames) - 1, len(clouds)).astype(int)
 
     def ask(row: int) -> None:
         found = score_places(
             method,
             queries.descriptors[: row + 1],
+            queries.clouds[row] if queries.clouds else None,
             indexed,
-            number,
-            exhaustive=False,
+            places.clouds,
+            is_known,
         )
-        if method.rerank_best:
-            found = rerank_places(
-                method, found, queries.clouds[row], places.clouds
-            )
         if not np.isnan(found).all():
             best = int(np.nanargmax(found))
             method.relative_pose(queries.descriptors[row], indexed, best)
@@ -88,7 +85,7 @@ def measure_cost(
         points=float(np.mean([len(cloud) for cloud in clouds])),
         describe_ms=float(np.median(describing[1:])),
         query_ms=float(np.median(asking[1:])),
-        places=number,
+        places=len(places.frames),
         place_bytes=float(np.mean(sizes)),
     )
 

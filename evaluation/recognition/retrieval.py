@@ -24,7 +24,7 @@ from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,
     RetrievalProtocol,
 )
-from evaluation.recognition.scoring import rerank_places, score_places
+from evaluation.recognition.scoring import score_places
 from evaluation.sequences.sequence import Sequence, check_same_world
 from evaluation.support.progress import Track, silent
 
@@ -132,17 +132,11 @@ def compare(
         found = score_places(
             method,
             queries.descriptors[: row + 1],
+            queries.clouds[row] if queries.clouds else None,
             indexed,
-            len(places.frames),
-            # A search for the best few places of all would find those that
-            # are not known yet.
-            exhaustive=not is_known[row].all(),
+            places.clouds,
+            is_known[row],
         )
-        found = np.where(is_known[row], found, np.nan)
-        if method.rerank_best:
-            found = rerank_places(
-                method, found, queries.clouds[row], places.clouds
-            )
         scores[row] = found
         if np.isnan(found).all():
             continue

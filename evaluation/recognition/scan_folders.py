@@ -11,7 +11,7 @@ from evaluation.clouds.cloud_files import is_cloud, read_cloud
 from evaluation.geometry import points as point_arrays
 from evaluation.methods.method import Method
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.recognition.scoring import rerank_places, score_places
+from evaluation.recognition.scoring import score_places
 from evaluation.sequences.sampling import select
 from evaluation.support.errors import InputError
 from evaluation.support.files import completing
@@ -58,6 +58,7 @@ def write_scores(
             clouds.append(cloud)
         num_ignored += ignored
     places = method.build_database(descriptors)
+    is_known = np.ones(len(place_files), dtype=bool)
     queries: list = []
     with (
         completing(output) as part,
@@ -70,10 +71,14 @@ def write_scores(
             num_ignored += ignored
             queries.append(method.describe(cloud))
             values = score_places(
-                method, queries, places, len(place_files), exhaustive=True
+                method,
+                queries,
+                cloud,
+                places,
+                clouds,
+                is_known,
+                exhaustive=True,
             )
-            if method.rerank_best:
-                values = rerank_places(method, values, cloud, clouds)
             for place, value in zip(place_files, values, strict=True):
                 text = "" if np.isnan(value) else repr(float(value))
                 writer.writerow([path.stem, place.stem, text])

@@ -14,29 +14,44 @@ from evaluation.support.errors import InputError
 def score_places(
     method: Method,
     queries: Sequence[Any],
+    query_cloud: np.ndarray | None,
     database: Any,
-    num_places: int,
+    place_clouds: Sequence[np.ndarray],
+    is_known: np.ndarray,
     *,
-    exhaustive: bool,
+    exhaustive: bool = False,
 ) -> np.ndarray:
     """Returns what a method scores the last of some queries, (D,) float64.
+
+    Its second stage, if it has one, is included.
 
     Args:
         method: that described queries and places.
         queries: descriptors, from the first of the drive to the one that
             asks.
+        query_cloud: of that one; for a second stage.
         database: that `build_database` made of the places.
-        num_places: D.
+        place_clouds: of the D places; likewise.
+        is_known: (D,) bool, which places may be candidates. A search for the
+            best few of all would find others: unless all are known, every
+            place is compared.
         exhaustive: see `Method.score`.
 
     Raises:
         InputError: if the method returns anything else.
     """
-    found = method.score_in_sequence(queries, database, exhaustive=exhaustive)
-    return _checked(method, "score", found, num_places)
+    found = method.score_in_sequence(
+        queries, database, exhaustive=exhaustive or not is_known.all()
+    )
+    scores = _checked(method, "score", found, len(is_known))
+    scores = np.where(is_known, scores, np.nan)
+    if not method.rerank_best:
+        return scores
+    assert query_cloud is not None
+    return _reranked(method, scores, query_cloud, place_clouds)
 
 
-def rerank_places(
+def _reranked(
     method: Method,
     scores: np.ndarray,
     query: np.ndarray,

@@ -30,18 +30,12 @@ def pose_table(results: Sequence[RecognitionResult]) -> Table:
     """
     rows = []
     for result in by_pair_and_method(results):
-        pose = result.outcome.pose
         rows.append(
             (
                 result.map_name,
                 " → ".join(result.stages),
                 title(result.method),
-                pose.translation_median,
-                pose.translation_90,
-                pose.rotation_median_deg,
-                pose.rotation_90_deg,
-                pose.success,
-                result.metrics["all"].curve.recall_at_full_precision,
+                *_values(result),
             )
         )
     return Table(
@@ -85,19 +79,25 @@ def pose_numbers(results: Sequence[RecognitionResult]) -> Table:
     )
     rows = []
     for result in results:
-        pose = result.outcome.pose
         rows.append(
             (
                 *result.pair,
                 result.method,
-                pose.num_accepted,
-                pose.translation_median,
-                pose.translation_90,
-                pose.rotation_median_deg,
-                pose.rotation_90_deg,
-                pose.success,
-                result.metrics["all"].curve.recall_at_full_precision,
+                result.outcome.pose.num_accepted,
+                *_values(result),
                 *protocol_values(result.outcome.protocol),
             )
         )
     return Table(header, tuple(rows))
+
+
+def _values(result: RecognitionResult) -> tuple[float, ...]:
+    pose = result.outcome.pose
+    return (
+        pose.translation_median,
+        pose.translation_90,
+        pose.rotation_median_deg,
+        pose.rotation_90_deg,
+        pose.success,
+        result.metrics["all"].curve.recall_at_full_precision,
+    )
