@@ -15,6 +15,7 @@ from evaluation.support.interrupts import (
 )
 
 FRAMES = 60
+LONG = 3000
 
 
 def tiny_scenario(folder, **changes):
@@ -47,6 +48,16 @@ def tiny_scenario(folder, **changes):
         "frames": FRAMES,
     }
     return make_scenario(values | changes, "test")
+
+
+def long_scenario(folder, name):
+    """The same drive at a crawl: seconds of work, so that it can be killed."""
+    crawl = {
+        "cruise": 0.6,
+        "longitudinal_acceleration": 1.5,
+        "lateral_acceleration": 2.0,
+    }
+    return tiny_scenario(folder, name=name, frames=LONG, speeds=crawl)
 
 
 def write_scenario(scenario, folder):

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from small_city import write_small_city
 import studies
-from tiny_drive import FRAMES, tiny_scenario, write_scenario
+from tiny_drive import FRAMES, long_scenario, tiny_scenario, write_scenario
 import yaml
 
 from cns_drake.city.generation.generate import generate_city
@@ -27,7 +27,6 @@ from evaluation.support.errors import InputError
 
 pytestmark = pytest.mark.slow
 
-LONG = 300
 ONE = Cluster(num_workers=1)
 
 
@@ -36,7 +35,7 @@ def scenarios(tmp_path_factory):
     folder = tmp_path_factory.mktemp("scenarios")
     return [
         tiny_scenario(folder, name="short"),
-        tiny_scenario(folder, name="long", frames=LONG),
+        long_scenario(folder, "long"),
     ]
 
 

@@ -14,7 +14,7 @@ from generation import Generation
 import job_functions
 import psutil
 import pytest
-from tiny_drive import tiny_scenario, write_scenario
+from tiny_drive import long_scenario, tiny_scenario, write_scenario
 
 from cns_drake.simulation.simulation import simulate
 from evaluation.jobs import dask_workers
@@ -23,8 +23,6 @@ from evaluation.jobs.running import Job, run_jobs
 from evaluation.support.errors import InputError
 
 pytestmark = pytest.mark.slow
-
-LONG = 300
 
 
 @pytest.fixture(scope="module")
@@ -37,8 +35,8 @@ def dask(tmp_path_factory):
 def scenarios(tmp_path_factory):
     folder = tmp_path_factory.mktemp("scenarios")
     return [
-        tiny_scenario(folder, name="first", frames=LONG),
-        tiny_scenario(folder, name="second", frames=LONG),
+        long_scenario(folder, "first"),
+        long_scenario(folder, "second"),
         # The drive is shorter.
         tiny_scenario(folder, name="endless", frames=10**6),
     ]
