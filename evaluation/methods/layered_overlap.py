@@ -34,10 +34,12 @@ from evaluation.methods.overlap_bits import (
     shifted_columns,
     turns,
 )
+from evaluation.methods.overlap_lanes import FIRST_POWERS, SECOND_POWERS
 from evaluation.methods.overlap_layers import GRID, NUM_LAYERS, layer_cells
 from evaluation.methods.overlap_search import (
     best_overlaps,
     climb,
+    in_lanes,
     overlaps_nearby,
 )
 
@@ -46,7 +48,7 @@ from evaluation.methods.overlap_search import (
 _FIRST_HALVINGS = 3
 _FIRST_MAPS = np.array([0, 0, 0, 1, 1])
 _FIRST_HALVES = np.array([0, 0, 1, 0, 1])
-_FIRST_WEIGHTS = np.array([1, 2])
+_FIRST_WEIGHTS = 2 ** np.array(FIRST_POWERS)
 _FIRST_TURNS = turns(24)
 _FIRST_REACH = 2
 # All within reach but the corners, which lie too far away to be a match.
@@ -58,21 +60,23 @@ _FIRST_SHIFTS = np.array(
         if abs(right - _FIRST_REACH) + abs(up - _FIRST_REACH) < 2 * _FIRST_REACH
     ]
 )
-# The second: cells of 2 m, of a map a word: low with middle, high, poles,
-# kerbs. Headings are 2.5 deg apart.
+# The second and the third: cells of 2 m, of a map a word: low with middle,
+# high, poles, kerbs. Headings are 5 deg apart, then 2.5 deg.
 _SECOND_HALVINGS = 2
 _SECOND_MAPS = np.array([0, 0, 1, 2, 3])
 _SECOND_HALVES = np.zeros(NUM_LAYERS, np.int64)
-_SECOND_WEIGHTS = np.array([1, 1, 4, 2])
+_SECOND_WEIGHTS = 2 ** np.array(SECOND_POWERS)
 _SECOND_TURNS = turns(144)
-_SECOND_REACH = np.array([3, 2])
-_SECOND_MARGIN = 2 * _FIRST_REACH + 2
+_SECOND_STEP = 2
+_SECOND_REACH = np.array([1, 1])
+_THIRD_REACH = np.array([3, 2])
+_SECOND_MARGIN = 2 * _FIRST_REACH + 3
 # From a pose of the first search to one of the second: place, heading, shifts.
 _TO_SECOND = np.array([1, 6, 2, 2])
-# The third: whole cells; steps of 2.5 deg and 1 m, then of half of that.
-_THIRD_TURNS = turns(288)
-_THIRD_STEPS = np.array([[2, 4], [1, 2]])
-_TO_THIRD = np.array([1, 2, 8, 8])
+# The last: whole cells; steps of 2.5 deg and 1 m, then of half of that.
+_LAST_TURNS = turns(288)
+_LAST_STEPS = np.array([[2, 4], [1, 2]])
+_TO_LAST = np.array([1, 2, 8, 8])
 # (distance / radius) to the power of two to the power of this is taken off.
 _SQUARINGS = 3
 
@@ -87,6 +91,7 @@ class LayeredOverlapConfig(MethodConfig):
         cell: length of a cell of the finest maps, of 256 x 256 [m].
         min_points: that fill a cell.
         poses: of places with a heading that the second search looks at.
+        refined: of these, that the third one looks at.
         candidates: places that are compared cell by cell.
         weights: of common cells: low, middle, high, poles and kerbs.
         least_cells: weighted cells that are added to those of either scan,
@@ -97,7 +102,8 @@ class LayeredOverlapConfig(MethodConfig):
 
     cell: PositiveFloat = 0.5
     min_points: PositiveInt = 1
-    poses: PositiveInt = 500
+    poses: PositiveInt = 8000
+    refined: PositiveInt = 250
     candidates: PositiveInt = 40
     weights: tuple[
         NonNegativeInt,
@@ -129,9 +135,10 @@ class LayeredDatabase:
 
     Attributes:
         places: the D descriptors.
-        first: (D, 2, R + 2 m) uint64 maps of the first search.
+        first: (D / 8, 2, R + 2 m, 8) uint64 maps of the first search, see
+            `in_lanes`.
         first_counts: (D, 2, 2) int64 bits in the halves of each map.
-        second: (D, 4, R + 2 m) uint64 maps of the second.
+        second: (D, 4, R + 2 m) uint64 maps of the second and the third.
         second_counts: (D, 4) int64 bits in each map.
     """
 
@@ -144,14 +151,14 @@ class LayeredDatabase:
 
 @register("layered-overlap")
 class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
-    """Layered overlap, in three searches from coarse to fine.
+    """Layered overlap, in four searches from coarse to fine.
 
-    The first two take the pose at which most bits coincide, and rank places
+    The first three take the pose at which most bits coincide, and rank places
     by how many standard deviations this is more than chance would have. The
-    third climbs from there, cell by cell. The score is the weighted number of
-    the query's cells that meet one of the place or a neighbour of one, over
-    the geometric mean of how many either has; less where the place's sensor
-    is so far from the query's that it is no match.
+    last one climbs from there, cell by cell. The score is the weighted number
+    of the query's cells that meet one of the place or a neighbour of one,
+    over the geometric mean of how many either has; less where the place's
+    sensor is so far from the query's that it is no match.
 
     What two equal counts decide, the first of them wins. All counts are
     integers, so that scores are the same on every processor.
@@ -177,9 +184,11 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
         )
         return LayeredDatabase(
             places=places,
-            first=_with_margin(first, _FIRST_REACH),
+            first=in_lanes(first, _FIRST_REACH),
             first_counts=_count_halves(first),
-            second=_with_margin(second, _SECOND_MARGIN),
+            second=np.pad(
+                second, ((0, 0), (0, 0), (_SECOND_MARGIN, _SECOND_MARGIN))
+            ),
             second_counts=count_bits(second),
         )
 
@@ -193,8 +202,9 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
         scores = np.full(len(database.places), np.nan)
         if len(query.cells) == 0:
             return scores
-        poses = self._search_first(query, database, exhaustive)
-        poses = self._search_second(query, database, poses, exhaustive)
+        poses = self._search_coarse(query, database, exhaustive)
+        if not exhaustive:
+            poses = poses[: self.config.candidates]
         for pose in poses:
             place = database.places[pose[0]]
             if len(place.cells) > 0:
@@ -213,82 +223,40 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
         if len(query.cells) == 0 or len(scan.cells) == 0:
             return None
         alone = self.build_database([scan])
-        poses = self._search_first(query, alone, exhaustive=False)
-        poses = self._search_second(query, alone, poses, exhaustive=False)
+        poses = self._search_coarse(query, alone, exhaustive=False)
         found = self._climb(query, scan, poses[0, 1:])
-        c, s = _THIRD_TURNS[found[0]] / _THIRD_TURNS[0, 0]
+        c, s = _LAST_TURNS[found[0]] / _LAST_TURNS[0, 0]
         R_PQ = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         half_cell = 0.5 * self.config.cell
         return make_pose(
             R_PQ, np.array([found[1] * half_cell, found[2] * half_cell, 0.0])
         )
 
-    def _search_first(
+    def _search_coarse(
         self, query: LayeredScan, database: LayeredDatabase, exhaustive: bool
     ) -> np.ndarray:
-        """Returns (N, 4) place, heading and shifts to begin the second with.
+        """Returns (N, 4) places, each with heading and shifts to climb from.
 
-        Either the best of all, or the best of each place.
+        Decreasing by how much they are more than chance would have; either
+        those that were looked at to the last, or all.
         """
-        bits = _first_bits(query, _FIRST_TURNS)
-        counts, shifts = best_overlaps(
-            shifted_columns(bits, _FIRST_REACH),
-            database.first,
-            _FIRST_WEIGHTS,
-            _FIRST_SHIFTS,
-        )
-        of_query = _count_halves(bits).reshape(len(bits), -1).T
-        of_places = database.first_counts.reshape(len(counts), -1)
-        weights = np.repeat(_FIRST_WEIGHTS, 2)[:, None]
-        surprise = _surprise(
-            counts,
-            of_places @ (weights * of_query),
-            of_places @ (weights**2 * of_query),
-            (GRID >> _FIRST_HALVINGS) ** 2,
-        )
-        if exhaustive:
-            heading = surprise.argmax(axis=1)
-            place = np.arange(len(heading))
-        else:
-            best = _greatest(surprise.ravel(), self.config.poses)
-            place, heading = np.divmod(best, len(_FIRST_TURNS))
-        found = _FIRST_SHIFTS[shifts[place, heading]] - _FIRST_REACH
-        return np.column_stack([place, heading, found]) * _TO_SECOND
-
-    def _search_second(
-        self,
-        query: LayeredScan,
-        database: LayeredDatabase,
-        poses: np.ndarray,
-        exhaustive: bool,
-    ) -> np.ndarray:
-        """Returns (N, 4) the best place, heading and shifts of some places.
-
-        Args:
-            query: that asks.
-            database: of the places.
-            poses: to look near, see `_search_first`.
-            exhaustive: keep all places, not only the best.
-        """
+        config = self.config
+        poses = _search_first(query, database, config.poses, exhaustive)
         bits = _second_bits(query, _SECOND_TURNS)
-        counts, found = overlaps_nearby(
-            bits, database.second, _SECOND_WEIGHTS, poses, _SECOND_REACH
+        coarse = _search_nearby(
+            np.ascontiguousarray(bits[::_SECOND_STEP]),
+            database,
+            poses // [1, _SECOND_STEP, 1, 1],
+            _SECOND_REACH,
         )
-        place = poses[:, 0]
-        product = count_bits(bits)[found[:, 0]] * database.second_counts[place]
-        surprise = _surprise(
-            counts,
-            product @ _SECOND_WEIGHTS,
-            product @ _SECOND_WEIGHTS**2,
-            (GRID >> _SECOND_HALVINGS) ** 2,
-        )
-        order = _greatest(surprise, len(surprise))
-        # Of each place the best pose, in the order of these.
-        _, first = np.unique(place[order], return_index=True)
-        kept = order[np.sort(first)]
         if not exhaustive:
-            kept = kept[: self.config.candidates]
-        return np.column_stack([place[kept], found[kept]]) * _TO_THIRD
+            coarse = coarse[: config.refined]
+        fine = _search_nearby(
+            bits, database, coarse * [1, _SECOND_STEP, 1, 1], _THIRD_REACH
+        )
+        # Of each place the best pose, in the order of these.
+        _, first = np.unique(fine[:, 0], return_index=True)
+        return fine[np.sort(first)] * _TO_LAST
 
     def _climb(
         self, query: LayeredScan, place: LayeredScan, start: np.ndarray
@@ -299,9 +267,9 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
             query.starts,
             fine_bits(place.cells, place.starts),
             np.array(self.config.weights),
-            _THIRD_TURNS,
+            _LAST_TURNS,
             start,
-            _THIRD_STEPS,
+            _LAST_STEPS,
         )
 
     def _rate(
@@ -325,6 +293,73 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
         return alike * max(1.0 - far, 0.0)
 
 
+def _search_first(
+    query: LayeredScan,
+    database: LayeredDatabase,
+    number: int,
+    exhaustive: bool,
+) -> np.ndarray:
+    """Returns (N, 4) place, heading and shifts to begin the second with.
+
+    Either the best of all, or the best of each place.
+    """
+    bits = _first_bits(query, _FIRST_TURNS)
+    counts, shifts = best_overlaps(
+        shifted_columns(bits, _FIRST_REACH),
+        database.first,
+        _FIRST_SHIFTS,
+    )
+    counts = counts[: len(database.places)]
+    # Of floats that hold whole numbers, products are exact and fast.
+    of_query = _count_halves(bits).reshape(len(bits), -1).T.astype(float)
+    of_places = database.first_counts.reshape(len(counts), -1).astype(float)
+    weights = np.repeat(_FIRST_WEIGHTS, 2)[:, None]
+    surprise = _surprise(
+        counts,
+        of_places @ (weights * of_query),
+        of_places @ (weights**2 * of_query),
+        (GRID >> _FIRST_HALVINGS) ** 2,
+    )
+    # What all headings have is no sign of a place: both scans are full near
+    # their sensors. Half of it, by trials.
+    surprise -= 0.5 * surprise.mean(axis=1, keepdims=True)
+    if exhaustive:
+        heading = surprise.argmax(axis=1)
+        place = np.arange(len(heading))
+    else:
+        best = _greatest(surprise.ravel(), number)
+        place, heading = np.divmod(best, len(_FIRST_TURNS))
+    found = _FIRST_SHIFTS[shifts[place, heading]] - _FIRST_REACH
+    return np.column_stack([place, heading, found]) * _TO_SECOND
+
+
+def _search_nearby(
+    bits: np.ndarray,
+    database: LayeredDatabase,
+    poses: np.ndarray,
+    reach: np.ndarray,
+) -> np.ndarray:
+    """Returns the best poses (N, 4) near others, the best of them first.
+
+    Args:
+        bits: (H, 4, R) maps of the query.
+        database: of the places.
+        poses: (N, 4) place, heading and shifts to look near.
+        reach: see `overlaps_nearby`.
+    """
+    counts, found = overlaps_nearby(bits, database.second, poses, reach)
+    place = poses[:, 0]
+    product = count_bits(bits)[found[:, 0]] * database.second_counts[place]
+    surprise = _surprise(
+        counts,
+        product @ _SECOND_WEIGHTS,
+        product @ _SECOND_WEIGHTS**2,
+        (GRID >> _SECOND_HALVINGS) ** 2,
+    )
+    order = _greatest(surprise, len(surprise))
+    return np.column_stack([place[order], found[order]])
+
+
 def _first_bits(scan: LayeredScan, at: np.ndarray) -> np.ndarray:
     """Returns (H, 2, R) maps of the first search, at some turns."""
     return coarse_bits(
@@ -342,11 +377,6 @@ def _second_bits(scan: LayeredScan, at: np.ndarray) -> np.ndarray:
         _SECOND_MAPS,
         _SECOND_HALVES,
     )
-
-
-def _with_margin(bits: np.ndarray, margin: int) -> np.ndarray:
-    """Returns maps (D, S, R) with rows without bits on either side."""
-    return np.pad(bits, ((0, 0), (0, 0), (margin, margin)))
 
 
 def _count_halves(bits: np.ndarray) -> np.ndarray:

@@ -1,56 +1,80 @@
 """Search for the pose at which two maps of bits overlap most.
 
-First on coarse maps, a word a row, of one query against many places; then
-cell by cell, of one query against one place.
+First on coarse maps, a word a row: of one query against many places, and then
+near some poses. At last cell by cell, of one query against one place.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from evaluation.methods.overlap_bits import UNIT_BITS, WORD, population
+from evaluation.methods.overlap_bits import UNIT_BITS, WORD
+from evaluation.methods.overlap_lanes import (
+    LANES,
+    common_of_places,
+    common_of_rows,
+)
 from evaluation.methods.overlap_layers import GRID
 from evaluation.support.compiled import compiled
 
 
+def in_lanes(maps: np.ndarray, margin: int) -> np.ndarray:
+    """Returns maps of places for `best_overlaps`.
+
+    Args:
+        maps: (D, S, R) uint64.
+        margin: m rows without bits to add on either side.
+
+    Returns:
+        (ceil(D / LANES), S, R + 2 m, LANES) uint64. What D lacks to a multiple
+        of LANES has no bits.
+    """
+    missing = -len(maps) % LANES
+    padded = np.pad(maps, ((0, missing), (0, 0), (margin, margin)))
+    blocks = padded.reshape(-1, LANES, *padded.shape[1:])
+    return np.ascontiguousarray(blocks.transpose(0, 2, 3, 1))
+
+
 @compiled
 def best_overlaps(
-    queries: np.ndarray,
-    places: np.ndarray,
-    weights: np.ndarray,
-    shifts: np.ndarray,
+    queries: np.ndarray, places: np.ndarray, shifts: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns how much of a query places overlap at most, at each heading.
 
     Args:
-        queries: (H, C, S, R) uint64: at H headings and C shifts along the
-            columns' axis, S maps of R rows.
-        places: (D, S, R + 2 m) uint64, m rows without bits on either side.
-        weights: (S,) int64 of the maps.
+        queries: (H, C, S, R) uint64, contiguous: maps of the first search at H
+            headings and C shifts along the columns' axis.
+        places: of D places, see `in_lanes`.
         shifts: (K, 2) int64 to try: by 0 to 2 m rows, and which of the C.
 
     Returns:
-        (D, H) int64 each: the weighted count of common bits, and at which
-        shift it is found first.
+        (D, H) int64 each, D a multiple of LANES: the weighted count of common
+        bits, and at which shift it is found first.
     """
-    num_headings, _, num_maps, rows = queries.shape
-    counts = np.full((len(places), num_headings), -1, np.int64)
-    found = np.zeros((len(places), num_headings), np.int64)
-    for index in range(len(places)):
+    num_headings, num_columns, num_maps, num_rows = queries.shape
+    num_blocks, _, num_place_rows, _ = places.shape
+    counts = np.full((num_blocks * LANES, num_headings), -1, np.int64)
+    found = np.zeros((num_blocks * LANES, num_headings), np.int64)
+    query_words, place_words = queries.ravel(), places.ravel()
+    common = np.zeros(LANES, np.int64)
+    for block in range(num_blocks):
         for heading in range(num_headings):
             for k in range(len(shifts)):
                 first, column = shifts[k]
-                total = 0
-                for one in range(num_maps):
-                    query = queries[heading, column, one]
-                    place = places[index, one, first : first + rows]
-                    common = np.uint64(0)
-                    for row in range(rows):
-                        common += population(query[row] & place[row])
-                    total += weights[one] * np.int64(common)
-                if total > counts[index, heading]:
-                    counts[index, heading] = total
-                    found[index, heading] = k
+                query = (heading * num_columns + column) * num_maps
+                common_of_places(
+                    query_words,
+                    query * num_rows,
+                    place_words,
+                    (block * num_maps * num_place_rows + first) * LANES,
+                    num_place_rows * LANES,
+                    common,
+                )
+                for lane in range(LANES):
+                    place = block * LANES + lane
+                    if common[lane] > counts[place, heading]:
+                        counts[place, heading] = common[lane]
+                        found[place, heading] = k
     return counts, found
 
 
@@ -58,16 +82,16 @@ def best_overlaps(
 def overlaps_nearby(
     queries: np.ndarray,
     places: np.ndarray,
-    weights: np.ndarray,
     starts: np.ndarray,
     reach: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Returns how much of a query places overlap at most near some poses.
 
     Args:
-        queries: (H, S, R) uint64: at headings of equal steps of a full turn.
-        places: (D, S, R + 2 m) uint64, m rows without bits on either side.
-        weights: (S,) int64 of the maps.
+        queries: (H, S, R) uint64, contiguous: maps of the second search, at
+            headings of equal steps of a full turn.
+        places: (D, S, R + 2 m) uint64, contiguous, m rows without bits on
+            either side.
         starts: (N, 4) int64: which place, heading, and shift of the query
             along rows and along columns.
         reach: (2,) int64: how far from there to look, of heading and shifts.
@@ -76,11 +100,14 @@ def overlaps_nearby(
         (N,) int64 weighted counts of common bits, and (N, 3) where they are
         found first: heading and shifts.
     """
-    num_headings, num_maps, rows = queries.shape
-    margin = (places.shape[2] - rows) // 2
+    num_headings, num_maps, num_rows = queries.shape
+    num_place_rows = places.shape[2]
+    margin = (num_place_rows - num_rows) // 2
+    query_words, place_words = queries.ravel(), places.ravel()
     counts = np.full(len(starts), -1, np.int64)
     poses = np.zeros((len(starts), 3), np.int64)
     for n in range(len(starts)):
+        place = starts[n, 0] * num_maps * num_place_rows
         for dt in range(-reach[0], reach[0] + 1):
             heading = (starts[n, 1] + dt) % num_headings
             for right in range(
@@ -90,19 +117,15 @@ def overlaps_nearby(
                 for up in range(
                     starts[n, 3] - reach[1], starts[n, 3] + reach[1] + 1
                 ):
-                    left = np.uint64(max(up, 0))
-                    back = np.uint64(max(-up, 0))
-                    total = 0
-                    for one in range(num_maps):
-                        first = margin + right
-                        query = queries[heading, one]
-                        place = places[starts[n, 0], one, first : first + rows]
-                        common = np.uint64(0)
-                        for row in range(rows):
-                            common += population(
-                                (query[row] << left >> back) & place[row]
-                            )
-                        total += weights[one] * np.int64(common)
+                    total = common_of_rows(
+                        query_words,
+                        heading * num_maps * num_rows,
+                        np.uint64(max(up, 0)),
+                        np.uint64(max(-up, 0)),
+                        place_words,
+                        place + margin + right,
+                        num_place_rows,
+                    )
                     if total > counts[n]:
                         counts[n] = total
                         poses[n] = heading, right, up

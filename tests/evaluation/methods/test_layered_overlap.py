@@ -2,74 +2,17 @@
 
 import math
 
+from layered_scans import matrix, seen_from, some_cells, town
 import numpy as np
 import pytest
 
 from evaluation.methods import make_method
 from evaluation.methods.layered_overlap import LayeredOverlap, LayeredScan
-from evaluation.methods.overlap_bits import (
-    coarse_bits,
-    count_bits,
-    fine_bits,
-    shifted_columns,
-    turns,
-)
 from evaluation.methods.overlap_layers import layer_cells
-from evaluation.methods.overlap_search import (
-    best_overlaps,
-    climb,
-    overlaps_nearby,
-)
-
-MAPS, HALVES = np.array([0, 0, 0, 1, 1]), np.array([0, 0, 1, 0, 1])
 
 
 def method(**parameters) -> LayeredOverlap:
     return make_method("layered-overlap", parameters)
-
-
-def some_cells(seed, sizes=(60, 50, 40, 9, 20)):
-    """Returns a scan's cells by lot, layer by layer."""
-    rng = np.random.default_rng(seed)
-    cells = [
-        np.sort(rng.choice(256 * 256, size, replace=False)) for size in sizes
-    ]
-    starts = np.concatenate([[0], np.cumsum(sizes)])
-    return np.concatenate(cells).astype(np.uint16), starts
-
-
-def town(seed, number=45):
-    """Returns walls, poles and ground around a sensor at 1.6 m, (N, 3)."""
-    rng = np.random.default_rng([seed, 7])
-    parts = [np.zeros((0, 3))]
-    for _ in range(number):
-        centre = rng.uniform(-55.0, 55.0, 2)
-        if np.hypot(*centre) < 5.0:
-            continue
-        length = rng.uniform(0.2, 14.0, 2) * [1.0, 0.02]
-        turn = rng.choice([0.0, 0.5 * math.pi, 0.7])
-        box = rng.uniform(-0.5, 0.5, (400, 2)) * length @ matrix(turn)[:2, :2].T
-        height = rng.uniform(0.0, rng.choice([1.0, 3.0, 12.0]), (400, 1))
-        parts.append(np.hstack([box + centre, height - 1.6]))
-    for _ in range(25):
-        centre = rng.uniform(-40.0, 40.0, 2)
-        z = np.linspace(-1.6, 3.0, 40)
-        parts.append(np.column_stack([np.tile(centre, (40, 1)), z]))
-    # Ground in each ring of each sector in which it is sought.
-    r, turn = np.meshgrid(np.arange(0.5, 90.0), np.arange(0.5, 360.0))
-    x, y = (r * f(np.radians(turn)) for f in (np.cos, np.sin))
-    parts.append(np.stack([x, y, np.full(x.shape, -1.6)], -1).reshape(-1, 3))
-    return np.concatenate(parts)
-
-
-def matrix(yaw):
-    c, s = math.cos(yaw), math.sin(yaw)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-
-
-def seen_from(points, yaw, x, y):
-    """Returns points in the frame of a sensor with that pose."""
-    return (points - [x, y, 0.0]) @ matrix(yaw)
 
 
 # By brute force: no words, no bits, no compiled loops.
@@ -106,29 +49,6 @@ def cells_by_layers(points, height=1.6):
     return layers
 
 
-def image(cells, starts, layer, turn, halvings):
-    """Returns a layer as a turned picture (n, n) of bool."""
-    n = 256 >> halvings
-    picture = np.zeros((n, n), dtype=bool)
-    for number in cells[starts[layer] : starts[layer + 1]].tolist():
-        u, v = 2 * (number // 256) + 1 - 256, 2 * (number % 256) + 1 - 256
-        unit = 2 * 2**14 << halvings
-        row = (int(turn[0]) * u - int(turn[1]) * v + (256 << 14)) // unit
-        column = (int(turn[1]) * u + int(turn[0]) * v + (256 << 14)) // unit
-        if 0 <= row < n and 0 <= column < n:
-            picture[row, column] = True
-    return picture
-
-
-def shifted(picture, right, up):
-    n = len(picture)
-    result = np.zeros_like(picture)
-    for row, column in np.argwhere(picture).tolist():
-        if 0 <= row + right < n and 0 <= column + up < n:
-            result[row + right, column + up] = True
-    return result
-
-
 class TestLayers:
     def test_equal_to_brute_force(self):
         points = town(1)
@@ -163,130 +83,6 @@ class TestLayers:
         for least, number in ((1, 2), (2, 1), (3, 0)):
             _, starts = layer_cells(points, 1.6, 0.5, least)
             assert starts[3] - starts[2] == number
-
-
-class TestCounts:
-    def test_coarse_maps(self):
-        cells, starts = some_cells(1)
-        turned = turns(24)[[0, 5, 17]]
-        bits = coarse_bits(cells, starts, turned, 3, MAPS, HALVES)
-        assert bits.shape == (3, 2, 32)
-        for heading, turn in enumerate(turned):
-            wanted = np.zeros((2, 32, 64), dtype=bool)
-            for layer in range(5):
-                picture = image(cells, starts, layer, turn, 3)
-                first = 32 * HALVES[layer]
-                wanted[MAPS[layer], :, first : first + 32] |= picture
-            columns = np.arange(64, dtype=np.uint64)
-            found = (bits[heading][..., None] >> columns) & np.uint64(1)
-            np.testing.assert_array_equal(found.astype(bool), wanted)
-            counts = count_bits(bits[heading : heading + 1])[0]
-            assert counts.tolist() == wanted.sum(axis=(1, 2)).tolist()
-
-    def test_first_search(self):
-        query, places = some_cells(2), [some_cells(3), some_cells(4)]
-        turned, weights = turns(6), np.array([1, 2])
-        shifts = np.array([(r, c) for r in range(3) for c in range(3)])
-        bits = coarse_bits(*query, turned, 3, MAPS, HALVES)
-        maps = np.concatenate(
-            [coarse_bits(*p, turned[:1], 3, MAPS, HALVES) for p in places]
-        )
-        counts, found = best_overlaps(
-            shifted_columns(bits, 1),
-            np.pad(maps, ((0, 0), (0, 0), (1, 1))),
-            weights,
-            shifts,
-        )
-        for d, place in enumerate(places):
-            for h, turn in enumerate(turned):
-                totals = []
-                for right, up in (shifts - 1).tolist():
-                    total = 0
-                    for group in ([0, 1], [2], [3], [4]):
-                        a, b = (
-                            np.logical_or.reduce(
-                                [image(*scan, one, t, 3) for one in group]
-                            )
-                            for scan, t in ((query, turn), (place, turned[0]))
-                        )
-                        # The map's rows were shifted the other way round.
-                        common = shifted(a, right, up) & b
-                        total += (1 if group[0] < 3 else 2) * common.sum()
-                    totals.append(total)
-                assert counts[d, h] == max(totals)
-                assert found[d, h] == totals.index(max(totals))
-
-    def test_second_search(self):
-        query, place = some_cells(5), some_cells(6)
-        turned, weights = turns(8), np.array([1, 1, 4, 2])
-        maps, halves = np.array([0, 0, 1, 2, 3]), np.zeros(5, np.int64)
-        bits = coarse_bits(*query, turned, 2, maps, halves)
-        padded = np.pad(
-            coarse_bits(*place, turned[:1], 2, maps, halves),
-            ((0, 0), (0, 0), (3, 3)),
-        )
-        counts, poses = overlaps_nearby(
-            bits,
-            padded,
-            weights,
-            np.array([[0, 7, 2, -1]]),
-            np.array([1, 1]),
-        )
-        best = (-1, None)
-        for heading in (6, 7, 0):
-            for right in (1, 2, 3):
-                for up in (-2, -1, 0):
-                    total = 0
-                    for group, weight in zip(
-                        ([0, 1], [2], [3], [4]), weights, strict=True
-                    ):
-                        a, b = (
-                            np.logical_or.reduce(
-                                [image(*scan, one, t, 2) for one in group]
-                            )
-                            for scan, t in (
-                                (query, turned[heading]),
-                                (place, turned[0]),
-                            )
-                        )
-                        total += weight * (shifted(a, right, up) & b).sum()
-                    if total > best[0]:
-                        best = (total, [heading, right, up])
-        assert (counts[0], poses[0].tolist()) == best
-
-    def test_third_search_counts_cells_that_meet_neighbours(self):
-        query, place = some_cells(7), some_cells(8, (900, 800, 700, 60, 300))
-        turned = turns(288)
-        found = climb(
-            *query,
-            fine_bits(*place),
-            np.array([3, 3, 2, 60, 5]),
-            turned,
-            np.array([40, 8, -8]),
-            np.array([[2, 4], [1, 2]]),
-        )
-        heading, right, up = found[:3].tolist()
-        for layer in range(5):
-            wide = np.zeros((258, 258), dtype=bool)
-            picture = image(*place, layer, turned[0], 0)
-            for i in range(3):
-                for j in range(3):
-                    wide[i : i + 256, j : j + 256] |= picture
-            wide = wide[1:-1, 1:-1]
-            c, s = turned[heading].tolist()
-            count = 0
-            first, last = query[1][layer : layer + 2]
-            for number in query[0][first:last].tolist():
-                u, v = 2 * (number // 256) - 255, 2 * (number % 256) - 255
-                row = (c * u - s * v + ((right + 256) << 14)) // 2**15
-                column = (s * u + c * v + ((up + 256) << 14)) // 2**15
-                if 0 <= row < 256 and 0 <= column < 256:
-                    count += wide[row, column]
-            assert found[3 + layer] == count
-
-    def test_words_of_all_bits(self):
-        ones = np.full((1, 1, 3), 2**64 - 1, np.uint64)
-        assert count_bits(ones).tolist() == [[192]]
 
 
 class TestFinding:
