@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -13,6 +13,9 @@ from scipy.spatial import cKDTree
 from shapely.geometry import LineString
 
 from cns_drake.imports.free_space import CELL, FreeSpace
+from cns_drake.motion.path_geometry import SmoothPath
+from cns_drake.motion.trajectory import POINT_SPACING
+from cns_drake.roads.u_turn import TIGHTEST_RADIUS
 from cns_drake.roads.waypoints import make_waypoint_path
 from evaluation.support.errors import InputError
 
@@ -34,8 +37,8 @@ _APART = 10.0
 _WAYPOINT_SPACING = 15.0
 # By how much waypoints may leave the path that was found, as tried [m].
 _SIMPLIFICATIONS = (1.5, 1.0, 0.7, 2.0, 3.0)
-# Of a running mean over so many cells.
-_STRAIGHTENED = 5
+# Of a running mean over so many cells, as tried.
+_STRAIGHTENED = (5, 11, 17)
 
 
 @dataclass(frozen=True)
@@ -179,22 +182,26 @@ def _away(
 
 def _drive(xy: np.ndarray, space: FreeSpace) -> FreeDrive | None:
     """Returns a drive along cells, with as few waypoints as there is room."""
-    kernel = np.ones(_STRAIGHTENED) / _STRAIGHTENED
-    if len(xy) < 4 * _STRAIGHTENED:
-        return None
-    smooth = np.column_stack(
-        [np.convolve(column, kernel, mode="valid") for column in xy.T]
-    )
-    for tolerance in _SIMPLIFICATIONS:
+    for straightened, tolerance in product(_STRAIGHTENED, _SIMPLIFICATIONS):
+        if len(xy) < 4 * straightened:
+            return None
+        kernel = np.ones(straightened) / straightened
+        smooth = np.column_stack(
+            [np.convolve(column, kernel, mode="valid") for column in xy.T]
+        )
         line = LineString(smooth).simplify(tolerance)
         waypoints = _densified(np.array(line.coords))
+        xyz = np.column_stack([waypoints, np.zeros(len(waypoints))])
         try:
-            points = make_waypoint_path(
-                np.column_stack([waypoints, np.zeros(len(waypoints))]), 1.0
-            ).points[:, :2]
+            path = make_waypoint_path(xyz, POINT_SPACING)
         except InputError:
             continue
-        if (space.clearance_at(points) >= space.least - _SLACK).all():
+        bend, _ = SmoothPath(path.points, path.spacing).tightest_bend()
+        points = path.points[:, :2]
+        if (
+            bend >= TIGHTEST_RADIUS
+            and (space.clearance_at(points) >= space.least - _SLACK).all()
+        ):
             drive = FreeDrive(waypoints, points)
             return drive if drive.length >= _SHORTEST else None
     return None

@@ -13,6 +13,10 @@ from cns_drake.motion.uniform_spline import (
     make_uniform_spline,
 )
 
+# Distance of the places at which bends are measured, far below that of the
+# knots between which curvature changes [m].
+_BEND_STEP = 0.1
+
 
 @dataclass(frozen=True)
 class PathJet:
@@ -154,6 +158,14 @@ class SmoothPath:
             dturn=ddyaw * c + dyaw * dc,
             ddturn=dddyaw * c + 2 * ddyaw * dc + dyaw * ddc,
         )
+
+    def tightest_bend(self) -> tuple[float, np.ndarray]:
+        """Returns the least radius [m] and the (3,) place that has it."""
+        steps = int(np.ceil(self.end / _BEND_STEP))
+        jet = self.evaluate(np.linspace(0.0, self.end, steps + 1))
+        curvature = np.abs(jet.turn) / jet.speed
+        at = int(curvature.argmax())
+        return float(1 / max(curvature[at], 1e-12)), jet.p[at]
 
     def evaluate_with_section(
         self, u: ArrayLike

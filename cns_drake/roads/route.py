@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, RootModel, Strict
 from cns_drake.roads.lane_path import LanePath, sample_lane_path
 from cns_drake.roads.network import RoadNetwork
 from cns_drake.roads.road import Direction, LaneRef, Road
+from cns_drake.roads.u_turn import find_loop
 from evaluation.support.errors import InputError
 
 # Distance between the points from which the path is interpolated [m].
@@ -22,6 +23,11 @@ MIN_LANE_CHANGE_LENGTH = 20.0
 # rear axle keeps so far from kerbs and medians, for its front swings out [m].
 _ASIDE_LENGTH = 25.0
 CAR_ROOM = 1.4
+
+# A car that turns round at a junction does so at most so far before it, and
+# places are tried at this distance [m].
+_TURNING_LENGTH = 30.0
+_TURNING_STEP = 0.5
 
 LaneNumber = Annotated[int, Field(ge=1)]
 LaneChange = Annotated[tuple[LaneNumber, LaneNumber], Strict(False)]
@@ -37,7 +43,8 @@ class RouteLeg(BaseModel):
             a change from the first to the second on this road.
         start: only in the first leg: where the drive begins, measured from
             the entry of the road [m].
-        end: only in the last leg: where it ends, measured likewise [m].
+        end: in the last leg: where it ends, measured likewise; in a leg
+            whose next one leads back: where the car turns round [m].
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
@@ -83,6 +90,10 @@ def make_lane_path(
     lane (`RoadNetwork.is_legal`). Lanes change only along a leg. Within a
     junction the lower one of the two roads' speed limits holds.
 
+    Where the next leg leads back on the same road, the car turns round in a
+    loop to the left: at the leg's end, or as near to the junction as there
+    is room.
+
     Args:
         network: the roads.
         route: the legs.
@@ -95,26 +106,36 @@ def make_lane_path(
 
     Raises:
         InputError: a leg names no lane of the network, does not follow from
-            the one before it, or is too short for its lane change; or the
-            whole route is too short.
+            the one before it, is too short for its lane change or has no
+            room for turning round; or the whole route is too short.
     """
     pieces: list[np.ndarray] = []
     limits: list[np.ndarray] = []
+    begin: float | None = None
     for k, leg in enumerate(route.root):
+        after = route.root[k + 1] if k + 1 < len(route.root) else None
         try:
-            _check_ends(leg, k == 0, k == len(route.root) - 1)
-            points = _leg_points(network, leg, aside)
+            _check_ends(network, leg, k == 0, after)
             limit = network.roads[leg.road].speed_limit
-            if k > 0:
+            length = network.roads[leg.road].length
+            if k > 0 and begin is None:
                 way = _way(network, route.root[k - 1], leg)
                 pieces.append(way)
                 limits.append(np.full(len(way), min(limit, limits[-1][0])))
+            first = leg.start or 0.0 if begin is None else begin
+            if after is not None and leads_back(leg, after):
+                loop, last = _turn_round(network, leg, after, first, aside)
+                begin = length - last
+            else:
+                loop, last = np.zeros((0, 3)), leg.end or length
+                begin = None
+            points = _leg_points(network, leg, first, last, aside)
+            pieces += [points, loop]
+            limits.append(np.full(len(points) + len(loop), limit))
         except ValueError as error:
             raise InputError(
                 f"{source}: route.{k} ({leg.road} {leg.direction}): {error}"
             ) from error
-        pieces.append(points)
-        limits.append(np.full(len(points), limit))
     return sample_lane_path(
         np.concatenate(pieces),
         np.concatenate(limits),
@@ -123,34 +144,59 @@ def make_lane_path(
     )
 
 
-def _check_ends(leg: RouteLeg, is_first: bool, is_last: bool) -> None:
+def leads_back(leg: RouteLeg, after: RouteLeg) -> bool:
+    """Tells whether the car turns round between two legs."""
+    return leg.road == after.road and leg.direction != after.direction
+
+
+def _check_ends(
+    network: RoadNetwork, leg: RouteLeg, is_first: bool, after: RouteLeg | None
+) -> None:
     if leg.start is not None and not is_first:
         raise ValueError("start is for the first leg only")
-    if leg.end is not None and not is_last:
-        raise ValueError("end is for the last leg only")
+    if leg.road not in network.roads:
+        raise ValueError(f"no road {leg.road!r}")
+    if leg.end is not None and after and not leads_back(leg, after):
+        raise ValueError(
+            "end is for the last leg, or where the next one leads back"
+        )
+    length = network.roads[leg.road].length
+    start = 0.0 if leg.start is None else leg.start
+    end = length if leg.end is None else leg.end
+    if not start < end <= length:
+        raise ValueError(
+            f"from {start:g} m to {end:g} m does not lie within the road's "
+            f"{length:.1f} m"
+        )
 
 
 def _leg_points(
-    network: RoadNetwork, leg: RouteLeg, aside: float
+    network: RoadNetwork,
+    leg: RouteLeg,
+    start: float,
+    end: float,
+    aside: float,
 ) -> np.ndarray:
     """Returns the (N, 3) points of a leg on its road.
+
+    Args:
+        network: the roads.
+        leg: the leg.
+        start, end: from where to where, from the entry of the road; beyond
+            the road where the car turns round in a junction [m].
+        aside: how far to the right of the lanes' middle [m].
 
     Raises:
         ValueError: the leg does not suit its road.
     """
-    if leg.road not in network.roads:
-        raise ValueError(f"no road {leg.road!r}")
     road = network.roads[leg.road]
     offsets = [
         road.lane_offset(leg.direction, lane.lane)
         for lane in (leg.entry_lane, leg.exit_lane)
     ]
-    start = 0.0 if leg.start is None else leg.start
-    end = road.length if leg.end is None else leg.end
-    if not start < end <= road.length:
+    if start >= end:
         raise ValueError(
-            f"from {start:g} m to {end:g} m does not lie within the road's "
-            f"{road.length:.1f} m"
+            f"the road is too short for turning round at {end:.1f} m"
         )
     count = int(np.ceil((end - start) / _DENSE_SPACING)) + 1
     travelled = np.linspace(start, end, count)
@@ -158,11 +204,69 @@ def _leg_points(
         travelled, offsets[0] != offsets[1]
     )
     offset = _moved_right(road, leg.direction, offset, travelled, aside)
+    return road.evaluate(_stations(road, leg, travelled), offset)[:, :3]
+
+
+def _stations(road: Road, leg: RouteLeg, travelled: np.ndarray) -> np.ndarray:
     if leg.direction == "forward":
-        stations = road.first_station + travelled
+        return road.first_station + travelled
+    return road.last_station - travelled
+
+
+def _turn_round(
+    network: RoadNetwork,
+    leg: RouteLeg,
+    after: RouteLeg,
+    start: float,
+    aside: float,
+) -> tuple[np.ndarray, float]:
+    """Returns how the car turns round at the end of a leg.
+
+    Returns:
+        The (N, 3) points between the lanes, and where it leaves the first
+        of them, from the entry of the road [m].
+
+    Raises:
+        ValueError: there is no room, or no such lane.
+    """
+    road = network.roads[leg.road]
+
+    def lanes_at(travelled: float) -> tuple[np.ndarray, float]:
+        """Returns the lane's pose and how far left the other one lies."""
+        offsets = [
+            _moved_right(
+                road,
+                one.direction,
+                np.array([road.lane_offset(one.direction, lane.lane)]),
+                np.array([from_entry]),
+                aside,
+            )[0]
+            for one, lane, from_entry in (
+                (leg, leg.exit_lane, travelled),
+                (after, after.entry_lane, road.length - travelled),
+            )
+        ]
+        station = _stations(road, leg, np.array([travelled]))
+        x, y, _, heading = road.evaluate(station, offsets[0])[0]
+        if leg.direction == "backward":
+            heading += np.pi
+        return np.array([x, y, heading]), abs(offsets[1] - offsets[0])
+
+    if leg.end is not None:
+        centres = np.array([leg.end])
     else:
-        stations = road.last_station - travelled
-    return road.evaluate(stations, offset)[:, :3]
+        # From the middle of the junction back.
+        first, last = road.first_station, road.full_length - road.last_station
+        beyond = last if leg.direction == "forward" else first
+        farthest = road.length + beyond
+        nearest = max(start, road.length - _TURNING_LENGTH)
+        centres = np.arange(farthest, nearest, -_TURNING_STEP)
+    loop = find_loop(lanes_at, centres, network.lane_area())
+    x, y, heading = lanes_at(loop.begin)[0]
+    ahead = (loop.points - (x, y)) @ (np.cos(heading), np.sin(heading))
+    z = road.height(_stations(road, leg, loop.begin + ahead))
+    points = np.column_stack([loop.points, z])[1:-1]
+    return points, loop.begin
 
 
 def _moved_right(

@@ -15,6 +15,7 @@ from cns_drake.roads.lane_path import (
     check_length,
     sample_lane_path,
 )
+from cns_drake.roads.u_turn import LOOP_RADIUS, loop_corners
 from evaluation.support.csv_files import read_rows
 from evaluation.support.errors import InputError
 
@@ -31,7 +32,9 @@ _FARTHEST = 1_000_000.0
 _DENSE_SPACING = 0.25
 
 
-def load_waypoint_path(path: Path | str, spacing: float) -> LanePath:
+def load_waypoint_path(
+    path: Path | str, spacing: float, *, u_turns: bool = False
+) -> LanePath:
     """Reads waypoints and makes a path of them.
 
     The file is CSV, one waypoint a line: x, y, z or x, y of the vehicle
@@ -46,6 +49,8 @@ def load_waypoint_path(path: Path | str, spacing: float) -> LanePath:
     Args:
         path: the file.
         spacing: distance of the points of the path [m].
+        u_turns: whether the car turns round where waypoints double back, in
+            a loop as tight as it can steer, whose far end is the waypoint.
 
     Raises:
         InputError: naming file, line and fault, or the file is too short
@@ -54,7 +59,11 @@ def load_waypoint_path(path: Path | str, spacing: float) -> LanePath:
     path = Path(path)
     points, lines = _read(path)
     return make_waypoint_path(
-        points, spacing, [f"{path}: line {line}" for line in lines], path
+        points,
+        spacing,
+        [f"{path}: line {line}" for line in lines],
+        path,
+        u_turns=u_turns,
     )
 
 
@@ -63,6 +72,8 @@ def make_waypoint_path(
     spacing: float,
     names: Sequence[str] | None = None,
     source: object = "waypoints",
+    *,
+    u_turns: bool = False,
 ) -> LanePath:
     """Makes a path of waypoints, without speed limits.
 
@@ -71,10 +82,12 @@ def make_waypoint_path(
         spacing: distance of the points of the path [m].
         names: N texts by which errors name the waypoints.
         source: by which errors name all of them.
+        u_turns: whether turns by more than 150 degrees are driven, as loops.
 
     Raises:
         InputError: fewer than two different waypoints, a turn by more than
-            150 degrees, or too little or too much to drive.
+            150 degrees that is not to be driven or has no room, or too
+            little or too much to drive.
     """
     waypoints = np.asarray(waypoints, dtype=float)
     if names is None:
@@ -84,31 +97,100 @@ def make_waypoint_path(
     waypoints = waypoints[kept]
     if len(waypoints) < 2:
         raise InputError(f"{source}: fewer than two different waypoints")
+    names = [names[k] for k in kept.tolist()]
     edges = np.diff(waypoints[:, :2], axis=0)
     lengths = np.hypot(edges[:, 0], edges[:, 1])
     headings = np.arctan2(edges[:, 1], edges[:, 0])
-    turns = np.abs((np.diff(headings) + np.pi) % (2 * np.pi) - np.pi)
-    for k in np.flatnonzero(turns > np.radians(_SHARPEST_TURN_DEG)):
+    turns = np.pi - (np.pi - np.diff(headings)) % (2 * np.pi)
+    is_loop = np.abs(turns) > np.radians(_SHARPEST_TURN_DEG)
+    for k in np.flatnonzero(is_loop):
+        if not u_turns:
+            raise InputError(
+                f"{names[k + 1]}: turns by {np.degrees(abs(turns[k])):.0f} "
+                f"deg, a car can turn by {_SHARPEST_TURN_DEG:.0f} deg at most; "
+                "u_turns: true has it turn round there in a loop"
+            )
+    # What loops take of the segments before and behind them.
+    taken = np.where(is_loop, _loop_length(turns), 0.0)
+    taken = np.concatenate([[0.0], taken, [0.0]])
+    free = lengths - taken[:-1] - taken[1:]
+    for k in np.flatnonzero((free < 0) & (lengths > 0)):
         raise InputError(
-            f"{names[kept[k + 1]]}: turns by {np.degrees(turns[k]):.0f} deg, "
-            f"a car can turn by {_SHARPEST_TURN_DEG:.0f} deg at most"
+            f"{names[k + 1]}: turning round takes {lengths[k] - free[k]:.2f} "
+            f"m between this waypoint and the one before, there are "
+            f"{lengths[k]:.2f} m"
         )
-    room = np.minimum(lengths[:-1], lengths[1:]) / 2
-    tangents = np.tan(turns / 2)
+    usable = np.minimum(lengths / 2, free)
+    room = np.minimum(usable[:-1], usable[1:])
+    tangents = np.tan(np.where(is_loop, 0.0, np.abs(turns)) / 2)
     radii = np.minimum(_CORNER_RADIUS, room / np.maximum(tangents, 1e-9))
-    curve = Centreline(waypoints[:, :2], radii)
+    corners, corner_radii = [waypoints[:1]], []
+    for at, loops in enumerate(is_loop):
+        corner = waypoints[at + 1 : at + 2]
+        if loops:
+            xy = _loop(corner[0, :2], headings[at], turns[at])
+            z = np.full(len(xy), corner[0, 2])
+            corner = np.column_stack([xy, z])
+        corners.append(corner)
+        corner_radii += [LOOP_RADIUS if loops else radii[at]] * len(corner)
+    return _rounded(
+        np.concatenate([*corners, waypoints[-1:]]),
+        np.array(corner_radii),
+        spacing,
+        source,
+    )
+
+
+def _rounded(
+    corners: np.ndarray, radii: np.ndarray, spacing: float, source: object
+) -> LanePath:
+    """Returns the path along (N, 3) corners with N - 2 inner radii [m]."""
+    curve = Centreline(corners[:, :2], radii)
     check_length(curve.length, source)
+    edges = np.diff(corners[:, :2], axis=0)
+    headings = np.arctan2(edges[:, 1], edges[:, 0])
+    turns = np.abs((np.diff(headings) + np.pi) % (2 * np.pi) - np.pi)
     count = int(np.ceil(curve.length / _DENSE_SPACING)) + 1
     along = np.linspace(0.0, curve.length, count)
-    # Where the curve passes each waypoint: the middle of its corner's arc.
-    saved = 2 * radii * tangents - radii * turns
+    # Where the curve passes each corner: the middle of its arc.
+    saved = 2 * radii * np.tan(turns / 2) - radii * turns
     shortened = np.concatenate([[0.0], np.cumsum(saved)])
-    at_waypoints = np.concatenate([[0.0], np.cumsum(lengths)])
-    at_waypoints[1:-1] -= (shortened[:-1] + shortened[1:]) / 2
-    at_waypoints[-1] -= shortened[-1]
-    z = PchipInterpolator(at_waypoints, waypoints[:, 2])(along)
+    lengths = np.hypot(edges[:, 0], edges[:, 1])
+    at_corners = np.concatenate([[0.0], np.cumsum(lengths)])
+    at_corners[1:-1] -= (shortened[:-1] + shortened[1:]) / 2
+    at_corners[-1] -= shortened[-1]
+    z = PchipInterpolator(at_corners, corners[:, 2])(along)
     points = np.column_stack([curve.evaluate(along)[:, :2], z])
     return sample_lane_path(points, np.full(count, np.inf), spacing, source)
+
+
+def _loop_length(turns: np.ndarray) -> np.ndarray:
+    """Returns what (N,) loops take of the way to and from them [m]."""
+    aside = np.cos(turns / 2)
+    return LOOP_RADIUS * (
+        np.abs(np.sin(turns / 2)) + np.sqrt(4 - (1 + aside) ** 2)
+    )
+
+
+def _loop(place: np.ndarray, heading: float, turn: float) -> np.ndarray:
+    """Returns the corners of a loop whose far end is a waypoint.
+
+    Args:
+        place: (2,) the waypoint [m].
+        heading: towards it [rad].
+        turn: by how much it turns there, positive to the left [rad].
+    """
+    if turn < 0:
+        mirror = np.array([1.0, -1.0])
+        return _loop(place * mirror, -heading, -turn) * mirror
+    outwards = heading - (np.pi - turn) / 2
+    centre = place - LOOP_RADIUS * np.array(
+        [np.cos(outwards), np.sin(outwards)]
+    )
+    aside = LOOP_RADIUS * np.cos(turn / 2)
+    return loop_corners(
+        centre, heading, heading + turn, LOOP_RADIUS, aside, aside
+    )
 
 
 def _read(path: Path) -> tuple[np.ndarray, list[int]]:

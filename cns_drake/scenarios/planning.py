@@ -6,6 +6,7 @@ from cns_drake.motion.trajectory import POINT_SPACING, Trajectory
 from cns_drake.recording.frame_clock import frames_within
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import make_lane_path
+from cns_drake.roads.u_turn import TIGHTEST_RADIUS
 from cns_drake.roads.waypoints import load_waypoint_path
 from cns_drake.scenarios.scenario import Scenario
 from evaluation.support.errors import InputError
@@ -15,8 +16,9 @@ def plan_drive(scenario: Scenario) -> Trajectory:
     """Plans the drive of a scenario, along its route or its waypoints.
 
     Raises:
-        InputError: the roads or the waypoints cannot be used, or the route
-            does not suit the roads.
+        InputError: the roads or the waypoints cannot be used, the route
+            does not suit the roads, or a bend is tighter than the car can
+            steer.
 
     Example:
         from cns_drake import load_scenario, plan_drive
@@ -24,7 +26,11 @@ def plan_drive(scenario: Scenario) -> Trajectory:
         trajectory = plan_drive(load_scenario("downtown_01"))
     """
     if scenario.waypoints is not None:
-        path = load_waypoint_path(scenario.waypoints, POINT_SPACING)
+        path = load_waypoint_path(
+            scenario.waypoints, POINT_SPACING, u_turns=scenario.u_turns
+        )
+        source = scenario.waypoints
+        cure = "waypoints farther apart, or fewer of them, make it wider"
     else:
         assert scenario.route is not None  # One of both is there.
         network = load_road_network(scenario.roads_file)
@@ -35,7 +41,26 @@ def plan_drive(scenario: Scenario) -> Trajectory:
             scenario.source,
             aside=scenario.aside,
         )
-    return Trajectory(path, scenario.speeds)
+        source = f"{scenario.source}: route"
+        cure = "a greater kerb_radius of the junction makes it wider"
+    trajectory = Trajectory(path, scenario.speeds)
+    _check_steering(trajectory, source, cure)
+    return trajectory
+
+
+def _check_steering(trajectory: Trajectory, source: str, cure: str) -> None:
+    """Checks that no bend of a drive is tighter than the car can steer.
+
+    Raises:
+        InputError: naming the source, the place and the cure.
+    """
+    radius, (x, y, _) = trajectory.path.tightest_bend()
+    if radius < TIGHTEST_RADIUS:
+        raise InputError(
+            f"{source}: a bend of {radius:.2f} m radius at {x:.1f}, {y:.1f}, "
+            f"the car turns within {TIGHTEST_RADIUS:.2f} m at the tightest; "
+            f"{cure}"
+        )
 
 
 def count_frames(scenario: Scenario, trajectory: Trajectory) -> int:

@@ -180,6 +180,7 @@ class Scenario(_Model):
             [m].
         waypoints: a CSV file of places to pass instead; see
             `cns_drake.roads.waypoints.load_waypoint_path`.
+        u_turns: whether the vehicle turns round where waypoints double back.
         speeds: how fast.
         lidars: the LiDARs by name; the name gives frame and topic.
         imu: the IMU.
@@ -201,6 +202,7 @@ class Scenario(_Model):
     route: Route | None = Field(default=None, validate_default=True)
     aside: float = Field(default=0.0, ge=-3.0, le=3.0)
     waypoints: str | None = Field(default=None, validate_default=True)
+    u_turns: bool = False
     speeds: Speeds
     lidars: dict[Name, LidarConfig] = Field(
         default={"lidar": LidarConfig()}, min_length=1
@@ -250,6 +252,16 @@ class Scenario(_Model):
         if waypoints is not None and info.data.get("aside", 0.0) != 0.0:
             raise ValueError("aside is of a route, waypoints lie where they do")
         return waypoints
+
+    @field_validator("u_turns")
+    @classmethod
+    def _of_waypoints(cls, u_turns: bool, info: ValidationInfo) -> bool:
+        if u_turns and info.data.get("route") is not None:
+            raise ValueError(
+                "is of waypoints; a route turns round where the next leg "
+                "leads back on its road"
+            )
+        return u_turns
 
     @field_validator("lidars")
     @classmethod

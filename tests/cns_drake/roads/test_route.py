@@ -147,8 +147,11 @@ FAULTS = {
         r"route\.1 .*ends at inner_east, .* starts at south",
     ),
     "U-turn": (
-        [leg("ring_east"), leg("ring_east", "backward")],
-        r"route\.1 .*U-turn from road ring_east to road ring_east",
+        [
+            leg("inner_street_west", end=20),
+            leg("inner_street_west", "backward"),
+        ],
+        r"route\.0 .*no room for turning round: it takes a disc of 13\.2 m",
     ),
     "left from the right lane": (
         [
@@ -183,7 +186,7 @@ FAULTS = {
     ),
     "end in the middle": (
         [leg("ring_east", end=3), leg("ring_south_east")],
-        r"route\.0 .*end is for the last leg only",
+        r"route\.0 .*end is for the last leg, or where",
     ),
     "too short": (
         [leg("ring_south_east", start=10, end=29)],

@@ -1,0 +1,192 @@
+"""How a car turns round: the tightest loop that its steering allows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+import shapely
+from shapely.geometry import Point, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from cns_drake.roads.centreline import Centreline, sample_stations
+
+# Of the car in worlds/vehicle.sdf: its axles' distance, from the middle to a
+# front wheel [m], and how far the inner one can be steered [rad].
+_WHEELBASE = 2.8
+_HALF_TRACK = 0.79
+_STEERING_LIMIT = 0.7
+# How far it reaches behind its rear axle and ahead of it, and half its width
+# with mirrors [m].
+_REAR, _FRONT, _HALF_WIDTH = 1.0, 3.72, 1.03
+
+# What the middle of the rear axle can go round [m].
+TIGHTEST_RADIUS = float(_WHEELBASE / np.tan(_STEERING_LIMIT) + _HALF_TRACK)
+# Of planned loops, whose curve is smoothed to the inside of its points [m].
+LOOP_RADIUS = 4.4
+# Distance of the places at which the car's outline is drawn [m].
+_STEP = 0.25
+# Of a dead end in which every street's loop has room [m].
+_DEAD_END_RADIUS = 8.0
+
+
+def loop_corners(
+    centre: ArrayLike,
+    heading_in: float,
+    heading_out: float,
+    radius: float,
+    aside_in: float,
+    aside_out: float,
+) -> np.ndarray:
+    """Returns the corners of a left loop; rounded by its radius it is smooth.
+
+    A car comes along a line, leaves it to the right, goes round the centre to
+    the left, and joins the line on which it leaves, again from the right. It
+    turns by more than 90 degrees.
+
+    Args:
+        centre: (2,) of the loop [m].
+        heading_in, heading_out: of both lines [rad].
+        radius: of the loop and of the bends at its ends [m].
+        aside_in, aside_out: how far the centre lies to the left of the lines,
+            at most the radius [m].
+
+    Returns:
+        (N, 2) corners [m].
+    """
+    swing_in = np.arccos(min(1.0, (radius + aside_in) / (2 * radius)))
+    swing_out = np.arccos(min(1.0, (radius + aside_out) / (2 * radius)))
+    turn = (heading_out - heading_in) % (2 * np.pi)
+    round_ = turn + swing_in + swing_out
+    parts = 3
+    share = round_ / parts
+    # Corners of the loop lie outside it.
+    first = heading_in - swing_in - np.pi / 2 + share / 2
+    angles = first + share * np.arange(parts)
+    reach = radius / np.cos(share / 2)
+    corners = [
+        np.asarray(centre)
+        + reach * np.column_stack([np.cos(angles), np.sin(angles)])
+    ]
+    for swing, heading, aside, sign in (
+        (swing_in, heading_in, aside_in, -1.0),
+        (swing_out, heading_out, aside_out, 1.0),
+    ):
+        if swing > 1e-6:
+            along = np.array([np.cos(heading), np.sin(heading)])
+            right = np.array([along[1], -along[0]])
+            # The bend begins 2 r sin(a) before the centre, and its corner
+            # lies r tan(a / 2) on from there.
+            before = 2 * np.sin(swing) - np.tan(swing / 2)
+            corner = (
+                np.asarray(centre)
+                + sign * before * radius * along
+                + aside * right
+            )
+            if sign < 0:
+                corners.insert(0, corner[None])
+            else:
+                corners.append(corner[None])
+    return np.concatenate(corners)
+
+
+class Loop(NamedTuple):
+    """How a car turns round between two lanes.
+
+    Attributes:
+        begin: how far it has come along its lane when it leaves it [m].
+        points: (N, 2) from there to where it joins the other lane, opposite
+            [m].
+    """
+
+    begin: float
+    points: np.ndarray
+
+
+def find_loop(
+    lanes_at: Callable[[float], tuple[np.ndarray, float]],
+    centres: np.ndarray,
+    area: BaseGeometry,
+) -> Loop:
+    """Returns the first loop for which there is room.
+
+    Args:
+        lanes_at: gives, for a distance travelled [m], x, y and heading of
+            the car, and how far to its left it is to drive back [m].
+        centres: (N,) distances at which the loop's centre may lie [m].
+        area: on which all of the car has to stay.
+
+    Raises:
+        ValueError: there is no room, which tells how much it takes.
+    """
+    shapely.prepare(area)
+    needed, widest = np.inf, 0.0
+    for centre in centres:
+        begin = float(centre) - _ahead(lanes_at(float(centre))[1])
+        (x, y, heading), width = lanes_at(begin)
+        points = _loop(np.array([x, y]), heading, width)
+        swept = swept_area(points)
+        if area.covers(swept):
+            return Loop(begin, points)
+        # From the middle of the loop to either side.
+        left = np.array([-np.sin(heading), np.cos(heading)])
+        along = np.array([left[1], -left[0]])
+        middle = np.array([x, y]) + _ahead(width) * along + width / 2 * left
+        off = (shapely.get_coordinates(swept) - middle) @ left
+        needed = min(needed, 2 * np.abs(off).max())
+        place = Point(middle)
+        if area.covers(place):
+            widest = max(widest, 2 * area.boundary.distance(place))
+    raise ValueError(
+        f"no room for turning round: it takes a disc of {needed:.1f} m across, "
+        f"and as much of the lanes before it, the widest here has "
+        f"{widest:.1f} m; turn where the carriageway is wider, or in a dead "
+        f"end of kerb_radius {_DEAD_END_RADIUS:g}"
+    )
+
+
+def _ahead(width: float) -> float:
+    """Returns how far ahead of where it begins a loop's centre lies [m]."""
+    radius = max(LOOP_RADIUS, width / 2)
+    return float(np.sqrt(4 * radius**2 - (radius + width / 2) ** 2))
+
+
+def _loop(start: np.ndarray, heading: float, width: float) -> np.ndarray:
+    """Returns the (N, 2) points of a loop into the lane beside it [m]."""
+    radius = max(LOOP_RADIUS, width / 2)
+    along = np.array([np.cos(heading), np.sin(heading)])
+    left = np.array([-along[1], along[0]])
+    centre = start + _ahead(width) * along + width / 2 * left
+    corners = loop_corners(
+        centre, heading, heading + np.pi, radius, width / 2, width / 2
+    )
+    curve = Centreline(
+        np.vstack([start, corners, start + width * left]),
+        np.full(len(corners), radius),
+    )
+    return curve.evaluate(sample_stations(0.0, curve.length, _STEP))[:, :2]
+
+
+def swept_area(points: ArrayLike) -> BaseGeometry:
+    """Returns what a car covers whose rear axle follows points.
+
+    Args:
+        points: (N, 2) of the middle of the axle, close to one another [m].
+    """
+    points = np.asarray(points, dtype=float)
+    along = np.gradient(points, axis=0)
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    left = np.column_stack([-along[:, 1], along[:, 0]])
+    corners = [
+        points + x * along + y * left
+        for x, y in (
+            (-_REAR, -_HALF_WIDTH),
+            (_FRONT, -_HALF_WIDTH),
+            (_FRONT, _HALF_WIDTH),
+            (-_REAR, _HALF_WIDTH),
+        )
+    ]
+    outlines = [Polygon(outline) for outline in np.stack(corners, axis=1)]
+    return shapely.union_all(outlines)
