@@ -40,6 +40,15 @@ def city(
             help="Write nothing; exit with 1 if a file would change.",
         ),
     ] = False,
+    repair_stages: Annotated[
+        bool,
+        typer.Option(
+            "--repair-stages",
+            help="In stages.yaml, give structures that stand where "
+            "structures.csv has them the names that they have since the plan "
+            "has grown.",
+        ),
+    ] = False,
     calibrate: Annotated[
         tuple[str, str] | None,
         typer.Option(
@@ -65,7 +74,7 @@ def city(
         from cns_drake.scenarios.sequence_table import write_table
 
     if check:
-        changed = differing_files(folder, note)
+        changed = differing_files(folder, note, repair_stages=repair_stages)
         for path in changed:
             print(path)
         if changed:
@@ -73,7 +82,7 @@ def city(
         return
     if start:
         start_city(folder, seed, note)
-    files = generate_city(folder, note)
+    files = generate_city(folder, note, repair_stages=repair_stages)
     write_table(folder, note)
     note(f"{len(files)} files")
 

@@ -128,6 +128,10 @@ RECIPES = {
         after=("table: city",),
         prints=("TCR_sym",),
     ),
+    "repair stages": Recipe(
+        _CITY + "town --repair-stages",
+        after=("start a city",),
+    ),
     "a city anew": Recipe(
         _CITY + "worlds/metropolis",
         changes=(("worlds/metropolis", "town"),),

@@ -14,6 +14,7 @@ from cns_drake.city.generation.city_structures import (
     make_city,
     meshes_of,
 )
+from cns_drake.city.generation.renaming import find_renaming, renamed_text
 from cns_drake.city.generation.sdf import MESH_FOLDER, stage_sdf
 from cns_drake.city.geometry.structures import MeshShape, Structure
 from cns_drake.city.growth.stage_structures import GrowingCity
@@ -21,13 +22,17 @@ from cns_drake.city.plan.stages import Stages, load_stages
 from cns_drake.scene.semantics import CLASS_IDS
 from evaluation.support.errors import InputError
 
+STAGES_NAME = "stages.yaml"
 TABLE_NAME = "structures.csv"
 # Instance ids are stored as uint16; 0 means no structure.
 MAX_STRUCTURES = 2**16 - 1
 
 
 def render_city(
-    world: Path, city: City, progress: Callable[[str], None] = lambda line: None
+    world: Path,
+    city: City,
+    progress: Callable[[str], None] = lambda line: None,
+    stages_text: str | None = None,
 ) -> dict[str, str]:
     """Returns the text of every generated file by its relative path.
 
@@ -35,6 +40,7 @@ def render_city(
         world: folder with `stages.yaml`; gives the world its name.
         city: made from the folder's `roads.yaml` and `city.yaml`.
         progress: takes one line at a time.
+        stages_text: what `stages.yaml` is going to hold, if not what it does.
 
     Raises:
         InputError: if the stages cannot be used or the city has too many
@@ -42,8 +48,8 @@ def render_city(
     """
     progress(f"{len(city.structures)} structures")
     names = [structure.name for structure in city.structures]
-    source = world / "stages.yaml"
-    stages = load_stages(source, names)
+    source = world / STAGES_NAME
+    stages = load_stages(source, names, stages_text)
     files = render_stages(
         world.resolve().name, city, stages, stages.stages, source, progress
     )
@@ -127,25 +133,41 @@ def structure_table(structures: Iterable[Structure]) -> str:
 
 
 def generate_city(
-    world: Path, progress: Callable[[str], None] = lambda line: None
+    world: Path,
+    progress: Callable[[str], None] = lambda line: None,
+    *,
+    repair_stages: bool = False,
 ) -> list[Path]:
     """Writes all generated files of a world folder.
 
     The same inputs give the same bytes. Each file is replaced at once, and
     stages and meshes that no longer belong to the city are removed.
 
+    Args:
+        world: the folder.
+        progress: takes one line at a time.
+        repair_stages: whether `stages.yaml` is brought up to a plan that
+            has grown: structures that stand where they stood, and have
+            another name than in `structures.csv`, get it there, too.
+
     Returns:
         The paths of all generated files.
 
     Raises:
-        InputError: if an input cannot be used or a file not be written.
+        InputError: if an input cannot be used or a file not be written; if
+            a structure in `stages.yaml` has another name now, and that is
+            not to be repaired; or if one is gone, and that cannot be.
     """
     world = Path(world)
-    files = render_city(world, make_city(world), progress)
+    city = make_city(world)
+    text = _stages_text(world, city, repair_stages, progress)
+    files = render_city(world, city, progress, text)
     try:
         (world / MESH_FOLDER).mkdir(exist_ok=True)
-        for name, text in files.items():
-            _replace(world / name, text)
+        if text is not None:
+            _replace(world / STAGES_NAME, text)
+        for name, content in files.items():
+            _replace(world / name, content)
         for path in _generated(world) - {world / name for name in files}:
             path.unlink()
     except OSError as error:
@@ -155,12 +177,54 @@ def generate_city(
     return [world / name for name in files]
 
 
+def _stages_text(
+    world: Path, city: City, repair: bool, progress: Callable[[str], None]
+) -> str | None:
+    """Returns what `stages.yaml` is to hold, or None if what it does.
+
+    Raises:
+        InputError: see `generate_city`.
+    """
+    stages, table = world / STAGES_NAME, world / TABLE_NAME
+    if not table.exists() and not repair:
+        return None
+    if not repair:
+        try:
+            found = find_renaming(stages, table, city.structures)
+        except InputError:
+            # A faulty table is written anew; of faulty stages is told later.
+            return None
+        for old, new in found.renamed.items():
+            raise InputError(
+                f"{stages}: {old} is {new} now, and {len(found.renamed) - 1} "
+                "more have other names; --repair-stages puts them there "
+                f"(or remove {TABLE_NAME}, if they are already)"
+            )
+        return None
+    found = find_renaming(stages, table, city.structures)
+    for line in found.lines():
+        progress(line)
+    if found.lost:
+        raise InputError(
+            f"{stages}: {len(found.lost)} structure(s) have no counterpart, "
+            f"such as {found.lost[0]}; take them out, then repair again"
+        )
+    return renamed_text(stages, found.renamed) if found.renamed else None
+
+
 def differing_files(
-    world: Path, progress: Callable[[str], None] = lambda line: None
+    world: Path,
+    progress: Callable[[str], None] = lambda line: None,
+    *,
+    repair_stages: bool = False,
 ) -> list[Path]:
     """Returns the files that generating the city anew would change."""
     world = Path(world)
-    files = render_city(world, make_city(world), progress)
+    city = make_city(world)
+    text = _stages_text(world, city, repair_stages, progress)
+    files = render_city(world, city, progress, text)
+    if text is not None:
+        files[STAGES_NAME] = text
     stale = _generated(world) - {world / name for name in files}
     changed = {
         world / name

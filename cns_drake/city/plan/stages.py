@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from evaluation.support.errors import InputError, describe_validation_error
-from evaluation.support.yaml_files import read_yaml
+from evaluation.support.yaml_files import parse_yaml, read_yaml
 
 LotUse = Literal["car_park", "market", "garden", "yard", "empty"]
 StageName = Annotated[str, Field(pattern=r"^\d\d$")]
@@ -129,12 +129,15 @@ class Stages(_Model):
         return [self.stages[name] for name in names[names.index(stage) :]]
 
 
-def load_stages(path: Path, structures: Collection[str]) -> Stages:
+def load_stages(
+    path: Path, structures: Collection[str], text: str | None = None
+) -> Stages:
     """Reads `stages.yaml` and checks it against the city.
 
     Args:
         path: the file.
         structures: the names of all structures of the city.
+        text: what the file is going to hold, in place of what it does.
 
     Returns:
         The stages, patterns replaced by the names that they stand for.
@@ -144,7 +147,7 @@ def load_stages(path: Path, structures: Collection[str]) -> Stages:
             stages are out of order, the last one lacks something, a name is
             unknown or absent twice, or a pattern stands for nothing.
     """
-    content = read_yaml(path)
+    content = read_yaml(path) if text is None else parse_yaml(text)
     try:
         stages = Stages.model_validate(content)
     except ValidationError as error:

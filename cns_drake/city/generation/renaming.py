@@ -1,0 +1,249 @@
+"""Brings the names in `stages.yaml` up to a plan that has grown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from pathlib import Path
+import re
+
+import numpy as np
+from scipy.spatial import cKDTree
+import yaml
+
+from cns_drake.city.geometry.structures import Structure
+from evaluation.support.csv_files import read_records
+from evaluation.support.errors import InputError
+from evaluation.support.files import read_bytes
+from evaluation.support.yaml_files import read_yaml
+
+# What is drawn anew stands elsewhere, all else where it was [m].
+_SAME_PLACE = 0.3
+_COLUMNS = ("name", "class", "x", "y", "tags")
+
+
+@dataclass(frozen=True)
+class Renaming:
+    """What has become of the structures that a file of stages names.
+
+    Attributes:
+        renamed: old name -> name of today, of those that stand where they
+            stood.
+        lost: names of those that do not, whatever bears the name today.
+        unclear: patterns that stand for other structures than they did.
+    """
+
+    renamed: dict[str, str]
+    lost: list[str]
+    unclear: list[str]
+
+    def lines(self) -> Iterator[str]:
+        """Yields a line for each of them."""
+        for old, new in self.renamed.items():
+            yield f"{old} is {new} now"
+        for name in self.lost:
+            yield f"{name} has no counterpart"
+        for pattern in self.unclear:
+            yield f"{pattern} stands for others than before"
+
+
+@dataclass(frozen=True)
+class _Row:
+    name: str
+    semantic_class: str
+    xy: tuple[float, float]
+    tags: str
+
+    @property
+    def stem(self) -> str:
+        return re.sub(r"_\d+$", "", self.name)
+
+
+def find_renaming(
+    stages: Path, table: Path, structures: Sequence[Structure]
+) -> Renaming:
+    """Tells what has become of the structures that stages name.
+
+    Args:
+        stages: a `stages.yaml`.
+        table: the `structures.csv` of the city for which it was written.
+        structures: of the city of today.
+
+    Raises:
+        InputError: a file cannot be read.
+    """
+    before = {row.name: row for row in _read(table)}
+    today = [_row_of(structure) for structure in structures]
+    successor = _successors(list(before.values()), today)
+    names = {row.name for row in today}
+    renamed: dict[str, str] = {}
+    lost: list[str] = []
+    unclear: list[str] = []
+    for name in dict.fromkeys(node.value for node in _name_nodes(stages)):
+        if "*" in name or "?" in name:
+            if _has_changed(name, before, names, successor):
+                unclear.append(name)
+        elif name not in before:
+            # A name of today, or a slip, of which generating tells.
+            continue
+        elif name not in successor:
+            lost.append(name)
+        elif successor[name] != name:
+            renamed[name] = successor[name]
+    return Renaming(renamed, lost, unclear)
+
+
+def renamed_text(stages: Path, renamed: Mapping[str, str]) -> str:
+    """Returns the text of a file of stages with other names in it.
+
+    Comments, order and all else stay as they are.
+
+    Raises:
+        InputError: the file cannot be read.
+    """
+    text = _text(stages)
+    for node in sorted(
+        _name_nodes(stages), key=lambda node: -node.start_mark.index
+    ):
+        if node.value in renamed:
+            start, end = node.start_mark.index, node.end_mark.index
+            # The scalar may have an anchor in front of it.
+            head, _, tail = text[start:end].rpartition(node.value)
+            new = head + renamed[node.value] + tail
+            text = text[:start] + new + text[end:]
+    return text
+
+
+def _text(path: Path) -> str:
+    try:
+        return read_bytes(path).decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: not UTF-8") from error
+
+
+def _name_nodes(path: Path) -> list[yaml.ScalarNode]:
+    """Returns the scalars of a file of stages that name structures."""
+    read_yaml(path)  # Within bounds, or an error in one line.
+    # Only the slower loader tells where in the text a node is.
+    root = yaml.compose(_text(path), yaml.SafeLoader)
+    lists = [
+        node
+        for _, stage in _items(root, "stages")
+        for node in (
+            *(group for _, group in _items(stage, "absent")),
+            *(
+                part
+                for kind in ("lower", "sites")
+                for _, growth in _items(stage, kind)
+                for key, part in _pairs(growth)
+                if key in ("structures", "but")
+            ),
+        )
+    ]
+    lists += [node for _, node in _items(root, "lots")]
+    # What an alias stands for is there once.
+    scalars = {
+        id(node): node
+        for group in lists
+        if isinstance(group, yaml.SequenceNode)
+        for node in group.value
+        if isinstance(node, yaml.ScalarNode)
+    }
+    return list(scalars.values())
+
+
+def _items(node: yaml.Node | None, key: str) -> list[tuple[str, yaml.Node]]:
+    """Returns the pairs of the mapping that a mapping has under a key."""
+    return [
+        pair
+        for name, value in _pairs(node)
+        if name == key
+        for pair in _pairs(value)
+    ]
+
+
+def _pairs(node: yaml.Node | None) -> list[tuple[str, yaml.Node]]:
+    """Returns the pairs of a mapping, of those it is merged of as well."""
+    if not isinstance(node, yaml.MappingNode):
+        return []
+    pairs = []
+    for key, value in node.value:
+        if key.value == "<<":
+            merged = (
+                value.value if isinstance(value, yaml.SequenceNode) else [value]
+            )
+            pairs += [pair for part in merged for pair in _pairs(part)]
+        else:
+            pairs.append((key.value, value))
+    return pairs
+
+
+def _has_changed(
+    pattern: str,
+    before: Iterable[str],
+    today: Iterable[str],
+    successor: Mapping[str, str],
+) -> bool:
+    """Tells whether a pattern names others, but for what is new or gone."""
+    meant = {
+        successor[name]
+        for name in before
+        if name in successor and fnmatchcase(name, pattern)
+    }
+    known = set(successor.values())
+    return meant != {
+        name for name in today if name in known and fnmatchcase(name, pattern)
+    }
+
+
+def _read(table: Path) -> list[_Row]:
+    rows = []
+    for line, row in read_records(table, _COLUMNS):
+        try:
+            xy = float(row["x"]), float(row["y"])
+        except ValueError:
+            xy = np.nan, np.nan
+        if not np.isfinite(xy).all():
+            raise InputError(f"{table}: line {line}: no finite x and y")
+        rows.append(_Row(row["name"], row["class"], xy, row["tags"]))
+    return rows
+
+
+def _row_of(structure: Structure) -> _Row:
+    x, y, _ = structure.xyz
+    return _Row(
+        structure.name,
+        structure.semantic_class,
+        (x, y),
+        " ".join(structure.tags),
+    )
+
+
+def _successors(
+    before: Sequence[_Row], today: Sequence[_Row]
+) -> dict[str, str]:
+    """Returns the name of today of what stands where it stood."""
+    if not before or not today:
+        return {}
+    tree = cKDTree([row.xy for row in today])
+    pairs = []
+    for row in before:
+        for k in tree.query_ball_point(row.xy, _SAME_PLACE):
+            other = today[k]
+            # What is of one kind is one thing; two things of a kind, such
+            # as the grounds of two districts, are told apart by names.
+            if (
+                row.stem == other.stem
+                and row.semantic_class == other.semantic_class
+            ):
+                gap = float(np.hypot(*np.subtract(row.xy, other.xy)))
+                unlike = (row.name != other.name, row.tags != other.tags)
+                pairs.append((gap > 0.01, unlike, gap, row.name, other.name))
+    found: dict[str, str] = {}
+    taken: set[str] = set()
+    for *_, old, new in sorted(pairs):
+        if old not in found and new not in taken:
+            found[old] = new
+            taken.add(new)
+    return found

@@ -1,0 +1,158 @@
+"""Names in `stages.yaml` that follow a plan that grows."""
+
+import csv
+import re
+
+import pytest
+from small_city import write_small_city
+from typer.testing import CliRunner
+import yaml
+
+from cns_drake.city.generation.generate import generate_city
+from cns_drake.command_line.cli import app
+from evaluation.support.errors import InputError
+
+pytestmark = pytest.mark.slow
+
+STAGES = """
+# Who was there first.
+stages:
+  "01":
+    story: without office_001 and its like
+    absent:
+      houses: [office_001, 'brick_block_001']   # the "north"
+      "trees: tree_001":
+        - tree_001
+        - &last tree_002
+    lower:
+      it: &grown {height: 6, structures: [office_051], but: [tree_*]}
+      that: {<<: *grown, height: 9}
+  "02": {story: all of it}
+lots: {market: [office_051]}
+"""
+# What is built in it bears the first numbers.
+DISTRICT = """
+  - name: new_square
+    area: [[-55, -105], [-15, -105], [-15, -55], [-55, -55]]
+    buildings:
+      - {archetype: office, at: [-35, -70], size: [16, 14], height: 20}
+      - {archetype: brick_block, at: [-35, -95], size: [16, 12], height: 14}
+    scatter: [{objects: {lime_tree: 1}, spacing: 12}]
+"""
+
+
+def rows_of(folder):
+    with open(folder / "structures.csv", encoding="utf-8") as file:
+        return {row["name"]: row for row in csv.DictReader(file)}
+
+
+def place(row):
+    return row["x"], row["y"], row["class"]
+
+
+def insert(folder):
+    plan = (folder / "city.yaml").read_text()
+    first = "districts:\n"
+    assert first in plan
+    plan = plan.replace(first, first + DISTRICT.lstrip("\n"))
+    (folder / "city.yaml").write_text(plan)
+
+
+@pytest.fixture
+def grown(tmp_path):
+    """A city whose plan has got another first district."""
+    folder = write_small_city(tmp_path / "small")
+    (folder / "stages.yaml").write_text(STAGES)
+    generate_city(folder)
+    insert(folder)
+    return folder
+
+
+def test_a_grown_plan_is_not_generated_with_the_old_names(grown):
+    files = {path: path.read_bytes() for path in grown.glob("*.*")}
+    with pytest.raises(
+        InputError, match=r"stages.yaml: \w+ is \w+ now, and"
+    ) as e:
+        generate_city(grown)
+    assert "--repair-stages" in str(e.value)
+    assert files == {path: path.read_bytes() for path in grown.glob("*.*")}
+    # Without a table the names are taken as they are; there is one no more.
+    (grown / "structures.csv").unlink()
+    with pytest.raises(InputError, match="unknown structure tree_001"):
+        generate_city(grown)
+
+
+def test_names_follow_what_stays_where_it_is(grown):
+    before = rows_of(grown)
+    told = CliRunner().invoke(
+        app, ["city", str(grown), "--repair-stages", "--check"]
+    )
+    assert told.exit_code == 1
+    assert (grown / "stages.yaml").read_text() == STAGES
+    assert str(grown / "stages.yaml") in told.output
+    done = CliRunner().invoke(app, ["city", str(grown), "--repair-stages"])
+    assert done.exit_code == 0, done.output
+    after = rows_of(grown)
+    text = (grown / "stages.yaml").read_text()
+    # Each name is that of what stands where its bearer stood.
+    named = re.compile(
+        r"(?<=[\[ '])(?:office|brick_block|tree)_\d+(?=[\],'\n])"
+    )
+    old, new = named.findall(STAGES), named.findall(text)
+    assert len(old) == len(new) == 6
+    for one, other in zip(old, new, strict=True):
+        assert one != other
+        assert place(before[one]) == place(after[other])
+        assert f"{one} is {other} now" in told.output
+    # All else is as it was, to the letter.
+    assert named.sub("", text) == named.sub("", STAGES)
+    stages = yaml.safe_load(text)["stages"]
+    assert "office_001" in stages["01"]["story"]
+    assert "trees: tree_001" in stages["01"]["absent"]
+    # And again, there is nothing to do.
+    again = CliRunner().invoke(app, ["city", str(grown), "--repair-stages"])
+    assert again.exit_code == 0
+    assert " is " not in again.output
+    assert (grown / "stages.yaml").read_text() == text
+
+
+def test_what_is_gone_is_named_and_nothing_written(grown):
+    plan = (grown / "city.yaml").read_text()
+    (grown / "city.yaml").write_text(
+        plan.replace("at: [30, -21]", "at: [36, -21]")
+    )
+    lines = []
+    with pytest.raises(InputError, match=r"1 structure.* such as office_051"):
+        generate_city(grown, lines.append, repair_stages=True)
+    assert "office_051 has no counterpart" in lines
+    assert (grown / "stages.yaml").read_text() == STAGES
+
+
+def test_patterns_that_mean_others_are_told(grown):
+    text = STAGES.replace("tree_*", '"office_00?"')
+    (grown / "stages.yaml").write_text(text)
+    lines = []
+    generate_city(grown, lines.append, repair_stages=True)
+    assert "office_00? stands for others than before" in lines
+    assert "office_00?" in (grown / "stages.yaml").read_text()
+
+
+def test_a_plan_that_has_not_grown_is_left_alone(tmp_path):
+    folder = write_small_city(tmp_path / "small")
+    (folder / "stages.yaml").write_text(STAGES)
+    written = generate_city(folder)
+    files = {path: path.read_bytes() for path in written}
+    generate_city(folder, repair_stages=True)
+    assert files == {path: path.read_bytes() for path in written}
+    assert (folder / "stages.yaml").read_text() == STAGES
+
+
+def test_a_faulty_table_is_no_hindrance_but_to_repair(tmp_path):
+    folder = write_small_city(tmp_path / "small")
+    (folder / "structures.csv").write_text("instance,name\n1,a\n")
+    with pytest.raises(InputError, match=r"structures\.csv: .*class"):
+        generate_city(folder, repair_stages=True)
+    generate_city(folder)
+    (folder / "structures.csv").unlink()
+    with pytest.raises(InputError, match=r"structures\.csv: No such file"):
+        generate_city(folder, repair_stages=True)
