@@ -14,7 +14,7 @@ from evaluation.support.interrupts import uninterrupted
 from evaluation.support.terminal import note, print_rows
 
 if TYPE_CHECKING:
-    from cns_drake.imports.import_map import ImportReport
+    from cns_drake.imports.import_report import ImportReport
 
 
 def import_city(
@@ -22,8 +22,8 @@ def import_city(
         list[str],
         typer.Argument(
             metavar="FILE",
-            help="CityJSON 1.0 to 2.0 (.json), CityJSONSeq (.jsonl), or "
-            "OpenStreetMap (.osm, .pbf).",
+            help="CityJSON 1.0 to 2.0 (.json), CityJSONSeq (.jsonl), "
+            "OpenStreetMap (.osm, .pbf), or OpenDRIVE (.xodr).",
         ),
     ],
     output: Annotated[
@@ -54,6 +54,13 @@ def import_city(
             help="Level of detail; the highest of each object if left out."
         ),
     ] = None,
+    seed: Annotated[
+        int,
+        typer.Option(
+            min=0,
+            help="Of the buildings along roads that have none (OpenDRIVE).",
+        ),
+    ] = 0,
 ) -> None:
     """Make a map of a real city.
 
@@ -61,6 +68,7 @@ def import_city(
     """
     with uninterrupted():
         from cns_drake.imports import import_map
+        from cns_drake.imports.import_report import ImportOptions
         from cns_drake.scenarios.sequence_table import write_table
 
     # The years that follow the first of --years come as arguments.
@@ -70,7 +78,7 @@ def import_city(
         raise InputError(f"give one file, not {' '.join(source)}")
     path = Path(paths[0])
     stages = tuple(sorted([*(years or ()), *more]))
-    options = import_map.ImportOptions(stages, year_attribute, undated, lod)
+    options = ImportOptions(stages, year_attribute, undated, lod, seed)
     report = import_map.import_city(path, output, options, note)
     write_table(output, note)
     print_rows(_rows(report, options.years))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 import os
 from pathlib import Path
 import re
@@ -26,69 +26,25 @@ from cns_drake.city.geometry.structures import (
     Part,
     Structure,
 )
-from cns_drake.imports.building_years import (
-    Undated,
-    stage_names,
-    stands_at,
-)
-from cns_drake.imports.drive_search import FreeDrive, find_drives
+from cns_drake.imports.building_years import stage_names, stands_at
+from cns_drake.imports.drive_files import write_drives
+from cns_drake.imports.drive_search import find_drives
 from cns_drake.imports.foreign_city import ForeignCity, Imported
 from cns_drake.imports.free_space import find_free_space, surface_samples
 from cns_drake.imports.import_ground import Ground, feet_of, guess_ground
+from cns_drake.imports.import_report import ImportOptions, ImportReport
 from cns_drake.imports.import_structures import import_cityjson
+from cns_drake.imports.opendrive.town import build_town
+from cns_drake.imports.opendrive.town_files import write_town
 from cns_drake.imports.openstreetmap import import_openstreetmap
 from cns_drake.imports.overview import draw_overview
 from evaluation.support.errors import InputError
 from evaluation.support.files import part_path, user_errors
 
-_SPEEDS = {
-    "cruise": 8.0,
-    "longitudinal_acceleration": 2.0,
-    "lateral_acceleration": 2.5,
-}
 # Of flat things on the ground every such corner helps to find its height.
 _EVERY_CORNER = 7
 # Between the points of a surface that the ground must not hide [m].
 _SURFACE_SPACING = 2.0
-
-
-@dataclass(frozen=True)
-class ImportOptions:
-    """What is taken of a file.
-
-    Attributes:
-        years: of the stages, increasing; one stage of all if there is none.
-        year_attribute: that tells when something was built; one of the usual
-            ones if None.
-        undated: what becomes of buildings without a year.
-        lod: level of detail; the highest of each object if None.
-    """
-
-    years: tuple[int, ...] = ()
-    year_attribute: str | None = None
-    undated: Undated = Undated.FIRST
-    lod: float | None = None
-
-
-@dataclass(frozen=True)
-class ImportReport:
-    """What came of a file.
-
-    Attributes:
-        kinds: type of object -> how many structures.
-        triangles: of all.
-        stages: stage -> how many structures stand.
-        undated: buildings without a year.
-        drives: lengths of the proposed drives [m].
-        faults: kind, how many, example.
-    """
-
-    kinds: dict[str, int]
-    triangles: int
-    stages: dict[str, int]
-    undated: int
-    drives: tuple[float, ...]
-    faults: list[tuple[str, int, str]]
 
 
 def import_city(
@@ -100,7 +56,8 @@ def import_city(
     """Writes a map folder of a file.
 
     Args:
-        source: CityJSON (.json, .jsonl) or OpenStreetMap (.osm, .pbf).
+        source: CityJSON (.json, .jsonl), OpenStreetMap (.osm, .pbf) or
+            OpenDRIVE (.xodr).
         output: the folder, which must not be there yet.
         options: what is taken.
         progress: takes one line at a time.
@@ -110,6 +67,10 @@ def import_city(
             is there or cannot be written.
     """
     stages = stage_names(options.years)
+    is_roads = source.suffix == ".xodr"
+    if is_roads and (options.years or options.lod is not None):
+        option = "--years" if options.years else "--lod"
+        raise InputError(f"{option}: {source} is a road network, without any")
     if os.path.lexists(output):
         raise InputError(f"{output}: is there already")
     name = output.resolve().name
@@ -118,6 +79,10 @@ def import_city(
             f"--output: {name!r}: letters, digits and underscores only"
         )
     progress(f"reading {source}")
+    if is_roads:
+        town = build_town(source, options.seed, progress)
+        with _drafted(output) as draft:
+            return write_town(draft, source, town, progress)
     city = _read(source, options)
     found = city.structures
     if not found:
@@ -137,27 +102,24 @@ def import_city(
     space = find_free_space(kept, ground)
     drives = find_drives(space)
     bottom = _bottom(kept, ground)
-    part = part_path(output)
-    draft = part / name
-    try:
-        with user_errors(output):
-            shutil.rmtree(part, ignore_errors=True)
-            (draft / MESH_FOLDER).mkdir(parents=True)
-            _write_world(
-                draft,
-                source,
-                [*bottom, *(one.structure for one in kept)],
-                {
-                    stage: [*bottom, *(one.structure for one in some)]
-                    for stage, some in zip(stages, standing, strict=True)
-                },
-            )
-            _write_facts(draft, source, city, options, stages)
-            _write_drives(draft, stages, options.years, drives, ground)
-            draw_overview(draft / "from_above.png", kept, space, drives)
-            os.replace(draft, output)
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
+    with _drafted(output) as draft:
+        _write_world(
+            draft,
+            source,
+            [*bottom, *(one.structure for one in kept)],
+            {
+                stage: [*bottom, *(one.structure for one in some)]
+                for stage, some in zip(stages, standing, strict=True)
+            },
+        )
+        _write_facts(draft, source, city, options, stages)
+        when = [f" in {year}" for year in options.years] or [""]
+        routes = [
+            np.column_stack([drive.waypoints, ground.height(drive.waypoints)])
+            for drive in drives
+        ]
+        write_drives(draft, dict(zip(stages, when, strict=True)), routes)
+        draw_overview(draft / "from_above.png", kept, space, drives)
     return ImportReport(
         kinds=dict(Counter(one.kind for one in kept)),
         triangles=sum(len(one.triangles) for one in kept),
@@ -171,13 +133,32 @@ def import_city(
     )
 
 
+@contextmanager
+def _drafted(output: Path) -> Iterator[Path]:
+    """Gives a folder of the same name, which takes the place when all is well.
+
+    Raises:
+        InputError: if it cannot be written.
+    """
+    part = part_path(output)
+    draft = part / output.resolve().name
+    try:
+        with user_errors(output):
+            shutil.rmtree(part, ignore_errors=True)
+            (draft / MESH_FOLDER).mkdir(parents=True)
+            yield draft
+            os.replace(draft, output)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
 def _read(source: Path, options: ImportOptions) -> ForeignCity:
     if source.suffix in (".json", ".jsonl"):
         return import_cityjson(source, options.lod, options.year_attribute)
     if source.suffix not in (".osm", ".pbf"):
         raise InputError(
-            f"{source}: not CityJSON (.json, .jsonl) or OpenStreetMap (.osm,"
-            " .pbf)"
+            f"{source}: not CityJSON (.json, .jsonl), OpenStreetMap (.osm,"
+            " .pbf) or OpenDRIVE (.xodr)"
         )
     if options.lod is not None:
         raise InputError(f"--lod: {source} has no levels of detail")
@@ -289,37 +270,3 @@ def _write_facts(
     )
     text = yaml.safe_dump(facts, sort_keys=False, allow_unicode=True)
     (draft / "import.yaml").write_text(comment + text, "utf-8")
-
-
-def _write_drives(
-    draft: Path,
-    stages: Sequence[str],
-    years: Sequence[int],
-    drives: Sequence[FreeDrive],
-    ground: Ground,
-) -> None:
-    """Writes routes, and scenarios of each through every stage."""
-    for letter, drive in zip("ab", drives, strict=False):
-        z = ground.height(drive.waypoints)
-        rows = [
-            f"{x:.2f},{y:.2f},{height:.2f}"
-            for (x, y), height in zip(drive.waypoints, z, strict=True)
-        ]
-        text = "\n".join(["x,y,z", *rows, ""])
-        (draft / f"route_{letter}.csv").write_text(text, "utf-8")
-    for number, stage in enumerate(stages):
-        # The last stage asks, from another route than the others know.
-        letters = "ab"[: len(drives)]
-        if number < len(stages) - 1:
-            letters = letters[::-1]
-        when = f" in {years[number]}" if years else ""
-        for kind, letter in zip(("sequence", "other"), letters, strict=False):
-            scenario = {
-                "map": ".",
-                "stage": stage,
-                "title": f"Route {letter} through {draft.name}{when}",
-                "waypoints": f"route_{letter}.csv",
-                "speeds": _SPEEDS,
-            }
-            text = yaml.safe_dump(scenario, sort_keys=False)
-            (draft / f"{kind}_{stage}.yaml").write_text(text, "utf-8")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Protocol
 
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 import numpy as np
 
-from cns_drake.imports.drive_search import FreeDrive
 from cns_drake.imports.foreign_city import Imported
 from cns_drake.imports.free_space import CELL, FreeSpace
 from cns_drake.scene.semantics import CLASS_RGB
@@ -19,22 +19,37 @@ _INCHES = 9.0
 _ROUTE_COLOURS = ("#d7191c", "#2c7bb6")
 
 
+class _Drive(Protocol):
+    """What is driven."""
+
+    @property
+    def path(self) -> np.ndarray:
+        """Its places from above (N, 2) [m]."""
+        ...
+
+
 def draw_overview(
     path: Path,
     structures: Sequence[Imported],
-    space: FreeSpace,
-    drives: Sequence[FreeDrive],
+    space: FreeSpace | None,
+    drives: Sequence[_Drive],
 ) -> None:
     """Draws what stands, where a car has room, and the drives [m].
 
     Args:
         path: the picture to write.
         structures: of the whole city.
-        space: where a car has room.
+        space: where a car has room, if that is to be seen.
         drives: that were found.
     """
-    rows, columns = space.clearance.shape
-    size = _INCHES * np.array([columns, rows]) / max(rows, columns)
+    corners = np.concatenate(
+        [one.triangles.reshape(-1, 3) for one in structures]
+    )
+    low, high = corners[:, :2].min(axis=0), corners[:, :2].max(axis=0)
+    if space is not None:
+        low = space.low
+        high = low + CELL * np.array(space.clearance.shape[::-1])
+    size = _INCHES * (high - low) / (high - low).max()
     figure = Figure(
         figsize=(size[0] + 0.8, size[1] + 0.6), layout="constrained"
     )
@@ -54,12 +69,17 @@ def draw_overview(
                     linewidths=0.3,
                 )
             )
-    left, low = space.low
-    extent = (left, left + CELL * columns, low, low + CELL * rows)
-    room = np.where(space.clearance >= space.least, 1.0, np.nan)
-    axes.imshow(
-        room, origin="lower", extent=extent, cmap="summer", alpha=0.35, vmax=1.2
-    )
+    extent = (low[0], high[0], low[1], high[1])
+    if space is not None:
+        room = np.where(space.clearance >= space.least, 1.0, np.nan)
+        axes.imshow(
+            room,
+            origin="lower",
+            extent=extent,
+            cmap="summer",
+            alpha=0.35,
+            vmax=1.2,
+        )
     for drive, line in zip(drives, _ROUTE_COLOURS, strict=False):
         axes.plot(*drive.path.T, color=line, linewidth=2.0)
         axes.plot(*drive.path[0], "o", color=line)
@@ -72,4 +92,6 @@ def draw_overview(
 
 def _colour(one: Imported) -> tuple[float, float, float]:
     part = one.structure.model.parts[0]
+    if one.structure.semantic_class == "vegetation":
+        return CLASS_RGB["vegetation"]
     return part.rgb or CLASS_RGB[one.structure.semantic_class]

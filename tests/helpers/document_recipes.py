@@ -12,7 +12,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from small_cityjson import write_blocks
+from small_opendrive import straight, write_roads
 import yaml
+
+
+def _write_sources(folder: Path) -> None:
+    write_blocks(folder / "blocks.json")
+    write_roads(
+        folder / "Town01.xodr",
+        straight("1", 0, 0, 150, 0),
+        straight("2", 150, 0, 300, 0),
+    )
 
 
 @dataclass(frozen=True)
@@ -102,7 +112,7 @@ RECIPES = {
         'map: .\nstage: "01"',
         file="imported.yaml",
         # What a reader has from elsewhere.
-        prepare=lambda folder: write_blocks(folder / "blocks.json"),
+        prepare=_write_sources,
     ),
     "imports": Recipe(
         ".venv/bin/cns-drake import delft",
@@ -116,6 +126,18 @@ RECIPES = {
         after=("imported scenario",),
         prints=("stage 02 (1970)", "drive b", "delft_04"),
         makes=("delft/from_above.png", "study/delft_01/metadata.yaml"),
+    ),
+    "imported roads": Recipe(
+        ".venv/bin/cns-drake import Town01.xodr",
+        changes=(
+            (
+                "reproduce town01 --output",
+                "simulate town01/sequence_01.yaml --frames 2 --output",
+            ),
+        ),
+        after=("imported scenario",),
+        prints=("drive a", "stage 02"),
+        makes=("town01/from_above.png", "study/town01_01/metadata.yaml"),
     ),
     "table: import": Recipe(
         "cns-drake import FILE",

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator, Mapping
+from collections.abc import (
+    Callable,
+    Container,
+    Iterable,
+    Iterator,
+    Mapping,
+    Sequence,
+)
 from dataclasses import dataclass
 from pathlib import Path
 
 from shapely import GEOSException
+from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
 from cns_drake.city.buildings import ARCHETYPES
@@ -14,7 +23,7 @@ from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.ground.bridges import bridge_structures
 from cns_drake.city.ground.districts import share_out
-from cns_drake.city.ground.elevation import apron, make_ground
+from cns_drake.city.ground.elevation import aprons, make_ground
 from cns_drake.city.ground.markings import marking_structure
 from cns_drake.city.ground.streets import kerb_height, street_structures
 from cns_drake.city.ground.terrain import GroundShape, ground_structures
@@ -31,6 +40,7 @@ from cns_drake.city.placement.sidewalks import (
 from cns_drake.city.plan.city_plan import CityPlan, DistrictPlan, load_plan
 from cns_drake.roads.network import RoadNetwork, load_road_network
 from cns_drake.roads.road_surface import RoadSurface
+from cns_drake.roads.street_areas import StreetAreas, SurfaceHeights
 from evaluation.support.errors import InputError
 
 
@@ -45,6 +55,31 @@ class City:
 
     structures: tuple[Structure, ...]
     cars: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Streets:
+    """Streets that a city is built along.
+
+    Attributes:
+        areas: of them.
+        surface: how high they lie.
+        kerb_height: of sidewalks above it [m].
+        junctions: the area of all junctions in W [m].
+        reserved: where nothing is built or planted, in W [m].
+        structures: their surfaces.
+        furnish: places what belongs to them, before all else but buildings.
+        park: parks cars in them, at last.
+    """
+
+    areas: StreetAreas
+    surface: SurfaceHeights
+    kerb_height: float
+    junctions: BaseGeometry
+    reserved: BaseGeometry
+    structures: Sequence[Structure]
+    furnish: Callable[[Draft], None]
+    park: Callable[[Draft], None]
 
 
 def meshes_of(structures: Iterable[Structure]) -> dict[str, Mesh]:
@@ -88,9 +123,7 @@ def make_city(world: Path) -> City:
 
 
 def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
-    """Makes a city.
-
-    What needs most room, or has the least choice of place, comes first.
+    """Makes a city of a road network.
 
     Args:
         network: the roads.
@@ -100,17 +133,46 @@ def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
     Raises:
         InputError: if the plan asks for something unknown or impossible.
     """
+    streets = Streets(
+        network,
+        RoadSurface(network),
+        kerb_height(network),
+        unary_union(
+            [network.junction_area(name) for name in network.junctions]
+        ),
+        Polygon(),
+        (*street_structures(network), marking_structure(network)),
+        lambda draft: furnish_junctions(draft, network),
+        lambda draft: park_along_streets(draft, network, plan.cars),
+    )
+    return build_along(streets, plan, source)
+
+
+def build_along(streets: Streets, plan: CityPlan, source: str) -> City:
+    """Makes a city along streets.
+
+    What needs most room, or has the least choice of place, comes first.
+
+    Args:
+        streets: that are there.
+        plan: of the districts.
+        source: the plan's file name, for messages.
+
+    Raises:
+        InputError: if the plan asks for something unknown or impossible.
+    """
     _check_names(plan, source)
-    draft = Draft(network, plan.seed)
+    draft = Draft(streets.areas, streets.kerb_height, plan.seed)
+    if not streets.reserved.is_empty:
+        draft.take(streets.reserved)
     districts = share_out(plan, draft.streets, source)
-    surface, kerb = RoadSurface(network), kerb_height(network)
-    place = surface, kerb, draft.streets, plan.bounds
+    place = streets.surface, streets.kerb_height, draft.streets, plan.bounds
     terraces = [pad for district in districts for pad in district.terraces]
     draft.base = make_ground(*place, terraces)
     for district in districts:
         place_buildings(draft, district, source)
-    aprons = [apron(s, draft.streets) for s in draft.structures]
-    draft.base = make_ground(*place, [*aprons, *terraces])
+    level = aprons(draft.structures, draft.streets)
+    draft.base = make_ground(*place, [*level, *terraces])
     shape = GroundShape(
         draft.base,
         districts,
@@ -121,15 +183,14 @@ def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
         lambda name: draft.rng(name, "relief"),
     )
     draft.ground_height = shape
-    furnish_junctions(draft)
+    streets.furnish(draft)
     for district in districts:
         furnish(draft, district, plan.cars, source)
-    furnish_sidewalks(draft, plan, districts)
-    park_along_streets(draft, plan.cars)
+    furnish_sidewalks(draft, plan, districts, streets.junctions)
+    streets.park(draft)
     plant_medians(draft, plan.medians or plan.street)
     ground = [
-        *street_structures(network),
-        marking_structure(network),
+        *streets.structures,
         *ground_structures(districts, shape, plan.water_level),
         *bridge_structures(districts, draft.streets, shape, plan.water_level),
     ]

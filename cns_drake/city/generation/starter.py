@@ -23,6 +23,7 @@ from cns_drake.city.geometry.polygons import polygons_of, snap
 from cns_drake.city.plan.city_plan import CityPlan, load_plan
 from cns_drake.roads.network import RoadNetwork, load_road_network
 from cns_drake.roads.route_drawing import draw_route
+from cns_drake.roads.street_areas import StreetAreas
 from evaluation.support.files import complete_part, write_part
 
 # The world reaches this far beyond the roads [m].
@@ -82,12 +83,12 @@ def start_city(
     write(
         plan_file.name,
         "The districts: what stands on the ground that the roads leave.",
-        lambda: _plan(network, seed),
+        lambda: starter_plan(network, seed),
     )
 
     def stages() -> dict:
         plan: CityPlan = load_plan(plan_file)
-        return _stages(lay_out(network, plan, str(plan_file)))
+        return starter_stages(lay_out(network, plan, str(plan_file)))
 
     write("stages.yaml", "What each stage lacks, by name.", stages)
     for k, stage in enumerate(("01", "02")):
@@ -111,14 +112,22 @@ def _drive(network: RoadNetwork, stage: str, rng: np.random.Generator) -> dict:
     }
 
 
-def _plan(network: RoadNetwork, seed: int) -> dict:
-    """Returns a plan in which every block has a character of its own."""
+def starter_plan(areas: StreetAreas, seed: int) -> dict:
+    """Returns a plan in which every block has a character of its own.
+
+    Args:
+        areas: of the streets.
+        seed: of the draws.
+
+    Returns:
+        What `CityPlan` validates.
+    """
     text = resources.files("cns_drake.city.generation").joinpath(
         "characters.yaml"
     )
     templates = yaml.safe_load(text.read_text(encoding="utf-8"))
     streets = unary_union(
-        [network.carriageway(), network.sidewalks(), network.medians()]
+        [areas.carriageway(), areas.sidewalks(), areas.medians()]
     )
     x0, y0, x1, y1 = streets.bounds
     bounds = (
@@ -157,8 +166,12 @@ def _plan(network: RoadNetwork, seed: int) -> dict:
     }
 
 
-def _stages(city: City) -> dict:
-    """Returns two stages; the first one lacks what stands in the east."""
+def starter_stages(city: City) -> dict:
+    """Returns two stages; the first one lacks what stands in the east.
+
+    Returns:
+        What `Stages` validates.
+    """
     standing = [
         structure
         for structure in city.structures

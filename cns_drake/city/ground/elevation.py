@@ -7,7 +7,7 @@ pads in it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +18,7 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry.polygons import snap
 from cns_drake.city.geometry.structures import Structure
-from cns_drake.roads.road_surface import RoadSurface
+from cns_drake.roads.street_areas import SurfaceHeights
 
 # Distance of the nodes between which the field is interpolated [m].
 _NODES = 2.0
@@ -79,7 +79,7 @@ class SlopingGround:
 
     def __init__(
         self,
-        surface: RoadSurface,
+        surface: SurfaceHeights,
         kerb_height: float,
         streets: BaseGeometry,
         bounds: tuple[float, float, float, float],
@@ -190,7 +190,7 @@ Ground = LevelGround | SlopingGround
 
 
 def make_ground(
-    surface: RoadSurface,
+    surface: SurfaceHeights,
     kerb_height: float,
     streets: BaseGeometry,
     bounds: tuple[float, float, float, float],
@@ -210,17 +210,21 @@ def make_ground(
     return SlopingGround(surface, kerb_height, streets, bounds, pads)
 
 
-def apron(building: Structure, streets: BaseGeometry) -> Pad:
-    """Returns the level ground around a building.
+def aprons(buildings: Iterable[Structure], streets: BaseGeometry) -> list[Pad]:
+    """Returns the level ground around buildings.
 
     Args:
-        building: at the height of its floor.
+        buildings: at the heights of their floors.
         streets: their area in W [m].
     """
-    around = building.footprint_W.buffer(_APRON, join_style="mitre")
-    beside = around.difference(streets.buffer(_APRON))
-    area = snap(beside.union(building.footprint_W))
-    return Pad(area, building.xyz[2])
+    kerbside = streets.buffer(_APRON)
+    pads = []
+    for building in buildings:
+        around = building.footprint_W.buffer(_APRON, join_style="mitre")
+        beside = around.difference(kerbside)
+        area = snap(beside.union(building.footprint_W))
+        pads.append(Pad(area, building.xyz[2]))
+    return pads
 
 
 def relaxed(z: np.ndarray) -> np.ndarray:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -22,6 +23,7 @@ from cns_drake.city.geometry.polygons import (
 from cns_drake.city.geometry.structures import MeshShape, Model, Part, Structure
 from cns_drake.roads.network import RoadNetwork
 from cns_drake.roads.road_surface import RoadSurface
+from cns_drake.roads.street_areas import StreetAreas, SurfaceHeights
 
 # Marks the structures that are ground: no stage lacks them.
 GROUND_TAG = "ground"
@@ -50,15 +52,59 @@ _SIDEWALK_RGB = (0.66, 0.64, 0.61)
 _MEDIAN_RGB = (0.47, 0.55, 0.34)
 
 
+@dataclass(frozen=True)
+class Covering:
+    """A part of the carriageway that is of another kind than the lanes.
+
+    Attributes:
+        name: of its structure.
+        semantic_class: likewise.
+        area: in W [m].
+        rgb: colour.
+    """
+
+    name: str
+    semantic_class: str
+    area: BaseGeometry
+    rgb: tuple[float, float, float]
+
+
+def parking_bays(area: BaseGeometry) -> Covering:
+    """Returns what is parked on, from its area in W [m]."""
+    return Covering("parking_bays", "parking", snap(area), _BAY_RGB)
+
+
 def street_structures(network: RoadNetwork) -> list[Structure]:
-    """Returns the ground of all streets, true to the heights of the roads.
+    """Returns the ground of all streets, true to the heights of the roads."""
+    bays = unary_union(list(network.parking_bays().values()))
+    return street_surfaces(
+        network,
+        RoadSurface(network),
+        kerb_height(network),
+        [parking_bays(bays)],
+    )
+
+
+def street_surfaces(
+    areas: StreetAreas,
+    surface: SurfaceHeights,
+    kerb: float,
+    coverings: Sequence[Covering],
+) -> list[Structure]:
+    """Returns the ground of streets.
 
     Kinds of ground that these streets do not have are left out.
+
+    Args:
+        areas: of the streets.
+        surface: how high the carriageway lies.
+        kerb: height of sidewalks and medians above it [m].
+        coverings: within the carriageway.
     """
-    road, walk = _heights(network)
-    medians = snap(network.medians())
-    paved = snap(network.carriageway()).difference(medians)
-    bays = snap(unary_union(list(network.parking_bays().values())))
+    road, walk = _heights(surface, kerb)
+    medians = snap(areas.medians())
+    paved = snap(areas.carriageway()).difference(medians)
+    covered = unary_union([one.area for one in coverings])
     kerbs = MultiPolygon(
         polygons_of(
             snap(
@@ -66,13 +112,16 @@ def street_structures(network: RoadNetwork) -> list[Structure]:
             )
         )
     )
-    sidewalks = snap(network.sidewalks()).difference(kerbs)
+    sidewalks = snap(areas.sidewalks()).difference(kerbs)
     outer = unary_union([paved, kerbs, sidewalks, medians]).boundary
     structures = [
         _surface(
-            "carriageway", "road", paved.difference(bays), road, _ROAD_RGB
+            "carriageway", "road", paved.difference(covered), road, _ROAD_RGB
         ),
-        _surface("parking_bays", "parking", bays, road, _BAY_RGB),
+        *(
+            _surface(one.name, one.semantic_class, one.area, road, one.rgb)
+            for one in coverings
+        ),
         _kerb_structure(kerbs, paved, road, walk),
         _surface(
             "sidewalks", "sidewalk", sidewalks, walk, _SIDEWALK_RGB, outer
@@ -85,11 +134,9 @@ def street_structures(network: RoadNetwork) -> list[Structure]:
 
 
 def _heights(
-    network: RoadNetwork,
+    surface: SurfaceHeights, kerb: float
 ) -> tuple[HeightMap | float, HeightMap | float]:
     """Returns the heights of the roads and of the sidewalks beside them."""
-    kerb = kerb_height(network)
-    surface = RoadSurface(network)
     if surface.is_level:
         return 0.0, kerb
 
@@ -137,7 +184,11 @@ def as_structure(
     area: BaseGeometry,
     rgb: tuple[float, float, float],
 ) -> Structure:
-    """Returns a structure of meshes that are given in W already."""
+    """Returns a structure of meshes that are given in W already.
+
+    Pieces without faces, of slivers alone, are left out.
+    """
+    pieces = {part: mesh for part, mesh in pieces.items() if mesh.faces}
     meshes = {f"{name}_{part}": mesh for part, mesh in pieces.items()}
     parts = tuple(
         Part(part, MeshShape(f"{name}_{part}"), rgb=rgb) for part in pieces

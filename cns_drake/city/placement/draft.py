@@ -17,10 +17,9 @@ from cns_drake.city.geometry.occupancy import Occupancy
 from cns_drake.city.geometry.polygons import HeightMap, snap
 from cns_drake.city.geometry.structures import MeshShape, Model, Structure
 from cns_drake.city.ground.elevation import Ground, LevelGround
-from cns_drake.city.ground.streets import kerb_height
 from cns_drake.city.placement.naming import name_stem
 from cns_drake.city.placement.objects import OBJECTS
-from cns_drake.roads.network import RoadNetwork
+from cns_drake.roads.street_areas import StreetAreas
 
 # An object stands upright where the ground falls by at most this much below
 # it, half of it sunk in on the upper side [m].
@@ -33,7 +32,7 @@ class Draft:
     """Collects structures, gives them names and keeps them apart.
 
     Attributes:
-        network: the roads.
+        areas: of the streets.
         streets: all ground that belongs to them, sidewalks included, in W.
         base: height of sidewalks and of the ground between them in W,
             without what buildings and relief change about it.
@@ -42,14 +41,14 @@ class Draft:
             buildings stand and the ground has been shaped around them.
     """
 
-    def __init__(self, network: RoadNetwork, seed: int):
-        self.network = network
+    def __init__(self, areas: StreetAreas, kerb_height: float, seed: int):
+        self.areas = areas
         self.streets: BaseGeometry = snap(
             unary_union(
-                [network.carriageway(), network.sidewalks(), network.medians()]
+                [areas.carriageway(), areas.sidewalks(), areas.medians()]
             )
         )
-        self.base: Ground = LevelGround(kerb_height(network))
+        self.base: Ground = LevelGround(kerb_height)
         self.structures: list[Structure] = []
         self.ground_height: HeightMap | None = None
         self._seed = seed
@@ -57,7 +56,7 @@ class Draft:
         self._walls = Occupancy()
         self._occupancy = Occupancy()
         self._lanes = Occupancy()
-        self._lanes.add(network.lane_area())
+        self._lanes.add(areas.lane_area())
 
     def rng(self, *words: str | int) -> np.random.Generator:
         """Returns the generator of one task, told apart by words.

@@ -8,8 +8,8 @@ import numpy as np
 
 from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.objects import OBJECTS
-from cns_drake.roads.network import Arm, Junction
-from cns_drake.roads.road import Direction
+from cns_drake.roads.network import Arm, Junction, RoadNetwork
+from cns_drake.roads.road import Direction, Road
 
 # Distance of posts from the kerb [m].
 _FROM_KERB = 0.7
@@ -22,19 +22,22 @@ _SIGN_DISTANCE = 9.0
 _SIGNS = ("sign_round", "sign_rectangular", "sign_triangular")
 
 
-def furnish_junctions(draft: Draft) -> None:
+def furnish_junctions(draft: Draft, network: RoadNetwork) -> None:
     """Places lights, stop signs and name signs at all arms, then signs."""
-    for junction in draft.network.junctions.values():
+    for junction in network.junctions.values():
         draft.open_range()
         rng = draft.rng("junction", junction.name)
         for arm in junction.arms:
-            _furnish_arm(draft, junction, arm, rng)
+            _furnish_arm(draft, network.roads[arm.road], junction, arm, rng)
 
 
 def _furnish_arm(
-    draft: Draft, junction: Junction, arm: Arm, rng: np.random.Generator
+    draft: Draft,
+    road: Road,
+    junction: Junction,
+    arm: Arm,
+    rng: np.random.Generator,
 ) -> None:
-    road = draft.network.roads[arm.road]
     starts = arm.end == "start"
     incoming: Direction = "backward" if starts else "forward"
     outgoing: Direction = "forward" if starts else "backward"

@@ -9,7 +9,6 @@ import numpy as np
 import shapely
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
-from shapely.ops import unary_union
 
 from cns_drake.city.ground.districts import District
 from cns_drake.city.placement.draft import Draft
@@ -18,6 +17,7 @@ from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.placement.open_ground import place_car
 from cns_drake.city.plan.city_plan import CityPlan, StreetPlan
 from cns_drake.city.plan.weighted import pick
+from cns_drake.roads.network import RoadNetwork
 
 # How far from the kerb things stand: their nearest point, not their middle
 # [m].
@@ -35,16 +35,23 @@ _TO_KERB = 0.08
 
 
 def furnish_sidewalks(
-    draft: Draft, plan: CityPlan, districts: Sequence[District]
+    draft: Draft,
+    plan: CityPlan,
+    districts: Sequence[District],
+    junctions: BaseGeometry,
 ) -> None:
-    """Places street lamps, then trees, then furniture on all sidewalks."""
-    junctions = unary_union(
-        [draft.network.junction_area(name) for name in draft.network.junctions]
-    )
+    """Places street lamps, then trees, then furniture on all sidewalks.
+
+    Args:
+        draft: the city so far.
+        plan: of its streets.
+        districts: beside these.
+        junctions: the area of all junctions in W [m].
+    """
     for task, distance in _FROM_KERB.items():
         keep_off = junctions.buffer(_JUNCTION_CLEARANCE[task])
         lines = lines_along(
-            draft.network.carriageway(), draft.network.sidewalks(), distance
+            draft.areas.carriageway(), draft.areas.sidewalks(), distance
         )
         for index, line in enumerate(lines):
             draft.open_range()
@@ -52,16 +59,19 @@ def furnish_sidewalks(
             _walk(draft, plan, districts, task, line, keep_off, rng)
 
 
-def park_along_streets(draft: Draft, cars: Mapping[str, float]) -> None:
+def park_along_streets(
+    draft: Draft, network: RoadNetwork, cars: Mapping[str, float]
+) -> None:
     """Parks cars in the bays at the sides of the roads.
 
     Args:
         draft: the city so far.
+        network: the roads.
         cars: object -> weight.
     """
-    for (name, side), bay in draft.network.parking_bays().items():
+    for (name, side), bay in network.parking_bays().items():
         draft.open_range()
-        road = draft.network.roads[name]
+        road = network.roads[name]
         rng = draft.rng("bays", name, side)
         sign = 1 if side == "left" else -1
         offset = sign * (road.half_width + road.parking / 2 + _TO_KERB)
@@ -78,7 +88,7 @@ def park_along_streets(draft: Draft, cars: Mapping[str, float]) -> None:
 
 def plant_medians(draft: Draft, plan: StreetPlan) -> None:
     """Plants the strips between the directions, and lights them."""
-    for index, median in enumerate(draft.network.medians().geoms):
+    for index, median in enumerate(draft.areas.medians().geoms):
         draft.open_range()
         rng = draft.rng("median", index)
         line = _middle_line(median)

@@ -11,7 +11,7 @@ from cns_drake.city.geometry.structures import Model, Structure
 from cns_drake.city.ground.elevation import (
     LevelGround,
     Pad,
-    apron,
+    aprons,
     make_ground,
     relaxed,
 )
@@ -160,7 +160,7 @@ def test_an_apron_surrounds_its_building_but_not_the_street(roads):
     model = Model((), {}, footprint)
     building = Structure("house_001", "building", model, (50.0, -10.2, 2.4))
     streets = streets_of(roads)
-    pad = apron(building, streets)
+    (pad,) = aprons([building], streets)
     assert pad.height == 2.4
     assert pad.area.contains(building.footprint_W)
     assert pad.area.intersection(streets).area < 1e-6

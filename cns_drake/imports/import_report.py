@@ -1,0 +1,48 @@
+"""What is taken of a file, and what came of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from cns_drake.imports.building_years import Undated
+
+
+@dataclass(frozen=True)
+class ImportOptions:
+    """What is taken of a file.
+
+    Attributes:
+        years: of the stages, increasing; one stage of all if there is none.
+        year_attribute: that tells when something was built; one of the usual
+            ones if None.
+        undated: what becomes of buildings without a year.
+        lod: level of detail; the highest of each object if None.
+        seed: of what is drawn where a file of roads has no buildings.
+    """
+
+    years: tuple[int, ...] = ()
+    year_attribute: str | None = None
+    undated: Undated = Undated.FIRST
+    lod: float | None = None
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class ImportReport:
+    """What came of a file.
+
+    Attributes:
+        kinds: type of object -> how many structures.
+        triangles: of all.
+        stages: stage -> how many structures stand.
+        undated: buildings without a year.
+        drives: lengths of the proposed drives [m].
+        faults: kind, how many, example.
+    """
+
+    kinds: dict[str, int]
+    triangles: int
+    stages: dict[str, int]
+    undated: int
+    drives: tuple[float, ...]
+    faults: list[tuple[str, int, str]]

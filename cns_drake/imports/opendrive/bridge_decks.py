@@ -1,0 +1,57 @@
+"""Lanes that are carried over others, as decks that are seen from below."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+import re
+
+import numpy as np
+
+from cns_drake.city.geometry.structures import Structure
+from cns_drake.imports.foreign_city import make_imported
+from cns_drake.imports.opendrive.lane_bands import LaneBand
+from cns_drake.imports.opendrive.lane_kinds import lane_class
+
+_DEPTH = np.array([0.0, 0.0, 0.8])  # [m]
+_LEAST_AREA = 1e-6
+
+
+def bridge_decks(bands: Sequence[LaneBand]) -> Iterator[Structure]:
+    """Yields the upper sides of bridges by class, and what is below them."""
+    of_road: dict[tuple[str, str], list[np.ndarray]] = defaultdict(list)
+    for band in bands:
+        # What carries no lane is closed all the same.
+        kind = lane_class(band.kind) or "other-ground"
+        left, right = band.inner, band.outer
+        if band.lane.number > 0:
+            left, right = right, left
+        of_road[band.road.name, kind].append(_strip(right, left))
+        low_left, low_right = left - _DEPTH, right - _DEPTH
+        of_road[band.road.name, "other-structure"] += [
+            _strip(low_left, low_right),
+            _strip(low_right, right),
+            _strip(left, low_left),
+        ]
+    for (road, kind), pieces in of_road.items():
+        triangles = np.concatenate(pieces)
+        edges = np.cross(
+            triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+        )
+        triangles = triangles[np.linalg.norm(edges, axis=1) > _LEAST_AREA]
+        if len(triangles):
+            name = re.sub(r"[^\w.-]+", "_", road, flags=re.ASCII)
+            yield make_imported(
+                f"bridge_{name}_{kind}", kind, "Bridge", {"deck": triangles}, {}
+            ).structure
+
+
+def _strip(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Returns the triangles between two lines (N, 3), seen from above if
+    the second lies to the left of the first."""
+    return np.concatenate(
+        [
+            np.stack([a[:-1], a[1:], b[1:]], axis=1),
+            np.stack([a[:-1], b[1:], b[:-1]], axis=1),
+        ]
+    )

@@ -1,0 +1,148 @@
+"""The areas of imported streets, as a city is built along them."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import shapely
+from shapely.geometry import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from cns_drake.city.geometry.polygons import polygons_of, snap
+from cns_drake.city.ground.streets import Covering, parking_bays
+from cns_drake.imports.opendrive.lane_bands import LaneBand
+from cns_drake.imports.opendrive.lane_kinds import is_raised, lane_class
+
+# Slits up to twice this width between lanes are closed [m].
+_SEAM = 0.05
+# Vertices closer to an outline than this are dropped [m].
+_SIMPLIFY = 0.005
+# What the lanes of a junction enclose is part of it, if it is no larger
+# [m^2]; larger ones are islands.
+_LARGEST_GAP = 80.0
+_LEAST_AREA = 1e-6
+_ISLAND_RGB = (0.55, 0.53, 0.50)
+_PATH_RGB = (0.52, 0.42, 0.38)
+
+
+class ImportedStreets:
+    """Areas of lanes that lie on the ground, by what they are.
+
+    Where two overlap, road comes before parking, that before other ground,
+    and sidewalks last.
+
+    Attributes:
+        junctions: the area of all junctions [m].
+        coverings: parts of the carriageway that are no road.
+        reserved: lanes of nothing, to be kept free.
+    """
+
+    def __init__(self, bands: Sequence[LaneBand]):
+        """Takes the lanes."""
+        alike: dict[str, list[BaseGeometry]] = defaultdict(list)
+        of_junction: dict[str, list[BaseGeometry]] = defaultdict(list)
+        for band in bands:
+            area = lane_polygon(band)
+            kind = lane_class(band.kind)
+            if area.is_empty:
+                continue
+            raised = is_raised(band.kind, band.lane.height)
+            if kind is None:
+                alike["reserved"].append(area)
+                continue
+            if raised:
+                kind = "median" if band.kind == "median" else "walk"
+            alike[kind].append(area)
+            if band.road.junction is not None and not raised:
+                of_junction[band.road.junction].append(area)
+        whole = [shapely.union_all(some) for some in of_junction.values()]
+        gaps = [gap for junction in whole for gap in _gaps(junction)]
+        islands = shapely.union_all([*alike["median"], *alike["walk"]])
+        gaps = [gap for gap in gaps if not gap.intersects(islands)]
+        road = _closed([*alike["road"], *gaps])
+        parking = _simple(shapely.union_all(alike["parking"]).difference(road))
+        level = road.union(parking)
+        path = _simple(shapely.union_all(alike["sidewalk"]).difference(level))
+        level = level.union(path)
+        other = _simple(
+            shapely.union_all(alike["other-ground"]).difference(level)
+        )
+        self._carriageway = _multi(_closed([level, other]))
+        self._lanes = _multi(road)
+        medians = _simple(shapely.union_all(alike["median"]))
+        self._medians = _multi(medians.difference(self._carriageway))
+        walks = _simple(shapely.union_all(alike["walk"]))
+        taken = self._carriageway.union(self._medians)
+        self._sidewalks = _multi(walks.difference(taken))
+        self.junctions = shapely.union_all([*whole, *gaps])
+        self.coverings = [
+            parking_bays(parking),
+            Covering("paths", "sidewalk", snap(path), _PATH_RGB),
+            Covering("islands", "other-ground", snap(other), _ISLAND_RGB),
+        ]
+        taken = taken.union(self._sidewalks)
+        reserved = shapely.union_all(alike["reserved"]).difference(taken)
+        self.reserved = _multi(snap(reserved))
+
+    def carriageway(self) -> MultiPolygon:
+        """Returns all lanes that are as high as the road."""
+        return self._carriageway
+
+    def lane_area(self) -> MultiPolygon:
+        """Returns the lanes that are road."""
+        return self._lanes
+
+    def sidewalks(self) -> MultiPolygon:
+        """Returns the sidewalks, a kerb above the road."""
+        return self._sidewalks
+
+    def medians(self) -> MultiPolygon:
+        """Returns medians that the file tells to have a kerb."""
+        return self._medians
+
+
+def lane_polygon(band: LaneBand) -> BaseGeometry:
+    """Returns the area of a lane [m]; empty for one without width."""
+    inner, outer = band.inner[:, :2], band.outer[:, :2]
+    outline = Polygon(np.concatenate([inner, outer[::-1]]))
+    if outline.is_valid:
+        return outline if outline.area > _LEAST_AREA else Polygon()
+    # In a bend tighter than the lane is wide its edge folds over.
+    corners = np.stack([inner[:-1], inner[1:], outer[1:], outer[:-1]], axis=1)
+    pieces = [
+        shapely.make_valid(Polygon(four), method="structure")
+        for four in corners
+    ]
+    return shapely.union_all([p for p in pieces if p.area > _LEAST_AREA])
+
+
+def _gaps(junction: BaseGeometry) -> list[Polygon]:
+    """Returns what the lanes of a junction enclose and leave open."""
+    # Lanes that only touch enclose something too.
+    grown = junction.buffer(_SEAM, join_style="mitre")
+    return [
+        Polygon(hole).buffer(2.0 * _SEAM)
+        for polygon in polygons_of(grown)
+        for hole in polygon.interiors
+        if Polygon(hole).area < _LARGEST_GAP
+    ]
+
+
+def _closed(parts: Iterable[BaseGeometry]) -> BaseGeometry:
+    """Returns a union without slits between neighbours."""
+    # Of edges that fold back GEOS divides by nothing, to no harm.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        grown = shapely.union_all(
+            [part.buffer(_SEAM, join_style="mitre") for part in parts]
+        )
+        return _simple(grown.buffer(-_SEAM, join_style="mitre"))
+
+
+def _simple(area: BaseGeometry) -> BaseGeometry:
+    return snap(snap(area).simplify(_SIMPLIFY))
+
+
+def _multi(area: BaseGeometry) -> MultiPolygon:
+    return MultiPolygon(polygons_of(area))

@@ -1,0 +1,222 @@
+"""Roads of a network: course, heights and lanes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cns_drake.imports.opendrive.plan_view import Piece
+
+
+class Cubics:
+    """A function of the distance, piece by piece a cubic polynomial."""
+
+    def __init__(self, rows: Sequence[Sequence[float]] = ()):
+        """Takes rows of a start and four coefficients, of ds^0 first."""
+        table = np.array(sorted(rows, key=lambda row: row[0]), dtype=float)
+        self._table = table.reshape(-1, 5)
+
+    def __bool__(self) -> bool:
+        return len(self._table) > 0
+
+    @property
+    def starts(self) -> np.ndarray:
+        """Where the pieces begin [m]."""
+        return self._table[:, 0]
+
+    def at(self, s: np.ndarray, inside: np.ndarray) -> np.ndarray:
+        """Returns the values (N,) at distances (N,).
+
+        Args:
+            s: where [m].
+            inside: places that tell the piece, which is what differs on
+                both sides of a joint [m].
+        """
+        return self._evaluate(s, inside, (1.0, 1.0, 1.0, 1.0), 0)
+
+    def slope(self, s: np.ndarray, inside: np.ndarray) -> np.ndarray:
+        """Returns the derivatives (N,); see `at`."""
+        return self._evaluate(s, inside, (0.0, 1.0, 2.0, 3.0), 1)
+
+    def bend(self, start: float, end: float) -> float:
+        """Returns the greatest second derivative on a stretch of one piece."""
+        middle = (start + end) / 2.0
+        index = int(np.searchsorted(self.starts, middle, side="right")) - 1
+        if index < 0:
+            return 0.0
+        begin, _, _, c, d = self._table[index]
+        return float(
+            max(abs(2.0 * c + 6.0 * d * (s - begin)) for s in (start, end))
+        )
+
+    def _evaluate(
+        self,
+        s: np.ndarray,
+        inside: np.ndarray,
+        factors: Sequence[float],
+        less: int,
+    ) -> np.ndarray:
+        if not self:
+            return np.zeros(len(s))
+        index = np.searchsorted(self.starts, inside, side="right") - 1
+        rows = self._table[np.maximum(index, 0)]
+        ds = s - rows[:, 0]
+        value = np.zeros(len(s))
+        for power in range(less, 4):
+            term = factors[power] * rows[:, 1 + power]
+            value += term * ds ** (power - less)
+        # Before the first piece nothing is told.
+        return np.where(index < 0, 0.0, value)
+
+
+@dataclass(frozen=True)
+class Lane:
+    """A lane of a section.
+
+    Attributes:
+        number: counted from the middle outwards, positive on the left.
+        kind: its type, such as driving.
+        width: over the distance along the road; or
+        border: how far its outer edge is from the middle.
+        height: how high its inner edge stands above the road [m].
+    """
+
+    number: int
+    kind: str
+    width: Cubics
+    border: Cubics
+    height: float
+
+
+@dataclass(frozen=True)
+class LaneSection:
+    """A stretch of road with the same lanes.
+
+    Attributes:
+        start, end: along the road [m].
+        lanes: without the middle one, by their number.
+    """
+
+    start: float
+    end: float
+    lanes: dict[int, Lane]
+
+
+@dataclass(frozen=True)
+class Thing:
+    """A signal, or an object beside the road.
+
+    Attributes:
+        name: unique in the network.
+        is_signal: a signal, else an object.
+        kind: its type, in small letters.
+        s, t: place along and across the road [m].
+        z: above the road [m].
+        heading: against that of the road [rad].
+        size: length, width, height; 0 where they are not told [m].
+        outline: (N, 3) corners about the place, or none: u, v, height; or
+        road_outline: (N, 3) corners s, t, height; or none [m].
+        is_dynamic: whether it is one with changing states, such as lights.
+        faces_back: whether it is for the traffic against the road.
+    """
+
+    name: str
+    is_signal: bool
+    kind: str
+    s: float
+    t: float
+    z: float
+    heading: float
+    size: tuple[float, float, float]
+    outline: np.ndarray | None = None
+    road_outline: np.ndarray | None = None
+    is_dynamic: bool = False
+    faces_back: bool = False
+
+
+@dataclass(frozen=True)
+class ImportedRoad:
+    """A road.
+
+    Attributes:
+        name: its id.
+        junction: id of the junction that it belongs to, or none.
+        length: of it [m].
+        pieces: of its course, one after the other.
+        elevation: height of the reference line [m].
+        superelevation: roll about it [rad].
+        lane_offset: of the middle of its lanes, to the left [m].
+        sections: of its lanes, one after the other.
+        keeps_left: whether its traffic does.
+        limits: pairs of where a speed limit begins, and it [m, m/s].
+        things: beside it.
+    """
+
+    name: str
+    junction: str | None
+    length: float
+    pieces: tuple[Piece, ...]
+    elevation: Cubics
+    superelevation: Cubics
+    lane_offset: Cubics
+    sections: tuple[LaneSection, ...]
+    keeps_left: bool = False
+    limits: tuple[tuple[float, float], ...] = ()
+    things: tuple[Thing, ...] = field(default=())
+
+    def reference(self, s: np.ndarray, inside: np.ndarray) -> np.ndarray:
+        """Returns (N, 5) x, y, z, heading and roll of the reference line.
+
+        Args:
+            s: (N,) along the road [m].
+            inside: see `Cubics.at`.
+        """
+        starts = np.array([piece.s for piece in self.pieces])
+        index = np.searchsorted(starts, inside, side="right") - 1
+        index = np.maximum(index, 0)
+        line = np.zeros((len(s), 3))
+        for k in np.unique(index):
+            chosen = index == k
+            line[chosen] = self.pieces[k].evaluate(s[chosen])
+        x, y, heading = line.T
+        z = self.elevation.at(s, inside)
+        roll = self.superelevation.at(s, inside)
+        return np.stack([x, y, z, heading, roll], axis=1)
+
+    def points(
+        self, s: np.ndarray, inside: np.ndarray, t: np.ndarray
+    ) -> np.ndarray:
+        """Returns (N, 3) places beside the reference line [m].
+
+        Args:
+            s: (N,) along the road [m].
+            inside: see `Cubics.at`.
+            t: (N,) to the left of it [m].
+        """
+        x, y, z, heading, roll = self.reference(s, inside).T
+        across = t * np.cos(roll)
+        return np.stack(
+            [
+                x - across * np.sin(heading),
+                y + across * np.cos(heading),
+                z + t * np.sin(roll),
+            ],
+            axis=1,
+        )
+
+
+@dataclass(frozen=True)
+class RoadMap:
+    """All roads of a file.
+
+    Attributes:
+        roads: in the order of the file.
+        reference_system: as the file names it.
+        origin: (3,) of the world in the file's coordinates [m].
+    """
+
+    roads: tuple[ImportedRoad, ...]
+    reference_system: str
+    origin: tuple[float, float, float]

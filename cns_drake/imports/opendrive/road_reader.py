@@ -1,0 +1,320 @@
+"""Reads roads from an OpenDRIVE file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+import math
+from pathlib import Path
+
+import numpy as np
+
+from cns_drake.imports.import_faults import ImportFaults
+from cns_drake.imports.opendrive.plan_view import (
+    Arc,
+    Cubic,
+    Piece,
+    Shape,
+    Spiral,
+)
+from cns_drake.imports.opendrive.road_model import (
+    Cubics,
+    ImportedRoad,
+    Lane,
+    LaneSection,
+    RoadMap,
+)
+from cns_drake.imports.opendrive.road_things import read_things
+from cns_drake.imports.opendrive.xml_elements import Element, read_elements
+from evaluation.support.errors import InputError
+
+_KNOWN = frozenset(
+    (
+        "OpenDRIVE",
+        "arc",
+        "border",
+        "center",
+        "cornerLocal",
+        "cornerRoad",
+        "elevation",
+        "elevationProfile",
+        "geoReference",
+        "geometry",
+        "header",
+        "height",
+        "lane",
+        "laneOffset",
+        "laneSection",
+        "lanes",
+        "lateralProfile",
+        "left",
+        "line",
+        "object",
+        "objects",
+        "outline",
+        "outlines",
+        "paramPoly3",
+        "planView",
+        "poly3",
+        "repeat",
+        "right",
+        "road",
+        "shape",
+        "signal",
+        "signals",
+        "speed",
+        "spiral",
+        "superelevation",
+        "type",
+        "width",
+    )
+)
+_UNITS = {"m/s": 1.0, "km/h": 1 / 3.6, "mph": 0.44704}
+# A file of a whole country would not end [m].
+_LARGEST = 20_000.0
+_LONGEST_ROAD = 100_000.0
+_LONGEST_TOGETHER = 2_000_000.0
+# The world is moved to the middle of roads that lie farther off [m].
+_FAR = 10_000.0
+# Lengths that differ by less agree [m].
+_ROUNDING = 0.01
+# No lane is wider, no curve sharper [m, 1/m].
+_WIDEST = 100.0
+_SHARPEST = 100.0
+_SHORTEST = 1e-5
+# Of a name that is made part of others.
+_LONGEST_NAME = 60
+
+
+def read_roads(path: Path, faults: ImportFaults) -> RoadMap:
+    """Reads all roads of a file.
+
+    Raises:
+        InputError: naming file, road, line and fault, if the file cannot be
+            read or holds what no road can be.
+    """
+    top = read_elements(path, "OpenDRIVE", _KNOWN)
+    roads: list[ImportedRoad] = []
+    taken: set[str] = set()
+    together = 0.0
+    for element in top.all("road"):
+        name = " ".join(element.attributes.get("id", "").split())
+        name = name[:_LONGEST_NAME]
+        if name in taken:
+            faults.add("road with the id of another, left out", name)
+            continue
+        taken.add(name)
+        try:
+            road = _road(element, name, faults)
+        except ValueError as error:
+            raise InputError(f"{path}: road {name}: {error}") from error
+        if road is not None:
+            roads.append(road)
+            together += road.length
+    if not roads:
+        raise InputError(f"{path}: no road in it")
+    if together > _LONGEST_TOGETHER:
+        raise InputError(
+            f"{path}: {together / 1000:.0f} km of roads, at most"
+            f" {_LONGEST_TOGETHER / 1000:.0f} km are read"
+        )
+    ends = np.array([(p.x, p.y) for road in roads for p in road.pieces])
+    low, high = ends.min(axis=0), ends.max(axis=0)
+    size = float((high - low).max())
+    if size > _LARGEST:
+        raise InputError(
+            f"{path}: {size / 1000:.0f} km across; cut out a piece of at most"
+            f" {_LARGEST / 1000:.0f} km"
+        )
+    origin = np.zeros(2)
+    if np.abs(ends).max() > _FAR:
+        origin = np.round((low + high) / 2.0)
+    reference = top.first("header", "geoReference")
+    return RoadMap(
+        tuple(_moved(road, origin) for road in roads),
+        " ".join(reference.content.split()) if reference else "",
+        (float(origin[0]), float(origin[1]), 0.0),
+    )
+
+
+def _moved(road: ImportedRoad, origin: np.ndarray) -> ImportedRoad:
+    pieces = tuple(
+        replace(piece, x=piece.x - origin[0], y=piece.y - origin[1])
+        for piece in road.pieces
+    )
+    return replace(road, pieces=pieces)
+
+
+def _road(
+    element: Element, name: str, faults: ImportFaults
+) -> ImportedRoad | None:
+    pieces = _pieces(element.all("planView", "geometry"), name, faults)
+    if not pieces:
+        faults.add("road without a course, left out", name)
+        return None
+    told = element.number("length")
+    length = pieces[-1].s + pieces[-1].length
+    if abs(told - length) > _ROUNDING:
+        faults.add("road of another length than its course, cut", name)
+        length = min(told, length)
+    if length > _LONGEST_ROAD:
+        raise ValueError(f"{length:g} m are more than {_LONGEST_ROAD:g} m")
+    sections = _sections(element, length, name, faults)
+    if not sections:
+        faults.add("road without lanes, left out", name)
+        return None
+    if element.first("lateralProfile", "shape"):
+        faults.add("lateral shape of a road, not read", name)
+    junction = element.text("junction", "-1")
+    lateral = element.all("lateralProfile", "superelevation")
+    offsets = element.all("lanes", "laneOffset")
+    return ImportedRoad(
+        name=name,
+        junction=None if junction == "-1" else junction,
+        length=length,
+        pieces=tuple(pieces),
+        elevation=_cubics(element.all("elevationProfile", "elevation"), "s"),
+        superelevation=_cubics(lateral, "s"),
+        lane_offset=_cubics(offsets, "s"),
+        sections=tuple(sections),
+        keeps_left=element.text("rule", "RHT").upper() == "LHT",
+        limits=tuple(_limits(element)),
+        things=tuple(read_things(element, name, faults)),
+    )
+
+
+def _pieces(
+    elements: Iterable[Element], name: str, faults: ImportFaults
+) -> list[Piece]:
+    found: list[Piece] = []
+    for one in elements:
+        length = one.number("length")
+        if length < 0.0:
+            raise ValueError(f"line {one.line}: geometry: length: {length:g}")
+        if length < _SHORTEST:
+            faults.add("geometry without length, left out", name)
+            continue
+        if length > _LONGEST_ROAD:
+            raise ValueError(
+                f"line {one.line}: geometry: length: {length:g} m are more"
+                f" than {_LONGEST_ROAD:g} m"
+            )
+        try:
+            shape = _shape(one, length)
+        except ValueError as error:
+            at = f"line {one.line}: geometry: "
+            text = str(error)
+            prefix = "" if text.startswith("line") else at
+            raise ValueError(prefix + text) from error
+        s, x, y, heading = (one.number(k) for k in ("s", "x", "y", "hdg"))
+        found.append(Piece(s, x, y, heading, length, shape))
+    found.sort(key=lambda piece: piece.s)
+    return found
+
+
+def _shape(geometry: Element, length: float) -> Shape:
+    """Returns the curve of a geometry.
+
+    Raises:
+        ValueError: if it has none, or one that is too sharp.
+    """
+    shape: Shape | None = None
+    for one in geometry.children:
+        if one.tag == "line":
+            shape = Arc(0.0)
+        elif one.tag == "arc":
+            shape = Arc(one.number("curvature"))
+        elif one.tag == "spiral":
+            ends = one.number("curvStart"), one.number("curvEnd")
+            if max(map(abs, ends)) > _SHARPEST:
+                raise ValueError(f"a spiral of curvature {max(ends):g} 1/m")
+            shape = Spiral(*ends, length)
+        elif one.tag == "poly3":
+            v = [one.number(k) for k in "abcd"]
+            # Where it is as long as told, u is not beyond its length.
+            shape = Cubic((0, 1, 0, 0), v, length, length, stretched=False)
+        elif one.tag == "paramPoly3":
+            u, v = ([one.number(k + c) for k in "abcd"] for c in "UV")
+            by_arc = one.text("pRange", "normalized") == "arcLength"
+            last = length if by_arc else 1.0
+            shape = Cubic(u, v, last, length, by_parameter=by_arc)
+    if shape is None:
+        raise ValueError("neither a line nor any curve that is known")
+    if shape.sharpest > _SHARPEST:
+        raise ValueError(f"a curve of curvature {shape.sharpest:g} 1/m")
+    return shape
+
+
+def _cubics(
+    elements: Iterable[Element], start: str, offset: float = 0.0
+) -> Cubics:
+    return Cubics(
+        [
+            (
+                one.number(start, 0.0) + offset,
+                *(one.number(k, 0.0) for k in "abcd"),
+            )
+            for one in elements
+        ]
+    )
+
+
+def _sections(
+    road: Element, length: float, name: str, faults: ImportFaults
+) -> list[LaneSection]:
+    elements = list(road.all("lanes", "laneSection"))
+    elements.sort(key=lambda one: one.number("s"))
+    starts = [one.number("s") for one in elements]
+    ends = [*starts[1:], length][: len(starts)]
+    found = []
+    for one, start, end in zip(elements, starts, ends, strict=True):
+        start, end = max(start, 0.0), min(end, length)
+        if end - start < _SHORTEST:
+            continue
+        lanes: dict[int, Lane] = {}
+        for side in ("left", "right"):
+            for element in one.all(side, "lane"):
+                lane = _lane(element, start)
+                if lane.number == 0:
+                    continue
+                if lane.number in lanes:
+                    faults.add("lane told twice, left out", name)
+                lanes.setdefault(lane.number, lane)
+        found.append(LaneSection(start, end, lanes))
+    return found
+
+
+def _lane(element: Element, start: float) -> Lane:
+    number = element.number("id")
+    if number != int(number):
+        raise ValueError(f"line {element.line}: lane: id: {number} is no id")
+    heights = element.first("height")
+    lane = Lane(
+        number=int(number),
+        kind=element.text("type", "none"),
+        width=_cubics(element.all("width"), "sOffset", start),
+        border=_cubics(element.all("border"), "sOffset", start),
+        height=heights.number("inner", 0.0) if heights else 0.0,
+    )
+    for one in (*element.all("width"), *element.all("border")):
+        if abs(one.number("a", 0.0)) > _WIDEST:
+            raise ValueError(
+                f"line {one.line}: lane {lane.number}: {one.tag}:"
+                f" {one.number('a'):g} m is beyond {_WIDEST:g} m"
+            )
+    return lane
+
+
+def _limits(road: Element) -> Iterator[tuple[float, float]]:
+    """Yields where speed limits begin [m], and they [m/s]."""
+    for one in road.all("type"):
+        speed = one.first("speed")
+        if speed is None:
+            continue
+        try:
+            limit = float(speed.text("max", ""))
+        except ValueError:
+            continue
+        limit *= _UNITS.get(speed.text("unit", "m/s"), 1.0)
+        if math.isfinite(limit) and limit > 0.0:
+            yield one.number("s", 0.0), limit

@@ -1,0 +1,156 @@
+"""A town on an imported road network as the files of a map."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+import re
+
+import numpy as np
+import shapely
+import yaml
+
+from cns_drake.city.generation.generate import render_stages
+from cns_drake.city.generation.sdf import MESH_FOLDER
+from cns_drake.city.geometry.polygons import polygons_of
+from cns_drake.city.geometry.structures import MeshShape, Structure
+from cns_drake.imports.drive_files import write_drives
+from cns_drake.imports.foreign_city import Imported
+from cns_drake.imports.import_report import ImportReport
+from cns_drake.imports.opendrive.town import Town
+from cns_drake.imports.overview import draw_overview
+
+_FACES_OF_A_BOX = 12
+_CROWN = 1.5  # [m]
+# Limits of the speed of a drive [m/s].
+_SPEEDS = (3.0, 12.0)
+# Classes that the picture from above shows; what is small is not seen.
+_SHOWN = (
+    "road",
+    "parking",
+    "sidewalk",
+    "other-ground",
+    "building",
+    "vegetation",
+)
+
+
+def write_town(
+    draft: Path,
+    source: Path,
+    town: Town,
+    progress: Callable[[str], None],
+) -> ImportReport:
+    """Writes all files of a town.
+
+    Args:
+        draft: the map's folder, which has its name and is there.
+        source: where the roads come from.
+        town: to write.
+        progress: takes one line at a time.
+
+    Raises:
+        InputError: if it has more structures than instance ids can count.
+    """
+    stages = town.stages.stages
+    files = render_stages(
+        draft.name,
+        town.city,
+        town.stages,
+        stages,
+        source,
+        progress,
+        origin=f"Imported by cns-drake from {source.name}.",
+    )
+    (draft / MESH_FOLDER).mkdir(exist_ok=True)
+    for name, text in files.items():
+        (draft / name).write_text(text, "utf-8")
+    _write_facts(draft, source, town)
+    write_drives(
+        draft,
+        {
+            stage: "" if stage == list(stages)[-1] else ", not all of it built"
+            for stage in stages
+        },
+        [drive.waypoints for drive in town.drives],
+        [
+            float(np.clip(drive.limit or _SPEEDS[1], *_SPEEDS))
+            for drive in town.drives
+        ],
+    )
+    draw_overview(
+        draft / "from_above.png",
+        list(_seen_from_above(town.city.structures)),
+        None,
+        town.drives,
+    )
+    return ImportReport(
+        kinds=town.kinds,
+        triangles=sum(map(_triangles, town.city.structures)),
+        stages={
+            stage: len(
+                set(
+                    re.findall(
+                        'visual name="([^"/]+)', files[f"stage_{stage}.sdf"]
+                    )
+                )
+            )
+            for stage in stages
+        },
+        undated=0,
+        drives=tuple(drive.length for drive in town.drives),
+        faults=town.faults.rows(),
+    )
+
+
+def _write_facts(draft: Path, source: Path, town: Town) -> None:
+    facts = {
+        "source": source.name,
+        "reference_system": town.roads.reference_system or "not told",
+        "origin": list(town.roads.origin),
+        "stages": {
+            stage: plan.story for stage, plan in town.stages.stages.items()
+        },
+        "left_out_or_repaired": {
+            kind: number for kind, number, _ in town.faults.rows()
+        },
+    }
+    comment = (
+        "# Where the roads of this map come from; all else is drawn by lot. A"
+        " place of the\n# map plus the origin is one of the source [m].\n"
+    )
+    text = yaml.safe_dump(facts, sort_keys=False, allow_unicode=True)
+    (draft / "import.yaml").write_text(comment + text, "utf-8")
+
+
+def _triangles(structure: Structure) -> int:
+    count = 0
+    for part in structure.model.parts:
+        if isinstance(part.shape, MeshShape):
+            count += structure.model.meshes[part.shape.mesh].num_triangles
+        else:
+            count += _FACES_OF_A_BOX
+    return count
+
+
+def _seen_from_above(structures: Iterable[Structure]) -> Iterable[Imported]:
+    """Yields footprints as triangles."""
+    for one in structures:
+        if one.semantic_class not in _SHOWN:
+            continue
+        area = one.footprint_W
+        if one.semantic_class == "vegetation":
+            # The crown, about.
+            area = area.buffer(_CROWN)
+        pieces = polygons_of(area)
+        cut = shapely.constrained_delaunay_triangles(
+            shapely.multipolygons(pieces)
+        )
+        corners = [
+            shapely.get_coordinates(triangle)[:3]
+            for triangle in shapely.get_parts(cut)
+        ]
+        if corners:
+            xy = np.array(corners)
+            z = np.zeros((*xy.shape[:2], 1))
+            yield Imported(one, "", None, np.concatenate([xy, z], axis=2))

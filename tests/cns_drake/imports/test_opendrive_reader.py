@@ -1,0 +1,180 @@
+"""Files of OpenDRIVE that are wrong, or hostile: one line, and no harm."""
+
+import pytest
+from small_opendrive import (
+    TWO_LANES,
+    geometry,
+    lane,
+    road,
+    section,
+    straight,
+    write_roads,
+)
+
+from cns_drake.imports.import_faults import ImportFaults
+from cns_drake.imports.opendrive.lane_bands import lane_bands
+from cns_drake.imports.opendrive.road_reader import read_roads
+from evaluation.support.errors import InputError
+
+LINE = geometry(0.0, 0.0, 0.0, 0.0, 50.0, "<line/>")
+LANES = section(0.0, *TWO_LANES)
+
+
+def faults_of(path):
+    faults = ImportFaults()
+    roads = read_roads(path, faults)
+    return roads, {kind: number for kind, number, _ in faults.rows()}
+
+
+BOMB = """<?xml version="1.0"?>
+<!DOCTYPE OpenDRIVE [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;">]>
+<OpenDRIVE><road id="&b;"/></OpenDRIVE>"""
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("", "cannot be parsed"),
+        ("<OpenDRIVE>", "cannot be parsed"),
+        ("\x00\x01", "cannot be parsed"),
+        ('<?xml version="1.0" encoding="klingon"?><OpenDRIVE/>', "parsed"),
+        ("<osm/>", "osm is no OpenDRIVE"),
+        ("<OpenDRIVE/>", "no road in it"),
+        (BOMB, "holds a document type"),
+        ("<OpenDRIVE>" + "<road>" * 5000, "nested more than 100 deep"),
+        ("<OpenDRIVE>" + "<userData>" * 5000, "nested more than 100 deep"),
+        (f'<OpenDRIVE><road id="{"9" * 5000}"/></OpenDRIVE>', "5000 letters"),
+    ],
+)
+def test_files_that_are_none(tmp_path, text, fault):
+    path = tmp_path / "a.xodr"
+    path.write_text(text)
+    with pytest.raises(InputError) as info:
+        read_roads(path, ImportFaults())
+    assert str(info.value).startswith(f"{path}: ")
+    assert fault in str(info.value)
+    assert "\n" not in str(info.value)
+
+
+def test_more_elements_than_any_road_map_has(tmp_path, monkeypatch):
+    name = "cns_drake.imports.opendrive.xml_elements._MOST_ELEMENTS"
+    monkeypatch.setattr(name, 1000)
+    path = tmp_path / "a.xodr"
+    path.write_text("<OpenDRIVE>" + "<road/>" * 2000 + "</OpenDRIVE>")
+    with pytest.raises(InputError, match="more than 1000 elements"):
+        read_roads(path, ImportFaults())
+
+
+def geometry_with(**changed):
+    values = {"s": 0, "x": 0, "y": 0, "hdg": 0, "length": 50, **changed}
+    row = " ".join(f'{k}="{v}"' for k, v in values.items() if v is not None)
+    return f"<geometry {row}><line/></geometry>"
+
+
+@pytest.mark.parametrize(
+    ("piece", "lanes", "fault"),
+    [
+        (geometry_with(x="1e300"), LANES, "geometry: x: '1e300' is no number"),
+        (geometry_with(y="nan"), LANES, "geometry: y: 'nan' is no number"),
+        (geometry_with(hdg="inf"), LANES, "geometry: hdg: 'inf'"),
+        (geometry_with(length=None), LANES, "geometry: no length"),
+        (geometry_with(length=-5), LANES, "geometry: length: -5"),
+        (geometry_with(length=1e7), LANES, "more than 100000 m"),
+        (geometry_with(x="far"), LANES, "'far' is no number"),
+        (LINE.replace("<line/>", "<bezier/>"), LANES, "neither a line nor"),
+        (LINE.replace("<line/>", "<arc/>"), LANES, "arc: no curvature"),
+        (
+            LINE.replace("<line/>", '<arc curvature="1e6"/>'),
+            LANES, "a curve of curvature 1e+06",
+        ),
+        (
+            LINE.replace(
+                "<line/>", '<spiral curvStart="0" curvEnd="5e7"/>'
+            ), LANES, "a spiral of curvature 5e+07",
+        ),
+        (
+            LINE.replace(
+                "<line/>",
+                '<paramPoly3 aU="0" bU="0" cU="0" dU="0" aV="0" bV="0" cV="0"'
+                ' dV="0"/>',
+            ), LANES, "a curve without length",
+        ),
+        (LINE, section(0.0, lane(-1, "driving", 1e6)), "1e+06 m is beyond"),
+        (LINE, section("x", *TWO_LANES), "laneSection: s: 'x'"),
+        (
+            LINE, LANES.replace('id="-1"', 'id="1.5"'), "lane: id: 1.5 is no",
+        ),
+    ],
+)  # fmt: skip
+def test_numbers_that_no_road_has(tmp_path, piece, lanes, fault):
+    path = write_roads(tmp_path / "a.xodr", road("17", 50.0, [piece], [lanes]))
+    with pytest.raises(InputError) as info:
+        read_roads(path, ImportFaults())
+    assert str(info.value).startswith(f"{path}: road 17: line ")
+    assert fault in str(info.value)
+
+
+def test_what_cannot_be_used_is_counted(tmp_path):
+    empty = geometry(50.0, 50.0, 0.0, 0.0, 0.0, "<line/>")
+    path = write_roads(
+        tmp_path / "a.xodr",
+        straight("1", 0, 0, 50, 0),
+        straight("1", 0, 9, 50, 9),
+        road("2", 0.0, [], [LANES]),
+        road("3", 50.0, [LINE], []),
+        road("4", 49.5, [LINE, empty], [LANES]),
+    )
+    roads, faults = faults_of(path)
+    assert [one.name for one in roads.roads] == ["1", "4"]
+    assert faults == {
+        "road with the id of another, left out": 1,
+        "road without a course, left out": 1,
+        "road without lanes, left out": 1,
+        "geometry without length, left out": 1,
+        "road of another length than its course, cut": 1,
+    }
+    assert roads.roads[1].length == 49.5
+
+
+def test_networks_that_are_too_large(tmp_path):
+    path = write_roads(
+        tmp_path / "a.xodr",
+        straight("1", 0, 0, 50, 0),
+        straight("2", 30_000, 0, 30_050, 0),
+    )
+    with pytest.raises(InputError, match="30 km across"):
+        read_roads(path, ImportFaults())
+
+
+def test_lanes_of_less_than_no_width_have_none(tmp_path):
+    lanes = section(
+        0.0, lane(-1, "driving", (0.0, 2.0, -0.1)), lane(-2, "sidewalk", 2.0)
+    )
+    path = write_roads(tmp_path / "a.xodr", road("1", 50.0, [LINE], [lanes]))
+    (one,) = read_roads(path, ImportFaults()).roads
+    first, second = lane_bands(one)
+    assert first.width.min() == 0.0
+    assert second.width.min() == pytest.approx(2.0)
+
+
+def test_speed_limits_have_units(tmp_path):
+    limits = (
+        '<type s="0" type="town"><speed max="36" unit="km/h"/></type>'
+        '<type s="9" type="town"><speed max="no limit"/></type>'
+        '<type s="20" type="town"><speed max="10" unit="mph"/></type>'
+    )
+    path = write_roads(
+        tmp_path / "a.xodr", straight("1", 0, 0, 50, 0, more=limits)
+    )
+    (one,) = read_roads(path, ImportFaults()).roads
+    assert one.limits == ((0.0, pytest.approx(10.0)), (20.0, 4.4704))
+
+
+def test_a_lane_of_nothing_among_others_is_paved(tmp_path):
+    lanes = section(
+        0.0, lane(-1, "none", 3.0), lane(-2, "shoulder", 1.0),
+        lane(-3, "none", 3.0),
+    )  # fmt: skip
+    path = write_roads(tmp_path / "a.xodr", road("1", 50.0, [LINE], [lanes]))
+    (one,) = read_roads(path, ImportFaults()).roads
+    assert [b.kind for b in lane_bands(one)] == ["enclosed", "shoulder", "none"]

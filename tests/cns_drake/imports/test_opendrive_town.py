@@ -1,0 +1,417 @@
+"""Towns along roads of OpenDRIVE: areas, buildings, drives, recordings."""
+
+from itertools import pairwise
+import math
+
+import numpy as np
+import pytest
+import shapely
+from shapely.geometry import LineString, Point, box
+from small_opendrive import (
+    cubic,
+    geometry,
+    lane,
+    road,
+    section,
+    straight,
+    turn,
+    write_roads,
+)
+from typer.testing import CliRunner
+import yaml
+
+from cns_drake.command_line.cli import app
+from cns_drake.imports.import_faults import ImportFaults
+from cns_drake.imports.opendrive.imported_streets import (
+    ImportedStreets,
+    lane_polygon,
+)
+from cns_drake.imports.opendrive.lane_bands import lane_bands
+from cns_drake.imports.opendrive.lane_drives import find_lane_drives
+from cns_drake.imports.opendrive.road_heights import RoadHeights
+from cns_drake.imports.opendrive.road_levels import split_levels
+from cns_drake.imports.opendrive.road_reader import read_roads
+from cns_drake.imports.opendrive.town import build_town
+from cns_drake.scenarios.planning import plan_drive
+from cns_drake.scenarios.scenario import load_scenario
+from evaluation.sequences import open_sequence
+from evaluation.support.errors import InputError
+
+ARM = 12.0
+R = ARM - 1.75
+L = ARM + 1.75
+
+
+def crossing(name, x, y, arms):
+    """Lanes that join the arms of a junction: right, left and straight on.
+
+    Args:
+        arms: headings outwards, in quarter turns.
+    """
+    found = []
+    for k in arms:
+        heading = math.pi / 2 * k
+        # On the right of who comes in.
+        c, s = math.cos(heading), math.sin(heading)
+        start = (x + ARM * c, y + ARM * s)
+        inwards = heading + math.pi
+        for m, angle in ((1, -1), (2, 0), (3, 1)):
+            if (k + 2 - angle * -1) % 4 not in arms and angle:
+                continue
+            if not angle and (k + 2) % 4 not in arms:
+                continue
+            # The reference line is the middle line of the road.
+            own = f"{name}_{k}_{m}"
+            if angle == 0:
+                end = (x - ARM * c, y - ARM * s)
+                found.append(
+                    straight(
+                        own, *start, *end, junction=name,
+                        lanes=(lane(-1, "driving", 3.5),),
+                    )
+                )  # fmt: skip
+            else:
+                found.append(
+                    turn(
+                        own, *start, inwards, ARM, angle * math.pi / 2,
+                        junction=name,
+                    )
+                )  # fmt: skip
+    return found
+
+
+def town_roads(size=100.0, **more):
+    """Six junctions about two squares, and a road out of them at both ends."""
+    places = {
+        "a": (0, 0), "b": (1, 0), "e": (2, 0),
+        "d": (0, 1), "c": (1, 1), "f": (2, 1),
+    }  # fmt: skip
+    arms = {
+        "a": (0, 1), "b": (0, 1, 2), "e": (0, 1, 2),
+        "d": (0, 2, 3), "c": (0, 2, 3), "f": (2, 3),
+    }  # fmt: skip
+    found = []
+    for name, (i, j) in places.items():
+        found += crossing(name, i * size, j * size, arms[name])
+    for first, last in ("ab", "be", "dc", "cf", "ad", "bc", "ef"):
+        (x0, y0), (x1, y1) = (
+            np.array(places[one]) * size for one in (first, last)
+        )
+        dx, dy = np.sign([x1 - x0, y1 - y0]) * ARM
+        found.append(
+            straight(first + last, x0 + dx, y0 + dy, x1 - dx, y1 - dy, **more)
+        )
+    end = 2 * size + ARM
+    found.append(straight("eg", end, 0, end + 90.0, 0, **more))
+    found.append(straight("hd", -90.0 - ARM, size, -ARM, size, **more))
+    return found
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("roads")
+    return write_roads(folder / "town.xodr", *town_roads())
+
+
+@pytest.fixture(scope="module")
+def town(source):
+    return build_town(source, seed=1)
+
+
+def bands_of(path):
+    roads = read_roads(path, ImportFaults()).roads
+    return [band for one in roads for band in lane_bands(one)]
+
+
+def test_junctions_have_no_holes(source):
+    streets = ImportedStreets(bands_of(source))
+    carriageway = streets.carriageway()
+    for x, y in ((0, 0), (100, 0), (100, 100), (200, 0)):
+        around = Point(x, y).buffer(ARM)
+        for part in shapely.get_parts(carriageway.intersection(around)):
+            assert not part.interiors
+    # The middle of the T-junction is no lane's, and road all the same.
+    assert carriageway.contains(Point(100, 0))
+    # Two lanes of 3.5 m and a sidewalk of 2 m on both sides.
+    across = LineString([(50, -20), (50, 20)])
+    assert across.intersection(carriageway).length == pytest.approx(
+        7.0, abs=0.02
+    )
+    walks = streets.sidewalks().intersection(across)
+    assert walks.length == pytest.approx(4.0, abs=0.02)
+    assert streets.sidewalks().intersection(carriageway).area < 1e-6
+
+
+def test_what_lanes_of_a_junction_enclose_is_road(tmp_path):
+    corners = [(0, 0), (16, 0), (8, 8), (0, 0)]
+    only = (lane(-1, "driving", 3.5),)
+    path = write_roads(
+        tmp_path / "a.xodr",
+        *(
+            straight(f"{k}", *a, *b, junction="5", lanes=only)
+            for k, (a, b) in enumerate(pairwise(corners))
+        ),
+    )
+    bands = bands_of(path)
+    middle = Point(8, 3)
+    assert all(lane_polygon(band).disjoint(middle) for band in bands)
+    assert ImportedStreets(bands).carriageway().contains(middle)
+
+
+def test_buildings_stand_apart_from_streets_and_each_other(source, town):
+    lanes = []
+    for band in bands_of(source):
+        corners = np.concatenate([band.inner, band.outer[::-1]])[:, :2]
+        lanes.append(shapely.make_valid(shapely.polygons(corners)))
+    streets = shapely.union_all(lanes)
+    buildings = [
+        one.footprint_W
+        for one in town.city.structures
+        if one.semantic_class == "building"
+    ]
+    assert len(buildings) > 10
+    for k, one in enumerate(buildings):
+        assert one.distance(streets) > 0.5
+        for other in buildings[:k]:
+            assert one.intersection(other).area < 0.2
+
+
+def test_everything_has_its_class(town):
+    classes = {s.name: s.semantic_class for s in town.city.structures}
+    assert classes["carriageway"] == "road"
+    assert classes["sidewalks"] == "sidewalk"
+    assert town.kinds["junctions"] == 6
+    assert town.kinds["roads"] == 9
+
+
+def test_drives_keep_to_their_lanes(source, town):
+    assert len(town.drives) == 2
+    middle = {}
+    for band in bands_of(source):
+        along = band.lane.number < 0
+        line = band.middle[:, :2] if along else band.middle[::-1, :2]
+        middle[band.road.name, band.lane.number] = LineString(line)
+    lines = shapely.MultiLineString(
+        [
+            line
+            for (_, number), line in middle.items()
+            if abs(number) == 1
+        ]
+    )  # fmt: skip
+    for drive in town.drives:
+        assert drive.length > 80.0
+        places = shapely.points(drive.path)
+        assert shapely.distance(lines, places).max() < 0.02
+        # Traffic keeps right: the road's middle line is on the left.
+        for name, line in (
+            ("ab", LineString([(12, 0), (88, 0)])),
+            ("bc", LineString([(100, 12), (100, 88)])),
+            ("eg", LineString([(212, 0), (302, 0)])),
+        ):
+            near = [
+                k for k in range(len(drive.path) - 1)
+                if line.distance(Point(drive.path[k])) < 2.0
+                and line.project(Point(drive.path[k])) > 5.0
+                and line.project(Point(drive.path[k])) < line.length - 5.0
+            ]  # fmt: skip
+            for k in near:
+                step = drive.path[k + 1] - drive.path[k]
+                foot = line.interpolate(line.project(Point(drive.path[k])))
+                away = np.array([foot.x, foot.y]) - drive.path[k]
+                assert step[0] * away[1] - step[1] * away[0] > 0.0, name
+        turns = np.diff(np.unwrap(np.arctan2(*np.diff(drive.path, axis=0).T)))
+        assert np.abs(turns).max() < 0.3
+    a, b = (LineString(drive.path) for drive in town.drives)
+    shared = a.intersection(b.buffer(0.5)).length
+    assert 0.05 < shared / a.length < 0.95
+    assert a.is_simple
+    assert b.is_simple
+
+
+def test_left_hand_traffic_keeps_left(tmp_path):
+    path = write_roads(
+        tmp_path / "a.xodr", straight("1", 0, 0, 200, 0, rule="LHT")
+    )
+    (drive,) = find_lane_drives(bands_of(path))
+    step = drive.path[-1] - drive.path[0]
+    assert drive.path[0, 1] * step[0] > 0.0
+    assert abs(drive.path[0, 1]) == pytest.approx(1.75)
+
+
+def test_heights_follow_grade_and_roll(tmp_path):
+    slope = cubic("elevation", 0, 2.0, 0.05, 0, 0, "s")
+    roll = cubic("superelevation", 0, 0.04, 0, 0, 0, "s")
+    path = write_roads(
+        tmp_path / "a.xodr",
+        straight("1", 0, 0, 100, 0, elevation=slope, lateral=roll),
+    )
+    surface = RoadHeights(bands_of(path))
+    xy = np.random.default_rng(0).uniform((1, -5), (99, 5), (200, 2))
+    expected = 2.0 + 0.05 * xy[:, 0] + math.tan(0.04) * xy[:, 1]
+    np.testing.assert_allclose(surface.heights(xy), expected, atol=2e-3)
+    assert not surface.is_level
+
+
+def test_a_road_over_another_is_a_bridge(tmp_path):
+    rise = cubic("elevation", 0, 6.0, 0, 0, 0, "s")
+    path = write_roads(
+        tmp_path / "a.xodr",
+        straight("1", -100, 0, 100, 0),
+        straight("2", 0, -100, 0, 100, elevation=rise),
+    )
+    _, raised = split_levels(bands_of(path))
+    assert {band.road.name for band in raised} == {"2"}
+    # It reaches a little farther than what it crosses: 5.5 m, and 10 m.
+    s = np.concatenate([band.s for band in raised])
+    assert 81.0 < s.min() < 90.0
+    assert 110.0 < s.max() < 119.0
+    built = build_town(path, 0)
+    decks = [s for s in built.city.structures if s.name.startswith("bridge")]
+    assert {one.semantic_class for one in decks} >= {"road", "other-structure"}
+    below = LineString([(-100, 0), (100, 0)]).buffer(1.0)
+    walls = [
+        one.footprint_W
+        for one in built.city.structures
+        if one.semantic_class == "building"
+    ]
+    assert all(one.disjoint(below) for one in walls)
+    assert all(one.disjoint(box(-5, -20, 5, 20)) for one in walls)
+
+
+SIGNS = """<signals>
+<signal id="1" s="20" t="-6" zOffset="2" type="206" dynamic="no"
+ orientation="+"/>
+<signal id="2" s="30" t="6" zOffset="4" type="1000001" dynamic="yes"
+ orientation="-"/>
+<signal id="3" s="40" t="-1" zOffset="5" type="274" dynamic="no"/>
+</signals><objects>
+<object id="1" type="building" s="50" t="20" zOffset="0" hdg="0"><outline>
+<cornerLocal u="-5" v="-4" z="0" height="9"/>
+<cornerLocal u="5" v="-4" z="0" height="9"/>
+<cornerLocal u="5" v="4" z="0" height="9"/>
+<cornerLocal u="-5" v="4" z="0" height="9"/></outline></object>
+<object id="2" type="barrier" s="60" t="-12" zOffset="0"><outlines><outline>
+<cornerRoad s="60" t="-12" dz="0" height="1"/>
+<cornerRoad s="80" t="-12" dz="0" height="1"/>
+<cornerRoad s="80" t="-12.5" dz="0" height="1"/>
+<cornerRoad s="60" t="-12.5" dz="0" height="1"/></outline></outlines></object>
+<object id="3" type="pole" s="90" t="7" zOffset="0" radius="0.1" height="5"/>
+<object id="4" type="crosswalk" s="90" t="0" length="4" width="7"/>
+<object id="5" type="pole" s="0" t="8" zOffset="0" length="0.2" width="0.2"
+ height="3"><repeat s="100" length="40" distance="10"/></object>
+<object id="6" type="tree" s="150" t="9" zOffset="0" radius="2" height="8"/>
+</objects>"""
+
+
+def test_signals_and_objects_stand_where_told(tmp_path):
+    path = write_roads(
+        tmp_path / "a.xodr", straight("1", 0, 0, 200, 0, more=SIGNS)
+    )
+    built = build_town(path, 0)
+    found = {s.name: s for s in built.city.structures}
+    stop = found["signal_1_0"]
+    assert stop.semantic_class == "traffic-sign"
+    assert stop.xyz[:2] == (20.0, -6.0)
+    # It looks back at who comes along the road.
+    assert abs(stop.yaw) == pytest.approx(math.pi, abs=1e-4)
+    house = found["object_1_0"]
+    assert house.semantic_class == "building"
+    assert house.footprint_W.equals(box(45, 16, 55, 24))
+    fence = found["object_1_1"]
+    assert fence.semantic_class == "fence"
+    assert fence.footprint_W.equals(box(60, -12.5, 80, -12))
+    assert found["object_1_2"].semantic_class == "pole"
+    poles = [n for n in found if n.startswith("object_1_4")]
+    assert len(poles) == 5
+    assert found["object_1_5"].semantic_class == "vegetation"
+    rows = {kind: number for kind, number, _ in built.faults.rows()}
+    assert rows == {
+        "signal over a lane, left out": 1,
+        "object that is painted on the road, left out": 1,
+    }
+    # What the file has is there at all stages, and nothing is built on it.
+    absent = {n for stage in built.stages.stages for n in
+              built.stages.absent(stage)}  # fmt: skip
+    assert not absent & set(found).intersection({"object_1_0", *poles})
+    drawn = [
+        one.footprint_W
+        for one in built.city.structures
+        if one.semantic_class == "building" and one.name != "object_1_0"
+    ]
+    assert all(one.disjoint(house.footprint_W) for one in drawn)
+
+
+def test_parking_lanes_are_parking(tmp_path):
+    lanes = (
+        lane(1, "driving", 3.5), lane(-1, "driving", 3.5),
+        lane(-2, "parking", 2.5), lane(-3, "biking", 1.5),
+        lane(-4, "sidewalk", 2.0),
+    )  # fmt: skip
+    path = write_roads(
+        tmp_path / "a.xodr", straight("1", 0, 0, 200, 0, lanes=lanes)
+    )
+    built = build_town(path, 0)
+    classes = {s.name: s for s in built.city.structures}
+    assert classes["parking_bays"].semantic_class == "parking"
+    bays = classes["parking_bays"].model.footprint
+    assert bays.area == pytest.approx(500.0)
+    assert classes["paths"].semantic_class == "sidewalk"
+    cars = [s for s in built.city.structures if "bay" in s.tags]
+    assert len(cars) > 8
+    assert all(bays.buffer(0.4).contains(one.footprint_W) for one in cars)
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+@pytest.mark.slow
+def test_the_command_from_end_to_end(source, tmp_path):
+    output = tmp_path / "town"
+    result = run("import", source, "--output", output, "--seed", "1")
+    assert result.exit_code == 0, result.output
+    assert "junctions" in result.output
+    again = tmp_path / "again" / "town"
+    again.parent.mkdir()
+    assert (
+        run("import", source, "--output", again, "--seed", "1").exit_code == 0
+    )
+    for path in output.rglob("*"):
+        if path.is_file():
+            twin = again / path.relative_to(output)
+            assert twin.read_bytes() == path.read_bytes(), path
+    facts = yaml.safe_load((output / "import.yaml").read_text())
+    assert facts["source"] == "town.xodr"
+    assert "town_01" in run("list", output).output
+    for name in ("sequence_01", "sequence_02", "other_02"):
+        trajectory = plan_drive(load_scenario(output / f"{name}.yaml"))
+        assert trajectory.length > 80.0
+    scenario = output / "sequence_02.yaml"
+    result = run(
+        "simulate", scenario, "--frames", "2", "--output", tmp_path / "rec"
+    )
+    assert result.exit_code == 0, result.output
+    scan = open_sequence(tmp_path / "rec" / "town_02").scan(0)
+    # Road below the car, at the height of the wheels.
+    below = np.hypot(scan["x"], scan["y"]) < 6.0
+    road_ = below & (scan["label"] == 40)
+    assert road_.sum() > 500
+    assert np.abs(scan["z"][road_] + 1.6).max() < 0.01
+    assert {40, 48, 50} <= set(np.unique(scan["label"]))
+
+
+@pytest.mark.parametrize(
+    ("option", "value"), [("--years", "1950"), ("--lod", "2")]
+)
+def test_options_of_other_formats(source, tmp_path, option, value):
+    result = run("import", source, option, value, "--output", tmp_path / "out")
+    assert isinstance(result.exception, InputError)
+    assert f"{option}: " in str(result.exception)
+
+
+def test_lanes_without_area(tmp_path):
+    line = geometry(0.0, 0.0, 0.0, 0.0, 50.0, "<line/>")
+    own = section(0.0, lane(-1, "none", 3.0))
+    path = write_roads(tmp_path / "a.xodr", road("1", 50.0, [line], [own]))
+    with pytest.raises(InputError, match="no lane in it has an area"):
+        build_town(path, 0)
