@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-import json
 from pathlib import Path
 import re
 from typing import Any
@@ -19,6 +18,7 @@ import numpy as np
 from cns_drake.imports.import_faults import ImportFaults
 from evaluation.support.errors import InputError
 from evaluation.support.files import check_regular
+from evaluation.support.json_text import parse_json
 
 # A face: the corners (N, 3) of its outer ring, then those of its holes.
 Face = list[np.ndarray]
@@ -138,21 +138,21 @@ def _documents(path: Path) -> Iterator[tuple[int, dict]]:
     check_regular(path)
     try:
         if path.suffix == ".jsonl":
-            with path.open(encoding="utf-8") as stream:
+            with path.open("rb") as stream:
                 for number, line in enumerate(stream, start=1):
                     if line.strip():
                         yield number, _object(line, f"{path}: line {number}")
         else:
-            yield 0, _object(path.read_text("utf-8"), str(path))
+            yield 0, _object(path.read_bytes(), str(path))
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: not UTF-8 ({error.reason})") from error
 
 
-def _object(text: str, where: str) -> dict:
+def _object(text: bytes, where: str) -> dict:
     try:
-        value = json.loads(text)
+        value = parse_json(text)
+    except UnicodeDecodeError as error:
+        raise InputError(f"{where}: not UTF-8 ({error.reason})") from error
     except RecursionError as error:
         raise InputError(f"{where}: nested too deeply") from error
     except ValueError as error:
@@ -250,11 +250,13 @@ def _vertices(document: dict, transform: object, where: str) -> np.ndarray:
     return points
 
 
-def _numbers(values: object, where: str) -> np.ndarray:
+def _numbers(values: Any, where: str) -> np.ndarray:
     """Returns (N, 3) float64."""
     try:
         with np.errstate(over="ignore"):
             points = np.array(values, dtype=np.float64).reshape(-1, 3)
+        if len(points) != len(values):
+            raise ValueError
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{where}: not three numbers each") from error
     return points

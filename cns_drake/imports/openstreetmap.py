@@ -5,11 +5,9 @@ Heights above the sea are not in it: the ground is level.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import shapely
@@ -31,6 +29,12 @@ from cns_drake.imports.foreign_city import (
     make_imported,
 )
 from cns_drake.imports.import_faults import ImportFaults
+from cns_drake.imports.osm_reading import (
+    Tags,
+    is_building,
+    is_told,
+    read_openstreetmap,
+)
 from cns_drake.imports.osm_tags import (
     area_kind,
     heights,
@@ -40,8 +44,6 @@ from cns_drake.imports.osm_tags import (
     street_width,
 )
 from evaluation.support.errors import InputError
-
-Tags = Mapping[str, str]
 
 # Of the Earth, WGS 84 [m].
 _SEMI_MAJOR = 6378137.0
@@ -55,23 +57,6 @@ _WALL = (0.2, 1.6)
 _LARGEST = 20_000.0  # [m]
 
 
-@dataclass
-class _Features:
-    """What a file holds, places as longitude and latitude [deg].
-
-    Attributes:
-        areas: id, tags and polygons.
-        ways: id, tags and line.
-        trees: id, tags and place.
-    """
-
-    areas: list[tuple[str, Tags, list[Polygon]]] = field(default_factory=list)
-    ways: list[tuple[str, Tags, np.ndarray]] = field(default_factory=list)
-    trees: list[tuple[str, Tags, tuple[float, float]]] = field(
-        default_factory=list
-    )
-
-
 def import_openstreetmap(path: Path, year_attribute: str | None) -> ForeignCity:
     """Reads a file; its origin is the middle of its buildings.
 
@@ -79,13 +64,9 @@ def import_openstreetmap(path: Path, year_attribute: str | None) -> ForeignCity:
         InputError: if it cannot be read, has no building, or is larger than
             20 km.
     """
-    features = _read(path)
-    faults = ImportFaults()
-    buildings = [
-        one
-        for one in features.areas
-        if _is_told(one[1], "building") or _is_told(one[1], "building:part")
-    ]
+    features = read_openstreetmap(path)
+    faults = features.faults
+    buildings = [one for one in features.areas if is_building(one[1])]
     if not buildings:
         raise InputError(f"{path}: no building in it")
     bounds = np.array([p.bounds for _, _, ps in buildings for p in ps])
@@ -106,49 +87,6 @@ def import_openstreetmap(path: Path, year_attribute: str | None) -> ForeignCity:
         *_trees(features.trees, local),
     ]
     return ForeignCity(found, (latitude, longitude), "WGS 84", faults)
-
-
-def _read(path: Path) -> _Features:
-    import osmium
-
-    features = _Features()
-    if not path.is_file():
-        raise InputError(f"{path}: no such file")
-    try:
-        reader = osmium.FileProcessor(str(path)).with_locations().with_areas()
-        for one in reader:
-            tags = {tag.k: tag.v for tag in one.tags}
-            if isinstance(one, osmium.osm.Area):
-                polygons = _polygons(one)
-                if polygons:
-                    kind = "w" if one.from_way() else "r"
-                    name = f"{kind}{one.orig_id()}"
-                    features.areas.append((name, tags, polygons))
-            elif isinstance(one, osmium.osm.Way) and tags:
-                line = [(n.lon, n.lat) for n in one.nodes if n.location.valid()]
-                if len(line) > 1:
-                    features.ways.append((f"w{one.id}", tags, np.array(line)))
-            elif (
-                isinstance(one, osmium.osm.Node)
-                and tags.get("natural") == "tree"
-                and one.location.valid()
-            ):
-                place = (one.lon, one.lat)
-                features.trees.append((f"n{one.id}", tags, place))
-    except RuntimeError as error:
-        first = str(error).splitlines()[0] if str(error) else "unreadable"
-        raise InputError(f"{path}: {first}") from error
-    return features
-
-
-def _polygons(area: Any) -> list[Polygon]:
-    found = []
-    for outer in area.outer_rings():
-        holes = [
-            [(n.lon, n.lat) for n in inner] for inner in area.inner_rings(outer)
-        ]
-        found.append(Polygon([(n.lon, n.lat) for n in outer], holes))
-    return found
 
 
 class _Local:
@@ -172,10 +110,6 @@ class _Local:
 
     def polygon(self, polygon: Polygon) -> Polygon:
         return shapely.transform(polygon, self)
-
-
-def _is_told(tags: Tags, name: str) -> bool:
-    return tags.get(name, "no") != "no"
 
 
 def _parts(geometry: BaseGeometry) -> Iterator[Polygon]:
@@ -209,7 +143,7 @@ def _buildings(
     for name, tags, polygons in told:
         for polygon in polygons:
             for one in _sound(local.polygon(polygon), name, faults):
-                group = parts if _is_told(tags, "building:part") else outlines
+                group = parts if is_told(tags, "building:part") else outlines
                 group.append((name, tags, one))
     of_outline: dict[int, list[tuple[str, Tags, Polygon]]] = {}
     tree_of_outlines = STRtree([one for _, _, one in outlines])
@@ -263,7 +197,7 @@ def _streets(
     roads: list[tuple[str, BaseGeometry]] = []
     walks: list[tuple[str, BaseGeometry]] = []
     for name, tags, line in ways:
-        if _is_told(tags, "tunnel") or _is_told(tags, "area"):
+        if is_told(tags, "tunnel") or is_told(tags, "area"):
             continue
         width, narrow = street_width(tags), path_width(tags)
         if width is None and narrow is None:
@@ -272,7 +206,7 @@ def _streets(
         if width is None:
             walks.append((name, course.buffer((narrow or 0.0) / 2.0, 4)))
             continue
-        if _is_told(tags, "bridge"):
+        if is_told(tags, "bridge"):
             faults.add("bridge, laid on the ground", name)
         roads.append((name, course.buffer(width / 2.0, 4)))
         for side, has in zip((1.0, -1.0), sidewalk_sides(tags), strict=True):
@@ -309,7 +243,7 @@ def _lands(
 ) -> Iterator[Imported]:
     for name, tags, polygons in areas:
         found = area_kind(tags)
-        if found is None or _is_told(tags, "building"):
+        if found is None or is_told(tags, "building"):
             continue
         kind, semantic_class = found
         surface = [
@@ -365,7 +299,8 @@ def _trees(
         x, y = local(np.array([place]))[0].tolist()
         needles = tags.get("leaf_type") == "needleleaved"
         model = tree(
-            np.random.default_rng([int(name[1:])]),
+            # Editors give negative numbers to what is new.
+            np.random.default_rng([abs(int(name[1:]))]),
             species="spruce" if needles else "lime_tree",
             height=length(tags.get("height")) or None,
         )

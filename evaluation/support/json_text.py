@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 import re
 from typing import Any
 
+import numpy as np
+
 # Data of people and programs are far from it.
 _DEEPEST = 50
 _STRING = re.compile(r'"(?:[^"\\]|\\.)*"', re.DOTALL)
-_BRACKET = re.compile(r"[\[\]{}]")
+# A backslash is found in strings only.
+_ESCAPE = re.compile(rb"\\.", re.DOTALL)
+# What may stand for a zero, or for half of a pair of surrogates.
+_SUSPECT = re.compile(rb"\\u(?:0000|[dD][89a-fA-F])")
+# Brackets are counted in pieces, for memory's sake [bytes].
+_PIECE = 1 << 24
 
 
 def parse_json(data: bytes) -> Any:
@@ -20,22 +26,52 @@ def parse_json(data: bytes) -> Any:
         data: in UTF-8.
 
     Raises:
-        ValueError: if it is none, is nested too deep, or holds text that no
-            file, terminal or path takes.
+        ValueError: if it is none, is nested too deep, has a key twice, or
+            holds text that no file, terminal or path takes.
     """
     text = data.decode("utf-8-sig")
-    steps = (
-        1 if bracket[0] in "[{" else -1
-        for bracket in _BRACKET.finditer(_STRING.sub("", text))
-    )
-    if max(itertools.accumulate(steps), default=0) > _DEEPEST:
+    if _depth(data) > _DEEPEST:
         raise ValueError(f"nested more than {_DEEPEST} deep")
-    # The only way to write either: both are no text.
-    for string in _STRING.findall(text) if "\\u" in text else ():
-        if "\0" in (word := json.loads(string)):
-            raise ValueError("a zero in a text")
-        try:
-            word.encode()
-        except UnicodeEncodeError:
-            raise ValueError("half of a pair of surrogates") from None
-    return json.loads(text)
+    if _SUSPECT.search(data):
+        # The only way to write either: both are no text.
+        for string in _STRING.findall(text):
+            if "\0" in (word := json.loads(string)):
+                raise ValueError("a zero in a text")
+            try:
+                word.encode()
+            except UnicodeEncodeError:
+                raise ValueError("half of a pair of surrogates") from None
+    return json.loads(text, object_pairs_hook=_without_doubles)
+
+
+def _without_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Returns an object; of keys that are there twice, one would be lost."""
+    value = dict(pairs)
+    if len(value) < len(pairs):
+        keys = [key for key, _ in pairs]
+        twice = next(key for key in keys if keys.count(key) > 1)
+        raise ValueError(f"the key {twice[:60]!r} is there twice")
+    return value
+
+
+def _depth(data: bytes) -> int:
+    """Returns how deep brackets are nested in what may be JSON."""
+    if b"\\" in data:
+        data = _ESCAPE.sub(b"__", data)
+    deepest, depth, in_string = 0, 0, False
+    for start in range(0, len(data), _PIECE):
+        octets = np.frombuffer(data, np.uint8)[start : start + _PIECE]
+        # Quotes take turns in beginning and ending a string.
+        quotes = np.flatnonzero(octets == ord('"'))
+        opening = np.flatnonzero((octets == ord("[")) | (octets == ord("{")))
+        closing = np.flatnonzero((octets == ord("]")) | (octets == ord("}")))
+        places = np.concatenate([opening, closing])
+        steps = np.repeat([1, -1], [len(opening), len(closing)])
+        outside = (np.searchsorted(quotes, places) % 2 == 1) == in_string
+        order = np.argsort(places[outside])
+        depths = depth + np.cumsum(steps[outside][order])
+        if len(depths):
+            deepest = max(deepest, int(depths.max()))
+            depth = int(depths[-1])
+        in_string ^= len(quotes) % 2 == 1
+    return deepest

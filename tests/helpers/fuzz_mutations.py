@@ -57,6 +57,33 @@ _DOCUMENTS = (
     "\ta: 1\n",
     "a: 'unended\n",
 )
+# Whole files of OpenStreetMap that ask more of a reader than they are long.
+_OSM_DOCUMENTS = (
+    "",
+    "<osm/>",
+    "<osm version='0.6'>",
+    "<gpx version='1.1'/>",
+    "<osm version='0.6'>" + "<node>" * 5000,
+    "<osm version='0.6'><bounds minlat='x'/></osm>",
+    "<osmChange version='0.6'><delete><node id='1' version='1'/></delete>"
+    "<create><node id='2' version='1' lat='1' lon='1'/></create></osmChange>",
+    "<!DOCTYPE osm [<!ENTITY a 'aaaaaaaaaa'>"
+    + "".join(
+        f"<!ENTITY {b} '{f'&{a};' * 10}'>"
+        for a, b in zip("abcdefgh", "bcdefghi", strict=True)
+    )
+    + "]><osm version='0.6'><node id='1' lat='1' lon='1'>"
+    "<tag k='building' v='&i;'/></node></osm>",
+    "<!DOCTYPE osm [<!ENTITY e SYSTEM 'file:///etc/passwd'>]>"
+    "<osm version='0.6'><note>&e;</note></osm>",
+    "<osm version='0.6'><relation id='1' version='1'>"
+    "<member type='relation' ref='1' role='outer'/>"
+    "<tag k='type' v='multipolygon'/><tag k='building' v='yes'/>"
+    "</relation></osm>",
+    "<osm version='0.6'><way id='1' version='1'>"
+    + "<nd ref='7'/>" * 3000
+    + "<tag k='building' v='yes'/></way></osm>",
+)
 
 
 def mutate(path: Path, data: bytes, rng: np.random.Generator) -> bytes:
@@ -109,6 +136,13 @@ def _mutate_json(data: bytes, rng) -> bytes:
         return _pick(rng, ("", "[" * 5000, "{", "[]", "{}", "NaN")).encode()
     tree = _mutate_tree(json.loads(data), rng)
     return json.dumps(tree, default=repr).encode()
+
+
+def _mutate_json_lines(data: bytes, rng) -> bytes:
+    lines = data.split(b"\n")
+    at = int(rng.integers(len(lines)))
+    lines[at] = _mutate_json(lines[at], rng)
+    return b"\n".join(lines)
 
 
 def _mutate_tree(tree, rng):
@@ -179,12 +213,12 @@ def _mutate_table(data: bytes, rng) -> bytes:
     return "\n".join(map(separator.join, rows)).encode("utf-8", "replace")
 
 
-def _mutate_tokens(data: bytes, rng) -> bytes:
+def _mutate_tokens(data: bytes, rng, first: int = 4000) -> bytes:
     """Replaces words of a text, or of the text that a file begins with."""
     if rng.random() < 0.2:
         return _mutate_lines(data, rng)
     # The header of a point cloud; the whole of most models.
-    head, tail = data[:4000], data[4000:]
+    head, tail = data[:first], data[first:]
     tokens = list(re.finditer(rb"[^\s<>\"=/]+", head))
     for _ in range(int(_pick(rng, (1, 1, 2)))):
         token = tokens[int(rng.integers(len(tokens)))]
@@ -194,6 +228,37 @@ def _mutate_tokens(data: bytes, rng) -> bytes:
             new = _word(rng).encode()
         head = head[: token.start()] + new + head[token.end() :]
     return head + tail
+
+
+def mutate_osm(path: Path, data: bytes, rng: np.random.Generator) -> bytes:
+    """Mutates OpenStreetMap's XML: words, bytes, or what it refers to."""
+    kind = rng.integers(6)
+    if kind < 2:
+        return _mutate_tokens(data, rng, first=1 << 20)
+    if kind == 2:
+        return mutate_bytes(data, rng, count=_pick(rng, (1, 2, 5)))
+    text = data.decode()
+    if kind == 3:
+        return _pick(rng, _OSM_DOCUMENTS).encode()
+    name, words = _pick(
+        rng,
+        (
+            ("lat", ("nan", "91", "1e300", "-90", "90", "", "1e-9", "x")),
+            ("lon", ("inf", "181", "-1e300", "-180", "180", "0", "13.00001")),
+            ("ref", ("1", "2", "47", "-5", "9" * 25, "", "x")),
+            ("id", ("1", "2", "0", "-5", "9" * 25, "x")),
+            ("role", ("outer", "inner", "outline", "part", "x" * 3000)),
+            ("v", ("1e999", "-3", "0", "nan", "9" * 400, "yes;no", "no")),
+            ("k", ("building", "area", "highway", "type", "building:part")),
+            ("type", ("way", "node", "relation", "x")),
+        ),
+    )
+    places = list(re.finditer(rf' {name}="([^"]*)"', text))
+    for _ in range(int(_pick(rng, (1, 3, 30)))):
+        place = places[int(rng.integers(len(places)))]
+        old = place[0]
+        text = text.replace(old, f' {name}="{_pick(rng, words)}"', 1)
+    return text.encode()
 
 
 def _mutate_lines(data: bytes, rng) -> bytes:
@@ -214,6 +279,7 @@ def _mutate_lines(data: bytes, rng) -> bytes:
 _MUTATORS = {
     ".yaml": _mutate_yaml,
     ".json": _mutate_json,
+    ".jsonl": _mutate_json_lines,
     ".csv": _mutate_table,
     ".txt": _mutate_table,
     **dict.fromkeys((".sdf", ".obj", ".pcd", ".ply", ".npy"), _mutate_tokens),

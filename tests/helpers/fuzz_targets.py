@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 import shutil
 
 from bag_recordings import contents, record
 import bent_drive
 import dataset_folders
+from fuzz_mutations import mutate_osm
 from fuzzing import Target
 import helipr_drive
 import lies
@@ -18,14 +20,15 @@ import numpy as np
 from small_city import PLAN, ROADS, STAGES
 from small_cityjson import CityWriter
 from small_map import box_visual, world_text
+from small_osm import write_corner
 import yaml
 
 from cns_drake.city.generation.city_structures import make_city, meshes_of
 from cns_drake.city.plan.city_plan import load_plan
 from cns_drake.city.plan.stages import load_stages
 from cns_drake.export.exporting import export_sequence
-from cns_drake.imports.cityjson import read_cityjson
-from cns_drake.imports.import_structures import import_structures
+from cns_drake.imports.import_structures import import_cityjson
+from cns_drake.imports.openstreetmap import import_openstreetmap
 from cns_drake.pictures.stage_pictures import load_views
 from cns_drake.recording.frame_clock import FRAME_PERIOD
 from cns_drake.recording.recording_folder import RecordingFolder
@@ -301,13 +304,49 @@ def _read_drive(folder: Path):
 def _write_cityjson(folder: Path) -> None:
     city = CityWriter("2.0")
     city.box("a", 10.0, -5.0, (4.0, 3.0, 2.0), z=0.5)
-    city.box("b", 30.0, 8.0, (9.0, 5.0, 6.0))
+    city.box("b", 30.0, 8.0, (9.0, 5.0, 6.0), parents=["a"])
+    low = {
+        "type": "MultiSurface",
+        "lod": "1.2",
+        "boundaries": [[city.ring([(0, 0, 0), (5, 0, 0), (5, 5, 0)])]],
+    }
+    place = {
+        "type": "GeometryInstance",
+        "template": 0,
+        "boundaries": [city.vertex(50.0, 5.0, 0.0)],
+        "transformationMatrix": np.eye(4).ravel().tolist(),
+    }
+    solids = {
+        "type": "CompositeSolid",
+        "lod": "2",
+        "boundaries": [[city.box_faces(20.0, 20.0, 0.0, (3.0, 3.0, 3.0))]],
+    }
+    attributes = {"yearOfConstruction": "1950-03-01", "name": "c"}
+    city.add("c", "Building", low, solids, attributes=attributes)
+    city.add("tree", "SolitaryVegetationObject", place)
+    city.templates = {
+        "templates": [{**low, "boundaries": [[[0, 1, 2]]]}],
+        "vertices-templates": [[0.0, 0.0, 0.0], [1.0, 0, 0], [0, 0, 2.0]],
+    }
     city.write(folder / "city.json")
+    whole = city.document()
+    head = {**whole, "CityObjects": {}, "vertices": []}
+    feature = {**whole, "type": "CityJSONFeature", "id": "a"}
+    lines = [json.dumps(one) for one in (head, feature, feature)]
+    (folder / "city.city.jsonl").write_text("\n".join(lines))
 
 
 def _read_cityjson(folder: Path) -> None:
-    city = read_cityjson(folder / "city.json")
-    import_structures(city, np.zeros(3), lod=None, year_attribute=None)
+    for name in ("city.json", "city.city.jsonl"):
+        import_cityjson(folder / name, None, None)
+
+
+def _write_osm(folder: Path) -> None:
+    write_corner(folder / "corner.osm")
+
+
+def _read_osm(folder: Path) -> None:
+    import_openstreetmap(folder / "corner.osm", None)
 
 
 _TOWN = ("roads.yaml", "stage_01.sdf", "structures.csv", "wedge.obj")
@@ -359,7 +398,11 @@ TARGETS = (
         "cns", 7, _export("cns"), ("cns/**/*",),
         lambda folder: _read_sequence(folder / "cns" / "Town" / "07"),
     ),
-    Target("cityjson", 8, _write_cityjson, ("city.json",), _read_cityjson),
+    Target("cityjson", 8, _write_cityjson, ("city.*",), _read_cityjson),
+    Target(
+        "openstreetmap", 8, _write_osm, ("corner.osm",), _read_osm,
+        mutate=mutate_osm,
+    ),
     # Well-formed parts that contradict each other.
     Target(
         "recording lies", 8, _write_recording, ("town_07/*.mcap",),

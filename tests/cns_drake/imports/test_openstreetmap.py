@@ -1,10 +1,11 @@
 """OpenStreetMap files, written here, and what becomes of them."""
 
-import math
+import re
 
 import numpy as np
 import pytest
 from shapely.geometry import Polygon
+from small_osm import LAT, LON, OsmWriter
 
 from cns_drake.imports.extrusions import extruded
 from cns_drake.imports.import_faults import ImportFaults
@@ -16,62 +17,6 @@ from cns_drake.imports.osm_tags import (
     street_width,
 )
 from evaluation.support.errors import InputError
-
-LAT, LON = 52.0, 13.0
-
-
-class OsmWriter:
-    """Writes nodes and ways, given in metres about 52 N, 13 E."""
-
-    def __init__(self):
-        self.rows = []
-        self._next = 1
-
-    def node(self, x, y, **tags):
-        # The lengths of a degree, by the series for WGS 84.
-        phi = math.radians(LAT)
-        lat = 111132.954 - 559.822 * math.cos(2 * phi)
-        lat += 1.175 * math.cos(4 * phi)
-        lon = 111412.84 * math.cos(phi) - 93.5 * math.cos(3 * phi)
-        lon += 0.118 * math.cos(5 * phi)
-        number = self._number()
-        self.rows.append(
-            f'<node id="{number}" version="1" lat="{LAT + y / lat:.9f}"'
-            f' lon="{LON + x / lon:.9f}">{_tags(tags)}</node>'
-        )
-        return number
-
-    def way(self, points, closed=False, **tags):
-        nodes = [self.node(*point) for point in points]
-        if closed:
-            nodes.append(nodes[0])
-        number = self._number()
-        refs = "".join(f'<nd ref="{node}"/>' for node in nodes)
-        self.rows.append(
-            f'<way id="{number}" version="1">{refs}{_tags(tags)}</way>'
-        )
-        return number
-
-    def box(self, x, y, a, b, **tags):
-        corners = [(x, y), (x + a, y), (x + a, y + b), (x, y + b)]
-        return self.way(corners, closed=True, **tags)
-
-    def write(self, path):
-        rows = sorted(self.rows, key=lambda row: row.startswith("<way"))
-        text = "\n".join(rows)
-        path.write_text(f'<osm version="0.6">\n{text}\n</osm>\n')
-        return path
-
-    def _number(self):
-        self._next += 1
-        return self._next
-
-
-def _tags(tags):
-    return "".join(
-        f'<tag k="{key.replace("__", ":")}" v="{value}"/>'
-        for key, value in tags.items()
-    )
 
 
 def read(path, year_attribute=None):
@@ -269,5 +214,47 @@ def test_half_a_country_is_refused(tmp_path):
 
 
 def test_no_such_file(tmp_path):
-    with pytest.raises(InputError, match="no such file"):
+    with pytest.raises(InputError, match="No such file"):
         import_openstreetmap(tmp_path / "none.osm", None)
+
+
+def test_what_is_cut_off_at_the_edge_is_told(tmp_path):
+    osm = OsmWriter()
+    osm.box(0, 0, 10, 10, building="yes")
+    street = osm.way([(0, 20), (40, 20), (80, 20)], highway="residential")
+    house = osm.box(20, 0, 10, 10, building="yes")
+    inner = osm.box(50, 0, 9, 9)
+    open_ = osm.relation({"outer": [99]}, type="multipolygon", building="yes")
+    osm.relation({"outer": [inner]}, type="multipolygon", landuse="grass")
+    path = osm.write(tmp_path / "city.osm")
+    # The last place of the street and a corner of the house are elsewhere.
+    text = path.read_text()
+    for way, place in ((street, -1), (house, 1)):
+        refs = re.search(rf'<way id="{way}".*?</way>', text)[0]
+        node = re.findall(r'ref="(\d+)"', refs)[place]
+        text = re.sub(rf'<node id="{node}".*\n', "", text)
+    path.write_text(text)
+    city, _ = read(path)
+    assert sorted(city.faults.rows()) == [
+        (
+            "building whose outline does not close, left out",
+            2,
+            f"w{house}",
+        ),
+        ("place of a way that is not in the file, left out", 1, f"w{street}"),
+    ]
+    assert open_ > 0
+
+
+@pytest.mark.parametrize("number", ["-7", "7"])
+def test_new_things_of_editors_have_negative_numbers(tmp_path, number):
+    osm = OsmWriter()
+    osm.box(0, 0, 10, 10, building="yes")
+    tree = osm.node(20, 20, natural="tree")
+    path = osm.write(tmp_path / "city.osm")
+    text = path.read_text().replace(
+        f'<node id="{tree}"', f'<node id="{number}"'
+    )
+    path.write_text(text)
+    _, found = read(path)
+    assert f"tree_n{number}" in found

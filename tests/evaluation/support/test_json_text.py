@@ -32,3 +32,19 @@ def test_what_json_writes_is_read(value):
 def test_what_is_refused(data, fault):
     with pytest.raises(ValueError, match=fault):
         parse_json(data)
+
+
+def test_a_key_that_is_there_twice_is_refused():
+    with pytest.raises(ValueError, match="the key 'a' is there twice"):
+        parse_json(b'{"b": {"a": 1, "a": 2}}')
+
+
+@pytest.mark.parametrize("piece", [1, 3, 1 << 24])
+def test_only_brackets_outside_of_texts_nest(monkeypatch, piece):
+    monkeypatch.setattr("evaluation.support.json_text._PIECE", piece)
+    value = {'"[{\\': ["[" * 60 + '\\"', "]" * 60, [1, {"]": [2]}]] * 30}
+    assert parse_json(json.dumps(value).encode()) == value
+    deep = "[" * 50 + "1" + "]" * 50
+    assert parse_json(f'{{"a": 1}}{deep}'[8:].encode())
+    with pytest.raises(ValueError, match="more than 50 deep"):
+        parse_json(f'[{deep}, "["]'.encode())

@@ -1,0 +1,117 @@
+"""What a file of OpenStreetMap holds, as far as a city is made of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from shapely.geometry import Polygon
+
+from cns_drake.imports.import_faults import ImportFaults
+from evaluation.support.errors import InputError
+from evaluation.support.files import check_regular
+
+Tags = Mapping[str, str]
+
+
+@dataclass
+class OsmFeatures:
+    """What a file holds, places as longitude and latitude [deg].
+
+    Attributes:
+        areas: id, tags and polygons.
+        ways: id, tags and line.
+        trees: id, tags and place.
+        faults: what could not be read.
+    """
+
+    areas: list[tuple[str, Tags, list[Polygon]]] = field(default_factory=list)
+    ways: list[tuple[str, Tags, np.ndarray]] = field(default_factory=list)
+    trees: list[tuple[str, Tags, tuple[float, float]]] = field(
+        default_factory=list
+    )
+    faults: ImportFaults = field(default_factory=ImportFaults)
+
+
+def read_openstreetmap(path: Path) -> OsmFeatures:
+    """Reads a file.
+
+    Raises:
+        InputError: if it cannot be read.
+    """
+    import osmium
+
+    features = OsmFeatures()
+    check_regular(path)
+    told: dict[str, None] = {}
+    try:
+        reader = osmium.FileProcessor(str(path)).with_locations().with_areas()
+        for one in reader:
+            tags = {tag.k: tag.v for tag in one.tags}
+            if isinstance(one, osmium.osm.Area):
+                polygons = _polygons(one)
+                if polygons:
+                    kind = "w" if one.from_way() else "r"
+                    name = f"{kind}{one.orig_id()}"
+                    features.areas.append((name, tags, polygons))
+            elif isinstance(one, osmium.osm.Way) and tags:
+                name = f"w{one.id}"
+                if is_building(tags):
+                    told[name] = None
+                line = [(n.lon, n.lat) for n in one.nodes if n.location.valid()]
+                missing = len(one.nodes) - len(line)
+                if missing and "highway" in tags:
+                    features.faults.add(
+                        "place of a way that is not in the file, left out",
+                        name,
+                        missing,
+                    )
+                if len(line) > 1:
+                    features.ways.append((name, tags, np.array(line)))
+            elif isinstance(one, osmium.osm.Relation):
+                if tags.get("type") == "multipolygon" and is_building(tags):
+                    told[f"r{one.id}"] = None
+            elif (
+                isinstance(one, osmium.osm.Node)
+                and tags.get("natural") == "tree"
+                and one.location.valid()
+            ):
+                place = (one.lon, one.lat)
+                features.trees.append((f"n{one.id}", tags, place))
+    except (
+        RuntimeError,
+        ValueError,
+        OverflowError,
+        osmium.InvalidLocationError,
+    ) as error:
+        first = str(error).splitlines()[0] if str(error) else "unreadable"
+        raise InputError(f"{path}: {first}") from error
+    closed = {name for name, _, _ in features.areas}
+    for name in (name for name in told if name not in closed):
+        features.faults.add(
+            "building whose outline does not close, left out", name
+        )
+    return features
+
+
+def _polygons(area: Any) -> list[Polygon]:
+    found = []
+    for outer in area.outer_rings():
+        holes = [
+            [(n.lon, n.lat) for n in inner] for inner in area.inner_rings(outer)
+        ]
+        found.append(Polygon([(n.lon, n.lat) for n in outer], holes))
+    return found
+
+
+def is_told(tags: Tags, name: str) -> bool:
+    """Tells whether there is such a tag, and it is not `no`."""
+    return tags.get(name, "no") != "no"
+
+
+def is_building(tags: Tags) -> bool:
+    """Tells whether a building or a part of one is meant."""
+    return is_told(tags, "building") or is_told(tags, "building:part")
