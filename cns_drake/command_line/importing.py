@@ -61,6 +61,23 @@ def import_city(
             help="Of the buildings along roads that have none (OpenDRIVE).",
         ),
     ] = 0,
+    along: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="WAYPOINTS",
+            help="CSV file of a drive of your own, x and y in the map, in "
+            "place of the two that are proposed.",
+        ),
+    ] = None,
+    within: Annotated[
+        float | None,
+        typer.Option(
+            min=1.0,
+            metavar="METRES",
+            help="Leave out what lies farther from the drives than that, "
+            "where memory is short.",
+        ),
+    ] = None,
 ) -> None:
     """Make a map of a real city.
 
@@ -78,7 +95,9 @@ def import_city(
         raise InputError(f"give one file, not {' '.join(source)}")
     path = Path(paths[0])
     stages = tuple(sorted([*(years or ()), *more]))
-    options = ImportOptions(stages, year_attribute, undated, lod, seed)
+    options = ImportOptions(
+        stages, year_attribute, undated, lod, seed, along, within
+    )
     report = import_map.import_city(path, output, options, note)
     write_table(output, note)
     print_rows(_rows(report, options.years))

@@ -34,6 +34,7 @@ from cns_drake.imports.free_space import find_free_space, surface_samples
 from cns_drake.imports.import_ground import Ground, feet_of, guess_ground
 from cns_drake.imports.import_report import ImportOptions, ImportReport
 from cns_drake.imports.import_structures import import_cityjson
+from cns_drake.imports.near_drives import drive_along, keep_near
 from cns_drake.imports.opendrive.town import build_town
 from cns_drake.imports.opendrive.town_files import write_town
 from cns_drake.imports.openstreetmap import import_openstreetmap
@@ -71,6 +72,9 @@ def import_city(
     if is_roads and (options.years or options.lod is not None):
         option = "--years" if options.years else "--lod"
         raise InputError(f"{option}: {source} is a road network, without any")
+    if is_roads and (options.along or options.within is not None):
+        option = "--along" if options.along else "--within"
+        raise InputError(f"{option}: {source} is a road network, taken whole")
     if os.path.lexists(output):
         raise InputError(f"{output}: is there already")
     name = output.resolve().name
@@ -78,6 +82,7 @@ def import_city(
         raise InputError(
             f"--output: {name!r}: letters, digits and underscores only"
         )
+    own = None if options.along is None else [drive_along(options.along)]
     progress(f"reading {source}")
     if is_roads:
         town = build_town(source, options.seed, progress)
@@ -100,7 +105,18 @@ def import_city(
     progress(f"{len(kept)} structures; looking for streets")
     ground = _ground(kept)
     space = find_free_space(kept, ground)
-    drives = find_drives(space)
+    drives = own if own is not None else find_drives(space)
+    if options.within is not None:
+        if not drives:
+            raise InputError("--within: no drive was found, give one: --along")
+        kept = keep_near(kept, drives, options.within, city.faults)
+        if not kept:
+            raise InputError(
+                f"--within: nothing stands within {options.within:g} m of "
+                "the drives"
+            )
+        standing = [_standing(kept, k, options) for k in range(len(stages))]
+        ground = _ground(kept)
     bottom = _bottom(kept, ground)
     with _drafted(output) as draft:
         _write_world(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from cns_drake.imports.building_years import Undated
 
@@ -18,6 +19,9 @@ class ImportOptions:
         undated: what becomes of buildings without a year.
         lod: level of detail; the highest of each object if None.
         seed: of what is drawn where a file of roads has no buildings.
+        along: waypoints of a drive, in place of two that are proposed.
+        within: how far from the drives a structure may lie; anywhere if None
+            [m].
     """
 
     years: tuple[int, ...] = ()
@@ -25,6 +29,8 @@ class ImportOptions:
     undated: Undated = Undated.FIRST
     lod: float | None = None
     seed: int = 0
+    along: Path | None = None
+    within: float | None = None
 
 
 @dataclass(frozen=True)

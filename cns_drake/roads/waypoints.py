@@ -57,7 +57,7 @@ def load_waypoint_path(
             for a drive.
     """
     path = Path(path)
-    points, lines = _read(path)
+    points, lines = read_waypoints(path)
     return make_waypoint_path(
         points,
         spacing,
@@ -193,8 +193,12 @@ def _loop(place: np.ndarray, heading: float, turn: float) -> np.ndarray:
     )
 
 
-def _read(path: Path) -> tuple[np.ndarray, list[int]]:
-    """Returns the (N, 3) waypoints of a file and the lines they are on."""
+def read_waypoints(path: Path) -> tuple[np.ndarray, list[int]]:
+    """Returns the (N, 3) waypoints of a file and the lines they are on.
+
+    Raises:
+        InputError: naming file, line and fault.
+    """
     points, lines = [], []
     columns = None
     for line, cells in read_rows(path):

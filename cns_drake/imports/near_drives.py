@@ -1,0 +1,103 @@
+"""What stands near drives: all of a city that a LiDAR on them can see."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import shapely
+from shapely.geometry import MultiLineString
+from shapely.geometry.base import BaseGeometry
+
+from cns_drake.city.geometry.mesh import Mesh
+from cns_drake.city.geometry.structures import MeshShape
+from cns_drake.imports.drive_search import FreeDrive
+from cns_drake.imports.foreign_city import Imported
+from cns_drake.imports.import_faults import ImportFaults
+from cns_drake.motion.path_geometry import SmoothPath
+from cns_drake.motion.trajectory import POINT_SPACING
+from cns_drake.roads.u_turn import TIGHTEST_RADIUS
+from cns_drake.roads.waypoints import load_waypoint_path, read_waypoints
+from evaluation.support.errors import InputError
+
+
+def drive_along(path: Path) -> FreeDrive:
+    """Returns a drive along waypoints of a file; heights are left aside.
+
+    Raises:
+        InputError: if the file cannot be used, or a bend is too tight.
+    """
+    points, _ = read_waypoints(path)
+    driven = load_waypoint_path(path, POINT_SPACING)
+    smooth = SmoothPath(driven.points, driven.spacing)
+    radius, (x, y, _) = smooth.tightest_bend()
+    if radius < TIGHTEST_RADIUS:
+        raise InputError(
+            f"{path}: a bend of {radius:.2f} m radius at {x:.1f}, {y:.1f}, "
+            f"the car turns within {TIGHTEST_RADIUS:.2f} m at the tightest"
+        )
+    return FreeDrive(points[:, :2], driven.points[:, :2])
+
+
+def keep_near(
+    structures: Sequence[Imported],
+    drives: Sequence[FreeDrive],
+    distance: float,
+    faults: ImportFaults,
+) -> list[Imported]:
+    """Returns the structures, and of terrain the part, near drives.
+
+    Args:
+        structures: of the city.
+        drives: at least one.
+        distance: how far from them a structure's nearest corner, or the
+            bounding box of it, may lie [m].
+        faults: is told how many are left out.
+    """
+    ways = MultiLineString([drive.path for drive in drives])
+    shapely.prepare(ways)
+    kept = []
+    for one in structures:
+        corners = one.triangles.reshape(-1, 3)
+        if not _near(corners[None], ways, distance)[0]:
+            name = one.structure.name
+            faults.add("structure far from the drives, left out", name)
+        elif one.kind == "TINRelief":
+            kept.append(_cropped(one, ways, distance))
+        else:
+            kept.append(one)
+    return kept
+
+
+def _near(
+    things: np.ndarray, ways: BaseGeometry, distance: float
+) -> np.ndarray:
+    """Tells of M things of N corners (M, N, 3) whether their boxes are near."""
+    low, high = things[:, :, :2].min(axis=1), things[:, :, :2].max(axis=1)
+    boxes = shapely.box(*low.T, *high.T)
+    return np.asarray(shapely.dwithin(boxes, ways, distance))
+
+
+def _cropped(one: Imported, ways: BaseGeometry, distance: float) -> Imported:
+    """Returns the part of a terrain that is near, as it is."""
+    meshes = {}
+    for name, mesh in one.structure.model.meshes.items():
+        faces = mesh.triangles()
+        near = faces[_near(mesh.vertices[faces], ways, distance)]
+        used, index = np.unique(near, return_inverse=True)
+        corners = map(tuple, index.reshape(-1, 3).tolist())
+        meshes[name] = Mesh(mesh.vertices[used], tuple(corners))
+    model = one.structure.model
+    parts = tuple(
+        part
+        for part in model.parts
+        if isinstance(part.shape, MeshShape) and meshes[part.shape.mesh].faces
+    )
+    filled = {name: mesh for name, mesh in meshes.items() if mesh.faces}
+    structure = replace(
+        one.structure, model=replace(model, parts=parts, meshes=filled)
+    )
+    near = _near(one.triangles, ways, distance)
+    return replace(one, structure=structure, triangles=one.triangles[near])
