@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cns_drake.imports.building_years import Undated
+from cns_drake.imports.import_report import DriveOn, ImportOptions
 from evaluation.support.errors import InputError
 from evaluation.support.interrupts import uninterrupted
 from evaluation.support.terminal import note, print_rows
@@ -78,6 +79,13 @@ def import_city(
             "where memory is short.",
         ),
     ] = None,
+    drive_on: Annotated[
+        DriveOn | None,
+        typer.Option(
+            help="Side of the streets on which cars drive; the right if "
+            "neither this nor OpenStreetMap tells.",
+        ),
+    ] = None,
 ) -> None:
     """Make a map of a real city.
 
@@ -85,7 +93,6 @@ def import_city(
     """
     with uninterrupted():
         from cns_drake.imports import import_map
-        from cns_drake.imports.import_report import ImportOptions
         from cns_drake.scenarios.sequence_table import write_table
 
     # The years that follow the first of --years come as arguments.
@@ -96,7 +103,7 @@ def import_city(
     path = Path(paths[0])
     stages = tuple(sorted([*(years or ()), *more]))
     options = ImportOptions(
-        stages, year_attribute, undated, lod, seed, along, within
+        stages, year_attribute, undated, lod, seed, along, within, drive_on
     )
     report = import_map.import_city(path, output, options, note)
     write_table(output, note)

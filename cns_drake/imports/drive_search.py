@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise, product
 
@@ -24,13 +24,13 @@ _COMFORT = 6.0
 # How much of the clearance the car that follows a path may lose [m].
 _SLACK = 0.6
 # No drive is longer, and none shorter [m].
-_LONGEST = 1500.0
+LONGEST = 1500.0
 _SHORTEST = 80.0
 # What the second drive has to itself at either end, at least [m].
-_SHORTEST_ARM = 30.0
+SHORTEST_ARM = 30.0
 # The part of the first drive that the second shares.
 _SHARED = (0.25, 0.75)
-_LEAST_SHARED = 0.15
+LEAST_SHARED = 0.15
 # The rest of it is left by so much [m].
 _APART = 10.0
 # Between waypoints at most, for the height; and from corners at least [m].
@@ -122,11 +122,11 @@ def find_drives(space: FreeSpace) -> list[FreeDrive]:
     start = int((part == np.bincount(part).argmax()).argmax())
     end = int(graph.farthest(graph.links, start)[-1])
     cells = _shortened(graph, graph.farthest(graph.links, end))
-    first = _drive(graph.xy[cells], space)
+    first = make_drive(graph.xy[cells], space)
     if first is None:
         return []
     for candidate in _seconds(graph, cells):
-        second = _drive(graph.xy[candidate], space)
+        second = make_drive(graph.xy[candidate], space)
         if second is not None:
             return [first, second]
     return [first]
@@ -138,7 +138,7 @@ def _travelled(xy: np.ndarray) -> np.ndarray:
 
 
 def _shortened(graph: _Graph, cells: np.ndarray) -> np.ndarray:
-    return cells[_travelled(graph.xy[cells]) <= _LONGEST]
+    return cells[_travelled(graph.xy[cells]) <= LONGEST]
 
 
 def _seconds(graph: _Graph, cells: np.ndarray) -> Iterator[np.ndarray]:
@@ -159,7 +159,7 @@ def _seconds(graph: _Graph, cells: np.ndarray) -> Iterator[np.ndarray]:
                 continue
             begin = first if k is None else k
             end = last if m is None else m
-            if along[end] - along[begin] < _LEAST_SHARED * along[-1]:
+            if along[end] - along[begin] < LEAST_SHARED * along[-1]:
                 continue
             parts = [head[:0:-1], cells[begin : end + 1], tail[1:]]
             yield _shortened(graph, np.concatenate(parts))
@@ -175,14 +175,24 @@ def _away(
     closed = np.isfinite(from_drive) & (here > 1.5 * _APART)
     path = graph.farthest(graph.without(closed), int(cells[k]))
     length = _travelled(graph.xy[path])[-1]
-    if length < _SHORTEST_ARM:
+    if length < SHORTEST_ARM:
         return None
-    return path[_travelled(graph.xy[path]) <= _LONGEST / 3]
+    return path[_travelled(graph.xy[path]) <= LONGEST / 3]
 
 
-def _drive(xy: np.ndarray, space: FreeSpace) -> FreeDrive | None:
-    """Returns a drive along cells, with as few waypoints as there is room."""
-    for straightened, tolerance in product(_STRAIGHTENED, _SIMPLIFICATIONS):
+def make_drive(
+    xy: np.ndarray,
+    space: FreeSpace,
+    tolerances: Sequence[float] = _SIMPLIFICATIONS,
+) -> FreeDrive | None:
+    """Returns a drive with as few waypoints as there is room, or None.
+
+    Args:
+        xy: (N, 2) places that it is to pass, about 1 m apart [m].
+        space: where a car has room.
+        tolerances: by how much its waypoints may leave them, as tried [m].
+    """
+    for straightened, tolerance in product(_STRAIGHTENED, tolerances):
         if len(xy) < 4 * straightened:
             return None
         kernel = np.ones(straightened) / straightened

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,7 @@ from cns_drake.city.geometry.structures import (
     Structure,
 )
 from cns_drake.imports.import_faults import ImportFaults
+from cns_drake.imports.street_lanes import Street
 
 Rgb = tuple[float, float, float]
 
@@ -63,12 +64,16 @@ class ForeignCity:
             latitude and longitude [deg].
         reference_system: of the origin, as the file names it.
         faults: what was repaired or left out.
+        streets: whose lanes are known; drives are looked for in them.
+        keeps_left: whether the file says that traffic does.
     """
 
     structures: list[Imported]
     origin: tuple[float, ...]
     reference_system: str
     faults: ImportFaults
+    streets: Sequence[Street] = ()
+    keeps_left: bool = False
 
 
 def make_imported(

@@ -28,17 +28,22 @@ from cns_drake.city.geometry.structures import (
 )
 from cns_drake.imports.building_years import stage_names, stands_at
 from cns_drake.imports.drive_files import write_drives
-from cns_drake.imports.drive_search import find_drives
+from cns_drake.imports.drive_search import FreeDrive, find_drives
 from cns_drake.imports.foreign_city import ForeignCity, Imported
-from cns_drake.imports.free_space import find_free_space, surface_samples
+from cns_drake.imports.free_space import (
+    FreeSpace,
+    find_free_space,
+    surface_samples,
+)
 from cns_drake.imports.import_ground import Ground, feet_of, guess_ground
-from cns_drake.imports.import_report import ImportOptions, ImportReport
+from cns_drake.imports.import_report import DriveOn, ImportOptions, ImportReport
 from cns_drake.imports.import_structures import import_cityjson
 from cns_drake.imports.near_drives import drive_along, keep_near
 from cns_drake.imports.opendrive.town import build_town
 from cns_drake.imports.opendrive.town_files import write_town
 from cns_drake.imports.openstreetmap import import_openstreetmap
 from cns_drake.imports.overview import draw_overview
+from cns_drake.imports.street_drives import find_street_drives
 from evaluation.support.errors import InputError
 from evaluation.support.files import part_path, user_errors
 
@@ -105,7 +110,9 @@ def import_city(
     progress(f"{len(kept)} structures; looking for streets")
     ground = _ground(kept)
     space = find_free_space(kept, ground)
-    drives = own if own is not None else find_drives(space)
+    drives = own
+    if drives is None:
+        drives = _find_drives(city, space, options)
     if options.within is not None:
         if not drives:
             raise InputError("--within: no drive was found, give one: --along")
@@ -179,6 +186,16 @@ def _read(source: Path, options: ImportOptions) -> ForeignCity:
     if options.lod is not None:
         raise InputError(f"--lod: {source} has no levels of detail")
     return import_openstreetmap(source, options.year_attribute)
+
+
+def _find_drives(
+    city: ForeignCity, space: FreeSpace, options: ImportOptions
+) -> list[FreeDrive]:
+    """Returns drives in the lanes of streets, or else in free space."""
+    side = options.drive_on
+    if side is None:
+        side = DriveOn.LEFT if city.keeps_left else DriveOn.RIGHT
+    return find_street_drives(city.streets, space, side) or find_drives(space)
 
 
 def _has_years(one: Imported) -> bool:

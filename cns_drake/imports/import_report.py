@@ -3,9 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
 
 from cns_drake.imports.building_years import Undated
+
+
+class DriveOn(str, Enum):
+    """The side of a street on which cars drive."""
+
+    RIGHT = "right"
+    LEFT = "left"
 
 
 @dataclass(frozen=True)
@@ -20,6 +28,8 @@ class ImportOptions:
         lod: level of detail; the highest of each object if None.
         seed: of what is drawn where a file of roads has no buildings.
         along: waypoints of a drive, in place of two that are proposed.
+        drive_on: side of the streets; that which the file tells, or the
+            right, if None.
         within: how far from the drives a structure may lie; anywhere if None
             [m].
     """
@@ -31,6 +41,7 @@ class ImportOptions:
     seed: int = 0
     along: Path | None = None
     within: float | None = None
+    drive_on: DriveOn | None = None
 
 
 @dataclass(frozen=True)

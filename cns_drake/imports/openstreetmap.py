@@ -6,15 +6,11 @@ Heights above the sea are not in it: the ground is level.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-import math
 from pathlib import Path
 
 import numpy as np
-import shapely
 from shapely.geometry import LineString, Point, Polygon
-from shapely.geometry.base import BaseGeometry
 from shapely.strtree import STRtree
-from shapely.validation import make_valid
 
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.plants.vegetation import tree
@@ -29,19 +25,23 @@ from cns_drake.imports.foreign_city import (
     make_imported,
 )
 from cns_drake.imports.import_faults import ImportFaults
+from cns_drake.imports.osm_places import Local, parts_of, sound_parts
 from cns_drake.imports.osm_reading import (
+    OsmWay,
     Tags,
     is_building,
     is_told,
     read_openstreetmap,
 )
+from cns_drake.imports.osm_streets import (
+    crossing_stripes,
+    drivable_streets,
+    street_surfaces,
+)
 from cns_drake.imports.osm_tags import (
     area_kind,
     heights,
     length,
-    path_width,
-    sidewalk_sides,
-    street_width,
 )
 from evaluation.support.errors import InputError
 
@@ -72,7 +72,7 @@ def import_openstreetmap(path: Path, year_attribute: str | None) -> ForeignCity:
     bounds = np.array([p.bounds for _, _, ps in buildings for p in ps])
     low, high = bounds[:, :2].min(axis=0), bounds[:, 2:].max(axis=0)
     longitude, latitude = np.round((low + high) / 2.0, 6).tolist()
-    local = _Local(longitude, latitude)
+    local = Local(longitude, latitude)
     size = local(np.array([high]))[0] - local(np.array([low]))[0]
     if size.max() > _LARGEST:
         raise InputError(
@@ -81,59 +81,28 @@ def import_openstreetmap(path: Path, year_attribute: str | None) -> ForeignCity:
         )
     found = [
         *_buildings(buildings, local, year_attribute, faults),
-        *_streets(features.ways, local, faults),
+        *street_surfaces(features.ways, local, faults),
+        *crossing_stripes(features.crossings, features.ways, local, faults),
         *_lands(features.areas, local, faults),
         *_barriers(features.ways, local, faults),
         *_trees(features.trees, local),
     ]
-    return ForeignCity(found, (latitude, longitude), "WGS 84", faults)
-
-
-class _Local:
-    """Places in metres east and north of an origin.
-
-    By the Earth's radii of curvature there: right to 1 in 10,000 within
-    10 km.
-    """
-
-    def __init__(self, longitude: float, latitude: float):
-        e2 = _FLATTENING * (2.0 - _FLATTENING)
-        s = math.sin(math.radians(latitude))
-        w2 = 1.0 - e2 * s * s
-        north = _SEMI_MAJOR * (1.0 - e2) / w2**1.5
-        east = _SEMI_MAJOR / math.sqrt(w2) * math.cos(math.radians(latitude))
-        self._origin = np.array([longitude, latitude])
-        self._metres = np.radians(1.0) * np.array([east, north])
-
-    def __call__(self, places: np.ndarray) -> np.ndarray:
-        return (places - self._origin) * self._metres
-
-    def polygon(self, polygon: Polygon) -> Polygon:
-        return shapely.transform(polygon, self)
-
-
-def _parts(geometry: BaseGeometry) -> Iterator[Polygon]:
-    """Yields the polygons of a geometry that has any."""
-    if isinstance(geometry, Polygon):
-        if geometry.area > _LEAST_AREA:
-            yield geometry
-        return
-    for one in getattr(geometry, "geoms", ()):
-        yield from _parts(one)
-
-
-def _sound(polygon: Polygon, name: str, faults: ImportFaults) -> list[Polygon]:
-    """Returns what a polygon is made of, in whole millimetres."""
-    geometry: BaseGeometry = polygon
-    if not polygon.is_valid:
-        faults.add("outline that crosses itself, repaired", name)
-        geometry = make_valid(polygon)
-    return list(_parts(shapely.set_precision(geometry, 0.001)))
+    return ForeignCity(
+        found,
+        (latitude, longitude),
+        "WGS 84",
+        faults,
+        drivable_streets(features.ways, local),
+        any(
+            tags.get("driving_side") == "left"
+            for _, tags, _, _ in features.ways
+        ),
+    )
 
 
 def _buildings(
     told: Iterable[tuple[str, Tags, list[Polygon]]],
-    local: _Local,
+    local: Local,
     year_attribute: str | None,
     faults: ImportFaults,
 ) -> Iterator[Imported]:
@@ -142,7 +111,7 @@ def _buildings(
     parts: list[tuple[str, Tags, Polygon]] = []
     for name, tags, polygons in told:
         for polygon in polygons:
-            for one in _sound(local.polygon(polygon), name, faults):
+            for one in sound_parts(local.polygon(polygon), name, faults):
                 group = parts if is_told(tags, "building:part") else outlines
                 group.append((name, tags, one))
     of_outline: dict[int, list[tuple[str, Tags, Polygon]]] = {}
@@ -189,56 +158,9 @@ def _buildings(
         )
 
 
-def _streets(
-    ways: Iterable[tuple[str, Tags, np.ndarray]],
-    local: _Local,
-    faults: ImportFaults,
-) -> Iterator[Imported]:
-    roads: list[tuple[str, BaseGeometry]] = []
-    walks: list[tuple[str, BaseGeometry]] = []
-    for name, tags, line in ways:
-        if is_told(tags, "tunnel") or is_told(tags, "area"):
-            continue
-        width, narrow = street_width(tags), path_width(tags)
-        if width is None and narrow is None:
-            continue
-        course = LineString(local(line))
-        if width is None:
-            walks.append((name, course.buffer((narrow or 0.0) / 2.0, 4)))
-            continue
-        if is_told(tags, "bridge"):
-            faults.add("bridge, laid on the ground", name)
-        roads.append((name, course.buffer(width / 2.0, 4)))
-        for side, has in zip((1.0, -1.0), sidewalk_sides(tags), strict=True):
-            if has:
-                reach = side * (width / 2.0 + _SIDEWALK)
-                strip = course.buffer(reach, single_sided=True)
-                walks.append((f"{name}_{'lr'[side < 0]}", strip))
-    paved = shapely.union_all([area for _, area in roads])
-    for names, areas, semantic_class, z in (
-        ("road", roads, "road", 0.0),
-        ("walk", walks, "sidewalk", _KERB),
-    ):
-        for name, area in areas:
-            is_road = semantic_class == "road"
-            surface = [
-                flat_surface(polygon, z, name, faults)
-                for part in _parts(area if is_road else area.difference(paved))
-                for polygon in _sound(part, name, faults)
-            ]
-            if surface:
-                yield make_imported(
-                    f"{names}_{name}",
-                    semantic_class,
-                    "Road" if is_road else "Sidewalk",
-                    {"surface": np.concatenate(surface)},
-                    {},
-                )
-
-
 def _lands(
     areas: Iterable[tuple[str, Tags, list[Polygon]]],
-    local: _Local,
+    local: Local,
     faults: ImportFaults,
 ) -> Iterator[Imported]:
     for name, tags, polygons in areas:
@@ -249,7 +171,7 @@ def _lands(
         surface = [
             flat_surface(one, -0.05, name, faults)
             for polygon in polygons
-            for one in _sound(local.polygon(polygon), name, faults)
+            for one in sound_parts(local.polygon(polygon), name, faults)
         ]
         if surface:
             colours = {"WaterBody": WATER, "LandUse": LAWN}
@@ -263,11 +185,11 @@ def _lands(
 
 
 def _barriers(
-    ways: Iterable[tuple[str, Tags, np.ndarray]],
-    local: _Local,
+    ways: Iterable[OsmWay],
+    local: Local,
     faults: ImportFaults,
 ) -> Iterator[Imported]:
-    for name, tags, line in ways:
+    for name, tags, line, _ in ways:
         kind = tags.get("barrier")
         if kind == "hedge":
             (width, usual), semantic_class = _HEDGE, "vegetation"
@@ -279,8 +201,8 @@ def _barriers(
         strip = LineString(local(line)).buffer(width / 2.0, cap_style="flat")
         solids = [
             np.concatenate(extruded(polygon, 0.0, high, name, faults))
-            for part in _parts(strip)
-            for polygon in _sound(part, name, faults)
+            for part in parts_of(strip)
+            for polygon in sound_parts(part, name, faults)
         ]
         if solids:
             yield make_imported(
@@ -293,7 +215,7 @@ def _barriers(
 
 
 def _trees(
-    told: Iterable[tuple[str, Tags, tuple[float, float]]], local: _Local
+    told: Iterable[tuple[str, Tags, tuple[float, float]]], local: Local
 ) -> Iterator[Imported]:
     for name, tags, place in told:
         x, y = local(np.array([place]))[0].tolist()

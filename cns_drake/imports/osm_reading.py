@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from shapely.geometry import Polygon
@@ -17,22 +17,33 @@ from evaluation.support.files import check_regular
 Tags = Mapping[str, str]
 
 
+class OsmWay(NamedTuple):
+    """A way: its id, tags, places [deg] and the numbers of its nodes."""
+
+    name: str
+    tags: Tags
+    line: np.ndarray
+    nodes: tuple[int, ...]
+
+
 @dataclass
 class OsmFeatures:
     """What a file holds, places as longitude and latitude [deg].
 
     Attributes:
         areas: id, tags and polygons.
-        ways: id, tags and line.
+        ways: with all of their places that are in the file.
         trees: id, tags and place.
+        crossings: number of the node, and tags.
         faults: what could not be read.
     """
 
     areas: list[tuple[str, Tags, list[Polygon]]] = field(default_factory=list)
-    ways: list[tuple[str, Tags, np.ndarray]] = field(default_factory=list)
+    ways: list[OsmWay] = field(default_factory=list)
     trees: list[tuple[str, Tags, tuple[float, float]]] = field(
         default_factory=list
     )
+    crossings: list[tuple[int, Tags]] = field(default_factory=list)
     faults: ImportFaults = field(default_factory=ImportFaults)
 
 
@@ -61,26 +72,27 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
                 name = f"w{one.id}"
                 if is_building(tags):
                     told[name] = None
-                line = [(n.lon, n.lat) for n in one.nodes if n.location.valid()]
-                missing = len(one.nodes) - len(line)
+                nodes = [n for n in one.nodes if n.location.valid()]
+                missing = len(one.nodes) - len(nodes)
                 if missing and "highway" in tags:
                     features.faults.add(
                         "place of a way that is not in the file, left out",
                         name,
                         missing,
                     )
-                if len(line) > 1:
-                    features.ways.append((name, tags, np.array(line)))
+                if len(nodes) > 1:
+                    line = np.array([(n.lon, n.lat) for n in nodes])
+                    numbers = tuple(n.ref for n in nodes)
+                    features.ways.append(OsmWay(name, tags, line, numbers))
             elif isinstance(one, osmium.osm.Relation):
                 if tags.get("type") == "multipolygon" and is_building(tags):
                     told[f"r{one.id}"] = None
-            elif (
-                isinstance(one, osmium.osm.Node)
-                and tags.get("natural") == "tree"
-                and one.location.valid()
-            ):
-                place = (one.lon, one.lat)
-                features.trees.append((f"n{one.id}", tags, place))
+            elif isinstance(one, osmium.osm.Node) and one.location.valid():
+                if tags.get("natural") == "tree":
+                    place = (one.lon, one.lat)
+                    features.trees.append((f"n{one.id}", tags, place))
+                elif tags.get("highway") == "crossing":
+                    features.crossings.append((one.id, tags))
     except (
         RuntimeError,
         ValueError,

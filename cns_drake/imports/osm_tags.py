@@ -10,6 +10,8 @@ import re
 
 STOREY = 3.0  # [m]
 LANE = 3.0  # [m]
+# Two cars pass each other from this width on [m].
+_TWO_CARS = 5.0
 # Levels of buildings that tell neither height nor levels.
 _USUAL_LEVELS = {
     "garage": 1,
@@ -104,8 +106,53 @@ def street_width(tags: Mapping[str, str]) -> float | None:
     if lanes:
         return LANE * lanes + 0.5
     usual = _STREETS[kind]
-    is_one_way = tags.get("oneway") in ("yes", "-1", "1")
+    is_one_way = not all(driven_ways(tags))
     return max(0.6 * usual, 3.5) if is_one_way else usual
+
+
+def driven_ways(tags: Mapping[str, str]) -> tuple[bool, bool]:
+    """Returns whether cars may drive along a street's line, and against it."""
+    if any(
+        tags.get(key) in ("no", "private", "bus", "agricultural")
+        for key in ("motor_vehicle", "motorcar", "vehicle")
+    ) or tags.get("access") in ("no", "private"):
+        return False, False
+    one_way = tags.get("oneway", "")
+    if one_way in ("-1", "reverse"):
+        return False, True
+    kind = tags.get("highway", "")
+    is_round = tags.get("junction") in ("roundabout", "circular")
+    usual = is_round or kind in ("motorway", "motorway_link")
+    if one_way in ("yes", "1", "true") or (usual and one_way != "no"):
+        return True, False
+    return True, True
+
+
+def lanes_beside(tags: Mapping[str, str], width: float) -> float:
+    """Returns how far the outermost lane lies from a street's middle [m].
+
+    Args:
+        tags: of the street.
+        width: of its carriageway [m].
+    """
+    lanes = length(tags.get("lanes"))
+    if not lanes:
+        lanes = 2.0 if all(driven_ways(tags)) else 1.0
+    # Where two cars cannot pass, both keep to the middle.
+    if width < _TWO_CARS and all(driven_ways(tags)):
+        return 0.0
+    return width / 2.0 * (1.0 - 1.0 / max(lanes, 1.0))
+
+
+def is_marked(tags: Mapping[str, str]) -> bool:
+    """Tells whether a crossing has stripes."""
+    markings = tags.get("crossing:markings")
+    if markings is not None:
+        return markings.startswith("zebra") or markings == "yes"
+    return (
+        tags.get("crossing") in ("zebra", "marked", "uncontrolled")
+        or tags.get("crossing_ref") == "zebra"
+    )
 
 
 def path_width(tags: Mapping[str, str]) -> float | None:

@@ -30,6 +30,9 @@ class OsmWriter:
         nodes = [self.node(*point) for point in points]
         if closed:
             nodes.append(nodes[0])
+        return self.way_of(nodes, **tags)
+
+    def way_of(self, nodes, **tags):
         number = self._number()
         refs = "".join(f'<nd ref="{node}"/>' for node in nodes)
         self.rows.append(

@@ -1,0 +1,147 @@
+"""Streets of OpenStreetMap: what they look like, and who may drive where."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from cns_drake.imports.extrusions import flat_surface
+from cns_drake.imports.foreign_city import Imported, make_imported
+from cns_drake.imports.import_faults import ImportFaults
+from cns_drake.imports.osm_places import Local, parts_of, sound_parts
+from cns_drake.imports.osm_reading import OsmWay, Tags, is_told
+from cns_drake.imports.osm_tags import (
+    driven_ways,
+    is_marked,
+    lanes_beside,
+    path_width,
+    sidewalk_sides,
+    street_width,
+)
+from cns_drake.imports.street_lanes import Street
+
+_SIDEWALK = 2.0
+_KERB = 0.12
+_WHITE = (0.86, 0.86, 0.84)
+# Stripes of a zebra crossing, and the gaps between them [m].
+_STRIPE, _STRIPE_LENGTH, _STRIPE_HEIGHT = 0.5, 3.0, 0.01
+
+
+def street_surfaces(
+    ways: Iterable[OsmWay], local: Local, faults: ImportFaults
+) -> Iterator[Imported]:
+    """Yields carriageways, and the sidewalks and paths beside them."""
+    roads: list[tuple[str, BaseGeometry]] = []
+    walks: list[tuple[str, BaseGeometry]] = []
+    for name, tags, line, _ in ways:
+        if is_told(tags, "tunnel") or is_told(tags, "area"):
+            continue
+        width, narrow = street_width(tags), path_width(tags)
+        if width is None and narrow is None:
+            continue
+        course = LineString(local(line))
+        if width is None:
+            walks.append((name, course.buffer((narrow or 0.0) / 2.0, 4)))
+            continue
+        if is_told(tags, "bridge"):
+            faults.add("bridge, laid on the ground", name)
+        roads.append((name, course.buffer(width / 2.0, 4)))
+        for side, has in zip((1.0, -1.0), sidewalk_sides(tags), strict=True):
+            if has:
+                reach = side * (width / 2.0 + _SIDEWALK)
+                strip = course.buffer(reach, single_sided=True)
+                walks.append((f"{name}_{'lr'[side < 0]}", strip))
+    paved = shapely.union_all([area for _, area in roads])
+    for names, areas, semantic_class, z in (
+        ("road", roads, "road", 0.0),
+        ("walk", walks, "sidewalk", _KERB),
+    ):
+        for name, area in areas:
+            is_road = semantic_class == "road"
+            surface = [
+                flat_surface(polygon, z, name, faults)
+                for part in parts_of(
+                    area if is_road else area.difference(paved)
+                )
+                for polygon in sound_parts(part, name, faults)
+            ]
+            if surface:
+                yield make_imported(
+                    f"{names}_{name}",
+                    semantic_class,
+                    "Road" if is_road else "Sidewalk",
+                    {"surface": np.concatenate(surface)},
+                    {},
+                )
+
+
+def drivable_streets(ways: Iterable[OsmWay], local: Local) -> list[Street]:
+    """Returns the streets that a car may drive, and where they meet."""
+    streets = []
+    for _, tags, line, nodes in ways:
+        width = street_width(tags)
+        if width is None or is_told(tags, "tunnel") or is_told(tags, "area"):
+            continue
+        forward, backward = driven_ways(tags)
+        if forward or backward:
+            beside = lanes_beside(tags, width)
+            streets.append(
+                Street(local(line), nodes, forward, backward, beside)
+            )
+    return streets
+
+
+def crossing_stripes(
+    crossings: Iterable[tuple[int, Tags]],
+    ways: Iterable[OsmWay],
+    local: Local,
+    faults: ImportFaults,
+) -> Iterator[Imported]:
+    """Yields the stripes of zebra crossings, a little above their street."""
+    marked = {number for number, tags in crossings if is_marked(tags)}
+    for _, tags, line, nodes in ways:
+        width = street_width(tags)
+        if width is None or is_told(tags, "tunnel"):
+            continue
+        for k, number in enumerate(nodes):
+            if number not in marked:
+                continue
+            marked.remove(number)
+            places = local(line)
+            along = places[min(k + 1, len(nodes) - 1)] - places[max(k - 1, 0)]
+            if not along.any():
+                continue
+            stripes = _stripes(places[k], along / np.hypot(*along), width)
+            name = f"n{number}"
+            surface = [
+                flat_surface(s, _STRIPE_HEIGHT, name, faults) for s in stripes
+            ]
+            yield make_imported(
+                f"crossing_{name}",
+                "road",
+                "Crossing",
+                {"stripes": np.concatenate(surface)},
+                {"stripes": _WHITE},
+            )
+
+
+def _stripes(
+    place: np.ndarray, along: np.ndarray, width: float
+) -> list[Polygon]:
+    """Returns the stripes across a street about a place, as they lie."""
+    left = np.array([-along[1], along[0]])
+    count = max(1, int((width - _STRIPE) / (2 * _STRIPE)))
+    middles = (np.arange(count) - (count - 1) / 2) * 2 * _STRIPE
+    corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) / 2
+    return [
+        Polygon(
+            place
+            + np.outer(corners[:, 0] * _STRIPE_LENGTH, along)
+            + np.outer(corners[:, 1] * _STRIPE + middle, left)
+        )
+        for middle in middles
+    ]

@@ -1,0 +1,239 @@
+"""Drives in the lanes of streets: sides, one-way streets, overlap, stripes."""
+
+import numpy as np
+import pytest
+from shapely.geometry import LineString, Point
+from small_osm import OsmWriter
+
+from cns_drake.imports.import_map import import_city
+from cns_drake.imports.import_report import DriveOn, ImportOptions
+from cns_drake.imports.openstreetmap import import_openstreetmap
+from cns_drake.imports.osm_tags import driven_ways, is_marked, lanes_beside
+from cns_drake.imports.street_lanes import LaneGraph, Street, make_lanes
+from cns_drake.scenarios.planning import plan_drive
+from cns_drake.scenarios.scenario import load_scenario
+
+STEP = 90.0
+WIDTH = 8.0
+
+
+def write_grid(path, one_way=(), columns=4, rows=3, **extra):
+    """Streets on a grid; those named, "x0" or "y2", are one-way.
+
+    Returns the way's tags and line, by name.
+    """
+    osm = OsmWriter()
+    low = -np.array([columns - 1, rows - 1]) * STEP / 2
+    node = {
+        (k, m): osm.node(low[0] + STEP * k, low[1] + STEP * m)
+        for k in range(columns)
+        for m in range(rows)
+    }
+    streets = {}
+    for name, places in {
+        **{f"x{k}": [(k, m) for m in range(rows)] for k in range(columns)},
+        **{f"y{m}": [(k, m) for k in range(columns)] for m in range(rows)},
+    }.items():
+        tags = {"highway": "residential", "width": str(WIDTH), **extra}
+        if name in one_way:
+            tags["oneway"] = one_way[name]
+        osm.way_of([node[place] for place in places], **tags)
+        streets[name] = (
+            tags.get("oneway"),
+            LineString([low + STEP * np.array(place) for place in places]),
+        )
+    # All around the origin: the map's is the middle of all buildings.
+    for k, m in ((0, 0), (columns - 2, rows - 2)):
+        x, y = low + STEP * (np.array([k, m]) + 0.5)
+        osm.box(x - 15, y - 15, 30, 30, building="yes")
+    osm.write(path)
+    return streets
+
+
+def drives_of(folder):
+    """Returns the places (N, 2) of both drives, and their directions."""
+    for name in ("sequence_01", "other_01"):
+        trajectory = plan_drive(load_scenario(folder / f"{name}.yaml"))
+        times = np.arange(0.0, trajectory.duration, 0.1)
+        jet = trajectory.path.evaluate(trajectory.path_parameter(times)[0])
+        yield jet.p[:, :2], np.column_stack([np.cos(jet.yaw), np.sin(jet.yaw)])
+
+
+@pytest.mark.parametrize("side", list(DriveOn))
+@pytest.mark.parametrize(
+    "one_way",
+    [
+        {},
+        {"y0": "yes", "y1": "-1", "y2": "yes", "x0": "yes", "x2": "-1"},
+        {f"x{k}": ("yes", "-1")[k % 2] for k in range(4)},
+    ],
+)
+def test_drives_keep_to_their_lanes(tmp_path, one_way, side):
+    streets = write_grid(tmp_path / "city.osm", one_way)
+    options = ImportOptions(drive_on=side)
+    report = import_city(tmp_path / "city.osm", tmp_path / "town", options)
+    assert len(report.drives) == 2
+    assert min(report.drives) > 150.0
+    checked = 0
+    for places, directions in drives_of(tmp_path / "town"):
+        assert LineString(places).is_simple
+        for place, direction in zip(places, directions, strict=True):
+            near = sorted(
+                (line.distance(Point(place)), name)
+                for name, (_, line) in streets.items()
+            )
+            # Away from the junctions.
+            if near[1][0] < 26.0:
+                continue
+            way, line = streets[near[0][1]]
+            ends = np.diff(np.array(line.coords)[[0, -1]], axis=0)[0]
+            along = ends / np.linalg.norm(ends)
+            foot = line.interpolate(line.project(Point(place)))
+            off = place - (foot.x, foot.y)
+            right = off @ (direction[1], -direction[0])
+            assert abs(direction @ along) > 0.97
+            if way is None:
+                expected = WIDTH / 4 * (1 if side is DriveOn.RIGHT else -1)
+            else:
+                expected = 0.0
+                assert (direction @ along > 0) == (way == "yes")
+            assert right == pytest.approx(expected, abs=0.3)
+            checked += 1
+    assert checked > 100
+
+
+def test_drives_share_a_part(tmp_path):
+    write_grid(tmp_path / "city.osm")
+    import_city(tmp_path / "city.osm", tmp_path / "town", ImportOptions())
+    a, b = (LineString(places) for places, _ in drives_of(tmp_path / "town"))
+    shared = a.intersection(b.buffer(1.0)).length
+    assert 0.1 < shared / a.length < 0.9
+    assert a.difference(b.buffer(15.0)).length > 20.0
+    assert b.difference(a.buffer(15.0)).length > 20.0
+
+
+def test_the_file_may_tell_the_side(tmp_path):
+    write_grid(tmp_path / "city.osm", driving_side="left")
+    assert import_openstreetmap(tmp_path / "city.osm", None).keeps_left
+    write_grid(tmp_path / "city.osm")
+    assert not import_openstreetmap(tmp_path / "city.osm", None).keeps_left
+
+
+def street(points, nodes, forward=True, backward=True, aside=1.5):
+    line = np.array(points, dtype=float)
+    return Street(line, tuple(nodes), forward, backward, aside)
+
+
+def test_lanes_are_cut_where_streets_meet():
+    streets = [
+        street([(0, 0), (10, 0), (20, 0), (30, 0)], [1, 2, 3, 4]),
+        street([(20, 20), (20, 0)], [5, 3], backward=False),
+    ]
+    lanes = make_lanes(streets)
+    ends = sorted((lane.begin, lane.end, lane.length) for lane in lanes)
+    assert ends == [
+        (1, 3, 20.0), (3, 1, 20.0), (3, 4, 10.0), (4, 3, 10.0), (5, 3, 20.0),
+    ]  # fmt: skip
+    graph = LaneGraph(lanes)
+    leads = {
+        (lanes[a].begin, lanes[a].end, lanes[b].end)
+        for a, b in zip(graph.rows, graph.columns, strict=True)
+    }
+    # Nobody turns round, nor into the one-way street.
+    assert leads == {(1, 3, 4), (4, 3, 1), (5, 3, 1), (5, 3, 4)}
+
+
+def test_a_roundabout_is_driven_one_way():
+    angle = np.linspace(0, 2 * np.pi, 9)
+    ring = 15 * np.column_stack([np.cos(angle), np.sin(angle)])
+    nodes = [*range(10, 18), 10]
+    tags = {"highway": "residential", "junction": "roundabout"}
+    forward, backward = driven_ways(tags)
+    lanes = make_lanes(
+        [
+            street(ring, nodes, forward, backward),
+            street([(-60, 0), (-15, 0)], [1, 14]),
+            street([(15, 0), (60, 0)], [10, 2]),
+        ]
+    )
+    graph = LaneGraph(lanes)
+    (start,) = (k for k, lane in enumerate(lanes) if lane.begin == 1)
+    after = {
+        (lanes[k].begin, lanes[k].end)
+        for a, k in zip(graph.rows, graph.columns, strict=True)
+        if a == start
+    }
+    # From the west on to the east by the south: counter-clockwise.
+    assert after == {(14, 10)}
+    (part,) = (lane for lane in lanes if (lane.begin, lane.end) == (14, 10))
+    assert part.line[:, 1].min() < -10.0
+
+
+@pytest.mark.parametrize(
+    ("tags", "expected"),
+    [
+        ({}, (True, True)),
+        ({"oneway": "yes"}, (True, False)),
+        ({"oneway": "-1"}, (False, True)),
+        ({"oneway": "no", "junction": "roundabout"}, (True, True)),
+        ({"junction": "roundabout"}, (True, False)),
+        ({"highway": "motorway"}, (True, False)),
+        ({"access": "private"}, (False, False)),
+        ({"motor_vehicle": "no", "oneway": "yes"}, (False, False)),
+    ],
+)
+def test_who_may_drive_where(tags, expected):
+    assert driven_ways(tags) == expected
+
+
+@pytest.mark.parametrize(
+    ("tags", "width", "expected"),
+    [
+        ({}, 8.0, 2.0),
+        ({}, 4.5, 0.0),
+        ({"lanes": "4"}, 12.0, 4.5),
+        ({"oneway": "yes"}, 4.0, 0.0),
+        ({"oneway": "yes", "lanes": "2"}, 6.0, 1.5),
+        ({"lanes": "1"}, 6.0, 0.0),
+    ],
+)
+def test_where_the_outermost_lane_lies(tags, width, expected):
+    assert lanes_beside(tags, width) == pytest.approx(expected)
+
+
+def test_zebra_crossings_have_stripes(tmp_path):
+    osm = OsmWriter()
+    osm.box(-5, 20, 10, 10, building="yes")
+    nodes = [
+        osm.node(-40, 0),
+        osm.node(0, 0, highway="crossing", crossing="zebra"),
+        osm.node(20, 0, highway="crossing", crossing="unmarked"),
+        osm.node(40, 0),
+    ]
+    osm.way_of(nodes, highway="residential", width="7")
+    city = import_openstreetmap(osm.write(tmp_path / "city.osm"), None)
+    (one,) = (o for o in city.structures if o.kind == "Crossing")
+    assert one.structure.semantic_class == "road"
+    a, b, c = np.moveaxis(one.triangles, 1, 0)
+    normals = np.cross(b - a, c - a)
+    assert (normals[:, 2] > 0).all()
+    # Six stripes of 0.5 m by 3 m within the 7 m of the street.
+    assert normals[:, 2].sum() / 2 == pytest.approx(6 * 1.5, rel=1e-3)
+    low, high = one.triangles.min(axis=(0, 1)), one.triangles.max(axis=(0, 1))
+    np.testing.assert_allclose(high - low, [3.0, 5.5, 0.0], atol=5e-3)
+    np.testing.assert_allclose((high + low)[2] / 2, 0.01)
+
+
+@pytest.mark.parametrize(
+    ("tags", "expected"),
+    [
+        ({"crossing": "zebra"}, True),
+        ({"crossing": "uncontrolled"}, True),
+        ({"crossing": "uncontrolled", "crossing:markings": "no"}, False),
+        ({"crossing": "traffic_signals"}, False),
+        ({"crossing:markings": "zebra:double"}, True),
+        ({}, False),
+    ],
+)
+def test_which_crossings_have_stripes(tags, expected):
+    assert is_marked(tags) is expected
