@@ -17,6 +17,7 @@ from mcap.writer import CompressionType
 from mcap_bytes import write_mcap
 import mulran_drive
 import numpy as np
+from opendrive_fuzzing import read_opendrive, write_opendrive
 from small_city import PLAN, ROADS, STAGES
 from small_cityjson import CityWriter
 from small_map import box_visual, world_text
@@ -403,6 +404,7 @@ TARGETS = (
         "openstreetmap", 8, _write_osm, ("corner.osm",), _read_osm,
         mutate=mutate_osm,
     ),
+    Target("opendrive", 8, write_opendrive, ("town.xodr",), read_opendrive),
     # Well-formed parts that contradict each other.
     Target(
         "recording lies", 8, _write_recording, ("town_07/*.mcap",),

@@ -20,6 +20,7 @@ from shapely.ops import unary_union
 
 from cns_drake.city.buildings import ARCHETYPES
 from cns_drake.city.geometry.mesh import Mesh
+from cns_drake.city.geometry.polygons import snap
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.ground.bridges import bridge_structures
 from cns_drake.city.ground.districts import share_out
@@ -66,7 +67,8 @@ class Streets:
         surface: how high they lie.
         kerb_height: of sidewalks above it [m].
         junctions: the area of all junctions in W [m].
-        reserved: where nothing is built or planted, in W [m].
+        margins: beside them, kept free, which buildings stand along, in W.
+        reserved: where else nothing is built or planted, in W [m].
         structures: their surfaces.
         furnish: places what belongs to them, before all else but buildings.
         park: parks cars in them, at last.
@@ -76,6 +78,7 @@ class Streets:
     surface: SurfaceHeights
     kerb_height: float
     junctions: BaseGeometry
+    margins: BaseGeometry
     reserved: BaseGeometry
     structures: Sequence[Structure]
     furnish: Callable[[Draft], None]
@@ -141,6 +144,7 @@ def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
             [network.junction_area(name) for name in network.junctions]
         ),
         Polygon(),
+        Polygon(),
         (*street_structures(network), marking_structure(network)),
         lambda draft: furnish_junctions(draft, network),
         lambda draft: park_along_streets(draft, network, plan.cars),
@@ -163,8 +167,11 @@ def build_along(streets: Streets, plan: CityPlan, source: str) -> City:
     """
     _check_names(plan, source)
     draft = Draft(streets.areas, streets.kerb_height, plan.seed)
-    if not streets.reserved.is_empty:
-        draft.take(streets.reserved)
+    for area in (streets.margins, streets.reserved):
+        if not area.is_empty:
+            draft.take(area)
+    if not streets.margins.is_empty:
+        draft.frontage = snap(draft.streets.union(streets.margins))
     districts = share_out(plan, draft.streets, source)
     place = streets.surface, streets.kerb_height, draft.streets, plan.bounds
     terraces = [pad for district in districts for pad in district.terraces]

@@ -174,7 +174,7 @@ def _row_houses(
     # Lots that touch the rim of the area must not fail by rounding.
     limit = area.buffer(0.05)
     houses: list[_House] = []
-    for line in lines_along(draft.streets, area, row.setback):
+    for line in lines_along(draft.frontage, area, row.setback):
         start, previous = 0.0, None
         while start < line.length - row.width[0]:
             house = _fitting_house(

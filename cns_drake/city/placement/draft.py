@@ -34,6 +34,7 @@ class Draft:
     Attributes:
         areas: of the streets.
         streets: all ground that belongs to them, sidewalks included, in W.
+        frontage: that buildings stand along; the streets if not told.
         base: height of sidewalks and of the ground between them in W,
             without what buildings and relief change about it.
         structures: what has been placed, in the order of placement.
@@ -48,6 +49,7 @@ class Draft:
                 [areas.carriageway(), areas.sidewalks(), areas.medians()]
             )
         )
+        self.frontage = self.streets
         self.base: Ground = LevelGround(kerb_height)
         self.structures: list[Structure] = []
         self.ground_height: HeightMap | None = None

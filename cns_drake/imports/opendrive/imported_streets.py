@@ -19,9 +19,10 @@ from cns_drake.imports.opendrive.lane_kinds import is_raised, lane_class
 _SEAM = 0.05
 # Vertices closer to an outline than this are dropped [m].
 _SIMPLIFY = 0.005
-# What the lanes of a junction enclose is part of it, if it is no larger
-# [m^2]; larger ones are islands.
-_LARGEST_GAP = 80.0
+# What lanes enclose beside a junction is part of it, if it is no larger [m^2];
+# larger ones are islands.
+_LARGEST_GAP = 60.0
+_LEVEL = ("road", "parking", "sidewalk", "other-ground")
 _LEAST_AREA = 1e-6
 _ISLAND_RGB = (0.55, 0.53, 0.50)
 _PATH_RGB = (0.52, 0.42, 0.38)
@@ -36,13 +37,13 @@ class ImportedStreets:
     Attributes:
         junctions: the area of all junctions [m].
         coverings: parts of the carriageway that are no road.
-        reserved: lanes of nothing, to be kept free.
+        margins: lanes of nothing, to be kept free.
     """
 
     def __init__(self, bands: Sequence[LaneBand]):
         """Takes the lanes."""
         alike: dict[str, list[BaseGeometry]] = defaultdict(list)
-        of_junction: dict[str, list[BaseGeometry]] = defaultdict(list)
+        in_junctions: list[BaseGeometry] = []
         for band in bands:
             area = lane_polygon(band)
             kind = lane_class(band.kind)
@@ -50,41 +51,45 @@ class ImportedStreets:
                 continue
             raised = is_raised(band.kind, band.lane.height)
             if kind is None:
-                alike["reserved"].append(area)
+                alike["margins"].append(area)
                 continue
             if raised:
                 kind = "median" if band.kind == "median" else "walk"
             alike[kind].append(area)
             if band.road.junction is not None and not raised:
-                of_junction[band.road.junction].append(area)
-        whole = [shapely.union_all(some) for some in of_junction.values()]
-        gaps = [gap for junction in whole for gap in _gaps(junction)]
+                in_junctions.append(area)
+        junctions = shapely.union_all(in_junctions)
         islands = shapely.union_all([*alike["median"], *alike["walk"]])
-        gaps = [gap for gap in gaps if not gap.intersects(islands)]
+        level = [one for kind in _LEVEL for one in alike[kind]]
+        gaps = [
+            gap
+            for gap in _gaps(shapely.union_all(level))
+            if gap.intersects(junctions) and not gap.intersects(islands)
+        ]
         road = _closed([*alike["road"], *gaps])
         parking = _simple(shapely.union_all(alike["parking"]).difference(road))
-        level = road.union(parking)
-        path = _simple(shapely.union_all(alike["sidewalk"]).difference(level))
-        level = level.union(path)
+        paved = road.union(parking)
+        path = _simple(shapely.union_all(alike["sidewalk"]).difference(paved))
+        paved = paved.union(path)
         other = _simple(
-            shapely.union_all(alike["other-ground"]).difference(level)
+            shapely.union_all(alike["other-ground"]).difference(paved)
         )
-        self._carriageway = _multi(_closed([level, other]))
+        self._carriageway = _multi(_closed([paved, other]))
         self._lanes = _multi(road)
         medians = _simple(shapely.union_all(alike["median"]))
         self._medians = _multi(medians.difference(self._carriageway))
         walks = _simple(shapely.union_all(alike["walk"]))
         taken = self._carriageway.union(self._medians)
         self._sidewalks = _multi(walks.difference(taken))
-        self.junctions = shapely.union_all([*whole, *gaps])
+        self.junctions = shapely.union_all([junctions, *gaps])
         self.coverings = [
             parking_bays(parking),
             Covering("paths", "sidewalk", snap(path), _PATH_RGB),
             Covering("islands", "other-ground", snap(other), _ISLAND_RGB),
         ]
         taken = taken.union(self._sidewalks)
-        reserved = shapely.union_all(alike["reserved"]).difference(taken)
-        self.reserved = _multi(snap(reserved))
+        margins = shapely.union_all(alike["margins"]).difference(taken)
+        self.margins = _multi(snap(margins))
 
     def carriageway(self) -> MultiPolygon:
         """Returns all lanes that are as high as the road."""
@@ -118,10 +123,11 @@ def lane_polygon(band: LaneBand) -> BaseGeometry:
     return shapely.union_all([p for p in pieces if p.area > _LEAST_AREA])
 
 
-def _gaps(junction: BaseGeometry) -> list[Polygon]:
-    """Returns what the lanes of a junction enclose and leave open."""
+def _gaps(lanes: BaseGeometry) -> list[Polygon]:
+    """Returns what lanes enclose and leave open, and no island is."""
     # Lanes that only touch enclose something too.
-    grown = junction.buffer(_SEAM, join_style="mitre")
+    with np.errstate(divide="ignore", invalid="ignore"):
+        grown = lanes.buffer(_SEAM, join_style="mitre")
     return [
         Polygon(hole).buffer(2.0 * _SEAM)
         for polygon in polygons_of(grown)

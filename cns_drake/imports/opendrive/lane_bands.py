@@ -15,13 +15,14 @@ from cns_drake.imports.opendrive.road_model import (
     Lane,
     LaneSection,
 )
-from evaluation.support.errors import InputError
 
 # Between two places on a border at most, and how far chords of the reference
 # line, widths and heights may leave them: borders are then true to 5 mm [m].
 _SPACING = 2.0
 _SAG = 0.002
-_MOST_STATIONS = 2_000_000
+_MOST_STATIONS = 200_000
+# No lane lies farther off, nor higher [m].
+_FARTHEST, _HIGHEST = 50_000.0, 10_000.0
 # Places are told apart by so much, from the joints inwards [m].
 _INWARDS = 1e-6
 
@@ -63,7 +64,8 @@ def lane_bands(road: ImportedRoad) -> Iterator[LaneBand]:
     """Yields all lanes of a road, section by section, from the middle.
 
     Raises:
-        InputError: if the road has too many bends to be followed.
+        ValueError: naming road and fault, if it has too many bends to be
+            followed, or a lane leads out of the world.
     """
     for k, section in enumerate(road.sections):
         s, inside = _stations(road, section)
@@ -88,6 +90,7 @@ def lane_bands(road: ImportedRoad) -> Iterator[LaneBand]:
                         border, side * (t - offset)
                     )
                 outer = road.points(s, inside, beyond)
+                _check_place(road, number, outer)
                 yield LaneBand(
                     road=road,
                     section=k,
@@ -102,6 +105,17 @@ def lane_bands(road: ImportedRoad) -> Iterator[LaneBand]:
                     s=s,
                 )
                 t, inner = beyond, outer
+
+
+def _check_place(road: ImportedRoad, lane: int, edge: np.ndarray) -> None:
+    for reach, axes in ((_FARTHEST, edge[:, :2]), (_HIGHEST, edge[:, 2])):
+        farthest = float(np.abs(axes).max())
+        # Not a number is beyond all.
+        if not farthest <= reach:
+            raise ValueError(
+                f"road {road.name}: lane {lane}: {farthest:g} m off, more than"
+                f" {reach:g} m"
+            )
 
 
 def _kind(road: ImportedRoad, section: LaneSection, lane: Lane) -> str:
@@ -157,7 +171,7 @@ def _stations(
         number = math.ceil((b - a) / step) + 1
         total += number
         if total > _MOST_STATIONS:
-            raise InputError(f"road {road.name}: too many bends")
+            raise ValueError(f"road {road.name}: too many bends")
         s = np.linspace(a, b, number)
         places.append(s)
         inside.append(np.clip(s, a + _INWARDS, b - _INWARDS))

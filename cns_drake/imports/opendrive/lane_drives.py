@@ -12,6 +12,10 @@ from scipy.spatial import cKDTree
 
 from cns_drake.imports.opendrive.lane_bands import LaneBand
 from cns_drake.imports.opendrive.lane_kinds import DRIVEN
+from cns_drake.motion.path_geometry import SmoothPath
+from cns_drake.motion.trajectory import POINT_SPACING
+from cns_drake.roads.u_turn import TIGHTEST_RADIUS
+from cns_drake.roads.waypoints import make_waypoint_path
 
 # Lanes follow one another where the end of one is so near the beginning of
 # the other, and they point the same way [m, rad].
@@ -19,15 +23,25 @@ _NEAR = 0.6
 _ASTRAY = np.radians(20.0)
 # A car needs so much at the ends of a lane [m].
 _LEAST_WIDTH = 1.8
+_LEAST_LENGTH = 0.05
 # No drive is longer, and none shorter [m].
 _LONGEST = 1500.0
 _SHORTEST = 80.0
-# The part of the first drive that the second shares, and what it has to
-# itself at either end at least [m].
-_SHARED = (0.25, 0.75)
+# Of the first drive: where the second joins it, from and to, and until where
+# it has left; both if no better is found; how much they share at least; and
+# what the second has to itself at either end [m].
+_SHARED = (0.25, 0.5, 0.75)
+_SHARED_AT_WORST = (0.0, 0.7, 1.0)
+_LEAST_SHARED = 0.15
+# As many places to join and to leave are tried.
+_MOST_PLACES = 12
 _SHORTEST_ARM = 40.0
 # Between waypoints [m].
 _SPACING = 2.0
+# Drives are straightened over so many waypoints to both sides, as tried.
+_SMOOTHING = (0, 1, 2, 3)
+# As many lanes may be too tight.
+_MOST_CLOSED = 30
 # As many lanes are tried as beginnings of the first drive.
 _MOST_BEGINNINGS = 1000
 
@@ -90,6 +104,10 @@ class _LaneGraph:
         cost = (self.lengths[rows] + self.lengths[columns]) / 2.0
         return coo_array((cost, (rows, columns)), (count, count)).tocsr()
 
+    def close(self, lane: int) -> None:
+        """Takes a lane out, that no car can steer along."""
+        self.links = self.without(set(), {lane})
+
     def without(self, roads: set[str], lanes: set[int]) -> coo_array:
         """Returns the links that no closed road or lane is part of."""
         links = self.links.tocoo()
@@ -118,8 +136,12 @@ def find_lane_drives(bands: Sequence[LaneBand]) -> list[LaneDrive]:
     graph = _LaneGraph(bands)
     if not graph.bands:
         return []
-    first = _longest(graph)
-    drive = _drive(graph, first)
+    drive = None
+    for _ in range(_MOST_CLOSED):
+        first = _longest(graph)
+        drive = _drive(graph, first)
+        if drive is not None or not first:
+            break
     if drive is None:
         return []
     for strict in (True, False):
@@ -135,7 +157,7 @@ def _is_driven(band: LaneBand) -> bool:
     return (
         band.kind in DRIVEN
         and min(width[0], width[-1]) > _LEAST_WIDTH
-        and float(np.linalg.norm(band.middle[-1] - band.middle[0])) > 0.05
+        and float(np.abs(np.diff(band.s)).sum()) > _LEAST_LENGTH
     )
 
 
@@ -217,11 +239,11 @@ def _seconds(
             other lane.
     """
     along = np.concatenate([[0.0], np.cumsum(graph.lengths[first])])
-    low, high = np.array(_SHARED) * along[-1]
-    begins = [k for k in range(len(first)) if low <= along[k] <= along[-1] / 2]
-    ends = [
-        k for k in range(len(first)) if along[-1] / 2 <= along[k + 1] <= high
-    ]
+    part = along / along[-1]
+    low, middle, high = _SHARED if strict else _SHARED_AT_WORST
+    lanes = range(len(first))
+    begins = _some([k for k in lanes if low <= part[k] <= middle])
+    ends = _some([k for k in lanes if 1 - middle <= part[k + 1] <= high])
     for begin in (*begins, None):
         head: list[int] = []
         start = 0 if begin is None else begin
@@ -234,7 +256,7 @@ def _seconds(
             if begin is None and end is None:
                 continue
             stop = len(first) - 1 if end is None else end
-            if stop < start:
+            if part[stop + 1] - part[start] < _LEAST_SHARED:
                 continue
             shared = first[start : stop + 1]
             tail: list[int] = []
@@ -246,6 +268,11 @@ def _seconds(
             way = [*head[:-1], *shared, *tail[1:]]
             if _meets_no_road_twice(graph, way):
                 yield way
+
+
+def _some(places: list[int]) -> list[int]:
+    """Returns no more places than are tried, evenly chosen."""
+    return places[:: -(-len(places) // _MOST_PLACES) or 1]
 
 
 def _away(
@@ -287,13 +314,46 @@ def _away(
 
 
 def _drive(graph: _LaneGraph, way: Sequence[int]) -> LaneDrive | None:
+    """Returns a drive along lanes that a car can steer.
+
+    None if it is too short, or a bend too tight, whose lane is then closed.
+    """
     if not way:
         return None
     line = np.concatenate([graph.lines[k] for k in way])
-    points = _resampled(_forwards(line))
+    points = _resampled(_forwards(line))[: int(_LONGEST / _SPACING) + 1]
     limits = [limit for k in way for _, limit in graph.bands[k].road.limits]
     drive = LaneDrive(points, min(limits) if limits else None)
-    return drive if drive.length >= _SHORTEST else None
+    if drive.length < _SHORTEST:
+        return None
+    place = points[0]
+    for window in _SMOOTHING:
+        smooth = _smoothed(points, window)
+        path = make_waypoint_path(smooth, POINT_SPACING)
+        bend, place = SmoothPath(path.points, path.spacing).tightest_bend()
+        if bend >= TIGHTEST_RADIUS:
+            return LaneDrive(smooth, drive.limit)
+    graph.close(
+        min(
+            way,
+            key=lambda k: float(
+                np.hypot(*(graph.lines[k] - place)[:, :2].T).min()
+            ),
+        )
+    )
+    return None
+
+
+def _smoothed(points: np.ndarray, window: int) -> np.ndarray:
+    """Returns the means (N, 3) over points to both sides, as many as there
+    are."""
+    count = len(points)
+    total = np.concatenate([np.zeros((1, 3)), np.cumsum(points, axis=0)])
+    at = np.arange(count)
+    reach = np.minimum(np.minimum(at, count - 1 - at), window)
+    return (total[at + reach + 1] - total[at - reach]) / (2 * reach + 1)[
+        :, None
+    ]
 
 
 def _forwards(line: np.ndarray) -> np.ndarray:

@@ -107,7 +107,10 @@ def _build(
     faults: ImportFaults,
     progress: Callable[[str], None],
 ) -> Town:
-    bands = [band for road in roads.roads for band in lane_bands(road)]
+    try:
+        bands = [band for road in roads.roads for band in lane_bands(road)]
+    except ValueError as error:
+        raise InputError(f"{source}: {error}") from error
     ground, raised = split_levels(bands)
     streets = ImportedStreets(ground)
     if streets.carriageway().is_empty:
@@ -138,9 +141,9 @@ def _build(
             surface=surface,
             kerb_height=kerb,
             junctions=streets.junctions,
+            margins=streets.margins,
             reserved=shapely.union_all(
                 [
-                    streets.reserved,
                     *(lane_polygon(band) for band in raised),
                     *(one.footprint_W for one in things),
                 ]

@@ -3,6 +3,7 @@
 import pytest
 from small_opendrive import (
     TWO_LANES,
+    cubic,
     geometry,
     lane,
     road,
@@ -14,6 +15,7 @@ from small_opendrive import (
 from cns_drake.imports.import_faults import ImportFaults
 from cns_drake.imports.opendrive.lane_bands import lane_bands
 from cns_drake.imports.opendrive.road_reader import read_roads
+from cns_drake.imports.opendrive.town import build_town
 from evaluation.support.errors import InputError
 
 LINE = geometry(0.0, 0.0, 0.0, 0.0, 50.0, "<line/>")
@@ -155,6 +157,29 @@ def test_lanes_of_less_than_no_width_have_none(tmp_path):
     first, second = lane_bands(one)
     assert first.width.min() == 0.0
     assert second.width.min() == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    ("lanes", "more", "fault"),
+    [
+        (
+            (lane(-1, "driving", (0.0, 3.0, 1e7)),), "",
+            r"road 1: lane -1: 5e\+08 m off, more than 50000 m",
+        ),
+        (
+            TWO_LANES, cubic("elevation", 0, 1e6, key="s"),
+            r"road 1: lane 1: 1e\+06 m off, more than 10000 m",
+        ),
+    ],
+)  # fmt: skip
+def test_lanes_that_lead_out_of_the_world(tmp_path, lanes, more, fault):
+    path = write_roads(
+        tmp_path / "a.xodr",
+        straight("1", 0, 0, 50, 0, lanes=lanes, elevation=more),
+    )
+    with pytest.raises(InputError, match=fault) as info:
+        build_town(path, 0)
+    assert str(info.value).startswith(f"{path}: ")
 
 
 def test_speed_limits_have_units(tmp_path):

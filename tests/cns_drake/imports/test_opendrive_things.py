@@ -1,0 +1,108 @@
+"""Signals and objects of OpenDRIVE, and lanes above others."""
+
+import math
+
+import numpy as np
+import pytest
+from shapely.geometry import LineString, box
+from small_opendrive import cubic, straight, write_roads
+
+from cns_drake.imports.import_faults import ImportFaults
+from cns_drake.imports.opendrive.lane_bands import lane_bands
+from cns_drake.imports.opendrive.road_levels import split_levels
+from cns_drake.imports.opendrive.road_reader import read_roads
+from cns_drake.imports.opendrive.town import build_town
+
+SIGNS = """<signals>
+<signal id="1" s="20" t="-6" zOffset="2" type="206" dynamic="no"
+ orientation="+"/>
+<signal id="2" s="30" t="6" zOffset="4" type="1000001" dynamic="yes"
+ orientation="-"/>
+<signal id="3" s="40" t="-1" zOffset="5" type="274" dynamic="no"/>
+</signals><objects>
+<object id="1" type="building" s="50" t="20" zOffset="0" hdg="0"><outline>
+<cornerLocal u="-5" v="-4" z="0" height="9"/>
+<cornerLocal u="5" v="-4" z="0" height="9"/>
+<cornerLocal u="5" v="4" z="0" height="9"/>
+<cornerLocal u="-5" v="4" z="0" height="9"/></outline></object>
+<object id="2" type="barrier" s="60" t="-12" zOffset="0"><outlines><outline>
+<cornerRoad s="60" t="-12" dz="0" height="1"/>
+<cornerRoad s="80" t="-12" dz="0" height="1"/>
+<cornerRoad s="80" t="-12.5" dz="0" height="1"/>
+<cornerRoad s="60" t="-12.5" dz="0" height="1"/></outline></outlines></object>
+<object id="3" type="pole" s="90" t="7" zOffset="0" radius="0.1" height="5"/>
+<object id="4" type="crosswalk" s="90" t="0" length="4" width="7"/>
+<object id="5" type="pole" s="0" t="8" zOffset="0" length="0.2" width="0.2"
+ height="3"><repeat s="100" length="40" distance="10"/></object>
+<object id="6" type="tree" s="150" t="9" zOffset="0" radius="2" height="8"/>
+</objects>"""
+
+
+def test_signals_and_objects_stand_where_told(tmp_path):
+    path = write_roads(
+        tmp_path / "a.xodr", straight("1", 0, 0, 200, 0, more=SIGNS)
+    )
+    built = build_town(path, 0)
+    found = {s.name: s for s in built.city.structures}
+    stop = found["signal_1_0"]
+    assert stop.semantic_class == "traffic-sign"
+    assert stop.xyz[:2] == (20.0, -6.0)
+    # It looks back at who comes along the road.
+    assert abs(stop.yaw) == pytest.approx(math.pi, abs=1e-4)
+    house = found["object_1_0"]
+    assert house.semantic_class == "building"
+    assert house.footprint_W.equals(box(45, 16, 55, 24))
+    fence = found["object_1_1"]
+    assert fence.semantic_class == "fence"
+    assert fence.footprint_W.equals(box(60, -12.5, 80, -12))
+    assert found["object_1_2"].semantic_class == "pole"
+    poles = [n for n in found if n.startswith("object_1_4")]
+    assert len(poles) == 5
+    assert found["object_1_5"].semantic_class == "vegetation"
+    rows = {kind: number for kind, number, _ in built.faults.rows()}
+    assert rows == {
+        "signal over a lane, left out": 1,
+        "object that is painted on the road, left out": 1,
+    }
+    # What the file has is there at all stages, and nothing is built on it.
+    absent = {n for stage in built.stages.stages for n in
+              built.stages.absent(stage)}  # fmt: skip
+    assert not absent & set(found).intersection({"object_1_0", *poles})
+    drawn = [
+        one.footprint_W
+        for one in built.city.structures
+        if one.semantic_class == "building" and one.name != "object_1_0"
+    ]
+    assert all(one.disjoint(house.footprint_W) for one in drawn)
+
+
+def test_a_road_over_another_is_a_bridge(tmp_path):
+    rise = cubic("elevation", 0, 6.0, 0, 0, 0, "s")
+    path = write_roads(
+        tmp_path / "a.xodr",
+        straight("1", -100, 0, 100, 0),
+        straight("2", 0, -100, 0, 100, elevation=rise),
+    )
+    _, raised = split_levels(
+        [
+            b
+            for r in read_roads(path, ImportFaults()).roads
+            for b in lane_bands(r)
+        ]
+    )
+    assert {band.road.name for band in raised} == {"2"}
+    # It reaches a little farther than what it crosses: 5.5 m, and 10 m.
+    s = np.concatenate([band.s for band in raised])
+    assert 81.0 < s.min() < 90.0
+    assert 110.0 < s.max() < 119.0
+    built = build_town(path, 0)
+    decks = [s for s in built.city.structures if s.name.startswith("bridge")]
+    assert {one.semantic_class for one in decks} >= {"road", "other-structure"}
+    below = LineString([(-100, 0), (100, 0)]).buffer(1.0)
+    walls = [
+        one.footprint_W
+        for one in built.city.structures
+        if one.semantic_class == "building"
+    ]
+    assert all(one.disjoint(below) for one in walls)
+    assert all(one.disjoint(box(-5, -20, 5, 20)) for one in walls)

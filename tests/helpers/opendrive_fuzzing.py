@@ -1,0 +1,60 @@
+"""A small file of OpenDRIVE to be changed, and all that reads it."""
+
+from pathlib import Path
+
+from small_opendrive import (
+    TWO_LANES,
+    cubic,
+    geometry,
+    road,
+    section,
+    write_roads,
+)
+
+from cns_drake.imports.import_faults import ImportFaults
+from cns_drake.imports.opendrive.imported_streets import ImportedStreets
+from cns_drake.imports.opendrive.lane_bands import lane_bands
+from cns_drake.imports.opendrive.lane_drives import find_lane_drives
+from cns_drake.imports.opendrive.road_levels import split_levels
+from cns_drake.imports.opendrive.road_reader import read_roads
+from cns_drake.imports.opendrive.thing_structures import thing_structures
+from evaluation.support.errors import InputError
+
+
+def write_opendrive(folder: Path) -> None:
+    shapes = (
+        ("<line/>", 20.0),
+        ('<spiral curvStart="0" curvEnd="0.04"/>', 25.0),
+        ('<paramPoly3 aU="0" bU="30" cU="-2" dU="1" aV="0" bV="0" cV="8"'
+         ' dV="-3"/>', 30.0),
+    )  # fmt: skip
+    pieces = [
+        geometry(20.0 * k, 25.0 * k, 0.0, 0.1, length, shape)
+        for k, (shape, length) in enumerate(shapes)
+    ]
+    signs = (
+        '<signals><signal s="5" t="-6" type="206"/></signals><objects><object'
+        ' type="pole" s="9" t="7" radius="0.1" height="5"><repeat s="9"'
+        ' length="20" distance="4"/></object></objects>'
+    )
+    write_roads(
+        folder / "town.xodr",
+        road(
+            "1", 70.0, pieces,
+            [section(0.0, *TWO_LANES), section(30.0, *TWO_LANES)],
+            elevation=cubic("elevation", 0, 1.0, 0.02, key="s"), more=signs,
+        ),
+    )  # fmt: skip
+
+
+def read_opendrive(folder: Path) -> None:
+    faults = ImportFaults()
+    roads = read_roads(folder / "town.xodr", faults).roads
+    try:
+        bands = [band for one in roads for band in lane_bands(one)]
+    except ValueError as error:
+        raise InputError(str(error)) from error
+    streets = ImportedStreets(split_levels(bands)[0])
+    find_lane_drives(bands)
+    for one in roads:
+        list(thing_structures(one, streets.lane_area(), faults))
