@@ -20,7 +20,11 @@ def change_stems(
     city: City, pair: tuple[RecordingInfo, RecordingInfo]
 ) -> tuple[str, str]:
     """Returns the names of the figures of a change: points, and sets."""
-    earlier, later = (one.stage for one in pair)
+    # What joins the parts stands in none but the first, so that no two
+    # cities' stages make one name.
+    earlier, later = (
+        one.stage.replace("%", "%p").replace("_", "%u") for one in pair
+    )
     change, sets = (
         file_name(f"{kind}_{city.name}_{earlier}_{later}")
         for kind in ("change", "sets")

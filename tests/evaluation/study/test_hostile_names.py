@@ -1,6 +1,7 @@
 """What a recording calls its map and stage leads nowhere, and stays text."""
 
 import html
+from pathlib import Path
 
 import pytest
 from small_towns import drive
@@ -8,6 +9,8 @@ import studies
 
 from evaluation.report.tables import Table
 from evaluation.study.chosen_methods import choose_methods
+from evaluation.study.collection import City, RecordingInfo
+from evaluation.study.figure_files import change_stems
 from evaluation.support.files import file_name
 
 STAGE = r"../../../../evil|$\frac{_%# <b>&"
@@ -79,3 +82,29 @@ def test_different_names_stay_different():
     assert len({file_name(text) for text in texts}) == len(texts)
     for usual in ("metropolis_04", "scan-context++", "family 3.5", "b\u00e9"):
         assert file_name(usual) == usual
+
+
+def test_no_two_figures_have_one_name():
+    names = set()
+    cases = [
+        ("x", "1_2", "3"),
+        ("x_1", "2", "3"),
+        ("x", "1", "2_3"),
+        ("x", "1%u2", "3"),
+        ("x", "1%2", "3"),
+    ]
+    for city, *stages in cases:
+        pair = tuple(
+            RecordingInfo(stage, Path(stage), city, stage, None)
+            for stage in stages
+        )
+        names.update(change_stems(City(city, {}, ()), pair))
+    assert len(names) == 2 * len(cases)
+    usual = tuple(
+        RecordingInfo(stage, Path(stage), "my_city", stage, None)
+        for stage in ("01", "04")
+    )
+    assert change_stems(City("my_city", {}, ()), usual) == (
+        "change_my_city_01_04",
+        "sets_my_city_01_04",
+    )
