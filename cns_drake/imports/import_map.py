@@ -199,8 +199,12 @@ def _find_drives(
 
 
 def _has_years(one: Imported) -> bool:
-    """Tells whether a structure is of a kind that is built some day."""
-    return not one.is_ground
+    """Tells whether a structure may be missing in a stage.
+
+    Who tells no years at all knows them of buildings alone.
+    """
+    is_building = one.kind.startswith("Building")
+    return not one.is_ground and (one.year is not None or is_building)
 
 
 def _standing(
@@ -210,8 +214,6 @@ def _standing(
         one
         for one in found
         if not _has_years(one)
-        # Who has no years at all knows them of buildings alone.
-        or (one.year is None and not one.kind.startswith("Building"))
         or stands_at(one.year, stage, options.years, options.undated)
     ]
 

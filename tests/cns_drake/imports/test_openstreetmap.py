@@ -7,8 +7,10 @@ import pytest
 from shapely.geometry import Polygon
 from small_osm import LAT, LON, OsmWriter
 
+from cns_drake.imports.building_years import Undated
 from cns_drake.imports.extrusions import extruded
 from cns_drake.imports.import_faults import ImportFaults
+from cns_drake.imports.import_map import ImportOptions, import_city
 from cns_drake.imports.openstreetmap import import_openstreetmap
 from cns_drake.imports.osm_tags import (
     heights,
@@ -92,6 +94,22 @@ def test_a_hipped_roof_slopes_on_four_sides():
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     assert (normals[:, 2] > 0.1).all()
     assert len(np.unique(np.round(normals, 6), axis=0)) == 4
+
+
+def test_only_buildings_lack_a_year(tmp_path):
+    osm = OsmWriter()
+    osm.box(0, 20, 20, 10, building="yes", start_date="1999-04")
+    osm.box(40, 20, 20, 10, building="yes")
+    osm.way([(-150, 0), (150, 0)], highway="residential")
+    osm.node(9, 12, natural="tree")
+    report = import_city(
+        osm.write(tmp_path / "a.osm"),
+        tmp_path / "town",
+        ImportOptions(years=(1980, 1995, 2020), undated=Undated.LAST),
+    )
+    assert report.undated == 1
+    first, second, third = report.stages.values()
+    assert (second - first, third - second) == (0, 2)
 
 
 def test_roofs_that_cannot_be_are_flat_and_told():
