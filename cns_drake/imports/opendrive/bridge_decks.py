@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-import re
 
 import numpy as np
 
@@ -40,9 +39,8 @@ def bridge_decks(bands: Sequence[LaneBand]) -> Iterator[Structure]:
         )
         triangles = triangles[np.linalg.norm(edges, axis=1) > _LEAST_AREA]
         if len(triangles):
-            name = re.sub(r"[^\w.-]+", "_", road, flags=re.ASCII)
             yield make_imported(
-                f"bridge_{name}_{kind}", kind, "Bridge", {"deck": triangles}, {}
+                f"bridge_{road}_{kind}", kind, "Bridge", {"deck": triangles}, {}
             ).structure
 
 

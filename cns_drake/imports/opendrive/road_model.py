@@ -141,7 +141,7 @@ class ImportedRoad:
     """A road.
 
     Attributes:
-        name: its id.
+        name: its id in letters, digits, dots and dashes, unique.
         junction: id of the junction that it belongs to, or none.
         length: of it [m].
         pieces: of its course, one after the other.

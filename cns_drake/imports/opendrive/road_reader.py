@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 import math
 from pathlib import Path
+import re
 
 import numpy as np
 
@@ -95,15 +96,17 @@ def read_roads(path: Path, faults: ImportFaults) -> RoadMap:
     """
     top = read_elements(path, "OpenDRIVE", _KNOWN)
     roads: list[ImportedRoad] = []
-    taken: set[str] = set()
+    ids: set[str] = set()
+    names: set[str] = set()
     together = 0.0
     for element in top.all("road"):
-        name = " ".join(element.attributes.get("id", "").split())
-        name = name[:_LONGEST_NAME]
-        if name in taken:
+        own = element.attributes.get("id", "")
+        name = _plain(own, names)
+        if own in ids:
             faults.add("road with the id of another, left out", name)
             continue
-        taken.add(name)
+        ids.add(own)
+        names.add(name)
         try:
             road = _road(element, name, faults)
         except ValueError as error:
@@ -135,6 +138,16 @@ def read_roads(path: Path, faults: ImportFaults) -> RoadMap:
         " ".join(reference.content.split()) if reference else "",
         (float(origin[0]), float(origin[1]), 0.0),
     )
+
+
+def _plain(own: str, taken: set[str]) -> str:
+    """Returns a new name of letters, digits, dots and dashes."""
+    stem = re.sub(r"[^0-9A-Za-z.-]+", "-", own)[:_LONGEST_NAME] or "unnamed"
+    name, number = stem, 1
+    while name in taken:
+        number += 1
+        name = f"{stem}-{number}"
+    return name
 
 
 def _moved(road: ImportedRoad, origin: np.ndarray) -> ImportedRoad:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 import math
-import re
 import zlib
 
 import numpy as np
@@ -64,7 +63,7 @@ def thing_structures(
                 "object beyond the end of its road, left out", thing.name
             )
             continue
-        name = re.sub(r"[^\w.-]+", "_", thing.name, flags=re.ASCII)
+        name = thing.name
         x, y, z, heading = _place(road, thing)
         if thing.is_signal:
             key = _signal_object(thing)

@@ -43,8 +43,9 @@ from evaluation.support.errors import InputError
 # Of sidewalks, where the file does not tell [m].
 _KERB = 0.1
 _KERBS = (0.03, 0.3)
-# The generator fills no larger ground [m^2].
+# The generator fills no larger ground [m^2, m].
 _LARGEST_AREA = 8e6
+_LONGEST_SIDE = 9000.0
 # Of cars in parking lanes: length of a bay, part that is taken, and the
 # least width of a lane [m].
 _BAY = (5.8, 7.4)
@@ -58,6 +59,7 @@ class Town:
 
     Attributes:
         roads: of the file.
+        seed: of what was drawn.
         city: everything, in all stages.
         stages: what stands when.
         streets: the areas of the roads that lie on the ground.
@@ -67,6 +69,7 @@ class Town:
     """
 
     roads: RoadMap
+    seed: int
     city: City
     stages: Stages
     streets: ImportedStreets
@@ -115,13 +118,15 @@ def _build(
     streets = ImportedStreets(ground)
     if streets.carriageway().is_empty:
         raise InputError(f"{source}: no lane in it has an area")
-    plan = CityPlan.model_validate(starter_plan(streets, seed))
-    x0, y0, x1, y1 = plan.bounds
-    if (x1 - x0) * (y1 - y0) > _LARGEST_AREA:
+    x0, y0, x1, y1 = streets.carriageway().bounds
+    sides = x1 - x0, y1 - y0
+    if sides[0] * sides[1] > _LARGEST_AREA or max(sides) > _LONGEST_SIDE:
         raise InputError(
-            f"{source}: {x1 - x0:.0f} m by {y1 - y0:.0f} m; cut out a piece"
-            f" of at most {_LARGEST_AREA / 1e6:.0f} km^2"
+            f"{source}: roads of {sides[0]:.0f} m by {sides[1]:.0f} m; cut out"
+            f" a piece of at most {_LARGEST_AREA / 1e6:.0f} km^2 and"
+            f" {_LONGEST_SIDE / 1000:.0f} km"
         )
+    plan = CityPlan.model_validate(starter_plan(streets, seed))
     lanes = streets.lane_area()
     things = [
         one
@@ -164,6 +169,7 @@ def _build(
     stages = starter_stages(City(tuple(generated), city.cars))
     return Town(
         roads,
+        seed,
         city,
         Stages.model_validate(stages),
         streets,

@@ -108,6 +108,7 @@ def _write_facts(draft: Path, source: Path, town: Town) -> None:
         "source": source.name,
         "reference_system": town.roads.reference_system or "not told",
         "origin": list(town.roads.origin),
+        "seed": town.seed,
         "stages": {
             stage: plan.story for stage, plan in town.stages.stages.items()
         },

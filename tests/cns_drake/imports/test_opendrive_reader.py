@@ -182,6 +182,25 @@ def test_lanes_that_lead_out_of_the_world(tmp_path, lanes, more, fault):
     assert str(info.value).startswith(f"{path}: ")
 
 
+def test_roads_too_long_to_be_built_on(tmp_path):
+    path = write_roads(tmp_path / "a.xodr", straight("1", 0, 0, 12_000, 0))
+    with pytest.raises(InputError, match="12000 m by 7 m; cut out a piece"):
+        build_town(path, 0)
+
+
+def test_ids_become_names_that_are_unique(tmp_path):
+    path = write_roads(
+        tmp_path / "a.xodr",
+        *(
+            straight(name, 0, 20 * k, 50, 20 * k)
+            for k, name in enumerate(("a b", "a/b", "a-b", "", "&#10;"))
+        ),
+    )
+    roads = read_roads(path, ImportFaults()).roads
+    names = ["a-b", "a-b-2", "a-b-3", "unnamed", "-"]
+    assert [one.name for one in roads] == names
+
+
 def test_speed_limits_have_units(tmp_path):
     limits = (
         '<type s="0" type="town"><speed max="36" unit="km/h"/></type>'

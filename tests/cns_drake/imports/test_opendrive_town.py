@@ -292,6 +292,7 @@ def test_the_command_from_end_to_end(source, tmp_path):
             assert twin.read_bytes() == path.read_bytes(), path
     facts = yaml.safe_load((output / "import.yaml").read_text())
     assert facts["source"] == "town.xodr"
+    assert facts["seed"] == 1
     assert "town_01" in run("list", output).output
     for name in ("sequence_01", "sequence_02", "other_02"):
         trajectory = plan_drive(load_scenario(output / f"{name}.yaml"))
