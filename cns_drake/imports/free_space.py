@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +24,12 @@ _FROM_EDGE = 1.6
 # Half of the widest street; what is wider open is outside the city [m].
 _HALF_STREET = 20.0
 _SAMPLE_SPACING = 0.5
+# From the middle of a city room is looked for at most so far: no drive is
+# longer [m].
+_FARTHEST = 1500.0
+# Of an edge that is not parted before, and points at once.
+_MOST_STEPS = 256
+_AT_ONCE = 1_000_000
 # Roads are used where they hold at least so much connected room [m^2].
 _LEAST_ROAD = 800.0
 
@@ -72,15 +78,13 @@ def find_free_space(
         structures: of the whole city, all that ever stand.
         ground: below them.
     """
-    corners = np.concatenate([s.triangles.reshape(-1, 3) for s in structures])
-    low = np.floor(corners[:, :2].min(axis=0))
-    size = np.ceil((corners[:, :2].max(axis=0) - low) / CELL).astype(int) + 1
+    low, high = _window(structures)
+    size = np.ceil((high - low) / CELL).astype(int) + 1
     shape = (int(size[1]), int(size[0]))
     blocked = np.zeros(shape, dtype=bool)
     roads = np.zeros(shape, dtype=bool)
     water = np.zeros(shape, dtype=bool)
     for one in structures:
-        points = surface_samples(one.triangles, _SAMPLE_SPACING)
         if one.structure.semantic_class == "road":
             grid = roads
         elif one.kind.startswith("Water"):
@@ -88,16 +92,22 @@ def find_free_space(
         elif one.is_ground:
             continue
         else:
-            above = points[:, 2] - ground.height(points[:, :2])
-            points = points[above < _HEADROOM]
-            # What is no higher than a kerb is driven over.
-            if len(points) and above.max() < 0.3:
-                continue
             grid = blocked
-        column, row = np.floor((points[:, :2] - low) / CELL).astype(int).T
-        grid[
-            np.clip(row, 0, shape[0] - 1), np.clip(column, 0, shape[1] - 1)
-        ] = True
+        highest, low_down = -np.inf, []
+        for points in surface_samples(
+            one.triangles, _SAMPLE_SPACING, (low, high)
+        ):
+            if grid is blocked:
+                above = points[:, 2] - ground.height(points[:, :2])
+                highest = max(highest, above.max())
+                points = points[above < _HEADROOM]
+            column, row = np.floor((points[:, :2] - low) / CELL).astype(int).T
+            low_down.append(np.unique(row * shape[1] + column))
+        # What is no higher than a kerb is driven over.
+        if grid is blocked and highest < 0.3:
+            continue
+        for cells in low_down:
+            grid.ravel()[cells] = True
     free = ~(blocked | (water & ~roads))
     on_roads = False
     paved = binary_closing(roads, iterations=1) & ~blocked
@@ -130,20 +140,71 @@ def _largest(cells: np.ndarray) -> int:
     return int(np.bincount(parts.ravel())[1:].max()) if number else 0
 
 
-def surface_samples(triangles: np.ndarray, spacing: float) -> np.ndarray:
-    """Returns points (N, 3) on triangles (M, 3, 3), edges included [m].
+def _window(structures: Sequence[Imported]) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the corners (2,) of where room is looked for [m]."""
+    boxes = np.array(
+        [
+            (s.triangles.min(axis=(0, 1)), s.triangles.max(axis=(0, 1)))
+            for s in structures
+        ]
+    )[:, :, :2]
+    middle = np.median(boxes.mean(axis=1), axis=0)
+    low = np.maximum(boxes[:, 0].min(axis=0), middle - _FARTHEST)
+    high = np.minimum(boxes[:, 1].max(axis=0), middle + _FARTHEST)
+    return np.floor(low), np.maximum(high, np.floor(low))
 
-    No place on a triangle is farther from all of them than the spacing.
+
+def surface_samples(
+    triangles: np.ndarray,
+    spacing: float,
+    window: tuple[np.ndarray, np.ndarray] | None = None,
+) -> Iterator[np.ndarray]:
+    """Yields points (N, 3) on triangles (M, 3, 3), edges included [m].
+
+    No place on a triangle is farther from all of them than the spacing. There
+    are not more than about a million at once.
+
+    Args:
+        triangles: to sample.
+        spacing: of the points [m].
+        window: (2,) least and greatest x and y; what is outside is left out.
     """
-    edges = triangles - np.roll(triangles, 1, axis=1)
-    longest = np.linalg.norm(edges, axis=2).max(axis=1)
-    steps = np.maximum(1, np.ceil(longest / spacing)).astype(int)
-    found = [np.zeros((0, 3))]
-    for number in np.unique(steps):
+    for part, number in _in_pieces(triangles, spacing, window):
         i, j = np.meshgrid(np.arange(number + 1), np.arange(number + 1))
         inside = i + j <= number
         u, v = i[inside] / number, j[inside] / number
         weights = np.stack([1.0 - u - v, u, v], axis=1)
-        of_size = triangles[steps == number]
-        found.append(np.einsum("kc,mcx->mkx", weights, of_size).reshape(-1, 3))
-    return np.concatenate(found)
+        most = max(1, _AT_ONCE // len(weights))
+        for first in range(0, len(part), most):
+            some = part[first : first + most]
+            points = np.einsum("kc,mcx->mkx", weights, some).reshape(-1, 3)
+            if window is not None:
+                low, high = window
+                xy = points[:, :2]
+                points = points[((xy >= low) & (xy <= high)).all(axis=1)]
+            if len(points):
+                yield points
+
+
+def _in_pieces(
+    triangles: np.ndarray,
+    spacing: float,
+    window: tuple[np.ndarray, np.ndarray] | None,
+) -> Iterator[tuple[np.ndarray, int]]:
+    """Yields triangles of a size, and into how many steps to part an edge."""
+    while len(triangles):
+        if window is not None:
+            low, high = window
+            xy = triangles[:, :, :2]
+            is_near = (xy.max(axis=1) >= low) & (xy.min(axis=1) <= high)
+            triangles = triangles[is_near.all(axis=1)]
+        edges = triangles - np.roll(triangles, 1, axis=1)
+        longest = np.linalg.norm(edges, axis=2).max(axis=1)
+        steps = np.maximum(1, np.ceil(longest / spacing)).astype(int)
+        for number in np.unique(steps[steps <= _MOST_STEPS]):
+            yield triangles[steps == number], int(number)
+        # Large ones in four, so that what is far of them is left out.
+        a, b, c = np.moveaxis(triangles[steps > _MOST_STEPS], 1, 0)
+        ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+        quarters = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
+        triangles = np.concatenate([np.stack(q, axis=1) for q in quarters])

@@ -13,6 +13,8 @@ from cns_drake.city.geometry.mesh import Mesh
 # Of the grid of a guessed ground, and how far it reaches beyond the city [m].
 CELL = 4.0
 MARGIN = 40.0
+# A larger city has larger cells.
+_MOST_CELLS = 500
 # It is smoothed over so many cells, and lies so far below what stands on it,
 # so that pavements are seen and not it [m].
 _SMOOTHING = 1.5
@@ -25,17 +27,21 @@ class Ground:
     Attributes:
         xs, ys: (C,) and (R,) of the grid [m].
         z: (R, C) heights there [m].
+        cell: distance of its lines [m].
     """
 
     def __init__(self, xs: np.ndarray, ys: np.ndarray, z: np.ndarray):
         self.xs, self.ys, self.z = xs, ys, z
+        self.cell = float(xs[1] - xs[0])
 
     def height(self, xy: np.ndarray) -> np.ndarray:
         """Returns the height at places (N, 2), between those of the grid."""
         column = np.clip(
-            (xy[:, 0] - self.xs[0]) / CELL, 0, len(self.xs) - 1.001
+            (xy[:, 0] - self.xs[0]) / self.cell, 0, len(self.xs) - 1.001
         )
-        row = np.clip((xy[:, 1] - self.ys[0]) / CELL, 0, len(self.ys) - 1.001)
+        row = np.clip(
+            (xy[:, 1] - self.ys[0]) / self.cell, 0, len(self.ys) - 1.001
+        )
         c, r = column.astype(int), row.astype(int)
         u, v = column - c, row - r
         z = self.z
@@ -49,8 +55,8 @@ class Ground:
     def below(self, points: np.ndarray) -> Ground:
         """Returns a ground that lies nowhere above some points (N, 3) [m]."""
         z = self.z.copy()
-        c = ((points[:, 0] - self.xs[0]) // CELL).astype(int)
-        r = ((points[:, 1] - self.ys[0]) // CELL).astype(int)
+        c = ((points[:, 0] - self.xs[0]) // self.cell).astype(int)
+        r = ((points[:, 1] - self.ys[0]) // self.cell).astype(int)
         for row in (r, r + 1):
             for column in (c, c + 1):
                 np.minimum.at(z, (row, column), points[:, 2])
@@ -74,10 +80,12 @@ def guess_ground(feet: np.ndarray, corners: np.ndarray) -> Ground:
         feet: (N, 3) places on the ground [m], one or more.
         corners: (M, 3) of all that stands, which it reaches beyond [m].
     """
-    low = np.floor((corners[:, :2].min(axis=0) - MARGIN) / CELL) * CELL
-    high = corners[:, :2].max(axis=0) + MARGIN
-    xs = np.arange(low[0], high[0] + CELL, CELL)
-    ys = np.arange(low[1], high[1] + CELL, CELL)
+    low, high = corners[:, :2].min(axis=0), corners[:, :2].max(axis=0)
+    cell = CELL * np.ceil(max(1.0, (high - low).max() / CELL / _MOST_CELLS))
+    low = np.floor((low - MARGIN) / cell) * cell
+    high = high + MARGIN
+    xs = np.arange(low[0], high[0] + cell, cell)
+    ys = np.arange(low[1], high[1] + cell, cell)
     x, y = np.meshgrid(xs, ys)
     z = NearestNDInterpolator(feet[:, :2], feet[:, 2])(x, y)
     if len(feet) >= 4 and np.linalg.matrix_rank(feet[:, :2] - feet[0, :2]) == 2:

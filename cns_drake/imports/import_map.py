@@ -49,8 +49,8 @@ from evaluation.support.files import part_path, user_errors
 
 # Of flat things on the ground every such corner helps to find its height.
 _EVERY_CORNER = 7
-# Between the points of a surface that the ground must not hide [m].
-_SURFACE_SPACING = 2.0
+# From the middle of a city [m].
+_FARTHEST = 10_000.0
 
 
 def import_city(
@@ -94,7 +94,7 @@ def import_city(
         with _drafted(output) as draft:
             return write_town(draft, source, town, progress)
     city = _read(source, options)
-    found = city.structures
+    found = _together(city)
     if not found:
         raise InputError(f"{source}: no object has a surface")
     standing = [_standing(found, k, options) for k in range(len(stages))]
@@ -188,6 +188,29 @@ def _read(source: Path, options: ImportOptions) -> ForeignCity:
     return import_openstreetmap(source, options.year_attribute)
 
 
+def _together(city: ForeignCity) -> list[Imported]:
+    """Returns the structures of a city without those that lie far away."""
+    if not city.structures:
+        return []
+    boxes = np.array(
+        [
+            (one.triangles.min(axis=(0, 1)), one.triangles.max(axis=(0, 1)))
+            for one in city.structures
+        ]
+    )
+    middle = np.median(boxes.mean(axis=1), axis=0)
+    kept = []
+    for one, reach in zip(
+        city.structures, np.abs(boxes - middle).max(axis=(1, 2)), strict=True
+    ):
+        if reach <= _FARTHEST:
+            kept.append(one)
+        else:
+            kind = f"object more than {_FARTHEST / 1000:g} km away, left out"
+            city.faults.add(kind, one.structure.name)
+    return kept
+
+
 def _find_drives(
     city: ForeignCity, space: FreeSpace, options: ImportOptions
 ) -> list[FreeDrive]:
@@ -242,12 +265,12 @@ def _bottom(kept: Sequence[Imported], ground: Ground) -> list[Structure]:
     while name in taken:
         name += "_"
     # Streets and water are to be seen, and not the guess above them.
-    told = [
-        surface_samples(one.triangles, _SURFACE_SPACING)
-        for one in kept
-        if one.is_ground
-    ]
-    lowered = ground.below(np.concatenate([np.zeros((0, 3)), *told]))
+    lowered = ground
+    spacing = ground.cell / 2.0
+    for one in kept:
+        if one.is_ground:
+            for points in surface_samples(one.triangles, spacing):
+                lowered = lowered.below(points)
     model = Model(
         (Part("surface", MeshShape(name)),),
         {name: lowered.to_mesh()},

@@ -4,6 +4,7 @@ import csv
 import os
 from pathlib import Path
 import re
+import resource
 
 import numpy as np
 import pytest
@@ -268,3 +269,40 @@ def test_real_files(tmp_path):
     for number, path in enumerate(files):
         report = import_city(path, tmp_path / f"m{number}", ImportOptions())
         assert report.triangles > 0
+
+
+def test_what_lies_far_away_is_left_out(tmp_path):
+    city = CityWriter()
+    for k in range(4):
+        city.box(f"house_{k}", 40.0 * k, 0.0, (20.0, 20.0, 6.0))
+    city.box("far", 3e6, -2e6, (20.0, 20.0, 6.0))
+    # A lake over half a continent, and a wall into space.
+    city.box("high", 10.0, 50.0, (20.0, 20.0, 1e6))
+    lake = {
+        "type": "MultiSurface",
+        "lod": "1",
+        "boundaries": [[city.ring([(0, 0, 0), (2e6, 0, 0), (0, 2e6, 0)])]],
+    }
+    city.add("lake", "WaterBody", lake)
+    source = city.write(tmp_path / "city.json")
+    report = import_city(source, tmp_path / "town", ImportOptions())
+    assert report.stages == {"01": 4}
+    assert ("object more than 10 km away, left out", 3, "far") in report.faults
+
+
+def test_large_surfaces_are_no_burden(tmp_path):
+    city = CityWriter()
+    for x in range(0, 200, 40):
+        city.box(f"low_{x}", x, 0.0, (30.0, 20.0, 6.0))
+        city.box(f"high_{x}", x, 32.0, (30.0, 20.0, 6.0))
+    far = 9000.0
+    ring = [(-far, -far, 0), (far, -far, 0), (far, far, 0), (-far, far, 0)]
+    land = {"type": "MultiSurface", "lod": "1"}
+    land["boundaries"] = [[city.ring(ring)]]
+    city.add("land", "LandUse", land)
+    source = city.write(tmp_path / "city.json")
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    report = import_city(source, tmp_path / "town", ImportOptions())
+    after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    assert report.drives[0] > 100.0
+    assert after - before < 1_500_000  # [kB]
