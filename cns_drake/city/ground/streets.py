@@ -90,6 +90,7 @@ def street_surfaces(
     surface: SurfaceHeights,
     kerb: float,
     coverings: Sequence[Covering],
+    kerbless: BaseGeometry | None = None,
 ) -> list[Structure]:
     """Returns the ground of streets.
 
@@ -100,6 +101,7 @@ def street_surfaces(
         surface: how high the carriageway lies.
         kerb: height of sidewalks and medians above it [m].
         coverings: within the carriageway.
+        kerbless: where no kerb is, as streets lead onto bridges, in W [m].
     """
     road, walk = _heights(surface, kerb)
     medians = snap(areas.medians())
@@ -112,6 +114,8 @@ def street_surfaces(
             )
         )
     )
+    if kerbless is not None:
+        kerbs = MultiPolygon(polygons_of(snap(kerbs.difference(kerbless))))
     sidewalks = snap(areas.sidewalks()).difference(kerbs)
     outer = unary_union([paved, kerbs, sidewalks, medians]).boundary
     structures = [

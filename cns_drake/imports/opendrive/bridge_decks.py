@@ -6,6 +6,9 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+import shapely
+from shapely.geometry import LineString
+from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.imports.foreign_city import make_imported
@@ -14,6 +17,8 @@ from cns_drake.imports.opendrive.lane_kinds import lane_class
 
 _DEPTH = np.array([0.0, 0.0, 0.8])  # [m]
 _LEAST_AREA = 1e-6
+# More than the width of a kerb [m].
+_END = 0.2
 
 
 def bridge_decks(bands: Sequence[LaneBand]) -> Iterator[Structure]:
@@ -42,6 +47,16 @@ def bridge_decks(bands: Sequence[LaneBand]) -> Iterator[Structure]:
             yield make_imported(
                 f"bridge_{road}_{kind}", kind, "Bridge", {"deck": triangles}, {}
             ).structure
+
+
+def bridge_ends(bands: Sequence[LaneBand]) -> BaseGeometry:
+    """Returns the area about the ends of bridges [m]."""
+    lines = [
+        LineString([band.inner[k, :2], band.outer[k, :2]])
+        for band in bands
+        for k in (0, -1)
+    ]
+    return shapely.union_all(lines).buffer(_END, cap_style="flat")
 
 
 def _strip(a: np.ndarray, b: np.ndarray) -> np.ndarray:

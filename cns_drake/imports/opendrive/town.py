@@ -23,7 +23,7 @@ from cns_drake.city.placement.open_ground import place_car
 from cns_drake.city.plan.city_plan import CityPlan
 from cns_drake.city.plan.stages import Stages
 from cns_drake.imports.import_faults import ImportFaults
-from cns_drake.imports.opendrive.bridge_decks import bridge_decks
+from cns_drake.imports.opendrive.bridge_decks import bridge_decks, bridge_ends
 from cns_drake.imports.opendrive.imported_streets import (
     ImportedStreets,
     lane_polygon,
@@ -154,7 +154,13 @@ def _build(
                 ]
             ),
             structures=(
-                *street_surfaces(streets, surface, kerb, streets.coverings),
+                *street_surfaces(
+                    streets,
+                    surface,
+                    kerb,
+                    streets.coverings,
+                    bridge_ends(raised),
+                ),
                 *decks,
                 *things,
             ),

@@ -96,6 +96,12 @@ def test_a_road_over_another_is_a_bridge(tmp_path):
     assert 81.0 < s.min() < 90.0
     assert 110.0 < s.max() < 119.0
     built = build_town(path, 0)
+    # No kerb lies across the road where the bridge begins, and those of the
+    # road below go on.
+    (kerbs,) = (s for s in built.city.structures if s.name == "kerbs")
+    across = box(-3, 8, 3, 20).union(box(-3, -20, 3, -8))
+    assert kerbs.footprint_W.disjoint(across)
+    assert kerbs.footprint_W.contains(LineString([(-9, 3.6), (9, 3.6)]))
     decks = [s for s in built.city.structures if s.name.startswith("bridge")]
     assert {one.semantic_class for one in decks} >= {"road", "other-structure"}
     below = LineString([(-100, 0), (100, 0)]).buffer(1.0)
