@@ -237,3 +237,17 @@ def test_zebra_crossings_have_stripes(tmp_path):
 )
 def test_which_crossings_have_stripes(tags, expected):
     assert is_marked(tags) is expected
+
+
+def test_a_place_on_another_continent_is_no_way_to_go(tmp_path):
+    osm = OsmWriter()
+    for x in (-60, -20, 20):
+        osm.box(x, 20, 30, 10, building="yes")
+    nodes = [osm.node(x, 0) for x in (-100, 0, 100)]
+    far = osm.node(-900_000, 0)
+    osm.way_of([*nodes, far], highway="residential", width="8")
+    osm.write(tmp_path / "city.osm")
+    report = import_city(
+        tmp_path / "city.osm", tmp_path / "town", ImportOptions()
+    )
+    assert all(length < 300.0 for length in report.drives)
