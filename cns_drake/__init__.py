@@ -1,16 +1,16 @@
 """Cities that change, driven and recorded by simulated LiDAR in Drake.
 
 What is public is in `__all__`; each name loads what it needs when it is first
-asked for. `cns_drake.evaluation` is the package of that name, also where the
-user has another one.
+asked for.
 """
 
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from cns_drake.isolation import isolate, our_evaluation
+from cns_drake.base.version import __version__
 
 if TYPE_CHECKING:
+    from cns_drake.base.errors import InputError
     from cns_drake.command_line.sequence_script import (
         run_script,
         run_sequence,
@@ -49,10 +49,6 @@ if TYPE_CHECKING:
     from cns_drake.simulation.sensor_recording import add_mcap_recorder
     from cns_drake.simulation.simulation import Run, simulate
     from cns_drake.simulation.station import make_station
-    import evaluation
-    from evaluation.support.errors import InputError
-
-__version__ = "0.1.0"
 
 __all__ = [
     "LIDAR_PRESETS",
@@ -78,7 +74,6 @@ __all__ = [
     "add_lidar_view",
     "add_mcap_recorder",
     "add_odometry",
-    "evaluation",
     "load_scenario",
     "load_world",
     "make_beam_pattern",
@@ -95,41 +90,43 @@ __all__ = [
 
 # Module -> what it gives.
 _HOMES = {
-    "command_line.sequence_script": ("run_script", "run_sequence"),
-    "motion.vehicle_motion": ("VehicleMotion",),
-    "pictures.static_page": ("save_meshcat_page",),
-    "recording.bag_writer": ("BagWriter",),
-    "recording.mcap_recorder": ("McapRecorder", "recording_topics"),
-    "scenarios.planning": ("plan_drive",),
-    "scenarios.scenario": ("Scenario", "load_scenario", "make_scenario"),
-    "scene.world": ("World", "load_world"),
-    "sensors.beam_pattern": ("BeamPattern",),
-    "sensors.free_patterns": ("DirectionPattern", "make_flash_pattern"),
-    "sensors.imu": ("Imu", "add_imu"),
-    "sensors.lidar": ("Lidar",),
-    "sensors.lidar_adding": ("add_lidar",),
-    "sensors.lidar_presets": ("LIDAR_PRESETS", "make_beam_pattern"),
-    "sensors.lidar_view": ("add_lidar_view",),
-    "sensors.livox_patterns": ("NoddingPattern", "RosettePattern"),
-    "sensors.measurement": ("MeasurementModel",),
-    "sensors.odometry": ("Odometry", "add_odometry"),
-    "sensors.spinning_pattern": ("SpinningPattern",),
-    "simulation.sensor_recording": ("add_mcap_recorder",),
-    "simulation.simulation": ("Run", "simulate"),
-    "simulation.station": ("make_station",),
+    "cns_drake.base.errors": ("InputError",),
+    "cns_drake.command_line.sequence_script": ("run_script", "run_sequence"),
+    "cns_drake.motion.vehicle_motion": ("VehicleMotion",),
+    "cns_drake.pictures.static_page": ("save_meshcat_page",),
+    "cns_drake.recording.bag_writer": ("BagWriter",),
+    "cns_drake.recording.mcap_recorder": ("McapRecorder", "recording_topics"),
+    "cns_drake.scenarios.planning": ("plan_drive",),
+    "cns_drake.scenarios.scenario": (
+        "Scenario",
+        "load_scenario",
+        "make_scenario",
+    ),
+    "cns_drake.scene.world": ("World", "load_world"),
+    "cns_drake.sensors.beam_pattern": ("BeamPattern",),
+    "cns_drake.sensors.free_patterns": (
+        "DirectionPattern",
+        "make_flash_pattern",
+    ),
+    "cns_drake.sensors.imu": ("Imu", "add_imu"),
+    "cns_drake.sensors.lidar": ("Lidar",),
+    "cns_drake.sensors.lidar_adding": ("add_lidar",),
+    "cns_drake.sensors.lidar_presets": ("LIDAR_PRESETS", "make_beam_pattern"),
+    "cns_drake.sensors.lidar_view": ("add_lidar_view",),
+    "cns_drake.sensors.livox_patterns": ("NoddingPattern", "RosettePattern"),
+    "cns_drake.sensors.measurement": ("MeasurementModel",),
+    "cns_drake.sensors.odometry": ("Odometry", "add_odometry"),
+    "cns_drake.sensors.spinning_pattern": ("SpinningPattern",),
+    "cns_drake.simulation.sensor_recording": ("add_mcap_recorder",),
+    "cns_drake.simulation.simulation": ("Run", "simulate"),
+    "cns_drake.simulation.station": ("make_station",),
 }
-
-isolate()
 
 
 def __getattr__(name: str) -> Any:
-    if name == "evaluation":
-        return our_evaluation()
-    if name == "InputError":
-        return our_evaluation().InputError
     for home, names in _HOMES.items():
         if name in names:
-            module = importlib.import_module(f"{__name__}.{home}")
+            module = importlib.import_module(home)
             return getattr(module, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 

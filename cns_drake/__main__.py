@@ -2,11 +2,12 @@
 
 import sys
 
-from cns_drake.isolation import prefer_ours
+from cns_drake.base.own_packages import check_evaluation, leave_out_folder
 
-prefer_ours()  # Before anything of it is imported.
+leave_out_folder(sys.path)  # Before anything else is imported.
 
-from evaluation.support.interrupts import (  # noqa: E402
+from cns_drake.base.errors import InputError  # noqa: E402
+from cns_drake.base.interrupts import (  # noqa: E402
     end_interrupted,
     interrupt_on_termination,
     uninterrupted,
@@ -18,8 +19,12 @@ def main() -> None:
     try:
         interrupt_on_termination()
         with uninterrupted():
+            check_evaluation()
             from cns_drake.command_line.cli import main as run
         run()
+    except InputError as error:
+        print(f"cns-drake: error: {error}", file=sys.stderr)
+        sys.exit(error.exit_status)
     except KeyboardInterrupt:
         print("cns-drake: interrupted", file=sys.stderr)
         end_interrupted()

@@ -1,6 +1,7 @@
 """Structural change and place recognition on LiDAR sequences.
 
-Independent of the simulator: nothing in here imports Drake.
+Independent of the simulator: nothing in here imports Drake, nor anything of
+`cns_drake` but `cns_drake.base`.
 
 What is public is in `__all__`; each name loads what it needs when it is first
 asked for. `evaluation.sequences` and `evaluation.methods` are public as well.
@@ -11,6 +12,7 @@ from pkgutil import extend_path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from cns_drake.base.errors import InputError
     from evaluation.change.tcr import TemporalChange, covered, temporal_change
     from evaluation.maps.voxel_maps import VoxelMap, map_sequence, voxelise
     from evaluation.methods import (
@@ -29,7 +31,6 @@ if TYPE_CHECKING:
     from evaluation.recognition.protocol import RetrievalProtocol
     from evaluation.recognition.retrieval import Retrieval, retrieve
     from evaluation.sequences import Sequence, open_sequence
-    from evaluation.support.errors import InputError
 
 __all__ = [
     "InputError",
@@ -57,25 +58,25 @@ __all__ = [
 
 # Module -> what it gives.
 _HOMES = {
-    "change.tcr": ("TemporalChange", "covered", "temporal_change"),
-    "maps.voxel_maps": ("VoxelMap", "map_sequence", "voxelise"),
-    "methods": (
+    "cns_drake.base.errors": ("InputError",),
+    "evaluation.change.tcr": ("TemporalChange", "covered", "temporal_change"),
+    "evaluation.maps.voxel_maps": ("VoxelMap", "map_sequence", "voxelise"),
+    "evaluation.methods": (
         "Method",
         "MethodConfig",
         "known_methods",
         "make_method",
         "register",
     ),
-    "recognition.metrics": (
+    "evaluation.recognition.metrics": (
         "PlaceRecognitionMetrics",
         "QueryOutcomes",
         "evaluate",
         "judge",
     ),
-    "recognition.protocol": ("RetrievalProtocol",),
-    "recognition.retrieval": ("Retrieval", "retrieve"),
-    "sequences": ("Sequence", "open_sequence"),
-    "support.errors": ("InputError",),
+    "evaluation.recognition.protocol": ("RetrievalProtocol",),
+    "evaluation.recognition.retrieval": ("Retrieval", "retrieve"),
+    "evaluation.sequences": ("Sequence", "open_sequence"),
 }
 
 # Python prefers a package to a folder without `__init__`. One of the user's
@@ -86,7 +87,7 @@ __path__ = extend_path(__path__, __name__)
 def __getattr__(name: str) -> Any:
     for home, names in _HOMES.items():
         if name in names:
-            module = importlib.import_module(f"{__name__}.{home}")
+            module = importlib.import_module(home)
             return getattr(module, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 

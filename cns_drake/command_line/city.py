@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
+from cns_drake.base.interrupts import uninterrupted
+from cns_drake.base.terminal import note
 from cns_drake.command_line.options import Jobs
-from evaluation.support.interrupts import uninterrupted
-from evaluation.support.terminal import note
 
 
 def city(
@@ -91,9 +91,9 @@ def _calibrate(
     folder: Path, earlier: str, later: str, jobs: int | None
 ) -> None:
     with uninterrupted():  # Only who calibrates needs the evaluation.
+        from cns_drake.base.jobs.cluster import choose_cluster
         from cns_drake.scenarios.scenario import load_scenario
         from cns_drake.studies.knob_effects import effect_lines, knob_effects
-        from evaluation.jobs.cluster import choose_cluster
 
     first, last = (
         load_scenario(folder / f"sequence_{stage}.yaml")

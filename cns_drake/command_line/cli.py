@@ -6,19 +6,19 @@ Everything slow to import is imported by the command that needs it, so that
 
 from __future__ import annotations
 
+from cns_drake.base import terminal
+from cns_drake.base.terminal import example
 from cns_drake.command_line.city import city
-from cns_drake.command_line.families import trend
 from cns_drake.command_line.importing import import_city
 from cns_drake.command_line.listing import list_sequences
 from cns_drake.command_line.recorded import export, repair
+from cns_drake.command_line.reproducing import reproduce
 from cns_drake.command_line.simulating import (
     generate,
-    reproduce,
     scan,
     simulate,
 )
-from evaluation.support import terminal
-from evaluation.support.terminal import example
+from cns_drake.command_line.trends import trend
 
 app = terminal.make_program(
     "cns-drake",

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 from rich.progress import Progress, TaskID
 
+from cns_drake.base.progress_bars import count_progress
 from cns_drake.recording.frame_clock import FRAME_PERIOD
-from evaluation.support.progress_bars import count_progress
 
 
 def frame_progress(

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.interrupts import uninterrupted
+from cns_drake.base.terminal import note, print_rows
 from cns_drake.imports.building_years import Undated
 from cns_drake.imports.import_report import DriveOn, ImportOptions
-from evaluation.support.errors import InputError
-from evaluation.support.interrupts import uninterrupted
-from evaluation.support.terminal import note, print_rows
 
 if TYPE_CHECKING:
     from cns_drake.imports.import_report import ImportReport

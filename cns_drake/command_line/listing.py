@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evaluation.support.errors import InputError
-from evaluation.support.interrupts import uninterrupted
-from evaluation.support.terminal import note
+from cns_drake.base.errors import InputError
+from cns_drake.base.interrupts import uninterrupted
+from cns_drake.base.terminal import note
 
 if TYPE_CHECKING:
     from cns_drake.scenarios.sequence_table import SequenceRow

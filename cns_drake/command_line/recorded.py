@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from evaluation.support.interrupts import uninterrupted
-from evaluation.support.progress_bars import count_progress, show_progress
+from cns_drake.base.interrupts import uninterrupted
+from cns_drake.base.progress_bars import count_progress, show_progress
 
 
 class ExportFormat(str, Enum):

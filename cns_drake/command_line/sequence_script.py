@@ -5,6 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from cns_drake.base import terminal
+from cns_drake.base.interrupts import uninterrupted
+from cns_drake.base.progress_bars import print_note, show_progress
 from cns_drake.command_line.frame_progress import frame_progress
 from cns_drake.command_line.options import (
     Frames,
@@ -14,9 +17,6 @@ from cns_drake.command_line.options import (
     Overwrite,
     Recording,
 )
-from evaluation.support import terminal
-from evaluation.support.interrupts import uninterrupted
-from evaluation.support.progress_bars import print_note, show_progress
 
 if TYPE_CHECKING:
     from cns_drake.simulation.simulation import Run
@@ -54,9 +54,9 @@ def run_sequence(
         run_sequence("downtown_01", Path("recordings"), frames=20)
     """
     with uninterrupted():  # Slow to import, not needed for `--help`.
+        from cns_drake.base.processors import num_cores
         from cns_drake.scenarios.scenario import load_scenario
         from cns_drake.simulation.simulation import simulate
-        from evaluation.support.processors import num_cores
 
     scenario = load_scenario(name_or_file)
     if lidar is not None:

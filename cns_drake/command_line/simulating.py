@@ -1,4 +1,4 @@
-"""Commands that simulate: one sequence, one scan, many sequences, a study."""
+"""Commands that simulate: one sequence, one scan, many sequences."""
 
 from __future__ import annotations
 
@@ -7,6 +7,9 @@ from typing import Annotated
 
 import typer
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.interrupts import uninterrupted
+from cns_drake.base.terminal import note
 from cns_drake.command_line.families import family_members
 from cns_drake.command_line.options import (
     LIDAR_OPTION,
@@ -19,11 +22,6 @@ from cns_drake.command_line.options import (
     Recording,
     Scheduler,
 )
-from evaluation.command_line.protocol_options import Costs, with_protocol
-from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.support.errors import InputError
-from evaluation.support.interrupts import uninterrupted
-from evaluation.support.terminal import note
 
 
 def simulate(
@@ -142,10 +140,10 @@ def generate(
     Finished ones are skipped, interrupted ones go on where they were.
     """
     with uninterrupted():
+        from cns_drake.base.jobs.cluster import choose_cluster
         from cns_drake.scenarios.scenario import load_scenario
         from cns_drake.scenarios.shipped import recordable_sequences
         from cns_drake.studies.recording_jobs import record_all
-        from evaluation.jobs.cluster import choose_cluster
 
     cluster = choose_cluster(jobs, scheduler)
     if not names and vary is None:
@@ -158,54 +156,3 @@ def generate(
     record_all(scenarios, output, cluster, overwrite=overwrite)
     for scenario in scenarios:
         typer.echo(output / scenario.name)
-
-
-@with_protocol
-def reproduce(
-    maps: Annotated[
-        list[str] | None,
-        typer.Argument(
-            metavar="MAP",
-            help="Which maps, by name or folder; all shipped ones by default.",
-        ),
-    ] = None,
-    *,
-    output: Output,
-    jobs: Jobs = None,
-    scheduler: Scheduler = None,
-    pages: Annotated[
-        bool | None,
-        typer.Option(
-            "--pages/--no-pages",
-            help="Also make a web page of each drive; by default, unless "
-            "--quick is given.",
-        ),
-    ] = None,
-    quick: Annotated[
-        bool,
-        typer.Option(
-            "--quick",
-            help="The report alone: simulate without recording.",
-        ),
-    ] = False,
-    costs: Costs = True,
-    protocol: RetrievalProtocol,
-) -> None:
-    """Simulate a map, evaluate it and report."""
-    with uninterrupted():
-        from cns_drake.studies.reproduction import reproduce_maps
-        from evaluation.jobs.cluster import choose_cluster
-
-    cluster = choose_cluster(jobs, scheduler)
-    if quick and pages:
-        raise InputError("--quick and --pages: give one of them")
-    report = reproduce_maps(
-        maps,
-        output,
-        cluster,
-        with_pages=pages is not False,
-        quick=quick,
-        protocol=protocol,
-        with_costs=costs,
-    )
-    typer.echo(report)

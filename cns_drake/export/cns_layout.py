@@ -11,6 +11,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 import yaml
 
+from cns_drake.base.cloud_writing import encode_pcd
+from cns_drake.base.recordings.mcap_sequence import McapSequence
 from cns_drake.export.drive_layout import (
     Layout,
     checked_name,
@@ -18,8 +20,6 @@ from cns_drake.export.drive_layout import (
     scenario_files,
     unit_quaternions,
 )
-from evaluation.clouds.cloud_writing import encode_pcd
-from evaluation.sequences.mcap_sequence import McapSequence
 
 
 def _drive_folder(sequence: McapSequence) -> PurePosixPath:

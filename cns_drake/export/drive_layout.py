@@ -10,10 +10,10 @@ import re
 
 import numpy as np
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.poses import FARTHEST
+from cns_drake.base.recordings.mcap_sequence import McapSequence
 from cns_drake.recording.rosbag2_metadata import to_yaml
-from evaluation.geometry.poses import FARTHEST
-from evaluation.sequences.mcap_sequence import McapSequence
-from evaluation.support.errors import InputError
 
 # What may become the name of a folder: nothing that leads out of it.
 _NAME = re.compile(r"\w[\w.-]*")

@@ -12,20 +12,20 @@ import os
 from pathlib import Path
 import shutil
 
-from cns_drake.export.cns_layout import CNS
-from cns_drake.export.drive_layout import Layout
-from cns_drake.export.kitti_layout import KITTI
-from cns_drake.export.tum_layout import TUM
-from cns_drake.recording.rosbag2_metadata import to_yaml
-from evaluation.sequences.mcap_sequence import McapSequence, holds_mcap
-from evaluation.support.errors import InputError
-from evaluation.support.files import (
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import (
     complete_part,
     part_path,
     user_errors,
     write_part,
 )
-from evaluation.support.yaml_files import read_yaml
+from cns_drake.base.recordings.mcap_sequence import McapSequence, holds_mcap
+from cns_drake.base.yaml_files import read_yaml
+from cns_drake.export.cns_layout import CNS
+from cns_drake.export.drive_layout import Layout
+from cns_drake.export.kitti_layout import KITTI
+from cns_drake.export.tum_layout import TUM
+from cns_drake.recording.rosbag2_metadata import to_yaml
 
 _LAYOUTS = {"cns": CNS, "kitti": KITTI, "tum": TUM}
 _MARKER = "export.yaml"

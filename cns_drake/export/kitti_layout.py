@@ -12,6 +12,9 @@ import re
 
 import numpy as np
 
+from cns_drake.base import poses
+from cns_drake.base.cloud_writing import encode_bin, encode_labels
+from cns_drake.base.recordings.mcap_sequence import McapSequence
 from cns_drake.export.drive_layout import (
     Layout,
     join_rows,
@@ -19,9 +22,6 @@ from cns_drake.export.drive_layout import (
     seconds,
     structure_files,
 )
-from evaluation.clouds.cloud_writing import encode_bin, encode_labels
-from evaluation.geometry import poses
-from evaluation.sequences.mcap_sequence import McapSequence
 
 _X_CS = np.array(
     [

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.recordings.mcap_sequence import McapSequence
+from cns_drake.base.recordings.scenario_file import read_scenario
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.scene.semantics import MOVING_IDS, OTHER_MOVING_ID
 from cns_drake.scene.structure_table import load_structure_table
 from cns_drake.scene.world import load_world, structures_in
-from evaluation.sequences.mcap_sequence import McapSequence
-from evaluation.sequences.scan_files import read_scenario
-from evaluation.support.errors import InputError
 
 
 class MarkedSequence(McapSequence):

@@ -11,13 +11,13 @@ from pathlib import PurePosixPath
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from cns_drake.base.recordings.mcap_sequence import McapSequence
 from cns_drake.export.drive_layout import (
     Layout,
     checked_name,
     seconds,
     unit_quaternions,
 )
-from evaluation.sequences.mcap_sequence import McapSequence
 
 
 def _drive_folder(sequence: McapSequence) -> PurePosixPath:

@@ -8,7 +8,7 @@ from itertools import pairwise
 import re
 from typing import Any
 
-from evaluation.support.errors import InputError
+from cns_drake.base.errors import InputError
 
 # The usual attributes, small letters, most telling first: 3DBAG, CityGML,
 # 3D BAG's forerunners, OpenStreetMap.

@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import check_regular
+from cns_drake.base.json_text import parse_json
 from cns_drake.imports.import_faults import ImportFaults
-from evaluation.support.errors import InputError
-from evaluation.support.files import check_regular
-from evaluation.support.json_text import parse_json
 
 # A face: the corners (N, 3) of its outer ring, then those of its holes.
 Face = list[np.ndarray]

@@ -14,6 +14,8 @@ import numpy as np
 from shapely.geometry import Point
 import yaml
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import part_path, user_errors
 from cns_drake.city.generation.generate import (
     MAX_STRUCTURES,
     TABLE_NAME,
@@ -44,8 +46,6 @@ from cns_drake.imports.opendrive.town_files import write_town
 from cns_drake.imports.openstreetmap import import_openstreetmap
 from cns_drake.imports.overview import draw_overview
 from cns_drake.imports.street_drives import find_street_drives
-from evaluation.support.errors import InputError
-from evaluation.support.files import part_path, user_errors
 
 # Of flat things on the ground every such corner helps to find its height.
 _EVERY_CORNER = 7

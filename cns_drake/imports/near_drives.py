@@ -11,6 +11,7 @@ import shapely
 from shapely.geometry import MultiLineString
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.base.errors import InputError
 from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.structures import MeshShape
 from cns_drake.imports.drive_search import FreeDrive
@@ -20,7 +21,6 @@ from cns_drake.motion.path_geometry import SmoothPath
 from cns_drake.motion.trajectory import POINT_SPACING
 from cns_drake.roads.u_turn import TIGHTEST_RADIUS
 from cns_drake.roads.waypoints import load_waypoint_path, read_waypoints
-from evaluation.support.errors import InputError
 
 
 def drive_along(path: Path) -> FreeDrive:

@@ -12,6 +12,7 @@ import numpy as np
 from shapely.geometry import LineString, Point, Polygon
 from shapely.strtree import STRtree
 
+from cns_drake.base.errors import InputError
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.plants.vegetation import tree
 from cns_drake.imports.building_years import construction_year
@@ -43,7 +44,6 @@ from cns_drake.imports.osm_tags import (
     heights,
     length,
 )
-from evaluation.support.errors import InputError
 
 # Of the Earth, WGS 84 [m].
 _SEMI_MAJOR = 6378137.0

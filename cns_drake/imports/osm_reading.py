@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from shapely.geometry import Polygon
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import check_regular
 from cns_drake.imports.import_faults import ImportFaults
-from evaluation.support.errors import InputError
-from evaluation.support.files import check_regular
 
 Tags = Mapping[str, str]
 

@@ -10,14 +10,14 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 import numpy as np
 
-from cns_drake.pictures.stage_scene import StageScene, View
-from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario import Scenario
-from evaluation.support.files import (
+from cns_drake.base.files import (
     complete_part,
     part_path,
     user_errors,
 )
+from cns_drake.pictures.stage_scene import StageScene, View
+from cns_drake.scenarios.planning import plan_drive
+from cns_drake.scenarios.scenario import Scenario
 
 _WIDTH, _HEIGHT = 800, 800
 # What is shown beyond the routes [m].

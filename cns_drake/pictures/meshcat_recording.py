@@ -11,13 +11,13 @@ from pydrake.geometry import QueryObject
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
+from cns_drake.base.files import complete_part, write_part
 from cns_drake.pictures.drive_page import (
     Drive,
     make_drive_page,
     moving_frames,
 )
 from cns_drake.scene.world import World
-from evaluation.support.files import complete_part, write_part
 
 # Together they keep a page below 25 MB, however long the drive.
 _MAX_SCANS = 160

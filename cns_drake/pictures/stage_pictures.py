@@ -8,19 +8,19 @@ from matplotlib.figure import Figure
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from cns_drake.pictures.stage_scene import StageScene, View
-from cns_drake.recording.frame_clock import FRAME_PERIOD
-from cns_drake.sensors.lidar_presets import make_beam_pattern
-from evaluation.support.errors import (
+from cns_drake.base.errors import (
     InputError,
     describe_validation_error,
 )
-from evaluation.support.files import (
+from cns_drake.base.files import (
     complete_part,
     part_path,
     user_errors,
 )
-from evaluation.support.yaml_files import read_yaml
+from cns_drake.base.yaml_files import read_yaml
+from cns_drake.pictures.stage_scene import StageScene, View
+from cns_drake.recording.frame_clock import FRAME_PERIOD
+from cns_drake.sensors.lidar_presets import make_beam_pattern
 
 _WIDTH, _HEIGHT = 960, 540
 # Height of the LiDAR below the camera's mast [m].

@@ -11,7 +11,7 @@ import zlib
 import numpy as np
 from pydrake.geometry import Meshcat
 
-from evaluation.support.files import complete_part, user_errors, write_part
+from cns_drake.base.files import complete_part, user_errors, write_part
 
 # Higher levels take many times as long for a few percent.
 _LEVEL = 6

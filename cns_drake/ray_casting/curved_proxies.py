@@ -10,6 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from cns_drake.base.compiled import compiled
 from cns_drake.ray_casting.ray_groups import RayGroup
 from cns_drake.scene.surface_merging import tessellate
 from cns_drake.scene.surfaces import (
@@ -19,7 +20,6 @@ from cns_drake.scene.surfaces import (
     HalfSpaceSurface,
     TriangleSurface,
 )
-from evaluation.support.compiled import compiled
 
 CurvedSurface = EllipsoidSurface | CylinderSurface | CapsuleSurface
 

@@ -13,9 +13,9 @@ from numba import types
 from numba.extending import intrinsic
 import numpy as np
 
+from cns_drake.base.compiled import compiled
 from cns_drake.ray_casting.embree import INVALID_ID
 from cns_drake.ray_casting.foreign_calls import POINTER, void_call
-from evaluation.support.compiled import compiled
 
 if TYPE_CHECKING:
     from cns_drake.ray_casting.rays import Hits, Rays

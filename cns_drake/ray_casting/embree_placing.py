@@ -12,9 +12,9 @@ from numba import types
 from numba.extending import intrinsic
 import numpy as np
 
+from cns_drake.base.compiled import compiled
 from cns_drake.ray_casting.embree import FLOAT3X4_ROW_MAJOR
 from cns_drake.ray_casting.foreign_calls import NUMBER, POINTER, void_call
-from evaluation.support.compiled import compiled
 
 
 @intrinsic  # type: ignore[untyped-decorator]  # numba has no hints.

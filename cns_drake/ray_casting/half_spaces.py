@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from evaluation.support.compiled import compiled
+from cns_drake.base.compiled import compiled
 
 if TYPE_CHECKING:
     from cns_drake.ray_casting.ray_groups import RayGroup

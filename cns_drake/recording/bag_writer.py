@@ -22,7 +22,14 @@ from typing import Any, NamedTuple
 from mcap.records import Channel, Message
 from mcap.writer import CompressionType, Writer
 
-from cns_drake import __version__
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import (
+    complete_part,
+    part_path,
+    user_errors,
+    write_part,
+)
+from cns_drake.base.version import __version__
 from cns_drake.recording import messages
 from cns_drake.recording.mcap_recovery import Fault, read_records
 from cns_drake.recording.part_file import PartFile
@@ -33,13 +40,6 @@ from cns_drake.recording.rosbag2_metadata import (
     make_qos_yaml,
     make_topic_metadata,
     to_yaml,
-)
-from evaluation.support.errors import InputError
-from evaluation.support.files import (
-    complete_part,
-    part_path,
-    user_errors,
-    write_part,
 )
 
 _CHUNK_BYTES = 1024 * 1024

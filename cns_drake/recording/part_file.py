@@ -7,7 +7,7 @@ import fcntl
 import os
 from pathlib import Path
 
-from evaluation.support.errors import InputError
+from cns_drake.base.errors import InputError
 
 
 class PartFile:

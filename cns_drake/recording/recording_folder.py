@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from evaluation.support.errors import InputError
-from evaluation.support.files import part_path, user_errors
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import part_path, user_errors
 
 
 class RecordingFolder:

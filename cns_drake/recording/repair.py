@@ -22,20 +22,20 @@ from mcap.records import (
 )
 from mcap.writer import CompressionType, Writer
 
-from cns_drake import __version__
-from cns_drake.recording.mcap_recovery import Fault, read_records
-from cns_drake.recording.rosbag2_metadata import (
-    TopicMetadata,
-    make_bag_information,
-    to_yaml,
-)
-from evaluation.support.errors import InputError
-from evaluation.support.files import (
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import (
     check_regular,
     check_writable,
     complete_part,
     part_path,
     user_errors,
+)
+from cns_drake.base.version import __version__
+from cns_drake.recording.mcap_recovery import Fault, read_records
+from cns_drake.recording.rosbag2_metadata import (
+    TopicMetadata,
+    make_bag_information,
+    to_yaml,
 )
 
 # Schemas and channels are kept in memory; more of them is no recording.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from evaluation.support.errors import InputError
+from cns_drake.base.errors import InputError
 
 # A path must be longer than this for a trajectory to be made of it [m].
 _MIN_LENGTH = 20.0

@@ -14,6 +14,7 @@ from shapely import STRtree
 from shapely.geometry import MultiPolygon
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.base.errors import InputError
 from cns_drake.roads import carriageway
 from cns_drake.roads.centreline import Centreline, blend
 from cns_drake.roads.road import DIRECTIONS, ENDS, End, LaneRef, Road
@@ -22,7 +23,6 @@ from cns_drake.roads.road_schema import (
     RoadsFile,
     read_roads_file,
 )
-from evaluation.support.errors import InputError
 
 Turn = Literal["left", "straight", "right"]
 

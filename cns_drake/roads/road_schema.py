@@ -7,11 +7,11 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError
 
-from evaluation.support.errors import (
+from cns_drake.base.errors import (
     InputError,
     describe_validation_error,
 )
-from evaluation.support.yaml_files import read_yaml
+from cns_drake.base.yaml_files import read_yaml
 
 # A town is not larger, nor anything in it wider [m].
 _LARGEST = 100_000.0

@@ -7,11 +7,11 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, RootModel, Strict
 
+from cns_drake.base.errors import InputError
 from cns_drake.roads.lane_path import LanePath, sample_lane_path
 from cns_drake.roads.network import RoadNetwork
 from cns_drake.roads.road import Direction, LaneRef, Road
 from cns_drake.roads.u_turn import find_loop
-from evaluation.support.errors import InputError
 
 # Distance between the points from which the path is interpolated [m].
 _DENSE_SPACING = 0.25

@@ -6,6 +6,7 @@ from collections import Counter, defaultdict
 
 import numpy as np
 
+from cns_drake.base.errors import InputError
 from cns_drake.roads.network import RoadNetwork
 from cns_drake.roads.road import LaneRef
 from cns_drake.roads.route import (
@@ -13,7 +14,6 @@ from cns_drake.roads.route import (
     Route,
     RouteLeg,
 )
-from evaluation.support.errors import InputError
 
 # How strongly roads that were driven before are avoided.
 _WEIGHT_OF_NEW = 6.0

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
+from cns_drake.base.csv_files import read_rows
+from cns_drake.base.errors import InputError
 from cns_drake.roads.centreline import Centreline
 from cns_drake.roads.lane_path import (
     LanePath,
@@ -16,8 +18,6 @@ from cns_drake.roads.lane_path import (
     sample_lane_path,
 )
 from cns_drake.roads.u_turn import LOOP_RADIUS, loop_corners
-from evaluation.support.csv_files import read_rows
-from evaluation.support.errors import InputError
 
 # Corners are rounded by arcs of this radius, or what fits between the
 # neighbouring waypoints [m].

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from cns_drake.base.errors import InputError
 from cns_drake.motion.trajectory import POINT_SPACING, Trajectory
 from cns_drake.recording.frame_clock import frames_within
 from cns_drake.roads.network import load_road_network
@@ -9,7 +10,6 @@ from cns_drake.roads.route import make_lane_path
 from cns_drake.roads.u_turn import TIGHTEST_RADIUS
 from cns_drake.roads.waypoints import load_waypoint_path
 from cns_drake.scenarios.scenario import Scenario
-from evaluation.support.errors import InputError
 
 
 def plan_drive(scenario: Scenario) -> Trajectory:

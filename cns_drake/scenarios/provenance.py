@@ -11,10 +11,10 @@ from pathlib import Path
 import platform
 import re
 
-from cns_drake import __version__
+from cns_drake.base.files import user_errors
+from cns_drake.base.version import __version__
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.shipped import vehicle_file
-from evaluation.support.files import user_errors
 
 # Whatever can have a say in a message's bytes.
 _PACKAGES = (

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from evaluation.support.csv_files import read_records
-from evaluation.support.errors import InputError
+from cns_drake.base.csv_files import read_records
+from cns_drake.base.errors import InputError
 
 
 def is_on_a_lot(row: Mapping[str, str]) -> bool:

@@ -21,6 +21,11 @@ from pydantic import (
 )
 from pydrake.math import RigidTransform, RollPitchYaw
 
+from cns_drake.base.errors import (
+    InputError,
+    describe_validation_error,
+)
+from cns_drake.base.yaml_files import read_yaml
 from cns_drake.motion.speed_profile import Speeds
 from cns_drake.recording.frame_clock import FRAME_PERIOD
 from cns_drake.roads.route import Route
@@ -32,11 +37,6 @@ from cns_drake.scenarios.shipped import (
 from cns_drake.sensors.beam_pattern import BeamPattern
 from cns_drake.sensors.lidar_presets import LIDAR_PRESETS, make_beam_pattern
 from cns_drake.sensors.measurement import MeasurementModel
-from evaluation.support.errors import (
-    InputError,
-    describe_validation_error,
-)
-from evaluation.support.yaml_files import read_yaml
 
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_]*$")]
 # On a vehicle nothing is farther, and rays are cast in single precision [m].

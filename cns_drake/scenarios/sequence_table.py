@@ -14,15 +14,15 @@ import io
 from pathlib import Path
 import zlib
 
-from cns_drake.scenarios.shipped import sequence_name
-from evaluation.support.csv_files import read_records
-from evaluation.support.errors import InputError
-from evaluation.support.files import (
+from cns_drake.base.csv_files import read_records
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import (
     complete_part,
     user_errors,
     write_part,
 )
-from evaluation.support.yaml_files import read_yaml
+from cns_drake.base.yaml_files import read_yaml
+from cns_drake.scenarios.shipped import sequence_name
 
 TABLE_NAME = "sequences.csv"
 

@@ -27,6 +27,17 @@ from pydantic import (
 )
 import yaml
 
+from cns_drake.base.csv_files import read_records
+from cns_drake.base.errors import (
+    InputError,
+    describe_validation_error,
+)
+from cns_drake.base.files import (
+    complete_part,
+    user_errors,
+    write_part,
+)
+from cns_drake.base.yaml_files import read_yaml
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import Route
 from cns_drake.roads.route_drawing import draw_route
@@ -34,17 +45,6 @@ from cns_drake.scenarios.scattered_loss import draw_losses, is_on_a_lot
 from cns_drake.scenarios.scenario import LidarConfig, Scenario, load_scenario
 from cns_drake.scenarios.shipped import shipped_sequences
 from cns_drake.scene.world import load_world, structures_in
-from evaluation.support.csv_files import read_records
-from evaluation.support.errors import (
-    InputError,
-    describe_validation_error,
-)
-from evaluation.support.files import (
-    complete_part,
-    user_errors,
-    write_part,
-)
-from evaluation.support.yaml_files import read_yaml
 
 # What can be missing; streets, ground and street furniture stay.
 _REMOVABLE = ("building", "vegetation")

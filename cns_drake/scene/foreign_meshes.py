@@ -15,7 +15,7 @@ import sys
 
 import numpy as np
 
-from evaluation.support.libraries import missing_library
+from cns_drake.base.libraries import missing_library
 
 
 class ForeignMeshes:

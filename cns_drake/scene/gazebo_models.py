@@ -8,9 +8,9 @@ from pathlib import Path
 from xml.etree import ElementTree
 from xml.parsers import expat
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import read_bytes
 from cns_drake.scene.model_check import check_model
-from evaluation.support.errors import InputError
-from evaluation.support.files import read_bytes
 
 # Where Gazebo and libsdformat, old and new, look for models.
 _VARIABLES = (

@@ -13,8 +13,8 @@ import math
 from pathlib import Path
 from xml.etree import ElementTree
 
+from cns_drake.base.errors import InputError
 from cns_drake.scene.gazebo_models import ModelFinder, model_file, read_xml
-from evaluation.support.errors import InputError
 
 # In a world, any of these makes it one for Gazebo.
 _SIGNS = (

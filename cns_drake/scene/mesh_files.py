@@ -14,12 +14,12 @@ from pydrake.geometry import (
     ReadObjToTriangleSurfaceMesh,
 )
 
+from cns_drake.base.errors import InputError
 from cns_drake.scene.drake_errors import PARSER_ERRORS, told_by_drake
 from cns_drake.scene.foreign_meshes import ForeignMeshes
 from cns_drake.scene.obj_check import check_obj
 from cns_drake.scene.surfaces import LARGEST_SIZE, TriangleSurface
 from cns_drake.scene.vtk_meshes import read_vtk
-from evaluation.support.errors import InputError
 
 # Formats whose y axis points up. Drake turns them, so that z does.
 _Y_UP = (".gltf", ".glb", ".dae")

@@ -14,10 +14,10 @@ import re
 from typing import NoReturn
 from xml.parsers import expat
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import read_bytes
 from cns_drake.scene.obj_check import check_obj
 from cns_drake.scene.surfaces import LARGEST_SIZE
-from evaluation.support.errors import InputError
-from evaluation.support.files import read_bytes
 
 _MODELS = (".sdf", ".urdf")
 _LONGEST_NAME = 1000

@@ -11,7 +11,7 @@ import re
 
 import numpy as np
 
-from evaluation.support.files import read_bytes
+from cns_drake.base.files import read_bytes
 
 _LIMIT_BYTES = 1 << 28
 _VERTEX = re.compile(rb"^[ \t]*v[ \t]", re.MULTILINE)

@@ -25,6 +25,7 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform
 
+from cns_drake.base.errors import InputError
 from cns_drake.scene.foreign_meshes import ForeignMeshes
 from cns_drake.scene.mesh_files import MeshFiles, mesh_key
 from cns_drake.scene.surfaces import (
@@ -36,7 +37,6 @@ from cns_drake.scene.surfaces import (
     Surface,
     TriangleSurface,
 )
-from evaluation.support.errors import InputError
 
 # The corners of a unit cube and its faces, counter-clockwise from outside.
 _CUBE_CORNERS = np.array(

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from cns_drake.base.csv_files import read_records
+from cns_drake.base.errors import InputError
 from cns_drake.scene.semantics import CLASS_IDS
-from evaluation.support.csv_files import read_records
-from evaluation.support.errors import InputError
 
 _MAX_INSTANCE = 2**16 - 1
 

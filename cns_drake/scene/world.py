@@ -12,6 +12,8 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import read_bytes
 from cns_drake.scene.drake_errors import PARSER_ERRORS, told_by_drake
 from cns_drake.scene.gazebo_models import read_xml
 from cns_drake.scene.gazebo_worlds import is_gazebo_world, simplify_world
@@ -21,8 +23,6 @@ from cns_drake.scene.structure_table import (
     StructureTable,
     load_structure_table,
 )
-from evaluation.support.errors import InputError
-from evaluation.support.files import read_bytes
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evaluation.support.compiled import compiled
+from cns_drake.base.compiled import compiled
 
 
 class BeamTable(NamedTuple):

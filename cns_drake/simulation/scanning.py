@@ -8,21 +8,21 @@ from pathlib import Path
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cns_drake.scene.world import World
-from cns_drake.sensors.beam_pattern import BeamPattern
-from cns_drake.sensors.lidar import Lidar
-from cns_drake.simulation.still_world import make_still_world
-from evaluation.clouds.cloud_writing import (
+from cns_drake.base.cloud_writing import (
     encode_bin,
     encode_pcd,
     to_xyzi,
 )
-from evaluation.support.errors import InputError
-from evaluation.support.files import (
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import (
     complete_part,
     part_path,
     user_errors,
 )
+from cns_drake.scene.world import World
+from cns_drake.sensors.beam_pattern import BeamPattern
+from cns_drake.sensors.lidar import Lidar
+from cns_drake.simulation.still_world import make_still_world
 
 
 def scan_world(

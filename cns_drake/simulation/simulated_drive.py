@@ -13,7 +13,9 @@ from functools import cached_property
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cns_drake import __version__
+from cns_drake.base import poses
+from cns_drake.base.recordings.sequence import Sequence
+from cns_drake.base.version import __version__
 from cns_drake.motion.sweep import Sweep
 from cns_drake.motion.trajectory import pose_at
 from cns_drake.recording.frame_clock import FRAME_PERIOD, frame_stamp_ns
@@ -27,8 +29,6 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar import Lidar
 from cns_drake.simulation.still_world import make_still_world
-from evaluation.geometry import poses
-from evaluation.sequences import Sequence
 
 
 @dataclass(frozen=True)

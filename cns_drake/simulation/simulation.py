@@ -12,7 +12,14 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
-from cns_drake import __version__
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import (
+    check_writable,
+    complete_part,
+    write_part,
+)
+from cns_drake.base.interrupts import interrupts_wait
+from cns_drake.base.version import __version__
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.pictures.meshcat_recording import MeshcatRecorder
 from cns_drake.recording.background_writer import BackgroundWriter
@@ -35,13 +42,6 @@ from cns_drake.scenarios.provenance import (
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scene.world import World
 from cns_drake.simulation.station import load_stage, make_station
-from evaluation.support.errors import InputError
-from evaluation.support.files import (
-    check_writable,
-    complete_part,
-    write_part,
-)
-from evaluation.support.interrupts import interrupts_wait
 
 # Reports that so many frames of so many are done.
 ProgressCallback = Callable[[int, int], None]

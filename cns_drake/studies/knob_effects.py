@@ -13,20 +13,20 @@ from pathlib import Path
 import shutil
 import tempfile
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.city.generation.city_structures import City, make_city
 from cns_drake.city.generation.generate import render_stages
 from cns_drake.city.generation.sdf import MESH_FOLDER
 from cns_drake.city.plan.stages import Stage, Stages, load_stages
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.simulation.simulated_drive import SimulatedDrive
-from evaluation.jobs.cluster import Cluster
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.trend_points import (
     Asked,
     TrendPoint,
     measure_drives,
 )
-from evaluation.support.errors import InputError
 
 _AS_IT_IS = "as_it_is"
 # Variant of the earlier stage -> what a reader is told.

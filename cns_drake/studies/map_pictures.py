@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from cns_drake import __version__
+from cns_drake.base.interrupts import uninterrupted
+from cns_drake.base.jobs.running import Job, Tell
+from cns_drake.base.version import __version__
 from cns_drake.scenarios.provenance import digest_file, digest_inputs
 from cns_drake.scenarios.scenario import Scenario, load_scenario
 from cns_drake.scenarios.shipped import sequences_of_map
-from evaluation.jobs.running import Job, Tell
 from evaluation.study.parts import is_current, write_part
-from evaluation.support.interrupts import uninterrupted
 
 # Expected time to draw a stage [s].
 _STAGE_COST = 10.0

@@ -7,6 +7,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 import sys
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import make_folder
+from cns_drake.base.interrupts import uninterrupted
+from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.running import Job, Tell, run_jobs
+from cns_drake.base.yaml_files import read_yaml
 from cns_drake.recording.frame_clock import frames_within
 from cns_drake.recording.recording_folder import RecordingFolder
 from cns_drake.scenarios.planning import plan_drive
@@ -16,12 +22,6 @@ from cns_drake.scenarios.provenance import (
     digest_inputs,
 )
 from cns_drake.scenarios.scenario import Scenario, make_scenario
-from evaluation.jobs.cluster import Cluster
-from evaluation.jobs.running import Job, Tell, run_jobs
-from evaluation.support.errors import InputError
-from evaluation.support.files import make_folder
-from evaluation.support.interrupts import uninterrupted
-from evaluation.support.yaml_files import read_yaml
 
 # Expected time to load a stage, and to simulate a frame with the default
 # LiDAR [s]; how many frames a drive has that does not say.

@@ -13,14 +13,14 @@ import shutil
 
 import yaml
 
-from cns_drake import __version__
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import make_folder, part_path, user_errors
+from cns_drake.base.interrupts import uninterrupted
+from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.running import Job, Tell, run_jobs
+from cns_drake.base.version import __version__
+from cns_drake.base.yaml_files import read_yaml
 from cns_drake.city.plan.city_plan import load_plan
-from evaluation.jobs.cluster import Cluster
-from evaluation.jobs.running import Job, Tell, run_jobs
-from evaluation.support.errors import InputError
-from evaluation.support.files import make_folder, part_path, user_errors
-from evaluation.support.interrupts import uninterrupted
-from evaluation.support.yaml_files import read_yaml
 
 # How each input that is written here begins.
 _MARK = b"# Of a city drawn anew by cns-drake"

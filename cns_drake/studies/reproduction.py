@@ -6,6 +6,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import make_folder
+from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.running import run_jobs
 from cns_drake.scenarios.scenario import Scenario, load_scenario
 from cns_drake.scenarios.shipped import sequences_of_map, shipped_maps
 from cns_drake.simulation.simulated_drive import SimulatedDrive
@@ -14,8 +18,6 @@ from cns_drake.studies.recording_jobs import (
     is_recorded,
     plan_recordings,
 )
-from evaluation.jobs.cluster import Cluster
-from evaluation.jobs.running import run_jobs
 from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,
     RetrievalProtocol,
@@ -23,8 +25,6 @@ from evaluation.recognition.protocol import (
 from evaluation.study.assembly import assemble
 from evaluation.study.collection import RecordingInfo
 from evaluation.study.plan import plan_study
-from evaluation.support.errors import InputError
-from evaluation.support.files import make_folder
 
 
 def reproduce_maps(

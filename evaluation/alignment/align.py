@@ -20,6 +20,10 @@ from typing import Literal
 
 import numpy as np
 
+from cns_drake.base import poses
+from cns_drake.base.errors import InputError
+from cns_drake.base.progress import Track, silent
+from cns_drake.base.recordings.sequence import Sequence, check_same_map
 from evaluation.alignment.alignment_report import AlignmentReport
 from evaluation.alignment.anchor_search import (
     find_candidates,
@@ -42,11 +46,7 @@ from evaluation.alignment.straightening import (
     make_consistent,
 )
 from evaluation.alignment.submaps import Submaps
-from evaluation.geometry import poses
 from evaluation.sequences.moved import MovedSequence
-from evaluation.sequences.sequence import Sequence, check_same_map
-from evaluation.support.errors import InputError
-from evaluation.support.progress import Track, silent
 
 When = Literal["auto", "always", "never"]
 

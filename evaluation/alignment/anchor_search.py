@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cns_drake.base.progress import Track
 from evaluation.alignment.submaps import Submaps
 from evaluation.methods.scan_context import ScanContext
 from evaluation.sequences.sampling import gather
-from evaluation.support.progress import Track
 
 # Candidates a query. LT-mapper takes 3, if they score 0.7 at least; here they
 # need not score, since in a changed city right ones score 0.3 to 0.5, and

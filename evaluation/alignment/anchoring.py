@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from cns_drake.base import poses
 from evaluation.alignment.loops import Loop, implied_poses, loop_errors
 from evaluation.alignment.pose_graph import FIXED, Ties, optimise
 from evaluation.alignment.submaps import Submaps
-from evaluation.geometry import poses
 
 # Loops that agree with an anchor [m, rad].
 AGREEMENT = (1.0, np.radians(2.0))

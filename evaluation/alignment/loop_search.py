@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from cns_drake.base import poses
+from cns_drake.base.progress import Track
 from evaluation.alignment.loops import Loop, close
 from evaluation.alignment.submaps import Submaps
-from evaluation.geometry import poses
-from evaluation.support.progress import Track
 
 # Keyframes that see the same are this close, seen from above [m].
 SAME_PLACE = 10.0

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from cns_drake.base import poses
 from evaluation.alignment.registration import register
 from evaluation.alignment.submaps import Submaps
-from evaluation.geometry import poses
 
 # What of two submaps must have a counterpart, over all and of upright things.
 # In a simulated city that lost three quarters of its buildings, trees and

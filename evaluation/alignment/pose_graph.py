@@ -16,7 +16,7 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 from scipy.spatial.transform import Rotation
 
-from evaluation.geometry import poses
+from cns_drake.base import poses
 
 # A pose that is not varied.
 FIXED = -1

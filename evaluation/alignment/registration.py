@@ -14,9 +14,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from evaluation.geometry import poses
+from cns_drake.base import poses
+from cns_drake.base.compiled import compiled
 from evaluation.geometry.neighbours import nearest_neighbours
-from evaluation.support.compiled import compiled
 
 # Neighbours, the point among them, that a normal is fitted to.
 NUM_NEIGHBOURS = 10

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cns_drake.base.progress import Track
+from cns_drake.base.recordings.sequence import Sequence
 from evaluation.alignment.anchoring import straighten
 from evaluation.alignment.loop_search import find_self_loops
 from evaluation.alignment.loops import loop_errors
 from evaluation.alignment.submaps import Submaps
 from evaluation.sequences.moved import MovedSequence
-from evaluation.sequences.sequence import Sequence
-from evaluation.support.progress import Track
 
 # Pairs that are tried; how many must fit, so that no chance one bends a drive;
 # and how often, if the drive has drifted.

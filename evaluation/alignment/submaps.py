@@ -6,11 +6,11 @@ from functools import lru_cache
 
 import numpy as np
 
+from cns_drake.base import poses
+from cns_drake.base.recordings.sequence import Sequence
 from evaluation.alignment.registration import Surface, make_surface
-from evaluation.geometry import poses
 from evaluation.maps.voxel_maps import VoxelAccumulator
 from evaluation.sequences.sampling import sample_frames
-from evaluation.sequences.sequence import Sequence
 
 # Between keyframes, along the path [m]; on very long drives more, on very
 # short ones less.

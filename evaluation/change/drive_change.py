@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.progress import Track, silent
 from evaluation.change.tcr import (
     COVERAGE_RADIUS,
     TAU,
@@ -35,8 +37,6 @@ from evaluation.sequences import (
     check_same_world,
     open_sequence,
 )
-from evaluation.support.errors import InputError
-from evaluation.support.progress import Track, silent
 
 if TYPE_CHECKING:
     from evaluation.alignment import AlignmentReport, When

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
+from cns_drake.base import points as point_arrays
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import check_regular
+from cns_drake.base.points import check_near
+from cns_drake.base.poses import FARTHEST
 from evaluation.clouds.pcd import read_pcd
 from evaluation.clouds.ply import read_ply
 from evaluation.clouds.record_blocks import check_size, read_binary
-from evaluation.geometry import points as point_arrays
-from evaluation.geometry.points import check_near
-from evaluation.geometry.poses import FARTHEST
-from evaluation.support.errors import InputError
-from evaluation.support.files import check_regular
 
 # Of a file and how many points to yield at once.
 _Reader = Callable[[Path, int], Iterator[np.ndarray]]

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from cns_drake.base.compiled import compiled
+from cns_drake.base.points import store
 from evaluation.clouds.record_blocks import check_size, read_binary, read_text
-from evaluation.geometry.points import store
-from evaluation.support.compiled import compiled
 
 _KINDS = {"F": "f", "I": "i", "U": "u"}
 # A header is some hundred bytes; a file without one is not searched further.

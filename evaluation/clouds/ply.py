@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from cns_drake.base.points import store
 from evaluation.clouds.record_blocks import check_size, read_binary, read_text
-from evaluation.geometry.points import store
 
 _TYPES = {
     "char": "i1",

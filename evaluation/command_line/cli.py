@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cns_drake.base import terminal
+from cns_drake.base.terminal import example
 from evaluation.command_line.protocol_options import Costs, with_protocol
 from evaluation.command_line.result_rows import change_rows, recognition_rows
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.support import terminal
-from evaluation.support.terminal import example
 
 if TYPE_CHECKING:
+    from cns_drake.base.recordings.sequence import Sequence
     from evaluation.methods.method import Method
-    from evaluation.sequences.sequence import Sequence
 
 app = terminal.make_program(
     "cns-eval",
@@ -182,10 +182,10 @@ def pr(
     recorded sequences (MCAP, MulRan, HeLiPR, KITTI odometry, CNS). Those of
     different world frames are aligned.
     """
+    from cns_drake.base.errors import InputError
     from evaluation.alignment import in_one_world
     from evaluation.recognition import place_recognition
     from evaluation.sequences import open_sequence
-    from evaluation.support.errors import InputError
 
     is_itself = database.resolve() == query.resolve()
     if protocol.exclude_recent is not None and not is_itself:
@@ -276,7 +276,7 @@ def report(
     Writes tables, figures and report.html. Interrupted, the same command
     goes on where it was.
     """
-    from evaluation.jobs.cluster import choose_cluster
+    from cns_drake.base.jobs.cluster import choose_cluster
     from evaluation.study import benchmark as reporting
 
     cluster = choose_cluster(jobs, scheduler)
@@ -321,7 +321,7 @@ def trend(
     One drive asks them all, by every method. Writes trend.csv and a figure
     with 95 % bands. Interrupted, the same command goes on where it was.
     """
-    from evaluation.jobs.cluster import choose_cluster
+    from cns_drake.base.jobs.cluster import choose_cluster
     from evaluation.study.trend import write_trend
     from evaluation.study.trend_points import measure_trend
 
@@ -351,9 +351,9 @@ def _tell_notes(sequence: Sequence) -> None:
 def _make_method(
     name: str, assignments: list[str] | None, height: float
 ) -> Method:
+    from cns_drake.base.errors import InputError
     from evaluation.methods import make_method
     from evaluation.methods.own_file import load_method
-    from evaluation.support.errors import InputError
 
     parameters: dict[str, object] = {"sensor_height": height}
     for assignment in assignments or []:

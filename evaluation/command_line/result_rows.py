@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from math import isnan
 from typing import TYPE_CHECKING
 
-from evaluation.support import terminal
+from cns_drake.base import terminal
 
 if TYPE_CHECKING:
     from evaluation.change.drive_change import ChangeReport

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from evaluation.support.compiled import compiled
+from cns_drake.base.compiled import compiled
 
 # A group has so many points or more, but less than twice as many.
 _GROUP_SIZE = 16

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from evaluation.support.compiled import compiled
+from cns_drake.base.compiled import compiled
 
 # Counts of so many bits stay in the cache.
 _BITS = 11

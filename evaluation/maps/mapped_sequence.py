@@ -7,13 +7,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from cns_drake.base.progress import Track, silent
+from cns_drake.base.recordings.sequence import Sequence
 from evaluation.maps.voxel_maps import (
     VOXEL_SIZE,
     VoxelAccumulator,
     VoxelMap,
 )
-from evaluation.sequences.sequence import Sequence
-from evaluation.support.progress import Track, silent
 
 # Of a voxel's side, for pictures: they show a point in each cube of 0.5 m.
 PICTURE_DIVISIONS = 10

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from evaluation.geometry import points as point_arrays
+from cns_drake.base import points as point_arrays
+from cns_drake.base.compiled import compiled
+from cns_drake.base.progress import Track, silent
+from cns_drake.base.recordings.sequence import Sequence
 from evaluation.geometry.sorting import cell_order
-from evaluation.sequences.sequence import Sequence
-from evaluation.support.compiled import compiled
-from evaluation.support.progress import Track, silent
 
 VOXEL_SIZE = 5.0
 Z_ORIGIN = -2.5

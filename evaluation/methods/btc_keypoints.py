@@ -14,7 +14,7 @@ from typing import TypeVar
 import numpy as np
 from scipy.spatial import cKDTree
 
-from evaluation.support.compiled import compiled
+from cns_drake.base.compiled import compiled
 
 # Cells along the side of a square in which one keypoint may lie, the least
 # number of points of an image, and by how many heights a cell may have less

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cns_drake.base.compiled import compiled
 from evaluation.geometry.sorting import stable_order
 from evaluation.methods.btc_voxel_order import voxel_order
-from evaluation.support.compiled import compiled
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from cns_drake.base.compiled import compiled
 from evaluation.methods.btc_keypoints import Keypoints, count_bits
-from evaluation.support.compiled import compiled
 
 # Fixed in the public program: how much longer the two short sides must be
 # than the long one [m], the sides' difference at which two triangles of one

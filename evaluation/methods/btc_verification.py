@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from evaluation.geometry import poses
+from cns_drake.base import poses
+from cns_drake.base.compiled import compiled
 from evaluation.methods.btc_planes import Planes
-from evaluation.support.compiled import compiled
 
 # Fixed in the public program: how many pairs are tried at most (about), how
 # far from its partner a vertex may come to lie [m], and how many pairs must

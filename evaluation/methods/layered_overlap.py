@@ -23,7 +23,7 @@ from pydantic import (
     PositiveInt,
 )
 
-from evaluation.geometry.poses import make_pose
+from cns_drake.base.poses import make_pose
 from evaluation.methods.method import Method, MethodConfig, register
 from evaluation.methods.overlap_bits import fine_bits, turns
 from evaluation.methods.overlap_coarse import (

@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from evaluation.support.compiled import compiled
+from cns_drake.base.compiled import compiled
 
 NUM_FEATURES = 6
 

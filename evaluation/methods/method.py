@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 import numpy as np
 from pydantic import BaseModel, ConfigDict, NonNegativeFloat, ValidationError
 
-from evaluation.support.errors import InputError
+from cns_drake.base.errors import InputError
 
 Descriptor = TypeVar("Descriptor")
 Database = TypeVar("Database")

@@ -14,8 +14,8 @@ from numba import types
 from numba.extending import intrinsic
 import numpy as np
 
+from cns_drake.base.compiled import compiled
 from evaluation.methods.overlap_layers import GRID, NUM_LAYERS
-from evaluation.support.compiled import compiled
 
 # Bits of a word.
 WORD = 64

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from evaluation.support.compiled import compiled
+from cns_drake.base.compiled import compiled
 
 # Rows and columns of the grid: a cell's number, row times 256 plus column, is
 # a uint16.

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cns_drake.base.compiled import compiled
 from evaluation.methods.overlap_bits import UNIT_BITS, WORD
 from evaluation.methods.overlap_lanes import (
     LANES,
@@ -15,7 +16,6 @@ from evaluation.methods.overlap_lanes import (
     common_of_rows,
 )
 from evaluation.methods.overlap_layers import GRID
-from evaluation.support.compiled import compiled
 
 
 def in_lanes(maps: np.ndarray, margin: int) -> np.ndarray:

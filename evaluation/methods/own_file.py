@@ -12,8 +12,8 @@ import sys
 import traceback
 from typing import Any
 
+from cns_drake.base.errors import InputError
 from evaluation.methods.method import Method
-from evaluation.support.errors import InputError
 
 # What others call of a method, and its author may have written.
 _CALLED = (

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from evaluation.support.compiled import compiled
+from cns_drake.base.compiled import compiled
 
 
 @compiled

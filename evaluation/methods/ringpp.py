@@ -19,15 +19,15 @@ import numpy as np
 from pydantic import Field, PositiveFloat, model_validator
 import scipy.fft
 
+from cns_drake.base.compiled import compiled
+from cns_drake.base.poses import make_pose
 from evaluation.geometry.neighbours import nearest_neighbours
-from evaluation.geometry.poses import make_pose
 from evaluation.methods.local_features import (
     NUM_FEATURES,
     local_features,
 )
 from evaluation.methods.method import Method, MethodConfig, register
 from evaluation.methods.radon import radon
-from evaluation.support.compiled import compiled
 
 # Keeps the spectrum of a channel that hardly varies from being blown up when
 # it is normalised: the default of PyTorch's InstanceNorm2d, with which the

@@ -16,7 +16,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
-from evaluation.geometry.poses import make_pose
+from cns_drake.base.poses import make_pose
 from evaluation.maps.voxel_maps import Z_ORIGIN, thin
 from evaluation.methods.method import Method, MethodConfig, register
 

@@ -8,15 +8,15 @@ from typing import Literal
 
 import numpy as np
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.progress import Track, silent
+from cns_drake.base.recordings.sequence import Sequence
 from evaluation.methods.method import Method
 from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,
     RetrievalProtocol,
 )
 from evaluation.sequences.sampling import gather, sample_frames
-from evaluation.sequences.sequence import Sequence
-from evaluation.support.errors import InputError
-from evaluation.support.progress import Track, silent
 
 # What a drive is described for.
 Role = Literal["places", "queries"]

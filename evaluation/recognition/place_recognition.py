@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, replace
 import math
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.progress import Track, silent
+from cns_drake.base.recordings.sequence import Sequence
 from evaluation.methods.method import Method
 from evaluation.recognition.metrics import (
     Interval,
@@ -20,9 +23,6 @@ from evaluation.recognition.protocol import (
     RetrievalProtocol,
 )
 from evaluation.recognition.retrieval import Retrieval, retrieve
-from evaluation.sequences.sequence import Sequence
-from evaluation.support.errors import InputError
-from evaluation.support.progress import Track, silent
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,13 @@ import math
 
 import numpy as np
 
-from evaluation.geometry import poses
+from cns_drake.base import poses
+from cns_drake.base.errors import InputError
 from evaluation.methods.method import Method
 from evaluation.recognition.metrics import (
     PlaceRecognitionMetrics,
     QueryOutcomes,
 )
-from evaluation.support.errors import InputError
 
 # A query is localised if its pose is no more wrong than this.
 SUCCESS_TRANSLATION = 2.0

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, fields, replace
 import math
 from typing import TYPE_CHECKING
 
-from evaluation.support.errors import InputError
+from cns_drake.base.errors import InputError
 
 if TYPE_CHECKING:
     from evaluation.methods.method import Method

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cns_drake.base.progress import Track, silent
+from cns_drake.base.recordings.sequence import Sequence, check_same_world
 from evaluation.methods.method import Method
 from evaluation.recognition.description import (
     DescribedDrive,
@@ -25,8 +27,6 @@ from evaluation.recognition.protocol import (
     RetrievalProtocol,
 )
 from evaluation.recognition.scoring import score_places
-from evaluation.sequences.sequence import Sequence, check_same_world
-from evaluation.support.progress import Track, silent
 
 
 @dataclass(frozen=True)

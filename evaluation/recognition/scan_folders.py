@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
+from cns_drake.base import points as point_arrays
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import completing
+from cns_drake.base.progress import Track, silent
 from evaluation.clouds.cloud_files import is_cloud, read_cloud
-from evaluation.geometry import points as point_arrays
 from evaluation.methods.method import Method
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.scoring import score_places
 from evaluation.sequences.sampling import select
-from evaluation.support.errors import InputError
-from evaluation.support.files import completing
-from evaluation.support.progress import Track, silent
 
 
 def write_scores(

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from cns_drake.base.errors import InputError
 from evaluation.methods.method import Method
-from evaluation.support.errors import InputError
 
 
 def score_places(

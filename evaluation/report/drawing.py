@@ -8,7 +8,7 @@ import matplotlib
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from evaluation.support.files import completing
+from cns_drake.base.files import completing
 
 # Okabe and Ito's colours, told apart by all kinds of colour vision; line
 # styles and markers for prints without colour.

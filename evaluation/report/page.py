@@ -11,6 +11,7 @@ import json
 from pathlib import Path
 import re
 
+from cns_drake.base.files import completing
 from evaluation.change.change_result import (
     ChangeResult,
     symmetric_changes,
@@ -29,7 +30,6 @@ from evaluation.report.page_routes import route_legend, route_picture
 from evaluation.report.page_survival import survival_section
 from evaluation.report.result_tables import shows_paper
 from evaluation.report.tables import Table
-from evaluation.support.files import completing
 
 _MEDIA_TYPES = {"svg": "image/svg+xml", "webp": "image/webp"}
 _SLOT = re.compile(r"\{\{(\w+)\}\}")

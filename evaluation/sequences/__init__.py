@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from evaluation.sequences.sequence import (
+from cns_drake.base.errors import InputError
+from cns_drake.base.recordings.sequence import (
     Placed,
     PlacedDrive,
     Sequence,
     check_same_world,
 )
-from evaluation.support.errors import InputError
 
 __all__ = [
     "Placed",
@@ -44,13 +44,8 @@ def open_sequence(path: Path, lidar: str | None = None) -> Sequence:
     """
     # Imported here: the readers' libraries are slow to load, and a map file
     # needs none of them.
-    from evaluation.sequences import (
-        cns_folder,
-        helipr,
-        kitti,
-        mcap_sequence,
-        mulran,
-    )
+    from cns_drake.base.recordings import mcap_sequence
+    from evaluation.sequences import cns_folder, helipr, kitti, mulran
 
     readers = (
         (mcap_sequence.holds_mcap, mcap_sequence.McapSequence),

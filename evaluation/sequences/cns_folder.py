@@ -21,9 +21,13 @@ from typing import Any
 import numpy as np
 import yaml
 
+from cns_drake.base import poses
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import read_bytes
+from cns_drake.base.recordings.motion import IMU_DTYPE
+from cns_drake.base.recordings.scenario_file import read_scenario
+from cns_drake.base.yaml_files import parse_yaml
 from evaluation.clouds.cloud_files import read_cloud
-from evaluation.geometry import poses
-from evaluation.sequences.motion import IMU_DTYPE
 from evaluation.sequences.pose_table import (
     pose_matrices,
     read_quaternions,
@@ -31,12 +35,8 @@ from evaluation.sequences.pose_table import (
 from evaluation.sequences.scan_files import (
     FileSequence,
     list_stamped,
-    read_scenario,
 )
 from evaluation.sequences.text_tables import read_stamped_rows
-from evaluation.support.errors import InputError
-from evaluation.support.files import read_bytes
-from evaluation.support.yaml_files import parse_yaml
 
 _POSES = "gt.csv"
 _IMU = "imu.csv"

@@ -6,9 +6,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
-from evaluation.geometry import poses
-from evaluation.sequences.sequence import Sequence
-from evaluation.support.errors import InputError
+from cns_drake.base import poses
+from cns_drake.base.errors import InputError
+from cns_drake.base.recordings.sequence import Sequence
 
 # Poses on either side of a scan that tell how the LiDAR moved. The ends of
 # the splines through them are free, so that an error there fades by about a

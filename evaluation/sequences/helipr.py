@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cns_drake.base.errors import InputError
 from evaluation.sequences import utm
 from evaluation.sequences.pose_table import read_quaternions
 from evaluation.sequences.scan_files import (
@@ -22,7 +23,6 @@ from evaluation.sequences.scan_files import (
     list_stamped,
     read_packed,
 )
-from evaluation.support.errors import InputError
 
 _SCANS = "LiDAR"
 _POSES = "LiDAR_GT"

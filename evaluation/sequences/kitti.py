@@ -24,22 +24,22 @@ from pathlib import Path
 
 import numpy as np
 
-from evaluation.geometry import poses
+from cns_drake.base import poses
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import read_bytes
+from cns_drake.base.json_text import parse_json
+from cns_drake.base.recordings.scenario_file import read_scenario
+from cns_drake.base.recordings.sequence import index_instances
 from evaluation.sequences.pose_table import pose_matrices
 from evaluation.sequences.scan_files import (
     FileSequence,
     read_packed,
-    read_scenario,
 )
-from evaluation.sequences.sequence import index_instances
 from evaluation.sequences.text_tables import (
     check_increasing,
     parse_seconds,
     read_numbers,
 )
-from evaluation.support.errors import InputError
-from evaluation.support.files import read_bytes
-from evaluation.support.json_text import parse_json
 
 _SCANS = "velodyne"
 _LABELS = "labels"

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from evaluation.sequences.sequence import Sequence
+from cns_drake.base.recordings.sequence import Sequence
 
 
 class MovedSequence(Sequence):

@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from evaluation.geometry import poses
+from cns_drake.base import poses
+from cns_drake.base.errors import InputError
 from evaluation.sequences import utm
 from evaluation.sequences.pose_table import read_matrices
 from evaluation.sequences.scan_files import (
@@ -23,7 +24,6 @@ from evaluation.sequences.scan_files import (
     list_stamped,
     read_packed,
 )
-from evaluation.support.errors import InputError
 
 _POSES = "global_pose.csv"
 _FOLDERS = ("sensor_data/Ouster", "Ouster")

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from evaluation.geometry import poses
+from cns_drake.base import poses
+from cns_drake.base.errors import InputError
 from evaluation.sequences.text_tables import (
     check_finite,
     check_increasing,
     read_stamped_rows,
 )
-from evaluation.support.errors import InputError
 
 # How far a rotation matrix or quaternion may be off: texts of four digits.
 _ROTATION_TOLERANCE = 1e-3

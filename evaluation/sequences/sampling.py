@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from evaluation.geometry import points as point_arrays
-from evaluation.geometry import poses
-from evaluation.sequences.sequence import Sequence
-from evaluation.support.errors import InputError
+from cns_drake.base import points as point_arrays
+from cns_drake.base import poses
+from cns_drake.base.errors import InputError
+from cns_drake.base.recordings.sequence import Sequence
 
 
 def sample_frames(positions: np.ndarray, spacing: float) -> np.ndarray:

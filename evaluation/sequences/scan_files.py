@@ -5,23 +5,18 @@ from __future__ import annotations
 import abc
 from collections.abc import Mapping
 from pathlib import Path
-import re
 
 import numpy as np
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import read_bytes
+from cns_drake.base.points import FARTHEST_RETURN
+from cns_drake.base.recordings.sequence import Sequence
 from evaluation.clouds.cloud_files import SCAN_LIMIT_BYTES
-from evaluation.geometry.points import FARTHEST_RETURN
-from evaluation.sequences.sequence import Sequence
 from evaluation.sequences.text_tables import (
     check_increasing,
     parse_stamps_ns,
 )
-from evaluation.support.errors import InputError
-from evaluation.support.files import read_bytes
-from evaluation.support.yaml_files import parse_yaml
-
-# A drive's name also names files.
-_NAME = re.compile(r"\w[\w.-]*")
 
 
 class FileSequence(Sequence):
@@ -101,27 +96,6 @@ class FileSequence(Sequence):
             ValueError: if the file is not of its format.
             OSError: if it cannot be read.
         """
-
-
-def read_scenario(folder: Path) -> Mapping | None:
-    """Returns what `scenario.yaml` in an exported drive says, if it is there.
-
-    Raises:
-        InputError: if it is no mapping in YAML.
-    """
-    path = folder / "scenario.yaml"
-    if not path.is_file():
-        return None
-    try:
-        scenario = parse_yaml(read_bytes(path))
-    except ValueError as error:
-        raise InputError(f"{path}: {error}") from error
-    if not isinstance(scenario, dict):
-        raise InputError(f"{path}: no mapping of a scenario's fields")
-    name = scenario.get("name")
-    if name is not None and not _NAME.fullmatch(str(name)):
-        raise InputError(f"{path}: name: {name!r} is no name of a drive")
-    return scenario
 
 
 def list_stamped(folder: Path, suffix: str) -> tuple[list[Path], np.ndarray]:

@@ -9,8 +9,8 @@ import warnings
 
 import numpy as np
 
-from evaluation.support.errors import InputError
-from evaluation.support.files import read_bytes
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import read_bytes
 
 _NS_PER_S = 1_000_000_000
 # Hours of an IMU [bytes].

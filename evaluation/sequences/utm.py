@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from evaluation.support.errors import InputError
+from cns_drake.base.errors import InputError
 
 DATUM = "utm-52n"
 

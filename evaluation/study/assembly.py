@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import quote
 
+from cns_drake.base.files import completing, make_folder
 from evaluation.change.change_result import (
     ChangeResult,
     symmetric_changes,
@@ -56,7 +57,6 @@ from evaluation.study.figure_files import (
 )
 from evaluation.study.parts import read_part
 from evaluation.study.study_layout import StudyFiles
-from evaluation.support.files import completing, make_folder
 
 
 @dataclass

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from evaluation.jobs.cluster import Cluster
-from evaluation.jobs.running import run_jobs
+from cns_drake.base.files import make_folder
+from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.running import run_jobs
 from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,
     RetrievalProtocol,
@@ -15,7 +16,6 @@ from evaluation.study.assembly import assemble
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import find_recordings
 from evaluation.study.plan import plan_study
-from evaluation.support.files import make_folder
 
 
 def write_report(

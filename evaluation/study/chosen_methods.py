@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import hashlib
 from pathlib import Path
 
+from cns_drake.base.errors import InputError
 from evaluation.methods import (
     Method,
     known_methods,
@@ -14,7 +15,6 @@ from evaluation.methods import (
     shipped_methods,
 )
 from evaluation.methods.own_file import load_method
-from evaluation.support.errors import InputError
 
 
 @dataclass(frozen=True)

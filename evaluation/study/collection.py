@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 import re
 
+from cns_drake.base.errors import InputError, one_line
 from evaluation.report import paper
 from evaluation.sequences import open_sequence
 from evaluation.study.drive_source import DriveSource, RecordedDrive
-from evaluation.support.errors import InputError, one_line
 
 _NAME = re.compile(r"(?P<map>.+)_(?P<stage>[^_]+)")
 _UNPLACED = "neither a scenario nor a name <map>_<stage> tells map and stage"

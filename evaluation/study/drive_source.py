@@ -12,8 +12,8 @@ import os
 from pathlib import Path
 from typing import Protocol
 
+from cns_drake.base.errors import InputError
 from evaluation.sequences import Sequence, open_sequence
-from evaluation.support.errors import InputError
 
 
 class DriveSource(Protocol):

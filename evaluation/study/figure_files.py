@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from cns_drake.base.files import file_name
 from evaluation.report.figures import CHANGE_LEGEND, SETS_LEGEND
 from evaluation.report.page_data import Illustration
 from evaluation.study.collection import City, RecordingInfo
 from evaluation.study.views import PAGE_KIND
-from evaluation.support.files import file_name
 
 
 def routes_stem(city: City) -> str:

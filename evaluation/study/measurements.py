@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from cns_drake.base.jobs.running import Tell
 from evaluation.change.change_result import ChangeResult
 from evaluation.change.drive_change import Surveyed
 from evaluation.change.drive_change import compare as compare_maps
-from evaluation.jobs.running import Tell
 from evaluation.recognition.place_recognition import judge_retrieval
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.recognition_result import RecognitionResult

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from evaluation.jobs.running import Tell
+from cns_drake.base.jobs.running import Tell
 from evaluation.recognition.costs import measure_cost
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.sequences.sampling import gather

@@ -15,9 +15,9 @@ from typing import Any, BinaryIO
 
 import zstandard
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import completing, make_folder
 from evaluation.study.plain_values import decode, encode
-from evaluation.support.errors import InputError
-from evaluation.support.files import completing, make_folder
 
 _MAGIC = b"cns-eval part 2\n"
 _LEVEL = 1

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from evaluation.jobs.running import Job
+from cns_drake.base.jobs.running import Job
 from evaluation.recognition.description import Role
 from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.progress import Track, silent
 from evaluation.maps.mapped_sequence import MappedSequence
 from evaluation.maps.thumbnails import thumbnail
 from evaluation.maps.voxel_maps import VoxelMap
@@ -22,8 +24,6 @@ from evaluation.recognition.protocol import (
     RetrievalProtocol,
 )
 from evaluation.sequences import PlacedDrive, Sequence
-from evaluation.support.errors import InputError
-from evaluation.support.progress import Track, silent
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from cns_drake.base.files import file_name
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.support.files import file_name
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from evaluation.jobs.running import Job, Tell
+from cns_drake.base.jobs.running import Job, Tell
+from cns_drake.base.progress import Track
 from evaluation.recognition.description import Role
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
@@ -15,7 +16,6 @@ from evaluation.study.drive_source import DriveSource
 from evaluation.study.parts import is_current, write_part
 from evaluation.study.recording_survey import survey_recording
 from evaluation.study.study_layout import SurveyFiles
-from evaluation.support.progress import Track
 
 # Expected seconds: for a process to start and import all that it needs; for
 # the maps of a drive of 3000 scans, with 250 places and 150 queries.

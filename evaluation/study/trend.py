@@ -16,6 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 import numpy as np
 
+from cns_drake.base.files import completing, make_folder
 from evaluation.recognition.protocol import (
     PROTOCOL_COLUMNS,
     protocol_values,
@@ -23,7 +24,6 @@ from evaluation.recognition.protocol import (
 from evaluation.report.drawing import method_style, plain, save
 from evaluation.report.result_tables import in_paper_order, title
 from evaluation.study.trend_points import TrendPoint
-from evaluation.support.files import completing, make_folder
 
 # Of the kernel that smooths over TCR_sym, as part of its range; and how the
 # band is found: by drawing databases with replacement.

@@ -10,9 +10,11 @@ from dataclasses import dataclass, replace
 import math
 from pathlib import Path
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import make_folder
+from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.running import Job, Tell, run_jobs
 from evaluation.change.tcr import temporal_change
-from evaluation.jobs.cluster import Cluster
-from evaluation.jobs.running import Job, Tell, run_jobs
 from evaluation.recognition.place_recognition import judge_retrieval
 from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,
@@ -32,8 +34,6 @@ from evaluation.study.parts import (
 from evaluation.study.recording_survey import survey_recording
 from evaluation.study.study_layout import StudyFiles, SurveyFiles
 from evaluation.study.surveys import survey_inputs, survey_job, tracking
-from evaluation.support.errors import InputError
-from evaluation.support.files import make_folder
 
 # Expected seconds for a database.
 _COST = 30.0

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from evaluation.jobs.running import Tell
+from cns_drake.base.files import make_folder
+from cns_drake.base.jobs.running import Tell
 from evaluation.report.drawing import PRINTED
 from evaluation.report.figures import (
     SeenRoute,
@@ -24,7 +25,6 @@ from evaluation.study.parts import (
     write_part,
 )
 from evaluation.study.study_layout import SurveyFiles
-from evaluation.support.files import make_folder
 
 # Of a figure that consists of pixels, on the page.
 PAGE_KIND = "webp"

@@ -30,6 +30,7 @@ from processes import in_process
 from stages import Open3dStage, read_stage
 import zstandard
 
+from cns_drake.base.processors import num_cores
 from cns_drake.motion.vehicle_motion import VehicleMotion
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.recording import messages
@@ -41,7 +42,6 @@ from cns_drake.scenarios.scenario import Scenario, load_scenario
 from cns_drake.sensors.lidar import Lidar
 from cns_drake.sensors.odometry import OdometrySensor
 from cns_drake.simulation.simulation import simulate
-from evaluation.support.processors import num_cores
 
 SEQUENCES = ("metropolis_04", "downtown_04")
 # Step -> what does it; of calls within calls, the innermost counts.

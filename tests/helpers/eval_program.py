@@ -8,9 +8,9 @@ from drive_files import make_scan, write_recording, yaw_pose
 import numpy as np
 import pytest
 
+from cns_drake.base import progress_bars, terminal
+from cns_drake.base.interrupts import SIGNALS
 from evaluation.command_line import cli
-from evaluation.support import progress_bars, terminal
-from evaluation.support.interrupts import SIGNALS
 
 
 def make_block_scene(seed):

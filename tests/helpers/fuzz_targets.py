@@ -24,6 +24,8 @@ from small_map import box_visual, world_text
 from small_osm import write_corner
 import yaml
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError as ReadingError
 from cns_drake.city.generation.city_structures import make_city, meshes_of
 from cns_drake.city.plan.city_plan import load_plan
 from cns_drake.city.plan.stages import load_stages
@@ -47,8 +49,6 @@ from cns_drake.simulation.scanning import save_scan, scan_world
 from cns_drake.simulation.simulation import simulate
 from evaluation import sequences
 from evaluation.clouds.cloud_files import read_cloud
-from evaluation.support.errors import InputError
-from evaluation.support.errors import InputError as ReadingError
 
 REFUSALS = (InputError, ReadingError)
 

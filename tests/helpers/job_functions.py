@@ -6,7 +6,7 @@ import select
 import signal
 import threading
 
-from evaluation.support.errors import InputError
+from cns_drake.base.errors import InputError
 
 
 def join(inputs, path, tell):

@@ -11,6 +11,7 @@ from small_opendrive import (
     write_roads,
 )
 
+from cns_drake.base.errors import InputError
 from cns_drake.imports.import_faults import ImportFaults
 from cns_drake.imports.opendrive.imported_streets import ImportedStreets
 from cns_drake.imports.opendrive.lane_bands import lane_bands
@@ -18,7 +19,6 @@ from cns_drake.imports.opendrive.lane_drives import find_lane_drives
 from cns_drake.imports.opendrive.road_levels import split_levels
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.thing_structures import thing_structures
-from evaluation.support.errors import InputError
 
 
 def write_opendrive(folder: Path) -> None:

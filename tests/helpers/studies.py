@@ -1,11 +1,11 @@
 """Studies whose jobs run in the process of a test, one after the other.
 
-That jobs run anywhere else is the business of `evaluation.jobs` and its
+That jobs run anywhere else is the business of `cns_drake.base.jobs` and its
 tests; processes would only make these slow.
 """
 
-from evaluation.jobs.job_process import nothing_left
-from evaluation.jobs.running import Tell
+from cns_drake.base.jobs.job_process import nothing_left
+from cns_drake.base.jobs.running import Tell
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.study.assembly import assemble
 from evaluation.study.collection import find_recordings

@@ -7,12 +7,12 @@ import sys
 from small_map import box_visual, world_text
 import yaml
 
-from cns_drake.scenarios.scenario import make_scenario
-from cns_drake.simulation.simulation import simulate
-from evaluation.support.interrupts import (
+from cns_drake.base.interrupts import (
     INTERRUPTED,
     interrupt_on_termination,
 )
+from cns_drake.scenarios.scenario import make_scenario
+from cns_drake.simulation.simulation import simulate
 
 FRAMES = 60
 LONG = 3000

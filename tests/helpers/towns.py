@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from evaluation.geometry.points import from_xyz
+from cns_drake.base.points import from_xyz
 from evaluation.sequences import Sequence
 
 LIDAR_HEIGHT = 1.6

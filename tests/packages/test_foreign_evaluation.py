@@ -14,27 +14,29 @@ KINDS = {
     "package": {
         "evaluation/__init__.py": "",
         "evaluation/metrics.py": "MINE = True\n",
-        "evaluation/support/__init__.py": FAILING,
+        "cns_drake/base/__init__.py": FAILING,
     },
     "failing": {"evaluation/__init__.py": FAILING},
     "folder": {
         "evaluation/metrics.py": "MINE = True\n",
-        "evaluation/support/errors.py": FAILING,
+        "cns_drake/base/errors.py": FAILING,
     },
     "module": {"evaluation.py": FAILING},
 }
 LIBRARY = """
 import sys
-import numpy as np
-from cns_drake import InputError, Lidar, evaluation, load_scenario
-from cns_drake.scene import world
-assert world.InputError is InputError is evaluation.InputError
-points = np.random.default_rng(1).uniform(size=(9, 3))
-assert evaluation.temporal_change(points, points).symmetric == 0.0
+from cns_drake import InputError, Lidar, add_lidar, load_scenario
 try:
     load_scenario("nowhere_01")
 except InputError:
     print("works")
+"""
+STUDY = """
+from cns_drake import InputError
+try:
+    import cns_drake.studies.reproduction
+except InputError as error:
+    print(error)
 """
 THEIRS = "import evaluation.metrics\nassert evaluation.metrics.MINE\n"
 
@@ -48,43 +50,55 @@ def folder(request, tmp_path):
     return tmp_path
 
 
-def run(folder, *command):
-    """Runs Python there, where the folder comes first, then this project."""
-    path = os.pathsep.join([".", str(ROOT)])
+def run(folder, *command, path=()):
+    """Runs Python there; `path` comes before this project."""
     return subprocess.run(
         [sys.executable, *command],
         cwd=folder,
-        env={**os.environ, "PYTHONPATH": path},
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([*path, str(ROOT)])},
         capture_output=True,
         text=True,
     )
 
 
-def test_library(folder):
-    script = folder / "script.py"
-    script.write_text(LIBRARY)
-    done = run(folder, script)
-    assert (done.stdout, done.returncode) == ("works\n", 0), done.stderr
+def run_script(folder, text):
+    """Runs a script that lies there; Python puts its folder first."""
+    (folder / "script.py").write_text(text)
+    return run(folder, "script.py")
 
 
-@pytest.mark.parametrize("folder", ["package", "folder"], indirect=True)
-def test_theirs_after_ours(folder):
-    script = folder / "script.py"
-    script.write_text(LIBRARY + THEIRS)
-    done = run(folder, script)
+def test_the_simulator_never_loads_an_evaluation(folder):
+    done = run_script(
+        folder, f"{LIBRARY}assert 'evaluation' not in sys.modules"
+    )
     assert (done.stdout, done.returncode) == ("works\n", 0), done.stderr
 
 
 @pytest.mark.parametrize("folder", ["package"], indirect=True)
-def test_theirs_before_ours(folder):
-    script = folder / "script.py"
-    script.write_text(THEIRS + LIBRARY + THEIRS)
-    done = run(folder, script)
+def test_the_user_keeps_theirs(folder):
+    done = run_script(folder, THEIRS + LIBRARY + THEIRS)
     assert (done.stdout, done.returncode) == ("works\n", 0), done.stderr
 
 
-def test_program(folder):
-    done = run(folder, "-m", "cns_drake", "list")
+@pytest.mark.parametrize(
+    "folder", ["package", "failing", "module"], indirect=True
+)
+def test_a_study_from_python_says_what_hides_its_evaluation(folder):
+    done = run_script(folder, STUDY)
+    (line,) = done.stdout.splitlines()
+    assert line.startswith(f"{folder}/evaluation"), done.stderr
+    assert "hides the package of that name" in line
+
+
+@pytest.mark.parametrize("folder", ["folder"], indirect=True)
+def test_a_folder_without_a_package_hides_nothing(folder):
+    done = run_script(folder, STUDY)
+    assert (done.stdout, done.returncode) == ("", 0), done.stderr
+
+
+@pytest.mark.parametrize("path", [(), (".",)])
+def test_a_program_leaves_out_the_current_folder(folder, path):
+    done = run(folder, "-m", "cns_drake", "list", path=path)
     assert done.returncode == 0, done.stderr
     assert "metropolis_04" in done.stdout
 
@@ -95,12 +109,12 @@ def test_diagram_script(folder):
     assert "Downtown, stage 01" in done.stdout
 
 
-def test_a_program_prefers_ours(folder):
-    # Also in the processes of its jobs, which get its search path.
-    code = (
-        "import cns_drake.__main__, evaluation, os, sys; "
-        "print(os.path.dirname(os.path.dirname(evaluation.__file__))); "
-        "print(cns_drake.isolation._Finder in sys.meta_path)"
-    )
-    done = run(folder, "-c", code)
-    assert done.stdout.splitlines() == [str(ROOT), "False"], done.stderr
+@pytest.mark.parametrize(
+    "folder", ["package", "failing", "module"], indirect=True
+)
+def test_a_program_says_what_hides_its_evaluation(folder, tmp_path_factory):
+    elsewhere = tmp_path_factory.mktemp("elsewhere")
+    done = run(elsewhere, "-m", "cns_drake", "list", path=[str(folder)])
+    assert (done.stdout, done.returncode) == ("", 2)
+    (line,) = done.stderr.splitlines()
+    assert line.startswith(f"cns-drake: error: {folder}/evaluation")

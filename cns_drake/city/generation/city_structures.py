@@ -18,6 +18,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
+from cns_drake.base.errors import InputError
 from cns_drake.city.buildings import ARCHETYPES
 from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.polygons import snap
@@ -42,7 +43,6 @@ from cns_drake.city.plan.city_plan import CityPlan, DistrictPlan, load_plan
 from cns_drake.roads.network import RoadNetwork, load_road_network
 from cns_drake.roads.road_surface import RoadSurface
 from cns_drake.roads.street_areas import StreetAreas, SurfaceHeights
-from evaluation.support.errors import InputError
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import os
 from pathlib import Path
 import tempfile
 
+from cns_drake.base.errors import InputError
 from cns_drake.city.generation.city_structures import (
     City,
     make_city,
@@ -20,7 +21,6 @@ from cns_drake.city.geometry.structures import MeshShape, Structure
 from cns_drake.city.growth.stage_structures import GrowingCity
 from cns_drake.city.plan.stages import Stages, load_stages
 from cns_drake.scene.semantics import CLASS_IDS
-from evaluation.support.errors import InputError
 
 STAGES_NAME = "stages.yaml"
 TABLE_NAME = "structures.csv"

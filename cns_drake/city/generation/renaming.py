@@ -12,11 +12,11 @@ import numpy as np
 from scipy.spatial import cKDTree
 import yaml
 
+from cns_drake.base.csv_files import read_records
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import read_bytes
+from cns_drake.base.yaml_files import read_yaml
 from cns_drake.city.geometry.structures import Structure
-from evaluation.support.csv_files import read_records
-from evaluation.support.errors import InputError
-from evaluation.support.files import read_bytes
-from evaluation.support.yaml_files import read_yaml
 
 # What is drawn anew stands elsewhere, all else where it was [m].
 _SAME_PLACE = 0.3

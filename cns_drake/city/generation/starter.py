@@ -18,13 +18,13 @@ from shapely.geometry import box
 from shapely.ops import unary_union
 import yaml
 
+from cns_drake.base.files import complete_part, write_part
 from cns_drake.city.generation.city_structures import City, lay_out
 from cns_drake.city.geometry.polygons import polygons_of, snap
 from cns_drake.city.plan.city_plan import CityPlan, load_plan
 from cns_drake.roads.network import RoadNetwork, load_road_network
 from cns_drake.roads.route_drawing import draw_route
 from cns_drake.roads.street_areas import StreetAreas
-from evaluation.support.files import complete_part, write_part
 
 # The world reaches this far beyond the roads [m].
 _MARGIN = 45.0

@@ -10,6 +10,7 @@ from shapely.affinity import affine_transform
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.base.errors import InputError
 from cns_drake.city.buildings import ARCHETYPES, sample
 from cns_drake.city.buildings.parts.site import Site
 from cns_drake.city.geometry.structures import Structure
@@ -17,7 +18,6 @@ from cns_drake.city.ground.districts import District
 from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.frontage import Lot, lines_along, lot_at
 from cns_drake.city.plan.city_plan import BuildingPlan, RowPlan
-from evaluation.support.errors import InputError
 
 # Neighbours closer than this get blank walls on the sides that face each
 # other; it is room for the eaves and balconies of both [m].

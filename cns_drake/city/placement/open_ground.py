@@ -11,6 +11,7 @@ import shapely
 from shapely.geometry import LineString, Polygon
 from shapely.ops import unary_union
 
+from cns_drake.base.errors import InputError
 from cns_drake.city.ground.districts import District
 from cns_drake.city.placement.draft import Draft
 from cns_drake.city.placement.frontage import Station, station_at
@@ -22,7 +23,6 @@ from cns_drake.city.plan.city_plan import (
     ScatterPlan,
 )
 from cns_drake.city.plan.weighted import pick
-from evaluation.support.errors import InputError
 
 # Least distance between two objects [m].
 _CLEARANCE = 0.15

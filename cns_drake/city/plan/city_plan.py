@@ -15,8 +15,8 @@ from pydantic import (
     model_validator,
 )
 
-from evaluation.support.errors import InputError, describe_validation_error
-from evaluation.support.yaml_files import read_yaml
+from cns_drake.base.errors import InputError, describe_validation_error
+from cns_drake.base.yaml_files import read_yaml
 
 # Of a city [m]: what is generated grows with its area.
 _LARGEST_SIDE = 10_000.0

@@ -9,8 +9,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from evaluation.support.errors import InputError, describe_validation_error
-from evaluation.support.yaml_files import parse_yaml, read_yaml
+from cns_drake.base.errors import InputError, describe_validation_error
+from cns_drake.base.yaml_files import parse_yaml, read_yaml
 
 LotUse = Literal["car_park", "market", "garden", "yard", "empty"]
 StageName = Annotated[str, Field(pattern=r"^\d\d$")]

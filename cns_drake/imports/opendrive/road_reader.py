@@ -10,6 +10,7 @@ import re
 
 import numpy as np
 
+from cns_drake.base.errors import InputError
 from cns_drake.imports.import_faults import ImportFaults
 from cns_drake.imports.opendrive.plan_view import (
     Arc,
@@ -27,7 +28,6 @@ from cns_drake.imports.opendrive.road_model import (
 )
 from cns_drake.imports.opendrive.road_things import read_things
 from cns_drake.imports.opendrive.xml_elements import Element, read_elements
-from evaluation.support.errors import InputError
 
 _KNOWN = frozenset(
     (

@@ -10,6 +10,7 @@ import numpy as np
 import shapely
 from shapely import GEOSException
 
+from cns_drake.base.errors import InputError
 from cns_drake.city.generation.city_structures import (
     City,
     Streets,
@@ -38,7 +39,6 @@ from cns_drake.imports.opendrive.road_levels import split_levels
 from cns_drake.imports.opendrive.road_model import RoadMap
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.thing_structures import thing_structures
-from evaluation.support.errors import InputError
 
 # Of sidewalks, where the file does not tell [m].
 _KERB = 0.1

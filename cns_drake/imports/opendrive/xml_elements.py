@@ -7,8 +7,8 @@ import math
 from pathlib import Path
 from xml.parsers import expat
 
-from evaluation.support.errors import InputError
-from evaluation.support.files import read_bytes
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import read_bytes
 
 _MOST_BYTES = 256 * 2**20
 _MOST_ELEMENTS = 1_000_000

@@ -7,6 +7,7 @@ import pytest
 import shapely
 from small_city import PLAN, ROADS
 
+from cns_drake.base.errors import InputError
 from cns_drake.city.generation.city_structures import (
     City,
     lay_out,
@@ -14,7 +15,6 @@ from cns_drake.city.generation.city_structures import (
 )
 from cns_drake.city.plan.city_plan import load_plan
 from cns_drake.roads.network import RoadNetwork, load_road_network
-from evaluation.support.errors import InputError
 
 
 @cache

@@ -2,8 +2,8 @@
 
 import pytest
 
+from cns_drake.base.errors import InputError
 from cns_drake.city.plan.stages import load_stages
-from evaluation.support.errors import InputError
 
 NAMES = ["tower_001", "tower_002", "tree_001", "tree_002", "car_001"]
 GOOD = """

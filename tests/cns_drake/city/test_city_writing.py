@@ -7,9 +7,9 @@ import pytest
 from small_city import write_small_city
 import typer
 
+from cns_drake.base.errors import InputError
 from cns_drake.city.generation.generate import generate_city
 from cns_drake.command_line.city import city
-from evaluation.support.errors import InputError
 
 pytestmark = pytest.mark.slow
 

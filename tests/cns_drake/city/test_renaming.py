@@ -8,9 +8,9 @@ from small_city import write_small_city
 from typer.testing import CliRunner
 import yaml
 
+from cns_drake.base.errors import InputError
 from cns_drake.city.generation.generate import generate_city
 from cns_drake.command_line.cli import app
-from evaluation.support.errors import InputError
 
 pytestmark = pytest.mark.slow
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from small_map import box_visual, world_text
 
+from cns_drake.base.cloud_writing import encode_labels
+from cns_drake.base.errors import InputError
 from cns_drake.export.exporting import export_sequence
 from cns_drake.scenarios.shipped import shipped_maps
 from evaluation import sequences
-from evaluation.clouds.cloud_writing import encode_labels
-from evaluation.support.errors import InputError
 
 # Instance -> name, class, its id, and the id where stage 01 lacks it, as
 # semantic-kitti.yaml has them: moving-car, -person, -bus, -truck, and

@@ -12,11 +12,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 import yaml
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.errors import InputError as ReadingError
 from cns_drake.export.exporting import export_sequence
 from evaluation import sequences
 from evaluation.study.collection import find_recordings, group_cities
-from evaluation.support.errors import InputError
-from evaluation.support.errors import InputError as ReadingError
 
 
 @pytest.fixture(scope="module")

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from small_cityjson import CityWriter
 
+from cns_drake.base.errors import InputError
 from cns_drake.imports.cityjson import read_cityjson
 from cns_drake.imports.import_structures import import_structures
-from evaluation.support.errors import InputError
 
 ORIGIN = np.array([85000.0, 446000.0, 3.0])
 

@@ -13,6 +13,7 @@ from small_cityjson import CityWriter, write_blocks
 from typer.testing import CliRunner
 import yaml
 
+from cns_drake.base.errors import InputError
 from cns_drake.command_line.cli import app
 from cns_drake.imports.building_years import Undated, construction_year
 from cns_drake.imports.import_map import import_city
@@ -21,7 +22,6 @@ from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import load_scenario
 from evaluation.clouds.cloud_files import read_cloud
 from evaluation.sequences import open_sequence
-from evaluation.support.errors import InputError
 
 pytestmark = pytest.mark.slow
 

@@ -20,6 +20,7 @@ from small_opendrive import (
 from typer.testing import CliRunner
 import yaml
 
+from cns_drake.base.errors import InputError
 from cns_drake.command_line.cli import app
 from cns_drake.imports.import_faults import ImportFaults
 from cns_drake.imports.opendrive.imported_streets import (
@@ -34,7 +35,6 @@ from cns_drake.imports.opendrive.town import build_town
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import load_scenario
 from evaluation.sequences import open_sequence
-from evaluation.support.errors import InputError
 
 ARM = 12.0
 R = ARM - 1.75

@@ -7,6 +7,7 @@ import pytest
 from shapely.geometry import Polygon
 from small_osm import LAT, LON, OsmWriter
 
+from cns_drake.base.errors import InputError
 from cns_drake.imports.building_years import Undated
 from cns_drake.imports.extrusions import extruded
 from cns_drake.imports.import_faults import ImportFaults
@@ -18,7 +19,6 @@ from cns_drake.imports.osm_tags import (
     sidewalk_sides,
     street_width,
 )
-from evaluation.support.errors import InputError
 
 
 def read(path, year_attribute=None):

@@ -16,11 +16,11 @@ from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 import pytest
 
+from cns_drake.base.errors import InputError
 from cns_drake.pictures.meshcat_recording import MeshcatRecorder
 from cns_drake.scene.semantics import CLASS_RGB
 from cns_drake.scene.world import load_world
 from cns_drake.sensors.beam_pattern import POINT_DTYPE
-from evaluation.support.errors import InputError
 
 PERIOD = 0.05
 NUM_FRAMES = 101

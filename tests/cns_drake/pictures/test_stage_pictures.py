@@ -6,13 +6,13 @@ from pydrake.geometry import FrameId, GeometryId
 from pydrake.math import RigidTransform
 import pytest
 
+from cns_drake.base.errors import InputError
 from cns_drake.pictures.rendering import look_at, render
 from cns_drake.pictures.stage_pictures import draw_stages, load_views
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.scene.perception_geometry import PerceptionGeometry
 from cns_drake.scene.surfaces import EllipsoidSurface
-from evaluation.support.errors import InputError
 
 
 def ball(position, rgb):

@@ -13,10 +13,10 @@ from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability, QosReliability
 import yaml
 
+from cns_drake.base.errors import InputError
 from cns_drake.recording import messages
 from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.rosbag2_metadata import Topic
-from evaluation.support.errors import InputError
 
 START_NS = 1_700_000_000_000_000_000
 SCENARIO = {"map": "town", "stage": 1, "pair": [[1, 2], [1, 2]]}

@@ -15,8 +15,8 @@ import pytest
 from tiny_drive import FRAMES, tiny_scenario
 import yaml
 
+from cns_drake.base.errors import InputError
 from cns_drake.simulation.simulation import simulate
-from evaluation.support.errors import InputError
 
 pytestmark = pytest.mark.slow
 

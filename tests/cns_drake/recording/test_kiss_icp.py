@@ -9,10 +9,10 @@ from mcap.reader import make_reader
 import numpy as np
 import pytest
 
+from cns_drake.base import poses
 from cns_drake.scenarios.scenario import load_scenario
 from cns_drake.simulation.simulation import simulate
 from evaluation import sequences
-from evaluation.geometry import poses
 
 pytestmark = pytest.mark.slow
 

@@ -13,6 +13,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability
 from scipy.spatial.transform import Rotation
 
+from cns_drake.base.errors import InputError
 from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.mcap_recorder import (
     McapRecorder,
@@ -20,7 +21,6 @@ from cns_drake.recording.mcap_recorder import (
     recording_topics,
 )
 from cns_drake.sensors.beam_pattern import POINT_DTYPE
-from evaluation.support.errors import InputError
 
 START_NS = 1_700_000_000_000_000_000
 PERIOD = 0.05

@@ -4,8 +4,8 @@ import os
 
 import pytest
 
+from cns_drake.base.errors import InputError
 from cns_drake.recording.part_file import PartFile
-from evaluation.support.errors import InputError
 
 
 def written(path, *pieces, finish=True):

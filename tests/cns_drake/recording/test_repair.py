@@ -15,13 +15,13 @@ from rosbags.highlevel import AnyReader
 import yaml
 import zstandard
 
+from cns_drake.base.errors import InputError
 from cns_drake.recording.mcap_recovery import (
     RECORD_LIMIT,
     Fault,
     read_records,
 )
 from cns_drake.recording.repair import repair_mcap
-from evaluation.support.errors import InputError
 
 COMPRESSIONS = (CompressionType.NONE, CompressionType.LZ4, CompressionType.ZSTD)
 

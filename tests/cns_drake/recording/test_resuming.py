@@ -13,9 +13,9 @@ from bag_recordings import (
 import numpy as np
 import pytest
 
+from cns_drake.base import files
+from cns_drake.base.errors import InputError
 from cns_drake.recording.frame_clock import frame_stamp_ns
-from evaluation.support import files
-from evaluation.support.errors import InputError
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,9 @@ from road_crossing import CROSS, load_network
 from shapely import unary_union
 from small_city import ROADS
 
+from cns_drake.base.errors import InputError
 from cns_drake.roads.carriageway import road_strip
 from cns_drake.roads.network import load_road_network
-from evaluation.support.errors import InputError
 
 
 @pytest.fixture

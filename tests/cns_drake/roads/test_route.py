@@ -5,10 +5,10 @@ from pydantic import ValidationError
 import pytest
 from scipy.spatial import cKDTree
 
+from cns_drake.base.errors import InputError
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import CAR_ROOM, Route, make_lane_path
 from cns_drake.scenarios.shipped import worlds_folder
-from evaluation.support.errors import InputError
 
 
 @pytest.fixture(scope="module")

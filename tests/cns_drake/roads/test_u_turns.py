@@ -6,6 +6,7 @@ from pydrake.multibody.plant import MultibodyPlant
 import pytest
 import yaml
 
+from cns_drake.base.errors import InputError
 from cns_drake.motion.speed_profile import Speeds
 from cns_drake.motion.trajectory import POINT_SPACING, Trajectory
 from cns_drake.motion.vehicle_motion import VehicleMotion
@@ -22,7 +23,6 @@ from cns_drake.roads.waypoints import load_waypoint_path, make_waypoint_path
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import load_scenario
 from cns_drake.scenarios.shipped import vehicle_file
-from evaluation.support.errors import InputError
 
 
 def network_of(folder, *, kerb_radius=8.0, **style):

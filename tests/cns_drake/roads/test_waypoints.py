@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from shapely.geometry import LineString, Point
 
+from cns_drake.base.errors import InputError
 from cns_drake.roads.waypoints import (
     load_waypoint_path,
     make_waypoint_path,
 )
-from evaluation.support.errors import InputError
 
 
 @pytest.fixture

@@ -9,10 +9,10 @@ from rosbags.highlevel import AnyReader
 from small_map import box_visual, world_text
 import yaml
 
+from cns_drake.base.errors import InputError
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import load_scenario
 from cns_drake.simulation.simulation import simulate
-from evaluation.support.errors import InputError
 
 SPEEDS = {
     "cruise": 6.0,

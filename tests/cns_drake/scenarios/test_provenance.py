@@ -6,12 +6,12 @@ import shutil
 import pytest
 from tiny_drive import tiny_scenario
 
+from cns_drake.base.errors import InputError
 from cns_drake.scenarios.provenance import (
     combined_digest,
     dependency_versions,
     digest_inputs,
 )
-from evaluation.support.errors import InputError
 
 INCLUDE = "<include><uri>{}</uri></include>"
 

@@ -6,6 +6,7 @@ import pytest
 from small_map import scenario_values
 import yaml
 
+from cns_drake.base.errors import InputError
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import (
     LidarConfig,
@@ -14,7 +15,6 @@ from cns_drake.scenarios.scenario import (
     make_scenario,
 )
 from cns_drake.scenarios.shipped import recordable_sequences
-from evaluation.support.errors import InputError
 
 
 def test_shipped_sequences_load():

@@ -7,6 +7,7 @@ import pytest
 from small_map import write_small_map
 import yaml
 
+from cns_drake.base.errors import InputError
 from cns_drake.scenarios.scenario import load_scenario
 from cns_drake.scenarios.sequence_facts import sequence_facts
 from cns_drake.scenarios.sequence_table import (
@@ -15,7 +16,6 @@ from cns_drake.scenarios.sequence_table import (
     write_table,
 )
 from cns_drake.scenarios.shipped import shipped_maps, shipped_sequences
-from evaluation.support.errors import InputError
 
 # A box has twelve triangles.
 BOX = 12

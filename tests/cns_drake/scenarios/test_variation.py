@@ -8,12 +8,12 @@ import pytest
 from small_map import scenario_values, write_small_map
 import yaml
 
+from cns_drake.base.errors import InputError
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.scenarios.variation import load_family, write_scenarios
 from cns_drake.scene.world import load_world, structures_in
-from evaluation.support.errors import InputError
 
 
 def family(tmp_path, redraw=None, **values):

@@ -2,12 +2,12 @@
 
 import pytest
 
+from cns_drake.base.errors import InputError
 from cns_drake.scene.structure_table import (
     StructureEntry,
     StructureTable,
     load_structure_table,
 )
-from evaluation.support.errors import InputError
 
 
 def write(tmp_path, text):

@@ -7,13 +7,13 @@ from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 from small_map import box_visual, world_text
 
+from cns_drake.base.errors import InputError
 from cns_drake.scenarios.shipped import vehicle_file
 from cns_drake.scene.perception_geometry import read_perception_geometry
 from cns_drake.scene.structure_table import StructureEntry
 from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar_presets import make_beam_pattern
 from cns_drake.simulation.scanning import scan_world
-from evaluation.support.errors import InputError
 
 MESH = "<mesh><uri>{}</uri></mesh>"
 

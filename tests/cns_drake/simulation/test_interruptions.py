@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from tiny_drive import FRAMES, run_and_tell, tiny_scenario
 
-from evaluation.support.interrupts import INTERRUPTED
+from cns_drake.base.interrupts import INTERRUPTED
 
 pytestmark = pytest.mark.slow
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from tiny_drive import FRAMES, tiny_scenario
 
+from cns_drake.base.errors import InputError
 from cns_drake.scenarios.scenario import load_scenario
 from cns_drake.simulation.simulated_drive import SimulatedDrive
 from cns_drake.simulation.simulation import simulate
 from evaluation.sequences import open_sequence
 from evaluation.study.recording_survey import survey_recording
-from evaluation.support.errors import InputError
 
 
 def check_same(simulated, recorded, frames):

@@ -6,12 +6,12 @@ from rosbags.highlevel import AnyReader
 from small_map import scenario_values, write_small_map
 import yaml
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.scenarios.scenario import load_scenario, make_scenario
 from cns_drake.simulation.simulation import simulate
 from cns_drake.simulation.station import load_stage
 from cns_drake.studies.recording_jobs import is_recorded, record_all
-from evaluation.jobs.cluster import Cluster
-from evaluation.support.errors import InputError
 
 TOPICS = ("/lidar/points", "/imu/data", "/odometry", "/tf")
 

@@ -15,15 +15,15 @@ import studies
 from tiny_drive import FRAMES, long_scenario, tiny_scenario, write_scenario
 import yaml
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.city.generation.generate import generate_city
 from cns_drake.scenarios.scenario import load_scenario
 from cns_drake.simulation.simulation import simulate
 from cns_drake.studies.recording_jobs import is_recorded, record_all
 from evaluation.change.drive_change import compare, survey
-from evaluation.jobs.cluster import Cluster
 from evaluation.sequences import open_sequence
 from evaluation.study import trend_points
-from evaluation.support.errors import InputError
 
 pytestmark = pytest.mark.slow
 

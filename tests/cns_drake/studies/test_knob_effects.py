@@ -3,11 +3,11 @@
 import pytest
 from small_city import write_small_city
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.city.generation.generate import generate_city
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.studies.knob_effects import effect_lines, knob_effects
-from evaluation.jobs.cluster import Cluster
-from evaluation.support.errors import InputError
 
 pytestmark = pytest.mark.slow
 

@@ -9,6 +9,9 @@ from small_city import ROADS, STAGES, write_small_city
 import studies
 import yaml
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.running import Tell
 from cns_drake.city.generation import generate
 from cns_drake.city.generation.city_structures import make_city
 from cns_drake.city.generation.generate import (
@@ -26,9 +29,6 @@ from cns_drake.studies.redrawing import (
     redraw_city,
     redrawn_inputs,
 )
-from evaluation.jobs.cluster import Cluster
-from evaluation.jobs.running import Tell
-from evaluation.support.errors import InputError
 
 pytestmark = pytest.mark.slow
 

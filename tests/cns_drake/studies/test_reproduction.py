@@ -6,6 +6,8 @@ import pytest
 from small_map import scenario_values, write_small_map
 import yaml
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.scenarios.scenario import load_scenario
 from cns_drake.simulation.simulated_drive import SimulatedDrive
 from cns_drake.simulation.simulation import simulate
@@ -14,10 +16,8 @@ from cns_drake.studies.reproduction import (
     control_drives,
     recording_info,
 )
-from evaluation.jobs.cluster import Cluster
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.study.collection import find_recordings, group_cities
-from evaluation.support.errors import InputError
 
 pytestmark = pytest.mark.slow
 

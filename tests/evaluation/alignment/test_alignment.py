@@ -22,15 +22,15 @@ from towns import (
     route,
 )
 
+from cns_drake.base import poses
+from cns_drake.base.errors import InputError
+from cns_drake.base.points import xyz
 from evaluation.alignment import align, in_one_world
 from evaluation.change.drive_change import survey_in_one_world
 from evaluation.change.tcr import temporal_change
-from evaluation.geometry import poses
-from evaluation.geometry.points import xyz
 from evaluation.maps.voxel_maps import map_sequence
 from evaluation.sequences import Sequence
 from evaluation.sequences.mulran import MulranSequence
-from evaluation.support.errors import InputError
 
 pytestmark = pytest.mark.slow
 

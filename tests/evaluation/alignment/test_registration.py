@@ -3,8 +3,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 from towns import make_town, rigid
 
+from cns_drake.base import poses
 from evaluation.alignment.registration import make_surface, register
-from evaluation.geometry import poses
 from evaluation.maps.voxel_maps import thin
 
 

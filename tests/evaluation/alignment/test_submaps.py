@@ -1,11 +1,11 @@
 import numpy as np
 from towns import TownDrive, drifted, make_scans, make_town, rigid, route
 
+from cns_drake.base import poses
+from cns_drake.base.points import from_xyz
 from evaluation.alignment.anchoring import fit_anchor
 from evaluation.alignment.loops import Loop
 from evaluation.alignment.submaps import Submaps
-from evaluation.geometry import poses
-from evaluation.geometry.points import from_xyz
 
 
 def make_drive(X_WS=None, number=50):

@@ -2,8 +2,8 @@ from drive_files import make_scan, write_recording, yaw_pose
 import numpy as np
 import pytest
 
+from cns_drake.base.errors import InputError
 from evaluation.change.drive_change import compare, survey
-from evaluation.support.errors import InputError
 
 
 def make_town(blocks):

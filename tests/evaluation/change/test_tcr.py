@@ -3,8 +3,8 @@ import math
 import numpy as np
 import pytest
 
+from cns_drake.base.points import from_xyz
 from evaluation.change.tcr import covered, temporal_change
-from evaluation.geometry.points import from_xyz
 from evaluation.maps.voxel_maps import voxelise
 
 NO_POINTS = np.empty((0, 3))

@@ -2,7 +2,7 @@ from drive_files import make_scan, write_recording, yaw_pose
 import numpy as np
 import pytest
 
-from evaluation.geometry.points import from_xyz
+from cns_drake.base.points import from_xyz
 from evaluation.maps.voxel_maps import (
     VoxelAccumulator,
     map_sequence,

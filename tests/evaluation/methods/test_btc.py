@@ -3,11 +3,11 @@ import math
 import numpy as np
 import pytest
 
-from evaluation.geometry import poses
+from cns_drake.base import poses
+from cns_drake.base.errors import InputError
 from evaluation.methods import make_method
 from evaluation.methods.btc_triangles import match
 from evaluation.recognition import scan_folders
-from evaluation.support.errors import InputError
 
 GROUND = -1.6
 SIZE = 40.0

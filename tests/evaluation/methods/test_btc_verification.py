@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from evaluation.geometry import poses
+from cns_drake.base import poses
 from evaluation.methods.btc_planes import Planes
 from evaluation.methods.btc_verification import (
     align,

@@ -4,12 +4,12 @@ from drive_files import make_scan, write_recording, yaw_pose
 import numpy as np
 import pytest
 
+from cns_drake.base.errors import InputError
 from evaluation.methods import Method, MethodConfig
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.retrieval import retrieve
 from evaluation.recognition.scan_folders import write_scores
 from evaluation.sequences import open_sequence
-from evaluation.support.errors import InputError
 
 
 def record(folder, heights, y=0.0):

@@ -3,10 +3,10 @@ import math
 import numpy as np
 import pytest
 
+from cns_drake.base.errors import InputError
 from evaluation.methods import make_method
 from evaluation.methods.radon import radon
 from evaluation.methods.ringpp import RingPlusPlus, _normalise
-from evaluation.support.errors import InputError
 
 CELL = 140.0 / 120.0
 # No pair can be nearer than this: see `test_no_pair_is_nearer`.

@@ -3,6 +3,7 @@ import math
 import numpy as np
 import pytest
 
+from cns_drake.base.errors import InputError
 from evaluation.methods import known_methods, make_method
 from evaluation.methods.scan_context import (
     Contexts,
@@ -11,7 +12,6 @@ from evaluation.methods.scan_context import (
     _key_shift,
     _polar_context,
 )
-from evaluation.support.errors import InputError
 
 NAME = "scan-context++"
 

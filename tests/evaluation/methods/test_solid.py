@@ -3,9 +3,9 @@ import math
 import numpy as np
 import pytest
 
+from cns_drake.base.errors import InputError
 from evaluation.methods import make_method
 from evaluation.methods.solid import SolidMethod
-from evaluation.support.errors import InputError
 
 
 def solid(**parameters) -> SolidMethod:

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from cns_drake.base.errors import InputError
 from evaluation.methods import Method, MethodConfig
 from evaluation.recognition.metrics import QueryOutcomes, evaluate
 from evaluation.recognition.place_recognition import run
@@ -14,7 +15,6 @@ from evaluation.recognition.pose_errors import (
     pose_metrics,
 )
 from evaluation.sequences import open_sequence
-from evaluation.support.errors import InputError
 
 
 def random_pose(rng):

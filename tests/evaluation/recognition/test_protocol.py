@@ -4,6 +4,7 @@ from drive_files import make_scan, write_recording, yaw_pose
 import numpy as np
 import pytest
 
+from cns_drake.base.errors import InputError
 from evaluation.methods import Method, MethodConfig
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import (
@@ -13,7 +14,6 @@ from evaluation.recognition.protocol import (
 )
 from evaluation.recognition.retrieval import retrieve
 from evaluation.sequences import open_sequence
-from evaluation.support.errors import InputError
 
 
 class Means(Method):

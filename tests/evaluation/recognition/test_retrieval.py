@@ -2,6 +2,7 @@ from drive_files import make_scan, write_recording, yaw_pose
 import numpy as np
 import pytest
 
+from cns_drake.base.errors import InputError
 from evaluation.methods import Method, MethodConfig, make_method
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.retrieval import retrieve
@@ -11,7 +12,6 @@ from evaluation.sequences.sampling import (
     sample_frames,
     within_range,
 )
-from evaluation.support.errors import InputError
 
 
 def line(xs):

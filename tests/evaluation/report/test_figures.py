@@ -6,7 +6,7 @@ from matplotlib.patches import Patch
 import numpy as np
 import pytest
 
-from evaluation.geometry.points import from_xyz
+from cns_drake.base.points import from_xyz
 from evaluation.maps.voxel_maps import VoxelAccumulator, VoxelMap
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.report import curve_figures

@@ -8,8 +8,8 @@ from lies import LIES, read_told, write_told
 import numpy as np
 import pytest
 
+from cns_drake.base.errors import InputError
 from evaluation.sequences import open_sequence
-from evaluation.support.errors import InputError
 
 
 @pytest.fixture
@@ -100,7 +100,7 @@ def test_messages_of_a_channel_that_nobody_names(recording, monkeypatch):
 _READ = """
 import sys
 from evaluation.sequences import open_sequence
-from evaluation.support.errors import InputError
+from cns_drake.base.errors import InputError
 try:
     sequence = open_sequence(sys.argv[1])
     sequence.X_WS, sequence.imu, [len(scan) for scan in sequence]

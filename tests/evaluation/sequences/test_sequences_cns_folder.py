@@ -9,8 +9,8 @@ from dataset_folders import (
 import numpy as np
 import pytest
 
+from cns_drake.base.errors import InputError
 from evaluation.sequences import check_same_world, open_sequence
-from evaluation.support.errors import InputError
 
 T0_NS = 1_700_000_000_000_000_001
 NUM_SCANS = 5

@@ -21,10 +21,10 @@ from helipr_drive import (
 import numpy as np
 import pytest
 
+from cns_drake.base.errors import InputError
 from evaluation.sequences import open_sequence
 from evaluation.sequences.helipr import HeliprSequence
 from evaluation.sequences.utm import ORIGIN
-from evaluation.support.errors import InputError
 
 FIELDS = {
     "Ouster": ("intensity", "t", "reflectivity", "ring", "ambient"),

@@ -9,8 +9,8 @@ from dataset_folders import (
 import numpy as np
 import pytest
 
+from cns_drake.base.errors import InputError
 from evaluation.sequences import open_sequence
-from evaluation.support.errors import InputError
 
 NUM_SCANS = 6
 # Forward, left, up of the LiDAR are -z... of the camera: roughly KITTI's.

@@ -15,15 +15,12 @@ from mcap.writer import CompressionType
 import numpy as np
 import pytest
 
+from cns_drake.base import poses
+from cns_drake.base.errors import InputError
+from cns_drake.base.recordings import mcap_file
+from cns_drake.base.recordings.point_cloud2 import to_points
 from evaluation import sequences
-from evaluation.geometry import poses
-from evaluation.sequences import (
-    check_same_world,
-    mcap_file,
-    open_sequence,
-)
-from evaluation.sequences.point_cloud2 import to_points
-from evaluation.support.errors import InputError
+from evaluation.sequences import check_same_world, open_sequence
 
 # A sensor that is turned as well as moved on its vehicle.
 P_BS = (0.3, -0.2, 1.6)

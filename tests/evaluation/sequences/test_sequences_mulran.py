@@ -12,9 +12,9 @@ from mulran_drive import NUM_SCANS, pose_table, scan_stamps, write_drive
 import numpy as np
 import pytest
 
+from cns_drake.base.errors import InputError
 from evaluation.sequences import check_same_world, open_sequence
 from evaluation.sequences.utm import ORIGIN
-from evaluation.support.errors import InputError
 
 # calib_base2ouster: Rz Ry Rx of 0.0001, 0.0003 and 179.6654 degrees.
 X_BS = np.array(

@@ -5,8 +5,8 @@ import os
 import numpy as np
 import pytest
 
+from cns_drake.base.errors import InputError
 from evaluation.sequences.text_tables import read_numbers, read_stamped_rows
-from evaluation.support.errors import InputError
 
 
 @pytest.mark.parametrize(

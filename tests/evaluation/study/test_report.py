@@ -6,15 +6,15 @@ import pytest
 from small_towns import drive
 import studies
 
-from evaluation.jobs.cluster import Cluster
-from evaluation.jobs.running import run_jobs
+from cns_drake.base.errors import InputError
+from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.running import run_jobs
 from evaluation.methods import method
 from evaluation.report import paper
 from evaluation.study.benchmark import write_report
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import find_recordings, group_cities
 from evaluation.study.plan import plan_study
-from evaluation.support.errors import InputError
 
 pytestmark = pytest.mark.slow
 

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from cns_drake.base.errors import InputError
 from evaluation.study.parts import (
     digest,
     is_current,
@@ -14,7 +15,6 @@ from evaluation.study.parts import (
     write_part,
 )
 from evaluation.study.plain_values import decode, encode
-from evaluation.support.errors import InputError
 
 INPUTS = {"drive": ["a", 3], "roles": ("places",), "z": {"b": 1.5, "a": None}}
 

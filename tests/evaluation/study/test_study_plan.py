@@ -5,9 +5,9 @@ import pickle
 
 import pytest
 
+from cns_drake.base.errors import InputError
 from evaluation.study.collection import RecordingInfo, group_cities
 from evaluation.study.plan import plan_study
-from evaluation.support.errors import InputError
 
 
 def info(name, stage, route="a", city="metropolis", needs=()):

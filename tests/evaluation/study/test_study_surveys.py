@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from small_towns import drive
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.jobs.running import Tell
 from evaluation.change.drive_change import survey
-from evaluation.jobs.running import Tell
 from evaluation.recognition.description import describe_drive
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.sequences import Sequence, open_sequence
@@ -18,7 +19,6 @@ from evaluation.study.parts import read_part
 from evaluation.study.recording_survey import survey_recording
 from evaluation.study.study_layout import RecognitionFiles, SurveyFiles
 from evaluation.study.surveys import survey_drive
-from evaluation.support.errors import InputError
 
 pytestmark = pytest.mark.slow
 

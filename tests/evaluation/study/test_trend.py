@@ -7,8 +7,9 @@ import pytest
 from small_towns import drive
 import studies
 
+from cns_drake.base.errors import InputError
+from cns_drake.base.jobs.cluster import Cluster
 from evaluation.change.drive_change import compare, survey
-from evaluation.jobs.cluster import Cluster
 from evaluation.methods import known_methods, make_method
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import RetrievalProtocol
@@ -16,7 +17,6 @@ from evaluation.sequences import open_sequence
 from evaluation.study import trend_points
 from evaluation.study.trend import smooth, smooth_band, write_trend
 from evaluation.study.trend_points import measure_trend
-from evaluation.support.errors import InputError
 
 pytestmark = pytest.mark.slow
 

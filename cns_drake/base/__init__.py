@@ -1,0 +1,1 @@
+"""What the simulator and the evaluation share: errors, files, jobs, formats."""

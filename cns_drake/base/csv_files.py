@@ -1,0 +1,61 @@
+"""Reading CSV files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import csv
+from pathlib import Path
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import read_bytes
+
+
+def read_rows(path: Path) -> list[tuple[int, list[str]]]:
+    """Returns the rows of a CSV file, each with the number of its line.
+
+    Cells are stripped of space around them; rows without any are left out.
+
+    Raises:
+        InputError: the file cannot be read or is not CSV in UTF-8.
+    """
+    content = read_bytes(path)
+    try:
+        reader = csv.reader(
+            content.decode("utf-8-sig").splitlines(), skipinitialspace=True
+        )
+        rows = [
+            (reader.line_num, [cell.strip() for cell in row]) for row in reader
+        ]
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: not UTF-8 text") from error
+    except csv.Error as error:
+        raise InputError(f"{path}: not CSV: {error}") from error
+    return [(line, row) for line, row in rows if any(row)]
+
+
+def read_records(
+    path: Path, columns: Sequence[str]
+) -> list[tuple[int, dict[str, str]]]:
+    """Returns the rows of a CSV file whose first line names the columns.
+
+    Args:
+        path: the file.
+        columns: those that must be there.
+
+    Returns:
+        For each row the number of its line, and column -> cell.
+
+    Raises:
+        InputError: as `read_rows`, a column is missing, or a row has not
+            one cell for each column.
+    """
+    (_, names), *rows = read_rows(path) or [(1, [])]
+    for column in columns:
+        if column not in names:
+            raise InputError(f"{path}: no column '{column}'")
+    for line, row in rows:
+        if len(row) != len(names):
+            raise InputError(
+                f"{path}: line {line}: {len(row)} cells instead of {len(names)}"
+            )
+    return [(line, dict(zip(names, row, strict=True))) for line, row in rows]

@@ -1,0 +1,219 @@
+"""Writing files that appear under their names only when they are whole."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import contextlib
+import fcntl
+import hashlib
+import os
+from pathlib import Path
+import stat
+
+from cns_drake.base.errors import InputError
+
+_WRITTEN_BYTES = 1 << 26
+# Some file systems allow 255; there are endings, and names of several parts.
+_LONGEST_NAME_BYTES = 120
+_KEPT_CHARACTERS = 20
+
+
+def part_path(path: Path) -> Path:
+    """Returns the name that a file has until it is complete."""
+    return path.with_name(f"{path.name}.part")
+
+
+@contextlib.contextmanager
+def user_errors(path: Path) -> Iterator[None]:
+    """Turns errors of the file system into one line that names the file.
+
+    Raises:
+        InputError: if the block raises OSError.
+    """
+    try:
+        yield
+    except OSError as error:
+        fault = error.strerror or str(error)
+        raise InputError(f"{path}: {fault}") from error
+
+
+@contextlib.contextmanager
+def completing(path: Path) -> Iterator[Path]:
+    """Yields where to write what shall become the file `path`.
+
+    On leaving normally the file is on the disk and gets its name; on an
+    exception it goes away.
+
+    Raises:
+        InputError: if it cannot be written.
+    """
+    part = part_path(path)
+    try:
+        with user_errors(path):
+            yield part
+            complete_part(path)
+    finally:
+        with contextlib.suppress(OSError):
+            part.unlink(missing_ok=True)
+
+
+def check_regular(path: Path) -> None:
+    """Refuses what is no file: a device never ends, a pipe may never begin.
+
+    Raises:
+        InputError: if it is another thing, or there is none.
+    """
+    with user_errors(path):
+        mode = path.stat().st_mode
+    if stat.S_ISDIR(mode):
+        raise InputError(f"{path}: Is a directory")
+    if not stat.S_ISREG(mode):
+        raise InputError(f"{path}: not a regular file")
+
+
+def read_bytes(path: Path, limit: int = _WRITTEN_BYTES) -> bytes:
+    """Reads a whole file, unless it is too large.
+
+    Args:
+        path: the file.
+        limit: how long it may be [bytes]; by default what is written by hand
+            or by a program for people.
+
+    Raises:
+        InputError: if it cannot be read, is none or is too large.
+    """
+    check_regular(path)
+    with user_errors(path), open(path, "rb") as stream:
+        content = stream.read(limit + 1)
+    if len(content) > limit:
+        raise InputError(f"{path}: larger than {limit} bytes")
+    return content
+
+
+def file_name(text: str) -> str:
+    """Returns a name that is that of a file, and leads nowhere else.
+
+    Names that a recording holds, of its map, its stage or itself, become
+    parts of paths only by this. Usual names stay as they are; others keep
+    what is harmless of them, and different ones stay different.
+
+    Args:
+        text: any.
+    """
+    name = "".join(
+        c if c.isalnum() or c in "_-+ " or (c == "." and k) else _escaped(c)
+        for k, c in enumerate(text)
+    )
+    if not name or len(name.encode()) > _LONGEST_NAME_BYTES:
+        digest = hashlib.sha256(text.encode("utf-8", "surrogatepass"))
+        # Behind a percent sign never else.
+        name = f"{name[:_KEPT_CHARACTERS]}%~{digest.hexdigest()[:32]}"
+    return name
+
+
+def _escaped(character: str) -> str:
+    octets = character.encode("utf-8", "surrogatepass")
+    return "".join(f"%{octet:02X}" for octet in octets)
+
+
+def write_part(path: Path, text: str) -> None:
+    """Writes text under the part name of `path`, down to the disk.
+
+    Raises:
+        InputError: if that fails, e.g. on a full disk.
+    """
+    part = part_path(path)
+    # Of several files, all are to be whole before the first gets its name.
+    with user_errors(part), open(part, "w", encoding="utf-8") as stream:
+        stream.write(text)
+        stream.flush()
+        os.fsync(stream.fileno())
+
+
+def complete_part(path: Path) -> None:
+    """Gives a file its final name, once all of it is on the disk.
+
+    An older file of that name is replaced.
+
+    Raises:
+        InputError: if that fails.
+    """
+    with user_errors(path):
+        part = part_path(path)
+        with part.open("rb") as stream:
+            os.fsync(stream.fileno())
+        os.replace(part, path)
+
+
+def check_writable(path: Path) -> None:
+    """Finds out before a long run whether a file can be written at its end.
+
+    Creates the folder if need be and leaves nothing else behind.
+
+    Raises:
+        InputError: if the file could not be written.
+    """
+    with user_errors(path):
+        if path.is_dir():
+            raise InputError(f"{path}: there is a folder of this name")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part = part_path(path)
+        part.touch()
+        part.unlink()
+
+
+def make_folder(path: Path) -> None:
+    """Makes a folder, with its parents, unless it is there already.
+
+    Raises:
+        InputError: if it cannot be made.
+    """
+    with user_errors(path):
+        path.mkdir(parents=True, exist_ok=True)
+
+
+@contextlib.contextmanager
+def exclusive(path: Path, on_wait: Callable[[], None]) -> Iterator[None]:
+    """Keeps other processes that ask for the same out, while the block runs.
+
+    The file `<path>.lock` is locked meanwhile, also for other machines if
+    the file system knows locks. It is unlocked however the process ends.
+
+    Args:
+        path: what the block works on, a file or a folder.
+        on_wait: is called before waiting for another process.
+
+    Raises:
+        InputError: if the lock cannot be written.
+    """
+    lock = path.with_name(f"{path.name}.lock")
+    make_folder(path.parent)
+    with contextlib.ExitStack() as stack:
+        try:
+            while not _lock(lock, stack, on_wait):
+                pass
+        except OSError as error:
+            raise InputError(f"{lock}: {error.strerror or error}") from error
+        yield
+
+
+def _lock(
+    lock: Path, stack: contextlib.ExitStack, on_wait: Callable[[], None]
+) -> bool:
+    """Locks a file; tells whether it still has its name then."""
+    stream = stack.enter_context(lock.open("w"))
+    try:
+        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        on_wait()
+        fcntl.flock(stream, fcntl.LOCK_EX)
+    except OSError:
+        pass  # Some network file systems know no locks; then there is none.
+    # Whoever had it before has removed it; others may have made it anew.
+    try:
+        if not os.path.samestat(os.stat(lock), os.fstat(stream.fileno())):
+            return False
+    except FileNotFoundError:
+        return False
+    stack.callback(lock.unlink, missing_ok=True)
+    return True

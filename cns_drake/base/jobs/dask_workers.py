@@ -1,0 +1,176 @@
+"""Workers of a scheduler of Dask, on any number of machines.
+
+Dask's own configuration says how to reach it: certificates of TLS, for one.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterator
+import contextlib
+import logging
+from typing import TYPE_CHECKING
+import uuid
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.interrupts import uninterrupted
+from cns_drake.base.jobs.job_process import ProcessDiedError, run_process
+from cns_drake.base.jobs.workers import Listener
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+# How long a scheduler may take to answer [s].
+_ANSWER_TIMEOUT = 10.0
+# What Dask calls all jobs.
+_KIND = "job"
+
+
+class DaskWorkers:
+    """Has jobs run by the workers of a scheduler; see `Workers`."""
+
+    def __init__(self, client: Client, listener: Listener):
+        self._client = client
+        self._listener = listener
+        self._id = uuid.uuid4().hex
+        self._futures: dict[str, Future] = {}
+        self._count = 0
+        client.subscribe_topic(self._id, lambda event: listener(*event[1]))
+        if not client.nthreads():
+            listener("note", "", f"{self._address}: no workers yet, waiting")
+
+    def submit(self, name: str, job: bytes, priority: float) -> None:
+        self._count += 1
+        future = self._client.submit(
+            work,
+            name,
+            job,
+            self._id,
+            # Up to the first "-", what Dask knows the duration of: only then
+            # it moves jobs from a worker to an idle one. A new key each time:
+            # an old one would stand for the old result.
+            key=f"{_KIND}-{name} {self._count}-{self._id}",
+            priority=priority,
+            pure=False,
+        )
+        self._futures[name] = future
+        future.add_done_callback(lambda future: self._end(name, future))
+
+    def stop(self) -> None:
+        futures = list(self._futures.values())
+        self._futures.clear()
+        self._client.cancel(futures, force=True)
+
+    @property
+    def _address(self) -> str:
+        return self._client.scheduler.address
+
+    def _end(self, name: str, future: Future) -> None:
+        if self._futures.pop(name, None) is not None:
+            self._listener("result", name, self._error(future))
+
+    def _error(self, future: Future) -> Exception | None:
+        """Returns what a job ended by, which may be nothing."""
+        if future.status == "finished":
+            return None
+        if future.status == "lost":
+            # Done, but its worker went before that was noticed here. Who does
+            # it again finds it done.
+            return ProcessDiedError("its worker died")
+        if future.status != "error":
+            return LostSchedulerError(
+                f"{self._address}: the connection to the scheduler was lost;"
+                " the same command goes on from here"
+            )
+        from distributed.scheduler import KilledWorker
+
+        error = future.exception()
+        if isinstance(error, KilledWorker):
+            return InputError("every worker that ran it died")
+        return error
+
+
+class LostSchedulerError(InputError):
+    """Nothing more will be heard of any job."""
+
+
+@contextlib.contextmanager
+def dask_workers(address: str, listener: Listener) -> Iterator[DaskWorkers]:
+    """Yields the workers of the scheduler at an address.
+
+    Raises:
+        InputError: if it does not answer.
+    """
+    # Slow to import, and needed by nobody who asks for help.
+    from distributed import Client
+
+    # What happens to jobs is told by whoever runs them, in other words.
+    for name in ("distributed", "distributed.client"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    _check_answer(address)
+    with contextlib.ExitStack() as stack:
+        with uninterrupted():  # Half of it could not be closed.
+            client = stack.enter_context(
+                Client(address, timeout=_ANSWER_TIMEOUT, set_as_default=False)
+            )
+        yield DaskWorkers(client, listener)
+
+
+def _check_answer(address: str) -> None:
+    """Raises InputError unless a scheduler answers in time.
+
+    A client would wait for ever for one that takes the call but is silent.
+    """
+    from distributed import Security
+    from distributed.core import rpc
+
+    async def ask() -> None:
+        keys = Security().get_connection_args("client")
+        async with rpc(address, connection_args=keys) as scheduler:
+            await scheduler.identity()
+
+    fault = f"--scheduler: {address}: no answer"
+    try:
+        asyncio.run(asyncio.wait_for(ask(), _ANSWER_TIMEOUT))
+    except asyncio.TimeoutError:
+        raise InputError(f"{fault} in {_ANSWER_TIMEOUT:g} s") from None
+    # Dask has all of these for an address of which it can make nothing, such
+    # as one of TLS without a certificate.
+    except (ImportError, OSError, TypeError, ValueError) as error:
+        raise InputError(f"{fault} ({error})") from error
+
+
+def work(name: str, job: bytes, topic: str) -> None:
+    """Runs a job; what a worker of Dask does.
+
+    Args:
+        name: of the job.
+        job: see `run_process`.
+        topic: under which the client hears of it.
+
+    Raises:
+        JobError: see `run_process`.
+        ProcessDiedError: see `run_process`.
+    """
+    from distributed import Status, get_worker
+
+    worker = get_worker()
+    key = worker.get_current_task()
+
+    def tell(kind: str, *values: object) -> None:
+        worker.log_event(topic, (kind, name, *values))
+
+    def is_wanted() -> bool:
+        # A client that goes, or no longer wants it, is noticed here only.
+        task = worker.state.tasks.get(key)
+        return (
+            worker.status in (Status.running, Status.paused)
+            and task is not None
+            and task.state != "cancelled"
+        )
+
+    tell("started")
+    try:
+        run_process(job, tell, is_wanted)
+    finally:
+        tell("ended")

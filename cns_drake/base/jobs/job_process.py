@@ -1,0 +1,251 @@
+"""The process in which one job runs, and what it tells its parent.
+
+A process each, with an interpreter of its own: what a job leaves in memory
+goes with it (Python systems in a Drake diagram are not freed otherwise), and
+whatever happens to one does not happen to the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import contextlib
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+import time
+import traceback
+
+from cns_drake.base.errors import InputError, one_line
+from cns_drake.base.files import exclusive
+from cns_drake.base.interrupts import (
+    end_interrupted,
+    ignore_interrupts,
+    interrupt_on_termination,
+    uninterrupted,
+)
+from cns_drake.base.libraries import missing_library
+
+# How long a process may take to close its files once it is asked to end [s].
+PATIENCE = 30.0
+# How often a job tells of its progress at most [s].
+_TELL_INTERVAL = 0.5
+# Where what a job prints goes, whatever stands for it in this process.
+_STDERR = 2
+# How often a parent looks whether its job is still wanted [s].
+_LOOK_INTERVAL = 0.2
+
+# A job takes and frees the same arrays thousands of times. The C library
+# would return their memory each time, as Dask's workers ask for, or where it
+# guesses wrong; fetching it anew takes longer than filling it [bytes].
+_ALLOCATION = {
+    "MALLOC_MMAP_THRESHOLD_": str(1 << 25),  # The largest that glibc takes.
+    "MALLOC_TRIM_THRESHOLD_": str(1 << 28),
+}
+
+# The search path is the parent's, not what the folder it runs in makes of it.
+_START = (
+    "import sys; number, *sys.path[:] = sys.argv[1:]; "
+    f"from {__name__} import main; main(int(number))"
+)
+
+
+class JobError(Exception):
+    """A job cannot be done; the message is one line that says why."""
+
+
+class ProcessDiedError(Exception):
+    """The process of a job was killed, or crashed, or was asked to end."""
+
+
+class Tell:
+    """How a job tells of itself; without an argument nobody listens."""
+
+    def __init__(self, send: Callable[..., None] = lambda *message: None):
+        """Takes what takes the messages: a kind and its values."""
+        self._send = send
+        self._told: float | None = None
+
+    def progress(self, done: int, total: int) -> None:
+        """Tells that so much of so much is done, in any unit."""
+        now = time.monotonic()
+        if (
+            done >= total
+            or self._told is None
+            or now - self._told >= _TELL_INTERVAL
+        ):
+            self._told = now
+            self._send("progress", int(done), int(total))
+
+    def note(self, text: str) -> None:
+        """Tells something that a user should know."""
+        self._send("note", str(text))
+
+
+def run_process(
+    job: bytes,
+    on_message: Callable[..., None],
+    is_wanted: Callable[[], bool],
+) -> None:
+    """Runs a job in a process of its own and waits for its end.
+
+    Args:
+        job: a pickled tuple: function, arguments, what it writes (see
+            `exclusive`) or None, and what tells whether nothing is left to
+            do (see `nothing_left`).
+        on_message: takes what the job tells; see `Tell`.
+        is_wanted: asked often; where it says no, the process is ended.
+
+    Raises:
+        JobError: the job cannot be done.
+        ProcessDiedError: its process ended before it was done.
+    """
+    ours, theirs = Pipe()
+    # In a session of its own no Ctrl-C reaches it: whoever is interrupted
+    # there ends its jobs in good order.
+    command = [sys.executable, "-c", _START, str(theirs.fileno()), *sys.path]
+    process = subprocess.Popen(
+        command,
+        env={**os.environ, **_ALLOCATION},
+        pass_fds=[theirs.fileno()],
+        stdin=subprocess.DEVNULL,
+        stdout=_STDERR,
+        start_new_session=True,
+    )
+    theirs.close()  # So that the pipe ends with the process.
+    with ours:
+        try:
+            told, text = _listen(ours, job, on_message, is_wanted)
+        finally:
+            status = _end(process)
+    if told == "fault":
+        raise JobError(text)
+    if told != "done":
+        raise ProcessDiedError(text or _describe(status))
+
+
+def _listen(
+    connection: Connection,
+    job: bytes,
+    on_message: Callable[..., None],
+    is_wanted: Callable[[], bool],
+) -> tuple[str, str]:
+    """Returns the last that a job told, "" if it just ended."""
+    with contextlib.suppress(EOFError, ConnectionError):
+        connection.send_bytes(job)
+        while is_wanted():
+            if connection.poll(_LOOK_INTERVAL):
+                kind, *values = connection.recv()
+                if kind in ("done", "fault", "died"):
+                    return kind, *values
+                on_message(kind, *values)
+    return "", ""
+
+
+def _end(process: subprocess.Popen) -> int:
+    """Sees that a process ends, and returns its status."""
+    process.terminate()
+    try:
+        return process.wait(PATIENCE)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        return process.wait()
+
+
+def _describe(status: int) -> str:
+    if status >= 0:
+        return f"its process ended with status {status}"
+    try:
+        name = signal.Signals(-status).name
+    except ValueError:
+        name = f"signal {-status}"
+    return f"its process was ended by {name}" + (
+        ", perhaps for lack of memory" if -status == signal.SIGKILL else ""
+    )
+
+
+def main(number: int) -> None:
+    """Runs the job that a parent sends; its whole process.
+
+    Args:
+        number: of the file descriptor that leads to the parent.
+    """
+    connection = Connection(number)
+    interrupt_on_termination(once=True)
+
+    def send(*message: object) -> None:
+        # Where the parent has gone, there is nobody to tell.
+        with contextlib.suppress(ConnectionError):
+            connection.send(message)
+
+    try:
+        job = connection.recv_bytes()
+        threading.Thread(
+            target=_end_with_parent, args=(connection,), daemon=True
+        ).start()
+        last = _run(job, Tell(send))
+    except KeyboardInterrupt:
+        end_interrupted()
+    ignore_interrupts()
+    send(*last)
+
+
+def _run(job: bytes, tell: Tell) -> tuple[str, str]:
+    """Runs a job; returns what is left to tell."""
+    try:
+        with uninterrupted():
+            function, arguments, output, is_done = pickle.loads(job)
+        with contextlib.ExitStack() as stack:
+            if output is not None:
+                stack.enter_context(
+                    exclusive(
+                        output,
+                        lambda: tell.note(
+                            f"{output}: waiting for another process that "
+                            "works on it"
+                        ),
+                    )
+                )
+            if not nothing_left(is_done, arguments):
+                function(*arguments, tell)
+    except MemoryError:
+        # Another time, or elsewhere, there may be enough.
+        return "died", "not enough memory"
+    except InputError as error:
+        return "fault", str(error)
+    except Exception as error:
+        lacking = isinstance(error, ImportError) and missing_library(error)
+        if lacking:
+            return "fault", lacking
+        tell.note(traceback.format_exc())
+        return "fault", one_line(f"{type(error).__name__}: {error}")
+    return "done", ""
+
+
+def nothing_left(is_done: Callable[..., bool] | None, arguments: tuple) -> bool:
+    """Tells whether a job has nothing to do, as far as it can tell.
+
+    Args:
+        is_done: answers, or raises InputError; None stands for no.
+        arguments: of the job.
+    """
+    if is_done is None:
+        return False
+    try:
+        return is_done(*arguments)
+    except InputError:
+        return False
+
+
+def _end_with_parent(connection: Connection) -> None:
+    """Ends this process when its parent has ended, even if killed."""
+    # Nothing more is sent: what comes is the end.
+    with contextlib.suppress(OSError):
+        connection.poll(None)
+    os.kill(os.getpid(), signal.SIGTERM)
+    threading.Event().wait(PATIENCE)
+    os.kill(os.getpid(), signal.SIGKILL)

@@ -1,0 +1,210 @@
+"""How far many jobs have come, on stderr: one display for all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import contextlib
+from dataclasses import dataclass
+import datetime
+import time
+from types import TracebackType
+
+from rich.console import Console, RenderableType
+from rich.progress import TaskID
+
+from cns_drake.base.progress import LINE_INTERVAL
+from cns_drake.base.progress_bars import print_note, show_bars
+
+# For so long costs are believed as they are given, before the measured pace
+# outweighs them [s].
+_PRIOR = 10.0
+# A job that takes less than this share of its cost was done already, and
+# tells nothing about the pace.
+_REAL_SHARE = 0.05
+
+
+@dataclass
+class _Work:
+    """One job.
+
+    Attributes:
+        cost: expected time [s].
+        done: the share that is done.
+        taken: time that the measured share took [s].
+        measured: the share that was done in that time.
+    """
+
+    cost: float
+    done: float = 0.0
+    taken: float = 0.0
+    measured: float = 0.0
+
+
+class TimeLeft:
+    """How long many jobs still take, by their costs and the pace so far.
+
+    Times are of any one clock [s].
+    """
+
+    def __init__(self, costs: Mapping[str, float]):
+        """Takes name -> expected time on one core [s]."""
+        self._works = {name: _Work(cost) for name, cost in costs.items()}
+        # Name -> time and share when the job was first heard of; the share
+        # is unknown until it tells. An earlier run may have left some.
+        self._running: dict[str, tuple[float, float | None]] = {}
+        self._most_running = 1
+
+    def start(self, name: str, now: float) -> None:
+        """A job starts, or starts again."""
+        work = self._works[name]
+        work.done = work.taken = work.measured = 0.0
+        self._running[name] = (now, None)
+        self._most_running = max(self._most_running, len(self._running))
+
+    def progress(self, name: str, share: float, now: float) -> None:
+        """A share of a job is done; what it loads before is no work."""
+        work = self._works[name]
+        work.done = share
+        since, first = self._running.get(name, (now, None))
+        if first is None:
+            self._running[name] = (now, share)
+        else:
+            work.taken, work.measured = now - since, share - first
+
+    def end(self, name: str, now: float) -> None:
+        """A job ends."""
+        work = self._works[name]
+        since, first = self._running.pop(name, (now, None))
+        work.done = 1.0
+        work.taken, work.measured = now - since, 1.0 - (first or 0.0)
+        if work.taken < _REAL_SHARE * work.cost:
+            work.taken = work.measured = 0.0
+
+    def share(self) -> float:
+        """Returns how much of all work is done, 0 to 1."""
+        total = sum(work.cost for work in self._works.values())
+        done = sum(work.cost * work.done for work in self._works.values())
+        return done / max(total, 1e-9)
+
+    def seconds(self) -> float:
+        """Returns the time that is left [s]."""
+        works = self._works.values()
+        taken = sum(work.taken for work in works)
+        expected = sum(work.cost * work.measured for work in works)
+        pace = (_PRIOR + taken) / (_PRIOR + expected)
+        left = [work.cost * (1 - work.done) for work in works if work.done < 1]
+        if not left:
+            return 0.0
+        # As many work side by side as did so before; the longest one ends
+        # no earlier for that.
+        side_by_side = min(self._most_running, len(left))
+        longest = max(
+            (
+                self._works[name].cost * (1 - self._works[name].done)
+                for name in self._running
+            ),
+            default=0.0,
+        )
+        return pace * max(sum(left) / side_by_side, longest)
+
+
+class JobProgress:
+    """A line for all jobs together and one for each that is running.
+
+    A context manager. Where there is no terminal, a line every few seconds.
+    """
+
+    def __init__(
+        self, costs: Mapping[str, float], console: Console | None = None
+    ):
+        """Takes name -> expected time on one core [s], and where to show."""
+        self._costs = costs
+        self._left = TimeLeft(costs)
+        self._stack = contextlib.ExitStack()
+        self._console = console
+        self._tasks: dict[str, TaskID] = {}
+        self._notes: dict[str, str] = {}
+        self._num_ended = 0
+        # When the next line is due where there is no terminal.
+        self._due = time.monotonic() + LINE_INTERVAL
+        self._silent = True
+
+    def __enter__(self) -> JobProgress:
+        self._bars = self._stack.enter_context(show_bars(console=self._console))
+        self._total = self._bars.add_task(self._summary(), total=1.0, note="")
+        self.refresh()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._stack.__exit__(kind, error, trace)
+
+    def __rich__(self) -> RenderableType:
+        """Returns what is shown."""
+        return self._bars.get_renderable()
+
+    def start(self, name: str) -> None:
+        """A job starts, or starts again."""
+        self._left.start(name, time.monotonic())
+        self._remove(name)
+        self._tasks[name] = self._bars.add_task(name, total=None, note="")
+        self.refresh()
+
+    def progress(self, name: str, done: int, total: int) -> None:
+        """So much of so much of a job is done."""
+        if name not in self._tasks:
+            return
+        share = done / max(total, 1)
+        self._left.progress(name, share, time.monotonic())
+        self._notes[name] = f"{done} of {total}"
+        self._bars.update(
+            self._tasks[name],
+            completed=done,
+            total=total,
+            note=self._notes[name],
+        )
+        if self._silent:  # Something has begun: that is soon told.
+            self._due = 0.0
+        self.refresh()
+
+    def end(self, name: str, fault: bool = False) -> None:
+        """A job ends."""
+        self._left.end(name, time.monotonic())
+        self._num_ended += 1
+        self._remove(name)
+        if not self._bars.console.is_terminal and not fault:
+            self.note(f"{name}: done, {self._summary()}")
+        self.refresh()
+
+    def note(self, text: str) -> None:
+        """Prints lines above the display."""
+        print_note(self._bars, text)
+
+    def refresh(self) -> None:
+        """Shows what has changed by now."""
+        left = datetime.timedelta(seconds=round(self._left.seconds()))
+        self._bars.update(
+            self._total,
+            description=self._summary(),
+            completed=self._left.share(),
+            note=f"{left} left",
+        )
+        now = time.monotonic()
+        if self._bars.console.is_terminal or now < self._due:
+            return
+        self._due = now + LINE_INTERVAL
+        self._silent = self._silent and not self._notes
+        running = [f"{name} {note}" for name, note in self._notes.items()]
+        self.note("; ".join([f"{self._summary()}, {left} left", *running]))
+
+    def _summary(self) -> str:
+        return f"{self._num_ended} of {len(self._costs)} jobs"
+
+    def _remove(self, name: str) -> None:
+        self._notes.pop(name, None)
+        if name in self._tasks:
+            self._bars.remove_task(self._tasks.pop(name))

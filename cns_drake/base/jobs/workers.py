@@ -1,0 +1,85 @@
+"""What runs jobs: on this machine a thread beside the process of each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import contextlib
+import threading
+from typing import Protocol
+
+from cns_drake.base.jobs.job_process import run_process
+
+# Takes what is told of a job: the kind, its name, and values. Besides what
+# the job tells itself these are "started", "ended", and at last "result" with
+# the exception that it ended by, or None. It is called from any thread.
+Listener = Callable[..., None]
+
+
+class Workers(Protocol):
+    """Runs jobs side by side, and tells a `Listener` of them."""
+
+    def submit(self, name: str, job: bytes, priority: float) -> None:
+        """Lets a job run, when there is room.
+
+        Args:
+            name: of the job.
+            job: see `run_process`.
+            priority: of several that wait, the one with most comes first.
+        """
+
+    def stop(self) -> None:
+        """Ends all jobs; "ended" tells when the files of each are closed."""
+
+
+class LocalWorkers:
+    """Starts every job at once: whoever submits them knows the room.
+
+    Nothing listens on any port, since whoever reached that could run
+    programs here.
+    """
+
+    def __init__(self, listener: Listener):
+        self._listener = listener
+        self._stopped = threading.Event()
+        self._threads: list[threading.Thread] = []
+
+    def submit(self, name: str, job: bytes, priority: float) -> None:
+        del priority
+        thread = threading.Thread(
+            target=self._run, args=(name, job), daemon=True
+        )
+        self._threads.append(thread)
+        thread.start()
+
+    def stop(self) -> None:
+        self._stopped.set()
+
+    def join(self) -> None:
+        """Waits until nothing runs any more."""
+        for thread in self._threads:
+            thread.join()
+
+    def _run(self, name: str, job: bytes) -> None:
+        error: Exception | None = None
+        self._listener("started", name)
+        try:
+            run_process(
+                job,
+                lambda kind, *values: self._listener(kind, name, *values),
+                lambda: not self._stopped.is_set(),
+            )
+        except Exception as caught:  # Whatever it is, it is told.
+            error = caught
+        self._listener("ended", name)
+        self._listener("result", name, error)
+
+
+@contextlib.contextmanager
+def local_workers(listener: Listener) -> Iterator[LocalWorkers]:
+    """Yields workers of this machine; what still runs at the end is ended."""
+    workers = LocalWorkers(listener)
+    try:
+        yield workers
+    finally:
+        workers.stop()
+        workers.join()

@@ -1,0 +1,137 @@
+"""Progress bars on stderr, each one line however narrow the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import contextlib
+import time
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    Progress,
+    ProgressColumn,
+    Task,
+    TaskID,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+from rich.table import Column
+from rich.text import Text
+
+from cns_drake.base.progress import LINE_INTERVAL
+
+
+class _ShortenedColumn(TextColumn):
+    """Text that gives way in a narrow terminal instead of wrapping."""
+
+    def render(self, task: Task) -> Text:
+        text = super().render(task)
+        text.no_wrap = True
+        text.overflow = "ellipsis"
+        return text
+
+
+def fixed_column() -> Column:
+    """Returns the layout of what is never wrapped."""
+    return Column(no_wrap=True)
+
+
+@contextlib.contextmanager
+def show_bars(
+    *columns: ProgressColumn, console: Console | None = None
+) -> Iterator[Progress]:
+    """Shows progress bars, each one line.
+
+    The field `note` of a task is shown behind its bar. Where there is no
+    terminal, no bar is drawn: it would be drawn once, at the end, beside an
+    error's line.
+
+    Args:
+        columns: shown between bar and note.
+        console: where; stderr by default.
+    """
+    progress = Progress(
+        TextColumn("{task.description}", table_column=fixed_column()),
+        BarColumn(table_column=Column(max_width=40)),
+        TextColumn("{task.percentage:>3.0f} %", table_column=fixed_column()),
+        *columns,
+        _ShortenedColumn("{task.fields[note]}", table_column=Column()),
+        console=console or Console(stderr=True),
+        refresh_per_second=2,
+    )
+    if progress.console.is_terminal:
+        with progress:
+            yield progress
+    else:
+        yield progress
+
+
+def print_note(progress: Progress, text: str) -> None:
+    """Prints a line above the progress bars."""
+    # Where there is no terminal, a line stays one line.
+    progress.console.print(text, soft_wrap=True, markup=False, highlight=False)
+
+
+@contextlib.contextmanager
+def show_progress(console: Console | None = None) -> Iterator[Progress]:
+    """Shows progress bars, each one line, with elapsed and remaining time.
+
+    See `show_bars`; where there is no terminal, see `count_progress`.
+
+    Args:
+        console: where; stderr by default.
+    """
+    with show_bars(
+        TimeElapsedColumn(table_column=fixed_column()),
+        TextColumn("left", table_column=fixed_column()),
+        TimeRemainingColumn(table_column=fixed_column()),
+        console=console,
+    ) as progress:
+        yield progress
+
+
+def count_progress(
+    progress: Progress,
+    task: TaskID,
+    note: Callable[[int, int, float], str] = lambda done, new, elapsed: "",
+    unit: str = "frames",
+) -> Callable[[int, int], None]:
+    """Returns a callback that shows how many frames of how many are done.
+
+    On a terminal the bar moves; elsewhere a line tells the same every few
+    seconds.
+
+    Args:
+        progress: where the task is shown.
+        task: its id.
+        note: of the frames done, how many of them are new since the first
+            call, and the time [s] they took -> what to add.
+        unit: what is counted.
+    """
+    console = progress.console
+    interval = 0.5 if console.is_terminal else LINE_INTERVAL
+    shown = 0.0
+    # Neither loading nor what an earlier run had done tells the speed.
+    first: tuple[float, int] | None = None
+
+    def on_frame(done: int, total: int) -> None:
+        nonlocal shown, first
+        now = time.monotonic()
+        if first is None:
+            first, shown = (now, done), now
+        if done < total and now - shown < interval:
+            return
+        shown = now
+        elapsed, new = now - first[0], done - first[1]
+        text = note(done, new, elapsed)
+        progress.update(task, completed=done, total=total, note=text)
+        if not console.is_terminal:
+            name = progress.tasks[task].description
+            left = elapsed * (total - done) / max(new, 1)
+            parts = [f"{name}: {done}/{total} {unit}", text]
+            parts.append(f"{left:.0f} s left")
+            print_note(progress, ", ".join(part for part in parts if part))
+
+    return on_frame

@@ -1,0 +1,1 @@
+"""Recorded drives: what each offers, and the reader of MCAP files."""

@@ -1,0 +1,352 @@
+"""Random access to the messages of an MCAP file.
+
+The `mcap` package reads messages in time order, or all of a span of time. A
+scan by number needs less and more: where each message of a topic lies, and
+the one chunk that holds it. Both come from the index that a complete file
+ends with, so that opening a file of gigabytes reads a few kilobytes.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+import contextlib
+import os
+from pathlib import Path
+import struct
+from typing import BinaryIO
+
+from mcap.exceptions import McapError
+from mcap.reader import SeekingReader
+from mcap.records import Channel, ChunkIndex
+import numpy as np
+import zstandard
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import check_regular
+from cns_drake.base.processors import num_cores
+from cns_drake.base.recordings.mcap_records import (
+    CHUNK_LIMIT_BYTES,
+    MAGIC,
+    RECORD_HEADER,
+    SUMMARY_LIMIT_BYTES,
+    check_summary,
+    read_attachment,
+    read_chunk,
+)
+
+# Of a message, after its record header: channel id, sequence, two times.
+_MESSAGE_HEADER = struct.Struct("<HIQQ")
+# Of a message index, after its record header: channel id, length of the rest.
+_INDEX_HEADER = struct.Struct("<HI")
+_INDEX_ENTRY = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
+# The frame that is being read, and its neighbour when two of them interleave.
+_CHUNKS_KEPT = 2
+# Where a message lies: the number of its chunk in the file's index, the place
+# of its record in the uncompressed chunk [bytes]; when it was logged [ns]; the
+# channel of its topic. An array, since a long drive has millions.
+LOCATION = np.dtype(
+    [
+        ("chunk", "<u4"),
+        ("offset", "<u8"),
+        ("log_time_ns", "<u8"),
+        ("channel_id", "<u2"),
+    ]
+)
+_ORDER = ("log_time_ns", "chunk", "offset")
+
+
+class McapFile:
+    """An indexed MCAP file, open for reading single messages.
+
+    The file is opened for each access only; two uncompressed chunks (of
+    1 MiB as a rule) are kept, since messages are mostly read in order.
+
+    All channels of a topic are one stream of messages, as when several nodes
+    publish on it.
+    """
+
+    def __init__(self, path: Path):
+        """Reads the index.
+
+        Raises:
+            InputError: if there is no such file, or it is no complete and
+                indexed MCAP file.
+        """
+        self.path = Path(path)
+        check_regular(self.path)
+        with self._reading() as stream:
+            self._check_ends(stream)
+            check_summary(stream)
+            summary = SeekingReader(
+                stream, record_size_limit=SUMMARY_LIMIT_BYTES
+            ).get_summary()
+        if summary is None or not summary.chunk_indexes:
+            raise InputError(f"{self.path}: the MCAP file has no chunk index")
+        self._summary = summary
+        self._chunk_indexes: list[ChunkIndex] = sorted(
+            self._summary.chunk_indexes,
+            key=lambda chunk: chunk.chunk_start_offset,
+        )
+        self._channels: dict[str, list[Channel]] = {}
+        for _, channel in sorted(self._summary.channels.items()):
+            self._channels.setdefault(channel.topic, []).append(channel)
+        self._check_channels()
+        self._locations: dict[str, np.ndarray] = {}
+        self._chunks: OrderedDict[int, memoryview] = OrderedDict()
+
+    @property
+    def topics(self) -> dict[str, list[str]]:
+        """Topic -> kinds of its messages: `<type> in <encoding>`, sorted.
+
+        Of a sound recording it is one kind.
+        """
+        return {
+            topic: sorted({self._kind(channel) for channel in channels})
+            for topic, channels in self._channels.items()
+        }
+
+    def locate(self, topic: str) -> np.ndarray:
+        """Returns where a topic's messages lie, in the order of time.
+
+        Returns:
+            (N,) of `LOCATION`.
+
+        Raises:
+            InputError: if the index cannot be read.
+        """
+        if topic not in self._locations:
+            self._locations[topic] = self._read_locations(topic)
+        return self._locations[topic]
+
+    def read(self, location: np.void) -> memoryview:
+        """Returns the serialised message at a location.
+
+        Raises:
+            InputError: if the chunk is damaged.
+        """
+        return self._message(self._chunk(int(location["chunk"])), location)
+
+    def visit(
+        self,
+        locations: np.ndarray,
+        take: Callable[[int, memoryview], None],
+    ) -> None:
+        """Shows many messages, unpacking each chunk once.
+
+        Chunks are unpacked on all cores, which zstd leaves Python free to
+        do, as far as a few megabytes of memory go.
+
+        Args:
+            locations: (N,) of `LOCATION`: where the messages lie.
+            take: is shown a position in `locations` and its serialised
+                message; called from several threads. What it keeps must not
+                refer to the message, or all chunks stay in memory.
+
+        Raises:
+            InputError: if a chunk is damaged, or as `take` does.
+        """
+        order = np.lexsort((locations["offset"], locations["chunk"]))
+        chunks = locations["chunk"][order]
+        groups = np.split(order, np.flatnonzero(np.diff(chunks)) + 1)
+
+        def visit_chunk(group: np.ndarray) -> None:
+            chunk = self._unpack(int(locations[group[0]]["chunk"]))
+            for i in group.tolist():
+                take(i, self._message(chunk, locations[i]))
+
+        largest = max(one.uncompressed_size for one in self._chunk_indexes)
+        at_once = CHUNK_LIMIT_BYTES // max(largest, 1)
+        pool = ThreadPoolExecutor(min(num_cores(), max(at_once, 1)))
+        try:
+            for _ in pool.map(visit_chunk, groups if len(order) else ()):
+                pass
+        finally:
+            # After a fault the other chunks are of no interest.
+            pool.shutdown(cancel_futures=True)
+
+    def attachment(self, name: str) -> bytes | None:
+        """Returns the content of the attachment of this name, if any.
+
+        Raises:
+            InputError: if it cannot be read, or others of this name differ.
+        """
+        content = None
+        for index in self._summary.attachment_indexes:
+            if index.name != name:
+                continue
+            with self._reading() as stream:
+                stream.seek(index.offset)
+                data = read_attachment(stream).data
+            if content not in (None, data):
+                raise InputError(
+                    f"{self.path}: attachment {name}: there are two, which"
+                    " differ"
+                )
+            content = data
+        return content
+
+    def _kind(self, channel: Channel) -> str:
+        schema = self._summary.schemas.get(channel.schema_id)
+        name = "a message without a type" if schema is None else schema.name
+        return f"{name} in {channel.message_encoding}"
+
+    def _read_locations(self, topic: str) -> np.ndarray:
+        parts = [np.empty(0, LOCATION)]
+        with self._reading() as stream:
+            # Many indexes in one place would be more than the file holds.
+            left = stream.seek(0, os.SEEK_END)
+            for channel in self._channels[topic]:
+                found = 0
+                for number, chunk in enumerate(self._chunk_indexes):
+                    offset = chunk.message_index_offsets.get(channel.id)
+                    if offset is None:
+                        continue
+                    part = self._read_index(stream, offset, left)
+                    part["chunk"], part["channel_id"] = number, channel.id
+                    left -= len(part) * _INDEX_ENTRY.itemsize
+                    found += len(part)
+                    parts.append(part)
+                self._check_count(channel.id, found)
+        locations = np.concatenate(parts)
+        places = np.sort(locations[["chunk", "offset"]])
+        if (places[1:] == places[:-1]).any():
+            raise InputError(
+                f"{self.path}: {topic}: the index lists a message twice"
+            )
+        # Those of one time keep the file's order.
+        return locations[np.lexsort([locations[key] for key in _ORDER[::-1]])]
+
+    @staticmethod
+    def _read_index(stream: BinaryIO, offset: int, left: int) -> np.ndarray:
+        """Returns where a chunk has a channel's messages; see `LOCATION`.
+
+        Args:
+            stream: the file.
+            offset: of the record of the index in it [bytes].
+            left: how long the index may be [bytes].
+        """
+        stream.seek(offset + RECORD_HEADER.size)
+        _, length = _INDEX_HEADER.unpack(stream.read(_INDEX_HEADER.size))
+        if length > left:
+            raise ValueError("the indexes of the chunks overlap")
+        entries = np.frombuffer(stream.read(length), _INDEX_ENTRY)
+        part = np.zeros(len(entries), LOCATION)
+        part["offset"] = entries["offset"]
+        part["log_time_ns"] = entries["log_time"]
+        return part
+
+    def _chunk(self, number: int) -> memoryview:
+        """Returns an uncompressed chunk, of which the last are kept."""
+        if number in self._chunks:
+            self._chunks.move_to_end(number)
+            return self._chunks[number]
+        new = self._chunk_indexes[number].uncompressed_size
+        while self._chunks and (
+            len(self._chunks) >= _CHUNKS_KEPT
+            or new + sum(map(len, self._chunks.values())) > CHUNK_LIMIT_BYTES
+        ):
+            self._chunks.popitem(last=False)
+        self._chunks[number] = self._unpack(number)
+        return self._chunks[number]
+
+    def _unpack(self, number: int) -> memoryview:
+        """Reads and uncompresses a chunk whose checksum is right."""
+        index = self._chunk_indexes[number]
+        with self._reading() as stream:
+            stream.seek(index.chunk_start_offset)
+            return memoryview(read_chunk(stream, index.uncompressed_size))
+
+    def _message(self, chunk: memoryview, location: np.void) -> memoryview:
+        _, offset, expected_time_ns, expected_channel_id = location.item()
+        with self._faults():
+            start = offset + RECORD_HEADER.size
+            _, length = RECORD_HEADER.unpack(chunk[offset:start])
+            body = chunk[start : start + length]
+            if len(body) != length:
+                raise EOFError("a message ends behind its chunk")
+            channel_id, _, log_time_ns, _ = _MESSAGE_HEADER.unpack_from(body)
+            # Nothing else would tell that a message index is damaged.
+            if (channel_id, log_time_ns) != (
+                expected_channel_id,
+                expected_time_ns,
+            ):
+                raise ValueError("a message is not where the index says")
+        return body[_MESSAGE_HEADER.size :]
+
+    def _check_channels(self) -> None:
+        """Refuses messages of a channel that the summary does not name.
+
+        Raises:
+            InputError: that tells its number.
+        """
+        used = {
+            number
+            for chunk in self._chunk_indexes
+            for number in chunk.message_index_offsets
+        }
+        statistics = self._summary.statistics
+        if statistics is not None:
+            used |= statistics.channel_message_counts.keys()
+        unknown = used - self._summary.channels.keys()
+        if unknown:
+            raise InputError(
+                f"{self.path}: messages of channel {min(unknown)}, of which"
+                " the summary says nothing"
+            )
+
+    def _check_count(self, channel_id: int, found: int) -> None:
+        """Refuses an index that lists not all messages of a channel.
+
+        Raises:
+            ValueError: that tells the numbers.
+        """
+        if self._summary.statistics is None:
+            return
+        counts = self._summary.statistics.channel_message_counts
+        if found != counts.get(channel_id, found):
+            raise ValueError(
+                f"the index has {found} of {counts[channel_id]} messages"
+            )
+
+    def _check_ends(self, stream: BinaryIO) -> None:
+        if stream.read(len(MAGIC)) != MAGIC:
+            raise InputError(f"{self.path}: not an MCAP file")
+        size = stream.seek(0, os.SEEK_END)
+        stream.seek(max(size - len(MAGIC), len(MAGIC)))
+        if stream.read() != MAGIC:
+            raise InputError(
+                f"{self.path}: the MCAP file is cut off or was not finished"
+            )
+        stream.seek(0)
+
+    @contextlib.contextmanager
+    def _reading(self) -> Iterator:
+        with self._faults(), open(self.path, "rb") as stream:
+            yield stream
+
+    @contextlib.contextmanager
+    def _faults(self) -> Iterator[None]:
+        """Turns what a missing or damaged file raises into one line."""
+        try:
+            yield
+        except OSError as error:
+            fault = error.strerror or str(error)
+            raise InputError(f"{self.path}: {fault}") from error
+        except (
+            McapError,
+            EOFError,
+            StopIteration,
+            MemoryError,
+            OverflowError,
+            ValueError,
+            RuntimeError,
+            struct.error,
+            zstandard.ZstdError,
+        ) as error:
+            # Some of them come without a word.
+            fault = str(error) or type(error).__name__
+            raise InputError(
+                f"{self.path}: damaged MCAP file ({fault})"
+            ) from error

@@ -1,0 +1,394 @@
+"""Drives recorded as MCAP by cns-drake (or by others on the same topics)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cns_drake.base import points as point_arrays
+from cns_drake.base import poses
+from cns_drake.base.errors import InputError
+from cns_drake.base.json_text import parse_json
+from cns_drake.base.recordings import mcap_messages
+from cns_drake.base.recordings.mcap_file import McapFile
+from cns_drake.base.recordings.mcap_messages import xyz, xyzw
+from cns_drake.base.recordings.motion import IMU_DTYPE, ODOMETRY_DTYPE
+from cns_drake.base.recordings.point_cloud2 import to_points
+from cns_drake.base.recordings.sequence import Sequence, index_instances
+
+_LIDAR_TOPIC = "/lidar/points"
+_ODOMETRY_TOPIC = "/odometry"
+_IMU_TOPIC = "/imu/data"
+_TF_STATIC_TOPIC = "/tf_static"
+
+
+class McapSequence(Sequence):
+    """A recording on the topics /lidar/points, /odometry and /tf_static.
+
+    Without `/lidar/points` the only topic of point clouds takes its place;
+    of several LiDARs, `lidar` chooses one. The topic /imu/data is optional.
+    Scan i is the i-th message of that topic by log time. Its pose is
+    that of the `/odometry` message with exactly the same stamp, composed
+    with the sensor's place on the vehicle from `/tf_static`; nothing is
+    interpolated.
+
+    What contradicts itself is refused: two poses for one stamp, two mounts of
+    a sensor, a frame that changes on the way.
+
+    Opening reads the file's index. Stamps and poses take one pass over the
+    file when they are first asked for; a scan takes one chunk.
+    """
+
+    def __init__(self, path: Path, lidar: str | None = None):
+        """Opens a recording.
+
+        Args:
+            path: the .mcap file, or the folder that holds it.
+            lidar: whose scans to read: those of the topic /<lidar>/points.
+
+        Raises:
+            InputError: if there is no complete recording at `path`, or no
+                such LiDAR in it.
+        """
+        self._file = McapFile(_mcap_path(Path(path)))
+        self._path = self._file.path
+        self.name = _sequence_name(Path(path))
+        self._lidar_topic = self._find_lidar_topic(lidar)
+        self._message_types = {
+            self._lidar_topic: mcap_messages.POINT_CLOUD,
+            _ODOMETRY_TOPIC: mcap_messages.ODOMETRY,
+            _TF_STATIC_TOPIC: mcap_messages.TF,
+        }
+        if _IMU_TOPIC in self._file.topics:
+            self._message_types[_IMU_TOPIC] = mcap_messages.IMU
+        for topic, message_type in self._message_types.items():
+            self._check_topic(topic, message_type)
+        self._scans = self._file.locate(self._lidar_topic)
+
+    def __len__(self) -> int:
+        return len(self._scans)
+
+    @property
+    def stamps_ns(self) -> np.ndarray:
+        return self._track[0]
+
+    @property
+    def X_WS(self) -> np.ndarray:
+        return self._track[1]
+
+    @property
+    def world_frame(self) -> str:  # type: ignore[override]  # Read late.
+        return self._first(_ODOMETRY_TOPIC).header.frame_id
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        lidars = (self.scenario or {}).get("lidars")
+        name = self._lidar_topic.strip("/").split("/")[0]
+        lidar = lidars.get(name) if isinstance(lidars, dict) else None
+        if not (isinstance(lidar, dict) and lidar.get("motion_distortion")):
+            return ()
+        return (
+            f"{self._path}: taken while the LiDAR moved, and used as taken"
+            " (evaluation.sequences.deskewing takes the motion out)",
+        )
+
+    @property
+    def scenario(self) -> Mapping | None:
+        scenario = self._json("scenario.json")
+        if scenario is not None and not isinstance(scenario, dict):
+            raise InputError(
+                f"{self._path}: attachment scenario.json: no JSON object"
+            )
+        return scenario
+
+    @property
+    def instances(self) -> Mapping[int, Mapping] | None:
+        table = self._json("structures.json")
+        if table is None:
+            return None
+        return index_instances(
+            table, f"{self._path}: attachment structures.json"
+        )
+
+    def scan(self, index: int) -> np.ndarray:
+        if not 0 <= index < len(self):
+            raise IndexError(f"scan {index} of {len(self)}")
+        message = self._message(self._lidar_topic, self._scans[index])
+        try:
+            points = to_points(message)
+            point_arrays.check_near(points, point_arrays.FARTHEST_RETURN)
+            return points
+        except ValueError as error:
+            raise InputError(
+                f"{self._path}: {self._lidar_topic}: scan {index} at"
+                f" {mcap_messages.stamp_ns(message.header)} ns: {error}"
+            ) from error
+
+    @property
+    def odometry(self) -> np.ndarray:
+        return self._stamps_and_odometry[1]
+
+    @cached_property
+    def imu(self) -> np.ndarray | None:
+        if _IMU_TOPIC not in self._message_types:
+            return None
+        rows = np.zeros(len(self._file.locate(_IMU_TOPIC)), IMU_DTYPE)
+        first = self._first(_IMU_TOPIC).header
+
+        def take(position: int, data: memoryview) -> None:
+            message = self._decode(_IMU_TOPIC, data)
+            self._check_frame(
+                _IMU_TOPIC,
+                mcap_messages.stamp_ns(message.header),
+                message.header.frame_id,
+                first.frame_id,
+            )
+            rows[position] = mcap_messages.imu_row(message)
+
+        self._file.visit(self._file.locate(_IMU_TOPIC), take)
+        self._check_agreement(_IMU_TOPIC, rows)
+        return rows
+
+    @cached_property
+    def _track(self) -> tuple[np.ndarray, np.ndarray]:
+        """Stamps (N,) [ns] and poses (N, 4, 4) of the scans."""
+        stamps_ns, odometry = self._stamps_and_odometry
+        rows = {stamp: i for i, stamp in enumerate(odometry["stamp_ns"])}
+        missing = [
+            index for index, stamp in enumerate(stamps_ns) if stamp not in rows
+        ]
+        if missing:
+            raise InputError(
+                f"{self._path}: {_ODOMETRY_TOPIC}: no pose with the stamp"
+                f" {stamps_ns[missing[0]]} of scan {missing[0]}"
+                f" ({len(missing)} of {len(self)} scans have none)"
+            )
+        matching = odometry[[rows[stamp] for stamp in stamps_ns]]
+        X_WB = self._to_poses(matching["position"], matching["quat_xyzw"])
+        return stamps_ns, X_WB @ self.X_BS
+
+    @cached_property
+    def _stamps_and_odometry(self) -> tuple[np.ndarray, np.ndarray]:
+        """Stamps (N,) of the scans, and the odometry, in one pass."""
+        num_scans = len(self)
+        places = self._file.locate(_ODOMETRY_TOPIC)
+        stamps_ns = np.zeros(num_scans, np.int64)
+        odometry = np.zeros(len(places), ODOMETRY_DTYPE)
+        lidar_frame = self._first(self._lidar_topic).header.frame_id
+        vehicle_frames = _vehicle_frames(self._first(_ODOMETRY_TOPIC))
+
+        def take(position: int, data: memoryview) -> None:
+            if position < num_scans:
+                header = self._cloud_header(data)
+                stamps_ns[position] = header.stamp_ns
+                topic, frame, first = (
+                    self._lidar_topic,
+                    header.frame_id,
+                    lidar_frame,
+                )
+                stamp_ns = header.stamp_ns
+            else:
+                message = self._decode(_ODOMETRY_TOPIC, data)
+                row = mcap_messages.odometry_row(message)
+                odometry[position - num_scans] = row
+                topic, frame, first = (
+                    _ODOMETRY_TOPIC,
+                    _vehicle_frames(message),
+                    vehicle_frames,
+                )
+                stamp_ns = row[0]
+            self._check_frame(topic, stamp_ns, frame, first)
+
+        self._file.visit(np.concatenate([self._scans, places]), take)
+        disorder = np.flatnonzero(np.diff(stamps_ns) <= 0)
+        if len(disorder):
+            raise InputError(
+                f"{self._path}: {self._lidar_topic}: the stamp of scan"
+                f" {disorder[0] + 1} is not later than the one before"
+            )
+        self._check_agreement(_ODOMETRY_TOPIC, odometry)
+        return stamps_ns, odometry
+
+    @cached_property
+    def X_BS(self) -> np.ndarray:
+        """Pose of the LiDAR on the vehicle B, (4, 4), from /tf_static."""
+        return self._mount(self._first(self._lidar_topic))
+
+    @cached_property
+    def X_BI(self) -> np.ndarray | None:
+        """Pose of the IMU on the vehicle B, (4, 4); None without an IMU."""
+        if _IMU_TOPIC not in self._message_types:
+            return None
+        return self._mount(self._first(_IMU_TOPIC))
+
+    def _mount(self, message: Any) -> np.ndarray:
+        """Returns the pose of a sensor's frame, that of its message, in B."""
+        base = self._first(_ODOMETRY_TOPIC).child_frame_id
+        sensor = message.header.frame_id
+        X_CS = np.eye(4)
+        child = sensor
+        for _ in range(len(self._edges) + 1):
+            if child == base:
+                return X_CS
+            if child not in self._edges:
+                break
+            child, p_PC, quat_PC = self._edges[child]
+            X_CS = self._to_poses(np.array(p_PC), np.array(quat_PC)) @ X_CS
+        raise InputError(
+            f"{self._path}: {_TF_STATIC_TOPIC}: no transform from {base} to"
+            f" {sensor}"
+        )
+
+    @cached_property
+    def _edges(self) -> dict[str, tuple]:
+        """Frame C -> its parent P, p_PC, quat_xyzw_PC, from /tf_static."""
+        edges: dict[str, tuple] = {}
+        for place in self._file.locate(_TF_STATIC_TOPIC):
+            for edge in self._message(_TF_STATIC_TOPIC, place).transforms:
+                child, transform = edge.child_frame_id, edge.transform
+                new = (
+                    edge.header.frame_id,
+                    xyz(transform.translation),
+                    xyzw(transform.rotation),
+                )
+                # Repeated, it says nothing new.
+                old = edges.setdefault(child, new)
+                if old != new:
+                    raise InputError(
+                        f"{self._path}: {_TF_STATIC_TOPIC}: {child}: at"
+                        f" {mcap_messages.stamp_ns(edge.header)} ns {new},"
+                        f" before {old}"
+                    )
+        return edges
+
+    def _to_poses(self, p: np.ndarray, quat_xyzw: np.ndarray) -> np.ndarray:
+        """Returns poses (..., 4, 4) of positions and quaternions."""
+        if not (np.isfinite(p).all() and np.isfinite(quat_xyzw).all()):
+            raise InputError(f"{self._path}: a pose is not finite")
+        if not (np.abs(p) < poses.FARTHEST).all():
+            raise InputError(
+                f"{self._path}: a pose is {np.abs(p).max():g} m from the origin"
+            )
+        try:
+            R = poses.rotation_from_quaternion(quat_xyzw)
+        except ValueError as error:
+            raise InputError(f"{self._path}: a pose has {error}") from error
+        return poses.make_pose(R, p)
+
+    def _first(self, topic: str) -> Any:
+        return self._message(topic, self._file.locate(topic)[0])
+
+    def _message(self, topic: str, place: np.void) -> Any:
+        return self._decode(topic, self._file.read(place))
+
+    def _decode(self, topic: str, data: memoryview) -> Any:
+        try:
+            return mcap_messages.decode(data, self._message_types[topic])
+        except ValueError as error:
+            raise InputError(f"{self._path}: {topic}: {error}") from error
+
+    def _cloud_header(self, data: memoryview) -> mcap_messages.CloudHeader:
+        try:
+            return mcap_messages.read_cloud_header(data)
+        except ValueError as error:
+            raise InputError(
+                f"{self._path}: {self._lidar_topic}: {error}"
+            ) from error
+
+    def _check_frame(
+        self, topic: str, stamp_ns: int, frame: str, first: str
+    ) -> None:
+        """Refuses a message that is of another frame than the first."""
+        if frame != first:
+            raise InputError(
+                f"{self._path}: {topic}: at {stamp_ns} ns in frame {frame!r},"
+                f" at first in {first!r}"
+            )
+
+    def _check_agreement(self, topic: str, rows: np.ndarray) -> None:
+        """Refuses two different messages with one stamp."""
+        order = np.argsort(rows["stamp_ns"], kind="stable")
+        twice = np.flatnonzero(np.diff(rows["stamp_ns"][order]) == 0)
+        for one, other in zip(order[twice], order[twice + 1], strict=True):
+            for name in rows.dtype.names or ():
+                old, new = rows[name][one], rows[name][other]
+                if not np.array_equal(old, new, equal_nan=True):
+                    raise InputError(
+                        f"{self._path}: {topic}: {name} at"
+                        f" {rows['stamp_ns'][one]} ns: {old} and {new}"
+                    )
+
+    def _find_lidar_topic(self, lidar: str | None) -> str:
+        """Returns the named LiDAR's topic, /lidar/points, or the only one."""
+        clouds = [
+            topic
+            for topic, kinds in self._file.topics.items()
+            if any(kind.startswith(mcap_messages.POINT_CLOUD) for kind in kinds)
+        ]
+        if lidar is not None:
+            wanted = f"/{lidar}/points"
+        elif _LIDAR_TOPIC in self._file.topics or len(clouds) != 1:
+            wanted = _LIDAR_TOPIC
+        else:
+            wanted = clouds[0]
+        if wanted not in self._file.topics and clouds:
+            raise InputError(
+                f"{self._path}: no topic {wanted} (point clouds:"
+                f" {' '.join(clouds)})"
+            )
+        return wanted
+
+    def _check_topic(self, topic: str, message_type: str) -> None:
+        found = self._file.topics.get(topic)
+        if found is None:
+            raise InputError(f"{self._path}: no topic {topic}")
+        if found != [f"{message_type} in cdr"]:
+            raise InputError(
+                f"{self._path}: {topic}: {' and '.join(found)} instead of"
+                f" {message_type} in cdr"
+            )
+        if len(self._file.locate(topic)) == 0:
+            raise InputError(f"{self._path}: {topic}: no message")
+
+    def _json(self, name: str) -> Any:
+        data = self._file.attachment(name)
+        if data is None:
+            return None
+        try:
+            return parse_json(data)
+        except ValueError as error:
+            raise InputError(
+                f"{self._path}: attachment {name}: {error}"
+            ) from error
+
+
+def holds_mcap(path: Path) -> bool:
+    """Returns whether `path` is an .mcap file or a folder with one."""
+    if path.is_dir():
+        return any(path.glob("*.mcap"))
+    return path.suffix == ".mcap"
+
+
+def _mcap_path(path: Path) -> Path:
+    if not path.is_dir():
+        return path
+    files = sorted(path.glob("*.mcap"))
+    if len(files) != 1:
+        raise InputError(f"{path}: {len(files)} .mcap files instead of one")
+    return files[0]
+
+
+def _sequence_name(path: Path) -> str:
+    resolved = path.resolve()
+    # rosbag2 numbers the files of a recording: <name>_0.mcap.
+    return (
+        resolved.name if resolved.is_dir() else resolved.stem.removesuffix("_0")
+    )
+
+
+def _vehicle_frames(message: Any) -> str:
+    return f"{message.header.frame_id} -> {message.child_frame_id}"

@@ -1,0 +1,233 @@
+"""How the command line talks: results, progress, and one-line errors."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+import contextlib
+from importlib import metadata
+import json
+import math
+import os
+import sys
+import time
+from typing import Annotated, Any, NoReturn
+
+import typer
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.interrupts import (
+    INTERRUPTED,
+    end_interrupted,
+    ignore_interrupts,
+    interrupt_on_termination,
+)
+from cns_drake.base.libraries import missing_library
+from cns_drake.base.progress import LINE_INTERVAL
+
+# All errors of usage are click's UsageError, which new versions of Typer
+# bring along under a private name; public is only this class derived from it.
+_UsageError: Any = typer.BadParameter.__base__
+
+
+def plain_app(**settings: Any) -> typer.Typer:
+    """Returns a command line without commands, whose help is plain text.
+
+    Rich would take units such as "[m, rad]" for markup, and its frames and
+    columns leave little room for words on a narrow terminal.
+
+    Args:
+        **settings: more of what `typer.Typer` takes.
+    """
+    return typer.Typer(
+        rich_markup_mode=None, pretty_exceptions_enable=False, **settings
+    )
+
+
+def make_program(name: str, summary: str, epilog: str) -> typer.Typer:
+    """Returns a program without commands, to which they are added.
+
+    It has `--version` and the options of shell completion, and shows its help
+    if called with nothing.
+
+    Args:
+        name: of the program.
+        summary: how its help begins.
+        epilog: how it ends; see `example`.
+    """
+    app = plain_app(help=summary, epilog=epilog)
+
+    @app.callback(invoke_without_command=True)
+    def start(
+        context: typer.Context,
+        version: Annotated[
+            bool, typer.Option("--version", help="Show the version and exit.")
+        ] = False,
+    ) -> None:
+        if version:
+            print(name, metadata.version("cns-drake"))
+            raise typer.Exit
+        if context.invoked_subcommand is None:
+            print(context.get_help())
+
+    return app
+
+
+def example(*lines: str) -> str:
+    """Returns the end of a command's help: lines to type, left as they are."""
+    # What follows \b is not wrapped.
+    return "\n  ".join(("\b\nExample:", *lines))
+
+
+def run(app: typer.Typer, program: str) -> NoReturn:
+    """Runs a command line; bad usage and bad input never show a traceback.
+
+    Exits with 0 on success; with 2 and one line on stderr for bad usage or
+    input, for files that cannot be used, for lack of memory and of libraries
+    of the system; with 1 for jobs that failed; with 130 when interrupted,
+    also by SIGTERM, so that open files are closed.
+
+    Args:
+        app: the commands.
+        program: the name under which errors are reported.
+    """
+    message: str | None = None
+    _open_standard_streams()
+    try:
+        interrupt_on_termination()
+        _check_arguments()
+        status = app(prog_name=program, standalone_mode=False) or 0
+        if status == INTERRUPTED:  # Typer has caught the interrupt itself.
+            message = "interrupted"
+        sys.stdout.flush()
+    except _UsageError as error:
+        message, status = f"error: {error.format_message()}", 2
+    except InputError as error:
+        message, status = f"error: {error}", error.exit_status
+    except (KeyboardInterrupt, typer.Abort):
+        message, status = "interrupted", INTERRUPTED
+    except BrokenPipeError:
+        # Whoever read the results has seen enough of them.
+        _forget_results()
+        status = 0
+    except MemoryError:
+        message, status = "error: not enough memory for this input", 2
+    except OSError as error:
+        where = error.filename or "standard output"
+        message = f"error: {where}: {error.strerror or error}"
+        status = 2
+        if error.filename is None:
+            _forget_results()
+    except ImportError as error:
+        fault = missing_library(error)
+        if fault is None:
+            raise
+        message, status = f"error: {fault}", 2
+    except SystemExit as error:
+        # Drake's C++ asks Python to end where a condition of its own fails.
+        status = error.code if isinstance(error.code, int) else 2
+        if isinstance(error.code, str):
+            message = f"error: {error.code}"
+    except UnicodeError as error:
+        message, status = f"error: a name that is no text ({error})", 2
+    # What the command does is done; nothing is left to interrupt.
+    ignore_interrupts()
+    if message is not None:
+        print(f"{program}: {' '.join(message.split())}", file=sys.stderr)
+    if status == INTERRUPTED:
+        end_interrupted()
+    raise SystemExit(status)
+
+
+def _open_standard_streams() -> None:
+    """Gives a process that was started without them its three streams.
+
+    The next file to be opened would take their places, and what is printed
+    would end up in it.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(number)
+        except OSError:
+            # For reading, so that a result that is lost is an error; what is
+            # told to people beside it may be lost.
+            writes = os.O_WRONLY if name == "stderr" else os.O_RDONLY
+            opened = os.open(os.devnull, writes)
+            if opened != number:
+                os.dup2(opened, number)
+                os.close(opened)
+            if name != "stdin":
+                setattr(sys, name, os.fdopen(number, "w", closefd=False))
+
+
+def _check_arguments() -> None:
+    """Refuses arguments that could be neither printed nor recorded."""
+    for word in sys.argv[1:]:
+        try:
+            word.encode()
+        except UnicodeEncodeError:
+            text = os.fsencode(word).decode(errors="replace")
+            raise InputError(f"{text}: not UTF-8 text") from None
+
+
+def _forget_results() -> None:
+    """Sends what is still to be printed nowhere.
+
+    Python flushes once more at its end, which must not fail again.
+    """
+    # In a test it is no file.
+    with contextlib.suppress(OSError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def track(items: Iterable[Any], description: str, total: int) -> Iterable[Any]:
+    """Shows progress on stderr: a bar, or lines where that is no terminal."""
+    from rich.console import Console
+    from rich.progress import track as rich_track
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        return _track_by_lines(items, description, total)
+    return rich_track(
+        items,
+        description=description,
+        total=total,
+        console=console,
+        transient=True,
+    )
+
+
+def _track_by_lines(
+    items: Iterable[Any], description: str, total: int
+) -> Iterator[Any]:
+    """Says every few seconds how many of the items are done."""
+    said = time.monotonic()
+    for done, item in enumerate(items):
+        if time.monotonic() - said >= LINE_INTERVAL:
+            note(f"{description}: {done} of {total}")
+            said = time.monotonic()
+        yield item
+
+
+def note(message: str) -> None:
+    """Tells the user something that is no result."""
+    print(message, file=sys.stderr)
+
+
+def print_json(values: dict) -> None:
+    """Prints a result as one JSON object."""
+    print(json.dumps(values, indent=2, allow_nan=False))
+
+
+def print_rows(rows: Iterable[tuple[str, str]]) -> None:
+    """Prints a result as lines of a name and a value."""
+    rows = list(rows)
+    width = max(len(name) for name, _ in rows)
+    for name, value in rows:
+        print(f"{name:<{width}}  {value}")
+
+
+def number(value: float | None) -> str:
+    """Returns a ratio with four decimals, as the paper prints them."""
+    if value is None or math.isnan(value):
+        return "undefined"
+    return f"{value:.4f}"

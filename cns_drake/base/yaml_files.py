@@ -1,0 +1,133 @@
+"""YAML as it is read here: strictly, and within bounds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import read_bytes
+
+# Data that are written by hand are far from either.
+_DEEPEST = 50
+_MOST_NODES = 1_000_000
+
+
+def read_yaml(path: Path) -> Any:
+    """Returns what a YAML file holds; None if it is empty.
+
+    Raises:
+        InputError: the file cannot be read, is not YAML, stands for more
+            than it should or has a key twice.
+    """
+    text = read_bytes(path)
+    try:
+        return parse_yaml(text)
+    except ValueError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def parse_yaml(text: str | bytes, loader: type = yaml.CSafeLoader) -> Any:
+    """Parses a document of YAML.
+
+    Aliases are understood, but a few lines of them must not stand for more
+    than a memory holds, nor for something that contains itself. A key that
+    is there twice is a slip of which YAML's libraries take the last.
+
+    Args:
+        text: the document, as bytes in an encoding that YAML knows.
+        loader: the class that makes values of nodes.
+
+    Returns:
+        Its value; None for an empty document.
+
+    Raises:
+        ValueError: in one line, if it is none or out of bounds.
+    """
+    try:
+        _check_depth(text, loader)
+        parser = loader(text)
+        try:
+            node = parser.get_single_node()
+            if node is None:
+                return None
+            _check(node, {})
+            return parser.construct_document(node)
+        finally:
+            parser.dispose()
+    except (
+        yaml.YAMLError,
+        # What the constructors of numbers and dates trip over.
+        ArithmeticError,
+        AttributeError,
+        LookupError,
+        RecursionError,
+        TypeError,
+        ValueError,
+    ) as error:
+        fault = " ".join(str(error).split())
+        raise ValueError(f"not readable as YAML: {fault}") from error
+
+
+def _check_depth(text: str | bytes, loader: type) -> None:
+    """Refuses what is nested so deep that making nodes of it would crash.
+
+    Raises:
+        ValueError: if it is.
+    """
+    depth = 0
+    for event in yaml.parse(text, Loader=loader):
+        if isinstance(event, yaml.CollectionStartEvent):
+            depth += 1
+        elif isinstance(event, yaml.CollectionEndEvent):
+            depth -= 1
+        if depth > _DEEPEST:
+            # What a parser finds has a place.
+            assert event.start_mark is not None
+            line = event.start_mark.line + 1
+            raise ValueError(f"line {line}: nested more than {_DEEPEST} deep")
+
+
+def _check(node: yaml.Node, sizes: dict[int, int]) -> int:
+    """Returns how many nodes a node stands for when aliases are resolved.
+
+    Args:
+        node: the node.
+        sizes: of the nodes seen before by their id; 0 for those above.
+
+    Raises:
+        ValueError: if it is out of bounds.
+    """
+    if isinstance(node, yaml.ScalarNode):
+        return 1
+    line = node.start_mark.line + 1
+    if id(node) in sizes:
+        if sizes[id(node)] == 0:
+            raise ValueError(f"line {line}: contains itself")
+        return sizes[id(node)]
+    sizes[id(node)] = 0
+    children = node.value
+    if isinstance(node, yaml.MappingNode):
+        _check_keys(node)
+        children = [part for pair in node.value for part in pair]
+    size = 1 + sum(_check(child, sizes) for child in children)
+    if size > _MOST_NODES:
+        raise ValueError(
+            f"line {line}: stands for more than {_MOST_NODES} values"
+        )
+    sizes[id(node)] = size
+    return size
+
+
+def _check_keys(node: yaml.MappingNode) -> None:
+    seen = set()
+    for key, _ in node.value:
+        if isinstance(key, yaml.ScalarNode):
+            if (key.tag, key.value) in seen:
+                raise ValueError(
+                    f"line {key.start_mark.line + 1}: {key.value!r} is there"
+                    " twice"
+                )
+            seen.add((key.tag, key.value))

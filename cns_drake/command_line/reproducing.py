@@ -1,0 +1,64 @@
+"""The command `cns-drake reproduce`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.interrupts import uninterrupted
+from cns_drake.command_line.options import Jobs, Output, Scheduler
+from evaluation.command_line.protocol_options import Costs, with_protocol
+from evaluation.recognition.protocol import RetrievalProtocol
+
+
+@with_protocol
+def reproduce(
+    maps: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="MAP",
+            help="Which maps, by name or folder; all shipped ones by default.",
+        ),
+    ] = None,
+    *,
+    output: Output,
+    jobs: Jobs = None,
+    scheduler: Scheduler = None,
+    pages: Annotated[
+        bool | None,
+        typer.Option(
+            "--pages/--no-pages",
+            help="Also make a web page of each drive; by default, unless "
+            "--quick is given.",
+        ),
+    ] = None,
+    quick: Annotated[
+        bool,
+        typer.Option(
+            "--quick",
+            help="The report alone: simulate without recording.",
+        ),
+    ] = False,
+    costs: Costs = True,
+    protocol: RetrievalProtocol,
+) -> None:
+    """Simulate a map, evaluate it and report."""
+    with uninterrupted():
+        from cns_drake.base.jobs.cluster import choose_cluster
+        from cns_drake.studies.reproduction import reproduce_maps
+
+    cluster = choose_cluster(jobs, scheduler)
+    if quick and pages:
+        raise InputError("--quick and --pages: give one of them")
+    report = reproduce_maps(
+        maps,
+        output,
+        cluster,
+        with_pages=pages is not False,
+        quick=quick,
+        protocol=protocol,
+        with_costs=costs,
+    )
+    typer.echo(report)

@@ -1,0 +1,112 @@
+"""The command `cns-drake trend`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cns_drake.base.interrupts import uninterrupted
+from cns_drake.command_line.families import family_members
+from cns_drake.command_line.options import Jobs, Output, Scheduler
+from evaluation.command_line.protocol_options import with_protocol
+from evaluation.recognition.protocol import RetrievalProtocol
+
+if TYPE_CHECKING:
+    from cns_drake.scenarios.scenario import Scenario
+
+
+@with_protocol
+def trend(
+    *,
+    vary: Annotated[
+        Path,
+        typer.Option(
+            metavar="FAMILY.yaml",
+            help="The members of this family are the databases.",
+        ),
+    ],
+    query: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME|SCENARIO.yaml",
+            help="The drive that asks: a shipped sequence or a scenario file.",
+        ),
+    ],
+    output: Output,
+    method: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Python file that registers a method, to run besides those "
+            "of cns-eval; may be repeated."
+        ),
+    ] = None,
+    jobs: Jobs = None,
+    scheduler: Scheduler = None,
+    protocol: RetrievalProtocol,
+) -> None:
+    """AUC over TCR_sym, of a family of drives.
+
+    None of them is recorded. Writes trend.csv and a figure with 95 % bands:
+    AUC, and the share of it that is kept. Without change is the same route
+    through the city of the query.
+    Interrupted, the same command goes on where it was.
+    """
+    with uninterrupted():
+        from cns_drake.base.jobs.cluster import choose_cluster
+        from cns_drake.scenarios.scenario import load_scenario
+        from cns_drake.simulation.simulated_drive import SimulatedDrive
+        from evaluation.study.chosen_methods import choose_methods
+        from evaluation.study.trend import write_trend
+        from evaluation.study.trend_points import Asked, measure_drives
+
+    cluster = choose_cluster(jobs, scheduler)
+    methods = choose_methods(method or ())
+    asking = load_scenario(query)
+    members = family_members(vary, output, cluster)
+    controls = family_controls(members, asking)
+    points = measure_drives(
+        asking.name,
+        SimulatedDrive(asking),
+        {
+            member.name: Asked(
+                SimulatedDrive(member), controls[member.name].name
+            )
+            for member in members
+        },
+        {one.name: SimulatedDrive(one) for one in controls.values()},
+        output,
+        cluster,
+        methods,
+        protocol,
+    )
+    print(write_trend(points, output))
+
+
+def family_controls(
+    members: Sequence[Scenario], asking: Scenario
+) -> dict[str, Scenario]:
+    """Returns member -> its drive through the city of the drive that asks.
+
+    Members that differ by nothing but their city share one.
+
+    Args:
+        members: of a family.
+        asking: the drive that asks them.
+    """
+    city = {
+        name: getattr(asking, name)
+        for name in ("map", "stage", "world", "without")
+    }
+    kinds: list[dict] = []
+    controls = {}
+    for member in members:
+        drive = member.model_copy(update={**city, "name": "", "title": ""})
+        kind = drive.model_dump()
+        if kind not in kinds:
+            kinds.append(kind)
+        name = f"{asking.name}_unchanged_{kinds.index(kind) + 1}"
+        controls[member.name] = drive.model_copy(update={"name": name})
+    return controls

@@ -1,1 +1,0 @@
-"""What every command needs: errors, files, interrupts, progress."""

@@ -1,0 +1,404 @@
+"""Jobs on processes of this machine: order, faults, deaths, interrupts."""
+
+import contextlib
+import os
+import pickle
+import subprocess
+import sys
+from types import SimpleNamespace
+
+from documents import ROOT
+import job_functions
+import psutil
+import pytest
+
+from cns_drake.base.errors import FailedJobsError, InputError
+from cns_drake.base.files import exclusive
+from cns_drake.base.jobs.cluster import Cluster, choose_cluster
+from cns_drake.base.jobs.dask_workers import DaskWorkers, LostSchedulerError
+from cns_drake.base.jobs.job_process import (
+    JobError,
+    ProcessDiedError,
+    Tell,
+    run_process,
+)
+from cns_drake.base.jobs.running import Job, run_jobs
+from cns_drake.base.processors import num_cores
+
+pytestmark = pytest.mark.slow
+
+
+def job(name, function, *arguments, needs=(), **options):
+    return Job(name, function, arguments, tuple(needs), **options)
+
+
+def test_what_is_done_starts_no_process(tmp_path, monkeypatch, capsys):
+    """Not even a cluster, if it is all; but what needs other work does."""
+    old, path = tmp_path / "old", tmp_path / "path"
+    old.write_text("old")
+    done = job(
+        "done", job_functions.join, [], old, is_done=job_functions.is_there
+    )
+    also = job(
+        "also", job_functions.refuse, needs=["done"], is_done=job_functions.yes
+    )
+    with monkeypatch.context() as patched:
+        patched.setattr(Cluster, "connect", None)
+        run_jobs([also, done], Cluster(num_workers=1))
+    assert old.read_text() == "old"
+    new = job(
+        "new", job_functions.join, [], path, needs=["done"],
+        is_done=job_functions.is_there,
+    )  # fmt: skip
+    # Whether this is done is known only to its own process, when `new` is.
+    again = job(
+        "again", job_functions.join, [], path, needs=["new"],
+        is_done=job_functions.is_there,
+    )  # fmt: skip
+    unknown = job(
+        "unknown", job_functions.join, [], tmp_path / "unknown",
+        is_done=job_functions.cannot_tell,
+    )  # fmt: skip
+    run_jobs([done, new, again, unknown], Cluster(num_workers=1))
+    assert (tmp_path / "unknown").is_file()
+    assert path.read_text() == "path"
+    assert "of 3 jobs" in capsys.readouterr().err
+
+
+def test_a_job_asks_again_when_it_has_its_output(tmp_path):
+    """Another copy of it may have come first."""
+    output = tmp_path / "output"
+    output.write_text("of the other")
+    for is_done, expected in (
+        (job_functions.is_there, "of the other"),
+        (job_functions.cannot_tell, "output"),
+    ):
+        arguments = ([], output)
+        run_process(
+            pickle.dumps((job_functions.join, arguments, output, is_done)),
+            lambda *message: None,
+            lambda: True,
+        )
+        assert output.read_text() == expected
+
+
+def test_what_is_needed_is_there_and_faults_stay_alone(tmp_path, capsys):
+    first, second, both, last = (tmp_path / name for name in "abcd")
+    process, tries, survivor = (tmp_path / name for name in "ptu")
+    jobs = [
+        # The one that needs most comes first in the list, not in time.
+        job("last", job_functions.join, [both], last, needs=["both"]),
+        job(
+            "both",
+            job_functions.join,
+            [first, second],
+            both,
+            needs=["first", "second"],
+            output=both,
+        ),
+        job("first", job_functions.join, [], first, cost=7.0, output=first),
+        job("second", job_functions.join, [], second),
+        job("process", job_functions.note_process, process),
+        job("refused", job_functions.refuse),
+        job("stumbles", job_functions.stumble),
+        job("dies", job_functions.die, tries),
+        job("survives", job_functions.die_first, tmp_path / "s", survivor),
+        job("orphan", job_functions.join, [], tmp_path / "o", needs=["dies"]),
+        job("orphan 2", job_functions.join, [], last, needs=["orphan"]),
+    ]
+    with pytest.raises(FailedJobsError) as raised:
+        run_jobs(jobs, Cluster(num_workers=2))
+    assert raised.value.exit_status == 1
+    *faults, left_out = str(raised.value).split("; ")
+    assert sorted(faults) == [
+        "dies: its process was ended by SIGKILL, perhaps for lack of memory",
+        "refused: FILE: field: cannot be used",
+        "stumbles: ZeroDivisionError: over nothing",
+    ]
+    assert left_out.endswith("need these: orphan, orphan 2")
+    assert last.read_text() == both.read_text() == "a+b"
+    assert tries.read_text() == "xxx"
+    assert survivor.read_text() == "at last"
+    # No lock is left behind.
+    assert {path.name for path in tmp_path.iterdir()} == set("abcdpstu")
+    # A process and a session of its own, for which Ctrl-C is not meant.
+    pid, parent, session = map(int, process.read_text().split())
+    assert pid == session
+    assert parent == os.getpid() != pid
+    told = capsys.readouterr().err
+    assert "here I am" in told
+    assert "ZeroDivisionError" in told
+    assert "last: done" in told
+
+
+class ScriptedCluster:
+    """Has workers whose jobs end as they are told, one after the other.
+
+    Attributes:
+        slots: see `Cluster`.
+        names: of what was submitted.
+    """
+
+    def __init__(self, *errors, slots=None):
+        self._errors = iter(errors)
+        self.slots = slots
+        self.names = []
+
+    @contextlib.contextmanager
+    def connect(self, listener):
+        self._listener = listener
+        yield self
+
+    def submit(self, name, job, priority):
+        self.names.append(name)
+        self._listener("result", name, next(self._errors))
+
+
+DIED = ProcessDiedError("its worker died")
+
+
+def test_what_is_lost_with_its_worker_is_asked_for_again(capsys):
+    cluster = ScriptedCluster(DIED, DIED, None)
+    run_jobs([job("a", job_functions.refuse)], cluster)
+    assert cluster.names == ["a"] * 3
+    assert "a: its worker died; it starts again" in capsys.readouterr().err
+    with pytest.raises(FailedJobsError, match=r"^a: its worker died$"):
+        run_jobs([job("a", job_functions.refuse)], ScriptedCluster(*[DIED] * 3))
+
+
+@pytest.mark.parametrize(
+    ("slots", "order"),
+    [(1, "b first; c needs b; a; d"), (None, "b first; a; d; c needs b")],
+)
+def test_a_free_worker_gets_what_is_most_urgent_then(slots, order):
+    """Not what was most urgent when its last job began."""
+    jobs = [
+        job("a", job_functions.refuse, cost=3.0),
+        job("b first", job_functions.refuse, cost=1.0),
+        job("c needs b", job_functions.refuse, needs=["b first"], cost=4.0),
+        job("d", job_functions.refuse, cost=2.0),
+    ]
+    cluster = ScriptedCluster(*[None] * 4, slots=slots)
+    run_jobs(jobs, cluster)
+    assert "; ".join(cluster.names) == order
+
+
+def test_a_fault_makes_room_for_the_next(capsys):
+    cluster = ScriptedCluster(DIED, DIED, DIED, None, slots=1)
+    jobs = [job(name, job_functions.refuse) for name in "ab"]
+    with pytest.raises(FailedJobsError, match=r"^a: its worker died$"):
+        run_jobs(jobs, cluster)
+    assert len(cluster.names) == 4
+    assert "a: failed: its worker died" in capsys.readouterr().err
+
+
+def test_a_scheduler_that_is_lost():
+    """As its client tells; what was done under a key is not asked again."""
+    told, keys = [], []
+    statuses = iter(["cancelled", "lost", "finished"])
+
+    def submit(function, *arguments, key, **options):
+        keys.append(key)
+        future = SimpleNamespace(status=next(statuses))
+        future.add_done_callback = lambda take: take(future)
+        return future
+
+    client = SimpleNamespace(
+        scheduler=SimpleNamespace(address="tcp://scripted:1"),
+        nthreads=dict,
+        subscribe_topic=lambda topic, handler: None,
+        submit=submit,
+    )
+    workers = DaskWorkers(client, lambda *message: told.append(message))
+    for _ in range(3):
+        workers.submit("a", b"", 1.0)
+    note, lost, died, done = told
+    assert note == ("note", "", "tcp://scripted:1: no workers yet, waiting")
+    assert isinstance(lost[2], LostSchedulerError)
+    assert str(lost[2]).startswith("tcp://scripted:1: the connection")
+    assert isinstance(died[2], ProcessDiedError)
+    assert done == ("result", "a", None)
+    assert len(set(keys)) == 3
+    with pytest.raises(InputError, match=r"^tcp://scripted:1: the connection"):
+        run_jobs([job("a", job_functions.refuse)], ScriptedCluster(lost[2]))
+
+
+def test_nobody_else_can_reach_local_jobs(tmp_path):
+    """No port is open, here or in the process of a job."""
+    path = tmp_path / "ports"
+    script = (
+        "import sys\n"
+        "from pathlib import Path\n"
+        "import job_functions\n"
+        "from cns_drake.base.jobs.cluster import Cluster\n"
+        "from cns_drake.base.jobs.running import Job, run_jobs\n"
+        "function, path = job_functions.note_ports, Path(sys.argv[1])\n"
+        "run_jobs([Job('notes', function, (path,))], Cluster(2))\n"
+        "assert 'distributed' not in sys.modules\n"
+    )
+    subprocess.run(
+        [sys.executable, "-c", script, path],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        check=True,
+    )
+    assert path.read_text() == "processes 2, ports []"
+
+
+def test_nothing_to_do_starts_nothing():
+    run_jobs([], Cluster(scheduler="nowhere"))
+
+
+@pytest.mark.parametrize(
+    ("need_of_a", "message"),
+    [("b", "cycle"), ("c", "a: needs c, which is no job")],
+)
+def test_needs_must_make_sense(need_of_a, message):
+    jobs = [
+        job("a", job_functions.refuse, needs=[need_of_a]),
+        job("b", job_functions.refuse, needs=["a"]),
+    ]
+    with pytest.raises(ValueError, match=message):
+        run_jobs(jobs, Cluster())
+
+
+def test_names_differ():
+    jobs = [job("a", job_functions.refuse)] * 2
+    with pytest.raises(ValueError, match="a: several jobs"):
+        run_jobs(jobs, Cluster())
+
+
+def test_a_job_that_is_not_wanted_ends(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    told = []
+
+    def is_wanted():
+        if not told:
+            told.append(job_functions.read_holder(pipe))
+            return True
+        return False
+
+    with pytest.raises(ProcessDiedError, match="ended with status 130"):
+        run_process(
+            pickle.dumps((job_functions.hold, (pipe,), None, None)),
+            lambda *message: None,
+            is_wanted,
+        )
+    assert not psutil.pid_exists(told[0])
+
+
+def test_a_job_ends_with_its_parent_even_if_that_is_killed(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    parent = subprocess.Popen(
+        [
+            sys.executable,
+            "-c",
+            "import pickle, sys\n"
+            "from pathlib import Path\n"
+            "import job_functions\n"
+            "from cns_drake.base.jobs.job_process import run_process\n"
+            "job = (job_functions.hold, (Path(sys.argv[1]),), None, None)\n"
+            "run_process(pickle.dumps(job), print, lambda: True)\n",
+            pipe,
+        ],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )
+    process = psutil.Process(job_functions.read_holder(pipe))
+    parent.kill()
+    parent.wait()
+    assert psutil.wait_procs([process], timeout=600)[1] == []
+
+
+def test_a_function_that_cannot_be_imported_is_a_fault():
+    missing = b"cno_such_module\nfunction\n."  # A pickle, by hand.
+    with pytest.raises(JobError, match=r"^ModuleNotFoundError: "):
+        run_process(missing, lambda *message: None, lambda: True)
+
+
+def test_freed_memory_is_kept_whatever_dask_has_its_workers_do(
+    tmp_path, monkeypatch
+):
+    for name, expected in (
+        ("MALLOC_TRIM_THRESHOLD_", str(2**28)),
+        ("HOME", "/x"),
+    ):
+        monkeypatch.setenv(name, "/x")
+        output = tmp_path / name
+        function = job_functions.note_variable
+        run_process(
+            pickle.dumps((function, (name, output), None, None)),
+            lambda *message: None,
+            lambda: True,
+        )
+        assert output.read_text() == repr(expected)
+
+
+def test_two_never_work_on_the_same(tmp_path):
+    output, pipe = tmp_path / "new" / "output", tmp_path / "pipe"
+    os.mkfifo(pipe)
+    script = (
+        "import sys\n"
+        "from pathlib import Path\n"
+        "from cns_drake.base.files import exclusive\n"
+        "output, pipe = map(Path, sys.argv[1:])\n"
+        "with exclusive(output, lambda: pipe.write_text('waiting')):\n"
+        "    output.write_text(output.read_text() + ' second')\n"
+    )
+    with exclusive(output, lambda: pytest.fail("there is nobody else")):
+        other = subprocess.Popen([sys.executable, "-c", script, output, pipe])
+        assert pipe.read_text() == "waiting"
+        output.write_text("first")
+    assert other.wait() == 0
+    assert output.read_text() == "first second"
+    assert list(output.parent.iterdir()) == [output]
+
+
+def test_a_lock_that_cannot_be_written(tmp_path):
+    (tmp_path / "file").touch()
+    with (
+        pytest.raises(InputError, match="file"),
+        exclusive(tmp_path / "file" / "x", lambda: None),
+    ):
+        pass
+
+
+def test_progress_is_told_now_and_then(monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr("time.monotonic", lambda: now[0])
+    told = []
+    tell = Tell(lambda *message: told.append(message))
+    for done in range(11):
+        tell.progress(done, 10)
+        now[0] += 0.2
+    # The first, the last, and one in half a second.
+    assert [done for _, done, _ in told] == [0, 3, 6, 9, 10]
+    tell.note(3)
+    assert told[-1] == ("note", "3")
+    Tell().progress(1, 2)
+
+
+def test_where_jobs_run(monkeypatch):
+    monkeypatch.delenv("DASK_SCHEDULER_ADDRESS", raising=False)
+    assert choose_cluster(None, None) == Cluster(num_cores())
+    monkeypatch.setenv("DASK_SCHEDULER_ADDRESS", "tcp://a:1")
+    assert choose_cluster(None, None).scheduler == "tcp://a:1"
+    assert choose_cluster(None, "tcp://b:2").scheduler == "tcp://b:2"
+    assert choose_cluster(3, None) == Cluster(3)
+    for num_jobs, message in ((0, "0 is not a positive"), (-1, "-1 is not")):
+        with pytest.raises(InputError, match=f"--jobs: {message}"):
+            choose_cluster(num_jobs, None)
+    with pytest.raises(InputError, match="--jobs and --scheduler"):
+        choose_cluster(1, "tcp://b:2")
+
+
+def test_commands_that_need_no_cluster_do_not_load_it():
+    script = (
+        "import sys\n"
+        "import cns_drake.command_line.cli\n"
+        "import cns_drake.studies.recording_jobs\n"
+        "import cns_drake.studies.reproduction\n"
+        "import evaluation.command_line.cli, cns_drake.base.jobs.running\n"
+        "assert not {'dask', 'distributed'} & sys.modules.keys()\n"
+    )
+    subprocess.run([sys.executable, "-c", script], check=True, cwd=ROOT)

@@ -1,0 +1,51 @@
+"""Tables as text: what is read of them, and what is refused."""
+
+import pytest
+
+from cns_drake.base.csv_files import read_records, read_rows
+from cns_drake.base.errors import InputError
+
+
+def write(tmp_path, content):
+    path = tmp_path / "table.csv"
+    path.write_bytes(content)
+    return path
+
+
+def test_rows_with_the_numbers_of_their_lines(tmp_path):
+    path = write(
+        tmp_path, b'\xef\xbb\xbfa, b\r\n\r\n1 ,"x, y"\r\n,\r\n2,\xc3\xbc'
+    )
+    assert read_rows(path) == [
+        (1, ["a", "b"]),
+        (3, ["1", "x, y"]),
+        (5, ["2", "\u00fc"]),
+    ]
+    assert read_records(path, ("b",)) == [
+        (3, {"a": "1", "b": "x, y"}),
+        (5, {"a": "2", "b": "\u00fc"}),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("content", "fault"),
+    [
+        (b"a,c\n1,2\n", "no column 'b'"),
+        (b"", "no column 'b'"),
+        (b"a,b\n1,2\n3\n", "line 3: 1 cells instead of 2"),
+        (b"a,b\n1,2,3\n", "line 2: 3 cells instead of 2"),
+        (b"a,b\n1,\xff\n", "not UTF-8"),
+        (b"a,b\n1," + b"7" * 200_000, "not CSV: field larger"),
+    ],
+)
+def test_what_is_no_table(tmp_path, content, fault):
+    path = write(tmp_path, content)
+    with pytest.raises(InputError, match=rf"table\.csv: {fault}"):
+        read_records(path, ("b",))
+
+
+def test_an_error_is_one_printable_line(tmp_path):
+    error = InputError("a\nb\x1b[31m\u202ec\ud800" + "x" * 9000)
+    assert str(error).startswith("a b [31m c x")
+    assert str(error).isprintable()
+    assert len(str(error)) < 2100

@@ -1,0 +1,97 @@
+import os
+
+import pytest
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import (
+    check_writable,
+    complete_part,
+    part_path,
+    read_bytes,
+    user_errors,
+    write_part,
+)
+
+
+def test_part_lies_beside_the_file(tmp_path):
+    assert part_path(tmp_path / "a.b.html") == tmp_path / "a.b.html.part"
+
+
+def test_final_name_comes_with_completion_only(tmp_path):
+    path = tmp_path / "page.html"
+    write_part(path, "ä\n")
+    assert not path.exists()
+    complete_part(path)
+    assert path.read_bytes() == b"\xc3\xa4\n"
+    assert not part_path(path).exists()
+
+
+def test_older_file_stays_until_completion(tmp_path):
+    path = tmp_path / "page.html"
+    path.write_text("old")
+    write_part(path, "new")
+    assert path.read_text() == "old"
+    complete_part(path)
+    assert path.read_text() == "new"
+
+
+def test_full_disk_is_told_in_one_line(tmp_path):
+    path = tmp_path / "page.html"
+    part_path(path).symlink_to("/dev/full")
+    with pytest.raises(InputError) as error:
+        write_part(path, "text")
+    assert str(error.value) == f"{path}.part: No space left on device"
+    assert not path.exists()
+
+
+def test_only_errors_of_the_file_system_are_turned(tmp_path):
+    with (
+        pytest.raises(InputError, match="x: Permission denied"),
+        user_errors("x"),
+    ):
+        raise OSError(13, os.strerror(13))
+    with pytest.raises(ValueError, match="other"), user_errors("x"):
+        raise ValueError("other")
+
+
+def test_check_creates_the_folder_and_nothing_else(tmp_path):
+    path = tmp_path / "new" / "page.html"
+    check_writable(path)
+    assert list(path.parent.iterdir()) == []
+
+
+def test_check_leaves_an_existing_file_alone(tmp_path):
+    path = tmp_path / "page.html"
+    path.write_text("old")
+    check_writable(path)
+    assert path.read_text() == "old"
+
+
+def test_check_refuses_what_cannot_be_written(tmp_path):
+    file = tmp_path / "file"
+    file.write_text("")
+    with pytest.raises(InputError, match=r"page\.html: "):
+        check_writable(file / "page.html")
+    with pytest.raises(InputError, match="there is a folder"):
+        check_writable(tmp_path)
+
+
+def test_what_is_no_file_is_not_read(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "zero").symlink_to("/dev/zero")
+    for name, fault in (
+        ("pipe", "not a regular file"),
+        ("zero", "not a regular file"),
+        (".", "Is a directory"),
+        ("none", "No such file"),
+    ):
+        with pytest.raises(InputError, match=fault):
+            read_bytes(tmp_path / name)
+
+
+def test_a_file_that_is_too_large(tmp_path):
+    path = tmp_path / "a"
+    path.write_bytes(b"12345")
+    assert read_bytes(path, limit=5) == b"12345"
+    with pytest.raises(InputError, match=f"^{path}: larger than 4 bytes"):
+        read_bytes(path, limit=4)

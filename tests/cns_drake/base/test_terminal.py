@@ -1,0 +1,128 @@
+"""What the commands show: one line for each task, however narrow."""
+
+import io
+import subprocess
+import sys
+
+import pytest
+from rich.console import Console
+import typer
+
+from cns_drake.base import progress_bars, terminal
+from cns_drake.base.errors import FailedJobsError, InputError
+from cns_drake.command_line.frame_progress import frame_progress
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "line"),
+    [
+        (InputError("FILE: fault"), 2, "error: FILE: fault"),
+        (FailedJobsError("job: fault"), 1, "error: job: fault"),
+        (MemoryError(), 2, "error: not enough memory for this input"),
+        (FileNotFoundError(2, "gone", "FILE"), 2, "error: FILE: gone"),
+        (OSError("full"), 2, "error: standard output: full"),
+    ],
+)
+def test_faults_are_one_line(monkeypatch, capsys, error, status, line):
+    app = typer.Typer()
+
+    @app.command()
+    def fail():
+        raise error
+
+    # Signals stay as the tests have them.
+    monkeypatch.setattr(terminal, "interrupt_on_termination", lambda: None)
+    monkeypatch.setattr(terminal, "ignore_interrupts", lambda: None)
+    monkeypatch.setattr("sys.argv", ["program"])
+    with pytest.raises(SystemExit) as raised:
+        terminal.run(app, "program")
+    assert raised.value.code == status
+    assert capsys.readouterr().err == f"program: {line}\n"
+
+
+@pytest.mark.parametrize("width", [30, 40, 60, 80, 200])
+def test_a_task_is_one_line_on_any_terminal(width):
+    screen = Console(file=io.StringIO(), width=width, force_terminal=True)
+    names = ["metropolis_01", "metropolis_01_stage_04", "suburbia_02"]
+    with progress_bars.show_progress(screen) as progress:
+        for name in names:
+            task = progress.add_task(name, total=2400, note="loading")
+            on_frame = frame_progress(progress, task)
+            on_frame(1, 2400)
+            on_frame(2400, 2400)
+        paper = Console(file=io.StringIO(), width=width)
+        paper.print(progress.get_renderable())
+    lines = paper.file.getvalue().splitlines()
+    assert len(lines) == len(names)
+    for name, line in zip(names, lines, strict=True):
+        assert len(line) <= width
+        assert line.startswith(name[:10])
+        if width >= 80:
+            assert "100 %" in line
+            assert "120.0 s sim" in line
+
+
+def test_without_a_terminal_progress_is_whole_lines():
+    paper = Console(file=io.StringIO(), width=40)
+    with progress_bars.show_progress(paper) as progress:
+        task = progress.add_task("metropolis_01_stage_04", note="loading")
+        frame_progress(progress, task)(2400, 2400)
+        progress_bars.print_note(progress, "[bold] " + "word " * 30)
+    lines = paper.file.getvalue().splitlines()
+    assert "2400/2400 frames, 120.0 s simulated" in lines[0]
+    assert lines[0].endswith("0 s left")
+    assert lines[1].split() == ["[bold]"] + 30 * ["word"]
+
+
+def test_without_a_terminal_a_failure_shows_no_bar():
+    paper = Console(file=io.StringIO(), width=40)
+    with progress_bars.show_progress(paper) as progress:
+        progress.add_task("metropolis_01", total=None, note="loading")
+    assert paper.file.getvalue() == ""
+
+
+def test_what_an_earlier_run_did_is_no_speed(monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr(progress_bars.time, "monotonic", lambda: now[0])
+    paper = Console(file=io.StringIO(), width=40)
+    with progress_bars.show_progress(paper) as progress:
+        task = progress.add_task("drive", total=None, note="")
+        on_frame = frame_progress(progress, task)
+        on_frame(1001, 1200)
+        now[0] = 110.0  # 100 frames, hence 5 s, in 10 s.
+        on_frame(1100, 1200)
+    line = paper.file.getvalue().splitlines()[0]
+    assert "drive: 1100/1200 frames, 55.0 s simulated" in line
+    assert "0.5 x real time, 10 s left" in line
+
+
+@pytest.mark.parametrize("program", ["cns_drake", "evaluation"])
+@pytest.mark.parametrize(
+    ("closed", "status"), [((), 0), ((1,), 2), ((0, 2), 0), ((0, 1, 2), 2)]
+)
+def test_streams_that_are_closed(tmp_path, program, closed, status):
+    """As by `>&-`: what is opened next must not take their places."""
+    words = [sys.executable, "-m", program, "--version"]
+    redirections = " ".join(f"{number}>&-" for number in closed)
+    result = subprocess.run(
+        ["sh", "-c", f'exec "$@" {redirections}', "sh", *words],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert result.returncode == status
+    assert "Traceback" not in result.stderr
+    if closed == (1,):
+        assert result.stderr.endswith("standard output: Bad file descriptor\n")
+        assert result.stderr.count("\n") == 1
+
+
+def test_an_argument_that_is_no_text(tmp_path):
+    result = subprocess.run(
+        [sys.executable, "-m", "evaluation", "tcr", b"\xff.npy", "b.npy"],
+        capture_output=True,
+        check=False,
+    )
+    assert result.returncode == 2
+    assert result.stderr.count(b"\n") == 1
+    assert b"not UTF-8 text" in result.stderr
