@@ -45,7 +45,7 @@ def cities_of_this_run(tmp_path_factory, pytestconfig):
 @pytest.fixture(scope="session")
 def small_map(tmp_path_factory):
     """Folder of a map that loads at once, with stages 01 and 04."""
-    from small_map import write_small_map
+    from helpers.small_map import write_small_map
 
     return write_small_map(tmp_path_factory.mktemp("maps") / "small")
 
@@ -53,7 +53,7 @@ def small_map(tmp_path_factory):
 @pytest.fixture(scope="session")
 def short_recording(small_map, tmp_path_factory):
     """Folder of a recording of 40 frames with the default LiDAR."""
-    from small_map import scenario_values
+    from helpers.small_map import scenario_values
 
     from cns_drake.scenarios.scenario import make_scenario
     from cns_drake.simulation.simulation import simulate
@@ -66,7 +66,7 @@ def short_recording(small_map, tmp_path_factory):
 @pytest.fixture(scope="session")
 def towns(tmp_path_factory):
     """Folder of two small drives, see `eval_program.write_towns`."""
-    from eval_program import write_towns
+    from helpers.eval_program import write_towns
 
     folder = tmp_path_factory.mktemp("towns")
     write_towns(folder)

@@ -23,8 +23,8 @@ import time
 import psutil
 import yaml
 
-sys.path.append(str(Path(__file__).resolve().parents[1] / "helpers"))
-from small_map import scenario_values, write_small_map
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+from helpers.small_map import scenario_values, write_small_map
 
 # These tell how long something took.
 _TIMED = ("costs.csv", "costs.md", "costs.tex", "report.html", "report.md")

@@ -3,7 +3,7 @@
 import pydoc
 import re
 
-import documents
+from helpers import documents
 from mcap.reader import make_reader
 import typer
 import yaml

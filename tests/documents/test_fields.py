@@ -2,7 +2,7 @@
 
 import typing
 
-import documents
+from helpers import documents
 from pydantic import BaseModel
 import pytest
 import yaml

@@ -2,7 +2,7 @@
 
 import re
 
-import documents
+from helpers import documents
 import pytest
 
 PAGES = {page.name: page for page in documents.pages()}

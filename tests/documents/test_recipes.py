@@ -2,9 +2,9 @@
 
 from dataclasses import replace
 
-from document_recipes import NOT_RUN, RECIPES
-from document_workplace import Workplace, claims
-import documents
+from helpers import documents
+from helpers.document_recipes import NOT_RUN, RECIPES
+from helpers.document_workplace import Workplace, claims
 import pytest
 
 

@@ -3,7 +3,7 @@
 import ast
 import pickle
 
-import documents
+from helpers import documents
 import numpy as np
 import pytest
 

@@ -10,9 +10,9 @@ it in other ways. A failure names the folder with the files that caused it.
 
 from concurrent.futures import ThreadPoolExecutor
 
-import fuzz_targets
-from fuzz_targets import TARGETS
-from fuzzing import Worker
+from helpers import fuzz_targets
+from helpers.fuzz_targets import TARGETS
+from helpers.fuzzing import Worker
 import pytest
 
 pytestmark = pytest.mark.slow

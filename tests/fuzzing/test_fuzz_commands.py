@@ -10,8 +10,8 @@ import shutil
 import subprocess
 import sys
 
-from fuzz_mutations import mutate
-from fuzz_targets import find_target
+from helpers.fuzz_mutations import mutate
+from helpers.fuzz_targets import find_target
 import numpy as np
 import pytest
 

@@ -1,7 +1,8 @@
 """A small recording whose places and numbers cannot be confused."""
 
-from drive_files import make_scan, write_recording, yaw_pose
 import numpy as np
+
+from helpers.drive_files import make_scan, write_recording, yaw_pose
 
 # A place in the world and on the vehicle that nothing can be confused with.
 P_BS = (0.3, -0.2, 1.7)

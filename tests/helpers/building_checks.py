@@ -5,12 +5,12 @@ from zlib import crc32
 
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
-from mesh_checks import rotation_matrix
 import numpy as np
 from shapely.affinity import rotate
 from shapely.geometry import Polygon, box
 
 from cns_drake.city.buildings import ARCHETYPES, sample
+from helpers.mesh_checks import rotation_matrix
 
 
 def typical_request(name: str, seed: int):

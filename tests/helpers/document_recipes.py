@@ -11,9 +11,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from small_cityjson import write_blocks
-from small_opendrive import straight, write_roads
 import yaml
+
+from helpers.small_cityjson import write_blocks
+from helpers.small_opendrive import straight, write_roads
 
 
 def _write_sources(folder: Path) -> None:

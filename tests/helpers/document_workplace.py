@@ -11,8 +11,8 @@ import subprocess
 import sys
 import threading
 
-from document_recipes import NOT_RUN, RECIPES
-import documents
+from helpers import documents
+from helpers.document_recipes import NOT_RUN, RECIPES
 
 # A machine that runs other tests beside may take its time to answer.
 _PATIENT = {"DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "300s"}

@@ -4,13 +4,13 @@ import math
 import signal
 import sys
 
-from drive_files import make_scan, write_recording, yaw_pose
 import numpy as np
 import pytest
 
 from cns_drake.base import progress_bars, terminal
 from cns_drake.base.interrupts import SIGNALS
 from evaluation.command_line import cli
+from helpers.drive_files import make_scan, write_recording, yaw_pose
 
 
 def make_block_scene(seed):

@@ -6,22 +6,8 @@ import json
 from pathlib import Path
 import shutil
 
-from bag_recordings import contents, record
-import bent_drive
-import dataset_folders
-from fuzz_mutations import mutate_osm
-from fuzzing import Target
-import helipr_drive
-import lies
 from mcap.writer import CompressionType
-from mcap_bytes import write_mcap
-import mulran_drive
 import numpy as np
-from opendrive_fuzzing import read_opendrive, write_opendrive
-from small_city import PLAN, ROADS, STAGES
-from small_cityjson import CityWriter
-from small_map import box_visual, world_text
-from small_osm import write_corner
 import yaml
 
 from cns_drake.base.errors import InputError
@@ -49,6 +35,22 @@ from cns_drake.simulation.scanning import save_scan, scan_world
 from cns_drake.simulation.simulation import simulate
 from evaluation import sequences
 from evaluation.clouds.cloud_files import read_cloud
+from helpers import (
+    bent_drive,
+    dataset_folders,
+    helipr_drive,
+    lies,
+    mulran_drive,
+)
+from helpers.bag_recordings import contents, record
+from helpers.fuzz_mutations import mutate_osm
+from helpers.fuzzing import Target
+from helpers.mcap_bytes import write_mcap
+from helpers.opendrive_fuzzing import read_opendrive, write_opendrive
+from helpers.small_city import PLAN, ROADS, STAGES
+from helpers.small_cityjson import CityWriter
+from helpers.small_map import box_visual, world_text
+from helpers.small_osm import write_corner
 
 REFUSALS = (InputError, ReadingError)
 

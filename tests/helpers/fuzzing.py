@@ -18,8 +18,9 @@ import shutil
 import traceback
 import warnings
 
-from fuzz_mutations import mutate, mutate_bytes
 import numpy as np
+
+from helpers.fuzz_mutations import mutate, mutate_bytes
 
 # A case takes milliseconds; the machine may be ever so busy.
 DEADLINE_S = 600.0

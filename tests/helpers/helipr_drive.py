@@ -1,6 +1,8 @@
 """Small drives in the format of HeLiPR."""
 
-from dataset_folders import (
+import numpy as np
+
+from helpers.dataset_folders import (
     SCAN_PERIOD_NS,
     UTM,
     make_points,
@@ -9,7 +11,6 @@ from dataset_folders import (
     write_bytes,
     write_quaternions,
 )
-import numpy as np
 
 # The last stamp at which Aeva's records are short.
 CHANGE_NS = 1691936557946849179

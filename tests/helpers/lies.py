@@ -10,10 +10,11 @@ from pathlib import Path
 import re
 from typing import Any
 
-from drive_files import TYPES
 from mcap.reader import make_reader
 from mcap.writer import Writer
 import numpy as np
+
+from helpers.drive_files import TYPES
 
 _LIDAR, _ODOMETRY, _IMU, _MOUNTS = (
     "/lidar/points",

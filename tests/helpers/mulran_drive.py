@@ -1,6 +1,6 @@
 """Small drives in the format of MulRan."""
 
-from dataset_folders import (
+from helpers.dataset_folders import (
     SCAN_PERIOD_NS,
     T0_NS,
     UTM,

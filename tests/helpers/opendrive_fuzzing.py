@@ -2,15 +2,6 @@
 
 from pathlib import Path
 
-from small_opendrive import (
-    TWO_LANES,
-    cubic,
-    geometry,
-    road,
-    section,
-    write_roads,
-)
-
 from cns_drake.base.errors import InputError
 from cns_drake.imports.import_faults import ImportFaults
 from cns_drake.imports.opendrive.imported_streets import ImportedStreets
@@ -19,6 +10,14 @@ from cns_drake.imports.opendrive.lane_drives import find_lane_drives
 from cns_drake.imports.opendrive.road_levels import split_levels
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.thing_structures import thing_structures
+from helpers.small_opendrive import (
+    TWO_LANES,
+    cubic,
+    geometry,
+    road,
+    section,
+    write_roads,
+)
 
 
 def write_opendrive(folder: Path) -> None:

@@ -1,7 +1,8 @@
 """Recordings of a small town at two stages, on two lanes of one street."""
 
-from drive_files import make_scan, write_recording, yaw_pose
 import numpy as np
+
+from helpers.drive_files import make_scan, write_recording, yaw_pose
 
 ROUTES = {"a": {"lanes": [1]}, "b": {"lanes": [2]}}
 

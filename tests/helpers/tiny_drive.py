@@ -4,7 +4,6 @@ import contextlib
 import signal
 import sys
 
-from small_map import box_visual, world_text
 import yaml
 
 from cns_drake.base.interrupts import (
@@ -13,6 +12,7 @@ from cns_drake.base.interrupts import (
 )
 from cns_drake.scenarios.scenario import make_scenario
 from cns_drake.simulation.simulation import simulate
+from helpers.small_map import box_visual, world_text
 
 FRAMES = 60
 LONG = 3000

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import textwrap
 
-import documents
+from helpers import documents
 import pytest
 
 ROOT = Path(__file__).parents[2]

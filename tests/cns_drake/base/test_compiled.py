@@ -6,7 +6,7 @@ import shutil
 import subprocess
 import sys
 
-import documents
+from helpers import documents
 import pytest
 
 _SCRIPT = """

@@ -1,7 +1,7 @@
 from itertools import cycle
 from pathlib import Path
 
-from building_checks import (
+from helpers.building_checks import (
     cast,
     normals,
     placed_triangles,
@@ -10,7 +10,7 @@ from building_checks import (
     typical_model,
     typical_request,
 )
-from mesh_checks import out_of_plane
+from helpers.mesh_checks import out_of_plane
 import numpy as np
 import pytest
 import shapely

@@ -2,11 +2,11 @@
 
 from functools import cache, partial
 
-from drives import shipped_drive
+from helpers.drives import shipped_drive
+from helpers.shipped_cities import ground_triangles, network_of, structures_of
 import numpy as np
 import pytest
 import shapely
-from shipped_cities import ground_triangles, network_of, structures_of
 
 from cns_drake.city.geometry.object_parts import part_triangles
 from cns_drake.city.ground.streets import GROUND_TAG, kerb_height

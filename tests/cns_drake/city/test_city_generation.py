@@ -3,15 +3,13 @@
 import csv
 import xml.etree.ElementTree as ElementTree
 
-from city_checks import (
+from helpers.city_checks import (
     check_no_structure_stands_in_a_lane,
     check_no_structure_stands_in_another,
     check_nothing_low_reaches_far_out_of_its_footprint,
     is_ground,
 )
-from pydrake.geometry import Role
-import pytest
-from shipped_cities import (
+from helpers.shipped_cities import (
     PLANS,
     city,
     network_of,
@@ -21,6 +19,8 @@ from shipped_cities import (
     visuals,
     world_of,
 )
+from pydrake.geometry import Role
+import pytest
 import yaml
 
 from cns_drake.city.generation.generate import TABLE_NAME, render_city

@@ -2,10 +2,10 @@
 
 from functools import cache
 
+from helpers.small_city import PLAN, ROADS
 import numpy as np
 import pytest
 import shapely
-from small_city import PLAN, ROADS
 
 from cns_drake.base.errors import InputError
 from cns_drake.city.generation.city_structures import (

@@ -2,11 +2,11 @@
 
 from functools import partial
 
+from helpers.shipped_cities import ground_triangles, network_of, structures_of
 import numpy as np
 import pytest
 import shapely
 from shapely.geometry import LineString, Point, box
-from shipped_cities import ground_triangles, network_of, structures_of
 
 from cns_drake.city.ground.streets import GROUND_TAG
 

@@ -1,11 +1,11 @@
 """The SDF text, read back by Drake."""
 
+from helpers.shipped_cities import parse_strictly
 import numpy as np
 from pydrake.geometry import Box, Cylinder, Mesh, Role, Sphere
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 from shapely.geometry import box
-from shipped_cities import parse_strictly
 
 from cns_drake.city.generation.sdf import stage_sdf
 from cns_drake.city.geometry.mesh import box_mesh

@@ -2,17 +2,17 @@
 
 from collections import Counter
 
-from city_checks import (
+from helpers.city_checks import (
     check_no_structure_stands_in_a_lane,
     check_no_structure_stands_in_another,
     check_nothing_low_reaches_far_out_of_its_footprint,
     is_ground,
 )
+from helpers.shipped_cities import PLANS, city, network_of
 import numpy as np
 import pytest
 import shapely
 from shapely.affinity import affine_transform
-from shipped_cities import PLANS, city, network_of
 
 from cns_drake.scene.semantics import CLASS_IDS
 

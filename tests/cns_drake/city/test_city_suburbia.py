@@ -3,10 +3,10 @@
 from functools import cache, partial
 import itertools
 
+from helpers.shipped_cities import network_of, structures_of, world_of
 import pytest
 import shapely
 from shapely.geometry import LineString, Point, box
-from shipped_cities import network_of, structures_of, world_of
 
 from cns_drake.city.plan.stages import load_stages
 

@@ -3,8 +3,8 @@
 import os
 import re
 
+from helpers.small_city import write_small_city
 import pytest
-from small_city import write_small_city
 import typer
 
 from cns_drake.base.errors import InputError

@@ -1,11 +1,11 @@
 import itertools
 import math
 
-from mesh_checks import out_of_plane, volume
+from helpers.mesh_checks import out_of_plane, volume
+from helpers.winding import winding_numbers
 import numpy as np
 import pytest
 from shapely.geometry import Polygon
-from winding import winding_numbers
 
 from cns_drake.city.buildings.parts import massing
 from cns_drake.city.buildings.parts.facades import (

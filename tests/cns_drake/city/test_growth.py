@@ -1,6 +1,6 @@
 """Buildings that are lower yet, young plants, building sites and lots."""
 
-from building_checks import (
+from helpers.building_checks import (
     cast,
     placed_triangles,
     rays_from_the_street,

@@ -1,4 +1,4 @@
-from mesh_checks import is_closed, out_of_plane, volume
+from helpers.mesh_checks import is_closed, out_of_plane, volume
 import numpy as np
 import pytest
 

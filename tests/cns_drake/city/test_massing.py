@@ -1,10 +1,10 @@
 import math
 
-from mesh_checks import is_closed, out_of_plane, volume
+from helpers.mesh_checks import is_closed, out_of_plane, volume
+from helpers.winding import winding_numbers
 import numpy as np
 import pytest
 from shapely.geometry import Point, Polygon, box
-from winding import winding_numbers
 
 from cns_drake.city.buildings.parts import details, massing, outlines
 from cns_drake.city.buildings.parts.helix import ramp_turn

@@ -1,4 +1,4 @@
-from mesh_checks import rotation_matrix, surface_points
+from helpers.mesh_checks import rotation_matrix, surface_points
 import numpy as np
 import pytest
 from shapely.geometry import MultiPoint, Point

@@ -1,6 +1,6 @@
 """What holds for every kind of object."""
 
-from mesh_checks import out_of_plane, parse_obj, surface_points
+from helpers.mesh_checks import out_of_plane, parse_obj, surface_points
 import numpy as np
 import pytest
 from shapely.geometry import MultiPoint

@@ -1,4 +1,4 @@
-from mesh_checks import first_hit, is_closed, solids
+from helpers.mesh_checks import first_hit, is_closed, solids
 import numpy as np
 import pytest
 

@@ -1,7 +1,7 @@
 import itertools
 import math
 
-from mesh_checks import is_closed, out_of_plane, volume
+from helpers.mesh_checks import is_closed, out_of_plane, volume
 import numpy as np
 import pytest
 

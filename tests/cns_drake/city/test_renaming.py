@@ -3,8 +3,8 @@
 import csv
 import re
 
+from helpers.small_city import write_small_city
 import pytest
-from small_city import write_small_city
 from typer.testing import CliRunner
 import yaml
 

@@ -1,4 +1,4 @@
-from mesh_checks import is_closed, solids, surface_points
+from helpers.mesh_checks import is_closed, solids, surface_points
 import numpy as np
 import pytest
 

@@ -1,7 +1,7 @@
 import itertools
 
-from building_checks import cast
-from mesh_checks import out_of_plane, surface_points
+from helpers.building_checks import cast
+from helpers.mesh_checks import out_of_plane, surface_points
 import numpy as np
 import pytest
 

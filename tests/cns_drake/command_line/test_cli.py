@@ -4,11 +4,11 @@ import re
 import subprocess
 import sys
 
-from documents import ROOT
-from eval_program import run_program
+from helpers.documents import ROOT
+from helpers.eval_program import run_program
+from helpers.small_map import box_visual, scenario_values, world_text
 import numpy as np
 import pytest
-from small_map import box_visual, scenario_values, world_text
 import yaml
 
 from cns_drake.__main__ import main

@@ -2,8 +2,8 @@
 
 import csv
 
+from helpers.small_city import write_small_city
 import pytest
-from small_city import write_small_city
 from typer.testing import CliRunner
 import yaml
 

@@ -3,10 +3,10 @@
 import json
 import re
 
-from drive_files import make_scan, write_recording, yaw_pose
+from helpers.drive_files import make_scan, write_recording, yaw_pose
+from helpers.small_map import box_visual, world_text
 import numpy as np
 import pytest
-from small_map import box_visual, world_text
 
 from cns_drake.base.cloud_writing import encode_labels
 from cns_drake.base.errors import InputError

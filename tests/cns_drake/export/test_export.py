@@ -5,8 +5,8 @@ import shutil
 import subprocess
 import sys
 
-from bent_drive import NUM_SCANS, P_BS, QUAT_BS, write_drive
-from lies import read_told, write_told
+from helpers.bent_drive import NUM_SCANS, P_BS, QUAT_BS, write_drive
+from helpers.lies import read_told, write_told
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

@@ -2,9 +2,9 @@
 
 import json
 
+from helpers.small_cityjson import CityWriter
 import numpy as np
 import pytest
-from small_cityjson import CityWriter
 
 from cns_drake.base.errors import InputError
 from cns_drake.imports.cityjson import read_cityjson

@@ -6,10 +6,10 @@ from pathlib import Path
 import re
 import resource
 
+from helpers.small_cityjson import CityWriter, write_blocks
 import numpy as np
 import pytest
 from shapely.geometry import LineString, box
-from small_cityjson import CityWriter, write_blocks
 from typer.testing import CliRunner
 import yaml
 

@@ -2,10 +2,10 @@
 
 import csv
 
+from helpers.small_cityjson import CityWriter, write_blocks
 import numpy as np
 import pytest
 from shapely.geometry import LineString, box
-from small_cityjson import CityWriter, write_blocks
 
 from cns_drake.base.errors import InputError
 from cns_drake.imports.import_map import import_city

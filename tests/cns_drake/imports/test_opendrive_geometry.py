@@ -4,13 +4,7 @@ import math
 import os
 from pathlib import Path
 
-import numpy as np
-import pytest
-from scipy.spatial import cKDTree
-from scipy.special import fresnel
-import shapely
-from shapely.geometry import LineString, Polygon
-from small_opendrive import (
+from helpers.small_opendrive import (
     cubic,
     geometry,
     lane,
@@ -19,6 +13,12 @@ from small_opendrive import (
     section,
     write_roads,
 )
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+from scipy.special import fresnel
+import shapely
+from shapely.geometry import LineString, Polygon
 
 from cns_drake.imports.import_faults import ImportFaults
 from cns_drake.imports.opendrive.imported_streets import ImportedStreets

@@ -1,7 +1,6 @@
 """Files of OpenDRIVE that are wrong, or hostile: one line, and no harm."""
 
-import pytest
-from small_opendrive import (
+from helpers.small_opendrive import (
     TWO_LANES,
     cubic,
     geometry,
@@ -11,6 +10,7 @@ from small_opendrive import (
     straight,
     write_roads,
 )
+import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.imports.import_faults import ImportFaults

@@ -2,10 +2,10 @@
 
 import math
 
+from helpers.small_opendrive import cubic, straight, write_roads
 import numpy as np
 import pytest
 from shapely.geometry import LineString, box
-from small_opendrive import cubic, straight, write_roads
 
 from cns_drake.imports.import_faults import ImportFaults
 from cns_drake.imports.opendrive.lane_bands import lane_bands

@@ -3,11 +3,7 @@
 from itertools import pairwise
 import math
 
-import numpy as np
-import pytest
-import shapely
-from shapely.geometry import LineString, Point
-from small_opendrive import (
+from helpers.small_opendrive import (
     cubic,
     geometry,
     lane,
@@ -17,6 +13,10 @@ from small_opendrive import (
     turn,
     write_roads,
 )
+import numpy as np
+import pytest
+import shapely
+from shapely.geometry import LineString, Point
 from typer.testing import CliRunner
 import yaml
 

@@ -2,10 +2,10 @@
 
 import re
 
+from helpers.small_osm import LAT, LON, OsmWriter
 import numpy as np
 import pytest
 from shapely.geometry import Polygon
-from small_osm import LAT, LON, OsmWriter
 
 from cns_drake.base.errors import InputError
 from cns_drake.imports.building_years import Undated

@@ -1,9 +1,9 @@
 """Drives in the lanes of streets: sides, one-way streets, overlap, stripes."""
 
+from helpers.small_osm import OsmWriter
 import numpy as np
 import pytest
 from shapely.geometry import LineString, Point
-from small_osm import OsmWriter
 
 from cns_drake.imports.import_map import import_city
 from cns_drake.imports.import_report import DriveOn, ImportOptions

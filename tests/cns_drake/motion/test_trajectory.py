@@ -1,6 +1,6 @@
 """Trajectories against closed forms, finite differences and their bounds."""
 
-from drives import (
+from helpers.drives import (
     CAREFUL,
     SPACING,
     helix_points,

@@ -1,6 +1,6 @@
 """Prescribed motion against the plant, finite differences and rolling."""
 
-from drives import CAREFUL, helix_points, lane_path, wavy_points
+from helpers.drives import CAREFUL, helix_points, lane_path, wavy_points
 import numpy as np
 from pydrake.geometry import Role, SceneGraph
 from pydrake.multibody.parsing import Parser

@@ -1,9 +1,9 @@
 """Drives from above: the view shows all of them, north up."""
 
+from helpers.small_map import write_small_map
 from matplotlib.image import imread
 import numpy as np
 import pytest
-from small_map import write_small_map
 import yaml
 
 from cns_drake.pictures.aerial_pictures import (

@@ -3,7 +3,7 @@
 import json
 import re
 
-from browser import chromium, has_chromium
+from helpers.browser import chromium, has_chromium
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.systems.analysis import Simulator

@@ -1,6 +1,6 @@
 from types import SimpleNamespace
 
-from meshcat_pages import (
+from helpers.meshcat_pages import (
     colors,
     objects,
     properties,

@@ -2,7 +2,7 @@ import base64
 import re
 from types import SimpleNamespace
 
-from meshcat_pages import read_messages
+from helpers.meshcat_pages import read_messages
 import numpy as np
 from pydrake.geometry import Box, Meshcat, MeshcatParams, Rgba, Sphere
 import pytest

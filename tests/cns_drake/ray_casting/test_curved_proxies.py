@@ -1,6 +1,6 @@
 """Polyhedra about curved shapes: around them, and close to them."""
 
-from closed_forms import capsule, cylinder, ellipsoid
+from helpers.closed_forms import capsule, cylinder, ellipsoid
 import numpy as np
 from pydrake.geometry import FrameId, GeometryId
 from pydrake.math import RigidTransform, RollPitchYaw

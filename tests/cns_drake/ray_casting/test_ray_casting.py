@@ -1,6 +1,6 @@
 """The ray caster against closed forms and against Open3D."""
 
-from closed_forms import box, capsule, cylinder, ellipsoid
+from helpers.closed_forms import box, capsule, cylinder, ellipsoid
 import numpy as np
 from pydrake.geometry import FrameId, GeometryId
 from pydrake.math import RigidTransform, RollPitchYaw

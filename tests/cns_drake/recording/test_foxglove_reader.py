@@ -9,7 +9,7 @@ import os
 import shutil
 import subprocess
 
-from documents import ROOT
+from helpers.documents import ROOT
 import numpy as np
 import pytest
 import yaml

@@ -8,11 +8,11 @@ import resource
 import subprocess
 import sys
 
-from bag_recordings import FRAMES as BAG_FRAMES
-from bag_recordings import contents, record
+from helpers.bag_recordings import FRAMES as BAG_FRAMES
+from helpers.bag_recordings import contents, record
+from helpers.tiny_drive import FRAMES, tiny_scenario
 from mcap.reader import make_reader
 import pytest
-from tiny_drive import FRAMES, tiny_scenario
 import yaml
 
 from cns_drake.base.errors import InputError

@@ -4,11 +4,11 @@ import io
 import resource
 import struct
 
+from helpers.mcap_bytes import write_mcap
 import lz4.frame
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.writer import MCAP0_MAGIC, CompressionType
-from mcap_bytes import write_mcap
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader

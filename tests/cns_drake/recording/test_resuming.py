@@ -2,7 +2,7 @@
 
 import os
 
-from bag_recordings import (
+from helpers.bag_recordings import (
     FRAMES,
     TOPICS,
     contents,

@@ -2,9 +2,9 @@
 
 import copy
 
+from helpers.road_crossing import CROSS, load_network
 import numpy as np
 import pytest
-from road_crossing import CROSS, load_network
 from shapely.geometry import Point
 
 from cns_drake.roads.road import LaneRef

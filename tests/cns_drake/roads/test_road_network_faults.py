@@ -2,10 +2,10 @@
 
 import copy
 
+from helpers.road_crossing import CROSS, load_network
+from helpers.small_city import ROADS
 import pytest
-from road_crossing import CROSS, load_network
 from shapely import unary_union
-from small_city import ROADS
 
 from cns_drake.base.errors import InputError
 from cns_drake.roads.carriageway import road_strip

@@ -2,11 +2,11 @@
 
 import shutil
 
-from bag_recordings import contents
+from helpers.bag_recordings import contents
+from helpers.small_map import box_visual, world_text
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
-from small_map import box_visual, world_text
 import yaml
 
 from cns_drake.base.errors import InputError

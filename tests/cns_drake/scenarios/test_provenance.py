@@ -3,8 +3,8 @@
 import importlib.metadata
 import shutil
 
+from helpers.tiny_drive import tiny_scenario
 import pytest
-from tiny_drive import tiny_scenario
 
 from cns_drake.base.errors import InputError
 from cns_drake.scenarios.provenance import (

@@ -1,9 +1,9 @@
 """Scenarios: what is accepted, what is refused, what comes back."""
 
+from helpers.small_map import scenario_values
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
-from small_map import scenario_values
 import yaml
 
 from cns_drake.base.errors import InputError

@@ -3,8 +3,8 @@
 from dataclasses import replace
 import shutil
 
+from helpers.small_map import write_small_map
 import pytest
-from small_map import write_small_map
 import yaml
 
 from cns_drake.base.errors import InputError

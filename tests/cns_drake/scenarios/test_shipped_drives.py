@@ -1,6 +1,6 @@
 """The twelve drives: legal, smooth, in their lanes, and where they meet."""
 
-from drives import SPACING, shipped_drive
+from helpers.drives import SPACING, shipped_drive
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree

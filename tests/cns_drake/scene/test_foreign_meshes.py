@@ -1,8 +1,8 @@
 """Meshes that Open3D reads, and what it crashes on."""
 
+from helpers.small_map import world_text
 import numpy as np
 import pytest
-from small_map import world_text
 
 from cns_drake.base.errors import InputError
 from cns_drake.scene.foreign_meshes import ForeignMeshes

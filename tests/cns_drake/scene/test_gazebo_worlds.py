@@ -1,6 +1,6 @@
 """Worlds as people write them for Gazebo."""
 
-from mesh_texts import obj_text
+from helpers.mesh_texts import obj_text
 import numpy as np
 from pydrake.math import RigidTransform
 import pytest

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
+from helpers.small_map import box_visual, world_text
 from pydrake.geometry import ReadObjToTriangleSurfaceMesh
 import pytest
-from small_map import box_visual, world_text
 
 from cns_drake.base.errors import InputError
 from cns_drake.scene.model_check import check_model

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
+from helpers.small_map import box_visual, world_text
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
-from small_map import box_visual, world_text
 
 from cns_drake.base.errors import InputError
 from cns_drake.scenarios.shipped import vehicle_file

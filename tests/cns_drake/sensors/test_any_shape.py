@@ -1,8 +1,15 @@
 """Every shape that a SceneGraph has, as SceneGraph itself sees it."""
 
-from drake_distances import marched_range
-from lidar_stage import FORWARD, X_WS, Stage, ahead, beam_index, positions
-from mesh_texts import gltf_text, obj_text, vtk_text
+from helpers.drake_distances import marched_range
+from helpers.lidar_stage import (
+    FORWARD,
+    X_WS,
+    Stage,
+    ahead,
+    beam_index,
+    positions,
+)
+from helpers.mesh_texts import gltf_text, obj_text, vtk_text
 import numpy as np
 from pydrake.common import MemoryFile
 from pydrake.geometry import (

@@ -1,7 +1,7 @@
 """Beam patterns: fields of view, rates, and what they see, exactly."""
 
-from closed_forms import box
-from lidar_stage import Stage, positions
+from helpers.closed_forms import box
+from helpers.lidar_stage import Stage, positions
 import numpy as np
 from pydrake.geometry import Box
 from pydrake.math import RigidTransform

@@ -4,8 +4,8 @@ What a LiDAR sees after a change is what one that never saw anything else
 sees, bit for bit, and what SceneGraph's own signed distance tells of it.
 """
 
-from drake_distances import marched_range
-from lidar_stage import FORWARD, Stage, ahead
+from helpers.drake_distances import marched_range
+from helpers.lidar_stage import FORWARD, Stage, ahead
 import numpy as np
 from pydrake.geometry import (
     Box,

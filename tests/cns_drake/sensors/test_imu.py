@@ -1,6 +1,6 @@
 """The IMU against closed forms and against the drive that it measures."""
 
-from drives import (
+from helpers.drives import (
     CAREFUL,
     helix_points,
     lane_path,

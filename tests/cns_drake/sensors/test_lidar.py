@@ -1,7 +1,14 @@
 """The Lidar system in a Diagram with a SceneGraph, against closed forms."""
 
-from closed_forms import box, cylinder, ellipsoid
-from lidar_stage import FORWARD, X_WS, Stage, ahead, beam_index, positions
+from helpers.closed_forms import box, cylinder, ellipsoid
+from helpers.lidar_stage import (
+    FORWARD,
+    X_WS,
+    Stage,
+    ahead,
+    beam_index,
+    positions,
+)
 import numpy as np
 from pydrake.geometry import (
     Box,

@@ -1,6 +1,6 @@
 """LiDARs in Diagrams with a MultibodyPlant: what they see and hide."""
 
-from lidar_stage import FORWARD, ahead
+from helpers.lidar_stage import FORWARD, ahead
 import numpy as np
 from pydrake.common.value import AbstractValue
 from pydrake.geometry import (

@@ -4,7 +4,7 @@ Oracle: closed forms, ray by ray, in the frame of each body at the time of
 that ray.
 """
 
-from closed_forms import box, capsule, cylinder, ellipsoid
+from helpers.closed_forms import box, capsule, cylinder, ellipsoid
 import numpy as np
 from pydrake.geometry import (
     Box,

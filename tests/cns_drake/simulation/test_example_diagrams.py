@@ -5,7 +5,7 @@ import re
 import subprocess
 import sys
 
-from meshcat_pages import objects, read_commands
+from helpers.meshcat_pages import objects, read_commands
 import pytest
 
 DIAGRAMS = Path(__file__).parents[3] / "diagrams"

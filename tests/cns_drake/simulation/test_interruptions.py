@@ -12,12 +12,12 @@ import multiprocessing
 import os
 import signal
 
-from bag_recordings import contents
+from helpers.bag_recordings import contents
+from helpers.tiny_drive import FRAMES, run_and_tell, tiny_scenario
 from mcap.exceptions import McapError
 from mcap.reader import NonSeekingReader
 import numpy as np
 import pytest
-from tiny_drive import FRAMES, run_and_tell, tiny_scenario
 
 from cns_drake.base.interrupts import INTERRUPTED
 

@@ -1,9 +1,9 @@
 """Single scans of worlds, and the files they are saved in."""
 
+from helpers.small_map import box_visual, world_text
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
-from small_map import box_visual, world_text
 
 from cns_drake.base.errors import InputError
 from cns_drake.scene.world import load_world

@@ -1,9 +1,9 @@
 """Noise, losses and motion distortion of LiDARs on a driving vehicle."""
 
+from helpers.small_map import scenario_values
 import numpy as np
 from pydrake.math import RigidTransform
 import pytest
-from small_map import scenario_values
 
 from cns_drake.recording.frame_clock import FRAME_PERIOD
 from cns_drake.scenarios.planning import plan_drive

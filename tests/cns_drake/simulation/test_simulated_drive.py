@@ -2,9 +2,9 @@
 
 import pickle
 
+from helpers.tiny_drive import FRAMES, tiny_scenario
 import numpy as np
 import pytest
-from tiny_drive import FRAMES, tiny_scenario
 
 from cns_drake.base.errors import InputError
 from cns_drake.scenarios.scenario import load_scenario

@@ -1,9 +1,9 @@
 """Runs from a scenario to a recording, and what may stop them."""
 
-from bag_recordings import contents
+from helpers.bag_recordings import contents
+from helpers.small_map import scenario_values, write_small_map
 import pytest
 from rosbags.highlevel import AnyReader
-from small_map import scenario_values, write_small_map
 import yaml
 
 from cns_drake.base.errors import InputError

@@ -1,11 +1,11 @@
 """The wired Diagram: names, ports, and what its sensors add up to."""
 
+from helpers.small_map import scenario_values
 import numpy as np
 from pydrake.systems.analysis import Simulator
 import pytest
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
-from small_map import scenario_values
 
 from cns_drake.recording.frame_clock import FRAME_PERIOD
 from cns_drake.scenarios.scenario import make_scenario

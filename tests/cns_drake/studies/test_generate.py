@@ -5,14 +5,19 @@ import os
 from pathlib import Path
 import signal
 
-from bag_recordings import contents
-from generation import Generation
+from helpers import studies
+from helpers.bag_recordings import contents
+from helpers.generation import Generation
+from helpers.small_city import write_small_city
+from helpers.tiny_drive import (
+    FRAMES,
+    long_scenario,
+    tiny_scenario,
+    write_scenario,
+)
 from mcap.reader import make_reader
 import numpy as np
 import pytest
-from small_city import write_small_city
-import studies
-from tiny_drive import FRAMES, long_scenario, tiny_scenario, write_scenario
 import yaml
 
 from cns_drake.base.errors import InputError

@@ -1,7 +1,7 @@
 """Calibration: the pair as it is, and with each knob taken back."""
 
+from helpers.small_city import write_small_city
 import pytest
-from small_city import write_small_city
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster

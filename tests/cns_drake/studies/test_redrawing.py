@@ -3,10 +3,9 @@
 import os
 import shutil
 
-import city_checks
+from helpers import city_checks, studies
+from helpers.small_city import ROADS, STAGES, write_small_city
 import pytest
-from small_city import ROADS, STAGES, write_small_city
-import studies
 import yaml
 
 from cns_drake.base.errors import InputError

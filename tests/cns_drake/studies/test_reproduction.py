@@ -2,8 +2,8 @@
 
 import csv
 
+from helpers.small_map import scenario_values, write_small_map
 import pytest
-from small_map import scenario_values, write_small_map
 import yaml
 
 from cns_drake.base.errors import InputError

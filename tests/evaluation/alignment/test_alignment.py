@@ -1,6 +1,6 @@
 import json
 
-from dataset_folders import (
+from helpers.dataset_folders import (
     T0_NS,
     UTM,
     pack,
@@ -8,11 +8,9 @@ from dataset_folders import (
     write_matrices,
     write_quaternions,
 )
-from drive_files import make_scan, write_recording
-from eval_program import run
-import numpy as np
-import pytest
-from towns import (
+from helpers.drive_files import make_scan, write_recording
+from helpers.eval_program import run
+from helpers.towns import (
     LIDAR_HEIGHT,
     TownDrive,
     drifted,
@@ -21,6 +19,8 @@ from towns import (
     rigid,
     route,
 )
+import numpy as np
+import pytest
 
 from cns_drake.base import poses
 from cns_drake.base.errors import InputError

@@ -1,6 +1,6 @@
+from helpers.towns import rigid
 import numpy as np
 import pytest
-from towns import rigid
 
 from evaluation.alignment.anchor_search import (
     Candidates,

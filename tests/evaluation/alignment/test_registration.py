@@ -1,7 +1,7 @@
+from helpers.towns import make_town, rigid
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from towns import make_town, rigid
 
 from cns_drake.base import poses
 from evaluation.alignment.registration import make_surface, register

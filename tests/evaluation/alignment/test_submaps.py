@@ -1,5 +1,12 @@
+from helpers.towns import (
+    TownDrive,
+    drifted,
+    make_scans,
+    make_town,
+    rigid,
+    route,
+)
 import numpy as np
-from towns import TownDrive, drifted, make_scans, make_town, rigid, route
 
 from cns_drake.base import poses
 from cns_drake.base.points import from_xyz

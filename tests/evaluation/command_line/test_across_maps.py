@@ -2,8 +2,8 @@
 
 import json
 
-from eval_program import assert_refused, run
-from small_towns import drive
+from helpers.eval_program import assert_refused, run
+from helpers.small_towns import drive
 
 
 def test_two_draws_of_a_city(capsys, tmp_path):

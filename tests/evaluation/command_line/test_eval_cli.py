@@ -3,7 +3,7 @@ import json
 import subprocess
 import sys
 
-from eval_program import assert_refused, run
+from helpers.eval_program import assert_refused, run
 import numpy as np
 import pytest
 

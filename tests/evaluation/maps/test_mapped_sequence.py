@@ -1,4 +1,4 @@
-from drive_files import make_scan, write_recording, yaw_pose
+from helpers.drive_files import make_scan, write_recording, yaw_pose
 import numpy as np
 import pytest
 

@@ -2,7 +2,7 @@
 
 import math
 
-from layered_scans import matrix, seen_from, some_cells, town
+from helpers.layered_scans import matrix, seen_from, some_cells, town
 import numpy as np
 import pytest
 

@@ -1,6 +1,6 @@
 """What a method may ask for beyond the coordinates of one scan."""
 
-from drive_files import make_scan, write_recording, yaw_pose
+from helpers.drive_files import make_scan, write_recording, yaw_pose
 import numpy as np
 import pytest
 

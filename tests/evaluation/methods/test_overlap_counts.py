@@ -1,6 +1,6 @@
 """The counts of layered overlap, by brute force."""
 
-from layered_scans import image, shifted, some_cells
+from helpers.layered_scans import image, shifted, some_cells
 import numpy as np
 import pytest
 

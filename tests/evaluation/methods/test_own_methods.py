@@ -2,8 +2,8 @@
 
 import json
 
-import documents
-from eval_program import assert_refused, run
+from helpers import documents
+from helpers.eval_program import assert_refused, run
 import pytest
 
 from evaluation.methods import method

@@ -1,6 +1,6 @@
 """Pose errors against turns and moves that are known."""
 
-from drive_files import make_scan, write_recording, yaw_pose
+from helpers.drive_files import make_scan, write_recording, yaw_pose
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

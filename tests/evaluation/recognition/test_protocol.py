@@ -1,6 +1,6 @@
 """What is asked, and what counts, is the user's."""
 
-from drive_files import make_scan, write_recording, yaw_pose
+from helpers.drive_files import make_scan, write_recording, yaw_pose
 import numpy as np
 import pytest
 

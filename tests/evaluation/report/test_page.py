@@ -2,8 +2,8 @@ import base64
 import itertools
 import re
 
+from helpers.small_page import make_content
 import pytest
-from small_page import make_content
 
 from evaluation.report.page import write_page
 from evaluation.report.page_data import browser_data

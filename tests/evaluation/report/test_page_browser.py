@@ -1,11 +1,11 @@
 import base64
 import io
 
-from browser import chromium, has_chromium
+from helpers.browser import chromium, has_chromium
+from helpers.small_page import QUERIES, make_content
 import numpy as np
 from PIL import Image
 import pytest
-from small_page import QUERIES, make_content
 
 from evaluation.report.page import write_page
 

@@ -3,8 +3,8 @@
 import subprocess
 import sys
 
-import bent_drive
-from lies import LIES, read_told, write_told
+from helpers import bent_drive
+from helpers.lies import LIES, read_told, write_told
 import numpy as np
 import pytest
 

@@ -1,4 +1,4 @@
-from dataset_folders import (
+from helpers.dataset_folders import (
     make_points,
     make_poses,
     stored,

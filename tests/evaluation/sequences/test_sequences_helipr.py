@@ -1,6 +1,6 @@
 import struct
 
-from dataset_folders import (
+from helpers.dataset_folders import (
     SCAN_PERIOD_NS,
     UTM,
     interpolated,
@@ -9,7 +9,7 @@ from dataset_folders import (
     stored,
     write_bytes,
 )
-from helipr_drive import (
+from helpers.helipr_drive import (
     CHANGE_NS,
     EARLY_AEVA,
     FORMATS,

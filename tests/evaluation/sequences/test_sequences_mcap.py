@@ -2,7 +2,7 @@ import builtins
 import struct
 import tracemalloc
 
-from drive_files import (
+from helpers.drive_files import (
     PERIOD_NS,
     T0_NS,
     TYPES,

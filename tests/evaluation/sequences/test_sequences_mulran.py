@@ -1,4 +1,4 @@
-from dataset_folders import (
+from helpers.dataset_folders import (
     SCAN_PERIOD_NS,
     T0_NS,
     UTM,
@@ -8,7 +8,7 @@ from dataset_folders import (
     write_bytes,
     xyzi,
 )
-from mulran_drive import NUM_SCANS, pose_table, scan_stamps, write_drive
+from helpers.mulran_drive import NUM_SCANS, pose_table, scan_stamps, write_drive
 import numpy as np
 import pytest
 

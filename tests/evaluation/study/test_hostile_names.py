@@ -3,9 +3,9 @@
 import html
 from pathlib import Path
 
+from helpers import studies
+from helpers.small_towns import drive
 import pytest
-from small_towns import drive
-import studies
 
 from cns_drake.base.files import file_name
 from evaluation.report.tables import Table

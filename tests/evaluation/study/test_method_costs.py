@@ -3,9 +3,9 @@
 import csv
 import pickle
 
+from helpers import studies
+from helpers.small_towns import drive
 import pytest
-from small_towns import drive
-import studies
 
 from evaluation.methods import known_methods
 from evaluation.recognition import costs

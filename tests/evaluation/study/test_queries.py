@@ -4,10 +4,10 @@ from collections import defaultdict
 import csv
 import math
 
+from helpers import studies
+from helpers.small_towns import drive
 import numpy as np
 import pytest
-from small_towns import drive
-import studies
 
 from evaluation.methods import known_methods
 

@@ -1,10 +1,10 @@
 import csv
 
-from drive_files import make_scan, write_recording, yaw_pose
+from helpers import studies
+from helpers.drive_files import make_scan, write_recording, yaw_pose
+from helpers.small_towns import drive
 import numpy as np
 import pytest
-from small_towns import drive
-import studies
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster

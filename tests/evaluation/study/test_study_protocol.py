@@ -2,11 +2,11 @@
 
 import csv
 
-from drive_files import make_scan, write_recording, yaw_pose
+from helpers import studies
+from helpers.drive_files import make_scan, write_recording, yaw_pose
+from helpers.small_towns import ROUTES, drive, make_town
 import numpy as np
 import pytest
-from small_towns import ROUTES, drive, make_town
-import studies
 
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.study.chosen_methods import choose_methods

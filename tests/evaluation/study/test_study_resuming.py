@@ -2,9 +2,9 @@
 
 import os
 
+from helpers import studies
+from helpers.small_towns import drive
 import pytest
-from small_towns import drive
-import studies
 
 from evaluation.methods import known_methods
 from evaluation.study.collection import find_recordings

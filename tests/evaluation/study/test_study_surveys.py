@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass, field
 
+from helpers.small_towns import drive
 import numpy as np
 import pytest
-from small_towns import drive
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.running import Tell

@@ -2,10 +2,10 @@
 
 import csv
 
+from helpers import studies
+from helpers.small_towns import drive
 import numpy as np
 import pytest
-from small_towns import drive
-import studies
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster

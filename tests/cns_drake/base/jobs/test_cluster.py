@@ -7,14 +7,14 @@ import socket
 import subprocess
 import sys
 
-from bag_recordings import contents
-from dask_processes import DaskProcesses
 from distributed import Security
-from generation import Generation
-import job_functions
+from helpers import job_functions
+from helpers.bag_recordings import contents
+from helpers.dask_processes import DaskProcesses
+from helpers.generation import Generation
+from helpers.tiny_drive import long_scenario, tiny_scenario, write_scenario
 import psutil
 import pytest
-from tiny_drive import long_scenario, tiny_scenario, write_scenario
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs import dask_workers
@@ -92,7 +92,7 @@ def test_jobs_end_with_the_client_that_wanted_them(dask, tmp_path, number):
     script = (
         "import sys\n"
         "from pathlib import Path\n"
-        "import job_functions\n"
+        "from helpers import job_functions\n"
         "from cns_drake.base.jobs.cluster import Cluster\n"
         "from cns_drake.base.jobs.running import Job, run_jobs\n"
         "address, pipe = sys.argv[1:]\n"
@@ -175,7 +175,7 @@ def test_a_scheduler_that_asks_for_certificates(certificates, tmp_path):
         script = (
             "import sys\n"
             "from pathlib import Path\n"
-            "import job_functions\n"
+            "from helpers import job_functions\n"
             "from cns_drake.base.jobs.cluster import Cluster\n"
             "from cns_drake.base.jobs.running import Job, run_jobs\n"
             "address, path = sys.argv[1:]\n"

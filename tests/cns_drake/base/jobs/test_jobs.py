@@ -7,8 +7,8 @@ import subprocess
 import sys
 from types import SimpleNamespace
 
-from documents import ROOT
-import job_functions
+from helpers import job_functions
+from helpers.documents import ROOT
 import psutil
 import pytest
 
@@ -229,7 +229,7 @@ def test_nobody_else_can_reach_local_jobs(tmp_path):
     script = (
         "import sys\n"
         "from pathlib import Path\n"
-        "import job_functions\n"
+        "from helpers import job_functions\n"
         "from cns_drake.base.jobs.cluster import Cluster\n"
         "from cns_drake.base.jobs.running import Job, run_jobs\n"
         "function, path = job_functions.note_ports, Path(sys.argv[1])\n"
@@ -296,7 +296,7 @@ def test_a_job_ends_with_its_parent_even_if_that_is_killed(tmp_path):
             "-c",
             "import pickle, sys\n"
             "from pathlib import Path\n"
-            "import job_functions\n"
+            "from helpers import job_functions\n"
             "from cns_drake.base.jobs.job_process import run_process\n"
             "job = (job_functions.hold, (Path(sys.argv[1]),), None, None)\n"
             "run_process(pickle.dumps(job), print, lambda: True)\n",
