@@ -29,8 +29,8 @@ from cns_drake.base.files import (
     user_errors,
     write_part,
 )
+from cns_drake.base.recordings import ros_types
 from cns_drake.base.version import __version__
-from cns_drake.recording import messages
 from cns_drake.recording.mcap_recovery import Fault, read_records
 from cns_drake.recording.part_file import PartFile
 from cns_drake.recording.recording_folder import RecordingFolder
@@ -296,7 +296,7 @@ class BagWriter:
             message_type: writer.register_schema(
                 message_type,
                 "ros2msg",
-                messages.message_definition(message_type).encode(),
+                ros_types.message_definition(message_type).encode(),
             )
             for message_type in dict.fromkeys(
                 topic.message_type for topic in self._topics
@@ -309,7 +309,7 @@ class BagWriter:
                 schema_ids[topic.message_type],
                 {
                     "offered_qos_profiles": make_qos_yaml(topic),
-                    "topic_type_hash": messages.message_hash(
+                    "topic_type_hash": ros_types.message_hash(
                         topic.message_type
                     ),
                 },

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from pydrake.systems.sensors import CameraInfo
 
-from cns_drake.recording.messages import make_header, message_class
+from cns_drake.base.recordings.ros_types import message_class
+from cns_drake.recording.messages import make_header
 
 IMAGE = "sensor_msgs/msg/Image"
 CAMERA_INFO = "sensor_msgs/msg/CameraInfo"

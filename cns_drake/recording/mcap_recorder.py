@@ -21,6 +21,7 @@ from pydrake.systems.sensors import (
     ImageRgba8U,
 )
 
+from cns_drake.base.recordings import ros_types
 from cns_drake.recording import messages
 from cns_drake.recording.background_writer import BackgroundWriter
 from cns_drake.recording.bag_writer import BagWriter
@@ -34,10 +35,10 @@ from cns_drake.recording.image_messages import (
 )
 from cns_drake.recording.rosbag2_metadata import Topic
 
-_TF_STATIC = Topic("/tf_static", messages.TF, latched=True)
-_TF = Topic("/tf", messages.TF)
-_ODOMETRY = Topic("/odometry", messages.ODOMETRY)
-_IMU = Topic("/imu/data", messages.IMU)
+_TF_STATIC = Topic("/tf_static", ros_types.TF, latched=True)
+_TF = Topic("/tf", ros_types.TF)
+_ODOMETRY = Topic("/odometry", ros_types.ODOMETRY)
+_IMU = Topic("/imu/data", ros_types.IMU)
 
 # Events of a periodic schedule come at exact multiples of the period; only
 # the rounding of that product separates their times from a frame's.
@@ -244,7 +245,7 @@ class McapRecorder(LeafSystem):
         self, topic: Topic, message: Any, stamp_ns: int, sequence: int
     ) -> None:
         self._bag.write(
-            topic.name, stamp_ns, messages.serialize(message), sequence
+            topic.name, stamp_ns, ros_types.serialize(message), sequence
         )
 
     def _frame_index(self, time: float) -> int:
@@ -318,7 +319,7 @@ def make_calibration(
 
 
 def _points_topic(lidar_name: str) -> Topic:
-    return Topic(f"/{lidar_name}/points", messages.POINT_CLOUD)
+    return Topic(f"/{lidar_name}/points", ros_types.POINT_CLOUD)
 
 
 def _image_topic(camera_name: str, kind: str) -> Topic:

@@ -10,19 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-import io
 import os
 import re
 import struct
 from typing import BinaryIO
-import zlib
 
-import lz4.frame
-from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import (
-    Attachment,
     Channel,
     Chunk,
     Header,
@@ -31,13 +26,17 @@ from mcap.records import (
     Metadata,
     Schema,
 )
-from mcap.writer import MCAP0_MAGIC
 import zstandard
 
-# The largest record, compressed or not, that is taken for real [bytes].
-RECORD_LIMIT = 64 * 1024 * 1024
+from cns_drake.base.recordings.mcap_records import (
+    CHUNK_LIMIT_BYTES,
+    MAGIC,
+    RECORD_HEADER,
+    RecordContent,
+    parse_attachment,
+    uncompress,
+)
 
-_RECORD_HEADER = struct.Struct("<BQ")
 _LAST_OPCODE = max(Opcode)
 # What a chunk begins with: the record's opcode and length, two times, size and
 # checksum of the content, compression, length of the compressed content.
@@ -91,8 +90,8 @@ def read_records(stream: BinaryIO) -> Iterator[McapRecord | Fault]:
     """
     size = stream.seek(0, os.SEEK_END)
     stream.seek(0)
-    position: int | None = len(MCAP0_MAGIC)
-    if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
+    position: int | None = len(MAGIC)
+    if stream.read(len(MAGIC)) != MAGIC:
         yield Fault(0, "does not begin as an MCAP file")
         position = _next_chunk(stream, 0, size)
     budget = _MOST_READ * size
@@ -122,11 +121,11 @@ class _DamageError(McapError):
 def _read_header(stream: BinaryIO, position: int, size: int) -> tuple[int, int]:
     """Returns opcode and end of the record at a position."""
     stream.seek(position)
-    header = stream.read(_RECORD_HEADER.size)
-    if len(header) < _RECORD_HEADER.size:
+    header = stream.read(RECORD_HEADER.size)
+    if len(header) < RECORD_HEADER.size:
         raise _DamageError("the file ends too early")
-    opcode, length = _RECORD_HEADER.unpack(header)
-    end = position + _RECORD_HEADER.size + length
+    opcode, length = RECORD_HEADER.unpack(header)
+    end = position + RECORD_HEADER.size + length
     if end > size:
         raise _DamageError("a record reaches beyond the end of the file")
     if opcode == 0:
@@ -135,8 +134,8 @@ def _read_header(stream: BinaryIO, position: int, size: int) -> tuple[int, int]:
 
 
 def _read_content(stream: BinaryIO, position: int, end: int) -> bytes:
-    start = position + _RECORD_HEADER.size
-    if end - start > RECORD_LIMIT:
+    start = position + RECORD_HEADER.size
+    if end - start > CHUNK_LIMIT_BYTES:
         raise _DamageError(f"a record of {end - start} bytes is too large")
     stream.seek(start)
     return stream.read(end - start)
@@ -176,7 +175,7 @@ def _next_chunk(stream: BinaryIO, start: int, size: int) -> int | None:
 
 def _parse(opcode: int, content: bytes) -> Iterator[McapRecord]:
     """Yields the records of interest that a record is or contains."""
-    stream = _Content(content)
+    stream = RecordContent(content)
     if opcode == Opcode.CHUNK:
         yield from _records_in_chunk(Chunk.read(stream))
     elif opcode == Opcode.HEADER:
@@ -184,17 +183,14 @@ def _parse(opcode: int, content: bytes) -> Iterator[McapRecord]:
     elif opcode == Opcode.METADATA:
         yield Metadata.read(stream)
     elif opcode == Opcode.ATTACHMENT:
-        (crc,) = struct.unpack("<I", content[-4:])
-        if crc and crc != zlib.crc32(content[:-4]):
-            raise _DamageError("an attachment's checksum is wrong")
-        yield Attachment.read(stream)
+        yield parse_attachment(content)
     else:
         yield from _parse_content(opcode, content)
 
 
 def _parse_content(opcode: int, content: bytes) -> Iterator[McapRecord]:
     """Like `_parse`, for the records that a chunk may contain."""
-    stream = _Content(content)
+    stream = RecordContent(content)
     if opcode == Opcode.MESSAGE:
         yield Message.read(stream, len(content))
     elif opcode == Opcode.SCHEMA:
@@ -204,53 +200,10 @@ def _parse_content(opcode: int, content: bytes) -> Iterator[McapRecord]:
 
 
 def _records_in_chunk(chunk: Chunk) -> Iterator[McapRecord]:
-    data = _uncompressed(chunk)
-    if len(data) != chunk.uncompressed_size:
-        raise _DamageError("a chunk's size is wrong")
-    if chunk.uncompressed_crc and chunk.uncompressed_crc != zlib.crc32(data):
-        raise _DamageError("a chunk's checksum is wrong")
-    stream = _Content(data)
+    stream = RecordContent(uncompress(chunk))
     while stream.left:
-        opcode, length = _RECORD_HEADER.unpack(stream.read(_RECORD_HEADER.size))
+        opcode, length = RECORD_HEADER.unpack(stream.read(RECORD_HEADER.size))
         yield from _parse_content(opcode, stream.read(length))
-
-
-def _uncompressed(chunk: Chunk) -> bytes:
-    """Returns a chunk's content; makes room for no more than it declares."""
-    size = chunk.uncompressed_size
-    if size > RECORD_LIMIT:
-        raise _DamageError(f"a chunk of {size} bytes is too large")
-    if chunk.compression == "":
-        return chunk.data
-    if chunk.compression == "zstd":
-        reader = zstandard.ZstdDecompressor(
-            max_window_size=RECORD_LIMIT
-        ).stream_reader(chunk.data)
-        data = reader.read(size)
-        rest = reader.read(1)
-    elif chunk.compression == "lz4":
-        decompressor = lz4.frame.LZ4FrameDecompressor()
-        data = decompressor.decompress(chunk.data, max_length=size)
-        rest = b"" if decompressor.eof else b"?"
-    else:
-        raise _DamageError(f"unknown compression '{chunk.compression[:20]}'")
-    if rest:
-        raise _DamageError("a chunk holds more than it declares")
-    return data
-
-
-class _Content(ReadDataStream):
-    """The content of one record, which no read can leave."""
-
-    def __init__(self, content: bytes):
-        super().__init__(io.BytesIO(content))
-        self.left = len(content)
-
-    def read(self, length: int) -> bytes:
-        if not 0 <= length <= self.left:
-            raise _DamageError("a field reaches beyond the end of its record")
-        self.left -= length
-        return super().read(length)
 
 
 def _describe(error: Exception) -> str:

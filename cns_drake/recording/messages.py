@@ -1,9 +1,7 @@
-"""ROS 2 messages of a recording: building and serialising them.
+"""ROS 2 messages of a recording: filling in their values.
 
-Definitions, serialisation (CDR) and type hashes come from rosbags' table of
-ROS 2 Humble types; this file only fills in the values. Poses go in as Drake
-types; stamps are whole nanoseconds, so that no rounding happens here.
-Quaternions leave in ROS order (x, y, z, w).
+Poses go in as Drake types; stamps are whole nanoseconds, so that no rounding
+happens here. Quaternions leave in ROS order (x, y, z, w).
 """
 
 from __future__ import annotations
@@ -13,46 +11,19 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.math import SpatialVelocity
-from rosbags.typesys import Stores, get_typestore
+
+from cns_drake.base.recordings.point_cloud2 import point_field_datatype
+from cns_drake.base.recordings.ros_types import (
+    IMU,
+    ODOMETRY,
+    POINT_CLOUD,
+    TF,
+    message_class,
+)
 
 MAP_FRAME = "map"
 BASE_FRAME = "base_link"
 IMU_FRAME = "imu"
-
-POINT_CLOUD = "sensor_msgs/msg/PointCloud2"
-IMU = "sensor_msgs/msg/Imu"
-ODOMETRY = "nav_msgs/msg/Odometry"
-TF = "tf2_msgs/msg/TFMessage"
-
-_TYPESTORE = get_typestore(Stores.ROS2_HUMBLE)
-
-# NumPy type -> datatype constant of sensor_msgs/msg/PointField.
-_POINT_FIELD_DATATYPES = {
-    np.dtype("<i1"): 1,
-    np.dtype("<u1"): 2,
-    np.dtype("<i2"): 3,
-    np.dtype("<u2"): 4,
-    np.dtype("<i4"): 5,
-    np.dtype("<u4"): 6,
-    np.dtype("<f4"): 7,
-    np.dtype("<f8"): 8,
-}
-
-
-def message_definition(message_type: str) -> str:
-    """Returns the .msg text of a type with the types it depends on."""
-    text, _ = _TYPESTORE.generate_msgdef(message_type, ros_version=2)
-    return text
-
-
-def message_hash(message_type: str) -> str:
-    """Returns the type's hash in REP-2011 form (`RIHS01_...`)."""
-    return _TYPESTORE.hash_rihs01(message_type)
-
-
-def serialize(message: Any) -> bytes:
-    """Returns the CDR form of a message made by this module."""
-    return bytes(_TYPESTORE.serialize_cdr(message, message.__msgtype__))
 
 
 def make_point_cloud(points: np.ndarray, frame_id: str, stamp_ns: int) -> Any:
@@ -79,7 +50,7 @@ def make_point_cloud(points: np.ndarray, frame_id: str, stamp_ns: int) -> Any:
             point_field(
                 name=name,
                 offset=offset,
-                datatype=_POINT_FIELD_DATATYPES[dtype],
+                datatype=point_field_datatype(dtype),
                 count=1,
             )
         )
@@ -207,11 +178,6 @@ def to_quat_xyzw(R: RotationMatrix) -> tuple[float, float, float, float]:
         quaternion.z(),
         quaternion.w(),
     )
-
-
-def message_class(message_type: str) -> type:
-    """Returns the class of a type of messages."""
-    return _TYPESTORE.types[message_type]
 
 
 def make_header(frame_id: str, stamp_ns: int) -> Any:

@@ -12,7 +12,7 @@ from typing import Any
 
 import yaml
 
-from cns_drake.recording import messages
+from cns_drake.base.recordings import ros_types
 
 _VERSION = 8
 
@@ -59,7 +59,7 @@ def make_topic_metadata(topic: Topic) -> TopicMetadata:
         message_type=topic.message_type,
         serialization_format="cdr",
         qos_yaml=make_qos_yaml(topic),
-        message_hash=messages.message_hash(topic.message_type),
+        message_hash=ros_types.message_hash(topic.message_type),
     )
 
 

@@ -31,6 +31,7 @@ from stages import Open3dStage, read_stage
 import zstandard
 
 from cns_drake.base.processors import num_cores
+from cns_drake.base.recordings import ros_types
 from cns_drake.motion.vehicle_motion import VehicleMotion
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.recording import messages
@@ -56,15 +57,12 @@ STEPS = {
     ),
     "cast": ((RayCastingScene, "cast_rays"),),
     "points": ((Lidar, "_calc_scan"),),
-    "messages": tuple(
-        (messages, name)
-        for name in (
-            "make_point_cloud",
-            "make_imu",
-            "make_odometry",
-            "make_tf",
-            "serialize",
-        )
+    "messages": (
+        (messages, "make_point_cloud"),
+        (messages, "make_imu"),
+        (messages, "make_odometry"),
+        (messages, "make_tf"),
+        (ros_types, "serialize"),
     ),
     "compression": ((zstandard, "compress"),),
     "file": ((BagWriter, "write"), (PartFile, "write")),

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 import struct
 from typing import Any
 
-from rosbags.typesys import Stores, get_typestore
+from cns_drake.base.recordings.ros_types import (
+    IMU,
+    ODOMETRY,
+    POINT_CLOUD,
+    TF,
+    deserialize,
+)
 
-POINT_CLOUD = "sensor_msgs/msg/PointCloud2"
-ODOMETRY = "nav_msgs/msg/Odometry"
-IMU = "sensor_msgs/msg/Imu"
-TF = "tf2_msgs/msg/TFMessage"
-
-_TYPESTORE = get_typestore(Stores.ROS2_HUMBLE)
 # More than a message of a type can need [bytes]: the rest is padding, which a
 # few kilobytes of a file can hold gigabytes of. A cloud has a chunk at most.
 _LONGEST = {ODOMETRY: 1 << 12, IMU: 1 << 12, TF: 1 << 20}
@@ -49,7 +49,7 @@ def decode(data: bytes | memoryview, message_type: str) -> Any:
     if message_type == POINT_CLOUD:
         read_cloud_header(data)
     try:
-        return _TYPESTORE.deserialize_cdr(data, message_type)
+        return deserialize(data, message_type)
     except Exception as error:
         # rosbags raises whatever its generated code trips over.
         raise ValueError(

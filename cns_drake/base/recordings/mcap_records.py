@@ -61,12 +61,22 @@ def read_attachment(stream: BinaryIO) -> Attachment:
     Raises:
         ValueError: if its checksum is wrong, or the record too large.
     """
-    body = _read_body(stream, _ATTACHMENT_LIMIT_BYTES, "an attachment")
+    return parse_attachment(
+        _read_body(stream, _ATTACHMENT_LIMIT_BYTES, "an attachment")
+    )
+
+
+def parse_attachment(body: bytes) -> Attachment:
+    """Returns the attachment whose record has this content.
+
+    Raises:
+        ValueError: if its checksum is wrong, or a field is cut off.
+    """
     # The checksum of all that precedes it ends the record; 0 is none.
     checksum = int.from_bytes(body[-4:], "little")
     if checksum not in (0, zlib.crc32(body[:-4])):
         raise ValueError("the checksum of an attachment is wrong")
-    return Attachment.read(ReadDataStream(io.BytesIO(body)))
+    return Attachment.read(RecordContent(body))
 
 
 def read_chunk(stream: BinaryIO, size: int) -> bytes:
@@ -83,13 +93,36 @@ def read_chunk(stream: BinaryIO, size: int) -> bytes:
     """
     limit = CHUNK_LIMIT_BYTES + _CHUNK_FIELDS_BYTES
     body = _read_body(stream, limit, "a chunk")
-    chunk = Chunk.read(ReadDataStream(io.BytesIO(body)))
+    chunk = Chunk.read(RecordContent(body))
     if chunk.uncompressed_size != size:
         raise ValueError(
             f"a chunk of {chunk.uncompressed_size} bytes, of {size} by the"
             " index"
         )
-    return _uncompress(chunk)
+    return uncompress(chunk)
+
+
+class RecordContent(ReadDataStream):
+    """The content of one record, which no read can leave.
+
+    Attributes:
+        left: how much of it is still to be read [bytes].
+    """
+
+    def __init__(self, content: bytes):
+        super().__init__(io.BytesIO(content))
+        self.left = len(content)
+
+    def read(self, length: int) -> bytes:
+        """Returns the next bytes.
+
+        Raises:
+            ValueError: if there are fewer.
+        """
+        if not 0 <= length <= self.left:
+            raise ValueError("a field reaches beyond the end of its record")
+        self.left -= length
+        return super().read(length)
 
 
 def _read_body(stream: BinaryIO, limit: int, what: str) -> bytes:
@@ -103,7 +136,7 @@ def _read_body(stream: BinaryIO, limit: int, what: str) -> bytes:
     return body
 
 
-def _uncompress(chunk: Chunk) -> bytes:
+def uncompress(chunk: Chunk) -> bytes:
     """Returns a chunk's records; a small file cannot fill the memory.
 
     Raises:

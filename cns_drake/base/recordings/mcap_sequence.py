@@ -13,7 +13,7 @@ from cns_drake.base import points as point_arrays
 from cns_drake.base import poses
 from cns_drake.base.errors import InputError
 from cns_drake.base.json_text import parse_json
-from cns_drake.base.recordings import mcap_messages
+from cns_drake.base.recordings import mcap_messages, ros_types
 from cns_drake.base.recordings.mcap_file import McapFile
 from cns_drake.base.recordings.mcap_messages import xyz, xyzw
 from cns_drake.base.recordings.motion import IMU_DTYPE, ODOMETRY_DTYPE
@@ -59,12 +59,12 @@ class McapSequence(Sequence):
         self.name = _sequence_name(Path(path))
         self._lidar_topic = self._find_lidar_topic(lidar)
         self._message_types = {
-            self._lidar_topic: mcap_messages.POINT_CLOUD,
-            _ODOMETRY_TOPIC: mcap_messages.ODOMETRY,
-            _TF_STATIC_TOPIC: mcap_messages.TF,
+            self._lidar_topic: ros_types.POINT_CLOUD,
+            _ODOMETRY_TOPIC: ros_types.ODOMETRY,
+            _TF_STATIC_TOPIC: ros_types.TF,
         }
         if _IMU_TOPIC in self._file.topics:
-            self._message_types[_IMU_TOPIC] = mcap_messages.IMU
+            self._message_types[_IMU_TOPIC] = ros_types.IMU
         for topic, message_type in self._message_types.items():
             self._check_topic(topic, message_type)
         self._scans = self._file.locate(self._lidar_topic)
@@ -327,7 +327,7 @@ class McapSequence(Sequence):
         clouds = [
             topic
             for topic, kinds in self._file.topics.items()
-            if any(kind.startswith(mcap_messages.POINT_CLOUD) for kind in kinds)
+            if any(kind.startswith(ros_types.POINT_CLOUD) for kind in kinds)
         ]
         if lidar is not None:
             wanted = f"/{lidar}/points"

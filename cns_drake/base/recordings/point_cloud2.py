@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-# Datatype constant of sensor_msgs/msg/PointField -> NumPy type.
+# Datatype constant of sensor_msgs/msg/PointField -> NumPy type, without the
+# order of bytes.
 _DATATYPES = {
     1: "i1",
     2: "u1",
@@ -18,6 +19,18 @@ _DATATYPES = {
     7: "f4",
     8: "f8",
 }
+
+
+def point_field_datatype(dtype: np.dtype) -> int:
+    """Returns PointField's constant for a scalar type of NumPy.
+
+    Raises:
+        ValueError: if PointField has none.
+    """
+    for constant, name in _DATATYPES.items():
+        if dtype == np.dtype(f"<{name}"):
+            return constant
+    raise ValueError(f"a point cloud cannot hold numbers of type {dtype}")
 
 
 def to_points(message: Any) -> np.ndarray:

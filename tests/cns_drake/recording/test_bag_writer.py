@@ -14,6 +14,7 @@ from rosbags.interfaces import QosDurability, QosReliability
 import yaml
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.recordings import ros_types
 from cns_drake.recording import messages
 from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.rosbag2_metadata import Topic
@@ -27,11 +28,11 @@ ATTACHMENTS = {
     ],
 }
 TOPICS = (
-    Topic("/tf", messages.TF),
-    Topic("/odometry", messages.ODOMETRY),
-    Topic("/tf_static", messages.TF, latched=True),
+    Topic("/tf", ros_types.TF),
+    Topic("/odometry", ros_types.ODOMETRY),
+    Topic("/tf_static", ros_types.TF, latched=True),
 )
-EMPTY_TF = messages.serialize(messages.make_tf("map", {}, START_NS))
+EMPTY_TF = ros_types.serialize(messages.make_tf("map", {}, START_NS))
 
 
 def open_bag(folder, **kwargs):

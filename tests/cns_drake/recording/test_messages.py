@@ -5,6 +5,7 @@ import pytest
 from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
 
+from cns_drake.base.recordings import ros_types
 from cns_drake.recording import messages
 from cns_drake.sensors.beam_pattern import POINT_DTYPE
 
@@ -14,7 +15,7 @@ STAMP_NS = 1_700_000_000_150_000_001
 def decode(message):
     """Reads a message back from its bytes with a typestore of its own."""
     return get_typestore(Stores.ROS2_HUMBLE).deserialize_cdr(
-        messages.serialize(message), message.__msgtype__
+        ros_types.serialize(message), message.__msgtype__
     )
 
 
@@ -81,7 +82,7 @@ def test_point_cloud_bytes_do_not_depend_on_padding():
 
     clean = messages.make_point_cloud(points, "lidar", STAMP_NS)
     dirty = messages.make_point_cloud(littered, "lidar", STAMP_NS)
-    assert messages.serialize(dirty) == messages.serialize(clean)
+    assert ros_types.serialize(dirty) == ros_types.serialize(clean)
 
 
 def test_point_cloud_may_be_empty():
@@ -167,10 +168,10 @@ def test_quaternion_comes_in_ros_order(yaw):
 
 
 def test_definition_and_hash_are_the_published_ones():
-    assert "sensor_msgs/PointField" in messages.message_definition(
-        messages.POINT_CLOUD
+    assert "sensor_msgs/PointField" in ros_types.message_definition(
+        ros_types.POINT_CLOUD
     )
     # As published with sensor_msgs of ROS 2 Iron and later.
-    assert messages.message_hash(messages.POINT_CLOUD) == (
+    assert ros_types.message_hash(ros_types.POINT_CLOUD) == (
         "RIHS01_9198cabf7da3796ae6fe19c4cb3bdd3525492988c70522628af5daa124bae2b5"
     )

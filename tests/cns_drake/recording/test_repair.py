@@ -16,8 +16,8 @@ import yaml
 import zstandard
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.recordings.mcap_records import CHUNK_LIMIT_BYTES
 from cns_drake.recording.mcap_recovery import (
-    RECORD_LIMIT,
     Fault,
     read_records,
 )
@@ -123,7 +123,7 @@ def test_definitions_come_from_the_end_if_the_first_chunk_is_lost(tmp_path):
     result, messages = repaired(tmp_path, content)
     assert result.num_faults == 1
     assert 180 < len(messages) < 200
-    assert result.first_fault.endswith("a chunk's checksum is wrong")
+    assert result.first_fault.endswith("the checksum of a chunk is wrong")
 
 
 def test_bytes_inserted_and_removed_between_chunks(tmp_path):
@@ -234,7 +234,7 @@ def make_bomb(size):
 
 
 HUGE = 2**63 + 1
-BOMB = make_bomb(2 * RECORD_LIMIT)
+BOMB = make_bomb(2 * CHUNK_LIMIT_BYTES)
 LZ4_BOMB = lz4.frame.compress(bytes(64 * 2**20), store_size=False)
 MESSAGE = struct.pack("<HIQQ", 1, 0, 0, 0)
 HARMFUL = {
@@ -248,7 +248,7 @@ HARMFUL = {
     "huge chunk content": record_of(
         Opcode.CHUNK, chunk_of(b"", size=0, length=HUGE)
     ),
-    "bomb": record_of(Opcode.CHUNK, chunk_of(BOMB, size=2 * RECORD_LIMIT)),
+    "bomb": record_of(Opcode.CHUNK, chunk_of(BOMB, size=2 * CHUNK_LIMIT_BYTES)),
     "bomb that lies": record_of(Opcode.CHUNK, chunk_of(BOMB, size=1000)),
     "lz4 bomb that lies": record_of(
         Opcode.CHUNK, chunk_of(LZ4_BOMB, size=1000, compression=b"lz4")
@@ -282,7 +282,8 @@ def test_harmful_records_cost_no_more_than_themselves(tmp_path, name):
     content = content[:header_end] + HARMFUL[name] + content[header_end:]
     limits = resource.getrlimit(resource.RLIMIT_AS)
     resource.setrlimit(
-        resource.RLIMIT_AS, (_address_space() + 6 * RECORD_LIMIT, limits[1])
+        resource.RLIMIT_AS,
+        (_address_space() + 6 * CHUNK_LIMIT_BYTES, limits[1]),
     )
     try:
         result, messages = repaired(tmp_path, content)
