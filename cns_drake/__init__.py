@@ -23,8 +23,8 @@ if TYPE_CHECKING:
         recording_topics,
     )
     from cns_drake.scenarios.planning import plan_drive
-    from cns_drake.scenarios.scenario import (
-        Scenario,
+    from cns_drake.scenarios.scenario import Scenario
+    from cns_drake.scenarios.scenario_loading import (
         load_scenario,
         make_scenario,
     )
@@ -97,11 +97,8 @@ _HOMES = {
     "cns_drake.recording.bag_writer": ("BagWriter",),
     "cns_drake.recording.mcap_recorder": ("McapRecorder", "recording_topics"),
     "cns_drake.scenarios.planning": ("plan_drive",),
-    "cns_drake.scenarios.scenario": (
-        "Scenario",
-        "load_scenario",
-        "make_scenario",
-    ),
+    "cns_drake.scenarios.scenario": ("Scenario",),
+    "cns_drake.scenarios.scenario_loading": ("load_scenario", "make_scenario"),
     "cns_drake.scene.world": ("World", "load_world"),
     "cns_drake.sensors.beam_pattern": ("BeamPattern",),
     "cns_drake.sensors.free_patterns": (

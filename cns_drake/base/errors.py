@@ -91,6 +91,7 @@ def _advice(fault: Mapping[str, Any], model: type[BaseModel] | None) -> str:
     is_number = isinstance(given, int | float) and not isinstance(given, bool)
     if fault["type"] == "string_type" and is_number and place:
         # YAML takes 02 for the number 2.
-        text = f"{given:02d}" if place[-1] == "stage" else f"{given}"
+        is_stage = place[-1] == "stage" and isinstance(given, int)
+        text = f"{given:02d}" if is_stage else f"{given}"
         return f'; quote it: {place[-1]}: "{text}"'
     return ""

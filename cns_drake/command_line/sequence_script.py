@@ -55,7 +55,7 @@ def run_sequence(
     """
     with uninterrupted():  # Slow to import, not needed for `--help`.
         from cns_drake.base.processors import num_cores
-        from cns_drake.scenarios.scenario import load_scenario
+        from cns_drake.scenarios.scenario_loading import load_scenario
         from cns_drake.simulation.simulation import simulate
 
     scenario = load_scenario(name_or_file)

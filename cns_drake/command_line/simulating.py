@@ -86,7 +86,8 @@ def scan(
         import numpy as np
         from pydrake.math import RigidTransform, RollPitchYaw
 
-        from cns_drake.scenarios.scenario import make_lidar_config
+        from cns_drake.scenarios.lidar_config import make_lidar_config
+        from cns_drake.scenarios.sensor_making import make_pattern
         from cns_drake.scene.surfaces import LARGEST_SIZE
         from cns_drake.scene.world import load_world
         from cns_drake.simulation.scanning import (
@@ -100,7 +101,7 @@ def scan(
     if max(map(abs, pose)) > LARGEST_SIZE:
         raise InputError(f"--pose: {pose} is beyond {LARGEST_SIZE:g} m or rad")
     check_ending(output)
-    pattern = make_lidar_config(lidar).pattern()
+    pattern = make_pattern(make_lidar_config(lidar))
     X_WS = RigidTransform(RollPitchYaw(*pose[3:]), pose[:3])
     loaded = load_world(world, model_paths=model_path or ())
     for text in loaded.notes:
@@ -141,7 +142,7 @@ def generate(
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
-        from cns_drake.scenarios.scenario import load_scenario
+        from cns_drake.scenarios.scenario_loading import load_scenario
         from cns_drake.scenarios.shipped import recordable_sequences
         from cns_drake.studies.recording_jobs import record_all
 

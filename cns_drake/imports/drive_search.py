@@ -14,8 +14,8 @@ from shapely.geometry import LineString
 
 from cns_drake.base.errors import InputError
 from cns_drake.imports.free_space import CELL, FreeSpace
+from cns_drake.motion.control_points import POINT_SPACING
 from cns_drake.motion.path_geometry import SmoothPath
-from cns_drake.motion.trajectory import POINT_SPACING
 from cns_drake.roads.u_turn import TIGHTEST_RADIUS
 from cns_drake.roads.waypoints import make_waypoint_path
 

@@ -17,8 +17,8 @@ from cns_drake.city.geometry.structures import MeshShape
 from cns_drake.imports.drive_search import FreeDrive
 from cns_drake.imports.foreign_city import Imported
 from cns_drake.imports.import_faults import ImportFaults
+from cns_drake.motion.control_points import POINT_SPACING
 from cns_drake.motion.path_geometry import SmoothPath
-from cns_drake.motion.trajectory import POINT_SPACING
 from cns_drake.roads.u_turn import TIGHTEST_RADIUS
 from cns_drake.roads.waypoints import load_waypoint_path, read_waypoints
 

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
 from pydrake.trajectories import BsplineTrajectory
 
 from cns_drake.motion.path_geometry import SmoothPath
+from cns_drake.motion.speeds import Speeds
 from cns_drake.motion.uniform_spline import REACH, make_uniform_spline
 
 # Distance of the knots of the time scaling [s]; acceleration changes within
@@ -21,24 +19,6 @@ _STEP = 0.1
 _MARGIN = 0.998
 # The smoothed drive runs ahead of the unsmoothed by less than this [m].
 _SMOOTHING_SLACK = 0.2
-
-Acceleration = Annotated[float, Field(ge=0.05, le=9.81, allow_inf_nan=False)]
-
-
-class Speeds(BaseModel):
-    """How a sequence is driven; the bounds hold at every instant.
-
-    Attributes:
-        cruise: the highest speed; the roads' limits hold besides [m/s].
-        longitudinal_acceleration: bound along the path, both signs [m/s^2].
-        lateral_acceleration: bound of the centripetal acceleration [m/s^2].
-    """
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
-
-    cruise: float = Field(default=13.5, ge=0.5, le=60, allow_inf_nan=False)
-    longitudinal_acceleration: Acceleration = 2.0
-    lateral_acceleration: Acceleration = 3.0
 
 
 def make_time_scaling(

@@ -17,14 +17,10 @@ from cns_drake.motion.path_geometry import (
     PathSection,
     SmoothPath,
 )
-from cns_drake.motion.speed_profile import Speeds, make_time_scaling
+from cns_drake.motion.speed_profile import make_time_scaling
+from cns_drake.motion.speeds import Speeds
 from cns_drake.motion.uniform_spline import SplineDerivatives
 from cns_drake.roads.lane_path import LanePath
-
-# Distance of the path's control points [m]: the curvature then builds up
-# over about 10 m, as a driver turns the wheel, and in the tightest bends of a
-# town the path leaves the middle of the lane by less than 10 cm.
-POINT_SPACING = 2.0
 
 _UP = np.array([0.0, 0.0, 1.0])
 

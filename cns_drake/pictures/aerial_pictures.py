@@ -18,6 +18,7 @@ from cns_drake.base.files import (
 from cns_drake.pictures.stage_scene import StageScene, View
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import world_file
 
 _WIDTH, _HEIGHT = 800, 800
 # What is shown beyond the routes [m].
@@ -64,7 +65,7 @@ def draw_drives(scenarios: Mapping[str, Scenario], path: Path) -> None:
     pictures: dict[tuple, np.ndarray] = {}
     for axes, (title, positions) in zip(panels, drives.items(), strict=False):
         scenario = scenarios[title]
-        world = (scenario.world_file, scenario.without)
+        world = (world_file(scenario), scenario.without)
         if world not in pictures:
             pictures[world] = StageScene(*world).photograph(
                 view, _WIDTH, _HEIGHT, haze_length=np.inf

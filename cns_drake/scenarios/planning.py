@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from cns_drake.base.errors import InputError
-from cns_drake.motion.trajectory import POINT_SPACING, Trajectory
+from cns_drake.motion.control_points import POINT_SPACING
+from cns_drake.motion.trajectory import Trajectory
 from cns_drake.recording.frame_clock import frames_within
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import make_lane_path
 from cns_drake.roads.u_turn import TIGHTEST_RADIUS
 from cns_drake.roads.waypoints import load_waypoint_path
 from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import map_folder
 
 
 def plan_drive(scenario: Scenario) -> Trajectory:
@@ -33,7 +35,7 @@ def plan_drive(scenario: Scenario) -> Trajectory:
         cure = "waypoints farther apart, or fewer of them, make it wider"
     else:
         assert scenario.route is not None  # One of both is there.
-        network = load_road_network(scenario.roads_file)
+        network = load_road_network(map_folder(scenario).roads)
         path = make_lane_path(
             network,
             scenario.route,

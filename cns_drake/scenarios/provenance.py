@@ -14,6 +14,7 @@ import re
 from cns_drake.base.files import user_errors
 from cns_drake.base.version import __version__
 from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import map_folder, world_file
 from cns_drake.scenarios.shipped import vehicle_file
 
 # Whatever can have a say in a message's bytes.
@@ -63,14 +64,14 @@ def digest_inputs(scenario: Scenario) -> dict[str, str]:
     Raises:
         InputError: a file cannot be read.
     """
-    inputs = {"world": scenario.world_file, "vehicle": vehicle_file()}
-    structures = scenario.world_file.parent / "structures.csv"
+    inputs = {"world": world_file(scenario), "vehicle": vehicle_file()}
+    structures = map_folder(scenario).structures
     if structures.is_file():
         inputs["structures"] = structures
     if scenario.waypoints is not None:
         inputs["waypoints"] = Path(scenario.waypoints)
     else:
-        inputs["roads"] = scenario.roads_file
+        inputs["roads"] = map_folder(scenario).roads
     return {name: digest_file(path) for name, path in inputs.items()}
 
 

@@ -21,10 +21,14 @@ from cns_drake.base.files import (
     user_errors,
     write_part,
 )
-from cns_drake.base.yaml_files import read_yaml
-from cns_drake.scenarios.shipped import sequence_name
-
-TABLE_NAME = "sequences.csv"
+from cns_drake.base.map_folder import MapFolder, sequence_name
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import (
+    check_files,
+    map_folder,
+    world_file,
+)
+from cns_drake.scenarios.scenario_loading import read_scenario_file
 
 
 @dataclass(frozen=True)
@@ -69,26 +73,27 @@ def sequence_rows(
         InputError: if a sequence cannot be read or planned, or its stage not
             be parsed.
     """
-    known = {row.checksum: row for row in _read(folder / TABLE_NAME)}
+    its = MapFolder(folder)
+    known = {row.checksum: row for row in _read(its.sequence_table)}
     # Of the meshes, names and sizes have to do: reading them all would take
     # longer than a listing may.
     meshes = "".join(
         f"{mesh.name} {mesh.stat().st_size}"
-        for mesh in sorted((folder / "meshes").glob("*"))
+        for mesh in sorted(its.meshes.glob("*"))
     ).encode()
     rows = []
-    for path in sorted(folder.glob("sequence_*.yaml")):
-        stage = str(_entries(path).get("stage"))
-        world = folder / f"stage_{stage}.sdf"
+    for path in its.sequences():
+        scenario = read_scenario_file(path)
+        world = world_file(scenario)
         if not world.is_file():
             continue
         # A map whose drives are told by waypoints has no roads.
-        roads = [p for p in (folder / "roads.yaml",) if p.is_file()]
+        roads = [p for p in (its.roads,) if p.is_file()]
         checksum = _checksum((path, *roads, world), meshes)
         row = known.get(checksum)
         if row is None:
             progress(f"measuring {sequence_name(path)}")
-            row = _measure(path, stage, checksum)
+            row = _measure(scenario, checksum)
         rows.append(row)
     return rows
 
@@ -110,15 +115,9 @@ def write_table(
     table = csv.writer(out, lineterminator="\n")
     table.writerow(field.name for field in fields(SequenceRow))
     table.writerows(astuple(row) for row in rows)
-    write_part(folder / TABLE_NAME, out.getvalue())
-    complete_part(folder / TABLE_NAME)
-
-
-def _entries(path: Path) -> dict:
-    entries = read_yaml(path)
-    if not isinstance(entries, dict):
-        raise InputError(f"{path}: not a mapping of scenario fields")
-    return entries
+    path = MapFolder(folder).sequence_table
+    write_part(path, out.getvalue())
+    complete_part(path)
 
 
 def _checksum(paths: Iterable[Path], more: bytes) -> str:
@@ -156,22 +155,21 @@ def _read(path: Path) -> list[SequenceRow]:
         return []
 
 
-def _measure(path: Path, stage: str, checksum: str) -> SequenceRow:
+def _measure(scenario: Scenario, checksum: str) -> SequenceRow:
     # Slow to import, and rarely needed.
-    from cns_drake.scenarios.scenario import load_scenario
     from cns_drake.scenarios.sequence_facts import sequence_facts
     from cns_drake.scene.perception_geometry import read_perception_geometry
     from cns_drake.scene.surfaces import TriangleSurface
     from cns_drake.scene.world import load_world
 
-    scenario = load_scenario(path)
+    check_files(scenario)
     facts = sequence_facts(scenario)
-    world = load_world(scenario.world_file, without=scenario.without)
+    world = load_world(world_file(scenario), without=scenario.without)
     geometries = read_perception_geometry(world.scene_graph.model_inspector())
     return SequenceRow(
         sequence=scenario.name,
-        map=path.resolve().parent.name,
-        stage=stage,
+        map=map_folder(scenario).path.resolve().name,
+        stage=str(scenario.stage),
         title=scenario.title,
         checksum=checksum,
         length=round(facts.length, 1),

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from cns_drake.base.map_folder import MapFolder, sequence_name
+
 
 def worlds_folder() -> Path:
     """Returns the folder of shipped maps.
@@ -23,8 +25,9 @@ def vehicle_file() -> Path:
 def shipped_maps() -> dict[str, Path]:
     """Returns the folder of each shipped map, by name."""
     return {
-        path.parent.name: path.parent
-        for path in sorted(worlds_folder().glob("*/roads.yaml"))
+        path.name: path
+        for path in sorted(worlds_folder().iterdir())
+        if MapFolder(path).roads.exists()
     }
 
 
@@ -33,40 +36,14 @@ def shipped_sequences() -> dict[str, Path]:
     return {
         sequence_name(path): path
         for folder in shipped_maps().values()
-        for path in sorted(folder.glob("sequence_*.yaml"))
+        for path in MapFolder(folder).sequences()
     }
 
 
 def recordable_sequences() -> dict[str, Path]:
-    """Returns the shipped sequences whose stage is shipped as well, by name.
-
-    A map's roads and drives may be there before its city is.
-    """
+    """Returns the shipped sequences whose stage is shipped as well, by name."""
     return {
         sequence_name(path): path
         for folder in shipped_maps().values()
-        for path in sequences_of_map(folder)
+        for path in MapFolder(folder).recordable_sequences()
     }
-
-
-def sequences_of_map(folder: Path) -> list[Path]:
-    """Returns the sequences in a map's folder whose stage is there as well."""
-    return [
-        path
-        for path in sorted(folder.glob("sequence_*.yaml"))
-        if path.with_name(path.name.replace("sequence_", "stage_"))
-        .with_suffix(".sdf")
-        .is_file()
-    ]
-
-
-def sequence_name(path: Path) -> str:
-    """Returns the name of the sequence that a scenario file describes.
-
-    `<map>/sequence_04.yaml` is `<map>_04`; any other file has the name of
-    its stem.
-    """
-    if path.stem.startswith("sequence_"):
-        number = path.stem.removeprefix("sequence_")
-        return f"{path.resolve().parent.name}_{number}"
-    return path.stem

@@ -41,8 +41,15 @@ from cns_drake.base.yaml_files import read_yaml
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import Route
 from cns_drake.roads.route_drawing import draw_route
+from cns_drake.scenarios.lidar_config import LidarConfig
 from cns_drake.scenarios.scattered_loss import draw_losses, is_on_a_lot
-from cns_drake.scenarios.scenario import LidarConfig, Scenario, load_scenario
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import (
+    check_files,
+    map_folder,
+    world_file,
+)
+from cns_drake.scenarios.scenario_loading import load_scenario
 from cns_drake.scenarios.shipped import shipped_sequences
 from cns_drake.scene.world import load_world, structures_in
 
@@ -180,10 +187,7 @@ def vary(
     """
     if base.map is None:
         raise InputError(f"{source}: base: {base.name} has no map to vary")
-    last = max(
-        path.stem.removeprefix("stage_")
-        for path in base.map_folder.glob("stage_*.sdf")
-    )
+    last = max(map_folder(base).stages())
     stage = family.stage or last
     if family.city_seeds:
         _check_redrawable(base, family, last, source)
@@ -204,21 +208,21 @@ def vary(
     if family.city_seeds:
         if redraw is None:
             raise ValueError("a family with city_seeds needs `redraw`")
-        folders = redraw(base.map_folder, stage, family.city_seeds)
+        folders = redraw(map_folder(base).path, stage, family.city_seeds)
         cities = {
             seed: base.model_copy(update={"map": str(folder)})
             for seed, folder in folders.items()
         }
     orders = {
         (city_seed, seed): _decay_order(
-            city.map_folder / "structures.csv", seed, removable
+            map_folder(city).structures, seed, removable
         )
         for city_seed, city in cities.items()
         for seed in family.seeds
     }
     losses = {
         (city_seed, seed): draw_losses(
-            city.map_folder / "structures.csv", family.scattered, seed, source
+            map_folder(city).structures, family.scattered, seed, source
         )
         for city_seed, city in cities.items()
         for seed in family.seeds
@@ -250,7 +254,7 @@ def vary(
         if route is not None:
             update |= {"route": route, "waypoints": None}
         member = city.model_copy(update=update)
-        member.check_files(source)
+        check_files(member, source)
         members.append(member)
     return members
 
@@ -301,7 +305,8 @@ def _check_redrawable(
         raise InputError(f"{source}: towards: {why}")
     if family.stage not in (None, last):
         raise InputError(f"{source}: stage: {why}")
-    for file in (base.map_folder / "city.yaml", base.roads_file):
+    folder = map_folder(base)
+    for file in (folder.plan, folder.roads):
         if not os.path.isfile(file):
             raise InputError(
                 f"{source}: city_seeds: no {file}, so that the city of base "
@@ -315,7 +320,7 @@ def _routes(
     """Returns the routes with their labels; None for the base's own."""
     if family.routes is None:
         return [(None, None)]
-    network = load_road_network(base.roads_file)
+    network = load_road_network(map_folder(base).roads)
     return [
         (
             f"r{k}",
@@ -340,8 +345,8 @@ def _difference(
     names = []
     for one in (stage, other):
         scenario = base.model_copy(update={"stage": one})
-        scenario.check_files(source)
-        names.append(structures_in(load_world(scenario.world_file)))
+        check_files(scenario, source)
+        names.append(structures_in(load_world(world_file(scenario))))
     difference = names[0] - names[1]
     if not difference:
         raise InputError(

@@ -26,6 +26,16 @@ from cns_drake.scenarios.provenance import (
     digest_inputs,
 )
 from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import (
+    check_files,
+    describe_scenario,
+    world_file,
+)
+from cns_drake.scenarios.sensor_making import (
+    make_measurement,
+    make_pattern,
+    sensor_pose,
+)
 from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar import Lidar
 from cns_drake.simulation.still_world import make_still_world
@@ -65,22 +75,22 @@ class SimulatedSequence(Sequence):
         Raises:
             InputError: the scenario cannot be run.
         """
-        scenario.check_files()
+        check_files(scenario)
         self.name = scenario.name
         self.world_frame = MAP_FRAME
         self._scenario = scenario
         self._trajectory = plan_drive(scenario)
         self._num_frames = count_frames(scenario, self._trajectory)
         name, config = next(iter(scenario.lidars.items()))
-        self._X_BS = config.pose()
-        pattern = config.pattern()
+        self._X_BS = sensor_pose(config)
+        pattern = make_pattern(config)
         self._column_t = None
         if config.motion_distortion:
             self._column_t = pattern.column_t_ns * 1e-9
-        measurement = config.measurement(name, scenario.seed)
+        measurement = make_measurement(config, name, scenario.seed)
         self._is_random = measurement.is_random
         # No LiDAR sees the vehicle that carries it.
-        world = load_world(scenario.world_file, without=scenario.without)
+        world = load_world(world_file(scenario), without=scenario.without)
         self._lidar = Lidar(
             world.scene_graph.world_frame_id(),
             RigidTransform(),
@@ -127,7 +137,7 @@ class SimulatedSequence(Sequence):
 
     @property
     def scenario(self) -> Mapping:
-        return self._scenario.described()
+        return describe_scenario(self._scenario)
 
     def scan(self, index: int) -> np.ndarray:
         context = self._lidar.GetMyMutableContextFromRoot(self._context)

@@ -40,6 +40,13 @@ from cns_drake.scenarios.provenance import (
     digest_inputs,
 )
 from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import (
+    check_files,
+    describe_scenario,
+    map_folder,
+    world_file,
+)
+from cns_drake.scenarios.sensor_making import sensor_pose
 from cns_drake.scene.world import World
 from cns_drake.simulation.station import load_stage, make_station
 
@@ -208,7 +215,7 @@ class _Drive:
 
 
 def _load(scenario: Scenario) -> _Drive:
-    scenario.check_files()
+    check_files(scenario)
     inputs = digest_inputs(scenario)
     trajectory = plan_drive(scenario)
     num_frames = count_frames(scenario, trajectory)
@@ -216,7 +223,7 @@ def _load(scenario: Scenario) -> _Drive:
     world = load_stage(scenario)
     if digest_inputs(scenario) != inputs:
         raise InputError(
-            f"{scenario.world_file}: changed while it was being read"
+            f"{world_file(scenario)}: changed while it was being read"
         )
     return _Drive(scenario, inputs, trajectory, world, num_frames)
 
@@ -257,7 +264,7 @@ def _make_bag(
 ) -> BagWriter:
     """Makes the recording of a drive, so far without messages."""
     scenario, inputs = drive.scenario, drive.inputs
-    described = scenario.described()
+    described = describe_scenario(scenario)
     return BagWriter(
         folder,
         topics,
@@ -266,7 +273,7 @@ def _make_bag(
             "scenario.json": described,
             "structures.json": _structure_list(drive.world),
             "calibration.json": make_calibration(
-                _lidar_poses(scenario), scenario.imu.pose()
+                _lidar_poses(scenario), sensor_pose(scenario.imu)
             ),
             "provenance.json": {
                 "versions": dependency_versions(),
@@ -274,7 +281,7 @@ def _make_bag(
             },
         },
         # It can be simulated again, as long as all lies as it does.
-        scenario=scenario.described(folder),
+        scenario=describe_scenario(scenario, folder),
         custom_data={
             "cns_drake_version": __version__,
             INPUTS_KEY: combined_digest(inputs),
@@ -290,7 +297,7 @@ def _make_bag(
 
 def _lidar_poses(scenario: Scenario) -> dict[str, RigidTransform]:
     """Returns LiDAR name -> pose X_BS in the vehicle frame."""
-    return {name: lidar.pose() for name, lidar in scenario.lidars.items()}
+    return {name: sensor_pose(one) for name, one in scenario.lidars.items()}
 
 
 def _structure_list(world: World) -> list[dict]:
@@ -314,11 +321,10 @@ def _other_stage(scenario: Scenario) -> tuple[World | None, str]:
     if scenario.without:
         whole = scenario.model_copy(update={"without": ()})
         return load_stage(whole), "the whole city"
-    stages = sorted(scenario.map_folder.glob("stage_*.sdf"))
-    others = [path for path in stages if path != scenario.world_file]
+    stages = list(map_folder(scenario).stages())
+    others = [stage for stage in stages if stage != scenario.stage]
     if scenario.stage is None or not others:
         return None, ""
-    last = others[-1] if stages[-1] in others else others[0]
-    stage = last.stem.removeprefix("stage_")
+    stage = others[-1] if stages[-1] in others else others[0]
     other = scenario.model_copy(update={"stage": stage})
     return load_stage(other), f"stage {stage}"

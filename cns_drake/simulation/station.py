@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 
-from cns_drake.motion.sweep import VehicleSweep
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.motion.vehicle_motion import VehicleMotion
 from cns_drake.pictures.meshcat_recording import MeshcatRecorder
@@ -17,11 +16,13 @@ from cns_drake.recording.frame_clock import FRAME_PERIOD, START_NS
 from cns_drake.recording.mcap_recorder import McapRecorder
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import world_file
+from cns_drake.scenarios.sensor_making import sensor_pose
 from cns_drake.scenarios.shipped import vehicle_file
 from cns_drake.scene.world import World, load_world
 from cns_drake.sensors.imu import add_imu
-from cns_drake.sensors.lidar_adding import add_lidar
 from cns_drake.sensors.odometry import add_odometry
+from cns_drake.simulation.lidar_applying import apply_lidar_config
 
 
 def make_station(
@@ -66,14 +67,10 @@ def make_station(
     """
     world = world or load_stage(scenario)
     trajectory = trajectory or plan_drive(scenario)
-    X_BSs = {name: lidar.pose() for name, lidar in scenario.lidars.items()}
-    X_BI = scenario.imu.pose()
+    X_BSs = {name: sensor_pose(one) for name, one in scenario.lidars.items()}
+    X_BI = sensor_pose(scenario.imu)
     plant = world.plant
     base = plant.GetBodyByName("base_link", world.vehicle)
-
-    vehicle = [
-        plant.get_body(index) for index in plant.GetBodyIndices(world.vehicle)
-    ]
 
     builder = DiagramBuilder()
     scene_graph = builder.AddNamedSystem("scene_graph", world.scene_graph)
@@ -92,28 +89,15 @@ def make_station(
     # What is measured, by name: also the names of the exported ports.
     measured = {"geometry_query": scene_graph.get_query_output_port()}
     for name, config in scenario.lidars.items():
-        lidar = add_lidar(
+        lidar = apply_lidar_config(
+            config,
             builder,
-            scene_graph,
-            base,
-            X_BSs[name],
-            config.pattern(),
+            world,
+            trajectory,
             name=name,
-            measurement=config.measurement(name, scenario.seed),
-            unseen=vehicle,
-            with_sweep=config.motion_distortion,
-            structures=world.structures,
-            anchored_frames=world.anchored_frames(),
+            seed=scenario.seed,
             num_threads=num_threads,
         )
-        if config.motion_distortion:
-            sweep = builder.AddNamedSystem(
-                f"{name}_sweep",
-                VehicleSweep(trajectory, config.pattern().column_t_ns * 1e-9),
-            )
-            builder.Connect(
-                sweep.GetOutputPort("sweep"), lidar.GetInputPort("sweep")
-            )
         measured[f"{name}_scan"] = lidar.GetOutputPort("scan")
     accelerometer, gyroscope = add_imu(builder, base, X_BI, motion=motion)
     measured["specific_force"] = accelerometer.get_measurement_output_port()
@@ -143,7 +127,7 @@ def make_station(
 def load_stage(scenario: Scenario) -> World:
     """Loads the stage of a scenario with the vehicle in it."""
     return load_world(
-        scenario.world_file, vehicle=vehicle_file(), without=scenario.without
+        world_file(scenario), vehicle=vehicle_file(), without=scenario.without
     )
 
 

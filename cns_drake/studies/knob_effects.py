@@ -15,11 +15,13 @@ import tempfile
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.map_folder import MapFolder
 from cns_drake.city.generation.city_structures import City, make_city
 from cns_drake.city.generation.generate import render_stages
 from cns_drake.city.generation.sdf import MESH_FOLDER
 from cns_drake.city.plan.stages import Stage, Stages, load_stages
 from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.simulation.simulated_drive import SimulatedDrive
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.trend_points import (
@@ -93,13 +95,13 @@ def _variants(
     earlier: Scenario, later: Scenario, folder: Path
 ) -> dict[str, Scenario]:
     """Builds the stages that are needed; returns the drives through them."""
-    source = earlier.map_folder
+    source = map_folder(earlier)
     first, last = earlier.stage, later.stage
-    if first is None or last is None or later.map_folder != source:
+    if first is None or last is None or map_folder(later) != source:
         raise InputError(f"{later.name}: map: not that of {earlier.name}")
-    city = make_city(source)
+    city = make_city(source.path)
     names = [structure.name for structure in city.structures]
-    stages = load_stages(source / "stages.yaml", names)
+    stages = load_stages(source.stage_plan, names)
     as_it_is = stages.on_its_own(first)
     plans = {
         _AS_IT_IS: as_it_is,
@@ -111,7 +113,7 @@ def _variants(
         if variant != _AS_IT_IS and plan == as_it_is:
             continue
         # Drives are of one world where their maps have one name.
-        path = folder / variant / source.resolve().name
+        path = folder / variant / source.path.resolve().name
         _write_map(path, city, stages, first, plan, source)
         drives[variant] = earlier.model_copy(update={"map": str(path)})
     if earlier.aside:
@@ -130,17 +132,15 @@ def _write_map(
     stages: Stages,
     stage: str,
     plan: Stage,
-    source: Path,
+    source: MapFolder,
 ) -> None:
     """Writes a map folder with one stage."""
     alone = stages.model_copy(
         update={"stages": {stage: plan, "99": Stage(story="the whole city")}}
     )
-    files = render_stages(
-        source.name, city, alone, [stage], source / "stages.yaml"
-    )
+    files = render_stages(source.name, city, alone, [stage], source.stage_plan)
     (path / MESH_FOLDER).mkdir(parents=True)
-    shutil.copy(source / "roads.yaml", path)
+    shutil.copy(source.roads, path)
     for name, text in files.items():
         (path / name).write_text(text, encoding="utf-8")
 

@@ -7,10 +7,11 @@ from pathlib import Path
 
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.jobs.running import Job, Tell
+from cns_drake.base.map_folder import MapFolder
 from cns_drake.base.version import __version__
 from cns_drake.scenarios.provenance import digest_file, digest_inputs
-from cns_drake.scenarios.scenario import Scenario, load_scenario
-from cns_drake.scenarios.shipped import sequences_of_map
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_loading import load_scenario
 from evaluation.study.parts import is_current, write_part
 
 # Expected time to draw a stage [s].
@@ -45,9 +46,9 @@ def plan_pictures(folder: Path, pictures: Path) -> list[Job]:
             is_done=is_done,
         )
 
-    num_drives = len(sequences_of_map(folder))
+    num_drives = len(MapFolder(folder).recordable_sequences())
     jobs = [job("drives", draw_map_drives, are_drives_drawn, num_drives)]
-    if _views(folder).is_file():
+    if MapFolder(folder).views.is_file():
         jobs.append(job("stages", draw_map_stages, are_stages_drawn, 2))
     return jobs
 
@@ -86,7 +87,9 @@ def _drives_inputs(folder: Path) -> dict:
 
 
 def _scenarios(folder: Path) -> list[Scenario]:
-    return [load_scenario(file) for file in sequences_of_map(folder)]
+    return [
+        load_scenario(file) for file in MapFolder(folder).recordable_sequences()
+    ]
 
 
 def draw_map_stages(folder: Path, path: Path, tell: Tell) -> None:
@@ -106,7 +109,7 @@ def draw_map_stages(folder: Path, path: Path, tell: Tell) -> None:
 
     inputs = _stages_inputs(folder)
     stages = {f.stem.replace("_", " "): f for f in _two_stages(folder)}
-    draw_stages(stages, load_views(_views(folder))["street"], path)
+    draw_stages(stages, load_views(MapFolder(folder).views)["street"], path)
     _write_note(path, inputs)
 
 
@@ -116,17 +119,13 @@ def are_stages_drawn(folder: Path, path: Path) -> bool:
 
 
 def _stages_inputs(folder: Path) -> dict:
-    files = [*_two_stages(folder), _views(folder)]
+    files = [*_two_stages(folder), MapFolder(folder).views]
     return {file.name: digest_file(file) for file in files}
 
 
 def _two_stages(folder: Path) -> tuple[Path, Path]:
-    files = sorted(folder.glob("stage_*.sdf"))
+    files = list(MapFolder(folder).stages().values())
     return files[0], files[-1]
-
-
-def _views(folder: Path) -> Path:
-    return folder / "views.yaml"
 
 
 def _write_note(path: Path, inputs: dict) -> None:

@@ -21,7 +21,8 @@ from cns_drake.scenarios.provenance import (
     combined_digest,
     digest_inputs,
 )
-from cns_drake.scenarios.scenario import Scenario, make_scenario
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_loading import make_scenario
 
 # Expected time to load a stage, and to simulate a frame with the default
 # LiDAR [s]; how many frames a drive has that does not say.

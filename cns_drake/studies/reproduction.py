@@ -10,8 +10,11 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import run_jobs
-from cns_drake.scenarios.scenario import Scenario, load_scenario
-from cns_drake.scenarios.shipped import sequences_of_map, shipped_maps
+from cns_drake.base.map_folder import MapFolder
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import map_folder
+from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.simulation.simulated_drive import SimulatedDrive
 from cns_drake.studies.map_pictures import plan_pictures
 from cns_drake.studies.recording_jobs import (
@@ -113,7 +116,9 @@ def reproduce_maps(
 
 
 def _sequences(folder: Path) -> list[Scenario]:
-    sequences = [load_scenario(path) for path in sequences_of_map(folder)]
+    sequences = [
+        load_scenario(path) for path in MapFolder(folder).recordable_sequences()
+    ]
     for sequence in sequences:
         if sequence.map is None:
             raise InputError(
@@ -158,7 +163,7 @@ def recording_info(
     return RecordingInfo(
         name=scenario.name,
         path=output.absolute() / scenario.name,
-        map_name=scenario.map_folder.name,
+        map_name=map_folder(scenario).name,
         stage=scenario.stage,
         route=scenario.route or scenario.waypoints,
         needs=(scenario.name,) if is_waiting else (),
@@ -169,7 +174,7 @@ def _recordable_maps() -> list[str]:
     return [
         name
         for name, folder in shipped_maps().items()
-        if sequences_of_map(folder)
+        if MapFolder(folder).recordable_sequences()
     ]
 
 
@@ -185,7 +190,7 @@ def _map_folder(name: str) -> Path:
         raise InputError(
             f"unknown map '{name}'; known: {known}; or give a folder"
         )
-    if not sequences_of_map(folder):
+    if not MapFolder(folder).recordable_sequences():
         raise InputError(
             f"{folder}: no sequence_NN.yaml whose stage_NN.sdf is there"
         )

@@ -32,7 +32,7 @@ from stages import (
 )
 
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.scenarios.scenario import load_scenario
+from cns_drake.scenarios.scenario_loading import load_scenario
 from cns_drake.scene.perception_geometry import PerceptionGeometry
 from cns_drake.scene.surfaces import TriangleSurface
 from cns_drake.sensors.spinning_pattern import SpinningPattern

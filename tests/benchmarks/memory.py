@@ -28,7 +28,7 @@ SPEED = 20.0
 
 def print_peak(sequence: str, frames: int | None) -> None:
     """Prints the peak of memory of recording a sequence."""
-    from cns_drake.scenarios.scenario import load_scenario
+    from cns_drake.scenarios.scenario_loading import load_scenario
 
     scenario = load_scenario(sequence)
     _record(scenario.model_copy(update={"frames": frames}), lambda done: None)
@@ -42,11 +42,12 @@ def print_growth(sequence: str, frames: int) -> None:
     from cns_drake.recording.frame_clock import FRAME_PERIOD
     from cns_drake.roads.network import load_road_network
     from cns_drake.roads.route_drawing import draw_route
-    from cns_drake.scenarios.scenario import load_scenario
+    from cns_drake.scenarios.scenario_files import map_folder
+    from cns_drake.scenarios.scenario_loading import load_scenario
 
     scenario = load_scenario(sequence)
     route = draw_route(
-        load_road_network(scenario.roads_file),
+        load_road_network(map_folder(scenario).roads),
         SPEED * frames * FRAME_PERIOD,
         np.random.default_rng(0),
     )

@@ -39,7 +39,9 @@ from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.frame_clock import FRAME_PERIOD
 from cns_drake.recording.part_file import PartFile
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario import Scenario, load_scenario
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.sensor_making import make_pattern, sensor_pose
 from cns_drake.sensors.lidar import Lidar
 from cns_drake.sensors.odometry import OdometrySensor
 from cns_drake.simulation.simulation import simulate
@@ -90,8 +92,8 @@ class TakingTurns:
         self._stage = Open3dStage(read_stage(scenario.name))
         self._drive = plan_drive(scenario)
         (lidar,) = scenario.lidars.values()
-        self._X_BS = lidar.pose()
-        self._d_Sset = lidar.pattern().beams(0).d_Sset
+        self._X_BS = sensor_pose(lidar)
+        self._d_Sset = make_pattern(lidar).beams(0).d_Sset
         self._start = _clocks()
 
     def on_frame(self, done: int, total: int) -> None:

@@ -10,10 +10,12 @@ import yaml
 from cns_drake.city.buildings import ARCHETYPES
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plan import city_plan, stages
-from cns_drake.motion.speed_profile import Speeds
+from cns_drake.motion.speeds import Speeds
 from cns_drake.roads import road_schema
 from cns_drake.roads.route import RouteLeg
 from cns_drake.scenarios import scenario, variation
+from cns_drake.scenarios.imu_config import ImuConfig
+from cns_drake.scenarios.lidar_config import LidarConfig
 from cns_drake.sensors.lidar_presets import LIDAR_PRESETS
 from evaluation.methods import MethodConfig, make_method, shipped_methods
 
@@ -40,8 +42,8 @@ TABLES = [
     ("scenarios", "## Fields", scenario.Scenario, None),
     ("scenarios", "### Route", RouteLeg, None),
     ("scenarios", "### Speeds", Speeds, None),
-    ("scenarios", "### LiDARs", scenario.LidarConfig, None),
-    ("scenarios", "### IMU", scenario.ImuConfig, None),
+    ("scenarios", "### LiDARs", LidarConfig, None),
+    ("scenarios", "### IMU", ImuConfig, None),
     ("scenarios", "## Families", variation.Family, None),
     ("scenarios", "### Routes by lot", variation.DrawnRoutes, None),
     *(

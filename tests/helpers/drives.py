@@ -3,12 +3,13 @@
 import numpy as np
 import yaml
 
-from cns_drake.motion.speed_profile import Speeds
+from cns_drake.motion.speeds import Speeds
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.roads.lane_path import LanePath
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import make_lane_path
 from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.scenarios.shipped import shipped_sequences
 
 SPACING = 2.0
@@ -74,7 +75,7 @@ def shipped_drive(name) -> tuple[Scenario, LanePath, Trajectory]:
     """Returns a shipped sequence with its lane path and trajectory."""
     values = yaml.safe_load(shipped_sequences()[name].read_text())
     scenario = Scenario.model_validate({"name": name, **values})
-    network = load_road_network(scenario.roads_file)
+    network = load_road_network(map_folder(scenario).roads)
     path = make_lane_path(
         network, scenario.route, SPACING, aside=scenario.aside
     )

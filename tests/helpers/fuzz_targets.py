@@ -25,7 +25,9 @@ from cns_drake.recording.repair import repair_mcap
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import Route, make_lane_path
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario import Scenario, load_scenario
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.sensor_making import make_pattern
 from cns_drake.scenarios.sequence_table import sequence_rows
 from cns_drake.scenarios.variation import load_family, write_scenarios
 from cns_drake.scene.perception_geometry import read_perception_geometry
@@ -139,7 +141,7 @@ def _simulate(folder: Path) -> None:
 
 def _is_small(scenario: Scenario) -> bool:
     beams = sum(
-        len(lidar.pattern().d_Sset) for lidar in scenario.lidars.values()
+        len(make_pattern(lidar).d_Sset) for lidar in scenario.lidars.values()
     )
     return beams < 40_000 and (scenario.frames or 1000) < 20
 

@@ -12,8 +12,8 @@ from scipy.spatial import cKDTree
 
 from cns_drake.imports.opendrive.lane_bands import LaneBand
 from cns_drake.imports.opendrive.lane_kinds import DRIVEN
+from cns_drake.motion.control_points import POINT_SPACING
 from cns_drake.motion.path_geometry import SmoothPath
-from cns_drake.motion.trajectory import POINT_SPACING
 from cns_drake.roads.u_turn import TIGHTEST_RADIUS
 from cns_drake.roads.waypoints import make_waypoint_path
 

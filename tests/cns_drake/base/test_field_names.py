@@ -29,6 +29,7 @@ class Plan(BaseModel):
         ({"home": {"stagge": "01"}}, "did you mean stage?"),
         ({"cornres": {}}, "did you mean corners?"),
         ({"home": {"stage": 2}}, 'quote it: stage: "02"'),
+        ({"home": {"stage": 0.1}}, 'quote it: stage: "0.1"'),
         ({"home": {"colour": 2}}, "Extra inputs are not permitted"),
     ],
 )

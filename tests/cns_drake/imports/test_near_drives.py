@@ -11,7 +11,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.imports.import_map import import_city
 from cns_drake.imports.import_report import ImportOptions
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario import load_scenario
+from cns_drake.scenarios.scenario_loading import load_scenario
 
 # The map's origin in the town of blocks is the middle of it.
 MIDDLE = 72.0

@@ -33,7 +33,7 @@ from cns_drake.imports.opendrive.road_heights import RoadHeights
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.town import build_town
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario import load_scenario
+from cns_drake.scenarios.scenario_loading import load_scenario
 from evaluation.sequences import open_sequence
 
 ARM = 12.0

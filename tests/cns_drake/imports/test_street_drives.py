@@ -11,7 +11,7 @@ from cns_drake.imports.openstreetmap import import_openstreetmap
 from cns_drake.imports.osm_tags import driven_ways, is_marked, lanes_beside
 from cns_drake.imports.street_lanes import LaneGraph, Street, make_lanes
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario import load_scenario
+from cns_drake.scenarios.scenario_loading import load_scenario
 
 STEP = 90.0
 WIDTH = 8.0

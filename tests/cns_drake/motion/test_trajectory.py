@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from cns_drake.motion.path_geometry import PathIntegral, SmoothPath
-from cns_drake.motion.speed_profile import Speeds
+from cns_drake.motion.speeds import Speeds
 from cns_drake.motion.trajectory import Trajectory, WheelMotion
 from cns_drake.motion.uniform_spline import make_uniform_spline
 from cns_drake.roads.lane_path import LanePath

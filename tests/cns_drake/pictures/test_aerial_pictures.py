@@ -10,7 +10,7 @@ from cns_drake.pictures.aerial_pictures import (
     draw_drives,
     view_from_above,
 )
-from cns_drake.scenarios.scenario import load_scenario
+from cns_drake.scenarios.scenario_loading import load_scenario
 from cns_drake.scenarios.shipped import shipped_sequences
 
 pytestmark = pytest.mark.slow

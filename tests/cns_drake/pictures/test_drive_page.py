@@ -18,6 +18,8 @@ from cns_drake.pictures.drive_page import (
 from cns_drake.pictures.meshcat_recording import MeshcatRecorder
 from cns_drake.recording.frame_clock import FRAME_PERIOD
 from cns_drake.scenarios.planning import count_frames, plan_drive
+from cns_drake.scenarios.scenario_files import map_folder
+from cns_drake.scenarios.sensor_making import sensor_pose
 from cns_drake.scene.world import load_world
 from cns_drake.simulation.station import load_stage, make_station
 
@@ -123,12 +125,14 @@ def test_without_another_stage_nothing_is_said_of_change(tmp_path):
 def test_page_of_a_shipped_drive_is_small(tmp_path):
     scenario = load_scenario("downtown_01")  # It has the largest page.
     world, trajectory = load_stage(scenario), plan_drive(scenario)
-    X_BSs = {name: lidar.pose() for name, lidar in scenario.lidars.items()}
+    X_BSs = {
+        name: sensor_pose(lidar) for name, lidar in scenario.lidars.items()
+    }
     recorder = MeshcatRecorder(
         world,
         X_BSs=X_BSs,
         period=FRAME_PERIOD,
-        other_stage=load_world(scenario.map_folder / "stage_04.sdf"),
+        other_stage=load_world(map_folder(scenario).stage("04")),
     )
     diagram = make_station(
         scenario, world=world, trajectory=trajectory, page=recorder

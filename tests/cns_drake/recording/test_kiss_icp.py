@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base import poses
-from cns_drake.scenarios.scenario import load_scenario
+from cns_drake.scenarios.scenario_loading import load_scenario
 from cns_drake.simulation.simulation import simulate
 from evaluation import sequences
 

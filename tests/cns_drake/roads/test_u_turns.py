@@ -7,8 +7,9 @@ import pytest
 import yaml
 
 from cns_drake.base.errors import InputError
-from cns_drake.motion.speed_profile import Speeds
-from cns_drake.motion.trajectory import POINT_SPACING, Trajectory
+from cns_drake.motion.control_points import POINT_SPACING
+from cns_drake.motion.speeds import Speeds
+from cns_drake.motion.trajectory import Trajectory
 from cns_drake.motion.vehicle_motion import VehicleMotion
 from cns_drake.roads.centreline import Centreline
 from cns_drake.roads.network import load_road_network
@@ -21,7 +22,7 @@ from cns_drake.roads.u_turn import (
 )
 from cns_drake.roads.waypoints import load_waypoint_path, make_waypoint_path
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario import load_scenario
+from cns_drake.scenarios.scenario_loading import load_scenario
 from cns_drake.scenarios.shipped import vehicle_file
 
 

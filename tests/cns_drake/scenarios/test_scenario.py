@@ -7,13 +7,12 @@ import pytest
 import yaml
 
 from cns_drake.base.errors import InputError
+from cns_drake.scenarios.lidar_config import LidarConfig
+from cns_drake.scenarios.mount import Mount
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario import (
-    LidarConfig,
-    Mount,
-    load_scenario,
-    make_scenario,
-)
+from cns_drake.scenarios.scenario_files import map_folder, world_file
+from cns_drake.scenarios.scenario_loading import load_scenario, make_scenario
+from cns_drake.scenarios.sensor_making import make_pattern, sensor_pose
 from cns_drake.scenarios.shipped import recordable_sequences
 
 
@@ -23,7 +22,7 @@ def test_shipped_sequences_load():
     for name in names:
         scenario = load_scenario(name)
         assert scenario.name == name
-        assert scenario.world_file.is_file()
+        assert world_file(scenario).is_file()
         assert scenario.title
 
 
@@ -31,11 +30,11 @@ def test_defaults_are_the_sensor_contract():
     scenario = load_scenario("metropolis_04")
     (name, lidar), *others = scenario.lidars.items()
     assert (name, others) == ("lidar", [])
-    np.testing.assert_array_equal(lidar.pose().translation(), [0, 0, 1.6])
-    pattern = lidar.pattern()
+    np.testing.assert_array_equal(sensor_pose(lidar).translation(), [0, 0, 1.6])
+    pattern = make_pattern(lidar)
     assert (pattern.num_rings, pattern.num_columns) == (32, 1024)
     assert (pattern.min_range, pattern.max_range) == (0.8, 120.0)
-    imu = scenario.imu.pose()
+    imu = sensor_pose(scenario.imu)
     np.testing.assert_array_equal(imu.translation(), [-1.0, 0, 1.6])
     assert imu.rotation().IsNearlyIdentity(0.0)
 
@@ -57,7 +56,7 @@ def test_map_folder_is_relative_to_the_scenario_file(small_map):
     path.write_text(yaml.safe_dump(values))
     scenario = load_scenario(path)
     assert scenario.name == "own_drive"
-    assert scenario.map_folder == small_map
+    assert map_folder(scenario).path == small_map
 
 
 def test_mount_angles_are_roll_pitch_yaw_in_degrees():
@@ -65,13 +64,13 @@ def test_mount_angles_are_roll_pitch_yaw_in_degrees():
     expected = RigidTransform(
         RollPitchYaw(np.deg2rad([10.0, 20.0, 30.0])), [1, 2, 3]
     )
-    assert mount.pose().IsNearlyEqualTo(expected, 1e-15)
+    assert sensor_pose(mount).IsNearlyEqualTo(expected, 1e-15)
 
 
 def test_preset_replaces_the_lidar_where_it_is():
     scenario = load_scenario("metropolis_01").with_lidar_preset("os1-128")
     config = scenario.lidars["lidar"]
-    assert config.pattern().num_rings == 128
+    assert make_pattern(config).num_rings == 128
     assert config.xyz == (0.0, 0.0, 1.6)
     own = {"lidars": {"a": {"columns": 64, "range_noise": 0.02}}}
     values = scenario.model_dump() | own

@@ -8,10 +8,10 @@ import pytest
 import yaml
 
 from cns_drake.base.errors import InputError
-from cns_drake.scenarios.scenario import load_scenario
+from cns_drake.base.map_folder import MapFolder
+from cns_drake.scenarios.scenario_loading import load_scenario
 from cns_drake.scenarios.sequence_facts import sequence_facts
 from cns_drake.scenarios.sequence_table import (
-    TABLE_NAME,
     sequence_rows,
     write_table,
 )
@@ -78,11 +78,11 @@ def test_only_what_changed_is_measured_again(folder):
 @pytest.mark.parametrize("text", ["", "sequence\nboxes_01\n", "\0,\x80"])
 def test_a_spoilt_table_is_measured_anew(folder, text):
     write_table(folder)
-    good = (folder / TABLE_NAME).read_bytes()
-    (folder / TABLE_NAME).write_bytes(text.encode("latin-1"))
+    good = MapFolder(folder).sequence_table.read_bytes()
+    MapFolder(folder).sequence_table.write_bytes(text.encode("latin-1"))
     assert measured(folder)[1] == ["boxes_01", "boxes_04"]
     write_table(folder)
-    assert (folder / TABLE_NAME).read_bytes() == good
+    assert MapFolder(folder).sequence_table.read_bytes() == good
 
 
 def test_a_sequence_that_is_no_mapping_is_named(folder):
@@ -95,7 +95,7 @@ def test_a_sequence_that_is_no_mapping_is_named(folder):
 def test_the_shipped_tables_are_up_to_date(name):
     folder = shipped_maps()[name]
     if not sorted(folder.glob("stage_*.sdf")):
-        assert not (folder / TABLE_NAME).exists()
+        assert not MapFolder(folder).sequence_table.exists()
         return
     _, again = measured(folder)
     assert again == []

@@ -10,7 +10,8 @@ from cns_drake.recording.frame_clock import FRAME_PERIOD, frames_within
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.road_surface import RoadSurface
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario import make_scenario
+from cns_drake.scenarios.scenario_files import map_folder
+from cns_drake.scenarios.scenario_loading import make_scenario
 from cns_drake.scenarios.sequence_facts import sequence_facts
 from cns_drake.scenarios.shipped import shipped_sequences
 from evaluation.recognition.protocol import PAPER_PROTOCOL
@@ -136,7 +137,7 @@ def test_the_vehicle_stays_in_its_lane(drives, name):
     corners = jet.p[:, None, :2] + (
         body[None, :, :1] * ahead[:, None] + body[None, :, 1:] * left[:, None]
     )
-    area = load_road_network(scenario.roads_file).lane_area()
+    area = load_road_network(map_folder(scenario).roads).lane_area()
     prepare(area)
     assert contains(area, polygons(corners)).all()
 
@@ -144,7 +145,7 @@ def test_the_vehicle_stays_in_its_lane(drives, name):
 @pytest.mark.parametrize("name", SHIPPED)
 def test_the_vehicle_follows_the_road_up_and_down(drives, name):
     scenario, _, trajectory = drives[name]
-    surface = RoadSurface(load_road_network(scenario.roads_file))
+    surface = RoadSurface(load_road_network(map_folder(scenario).roads))
     t = np.arange(0.0, trajectory.duration, 0.02)
     jet = trajectory.path.evaluate(trajectory.path_parameter(t)[0])
     off = jet.p[:, 2] - surface.heights(jet.p[:, :2])
@@ -240,7 +241,7 @@ def test_pairs_meet_as_often_as_the_papers(frames, pair):
 @pytest.mark.parametrize("pair", QUERIES_WITH_MATCH)
 def test_pairs_see_nearly_the_same_streets(drives, frames, pair):
     # What one drive sees and the other does not would count as change.
-    network = load_road_network(drives[pair[0]][0].roads_file)
+    network = load_road_network(map_folder(drives[pair[0]][0]).roads)
     places = np.concatenate(
         [
             road.evaluate(np.arange(0.5, road.full_length))[:, :2]

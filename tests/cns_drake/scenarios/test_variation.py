@@ -10,7 +10,8 @@ import yaml
 
 from cns_drake.base.errors import InputError
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario import load_scenario
+from cns_drake.scenarios.scenario_files import map_folder, world_file
+from cns_drake.scenarios.scenario_loading import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.scenarios.variation import load_family, write_scenarios
 from cns_drake.scene.world import load_world, structures_in
@@ -85,7 +86,7 @@ def test_between_two_stages_lies_what_the_earlier_one_lacks(tmp_path):
     assert members[2].title == "40.0 % of what stage 02 lacks missing"
     # All of it missing: what stands at the stage that it goes towards.
     (whole,) = [m for m in members if m.name.endswith("m1000_s0")]
-    world = load_world(whole.world_file, without=whole.without)
+    world = load_world(world_file(whole), without=whole.without)
     assert structures_in(world) == first
 
 
@@ -253,7 +254,7 @@ def test_a_folder_of_cities_and_scenarios_can_be_moved(tmp_path, town):
     moved.parent.mkdir()
     output.rename(moved)
     member = load_scenario(moved / path.relative_to(output))
-    assert member.map_folder == moved / "cities" / "town_c2"
+    assert map_folder(member).path == moved / "cities" / "town_c2"
     assert member.without == members[0].without
     # A map that lies elsewhere stays where it is.
     (path,) = write_scenarios(

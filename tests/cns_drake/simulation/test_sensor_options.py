@@ -7,7 +7,8 @@ import pytest
 
 from cns_drake.recording.frame_clock import FRAME_PERIOD
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario import make_scenario
+from cns_drake.scenarios.scenario_loading import make_scenario
+from cns_drake.scenarios.sensor_making import make_pattern, sensor_pose
 from cns_drake.simulation.simulation import simulate
 from cns_drake.simulation.station import load_stage, make_station
 from evaluation.sequences import open_sequence
@@ -87,7 +88,7 @@ def test_the_vehicle_is_turning(bend):
 def test_deskewed_points_lie_on_the_geometry(bend):
     """Each with the pose at its own time; with the stamp's, they do not."""
     scenario, trajectory, scan = bend
-    X_BS = scenario.lidars["lidar"].pose()
+    X_BS = sensor_pose(scenario.lidars["lidar"])
     time = BEND_FRAME * FRAME_PERIOD
     # Half a step of rounding along each axis, and float32 of the casting.
     rounding = np.sqrt(3.0) * 2.0**-11 + 1e-4
@@ -99,7 +100,7 @@ def test_deskewed_points_lie_on_the_geometry(bend):
 
 def test_every_column_tells_its_true_time(bend):
     scenario, _, scan = bend
-    pattern = scenario.lidars["lidar"].pattern()
+    pattern = make_pattern(scenario.lidars["lidar"])
     azimuth = np.arctan2(scan["y"], scan["x"]).astype(float)
     # The turn starts at the rear and goes clockwise.
     turned = np.mod(np.pi - azimuth, 2.0 * np.pi)
@@ -223,7 +224,7 @@ def test_recorded_poses_deskew(swept_recording, frame):
     scenario, folder = swept_recording
     sequence = open_sequence(folder)
     trajectory = plan_drive(scenario)
-    X_BS = scenario.lidars["lidar"].pose()
+    X_BS = sensor_pose(scenario.lidars["lidar"])
     time = frame * FRAME_PERIOD
     X_WS = trajectory.pose(time) @ X_BS
     p_W = to_world(sequence.scan(frame), trajectory, X_BS, time)

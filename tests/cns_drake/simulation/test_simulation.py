@@ -8,7 +8,8 @@ import yaml
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.scenarios.scenario import load_scenario, make_scenario
+from cns_drake.scenarios.scenario_files import world_file
+from cns_drake.scenarios.scenario_loading import load_scenario, make_scenario
 from cns_drake.simulation.simulation import simulate
 from cns_drake.simulation.station import load_stage
 from cns_drake.studies.recording_jobs import is_recorded, record_all
@@ -103,8 +104,8 @@ def test_a_world_that_changes_under_its_reader_is_refused(
 
     def load_and_change(scenario):
         world = load_stage(scenario)
-        scenario.world_file.write_text(
-            scenario.world_file.read_text() + "<!-- changed -->"
+        world_file(scenario).write_text(
+            world_file(scenario).read_text() + "<!-- changed -->"
         )
         return world
 

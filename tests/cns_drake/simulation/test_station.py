@@ -8,7 +8,8 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from cns_drake.recording.frame_clock import FRAME_PERIOD
-from cns_drake.scenarios.scenario import make_scenario
+from cns_drake.scenarios.scenario_loading import make_scenario
+from cns_drake.scenarios.sensor_making import sensor_pose
 from cns_drake.simulation.station import make_station
 
 GRAVITY_W = np.array([0.0, 0.0, -9.81])
@@ -110,7 +111,7 @@ def test_imu_adds_up_to_the_trajectory(scenario):
     times = np.array([s[0] for s in samples])
     assert len(times) == round(duration / FRAME_PERIOD) + 1
 
-    X_BI = scenario.imu.pose()
+    X_BI = sensor_pose(scenario.imu)
     X_WI = [s[3] @ X_BI for s in samples]
     p_WI_expected = np.array([X.translation() for X in X_WI])
     start = samples[0]

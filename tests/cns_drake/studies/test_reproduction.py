@@ -8,7 +8,7 @@ import yaml
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.scenarios.scenario import load_scenario
+from cns_drake.scenarios.scenario_loading import load_scenario
 from cns_drake.simulation.simulated_drive import SimulatedDrive
 from cns_drake.simulation.simulation import simulate
 from cns_drake.studies import reproduction

@@ -1,0 +1,100 @@
+"""What lies where in the folder of a map."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class MapFolder:
+    """The folder of a map, of which any file may be missing.
+
+    Attributes:
+        path: the folder.
+    """
+
+    path: Path
+
+    @property
+    def name(self) -> str:
+        """The name of the map."""
+        return self.path.name
+
+    @property
+    def roads(self) -> Path:
+        """The road network."""
+        return self.path / "roads.yaml"
+
+    @property
+    def plan(self) -> Path:
+        """The plan from which the city is generated."""
+        return self.path / "city.yaml"
+
+    @property
+    def stage_plan(self) -> Path:
+        """What each stage lacks."""
+        return self.path / "stages.yaml"
+
+    @property
+    def structures(self) -> Path:
+        """The table of structures."""
+        return self.path / "structures.csv"
+
+    @property
+    def sequence_table(self) -> Path:
+        """The table of sequences and their figures."""
+        return self.path / "sequences.csv"
+
+    @property
+    def meshes(self) -> Path:
+        """The folder of the meshes that the stages name."""
+        return self.path / "meshes"
+
+    @property
+    def views(self) -> Path:
+        """The views of which pictures are made."""
+        return self.path / "views.yaml"
+
+    def stage(self, stage: str) -> Path:
+        """Returns the SDF file of a stage."""
+        return self.path / f"stage_{stage}.sdf"
+
+    def stages(self) -> dict[str, Path]:
+        """Returns stage -> SDF file of the stages that are there, in order."""
+        return {
+            path.stem.removeprefix("stage_"): path
+            for path in sorted(self.path.glob(self.stage("*").name))
+        }
+
+    def sequence(self, number: str) -> Path:
+        """Returns the scenario file of a sequence."""
+        return self.path / f"sequence_{number}.yaml"
+
+    def sequences(self) -> list[Path]:
+        """Returns the scenario files of the sequences, in order."""
+        return sorted(self.path.glob(self.sequence("*").name))
+
+    def recordable_sequences(self) -> list[Path]:
+        """Returns those whose stage is there as well.
+
+        A map's roads and drives may be there before its city is.
+        """
+        stages = self.stages()
+        return [
+            path
+            for path in self.sequences()
+            if path.stem.removeprefix("sequence_") in stages
+        ]
+
+
+def sequence_name(path: Path) -> str:
+    """Returns the name of the sequence that a scenario file describes.
+
+    `<map>/sequence_04.yaml` is `<map>_04`; any other file has the name of
+    its stem.
+    """
+    if path.stem.startswith("sequence_"):
+        number = path.stem.removeprefix("sequence_")
+        return f"{path.resolve().parent.name}_{number}"
+    return path.stem

@@ -1,0 +1,89 @@
+"""A LiDAR of a scenario."""
+
+from __future__ import annotations
+
+from pydantic import (
+    Field,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
+
+from cns_drake.base.errors import InputError, describe_validation_error
+from cns_drake.scenarios.mount import Mount, Triple
+from cns_drake.sensors.lidar_presets import LIDAR_PRESETS
+
+
+class LidarConfig(Mount):
+    """A LiDAR.
+
+    Attributes:
+        preset: which unit, a key of `LIDAR_PRESETS`.
+        columns: columns in a turn, in place of the preset's.
+        min_range: nearest range, in place of the preset's [m].
+        max_range: farthest range, in place of the preset's [m].
+        resolution: step of the coordinates [m]; 0 records what was cast.
+        range_noise: standard deviation of the ranges [m].
+        dropout: probability that a return is lost.
+        faint_dropout: probability that a return of no intensity is lost,
+            falling linearly with intensity to none for full intensity.
+        motion_distortion: whether each column is cast from the sensor's pose
+            at its own firing time, instead of all from that at the stamp.
+    """
+
+    xyz: Triple = (0.0, 0.0, 1.6)
+    preset: str = "cns"
+    columns: int | None = Field(default=None, ge=4, le=8192)
+    min_range: float | None = Field(default=None, ge=0.0)
+    max_range: float | None = Field(default=None, gt=0.0, le=1000.0)
+    # About what real units resolve; a third less to store than exact values.
+    resolution: float = Field(default=2.0**-10, ge=0.0, le=1.0)
+    range_noise: float = Field(default=0.0, ge=0.0, le=10.0)
+    dropout: float = Field(default=0.0, ge=0.0, le=1.0)
+    faint_dropout: float = Field(default=0.0, ge=0.0, le=1.0)
+    motion_distortion: bool = False
+
+    @field_validator("preset")
+    @classmethod
+    def _check_known(cls, preset: str) -> str:
+        if preset not in LIDAR_PRESETS:
+            known = ", ".join(LIDAR_PRESETS)
+            raise ValueError(f"unknown preset '{preset}'; known: {known}")
+        return preset
+
+    @model_validator(mode="after")
+    def _check_unit(self) -> LidarConfig:
+        unit = LIDAR_PRESETS[self.preset]
+        if self.columns and unit.num_columns is None:
+            raise ValueError(f"the preset '{self.preset}' has no columns")
+        nearest = unit.min_range if self.min_range is None else self.min_range
+        farthest = unit.max_range if self.max_range is None else self.max_range
+        if nearest >= farthest:
+            raise ValueError(
+                f"min_range {nearest:g} is not below max_range {farthest:g}"
+            )
+        return self
+
+    def with_preset(self, preset: str) -> LidarConfig:
+        """Returns another unit in the same place that measures alike.
+
+        Raises:
+            InputError: the preset is not known.
+        """
+        unit = make_lidar_config(preset)
+        unit_fields = ("preset", "columns", "min_range", "max_range")
+        return self.model_copy(
+            update={field: getattr(unit, field) for field in unit_fields}
+        )
+
+
+def make_lidar_config(preset: str) -> LidarConfig:
+    """Returns a LiDAR of a preset.
+
+    Raises:
+        InputError: the preset is not known.
+    """
+    try:
+        return LidarConfig(preset=preset)
+    except ValidationError as error:
+        raise InputError(describe_validation_error("--lidar", error)) from None

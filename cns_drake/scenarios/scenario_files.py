@@ -1,0 +1,83 @@
+"""The files that a scenario names."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.map_folder import MapFolder
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.shipped import shipped_maps
+
+
+def map_folder(scenario: Scenario) -> MapFolder:
+    """Returns the folder of a scenario's map.
+
+    For a scenario of a world it is the folder where the world's file lies.
+    """
+    if scenario.world is not None:
+        return MapFolder(Path(scenario.world).parent)
+    assert scenario.map is not None  # It has a world or a map.
+    return MapFolder(shipped_maps().get(scenario.map, Path(scenario.map)))
+
+
+def world_file(scenario: Scenario) -> Path:
+    """Returns the SDF file of a scenario's stage, or its world itself."""
+    if scenario.world is not None:
+        return Path(scenario.world)
+    return map_folder(scenario).stage(str(scenario.stage))
+
+
+def check_files(scenario: Scenario, source: object = None) -> None:
+    """Checks that the map and its stage, or the other files, exist.
+
+    Args:
+        scenario: what names them.
+        source: the file that errors begin with; by default the scenario's.
+
+    Raises:
+        InputError: they do not.
+    """
+    source = source or scenario.source
+    for field in ("world", "waypoints"):
+        file = getattr(scenario, field)
+        if file is not None and not os.path.isfile(file):
+            raise InputError(f"{source}: {field}: {file}: no such file")
+    if scenario.map is None:
+        return
+    folder = map_folder(scenario)
+    if not os.path.isdir(folder.path):
+        known = ", ".join(shipped_maps())
+        raise InputError(
+            f"{source}: map: '{scenario.map}' is neither a shipped map "
+            f"({known}) nor a folder"
+        )
+    if not os.path.isfile(world_file(scenario)):
+        stages = ", ".join(folder.stages()) or "none"
+        raise InputError(
+            f"{source}: stage: map '{scenario.map}' has no stage "
+            f"'{scenario.stage}'; it has: {stages}"
+        )
+
+
+def describe_scenario(scenario: Scenario, folder: Path | None = None) -> dict:
+    """Returns the fields of a scenario that are given, ready for JSON.
+
+    Where a map, world or waypoints lie is no part of what is driven; their
+    content has a digest (see `provenance`).
+
+    Args:
+        scenario: what to describe.
+        folder: from which files are named by relative paths; without it,
+            they are named without their folders.
+    """
+    values = scenario.model_dump(mode="json", exclude_none=True)
+    for field in ("map", "world", "waypoints"):
+        place = values.get(field)
+        if place is None or place in shipped_maps():
+            continue
+        values[field] = Path(place).name
+        if folder is not None:
+            values[field] = os.path.relpath(place, folder.resolve())
+    return values

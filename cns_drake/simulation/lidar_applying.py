@@ -1,0 +1,67 @@
+"""From the configuration of a LiDAR to its systems in a Diagram."""
+
+from __future__ import annotations
+
+from pydrake.systems.framework import DiagramBuilder
+
+from cns_drake.motion.sweep import VehicleSweep
+from cns_drake.motion.trajectory import Trajectory
+from cns_drake.scenarios.lidar_config import LidarConfig
+from cns_drake.scenarios.sensor_making import (
+    make_measurement,
+    make_pattern,
+    sensor_pose,
+)
+from cns_drake.scene.world import World
+from cns_drake.sensors.lidar import Lidar
+from cns_drake.sensors.lidar_adding import add_lidar
+
+
+def apply_lidar_config(
+    config: LidarConfig,
+    builder: DiagramBuilder,
+    world: World,
+    trajectory: Trajectory,
+    *,
+    name: str,
+    seed: int = 0,
+    num_threads: int = 1,
+) -> Lidar:
+    """Adds the LiDAR that a configuration describes to the vehicle.
+
+    With motion distortion, a system `<name>_sweep` gives its poses.
+
+    Args:
+        config: the LiDAR.
+        builder: of the Diagram that holds the world's SceneGraph.
+        world: the stage with the vehicle.
+        trajectory: of the vehicle.
+        name: of the LiDAR.
+        seed: of its noise.
+        num_threads: how many threads cast its rays.
+    """
+    plant = world.plant
+    pattern = make_pattern(config)
+    lidar = add_lidar(
+        builder,
+        world.scene_graph,
+        plant.GetBodyByName("base_link", world.vehicle),
+        sensor_pose(config),
+        pattern,
+        name=name,
+        measurement=make_measurement(config, name, seed),
+        unseen=[plant.get_body(k) for k in plant.GetBodyIndices(world.vehicle)],
+        with_sweep=config.motion_distortion,
+        structures=world.structures,
+        anchored_frames=world.anchored_frames(),
+        num_threads=num_threads,
+    )
+    if config.motion_distortion:
+        sweep = builder.AddNamedSystem(
+            f"{name}_sweep",
+            VehicleSweep(trajectory, pattern.column_t_ns * 1e-9),
+        )
+        builder.Connect(
+            sweep.GetOutputPort("sweep"), lidar.GetInputPort("sweep")
+        )
+    return lidar

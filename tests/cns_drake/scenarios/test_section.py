@@ -1,0 +1,20 @@
+"""What sections of a scenario write."""
+
+from cns_drake.scenarios.section import Section, field_off_by_default
+
+
+class Weather(Section):
+    rain: float = 0.0
+    fog: float = field_off_by_default(0.0, ge=0.0)
+
+
+class Drive(Section):
+    weather: Weather = Weather()
+
+
+def test_a_field_without_effect_is_not_written():
+    assert Drive().model_dump(mode="json") == {"weather": {"rain": 0.0}}
+    drive = Drive(weather=Weather(fog=2.0))
+    written = {"weather": {"rain": 0.0, "fog": 2.0}}
+    assert drive.model_dump(mode="json", exclude_none=True) == written
+    assert Drive.model_validate(written) == drive
