@@ -14,9 +14,17 @@ import typer
 
 from cns_drake.base import terminal
 from cns_drake.base.terminal import example
-from evaluation.command_line.protocol_options import Costs, with_protocol
+from evaluation.command_line.protocol_options import (
+    Costs,
+    Gate,
+    Radius,
+    with_protocol,
+)
 from evaluation.command_line.result_rows import change_rows, recognition_rows
-from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition.protocol import (
+    PAPER_PROTOCOL,
+    RetrievalProtocol,
+)
 
 if TYPE_CHECKING:
     from cns_drake.base.recordings.sequence import Sequence
@@ -241,6 +249,8 @@ def scores(
     output: Annotated[Path, typer.Option(help="CSV file to write.")],
     parameter: _Parameters = None,
     sensor_height: _SensorHeight = 1.6,
+    gate: Gate = False,
+    radius: Radius = PAPER_PROTOCOL.radius,
 ) -> None:
     """Scores of all pairs of scans of two folders.
 
@@ -250,9 +260,15 @@ def scores(
     """
     from evaluation.recognition import scan_folders
 
+    protocol = RetrievalProtocol(radius=radius, gate=gate)
     chosen = _make_method(method, parameter, sensor_height)
     num_ignored = scan_folders.write_scores(
-        chosen, database, query, output, terminal.track
+        chosen,
+        database,
+        query,
+        output,
+        terminal.track,
+        gate_radius=protocol.gate_radius,
     )
     if num_ignored:
         terminal.note(f"{num_ignored} points not finite")

@@ -14,12 +14,22 @@ from evaluation.recognition.protocol import (
     RetrievalProtocol,
 )
 
+Radius = Annotated[
+    float,
+    typer.Option(help="A place is a match within this distance [m]."),
+]
+Gate = Annotated[
+    bool,
+    typer.Option(
+        "--gate",
+        help="Among the best places of a query, reject those that the"
+        " method's own pose puts beyond the radius; for every method that"
+        " estimates poses.",
+    ),
+]
 _OPTIONS: dict[str, tuple[object, object]] = {
     "radius": (
-        Annotated[
-            float,
-            typer.Option(help="A place is a match within this distance [m]."),
-        ],
+        Radius,
         PAPER_PROTOCOL.radius,
     ),
     "query_spacing": (
@@ -63,6 +73,7 @@ _OPTIONS: dict[str, tuple[object, object]] = {
         ],
         None,
     ),
+    "gate": (Gate, PAPER_PROTOCOL.gate),
 }
 
 

@@ -260,10 +260,17 @@ class Btc(Method[BtcDescription, BtcDatabase]):
 
         None if too few match or agree.
         """
-        alone = self.build_database([database.places[place]])
-        for _, X_PQ in self._motions(query, alone, None):
-            return X_PQ
-        return None
+        return self.relative_poses(query, database, [place])[0]
+
+    def relative_poses(
+        self,
+        query: BtcDescription,
+        database: BtcDatabase,
+        places: Sequence[int],
+    ) -> list[np.ndarray | None]:
+        some = self.build_database([database.places[place] for place in places])
+        found = dict(self._motions(query, some, None))
+        return [found.get(index) for index in range(len(places))]
 
     def _motions(
         self,

@@ -17,7 +17,6 @@ import math
 
 import numpy as np
 from pydantic import (
-    NonNegativeFloat,
     NonNegativeInt,
     PositiveFloat,
     PositiveInt,
@@ -27,6 +26,7 @@ from cns_drake.base.poses import make_pose
 from evaluation.methods.method import Method, MethodConfig, register
 from evaluation.methods.overlap_bits import fine_bits, turns
 from evaluation.methods.overlap_coarse import (
+    NUM_HEADINGS,
     LayeredDatabase,
     LayeredScan,
     build_database,
@@ -39,8 +39,6 @@ from evaluation.methods.overlap_search import climb
 _LAST_TURNS = turns(288)
 _LAST_STEPS = np.array([[2, 4], [1, 2]])
 _TO_LAST = np.array([1, 2, 8, 8])
-# (distance / radius) to the power of two to the power of this is taken off.
-_SQUARINGS = 3
 
 
 class LayeredOverlapConfig(MethodConfig):
@@ -58,8 +56,6 @@ class LayeredOverlapConfig(MethodConfig):
         weights: of common cells: low, middle, high, poles and kerbs.
         least_cells: weighted cells that are added to those of either scan,
             lest two be alike that hardly show anything.
-        radius: from which on a place is too far away to be a match [m]; the
-            default suits the protocol's radius of 7.5 m. 0 leaves it out.
     """
 
     cell: PositiveFloat = 0.5
@@ -75,7 +71,6 @@ class LayeredOverlapConfig(MethodConfig):
         NonNegativeInt,
     ] = (3, 3, 2, 60, 5)
     least_cells: NonNegativeInt = 150
-    radius: NonNegativeFloat = 8.5
 
 
 @register("layered-overlap")
@@ -86,8 +81,7 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
     by how many standard deviations this is more than chance would have. The
     last one climbs from there, cell by cell. The score is the weighted number
     of the query's cells that meet one of the place or a neighbour of one,
-    over the geometric mean of how many either has; less where the place's
-    sensor is so far from the query's that it is no match.
+    over the geometric mean of how many either has.
 
     What two equal counts decide, the first of them wins. All counts are
     integers, so that scores are the same on every processor.
@@ -117,9 +111,12 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
         scores = np.full(len(database.places), np.nan)
         if len(query.cells) == 0:
             return scores
-        poses = self._search(query, database, exhaustive)
+        config = self.config
+        poses = self._search(
+            query, database, config.poses, config.refined, exhaustive
+        )
         if not exhaustive:
-            poses = poses[: self.config.candidates]
+            poses = poses[: config.candidates]
         for pose in poses:
             place = database.places[pose[0]]
             if len(place.cells) > 0:
@@ -134,12 +131,30 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
 
         None if one of the two shows nothing.
         """
-        scan = database.places[place]
-        if len(query.cells) == 0 or len(scan.cells) == 0:
-            return None
-        alone = self.build_database([scan])
-        poses = self._search(query, alone, exhaustive=False)
-        found = self._climb(query, scan, poses[0, 1:])
+        return self.relative_poses(query, database, [place])[0]
+
+    def relative_poses(
+        self,
+        query: LayeredScan,
+        database: LayeredDatabase,
+        places: Sequence[int],
+    ) -> list[np.ndarray | None]:
+        scans = [database.places[place] for place in places]
+        poses: list[np.ndarray | None] = [None] * len(scans)
+        if len(query.cells) == 0 or len(scans) == 0:
+            return poses
+        # Every place with every heading, as if each were alone.
+        every = len(scans) * NUM_HEADINGS
+        some = self.build_database(scans)
+        for start in self._search(query, some, every, every):
+            scan = scans[start[0]]
+            if len(scan.cells) > 0:
+                found = self._climb(query, scan, start[1:])
+                poses[start[0]] = self._to_pose(found)
+        return poses
+
+    def _to_pose(self, found: np.ndarray) -> np.ndarray:
+        """Returns X_PQ (4, 4) of the pose in a result of `climb`."""
         c, s = _LAST_TURNS[found[0]] / _LAST_TURNS[0, 0]
         R_PQ = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         half_cell = 0.5 * self.config.cell
@@ -148,10 +163,14 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
         )
 
     def _search(
-        self, query: LayeredScan, database: LayeredDatabase, exhaustive: bool
+        self,
+        query: LayeredScan,
+        database: LayeredDatabase,
+        poses: int,
+        refined: int,
+        exhaustive: bool = False,
     ) -> np.ndarray:
         """Returns (N, 4) places, each with heading and shifts to climb from."""
-        poses, refined = self.config.poses, self.config.refined
         found = search_coarse(query, database, poses, refined, exhaustive)
         return found * _TO_LAST
 
@@ -180,11 +199,4 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
         of_place = int(weights @ np.diff(place.starts)) + config.least_cells
         if of_query == 0 or of_place == 0:
             return 0.0
-        alike = common / math.sqrt(of_query * of_place)
-        if config.radius == 0.0:
-            return alike
-        half_cells = int(found[1]) ** 2 + int(found[2]) ** 2
-        far = half_cells * (0.5 * config.cell / config.radius) ** 2
-        for _ in range(_SQUARINGS):
-            far *= far
-        return alike * max(1.0 - far, 0.0)
+        return common / math.sqrt(of_query * of_place)

@@ -28,7 +28,8 @@ _FIRST_HALVINGS = 3
 _FIRST_MAPS = np.array([0, 0, 0, 1, 1])
 _FIRST_HALVES = np.array([0, 0, 1, 0, 1])
 _FIRST_WEIGHTS = 2 ** np.array(FIRST_POWERS)
-_FIRST_TURNS = turns(24)
+NUM_HEADINGS = 24
+_FIRST_TURNS = turns(NUM_HEADINGS)
 _FIRST_REACH = 2
 # All within reach but the corners, which lie too far away to be a match.
 _FIRST_SHIFTS = np.array(

@@ -19,7 +19,7 @@ from evaluation.methods.method import Method
 _CALLED = (
     *("__init__", "describe", "describe_place", "describe_batch"),
     *("build_database", "score", "score_in_sequence", "rerank"),
-    "relative_pose",
+    *("relative_pose", "relative_poses"),
 )
 
 

@@ -26,8 +26,8 @@ class Cost:
         scans_per_place: how many scans were merged into a cloud.
         points: in a cloud, in the mean.
         describe_ms: to describe a cloud, as a query [ms].
-        query_ms: to compare a query with all places, a second stage and the
-            pose of the best place included [ms].
+        query_ms: to compare a query with all places, a second stage, the gate
+            and the pose of the best place included [ms].
         places: how many these are.
         place_bytes: of a place's description, pickled, in the mean.
     """
@@ -47,6 +47,7 @@ def measure_cost(
     scans_per_place: int,
     database: DescribedDrive,
     query: DescribedDrive,
+    gate_radius: float | None = None,
 ) -> Cost:
     """Measures a method.
 
@@ -57,6 +58,7 @@ def measure_cost(
         scans_per_place: that were merged into each.
         database: with places.
         query: with queries, of which as many are asked as there are clouds.
+        gate_radius: see `score_places`.
     """
     describing = [_cpu_ms(method.describe, cloud) for cloud in clouds]
     places, queries = database.places, query.queries
@@ -72,6 +74,7 @@ def measure_cost(
             indexed,
             places.clouds,
             is_known,
+            gate_radius=gate_radius,
         )
         if not np.isnan(found).all():
             best = int(np.nanargmax(found))

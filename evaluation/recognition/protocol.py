@@ -28,6 +28,8 @@ class RetrievalProtocol:
         exclude_recent: of a drive that is asked about itself: only places
             that it passed at least so long before are known [s]. None for
             drives that ask others.
+        gate: among the best places of a query, reject those that the method's
+            own pose puts farther away than the radius, see `gate`.
 
     Raises:
         InputError: if a value is not positive, with the option that it has
@@ -45,10 +47,13 @@ class RetrievalProtocol:
     max_range: float = 100.0
     scans_per_place: int | None = None
     exclude_recent: float | None = None
+    gate: bool = False
 
     def __post_init__(self) -> None:
         for name, value in asdict(self).items():
-            if value is not None and not 0.0 < value < math.inf:
+            if name == "gate" or value is None:
+                continue
+            if not 0.0 < value < math.inf:
                 option = name.replace("_", "-")
                 raise InputError(f"--{option}: {value} is not positive")
 
@@ -58,6 +63,11 @@ class RetrievalProtocol:
             return self.scans_per_place
         return method.scans_per_place
 
+    @property
+    def gate_radius(self) -> float | None:
+        """The radius that the gate compares with [m]; None without a gate."""
+        return self.radius if self.gate else None
+
     def of(self, method: Method) -> RetrievalProtocol:
         """Returns what a method runs with: nothing is left to it."""
         return replace(self, scans_per_place=self.scans(method))
@@ -65,7 +75,8 @@ class RetrievalProtocol:
     def described(self) -> dict[str, float | int | None]:
         """Returns what the descriptions of a drive depend on."""
         values = asdict(self)
-        del values["radius"], values["exclude_recent"]
+        for name in ("radius", "exclude_recent", "gate"):
+            del values[name]
         return values
 
     def to_json(self) -> dict[str, float | int | None]:
@@ -87,8 +98,17 @@ class RetrievalProtocol:
                 "of a drive against itself places passed at least"
                 f" {self.exclude_recent:g} s before"
             )
-        return f"{', '.join(parts)}."
+        text = f"{', '.join(parts)}."
+        if self.gate:
+            text += f" {GATE_TEXT}"
+        return text
 
+
+# What the gate does, for those who read a table.
+GATE_TEXT = (
+    "With the gate: each method's own pose says how far a place is from the"
+    " query, and places beyond the radius are rejected."
+)
 
 # The defaults, which are the paper's.
 PAPER_PROTOCOL = RetrievalProtocol()
@@ -100,5 +120,5 @@ PROTOCOL_COLUMNS = tuple(one.name for one in fields(RetrievalProtocol))
 def protocol_values(
     protocol: RetrievalProtocol,
 ) -> tuple[float | int | None, ...]:
-    """Returns the values of `PROTOCOL_COLUMNS`."""
-    return tuple(asdict(protocol).values())
+    """Returns the values of `PROTOCOL_COLUMNS`; the gate as 0 or 1."""
+    return tuple((asdict(protocol) | {"gate": int(protocol.gate)}).values())

@@ -136,6 +136,7 @@ def compare(
             indexed,
             places.clouds,
             is_known[row],
+            gate_radius=protocol.gate_radius,
         )
         scores[row] = found
         if np.isnan(found).all():

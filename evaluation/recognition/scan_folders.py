@@ -24,6 +24,8 @@ def write_scores(
     query: Path,
     output: Path,
     track: Track = silent,
+    *,
+    gate_radius: float | None = None,
 ) -> int:
     """Writes the score of every query with every place as CSV.
 
@@ -38,6 +40,7 @@ def write_scores(
         query: likewise.
         output: the file to write.
         track: reports progress.
+        gate_radius: reject places by the gate, see `gate.gated` [m].
 
     Returns:
         How many points were left out as not finite.
@@ -77,6 +80,7 @@ def write_scores(
                 places,
                 clouds,
                 is_known,
+                gate_radius=gate_radius,
                 exhaustive=True,
             )
             for place, value in zip(place_files, values, strict=True):

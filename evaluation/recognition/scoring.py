@@ -9,6 +9,7 @@ import numpy as np
 
 from cns_drake.base.errors import InputError
 from evaluation.methods.method import Method
+from evaluation.recognition.gate import gated
 
 
 def score_places(
@@ -19,11 +20,12 @@ def score_places(
     place_clouds: Sequence[np.ndarray],
     is_known: np.ndarray,
     *,
+    gate_radius: float | None = None,
     exhaustive: bool = False,
 ) -> np.ndarray:
     """Returns what a method scores the last of some queries, (D,) float64.
 
-    Its second stage, if it has one, is included.
+    Its second stage, if it has one, and the gate are included.
 
     Args:
         method: that described queries and places.
@@ -35,6 +37,7 @@ def score_places(
         is_known: (D,) bool, which places may be candidates. A search for the
             best few of all would find others: unless all are known, every
             place is compared.
+        gate_radius: radius of a match for `gated` [m]; None without a gate.
         exhaustive: see `Method.score`.
 
     Raises:
@@ -45,10 +48,12 @@ def score_places(
     )
     scores = _checked(method, "score", found, len(is_known))
     scores = np.where(is_known, scores, np.nan)
-    if not method.rerank_best:
+    if method.rerank_best:
+        assert query_cloud is not None
+        scores = _reranked(method, scores, query_cloud, place_clouds)
+    if gate_radius is None:
         return scores
-    assert query_cloud is not None
-    return _reranked(method, scores, query_cloud, place_clouds)
+    return gated(method, queries[-1], database, scores, gate_radius)
 
 
 def _reranked(

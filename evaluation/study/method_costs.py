@@ -70,7 +70,16 @@ def measure_costs(
             ]
             _, database = read_part(surveys[0].described(choice))
             _, query = read_part(surveys[1].described(choice))
-            costs.append(measure_cost(method, clouds, number, database, query))
+            costs.append(
+                measure_cost(
+                    method,
+                    clouds,
+                    number,
+                    database,
+                    query,
+                    protocol.gate_radius,
+                )
+            )
     write_part(result, inputs, costs)
 
 

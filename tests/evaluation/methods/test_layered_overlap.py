@@ -127,16 +127,18 @@ class TestFinding:
         ]
         assert min(scores) > 0.75 * max(scores)
 
-    def test_a_place_too_far_away_is_none(self):
-        near, far = (
-            method(radius=radius).score(
-                method().describe(seen_from(town(3), 0.0, 6.0, 0.0)),
-                method().build_database([method().describe(town(3))]),
-            )[0]
-            for radius in (8.5, 5.0)
-        )
-        assert near > 0.3
-        assert far == 0.0
+    def test_poses_of_several_places_at_once(self):
+        chosen = method()
+        scans = [chosen.describe(town(seed)) for seed in range(4)]
+        scans.insert(2, chosen.describe(np.zeros((0, 3))))
+        database = chosen.build_database(scans)
+        query = chosen.describe(seen_from(town(1), 0.4, 2.0, -1.0))
+        places = [4, 1, 2, 0]
+        found = chosen.relative_poses(query, database, places)
+        assert found[2] is None
+        for place, X_PQ in zip(places, found, strict=True):
+            alone = chosen.relative_pose(query, database, place)
+            assert alone is X_PQ is None or (alone == X_PQ).all()
 
     def test_the_search_passes_over_what_is_not_alike(self):
         chosen = method(candidates=2)

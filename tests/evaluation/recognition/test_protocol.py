@@ -122,7 +122,9 @@ def test_others_are_asked_all_they_know(drives):
     np.testing.assert_array_equal(found.matches, found.distances <= 7.5)
 
 
-@pytest.mark.parametrize("name", PROTOCOL_COLUMNS)
+@pytest.mark.parametrize(
+    "name", [one for one in PROTOCOL_COLUMNS if one != "gate"]
+)
 @pytest.mark.parametrize("value", [0, -1.0, np.nan, np.inf])
 def test_what_is_not_positive_is_refused(name, value):
     option = name.replace("_", "-")
@@ -139,3 +141,13 @@ def test_it_is_told_with_every_number():
     text = protocol.to_text()
     assert "within 3 m" in text
     assert "4 scans a place" in text
+
+
+def test_the_gate_is_said():
+    open_gate, shut = RetrievalProtocol(), RetrievalProtocol(gate=True)
+    assert "gate" not in open_gate.to_text()
+    assert "With the gate" in shut.to_text()
+    assert (open_gate.gate_radius, shut.gate_radius) == (None, 7.5)
+    assert protocol_values(shut)[PROTOCOL_COLUMNS.index("gate")] == 1
+    # What a drive is described by does not depend on it.
+    assert shut.described() == open_gate.described()
