@@ -10,7 +10,12 @@ from pydrake.common.value import AbstractValue, Value
 from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialAcceleration, SpatialVelocity
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import Joint, ModelInstanceIndex, RevoluteJoint
+from pydrake.multibody.tree import (
+    Joint,
+    ModelInstanceIndex,
+    PrismaticJoint,
+    RevoluteJoint,
+)
 from pydrake.systems.framework import (
     BasicVector,
     Context,
@@ -19,7 +24,7 @@ from pydrake.systems.framework import (
 )
 
 from cns_drake.motion.trajectory import (
-    AngleMotion,
+    JointMotion,
     Moments,
     Trajectory,
     WheelMotion,
@@ -27,6 +32,9 @@ from cns_drake.motion.trajectory import (
     spatial_acceleration_at,
     spatial_velocity_at,
 )
+
+# Cosine of the angle between two directions that are taken for one.
+_PARALLEL = 1 - 1e-9
 
 
 class _State(NamedTuple):
@@ -44,7 +52,8 @@ class VehicleMotion(LeafSystem):
     sensors and the SceneGraph that a plant feeds can be fed by it; no port
     of a plant takes a prescribed motion. The vehicle's floating base B
     follows the trajectory; each revolute joint about B's y rolls, each about
-    B's z steers, so that no wheel slips. All else keeps its default position.
+    B's z steers, so that no wheel slips; each prismatic joint along B's z
+    keeps its wheel on the ground. All else keeps its default position.
 
     .. pydrake_system::
 
@@ -78,8 +87,7 @@ class VehicleMotion(LeafSystem):
             trajectory: where its base is at every time.
 
         Raises:
-            ValueError: a joint of the vehicle is neither a rolling nor a
-                steering one.
+            ValueError: a joint of the vehicle is none of these.
         """
         super().__init__()
         self._plant = plant
@@ -131,23 +139,30 @@ class VehicleMotion(LeafSystem):
 
     def _describe(
         self, joint: Joint
-    ) -> tuple[Callable[[Moments], AngleMotion], float]:
-        """Returns how a joint turns, and its sign."""
+    ) -> tuple[
+        Callable[[Context, float], None],
+        Callable[[Moments], JointMotion],
+        float,
+    ]:
+        """Returns what sets a joint, how it moves, and its sign."""
         context = self._plant_context
         frame = joint.frame_on_child()
         X_BJ = frame.CalcPose(context, self._base.body_frame())
+        R_BJ = X_BJ.rotation().matrix()
+        wheel = WheelMotion(self._trajectory, X_BJ.translation())
         if isinstance(joint, RevoluteJoint):
-            axis_B = X_BJ.rotation().matrix() @ joint.revolute_axis()
-            wheel = WheelMotion(self._trajectory, X_BJ.translation())
-            for turn, direction in (
-                (wheel.rolling, axis_B[1]),
-                (wheel.steering, axis_B[2]),
-            ):
-                if abs(direction) > 1 - 1e-9:
-                    return turn, float(np.sign(direction))
+            axis_B = R_BJ @ joint.revolute_axis()
+            if abs(axis_B[1]) > _PARALLEL:
+                return joint.set_angle, wheel.rolling, np.sign(axis_B[1])
+            if abs(axis_B[2]) > _PARALLEL:
+                return joint.set_angle, wheel.steering, np.sign(axis_B[2])
+        if isinstance(joint, PrismaticJoint):
+            axis_B = R_BJ @ joint.translation_axis()
+            if abs(axis_B[2]) > _PARALLEL:
+                return joint.set_translation, wheel.travel, np.sign(axis_B[2])
         raise ValueError(
-            f"joint {joint.name()} does not turn about the vehicle's y (a "
-            "wheel) or z (its steering)"
+            f"joint {joint.name()} neither turns about the vehicle's y (a "
+            "wheel) or z (its steering) nor slides along z (its spring)"
         )
 
     def _calc_state(self, context: Context, value: AbstractValue) -> None:
@@ -166,9 +181,9 @@ class VehicleMotion(LeafSystem):
         rows = slice(start, start + 6)
         v[rows] = spatial_velocity_at(moment).get_coeffs()
         vdot[rows] = spatial_acceleration_at(moment).get_coeffs()
-        for joint, turn, sign in self._joints:
-            motion = turn(moment)
-            joint.set_angle(plant_context, sign * motion.angle[0])
+        for joint, set_position, move, sign in self._joints:
+            motion = move(moment)
+            set_position(plant_context, sign * motion.position[0])
             v[joint.velocity_start()] = sign * motion.rate[0]
             vdot[joint.velocity_start()] = sign * motion.acceleration[0]
         q = plant.GetPositions(plant_context).copy()

@@ -22,6 +22,11 @@ def vehicle_file() -> Path:
     return worlds_folder() / "vehicle.sdf"
 
 
+def suspension_file() -> Path:
+    """Returns the YAML file of the vehicle's springs."""
+    return worlds_folder() / "suspension.yaml"
+
+
 def shipped_maps() -> dict[str, Path]:
     """Returns the folder of each shipped map, by name."""
     return {

@@ -71,6 +71,29 @@ def wavy_points(seed) -> np.ndarray:
     return np.stack([x, y, height], axis=1)
 
 
+def check_derivatives(trajectory, times, *, velocity_atol, acceleration_atol):
+    """Checks velocities and accelerations against differences of the poses."""
+    step = 1e-4
+    for t in times:
+        before, now, after = (trajectory.pose(t + k * step) for k in (-1, 0, 1))
+        V = trajectory.spatial_velocity(t)
+        v = (after.translation() - before.translation()) / (2 * step)
+        np.testing.assert_allclose(V.translational(), v, atol=velocity_atol)
+        dR = after.rotation().matrix() - before.rotation().matrix()
+        w_cross = dR / (2 * step) @ now.rotation().matrix().T
+        w = [w_cross[2, 1], w_cross[0, 2], w_cross[1, 0]]
+        np.testing.assert_allclose(V.rotational(), w, atol=velocity_atol)
+
+        A = trajectory.spatial_acceleration(t)
+        V_before, V_after = (
+            trajectory.spatial_velocity(t + k * step) for k in (-1, 1)
+        )
+        change = (V_after.get_coeffs() - V_before.get_coeffs()) / (2 * step)
+        np.testing.assert_allclose(
+            A.get_coeffs(), change, atol=acceleration_atol
+        )
+
+
 def shipped_drive(name) -> tuple[Scenario, LanePath, Trajectory]:
     """Returns a shipped sequence with its lane path and trajectory."""
     values = yaml.safe_load(shipped_sequences()[name].read_text())

@@ -3,6 +3,7 @@
 from helpers.drives import (
     CAREFUL,
     SPACING,
+    check_derivatives,
     helix_points,
     lane_path,
     smoothed_radius,
@@ -111,23 +112,10 @@ def test_a_straight_drive_takes_the_time_of_bounded_acceleration():
 
 def test_velocity_and_acceleration_are_derivatives_of_the_pose():
     trajectory = Trajectory(lane_path(wavy_points(1)), CAREFUL)
-    step = 1e-4
-    for t in np.linspace(1.0, trajectory.duration - 1.0, 41):
-        before, now, after = (trajectory.pose(t + k * step) for k in (-1, 0, 1))
-        V = trajectory.spatial_velocity(t)
-        v = (after.translation() - before.translation()) / (2 * step)
-        np.testing.assert_allclose(V.translational(), v, atol=1e-6)
-        dR = after.rotation().matrix() - before.rotation().matrix()
-        w_cross = dR / (2 * step) @ now.rotation().matrix().T
-        w = [w_cross[2, 1], w_cross[0, 2], w_cross[1, 0]]
-        np.testing.assert_allclose(V.rotational(), w, atol=1e-6)
-
-        A = trajectory.spatial_acceleration(t)
-        V_before, V_after = (
-            trajectory.spatial_velocity(t + k * step) for k in (-1, 1)
-        )
-        change = (V_after.get_coeffs() - V_before.get_coeffs()) / (2 * step)
-        np.testing.assert_allclose(A.get_coeffs(), change, atol=1e-6)
+    times = np.linspace(1.0, trajectory.duration - 1.0, 41)
+    check_derivatives(
+        trajectory, times, velocity_atol=1e-6, acceleration_atol=1e-6
+    )
 
 
 def test_the_path_turns_without_jumps_and_without_roll():
@@ -190,12 +178,12 @@ def test_wheels_of_a_steady_bend_roll_on_circles():
         rolling = wheel.rolling(trajectory.at(t))
         # The turning centre lies at (0, r) in the vehicle frame.
         own_radius = np.hypot(r - y, x)
-        np.testing.assert_allclose(steering.angle, np.arctan2(x, r - y))
+        np.testing.assert_allclose(steering.position, np.arctan2(x, r - y))
         np.testing.assert_allclose(steering.rate, 0.0, atol=1e-6)
         np.testing.assert_allclose(
             rolling.rate, yaw_rate * own_radius / 0.3, rtol=1e-8
         )
-        rolled = rolling.angle[1] - rolling.angle[0]
+        rolled = rolling.position[1] - rolling.position[0]
         assert rolled == pytest.approx(0.5 * rolling.rate[0], rel=1e-8)
 
 
@@ -208,7 +196,7 @@ def test_wheel_rates_are_derivatives_of_the_angles():
         now, before, after = (
             turn(trajectory.at(t + shift)) for shift in (0.0, -step, step)
         )
-        rate = (after.angle - before.angle) / (2 * step)
+        rate = (after.position - before.position) / (2 * step)
         np.testing.assert_allclose(now.rate, rate, atol=1e-5)
         acceleration = (after.rate - before.rate) / (2 * step)
         np.testing.assert_allclose(now.acceleration, acceleration, atol=1e-5)

@@ -177,7 +177,7 @@ def test_a_joint_that_is_no_wheel_is_refused():
     (cart,) = Parser(plant).AddModelsFromString(text, "sdf")
     plant.Finalize()
     trajectory = Trajectory(lane_path(helix_points(30, 0, 40)), CAREFUL)
-    with pytest.raises(ValueError, match="joint axle does not turn about"):
+    with pytest.raises(ValueError, match="joint axle neither turns about"):
         VehicleMotion(plant, cart, trajectory)
 
 

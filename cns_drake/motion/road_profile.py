@@ -1,0 +1,76 @@
+"""How rough a road is: heights over the plane, of a class of ISO 8608."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from scipy.ndimage import map_coordinates
+
+RoughnessClass = Literal["A", "B", "C", "D", "E"]
+
+# Geometric means of ISO 8608: one-sided power spectral density of the
+# heights along a line at the spatial frequency _N0 [m^3].
+ROUGHNESS: dict[str, float] = {
+    name: 16e-6 * 4.0**k for k, name in enumerate("ABCDE")
+}
+_N0 = 0.1  # [cycles/m]
+
+# The layers' lattices [m]. Their sum has the class's spectrum for wavelengths
+# from 0.35 to 90 m and no more of longer waves, which are hills, than of 90 m;
+# shorter ones a tyre swallows.
+_SPACINGS = 0.05 * 2.0 ** np.arange(10)
+# The finest layer stands in for all that would be finer still: the sum of the
+# geometric series 1 + 1/4 + 1/16 + ...
+_FINEST_SHARE = 4.0 / 3.0
+# Nodes of a lattice in each direction, before it repeats.
+_NODES = 512
+
+# Integral of sinc(x)^8 from -inf to inf: the B-spline of degree 7 at 0.
+_TRANSVERSE = 151.0 / 315.0
+# Integral of x sinc(x)^8 from 0 to inf.
+_OVER_LAYERS = 0.03611499185872766
+
+
+class RoadProfile:
+    """Heights of the road's surface, a function of place and seed alone.
+
+    The heights are a sum of layers. A layer is a cubic B-spline over a square
+    lattice whose coefficients are independent normal numbers of variance s^2.
+    With lattice spacing h its spectrum along any line is nearly
+    2 s^2 h sinc(n h)^8 151/315, flat up to n = 0.2 / h and then falling
+    steeply. Spacings that double and variances s^2 that grow like h make the
+    levels grow like h^2, and the sum over the layers falls like n^-2: that is
+    G_d(n) = G_d(n0) (n / n0)^-2 of ISO 8608, with ripples of 1.5 %.
+
+    Each lattice is turned and shifted at random, so that no street runs along
+    all of them, and repeats after 512 nodes: a street would have to run
+    along a lattice to meet the same layer again.
+    """
+
+    def __init__(self, roughness: RoughnessClass, seed: int):
+        """Makes the profile.
+
+        Args:
+            roughness: the class.
+            seed: of the layers.
+        """
+        self._level = ROUGHNESS[roughness] * _N0**2 * np.log(2) / _OVER_LAYERS
+        self._seed = seed
+
+    def heights(self, p_WQset: np.ndarray) -> np.ndarray:
+        """Returns the (N,) heights [m] at (N, 2) places in the world [m]."""
+        heights = np.zeros(len(p_WQset))
+        for layer, spacing in enumerate(_SPACINGS):
+            rng = np.random.default_rng([self._seed, layer])
+            share = _FINEST_SHARE if layer == 0 else 1.0
+            variance = share * self._level * spacing / (2.0 * _TRANSVERSE)
+            nodes = rng.normal(0.0, np.sqrt(variance), (_NODES, _NODES))
+            angle, *shift = rng.uniform(0.0, 1.0, 3)
+            c, s = np.cos(2 * np.pi * angle), np.sin(2 * np.pi * angle)
+            places = np.array([[c, -s], [s, c]]) @ p_WQset.T / spacing
+            places += np.array(shift)[:, None] * _NODES
+            heights += map_coordinates(
+                nodes, places % _NODES, mode="grid-wrap", prefilter=False
+            )
+        return heights

@@ -1,0 +1,230 @@
+"""A car on four springs: how its body and wheels answer road and drive."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import PrismaticJoint
+from scipy.signal import cont2discrete
+
+from cns_drake.base.errors import InputError, describe_validation_error
+from cns_drake.base.yaml_files import read_yaml
+from cns_drake.motion.body_ride import NUM_COORDINATES
+
+_GRAVITY = 9.81
+
+
+class AxleRates(BaseModel):
+    """A rate of both axles."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    front: float = Field(ge=0.0, allow_inf_nan=False)
+    rear: float = Field(ge=0.0, allow_inf_nan=False)
+
+
+class SuspensionRates(BaseModel):
+    """Rates of springs, dampers and tyres.
+
+    Attributes:
+        spring_rate: of one wheel's spring [N/m].
+        damping_rate: of one wheel's damper [N s/m].
+        tyre_rate: of one tyre [N/m].
+        roll_bar_rate: of an axle's anti-roll bar [N m/rad].
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    spring_rate: AxleRates
+    damping_rate: AxleRates
+    tyre_rate: AxleRates
+    roll_bar_rate: AxleRates
+
+
+def load_suspension_rates(path: Path) -> SuspensionRates:
+    """Loads rates from a YAML file.
+
+    Raises:
+        InputError: the file cannot be used.
+    """
+    try:
+        return SuspensionRates.model_validate(read_yaml(path))
+    except ValidationError as error:
+        raise InputError(
+            describe_validation_error(path, error, SuspensionRates)
+        ) from None
+
+
+@dataclass(frozen=True)
+class CarMasses:
+    """Where a car's masses are.
+
+    Attributes:
+        body: mass of what the springs carry [kg].
+        roll_inertia: of the body about its centre of mass [kg m^2].
+        pitch_inertia: of the body about its centre of mass [kg m^2].
+        center: x and z of that centre in the vehicle frame B [m].
+        wheels: (W,) mass of each wheel with what moves with it [kg].
+        p_BWset: (W, 2) x and y of the wheels in B [m].
+    """
+
+    body: float
+    roll_inertia: float
+    pitch_inertia: float
+    center: tuple[float, float]
+    wheels: np.ndarray
+    p_BWset: np.ndarray
+
+
+def load_car_masses(vehicle: Path) -> CarMasses:
+    """Loads the masses of an SDF model.
+
+    Its floating base is the body. What a joint along z moves is a wheel.
+
+    Raises:
+        RuntimeError: the model cannot be used.
+    """
+    plant = MultibodyPlant(time_step=0.0)
+    (model,) = Parser(plant).AddModels(str(vehicle))
+    plant.Finalize()
+    base = plant.GetUniqueFloatingBaseBodyOrThrow(model)
+    inertia = base.default_spatial_inertia()
+    center = inertia.get_com()
+    moments = inertia.Shift(center).CalcRotationalInertia().get_moments()
+    context = plant.CreateDefaultContext()
+    masses, places = [], []
+    for index in plant.GetJointIndices(model):
+        joint = plant.get_joint(index)
+        if isinstance(joint, PrismaticJoint):
+            moved = plant.GetBodiesKinematicallyAffectedBy([index])
+            masses.append(sum(plant.get_body(k).default_mass() for k in moved))
+            X_BW = joint.frame_on_child().CalcPose(context, base.body_frame())
+            places.append(X_BW.translation()[:2])
+    return CarMasses(
+        body=inertia.get_mass(),
+        roll_inertia=moments[0],
+        pitch_inertia=moments[1],
+        center=(center[0], center[2]),
+        wheels=np.array(masses),
+        p_BWset=np.array(places),
+    )
+
+
+class Suspension:
+    """The linear full-car model of vehicle dynamics.
+
+    The body heaves, rolls and pitches, each wheel moves up and down between
+    its spring and its tyre. The coordinates are heave of the body, upwards,
+    its roll, pitch about x and y of B (right side down, nose down), and the
+    heights of the wheels, all against where they are at rest on a level road.
+    The body turns about the point on the ground below its centre of mass,
+    which is the roll axis at ground level that the source of the shipped
+    rates has. There is neither anti-dive nor anti-squat geometry.
+
+    With stretch g q of a spring of rate k, K is the sum of k g' g; so for C.
+    """
+
+    def __init__(self, masses: CarMasses, rates: SuspensionRates):
+        """Sets the equations of motion up.
+
+        Args:
+            masses: of the car.
+            rates: of its springs.
+        """
+        self.masses = masses
+        x, y = masses.p_BWset.T
+        count = len(x)
+        size = NUM_COORDINATES + count
+        center_x, height = masses.center
+        front = x > center_x
+
+        def each(axles: AxleRates) -> np.ndarray:
+            return np.where(front, axles.front, axles.rear)
+
+        # How far each spring and each tyre is stretched by the coordinates.
+        tyres = np.eye(size)[NUM_COORDINATES:]
+        springs = np.column_stack(
+            [np.ones(count), y, center_x - x, -np.eye(count)]
+        )
+        self._mass = np.diag(
+            [
+                masses.body,
+                masses.roll_inertia + masses.body * height**2,
+                masses.pitch_inertia + masses.body * height**2,
+                *masses.wheels,
+            ]
+        )
+        stiffness = springs.T * each(rates.spring_rate) @ springs
+        stiffness += tyres.T * each(rates.tyre_rate) @ tyres
+        for axle, rate in (
+            (front, rates.roll_bar_rate.front),
+            (~front, rates.roll_bar_rate.rear),
+        ):
+            # The bar is twisted by the body's roll over the axle's.
+            twist = np.sign(y[axle]) @ springs[axle] / np.abs(y[axle]).sum()
+            stiffness += rate * np.outer(twist, twist)
+        # A tilted body hangs over.
+        overhang = masses.body * _GRAVITY * height
+        stiffness -= np.diag([0.0, overhang, overhang, *np.zeros(count)])
+        self._stiffness = stiffness
+        self._damping = springs.T * each(rates.damping_rate) @ springs
+        # What heights of the road below the wheels and the specific force in
+        # B, less its value at rest, do to the coordinates.
+        self._loads = np.zeros((size, count + 3))
+        self._loads[:, :count] = tyres.T * each(rates.tyre_rate)
+        self._loads[2, count] = -masses.body * height
+        self._loads[1, count + 1] = masses.body * height
+        self._loads[0, count + 2] = -masses.body
+        self._loads[NUM_COORDINATES:, count + 2] = -masses.wheels
+
+    def at_rest(self, inputs: np.ndarray) -> np.ndarray:
+        """Returns the coordinates under (W + 3,) inputs that do not change."""
+        return np.linalg.solve(self._stiffness, self._loads @ inputs)
+
+    def respond(
+        self, inputs: np.ndarray, step: float
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Returns how the body moves, from rest under the first inputs.
+
+        The solution is exact for inputs that change linearly within a step.
+
+        Args:
+            inputs: (N, W + 3) heights of the road below the wheels [m] and
+                specific force along x, y, z of B less its value at rest
+                [m/s^2], at even times.
+            step: between these times [s].
+
+        Returns:
+            Heave [m], roll and pitch [rad], (N, 3), and their first and
+            second derivatives.
+        """
+        size = len(self._mass)
+        to_rates = np.linalg.solve(
+            self._mass,
+            np.hstack([-self._stiffness, -self._damping, self._loads]),
+        )
+        A = np.vstack([np.eye(size, 2 * size, size), to_rates[:, : 2 * size]])
+        B = np.vstack([np.zeros_like(self._loads), to_rates[:, 2 * size :]])
+        body = slice(NUM_COORDINATES)
+        rates = slice(size, size + NUM_COORDINATES)
+        C = np.vstack(
+            [np.eye(2 * size)[body], np.eye(2 * size)[rates], A[rates]]
+        )
+        D = np.zeros((len(C), B.shape[1]))
+        D[-NUM_COORDINATES:] = B[rates]
+        A, B, C, D, _ = cont2discrete((A, B, C, D), step, method="foh")
+        driven = inputs @ B.T
+        states = np.empty((len(inputs), 2 * size))
+        # Not at_rest(): the states of this hold are not the coordinates.
+        state = np.linalg.solve(np.eye(2 * size) - A, driven[0])
+        for k, drive in enumerate(driven):
+            states[k] = state
+            state = A @ state + drive
+        answers = states @ C.T + inputs @ D.T
+        q, dq, ddq = np.split(answers, 3, axis=1)
+        return q, dq, ddq
