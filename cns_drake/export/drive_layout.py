@@ -61,11 +61,18 @@ def checked_name(sequence: McapSequence, text: str) -> str:
     return text
 
 
-def scenario_files(sequence: McapSequence) -> dict[str, str]:
-    """Returns `scenario.yaml`, with the sequence's name, if it is known."""
+def scenario_files(
+    sequence: McapSequence, name: str | None = None
+) -> dict[str, str]:
+    """Returns `scenario.yaml`, if the recording has a scenario.
+
+    Args:
+        sequence: the recording.
+        name: of the drive; by default the recording's.
+    """
     if sequence.scenario is None:
         return {}
-    scenario = {**sequence.scenario, "name": sequence.name}
+    scenario = {**sequence.scenario, "name": name or sequence.name}
     return {"scenario.yaml": to_yaml(scenario)}
 
 

@@ -35,9 +35,21 @@ _PROJECTION = np.eye(4)
 
 
 def _number(sequence: McapSequence) -> str:
-    """Returns the drive's two digits: those its name ends with, or 00."""
+    """Returns the drive's number: the digits its name ends with, or 00.
+
+    The second LiDAR of a recording adds 100, the third 200: tools for KITTI
+    want numbers.
+    """
     digits = re.findall(r"\d*$", sequence.name)[0]
-    return f"{int(digits or 0):02d}"
+    lidar = sequence.lidar_names.index(sequence.lidar_name)
+    return f"{100 * lidar + int(digits or 0):02d}"
+
+
+def _name(sequence: McapSequence) -> str:
+    """Returns the drive's name; after the first LiDAR with the LiDAR's."""
+    if sequence.lidar_name == sequence.lidar_names[0]:
+        return sequence.name
+    return f"{sequence.name}_{sequence.lidar_name}"
 
 
 def _drive_folder(sequence: McapSequence) -> PurePosixPath:
@@ -61,7 +73,7 @@ def _inner_files(sequence: McapSequence) -> dict[str, str]:
         ),
         "first_pose.txt": _rows(sequence.X_WS[:1]),
         **structure_files(sequence),
-        **scenario_files(sequence),
+        **scenario_files(sequence, _name(sequence)),
     }
 
 
@@ -88,6 +100,8 @@ def _rows(X: np.ndarray) -> str:
 
 KITTI = Layout(
     files={
+        "<NN>": "the drive's number, plus 100 for the second LiDAR of its"
+        " recording, plus 200 for the third",
         "poses/<NN>.txt": "upper 3 x 4 of the camera's pose in its frame at"
         " the first scan, a row a scan",
         "sequences/<NN>/poses.txt": "the same, where tools for SemanticKITTI"

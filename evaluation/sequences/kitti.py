@@ -6,7 +6,11 @@
     poses/NN.txt                     upper 3 x 4 of X_C0C, a row a scan
 
 C is the left grey camera (x right, y down, z forward), C0 that at the first
-scan, S the LiDAR. Beside these there may be, in SemanticKITTI's form,
+scan, S the LiDAR. Without a `calib.txt` the poses are those of the LiDAR,
+X_S0S. Scans may be missing: then the rows that their numbers name are used.
+Where scans were renumbered, `frames.txt` has their old numbers, one a scan.
+
+Beside these there may be, in SemanticKITTI's form,
 
     sequences/NN/labels/%06d.label   uint32 label | instance << 16, a point
 
@@ -20,7 +24,9 @@ and, as cns-drake exports a drive,
 from __future__ import annotations
 
 from collections.abc import Mapping
+import itertools
 from pathlib import Path
+import re
 
 import numpy as np
 
@@ -43,6 +49,7 @@ from evaluation.sequences.text_tables import (
 
 _SCANS = "velodyne"
 _LABELS = "labels"
+_FRAMES = "frames.txt"
 _FIRST_POSE = "first_pose.txt"
 _STRUCTURES = "structures.json"
 _RECORD = np.dtype([(name, "<f4") for name in ("x", "y", "z", "intensity")])
@@ -69,7 +76,7 @@ class KittiSequence(FileSequence):
             InputError: if there is none, its files do not fit together, or
                 it has no poses (as 11 to 21).
         """
-        files = _numbered_files(path / _SCANS)
+        files, numbers = _numbered_files(path)
         times_path = path / "times.txt"
         times = read_numbers(times_path, [("time", "U40")])["time"]
         try:
@@ -79,18 +86,24 @@ class KittiSequence(FileSequence):
         check_increasing(times_path, stamps_ns, "row")
         poses_path = _poses_path(path)
         X_C0C = _read_poses(poses_path)
-        for table, rows in ((times_path, stamps_ns), (poses_path, X_C0C)):
-            if len(rows) != len(files):
-                raise InputError(
-                    f"{table}: {len(rows)} rows for {len(files)} scans"
-                )
-        X_CS = _read_calibration(path / "calib.txt")
+        notes: list[str] = []
+        stamps_ns = _rows_of_scans(times_path, stamps_ns, numbers, notes)
+        X_C0C = _rows_of_scans(poses_path, X_C0C, numbers, notes)
+        calibration = path / "calib.txt"
+        X_CS = np.eye(4)
+        if calibration.exists():
+            X_CS = _read_calibration(calibration)
+        else:
+            notes.append(
+                f"{calibration}: not there; the poses in {poses_path.name} are"
+                " taken as those of the LiDAR"
+            )
         X_WS = poses.inverse(X_CS) @ X_C0C @ X_CS
         name = path.resolve().name
         world_frame = f"kitti/{name}"
         first_pose = path / _FIRST_POSE
         if first_pose.is_file():
-            X_WS = _read_poses(first_pose)[0] @ X_WS
+            X_WS = _read_first_pose(first_pose) @ X_WS
             world_frame = "map"
         scenario = read_scenario(path)
         self._structures = path / _STRUCTURES
@@ -102,6 +115,7 @@ class KittiSequence(FileSequence):
             files=files,
             stamps_ns=stamps_ns,
             X_WS=X_WS,
+            notes=tuple(notes),
             scenario=scenario,
         )
 
@@ -138,18 +152,67 @@ def holds_kitti(path: Path) -> bool:
     return (path / _SCANS).is_dir()
 
 
-def _numbered_files(folder: Path) -> list[Path]:
-    """Returns the scans 000000.bin, 000001.bin, ... without a gap."""
+def _numbered_files(path: Path) -> tuple[list[Path], list[int]]:
+    """Returns the scans of a drive in order, and the number of each."""
+    folder = path / _SCANS
     files = sorted(folder.glob("*.bin"))
     if not files:
         raise InputError(f"{folder}: no scan (*.bin) in it")
-    for number, file in enumerate(files):
-        if file.name != f"{number:06d}.bin":
+    for file in files:
+        if re.fullmatch("[0-9]{6}", file.stem) is None:
+            raise InputError(f"{file}: the name is no number of six digits")
+    numbers = [int(file.stem) for file in files]
+    frames = path / _FRAMES
+    if not frames.is_file():
+        return files, numbers
+    listed = read_numbers(frames, [("number", "U40")])["number"]
+    if len(listed) != len(files):
+        raise InputError(f"{frames}: {len(listed)} rows for {len(files)} scans")
+    for row, text in enumerate(listed.tolist()):
+        # No frame of a drive has a number of ten digits.
+        if re.fullmatch("[0-9]{1,9}", text) is None:
+            raise InputError(f"{frames}: row {row + 1}: {text!r} is no number")
+    renumbered = numbers == list(range(len(files)))
+    found, numbers = numbers, list(map(int, listed))
+    for row, (before, number) in enumerate(itertools.pairwise(numbers)):
+        if number <= before:
             raise InputError(
-                f"{folder / f'{number:06d}.bin'}: missing (there is"
-                f" {file.name})"
+                f"{frames}: row {row + 2}: {number} does not follow {before}"
             )
-    return files
+    if numbers != found and not renumbered:
+        raise InputError(
+            f"{frames}: other numbers than those of the files in {folder}"
+        )
+    return files, numbers
+
+
+def _rows_of_scans(
+    path: Path, rows: np.ndarray, numbers: list[int], notes: list[str]
+) -> np.ndarray:
+    """Returns the rows of a table that belong to the scans.
+
+    Args:
+        path: the table.
+        rows: (M, ...): one a scan, or one for each number there is.
+        numbers: of the N scans.
+        notes: gets a note if scans are missing.
+
+    Raises:
+        InputError: if the table is too short.
+    """
+    if len(rows) == len(numbers):
+        return rows
+    if len(rows) < len(numbers):
+        raise InputError(f"{path}: {len(rows)} rows for {len(numbers)} scans")
+    if numbers[-1] >= len(rows):
+        raise InputError(
+            f"{path}: {len(rows)} rows, none for scan {numbers[-1]}"
+        )
+    notes.append(
+        f"{path}: {len(rows)} rows for {len(numbers)} scans; the rows of the"
+        " scans' numbers are used"
+    )
+    return rows[numbers]
 
 
 def _poses_path(path: Path) -> Path:
@@ -164,6 +227,14 @@ def _poses_path(path: Path) -> Path:
         f"{path}: KITTI: no poses, neither ../../poses/{resolved.name}.txt nor"
         " poses.txt"
     )
+
+
+def _read_first_pose(path: Path) -> np.ndarray:
+    """Returns X_WS (4, 4) at the first scan."""
+    rows = _read_poses(path)
+    if len(rows) != 1:
+        raise InputError(f"{path}: {len(rows)} rows instead of one")
+    return rows[0]
 
 
 def _read_poses(path: Path) -> np.ndarray:

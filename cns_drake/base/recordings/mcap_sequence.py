@@ -81,14 +81,27 @@ class McapSequence(Sequence):
         return self._track[1]
 
     @property
+    def lidar_names(self) -> tuple[str, ...]:
+        """Names of the LiDARs; first the one that is read by default."""
+        clouds = self._cloud_topics()
+        clouds.sort(key=lambda topic: topic != _LIDAR_TOPIC)
+        return tuple(map(_lidar_name, clouds))
+
+    @property
+    def lidar_name(self) -> str:
+        """Name of the LiDAR whose scans are read."""
+        return _lidar_name(self._lidar_topic)
+
+    @property
     def world_frame(self) -> str:  # type: ignore[override]  # Read late.
         return self._first(_ODOMETRY_TOPIC).header.frame_id
 
     @property
     def notes(self) -> tuple[str, ...]:
         lidars = (self.scenario or {}).get("lidars")
-        name = self._lidar_topic.strip("/").split("/")[0]
-        lidar = lidars.get(name) if isinstance(lidars, dict) else None
+        lidar = (
+            lidars.get(self.lidar_name) if isinstance(lidars, dict) else None
+        )
         if not (isinstance(lidar, dict) and lidar.get("motion_distortion")):
             return ()
         return (
@@ -324,11 +337,7 @@ class McapSequence(Sequence):
 
     def _find_lidar_topic(self, lidar: str | None) -> str:
         """Returns the named LiDAR's topic, /lidar/points, or the only one."""
-        clouds = [
-            topic
-            for topic, kinds in self._file.topics.items()
-            if any(kind.startswith(ros_types.POINT_CLOUD) for kind in kinds)
-        ]
+        clouds = self._cloud_topics()
         if lidar is not None:
             wanted = f"/{lidar}/points"
         elif _LIDAR_TOPIC in self._file.topics or len(clouds) != 1:
@@ -341,6 +350,13 @@ class McapSequence(Sequence):
                 f" {' '.join(clouds)})"
             )
         return wanted
+
+    def _cloud_topics(self) -> list[str]:
+        return [
+            topic
+            for topic, kinds in self._file.topics.items()
+            if any(kind.startswith(ros_types.POINT_CLOUD) for kind in kinds)
+        ]
 
     def _check_topic(self, topic: str, message_type: str) -> None:
         found = self._file.topics.get(topic)
@@ -388,6 +404,10 @@ def _sequence_name(path: Path) -> str:
     return (
         resolved.name if resolved.is_dir() else resolved.stem.removesuffix("_0")
     )
+
+
+def _lidar_name(topic: str) -> str:
+    return topic.strip("/").split("/")[0]
 
 
 def _vehicle_frames(message: Any) -> str:

@@ -177,10 +177,17 @@ def check_same_world(
     Raises:
         InputError: if their world frames or their maps differ by name.
     """
-    if first.world_frame != second.world_frame:
+    frames = first.world_frame, second.world_frame
+    if frames[0] != frames[1]:
+        advice = ""
+        if any(frame.startswith("kitti/") for frame in frames):
+            advice = (
+                " (a first_pose.txt in a drive's folder says where in the map"
+                " its first scan was taken)"
+            )
         raise InputError(
-            f"{second.name}: poses in frame {second.world_frame!r}, those of"
-            f" {first.name} in {first.world_frame!r}"
+            f"{second.name}: poses in frame {frames[1]!r}, those of"
+            f" {first.name} in {frames[0]!r}{advice}"
         )
     if not across_maps:
         check_same_map(first, second)

@@ -1,5 +1,6 @@
 """Exports, read back by our readers and by those of others."""
 
+import io
 import json
 import shutil
 import subprocess
@@ -7,6 +8,8 @@ import sys
 
 from helpers.bent_drive import NUM_SCANS, P_BS, QUAT_BS, write_drive
 from helpers.lies import read_told, write_told
+from mcap.reader import make_reader
+from mcap.writer import Writer
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -380,6 +383,59 @@ def test_one_of_several_lidars(drive, tmp_path):
     ):
         export_sequence(rear, "kitti", tmp_path / "side", lidar="side")
     assert not (tmp_path / "side").exists()
+
+
+def add_topic(path, old, new):
+    """Repeats the messages of a topic under another name."""
+    content = path.read_bytes()
+    with open(path, "wb") as stream:
+        writer = Writer(stream)
+        writer.start(profile="ros2", library="test")
+        reader = make_reader(io.BytesIO(content))
+        for one in reader.iter_attachments():
+            writer.add_attachment(
+                one.create_time,
+                one.log_time,
+                one.name,
+                one.media_type,
+                one.data,
+            )
+        ids = {}
+        for schema, channel, message in reader.iter_messages():
+            for topic in (channel.topic, new):
+                if topic == new and channel.topic != old:
+                    continue
+                if topic not in ids:
+                    schema_id = writer.register_schema(
+                        schema.name, schema.encoding, schema.data
+                    )
+                    ids[topic] = writer.register_channel(
+                        topic, "cdr", schema_id
+                    )
+                writer.add_message(
+                    ids[topic],
+                    message.log_time,
+                    message.data,
+                    message.publish_time,
+                    message.sequence,
+                )
+        writer.finish()
+
+
+def test_two_lidars_share_a_kitti_folder(tmp_path):
+    recording = write_drive(tmp_path / "recordings" / "town_07")
+    add_topic(recording / "town_07_0.mcap", "/lidar/points", "/rear/points")
+    output = tmp_path / "kitti"
+    for lidar, number in (("lidar", "07"), ("rear", "107")):
+        drive = export_sequence(recording, "kitti", output, lidar=lidar)
+        assert drive == output / "sequences" / number
+        assert (output / f"poses/{number}.txt").is_file()
+        with pytest.raises(InputError, match="is there already"):
+            export_sequence(recording, "kitti", output, lidar=lidar)
+    names = [
+        sequences.open(drive).name for drive in sorted(drive.parent.iterdir())
+    ]
+    assert names == ["town_07", "town_07_rear"]
 
 
 def test_names_that_lead_elsewhere_are_refused(tmp_path):
