@@ -11,8 +11,9 @@ from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import run_jobs
 from cns_drake.base.map_folder import MapFolder
+from cns_drake.base.recordings.driven_way import driven_way
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import map_folder
+from cns_drake.scenarios.scenario_files import describe_scenario, map_folder
 from cns_drake.scenarios.scenario_loading import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.simulation.simulated_drive import SimulatedDrive
@@ -165,7 +166,7 @@ def recording_info(
         path=output.absolute() / scenario.name,
         map_name=map_folder(scenario).name,
         stage=scenario.stage,
-        route=scenario.route or scenario.waypoints,
+        way=driven_way(describe_scenario(scenario)),
         needs=(scenario.name,) if is_waiting else (),
     )
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import re
 
 from cns_drake.base.errors import InputError, one_line
+from cns_drake.base.recordings.driven_way import driven_way
 from evaluation.report import paper
 from evaluation.sequences import open_sequence
 from evaluation.study.drive_source import DriveSource, RecordedDrive
@@ -25,8 +26,7 @@ class RecordingInfo:
         path: where it lies, or will lie.
         map_name: of the city.
         stage: of the city's life; stages sort by name.
-        route: what the scenario says about it; None if it is unknown. Only
-            compared with those of other recordings.
+        way: where the drive leads (see `driven_way`); None if it is unknown.
         needs: names of the jobs that make the recording.
         made_by: opens the drive where it is not read from `path`.
     """
@@ -35,7 +35,7 @@ class RecordingInfo:
     path: Path
     map_name: str
     stage: str
-    route: object | None
+    way: dict | None
     needs: tuple[str, ...] = ()
     made_by: DriveSource | None = None
 
@@ -43,6 +43,10 @@ class RecordingInfo:
     def source(self) -> DriveSource:
         """What opens the drive."""
         return self.made_by or RecordedDrive(self.path.absolute())
+
+    def drives_like(self, other: RecordingInfo) -> bool:
+        """Tells whether both are known to lead the same way."""
+        return self.way is not None and self.way == other.way
 
 
 @dataclass(frozen=True)
@@ -93,12 +97,8 @@ class City:
     ) -> RecordingInfo | None:
         """Returns a drive on the route of one in the stage of the other."""
         for other in self.others:
-            for stage, route in ((second, first), (first, second)):
-                if (
-                    other.stage == stage.stage
-                    and other.route is not None
-                    and other.route == route.route
-                ):
+            for stage, way in ((second, first), (first, second)):
+                if other.stage == stage.stage and other.drives_like(way):
                     return other
         return None
 
@@ -115,11 +115,7 @@ class City:
             return None
         for replaced, kept in ((database, query), (query, database)):
             for other in self.others:
-                if (
-                    other.stage == kept.stage
-                    and other.route is not None
-                    and other.route == replaced.route
-                ):
+                if other.stage == kept.stage and other.drives_like(replaced):
                     if replaced is database:
                         return other, query
                     return database, other
@@ -208,18 +204,15 @@ def _place(path: Path) -> RecordingInfo | None:
     """Returns a recording; None if nothing tells its map and stage."""
     sequence = open_sequence(path)
     scenario = sequence.scenario or {}
-    # A city has lanes to follow, any other world has waypoints.
-    route = scenario.get("route") or scenario.get("waypoints")
+    way = driven_way(scenario)
     if {"map", "stage"} <= set(scenario):
         map_name = one_line(Path(str(scenario["map"])).name)
         stage = one_line(scenario["stage"])
-        return RecordingInfo(sequence.name, path, map_name, stage, route)
+        return RecordingInfo(sequence.name, path, map_name, stage, way)
     match = _NAME.fullmatch(sequence.name)
     if match is None:
         return None
-    return RecordingInfo(
-        sequence.name, path, match["map"], match["stage"], route
-    )
+    return RecordingInfo(sequence.name, path, match["map"], match["stage"], way)
 
 
 def _make_city(name: str, recordings: list[RecordingInfo]) -> City:

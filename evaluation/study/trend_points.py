@@ -14,6 +14,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, Tell, run_jobs
+from cns_drake.base.recordings.driven_way import driven_way
 from evaluation.change.tcr import temporal_change
 from evaluation.recognition.place_recognition import judge_retrieval
 from evaluation.recognition.protocol import (
@@ -136,8 +137,12 @@ def measure_trend(
     serving = [opened[path] for path in controls]
     asked = {}
     for path in databases:
-        route = _route(opened[path])
-        same = [c.name for c in serving if route and _route(c) == route]
+        way = driven_way(opened[path].scenario)
+        same = [
+            control.name
+            for control in serving
+            if way is not None and driven_way(control.scenario) == way
+        ]
         asked[opened[path].name] = Asked(
             _recorded(path), same[0] if same else None
         )
@@ -300,17 +305,6 @@ def _inputs(
         "queries": [part_digest(query.described(one)) for one in methods],
         "methods": [method.inputs() for method in methods],
     }
-
-
-def _route(sequence: Recorded) -> dict | None:
-    """Returns where a drive leads; None if it does not say."""
-    scenario = sequence.scenario or {}
-    route = {
-        name: scenario[name]
-        for name in ("route", "waypoints", "aside")
-        if scenario.get(name) is not None
-    }
-    return route or None
 
 
 def _recorded(path: Path) -> RecordedDrive:

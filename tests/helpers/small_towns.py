@@ -20,8 +20,11 @@ def make_town(stage):
     return np.concatenate(parts)
 
 
-def drive(folder, stage, route, *, city="metropolis", scenario=True):
-    """Writes a drive of 80 m along the street."""
+def drive(folder, stage, route, *, city="metropolis", scenario=True, more=None):
+    """Writes a drive of 80 m along the street.
+
+    Its scenario may have more fields.
+    """
     points = make_town(stage)
     scans, X_WBs = [], []
     for i in range(9):
@@ -30,9 +33,8 @@ def drive(folder, stage, route, *, city="metropolis", scenario=True):
         near = p[np.linalg.norm(p, axis=1) < 60.0]
         scans.append(make_scan(near - [0.0, 0.0, 1.6]))
         X_WBs.append(X_WB)
-    attachments = {
-        "scenario.json": {"map": city, "stage": stage, "route": ROUTES[route]}
-    }
+    said = {"map": city, "stage": stage, "route": ROUTES[route]}
+    attachments = {"scenario.json": said | (more or {})}
     write_recording(
         folder, scans, X_WBs, attachments=attachments if scenario else None
     )

@@ -97,7 +97,7 @@ class Sequence(abc.ABC):
     def scenario(self) -> Mapping | None:
         """How the drive was simulated, if the recording says so.
 
-        Keys used here: `map`, `stage` and `route`.
+        Keys used here: `map`, `stage`, and those of `driven_way`.
         """
         return None
 
