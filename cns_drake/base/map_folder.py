@@ -5,6 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+ROADS_NAME = "roads.yaml"
+PLAN_NAME = "city.yaml"
+STAGES_NAME = "stages.yaml"
+STRUCTURES_NAME = "structures.csv"
+MESH_FOLDER = "meshes"
+
+
+def stage_name(stage: str) -> str:
+    """Returns the name of the SDF file of a stage."""
+    return f"stage_{stage}.sdf"
+
 
 @dataclass(frozen=True)
 class MapFolder:
@@ -24,22 +35,22 @@ class MapFolder:
     @property
     def roads(self) -> Path:
         """The road network."""
-        return self.path / "roads.yaml"
+        return self.path / ROADS_NAME
 
     @property
     def plan(self) -> Path:
         """The plan from which the city is generated."""
-        return self.path / "city.yaml"
+        return self.path / PLAN_NAME
 
     @property
     def stage_plan(self) -> Path:
         """What each stage lacks."""
-        return self.path / "stages.yaml"
+        return self.path / STAGES_NAME
 
     @property
     def structures(self) -> Path:
         """The table of structures."""
-        return self.path / "structures.csv"
+        return self.path / STRUCTURES_NAME
 
     @property
     def sequence_table(self) -> Path:
@@ -49,7 +60,7 @@ class MapFolder:
     @property
     def meshes(self) -> Path:
         """The folder of the meshes that the stages name."""
-        return self.path / "meshes"
+        return self.path / MESH_FOLDER
 
     @property
     def views(self) -> Path:
@@ -58,13 +69,13 @@ class MapFolder:
 
     def stage(self, stage: str) -> Path:
         """Returns the SDF file of a stage."""
-        return self.path / f"stage_{stage}.sdf"
+        return self.path / stage_name(stage)
 
     def stages(self) -> dict[str, Path]:
         """Returns stage -> SDF file of the stages that are there, in order."""
         return {
             path.stem.removeprefix("stage_"): path
-            for path in sorted(self.path.glob(self.stage("*").name))
+            for path in sorted(self.path.glob(stage_name("*")))
         }
 
     def sequence(self, number: str) -> Path:

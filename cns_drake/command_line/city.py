@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from cns_drake.base.interrupts import uninterrupted
+from cns_drake.base.map_folder import MapFolder
 from cns_drake.base.terminal import note
 from cns_drake.command_line.options import Jobs
 
@@ -96,7 +97,7 @@ def _calibrate(
         from cns_drake.studies.knob_effects import effect_lines, knob_effects
 
     first, last = (
-        load_scenario(folder / f"sequence_{stage}.yaml")
+        load_scenario(MapFolder(folder).sequence(stage))
         for stage in (earlier, later)
     )
     effects = knob_effects(first, last, choose_cluster(jobs, None))

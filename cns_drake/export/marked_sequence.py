@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.map_folder import MapFolder
 from cns_drake.base.recordings.mcap_sequence import McapSequence
 from cns_drake.base.recordings.scenario_file import read_scenario
 from cns_drake.scenarios.shipped import shipped_maps
@@ -46,7 +47,7 @@ class MarkedSequence(McapSequence):
         if recorded is None:
             raise InputError(f"{path}: has no list of structures")
         folder = self._map_folder()
-        self._check_structures(folder / "structures.csv", recorded)
+        self._check_structures(folder.structures, recorded)
         standing = structures_in(load_world(_world_file(folder, stage)))
         self._absent = {
             instance: entry
@@ -94,20 +95,20 @@ class MarkedSequence(McapSequence):
             groups[label].append(instance)
         return groups
 
-    def _map_folder(self) -> Path:
+    def _map_folder(self) -> MapFolder:
         place = (self.scenario or {}).get("map")
         if not isinstance(place, str):
             raise InputError(
                 f"{self._path}: was not recorded in a stage of a map"
             )
         if place in shipped_maps():
-            return shipped_maps()[place]
+            return MapFolder(shipped_maps()[place])
         # The recording has the map's name; the file beside it says where.
         beside = read_scenario(self._path.parent) or {}
         folder = self._path.parent / str(beside.get("map", place))
         if not folder.is_dir():
             raise InputError(f"{self._path}: map: {folder}: no such folder")
-        return folder
+        return MapFolder(folder)
 
     def _check_structures(
         self, table: Path, recorded: Mapping[int, Mapping]
@@ -126,14 +127,11 @@ class MarkedSequence(McapSequence):
                 )
 
 
-def _world_file(folder: Path, stage: str) -> Path:
-    files = {
-        path.stem.removeprefix("stage_"): path
-        for path in sorted(folder.glob("stage_*.sdf"))
-    }
-    if stage not in files:
+def _world_file(folder: MapFolder, stage: str) -> Path:
+    stages = folder.stages()
+    if stage not in stages:
         raise InputError(
-            f"{folder}: no stage '{stage}'; it has: "
-            f"{', '.join(files) or 'none'}"
+            f"{folder.path}: no stage '{stage}'; it has: "
+            f"{', '.join(stages) or 'none'}"
         )
-    return files[stage]
+    return stages[stage]

@@ -16,12 +16,12 @@ import yaml
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import part_path, user_errors
+from cns_drake.base.map_folder import MESH_FOLDER, STRUCTURES_NAME, stage_name
 from cns_drake.city.generation.generate import (
     MAX_STRUCTURES,
-    TABLE_NAME,
     structure_table,
 )
-from cns_drake.city.generation.sdf import MESH_FOLDER, stage_sdf
+from cns_drake.city.generation.sdf import stage_sdf
 from cns_drake.city.geometry.structures import (
     MeshShape,
     Model,
@@ -285,14 +285,14 @@ def _write_world(
     structures: Sequence[Structure],
     stages: dict[str, list[Structure]],
 ) -> None:
-    (draft / TABLE_NAME).write_text(structure_table(structures), "utf-8")
+    (draft / STRUCTURES_NAME).write_text(structure_table(structures), "utf-8")
     for stage, some in stages.items():
         text = stage_sdf(
             f"{draft.name}_{stage}",
             some,
             comment=f"Imported by cns-drake from {source.name}.",
         )
-        (draft / f"stage_{stage}.sdf").write_text(text, "utf-8")
+        (draft / stage_name(stage)).write_text(text, "utf-8")
     # Trees of a kind share theirs.
     meshes = {
         name: mesh

@@ -14,6 +14,7 @@ from pydrake.multibody.tree import ModelInstanceIndex
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
+from cns_drake.base.map_folder import MapFolder
 from cns_drake.scene.drake_errors import PARSER_ERRORS, told_by_drake
 from cns_drake.scene.gazebo_models import read_xml
 from cns_drake.scene.gazebo_worlds import is_gazebo_world, simplify_world
@@ -121,7 +122,7 @@ def load_world(
         vehicle_model = _parse(parser, vehicle)[0]
     plant.Finalize()
 
-    table = structures or sdf.parent / "structures.csv"
+    table = structures or MapFolder(sdf.parent).structures
     found = set(map(structure_name, names))
     if structures is not None or table.is_file():
         entries = load_structure_table(table)

@@ -15,10 +15,9 @@ import tempfile
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.base.map_folder import MapFolder
+from cns_drake.base.map_folder import MESH_FOLDER, MapFolder
 from cns_drake.city.generation.city_structures import City, make_city
 from cns_drake.city.generation.generate import render_stages
-from cns_drake.city.generation.sdf import MESH_FOLDER
 from cns_drake.city.plan.stages import Stage, Stages, load_stages
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder

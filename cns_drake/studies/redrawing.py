@@ -18,6 +18,7 @@ from cns_drake.base.files import make_folder, part_path, user_errors
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, Tell, run_jobs
+from cns_drake.base.map_folder import STAGES_NAME, MapFolder
 from cns_drake.base.version import __version__
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.city.plan.city_plan import load_plan
@@ -57,7 +58,7 @@ def redraw_cities(
     map_folder, output = map_folder.resolve(), output.resolve()
     folders = {seed: output / f"{map_folder.name}_c{seed}" for seed in seeds}
     # What can be found wrong at once is found before anything slow.
-    load_plan(map_folder / "city.yaml")
+    load_plan(MapFolder(map_folder).plan)
     for folder in folders.values():
         _is_replaced(folder)
     make_folder(output)
@@ -153,7 +154,8 @@ def redrawn_inputs(map_folder: Path, stage: str, seed: int) -> dict[str, bytes]:
     Raises:
         InputError: a file of the map cannot be read, or is no plan.
     """
-    roads, plan = map_folder / "roads.yaml", map_folder / "city.yaml"
+    source = MapFolder(map_folder)
+    roads, plan = source.roads, source.plan
     load_plan(plan)
     with user_errors(roads):
         network = roads.read_bytes()
@@ -164,7 +166,7 @@ def redrawn_inputs(map_folder: Path, stage: str, seed: int) -> dict[str, bytes]:
             "the map's plan with another seed",
             read_yaml(plan) | {"seed": seed},
         ),
-        "stages.yaml": _to_yaml("its only stage", {"stages": stages}),
+        STAGES_NAME: _to_yaml("its only stage", {"stages": stages}),
     }
 
 
@@ -185,7 +187,7 @@ def _is_replaced(folder: Path) -> bool:
     Raises:
         InputError: something else has the name.
     """
-    plan = folder / "city.yaml"
+    plan = MapFolder(folder).plan
     with user_errors(folder):
         if not os.path.lexists(folder):
             return False

@@ -19,6 +19,7 @@ from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.map_folder import MapFolder
 from cns_drake.city.buildings import ARCHETYPES
 from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.polygons import snap
@@ -109,13 +110,13 @@ def make_city(world: Path) -> City:
     Raises:
         InputError: if one of the files cannot be used.
     """
-    roads = world / "roads.yaml"
+    roads = MapFolder(world).roads
     network = load_road_network(roads)
     try:
         network.carriageway()
     except ValueError as error:
         raise InputError(f"{roads}: {error}") from error
-    source = world / "city.yaml"
+    source = MapFolder(world).plan
     plan = load_plan(source)
     try:
         return lay_out(network, plan, str(source))

@@ -10,20 +10,24 @@ from pathlib import Path
 import tempfile
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.map_folder import (
+    MESH_FOLDER,
+    STAGES_NAME,
+    STRUCTURES_NAME,
+    stage_name,
+)
 from cns_drake.city.generation.city_structures import (
     City,
     make_city,
     meshes_of,
 )
 from cns_drake.city.generation.renaming import find_renaming, renamed_text
-from cns_drake.city.generation.sdf import MESH_FOLDER, stage_sdf
+from cns_drake.city.generation.sdf import stage_sdf
 from cns_drake.city.geometry.structures import MeshShape, Structure
 from cns_drake.city.growth.stage_structures import GrowingCity
 from cns_drake.city.plan.stages import Stages, load_stages
 from cns_drake.scene.semantics import CLASS_IDS
 
-STAGES_NAME = "stages.yaml"
-TABLE_NAME = "structures.csv"
 # Instance ids are stored as uint16; 0 means no structure.
 MAX_STRUCTURES = 2**16 - 1
 
@@ -88,7 +92,7 @@ def render_stages(
             "structures are more than instance ids can count "
             f"({MAX_STRUCTURES})"
         )
-    files = {TABLE_NAME: structure_table(growing.structures)}
+    files = {STRUCTURES_NAME: structure_table(growing.structures)}
     used: list[Structure] = []
     for stage in wanted:
         try:
@@ -96,7 +100,7 @@ def render_stages(
         except ValueError as error:
             raise InputError(f"{source}: stages.{stage}.{error}") from error
         used += standing
-        files[f"stage_{stage}.sdf"] = stage_sdf(
+        files[stage_name(stage)] = stage_sdf(
             f"{world}_{stage}",
             standing,
             comment=origin
@@ -188,7 +192,7 @@ def _stages_text(
     Raises:
         InputError: see `generate_city`.
     """
-    stages, table = world / STAGES_NAME, world / TABLE_NAME
+    stages, table = world / STAGES_NAME, world / STRUCTURES_NAME
     if not table.exists() and not repair:
         return None
     if not repair:
@@ -201,7 +205,7 @@ def _stages_text(
             raise InputError(
                 f"{stages}: {old} is {new} now, and {len(found.renamed) - 1} "
                 "more have other names; --repair-stages puts them there "
-                f"(or remove {TABLE_NAME}, if they are already)"
+                f"(or remove {STRUCTURES_NAME}, if they are already)"
             )
         return None
     found = find_renaming(stages, table, city.structures)
@@ -256,9 +260,9 @@ def _mesh_files(structures: Sequence[Structure]) -> dict[str, str]:
 def _generated(world: Path) -> set[Path]:
     """Returns the files in a world folder that a generator wrote."""
     return {
-        *world.glob("stage_*.sdf"),
+        *world.glob(stage_name("*")),
         *(world / MESH_FOLDER).glob("*.obj"),
-        *world.glob(TABLE_NAME),
+        *world.glob(STRUCTURES_NAME),
     }
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from xml.sax.saxutils import quoteattr
 
+from cns_drake.base.map_folder import MESH_FOLDER
 from cns_drake.city.geometry.structures import (
     BoxShape,
     CylinderShape,
@@ -18,7 +19,6 @@ from cns_drake.scene.semantics import CLASS_RGB
 
 # Meshes are named relative to the SDF file, so that a stage needs no package
 # map: it parses from wherever the world's folder lies.
-MESH_FOLDER = "meshes"
 
 
 def stage_sdf(

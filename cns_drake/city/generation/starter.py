@@ -19,6 +19,7 @@ from shapely.ops import unary_union
 import yaml
 
 from cns_drake.base.files import complete_part, write_part
+from cns_drake.base.map_folder import STAGES_NAME, MapFolder
 from cns_drake.city.generation.city_structures import City, lay_out
 from cns_drake.city.geometry.polygons import polygons_of, snap
 from cns_drake.city.plan.city_plan import CityPlan, load_plan
@@ -64,7 +65,7 @@ def start_city(
     Raises:
         InputError: if the roads cannot be used, or a file not be written.
     """
-    network = load_road_network(world / "roads.yaml")
+    network = load_road_network(MapFolder(world).roads)
     written = []
 
     def write(name: str, comment: str, values: Callable[[], dict]) -> None:
@@ -79,7 +80,7 @@ def start_city(
         complete_part(path)
         written.append(path)
 
-    plan_file = world / "city.yaml"
+    plan_file = MapFolder(world).plan
     write(
         plan_file.name,
         "The districts: what stands on the ground that the roads leave.",
@@ -90,11 +91,11 @@ def start_city(
         plan: CityPlan = load_plan(plan_file)
         return starter_stages(lay_out(network, plan, str(plan_file)))
 
-    write("stages.yaml", "What each stage lacks, by name.", stages)
+    write(STAGES_NAME, "What each stage lacks, by name.", stages)
     for k, stage in enumerate(("01", "02")):
         rng = np.random.default_rng([seed, k])
         write(
-            f"sequence_{stage}.yaml",
+            MapFolder(world).sequence(stage).name,
             f"A drive through stage {stage}, on a route drawn by lot.",
             partial(_drive, network, stage, rng),
         )

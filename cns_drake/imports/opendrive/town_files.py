@@ -10,8 +10,8 @@ import numpy as np
 import shapely
 import yaml
 
+from cns_drake.base.map_folder import MESH_FOLDER, stage_name
 from cns_drake.city.generation.generate import render_stages
-from cns_drake.city.generation.sdf import MESH_FOLDER
 from cns_drake.city.geometry.polygons import polygons_of
 from cns_drake.city.geometry.structures import MeshShape, Structure
 from cns_drake.imports.drive_files import write_drives
@@ -91,7 +91,7 @@ def write_town(
             stage: len(
                 set(
                     re.findall(
-                        'visual name="([^"/]+)', files[f"stage_{stage}.sdf"]
+                        'visual name="([^"/]+)', files[stage_name(stage)]
                     )
                 )
             )

@@ -23,7 +23,8 @@ from pydrake.geometry import Role
 import pytest
 import yaml
 
-from cns_drake.city.generation.generate import TABLE_NAME, render_city
+from cns_drake.base.map_folder import STRUCTURES_NAME
+from cns_drake.city.generation.generate import render_city
 from cns_drake.city.geometry.object_parts import part_mesh
 from cns_drake.city.ground.streets import GROUND_TAG
 from cns_drake.city.growth.lowering import cut_at
@@ -41,7 +42,7 @@ def files(world) -> dict[str, bytes]:
     found = [
         *world.glob("stage_*.sdf"),
         *world.glob("meshes/*"),
-        world / TABLE_NAME,
+        world / STRUCTURES_NAME,
     ]
     return {str(p.relative_to(world)): p.read_bytes() for p in found}
 
@@ -167,7 +168,7 @@ def test_the_ground_is_there_at_all_stages(name, stages):
 
 
 def test_the_table_names_every_structure_once(name, growing):
-    with (world_of(name) / TABLE_NAME).open(newline="") as file:
+    with (world_of(name) / STRUCTURES_NAME).open(newline="") as file:
         rows = list(csv.DictReader(file))
     structures = growing.structures
     assert [int(row["instance"]) for row in rows] == list(
