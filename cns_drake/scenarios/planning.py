@@ -4,6 +4,12 @@ from __future__ import annotations
 
 from cns_drake.base.errors import InputError
 from cns_drake.motion.control_points import POINT_SPACING
+from cns_drake.motion.ride import ride_on_springs
+from cns_drake.motion.suspension import (
+    Suspension,
+    load_car_masses,
+    load_suspension_rates,
+)
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.recording.frame_clock import frames_within
 from cns_drake.roads.network import load_road_network
@@ -12,15 +18,16 @@ from cns_drake.roads.u_turn import TIGHTEST_RADIUS
 from cns_drake.roads.waypoints import load_waypoint_path
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder
+from cns_drake.scenarios.shipped import suspension_file, vehicle_file
 
 
 def plan_drive(scenario: Scenario) -> Trajectory:
     """Plans the drive of a scenario, along its route or its waypoints.
 
     Raises:
-        InputError: the roads or the waypoints cannot be used, the route
-            does not suit the roads, or a bend is tighter than the car can
-            steer.
+        InputError: the roads, the waypoints or the vehicle's springs cannot
+            be used, the route does not suit the roads, or a bend is tighter
+            than the car can steer.
 
     Example:
         from cns_drake import load_scenario, plan_drive
@@ -47,7 +54,14 @@ def plan_drive(scenario: Scenario) -> Trajectory:
         cure = "a greater kerb_radius of the junction makes it wider"
     trajectory = Trajectory(path, scenario.speeds)
     _check_steering(trajectory, source, cure)
-    return trajectory
+    profile = scenario.ride.profile()
+    if profile is None:
+        return trajectory
+    suspension = Suspension(
+        load_car_masses(vehicle_file()),
+        load_suspension_rates(suspension_file()),
+    )
+    return ride_on_springs(trajectory, suspension, profile)
 
 
 def _check_steering(trajectory: Trajectory, source: str, cure: str) -> None:

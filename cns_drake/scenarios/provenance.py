@@ -15,7 +15,7 @@ from cns_drake.base.files import user_errors
 from cns_drake.base.version import __version__
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder, world_file
-from cns_drake.scenarios.shipped import vehicle_file
+from cns_drake.scenarios.shipped import suspension_file, vehicle_file
 
 # Whatever can have a say in a message's bytes.
 _PACKAGES = (
@@ -57,9 +57,9 @@ def digest_inputs(scenario: Scenario) -> dict[str, str]:
     paths; what it finds by a `package://` or `model://` URI does not count.
 
     Returns:
-        `world`, `vehicle`, and `structures`, `roads` or `waypoints` where
-        there are such -> hexadecimal digest. It depends on contents and on
-        the relative names alone, not on where the files lie.
+        `world`, `vehicle`, and `structures`, `suspension`, `roads` or
+        `waypoints` where there are such -> hexadecimal digest. It depends on
+        contents and on the relative names alone, not on where the files lie.
 
     Raises:
         InputError: a file cannot be read.
@@ -68,6 +68,8 @@ def digest_inputs(scenario: Scenario) -> dict[str, str]:
     structures = map_folder(scenario).structures
     if structures.is_file():
         inputs["structures"] = structures
+    if scenario.ride.profile() is not None:
+        inputs["suspension"] = suspension_file()
     if scenario.waypoints is not None:
         inputs["waypoints"] = Path(scenario.waypoints)
     else:

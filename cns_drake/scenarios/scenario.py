@@ -16,7 +16,8 @@ from cns_drake.scenarios.alternatives import (
 )
 from cns_drake.scenarios.imu_config import ImuConfig
 from cns_drake.scenarios.lidar_config import LidarConfig
-from cns_drake.scenarios.section import Name, Section
+from cns_drake.scenarios.ride_config import RideConfig
+from cns_drake.scenarios.section import Name, Section, field_off_by_default
 
 # A default is checked as well: a field that is missing may be needed.
 _Optional = Field(default=None, validate_default=True)
@@ -44,6 +45,7 @@ class Scenario(Section):
             `cns_drake.roads.waypoints.load_waypoint_path`.
         u_turns: whether the vehicle turns round where waypoints double back.
         speeds: how fast.
+        ride: how springs and the road move the body.
         lidars: the LiDARs by name; the name gives frame and topic.
         imu: the IMU.
         frames: how many frames to record; all of the route by default.
@@ -89,6 +91,7 @@ class Scenario(Section):
         ),
     ] = False
     speeds: Speeds
+    ride: RideConfig = field_off_by_default(RideConfig())
     lidars: dict[Name, LidarConfig] = Field(
         default={"lidar": LidarConfig()}, min_length=1
     )

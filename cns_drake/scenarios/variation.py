@@ -41,7 +41,9 @@ from cns_drake.base.yaml_files import read_yaml
 from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import Route
 from cns_drake.roads.route_drawing import draw_route
+from cns_drake.scenarios.imu_config import ImuConfig
 from cns_drake.scenarios.lidar_config import LidarConfig
+from cns_drake.scenarios.ride_config import RideConfig
 from cns_drake.scenarios.scattered_loss import draw_losses, is_on_a_lot
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import (
@@ -124,6 +126,8 @@ class Family(_Model):
             same streets, in place of the map as it is.
         routes: routes by lot in place of the base's.
         lidars: presets in place of the base's LiDARs.
+        ride: of all members, in place of the base's.
+        imu: of all members, in place of the base's.
     """
 
     base: str
@@ -139,6 +143,8 @@ class Family(_Model):
     ] = Field(default=(), min_length=1)
     routes: DrawnRoutes | None = None
     lidars: tuple[str, ...] = ()
+    ride: RideConfig | None = None
+    imu: ImuConfig | None = None
 
 
 def load_family(path: Path, redraw: Redraw | None = None) -> list[Scenario]:
@@ -187,6 +193,10 @@ def vary(
     """
     if base.map is None:
         raise InputError(f"{source}: base: {base.name} has no map to vary")
+    sections = {"ride": family.ride, "imu": family.imu}
+    base = base.model_copy(
+        update={name: value for name, value in sections.items() if value}
+    )
     last = max(map_folder(base).stages())
     stage = family.stage or last
     if family.city_seeds:

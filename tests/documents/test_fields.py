@@ -16,6 +16,7 @@ from cns_drake.roads.route import RouteLeg
 from cns_drake.scenarios import scenario, variation
 from cns_drake.scenarios.imu_config import ImuConfig
 from cns_drake.scenarios.lidar_config import LidarConfig
+from cns_drake.scenarios.ride_config import RideConfig
 from cns_drake.sensors.lidar_presets import LIDAR_PRESETS
 from evaluation.methods import MethodConfig, make_method, shipped_methods
 
@@ -42,6 +43,7 @@ TABLES = [
     ("scenarios", "## Fields", scenario.Scenario, None),
     ("scenarios", "### Route", RouteLeg, None),
     ("scenarios", "### Speeds", Speeds, None),
+    ("scenarios", "### Ride", RideConfig, None),
     ("scenarios", "### LiDARs", LidarConfig, None),
     ("scenarios", "### IMU", ImuConfig, None),
     ("scenarios", "## Families", variation.Family, None),

@@ -10,7 +10,12 @@ from cns_drake.base.errors import InputError
 from cns_drake.scenarios.lidar_config import LidarConfig
 from cns_drake.scenarios.mount import Mount
 from cns_drake.scenarios.planning import plan_drive
-from cns_drake.scenarios.scenario_files import map_folder, world_file
+from cns_drake.scenarios.provenance import digest_inputs
+from cns_drake.scenarios.scenario_files import (
+    describe_scenario,
+    map_folder,
+    world_file,
+)
 from cns_drake.scenarios.scenario_loading import load_scenario, make_scenario
 from cns_drake.scenarios.sensor_making import make_pattern, sensor_pose
 from cns_drake.scenarios.shipped import recordable_sequences
@@ -171,3 +176,29 @@ def test_where_it_was_read_from_makes_no_other_scenario(small_map, tmp_path):
     assert loaded != make_scenario(values | {"seed": 1}, "test")
     assert loaded.source == str(path)
     assert make_scenario(values, "test").source == values["name"]
+
+
+def test_a_ride_is_written_only_where_there_is_one(small_map):
+    values = scenario_values(small_map)
+    rigid = make_scenario(values, "test")
+    assert "ride" not in describe_scenario(rigid)
+    rough = make_scenario({**values, "ride": {"roughness": "B"}}, "test")
+    assert describe_scenario(rough)["ride"] == {"roughness": "B", "seed": 1}
+    none = make_scenario({**values, "ride": {"roughness": "none"}}, "test")
+    assert none == rigid
+    moved, still = (plan_drive(one).poses([20.0])[1] for one in (rough, none))
+    assert np.abs(moved - still).max() > 1e-4
+    np.testing.assert_array_equal(plan_drive(rigid).poses([20.0])[1], still)
+    assert "suspension" in digest_inputs(rough)
+    assert digest_inputs(none) == digest_inputs(rigid)
+    assert "suspension" not in digest_inputs(rigid)
+
+
+@pytest.mark.parametrize(
+    "ride", [{"roughness": "F"}, {"seed": -1}, {"class": 1}]
+)
+def test_a_ride_that_is_none_is_named(small_map, ride):
+    values = {**scenario_values(small_map), "ride": ride}
+    (field,) = ride
+    with pytest.raises(InputError, match=f"^test: ride.{field}: "):
+        make_scenario(values, "test")

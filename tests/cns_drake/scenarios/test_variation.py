@@ -9,6 +9,7 @@ import pytest
 import yaml
 
 from cns_drake.base.errors import InputError
+from cns_drake.command_line.trends import family_controls
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_files import map_folder, world_file
 from cns_drake.scenarios.scenario_loading import load_scenario
@@ -108,6 +109,26 @@ def test_routes_and_lidars_multiply(tmp_path):
     routes = {str(m.route) for m in members}
     assert len(routes) == 2
     assert plan_drive(members[0]).length > 450.0
+
+
+def test_all_members_ride_and_measure_alike(tmp_path):
+    ride = {"roughness": "C", "seed": 3}
+    imu = {"xyz": [0.5, 0.0, 1.0]}
+    values = {"missing": [0.1, 0.2], "ride": ride, "imu": imu}
+    rough = family(tmp_path, **values)
+    rigid = family(tmp_path, missing=[0.1, 0.2])
+    assert [m.name for m in rough] == [m.name for m in rigid]
+    for member, other in zip(rough, rigid, strict=True):
+        assert member.ride.model_dump() == ride
+        assert member.imu.xyz == (0.5, 0.0, 1.0)
+        update = {"ride": other.ride, "imu": other.imu}
+        assert member.model_copy(update=update) == other
+    # So do their drives through the city of the drive that asks.
+    asking = load_scenario("metropolis_04")
+    controls = family_controls(rough, asking)
+    assert controls[rough[0].name].ride == rough[0].ride
+    (path, _) = write_scenarios(rough, tmp_path / "written")
+    assert load_scenario(path) == rough[0]
 
 
 def test_a_member_is_a_scenario_file_of_its_own(tmp_path):

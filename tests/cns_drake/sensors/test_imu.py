@@ -7,13 +7,13 @@ from helpers.drives import (
     shipped_drive,
     smoothed_radius,
 )
+from helpers.imu_integration import integrate_imu
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 import pytest
-from scipy.spatial.transform import Rotation
 
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.motion.vehicle_motion import VehicleMotion
@@ -146,17 +146,9 @@ def test_integrating_the_imu_reproduces_the_drive():
         X_WI = odometry.X_WB @ X_BI
         p_WI[i] = X_WI.translation()
         if i == 0:
-            R, p, v = Rotation.from_matrix(X_WI.rotation().matrix()), p_WI[0], 0
-
-    drift = np.zeros(count)
-    for i in range(count - 1):
-        R_next = R * Rotation.from_rotvec(period * (rate[i] + rate[i + 1]) / 2)
-        a = R.apply(force[i]) - [0, 0, GRAVITY]
-        a_next = R_next.apply(force[i + 1]) - [0, 0, GRAVITY]
-        p = p + v * period + (2 * a + a_next) * period**2 / 6
-        v = v + (a + a_next) * period / 2
-        R = R_next
-        drift[i + 1] = np.linalg.norm(p - p_WI[i + 1])
+            start = X_WI
+    found = integrate_imu(force, rate, period, start)
+    drift = np.linalg.norm(found - p_WI, axis=1)
     # Only the 20 Hz trapezoidal rule is in error.
     print(
         f"drift {drift[-1]:.3f} m, at most {drift.max():.3f} m, over "

@@ -1,0 +1,29 @@
+"""The ride of a scenario: springs and a rough road."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from cns_drake.motion.road_profile import RoadProfile, RoughnessClass
+from cns_drake.scenarios.section import Section
+
+
+class RideConfig(Section):
+    """How the body of the vehicle moves against its path.
+
+    Attributes:
+        roughness: the road's class of ISO 8608; without one the vehicle is
+            rigid and follows its path exactly.
+        seed: of the road's profile.
+    """
+
+    roughness: Literal["none", RoughnessClass] = "none"
+    seed: int = Field(default=1, ge=0)
+
+    def profile(self) -> RoadProfile | None:
+        """Returns the road's profile; None if the vehicle is rigid."""
+        if self.roughness == "none":
+            return None
+        return RoadProfile(self.roughness, self.seed)
