@@ -1,4 +1,4 @@
-"""The paper's experiments on a map, from simulation to report."""
+"""The experiments on maps, from simulation to report."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from cns_drake.studies.recording_jobs import (
     is_recorded,
     plan_recordings,
 )
+from evaluation.paper import reference_for
 from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,
     RetrievalProtocol,
@@ -98,8 +99,13 @@ def reproduce_maps(
     recordings.sort(key=lambda recording: recording.name)
     report = output / "report"
     make_folder(output)
+    reference = reference_for(folder.name for folder in folders)
     study = plan_study(
-        recordings, report, protocol=protocol, with_costs=with_costs
+        recordings,
+        report,
+        protocol=protocol,
+        with_costs=with_costs,
+        reference=reference,
     )
     run_jobs([*jobs, *study, *pictures], cluster)
     addresses = {
@@ -113,6 +119,7 @@ def reproduce_maps(
         pages=addresses,
         protocol=protocol,
         with_costs=with_costs,
+        reference=reference,
     )
 
 

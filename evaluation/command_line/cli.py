@@ -293,6 +293,7 @@ def report(
     goes on where it was.
     """
     from cns_drake.base.jobs.cluster import choose_cluster
+    from evaluation.paper import reference_for
     from evaluation.study import benchmark as reporting
 
     cluster = choose_cluster(jobs, scheduler)
@@ -304,6 +305,7 @@ def report(
         protocol,
         on_note=terminal.note,
         with_costs=costs,
+        reference_for=reference_for,
     )
     print(path)
 

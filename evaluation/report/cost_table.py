@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import astuple, fields
 
 from evaluation.recognition.costs import Cost
-from evaluation.report.result_tables import in_paper_order, title
+from evaluation.report.method_titles import in_table_order, title
 from evaluation.report.tables import Table
 
 COST_CAPTION = (
@@ -20,7 +20,7 @@ def cost_table(costs: Sequence[Cost]) -> Table:
     """Returns the table for print, a row for each method."""
     by_method = {cost.method: cost for cost in costs}
     rows = []
-    for method in in_paper_order(by_method):
+    for method in in_table_order(by_method):
         cost = by_method[method]
         rows.append(
             (

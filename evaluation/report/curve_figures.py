@@ -14,13 +14,9 @@ from evaluation.recognition.metrics import (
     PlaceRecognitionMetrics,
 )
 from evaluation.recognition.recognition_result import RecognitionResult
-from evaluation.report import paper
 from evaluation.report.drawing import method_style, plain, save
-from evaluation.report.result_tables import (
-    in_paper_order,
-    shows_paper,
-    title,
-)
+from evaluation.report.method_titles import in_table_order, title
+from evaluation.report.reference import NO_REFERENCE, Reference
 
 # A line is not fitted through fewer.
 _LEAST_POINTS = 5
@@ -44,7 +40,7 @@ def draw_pr_curves(
     for row, mode in zip(grid, MODES, strict=True):
         for axes, pair in zip(row, pairs, strict=True):
             of_method = {r.method: r for r in results if r.pair == pair}
-            for method in in_paper_order(of_method):
+            for method in in_table_order(of_method):
                 _draw_curve(axes, method, of_method[method].metrics[mode])
             axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.02))
             # A phone shows one panel at a time.
@@ -65,22 +61,24 @@ def draw_auc_over_change(
     results: Sequence[RecognitionResult],
     changes: Mapping[tuple[str, str, str], float],
     stem: Path,
+    reference: Reference = NO_REFERENCE,
 ) -> None:
-    """Draws AUC against TCR_sym, ours with 95 % intervals and the paper's.
+    """Draws AUC against TCR_sym, with 95 % intervals.
 
-    Left all queries are counted, then those with a match; right of them is
-    the paper's Table II, where its maps are shown.
+    Left all queries are counted, then those with a match; right of them are
+    the reference's values, where it has such.
 
     Args:
         results: of all pairs and methods.
         changes: TCR_sym of each pair.
         stem: path to write, without ending.
+        reference: whose values stand beside.
     """
-    with_paper = shows_paper(results)
-    count = len(MODES) + with_paper
+    with_reference = any(map(reference.covers, results))
+    count = len(MODES) + with_reference
     figure = Figure(figsize=(3.4 * count, 3.7), layout="constrained")
     panels = figure.subplots(1, count, sharex=True, sharey=True)
-    methods = in_paper_order(result.method for result in results)
+    methods = in_table_order(result.method for result in results)
     for axes, mode in zip(panels, MODES, strict=False):
         for index, method in enumerate(methods):
             points = [
@@ -92,12 +90,12 @@ def draw_auc_over_change(
             shift = 0.0008 * (index - 0.5 * (len(methods) - 1))
             _draw_points(axes, method, points, shift)
         axes.set_title(f"this report, {mode} queries", fontsize=9)
-    if with_paper:
+    if with_reference:
         for method in methods:
-            _draw_paper(panels[-1], method)
-        panels[-1].set_title(
-            "the paper (RING++ filtered, others all)", fontsize=9
-        )
+            _draw_published(
+                panels[-1], method, reference.auc_over_change(method)
+            )
+        panels[-1].set_title(reference.counting[1], fontsize=9)
     for axes in panels:
         axes.tick_params(labelleft=True)
         axes.set(xlabel=r"TCR$_\mathrm{sym}$", ylim=(0.0, 1.02))
@@ -160,12 +158,9 @@ def _draw_points(
     _draw_line(axes, x, y, colour, style)
 
 
-def _draw_paper(axes: Axes, method: str) -> None:
-    values = [
-        (paper.tcr_between(*key[:3]), value.auc)
-        for key, value in paper.recognition_values().items()
-        if key[3] == method
-    ]
+def _draw_published(
+    axes: Axes, method: str, values: Sequence[tuple[float, float]]
+) -> None:
     if not values:
         return
     colour, style, marker = method_style(method)

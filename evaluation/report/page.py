@@ -19,7 +19,6 @@ from evaluation.change.change_result import (
 from evaluation.recognition.metrics import MODES
 from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.recognition.survival import Survival
-from evaluation.report.findings import Finding
 from evaluation.report.page_data import (
     Illustration,
     PageDrive,
@@ -28,7 +27,7 @@ from evaluation.report.page_data import (
 )
 from evaluation.report.page_routes import route_legend, route_picture
 from evaluation.report.page_survival import survival_section
-from evaluation.report.result_tables import shows_paper
+from evaluation.report.reference import Finding, Judgement
 from evaluation.report.tables import Table
 
 _MEDIA_TYPES = {"svg": "image/svg+xml", "webp": "image/webp"}
@@ -42,8 +41,8 @@ class PageContent:
     """All that the page shows.
 
     Attributes:
-        findings: of the paper, judged.
-        aims: how near the numbers come to the paper's.
+        judgements: claims, judged.
+        beside: whose numbers stand beside; empty for none.
         changes: TCR of all pairs.
         change: Table I.
         recognition: Table II in its forms, that of mode all last but one.
@@ -58,8 +57,8 @@ class PageContent:
             look around in; drives without one may be left out.
     """
 
-    findings: Sequence[Finding]
-    aims: Sequence[Finding]
+    judgements: Sequence[Judgement]
+    beside: str
     changes: Sequence[ChangeResult]
     change: Table
     recognition: Sequence[Table]
@@ -124,10 +123,8 @@ def _lead(content: PageContent) -> str:
         "How much cities changed between drives, and how well LiDAR place"
         " recognition copes"
     )
-    if shows_paper(content.recognitions):
-        text += (
-            ", beside the numbers of the paper “The City that Never Settles”"
-        )
+    if content.beside:
+        text += f", beside the numbers of {html.escape(content.beside)}"
     lead = f"<p>{text}.</p>"
     if content.recognitions:
         lead += (
@@ -150,10 +147,9 @@ def _summary(content: PageContent) -> str:
     parts = ['<h2>Summary</h2><ul class="facts">']
     parts += [f"<li>{what} <b>{n}</b></li>" for what, n in facts]
     parts.append("</ul>")
-    parts.append(_judged(content.findings))
-    if content.aims:
-        parts.append("<h3>How near to the paper's numbers</h3>")
-        parts.append(_judged(content.aims))
+    for one in content.judgements:
+        parts.append(f"<h3>{html.escape(one.heading)}</h3>")
+        parts.append(_judged(one.findings))
     if content.pages:
         parts.append('<h3>Recordings to look around in</h3><p class="links">')
         parts += [
@@ -164,8 +160,6 @@ def _summary(content: PageContent) -> str:
 
 
 def _judged(found: Sequence[Finding]) -> str:
-    if not found:
-        return ""
     parts = ['<dl class="findings">']
     for one in found:
         kind = one.verdict.replace(" ", "-")

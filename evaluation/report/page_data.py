@@ -17,8 +17,8 @@ from evaluation.maps.thumbnails import CELL, HEIGHT_STEP, MAX_POINTS
 from evaluation.recognition.metrics import MODES
 from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.report.drawing import Legend
+from evaluation.report.method_titles import in_table_order, title
 from evaluation.report.point_rendering import Picture
-from evaluation.report.result_tables import in_paper_order, title
 
 # Points in all scans of a page; at some 3 bytes each they leave room for the
 # figures in 25 MB.
@@ -207,7 +207,7 @@ def _pair_data(
         "matches": [np.flatnonzero(row).tolist() for row in retrieval.matches],
         "methods": [
             _method_data(by_method[method])
-            for method in in_paper_order(by_method)
+            for method in in_table_order(by_method)
         ],
     }
 

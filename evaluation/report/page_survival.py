@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 import html
 
 from evaluation.recognition.survival import Kept, Survival
-from evaluation.report.result_tables import title
+from evaluation.report.method_titles import title
 from evaluation.report.survival_tables import (
     NO_CONTROL,
     SURVIVAL_CAPTION,

@@ -9,7 +9,8 @@ from evaluation.recognition.protocol import (
     protocol_values,
 )
 from evaluation.recognition.recognition_result import RecognitionResult
-from evaluation.report.result_tables import by_pair_and_method, title
+from evaluation.report.method_titles import title
+from evaluation.report.result_tables import by_pair_and_method
 from evaluation.report.tables import Table
 
 POSE_CAPTION = (

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from evaluation.recognition.survival import Survival
 from evaluation.report.drawing import method_style, plain, save
-from evaluation.report.result_tables import title
+from evaluation.report.method_titles import title
 from evaluation.report.survival_tables import by_pair, percent
 
 # As wide as a phone's screen, so that letters stay legible there [inches].

@@ -12,7 +12,7 @@ from evaluation.recognition.protocol import (
     protocol_values,
 )
 from evaluation.recognition.survival import Kept, Survival
-from evaluation.report.result_tables import in_paper_order, title
+from evaluation.report.method_titles import in_table_order, title
 from evaluation.report.tables import MISSING, Table
 
 NO_CONTROL = "no control"
@@ -27,14 +27,14 @@ SURVIVAL_CAPTION = (
 def by_pair(
     survivals: Sequence[Survival],
 ) -> dict[tuple[str, str, str], list[Survival]]:
-    """Returns (map, database, query) -> methods in the paper's order."""
+    """Returns (map, database, query) -> methods in the order of tables."""
     groups: dict[tuple[str, str, str], list[Survival]] = {}
     for one in survivals:
         groups.setdefault(one.pair, []).append(one)
     return {
         pair: [
             one
-            for method in in_paper_order(s.method for s in group)
+            for method in in_table_order(s.method for s in group)
             for one in group
             if one.method == method
         ]
@@ -128,7 +128,7 @@ def survival_summary(survivals: Sequence[Survival]) -> str:
                     [one.auc.share for one in known if one.method == method]
                 )
             )
-            for method in in_paper_order(one.method for one in known)
+            for method in in_table_order(one.method for one in known)
             if any(
                 not math.isnan(one.auc.share)
                 for one in known

@@ -20,21 +20,23 @@ from evaluation.recognition.protocol import (
 from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.recognition.survival import Survival
 from evaluation.report import page
-from evaluation.report.aims import aims
 from evaluation.report.cost_table import cost_numbers, cost_table
 from evaluation.report.curve_figures import (
     draw_auc_over_change,
     draw_pr_curves,
 )
-from evaluation.report.findings import Finding, findings
 from evaluation.report.page_data import Illustration, PageDrive
 from evaluation.report.pose_tables import pose_numbers, pose_table
 from evaluation.report.query_table import DriveTrack, query_table
+from evaluation.report.reference import (
+    NO_REFERENCE,
+    Judgement,
+    Reference,
+)
 from evaluation.report.result_tables import (
     audit_table,
     change_table,
     recognition_tables,
-    shows_paper,
 )
 from evaluation.report.survival_figure import draw_survival
 from evaluation.report.survival_tables import (
@@ -79,6 +81,7 @@ def assemble(
     *,
     protocol: RetrievalProtocol = PAPER_PROTOCOL,
     with_costs: bool = False,
+    reference: Reference = NO_REFERENCE,
 ) -> Path:
     """Writes the report of a study whose jobs are done.
 
@@ -96,6 +99,7 @@ def assemble(
             in 3-D, for those that have one.
         protocol: likewise.
         with_costs: likewise.
+        reference: likewise.
 
     Returns:
         The path of `report.html`.
@@ -107,18 +111,20 @@ def assemble(
     chosen = choose_methods() if methods is None else methods
     make_folder(files.figures)
     collected = _Collected()
-    cities = group_cities(recordings)
+    cities = group_cities(recordings, reference)
     for city in cities:
         _collect(city, files, chosen, protocol, collected)
     pairs = [pair for city in cities for pair in city.recognition_pairs()]
     if collected.recognitions:
+        covered = any(map(reference.covers, collected.recognitions))
         shown = auc_illustration(
-            files.figures, shows_paper(collected.recognitions)
+            files.figures, reference.title if covered else ""
         )
         draw_auc_over_change(
             collected.recognitions,
             symmetric_changes(collected.changes),
             shown.stem,
+            reference,
         )
         collected.illustrations.insert(0, shown)
     if any(one.unchanged is not None for one in collected.survivals):
@@ -126,7 +132,7 @@ def assemble(
         draw_survival(collected.survivals, shown.stem)
         collected.illustrations.insert(0, shown)
     costs = read_part(files.costs) if with_costs and pairs else []
-    return _write_all(collected, output, pages or {}, costs)
+    return _write_all(collected, output, pages or {}, costs, reference)
 
 
 def _collect(
@@ -190,13 +196,13 @@ def _write_all(
     output: Path,
     pages: Mapping[str, str],
     costs: Sequence[Cost],
+    reference: Reference,
 ) -> Path:
     changes, recognitions = collected.changes, collected.recognitions
-    found = findings(recognitions, changes)
-    aimed = aims(recognitions, changes)
-    change = change_table(changes)
-    recognition = recognition_tables(recognitions, changes)
-    audit = audit_table(recognitions)
+    judgements = reference.judge(recognitions, changes)
+    change = change_table(changes, reference)
+    recognition = recognition_tables(recognitions, changes, reference)
+    audit = audit_table(recognitions, reference)
     survival = survival_table(collected.survivals)
     poses, cost = pose_table(recognitions), cost_table(costs)
     _write_queries(collected, output)
@@ -216,8 +222,10 @@ def _write_all(
     page.write_page(
         path,
         page.PageContent(
-            findings=found,
-            aims=aimed,
+            judgements=judgements,
+            beside=reference.title
+            if any(map(reference.covers, recognitions))
+            else "",
             changes=changes,
             change=change,
             recognition=recognition,
@@ -236,8 +244,7 @@ def _write_all(
         _to_markdown(
             survival_summary(collected.survivals),
             survival,
-            found,
-            aimed,
+            judgements,
             change,
             recognition,
             audit,
@@ -264,8 +271,7 @@ def _write_queries(collected: _Collected, output: Path) -> None:
 def _to_markdown(
     summary: str,
     survival: Table,
-    found: list[Finding],
-    aimed: list[Finding],
+    judgements: Sequence[Judgement],
     change: Table,
     recognition: list[Table],
     audit: Table,
@@ -277,18 +283,14 @@ def _to_markdown(
     if survival.rows:
         parts.append("## Which method survives the change?\n")
         parts += [f"{escape_markdown(summary)}\n", _captioned(survival)]
-    for heading, judged in (
-        ("The paper's findings", found),
-        ("How near to the paper's numbers", aimed),
-    ):
-        if judged:
-            parts.append(f"## {heading}\n")
-            parts += [
-                f"- **{escape_markdown(one.claim)}** This {one.verdict}."
-                f" {escape_markdown(one.evidence)}"
-                for one in judged
-            ]
-            parts.append("")
+    for judgement in judgements:
+        parts.append(f"## {judgement.heading}\n")
+        parts += [
+            f"- **{escape_markdown(one.claim)}** This {one.verdict}."
+            f" {escape_markdown(one.evidence)}"
+            for one in judgement.findings
+        ]
+        parts.append("")
     if change.rows:
         parts += ["## Table I: temporal change ratio\n", _captioned(change)]
     if audit.rows:

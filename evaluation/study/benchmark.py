@@ -12,6 +12,7 @@ from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,
     RetrievalProtocol,
 )
+from evaluation.report.reference import NO_REFERENCE, Reference
 from evaluation.study.assembly import assemble
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import find_recordings
@@ -27,6 +28,7 @@ def write_report(
     on_note: Callable[[str], None] = lambda text: None,
     *,
     with_costs: bool = False,
+    reference_for: Callable[[set[str]], Reference] = lambda maps: NO_REFERENCE,
 ) -> Path:
     """Measures all recordings in a folder; writes tables, figures, a page.
 
@@ -43,6 +45,7 @@ def write_report(
         protocol: of place recognition.
         on_note: is told which recordings are left out.
         with_costs: measure what the methods cost, too.
+        reference_for: returns what the report of some maps stands beside.
 
     Returns:
         The path of `report.html`.
@@ -53,9 +56,22 @@ def write_report(
     """
     methods = choose_methods(own_methods)
     found = find_recordings(recordings, on_note)
-    jobs = plan_study(found, output, methods, protocol, with_costs=with_costs)
+    reference = reference_for({one.map_name for one in found})
+    jobs = plan_study(
+        found,
+        output,
+        methods,
+        protocol,
+        with_costs=with_costs,
+        reference=reference,
+    )
     make_folder(output)
     run_jobs(jobs, cluster)
     return assemble(
-        found, output, methods, protocol=protocol, with_costs=with_costs
+        found,
+        output,
+        methods,
+        protocol=protocol,
+        with_costs=with_costs,
+        reference=reference,
     )

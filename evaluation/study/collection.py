@@ -9,7 +9,7 @@ import re
 
 from cns_drake.base.errors import InputError, one_line
 from cns_drake.base.recordings.driven_way import driven_way
-from evaluation.report import paper
+from evaluation.report.reference import NO_REFERENCE, Reference
 from evaluation.sequences import open_sequence
 from evaluation.study.drive_source import DriveSource, RecordedDrive
 
@@ -58,14 +58,16 @@ class City:
         stages: one recording a stage, by stage: `<map>_<stage>`.
         others: further drives through one of the stages, which may serve as
             controls.
+        reference: says which pairs are asked both ways.
     """
 
     name: str
     stages: dict[str, RecordingInfo]
     others: tuple[RecordingInfo, ...]
+    reference: Reference = NO_REFERENCE
 
     def change_pairs(self) -> list[tuple[RecordingInfo, RecordingInfo]]:
-        """Returns every stage with the last one, as the paper compares."""
+        """Returns every stage with the last one."""
         *earlier, last = (self.stages[key] for key in sorted(self.stages))
         return [(recording, last) for recording in earlier]
 
@@ -75,7 +77,7 @@ class City:
         """Returns pairs of database and query.
 
         Every earlier stage is a database for the last one; the other way
-        round where the paper has it.
+        round where the reference has it.
 
         Args:
             with_itself: also each stage with itself, for loop closure.
@@ -83,10 +85,7 @@ class City:
         pairs = []
         for earlier, last in self.change_pairs():
             pairs.append((earlier, last))
-            if any(
-                key[:3] == (self.name, last.stage, earlier.stage)
-                for key in paper.recognition_values()
-            ):
+            if self.reference.asks_back(self.name, earlier.stage, last.stage):
                 pairs.append((last, earlier))
         if with_itself:
             pairs += [(one, one) for one in self.stages.values()]
@@ -157,8 +156,14 @@ def find_recordings(
     return found
 
 
-def group_cities(recordings: Iterable[RecordingInfo]) -> list[City]:
+def group_cities(
+    recordings: Iterable[RecordingInfo], reference: Reference = NO_REFERENCE
+) -> list[City]:
     """Returns the cities that recordings are of, by name.
+
+    Args:
+        recordings: of any cities.
+        reference: says which pairs are asked both ways.
 
     Raises:
         InputError: if two have one name, or claim the same place.
@@ -173,7 +178,9 @@ def group_cities(recordings: Iterable[RecordingInfo]) -> list[City]:
             )
         paths[one.name] = one.path
     return [
-        _make_city(name, [r for r in recordings if r.map_name == name])
+        _make_city(
+            name, [r for r in recordings if r.map_name == name], reference
+        )
         for name in sorted({recording.map_name for recording in recordings})
     ]
 
@@ -215,7 +222,9 @@ def _place(path: Path) -> RecordingInfo | None:
     return RecordingInfo(sequence.name, path, match["map"], match["stage"], way)
 
 
-def _make_city(name: str, recordings: list[RecordingInfo]) -> City:
+def _make_city(
+    name: str, recordings: list[RecordingInfo], reference: Reference
+) -> City:
     stages = {}
     for stage in sorted({recording.stage for recording in recordings}):
         candidates = [r for r in recordings if r.stage == stage]
@@ -229,4 +238,4 @@ def _make_city(name: str, recordings: list[RecordingInfo]) -> City:
         stages[stage] = (named or candidates)[0]
     chosen = {recording.name for recording in stages.values()}
     others = tuple(r for r in recordings if r.name not in chosen)
-    return City(name, stages, others)
+    return City(name, stages, others, reference)

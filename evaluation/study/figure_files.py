@@ -85,14 +85,19 @@ def illustrations(city: City, folder: Path) -> list[Illustration]:
     return shown
 
 
-def auc_illustration(folder: Path, with_paper: bool) -> Illustration:
-    """Returns the figure of all cities together."""
-    paper = ", and the paper's" if with_paper else ""
+def auc_illustration(folder: Path, beside: str = "") -> Illustration:
+    """Returns the figure of all cities together.
+
+    Args:
+        folder: of figures.
+        beside: whose values stand beside; empty for none.
+    """
+    others = f", and of {beside}" if beside else ""
     return Illustration(
         folder / "auc_over_tcr",
-        f"AUC against TCR_sym with 95 % intervals{paper}",
+        f"AUC against TCR_sym with 95 % intervals{others}",
         "svg",
-        num_panels=3 if with_paper else 2,
+        num_panels=3 if beside else 2,
     )
 
 

@@ -11,6 +11,7 @@ from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,
     RetrievalProtocol,
 )
+from evaluation.report.reference import NO_REFERENCE, Reference
 from evaluation.study.chosen_methods import MethodChoice, choose_methods
 from evaluation.study.collection import (
     City,
@@ -53,6 +54,7 @@ def plan_study(
     protocol: RetrievalProtocol = PAPER_PROTOCOL,
     *,
     with_costs: bool = False,
+    reference: Reference = NO_REFERENCE,
 ) -> list[Job]:
     """Returns the jobs that leave what `assemble` makes a report of.
 
@@ -67,13 +69,14 @@ def plan_study(
         protocol: of place recognition.
         with_costs: measure what the methods cost, too, when all else is
             done.
+        reference: which the report stands beside.
 
     Raises:
         InputError: if two recordings claim the same place.
     """
     files = StudyFiles(output.absolute())
     chosen = choose_methods() if methods is None else tuple(methods)
-    cities = group_cities(recordings)
+    cities = group_cities(recordings, reference)
     jobs = [
         job
         for city in cities

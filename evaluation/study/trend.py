@@ -22,7 +22,7 @@ from evaluation.recognition.protocol import (
     protocol_values,
 )
 from evaluation.report.drawing import method_style, plain, save
-from evaluation.report.result_tables import in_paper_order, title
+from evaluation.report.method_titles import in_table_order, title
 from evaluation.study.trend_points import TrendPoint
 
 # Of the kernel that smooths over TCR_sym, as part of its range; and how the
@@ -110,7 +110,7 @@ def _draw_panel(
     label: str,
     value: Callable[[TrendPoint], float],
 ) -> None:
-    for method in in_paper_order(point.method for point in points):
+    for method in in_table_order(point.method for point in points):
         colour, style, marker = method_style(method)
         known = sorted(
             (p.tcr_sym, value(p))

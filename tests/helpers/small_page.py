@@ -13,10 +13,10 @@ from evaluation.recognition.retrieval import Retrieval
 from evaluation.recognition.survival import Survival
 from evaluation.report.cost_table import cost_table
 from evaluation.report.figures import top_view
-from evaluation.report.findings import Finding
 from evaluation.report.page import PageContent
 from evaluation.report.page_data import Illustration, make_drive
 from evaluation.report.pose_tables import pose_table
+from evaluation.report.reference import Finding, Judgement
 from evaluation.report.result_tables import (
     audit_table,
     change_table,
@@ -43,8 +43,14 @@ def make_content(folder, **changed):
     ]
     without_change = _result("scan-context++", [0, 1, 4, 6, 3])
     values = {
-        "findings": [Finding("A < B & C.", "does not hold", "1 of 2.")],
-        "aims": [Finding("C > D.", "is missed", "3 of 4.")],
+        "judgements": [
+            Judgement(heading, [finding])
+            for heading, finding in (
+                ("Claims", Finding("A < B & C.", "does not hold", "1 of 2.")),
+                ("Aims", Finding("C > D.", "is missed", "3 of 4.")),
+            )
+        ],
+        "beside": "",
         "changes": [],
         "change": change_table([]),
         "recognition": [

@@ -6,6 +6,7 @@ tests; processes would only make these slow.
 
 from cns_drake.base.jobs.job_process import nothing_left
 from cns_drake.base.jobs.running import Tell
+from evaluation.paper import reference_for
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.study.assembly import assemble
 from evaluation.study.collection import find_recordings
@@ -22,8 +23,11 @@ def do(jobs):
 def report(recordings, output, methods=None, protocol=PAPER_PROTOCOL):
     """Returns the path of the report on a folder of recordings."""
     found = find_recordings(recordings)
-    do(plan_study(found, output, methods, protocol))
-    return assemble(found, output, methods, protocol=protocol)
+    reference = reference_for({one.map_name for one in found})
+    do(plan_study(found, output, methods, protocol, reference=reference))
+    return assemble(
+        found, output, methods, protocol=protocol, reference=reference
+    )
 
 
 def report_files(output):

@@ -8,6 +8,7 @@ import pytest
 
 from cns_drake.base.points import from_xyz
 from evaluation.maps.voxel_maps import VoxelAccumulator, VoxelMap
+from evaluation.paper import reference_for
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.report import curve_figures
 from evaluation.report.curve_figures import draw_auc_over_change
@@ -74,7 +75,9 @@ def test_no_line_through_fewer_than_five_points(
             )
             for pair in pairs[:known]
         ]
-        draw_auc_over_change(results, changes, tmp_path / "auc")
+        draw_auc_over_change(
+            results, changes, tmp_path / "auc", reference_for({city})
+        )
     for figure, has_line in zip(drawn, (False, True), strict=True):
         # The paper's own table has ten pairs, and stands beside its cities.
         assert len(figure.axes) == panels

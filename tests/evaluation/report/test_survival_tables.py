@@ -49,7 +49,7 @@ def test_numbers():
     assert rows[0]["r1_kept"] == 1.0
     first, last = table.to_csv().splitlines()[1:]
     assert first.startswith("town,01,03,btc,0.8,0.4,0.5,0.25,0.75,")
-    protocol = "5.0,10.0,5.0,100.0,10,"
+    protocol = "5.0,10.0,5.0,100.0,10,,0"
     assert first.endswith(f",town_01_stage_03,{protocol}")
     # Without a control, nothing but what was measured.
     assert last.startswith("town,00,03,btc,,0.5,,,,,")

@@ -10,7 +10,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import run_jobs
 from evaluation.methods import method
-from evaluation.report import paper
+from evaluation.paper import reference_for
 from evaluation.study.benchmark import write_report
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import find_recordings, group_cities
@@ -56,7 +56,9 @@ def recordings(tmp_path_factory):
 
 
 def find_cities(folder):
-    return group_cities(find_recordings(folder))
+    found = find_recordings(folder)
+    reference = reference_for({one.map_name for one in found})
+    return group_cities(found, reference)
 
 
 def test_recordings_find_their_roles(recordings):
@@ -178,7 +180,12 @@ def test_figures_for_print_and_page(report):
 
 
 def test_report_is_the_same_whoever_works(recordings, report, tmp_path):
-    write_report(recordings, tmp_path, Cluster(num_workers=2))
+    write_report(
+        recordings,
+        tmp_path,
+        Cluster(num_workers=2),
+        reference_for=reference_for,
+    )
     files = studies.report_files(tmp_path)
     assert len(files) == 16 + 18
     assert files == studies.report_files(report)
@@ -281,20 +288,3 @@ def test_output_that_cannot_be_written(recordings, tmp_path):
     (tmp_path / "out").write_text("a file")
     with pytest.raises(InputError, match=f"^{tmp_path / 'out'}"):
         write_report(recordings, tmp_path / "out", Cluster())
-
-
-def test_paper_values():
-    change = paper.tcr_values()
-    assert len(change) == 9
-    # The first misprint: Table I prints 0.1120 here.
-    assert change["downtown", "01", "04"] == 0.1674
-    recognition = paper.recognition_values()
-    assert len(recognition) == 40
-    # The second: R@1 is printed as 0.9626.
-    value = recognition["riverside", "02", "01", "ring++", "filtered"]
-    assert value.recall_at_1 == 0.7626
-    # All of RING++ then obeys F1 = 2 R / (1 + R), to the printed digits.
-    for key, value in recognition.items():
-        if key[3] == "ring++":
-            r = value.recall_at_1
-            assert value.f1_max == pytest.approx(2 * r / (1 + r), abs=1.1e-4)

@@ -6,6 +6,7 @@ import pickle
 import pytest
 
 from cns_drake.base.errors import InputError
+from evaluation.paper import reference_for
 from evaluation.study.collection import RecordingInfo, group_cities
 from evaluation.study.plan import plan_study
 
@@ -97,7 +98,12 @@ def test_a_control_serves_both_ways(tmp_path):
         info("riverside_02", "02", "b", "riverside"),
         info("riverside_01_stage_02", "02", "a", "riverside"),
     ]
-    jobs = {job.name: job for job in plan_study(drives, tmp_path)}
+    jobs = {
+        job.name: job
+        for job in plan_study(
+            drives, tmp_path, reference=reference_for({"riverside"})
+        )
+    }
     roles = sorted(jobs["survey riverside_01_stage_02"].arguments[1])
     assert roles == ["places", "queries"]
     assert {
@@ -109,7 +115,9 @@ def test_a_control_serves_both_ways(tmp_path):
 def test_jobs_can_go_anywhere(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     river = [info(f"riverside_{s}", s, s, "riverside") for s in ("01", "02")]
-    jobs = plan_study(FAMILY + river, Path("out"))
+    jobs = plan_study(
+        FAMILY + river, Path("out"), reference=reference_for({"riverside"})
+    )
     names = [job.name for job in jobs]
     assert len(set(names)) == len(names)
     outputs = [job.output for job in jobs]

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from evaluation.change.change_result import ChangeResult, symmetric_changes
+from evaluation.paper import printed_values as printed
 from evaluation.recognition.recognition_result import RecognitionResult
-from evaluation.report import paper
-from evaluation.report.findings import Finding
-from evaluation.report.result_tables import paper_mode, paper_values, title
+from evaluation.report.method_titles import title
+from evaluation.report.reference import Finding
 
 MET = "is met"
 MISSED = "is missed"
@@ -58,14 +58,14 @@ def aims(
     """
     differences = _differences(results)
     if differences.keys() != {
-        (*key[:3], key[3]) for key in paper.recognition_values()
+        (*key[:3], key[3]) for key in printed.recognition_values()
     }:
         return []
     pairs = list(dict.fromkeys(key[:3] for key in differences))
     tcr = [
-        abs(value - paper.tcr_between(*pair))
+        abs(value - printed.tcr_between(*pair))
         for pair, value in symmetric_changes(changes).items()
-        if pair in paper.tcr_values()
+        if pair in printed.tcr_values()
     ]
     best = [_best_method(results, pair) == "ring++" for pair in pairs]
     found = [
@@ -105,11 +105,11 @@ def _differences(
     """Returns (map, database, query, method) -> AUC here less the paper's."""
     found = {}
     for result in results:
-        mode = paper_mode(result.method)
-        printed = paper_values(result, mode)
-        if printed is not None:
+        mode = printed.mode_of(result.method)
+        theirs = printed.values_of(result, mode)
+        if theirs is not None:
             key = (*result.pair, result.method)
-            found[key] = result.metrics[mode].auc - printed.auc
+            found[key] = result.metrics[mode].auc - theirs.auc
     return found
 
 
@@ -118,10 +118,9 @@ def _best_method(
 ) -> str:
     """Returns the method of the paper with the greatest AUC on a pair."""
     auc = {
-        result.method: result.metrics[paper_mode(result.method)].auc
+        result.method: result.metrics[printed.mode_of(result.method)].auc
         for result in results
-        if result.pair == pair
-        and paper_values(result, paper_mode(result.method)) is not None
+        if result.pair == pair and printed.is_printed(result)
     }
     return max(auc, key=lambda method: auc[method])
 

@@ -12,14 +12,11 @@ from evaluation.change.change_result import (
     ChangeResult,
     symmetric_changes,
 )
+from evaluation.paper import printed_values as printed
 from evaluation.recognition.metrics import MODES
 from evaluation.recognition.recognition_result import RecognitionResult
-from evaluation.report import paper
-from evaluation.report.result_tables import (
-    in_paper_order,
-    is_of_paper,
-    title,
-)
+from evaluation.report.method_titles import in_table_order, title
+from evaluation.report.reference import Finding
 
 # A trend is not judged from fewer pairs.
 _FEWEST_PAIRS = 5
@@ -29,21 +26,6 @@ HOLDS = "holds"
 IN_PART = "holds in part"
 FAILS = "does not hold"
 UNDECIDED = "cannot be judged"
-
-
-@dataclass(frozen=True)
-class Finding:
-    """A claim of the paper, and what our numbers say.
-
-    Attributes:
-        claim: of the paper.
-        verdict: whether it holds here.
-        evidence: the numbers behind the verdict.
-    """
-
-    claim: str
-    verdict: str
-    evidence: str
 
 
 @dataclass(frozen=True)
@@ -81,10 +63,10 @@ def findings(
         results: place recognition of all pairs.
         changes: TCR of all pairs.
     """
-    results = [r for r in results if is_of_paper(r)]
-    changes = [c for c in changes if c.map_name in paper.city_names()]
+    results = [r for r in results if printed.is_printed(r)]
+    changes = [c for c in changes if c.map_name in printed.city_names()]
     tcr = symmetric_changes(changes)
-    methods = in_paper_order(result.method for result in results)
+    methods = in_table_order(result.method for result in results)
     found = []
     if changes:
         found.append(_larger_than_real(changes))
@@ -116,16 +98,11 @@ def trend(change: Sequence[float], auc: Sequence[float]) -> Trend:
 
 def paper_trend(method: str) -> Trend:
     """Returns the trend in the paper's own Table II."""
-    values = [
-        (paper.tcr_between(*key[:3]), value.auc)
-        for key, value in paper.recognition_values().items()
-        if key[3] == method
-    ]
-    return trend(*zip(*values, strict=True))
+    return trend(*zip(*printed.auc_over_change(method), strict=True))
 
 
 def _larger_than_real(changes: Sequence[ChangeResult]) -> Finding:
-    real = paper.tcr_values()["kaist", "01", "06"]
+    real = printed.tcr_values()["kaist", "01", "06"]
     # The paper's Table I: each map's first stage against its last.
     widest: dict[str, ChangeResult] = {}
     for result in changes:
@@ -253,7 +230,7 @@ def _trends(
 
 
 def _describe_trends(trends: dict[str, Trend]) -> str:
-    known = {key[3] for key in paper.recognition_values()}
+    known = {key[3] for key in printed.recognition_values()}
     parts = []
     for method, ours in trends.items():
         text = (

@@ -3,8 +3,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from evaluation.paper.findings import findings, paper_trend, trend
 from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.report.findings import findings, paper_trend, trend
 
 MODES = ("all", "filtered")
 

@@ -10,28 +10,18 @@ AUC in all its rows.
 from __future__ import annotations
 
 import csv
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from importlib import resources
-from typing import TYPE_CHECKING
 
+from evaluation.recognition.metrics import Mode
 from evaluation.recognition.protocol import RetrievalProtocol
-
-if TYPE_CHECKING:
-    from evaluation.recognition.metrics import Mode
-
-
-@dataclass(frozen=True)
-class PaperRecognition:
-    """One cell of the paper's Table II."""
-
-    auc: float
-    recall_at_1: float
-    f1_max: float
+from evaluation.recognition.recognition_result import RecognitionResult
+from evaluation.report.reference import Published
 
 
 def is_protocol(method: str, protocol: RetrievalProtocol) -> bool:
-    """Tells whether the paper ran a method by a protocol.
+    """Returns whether the paper ran a method by a protocol.
 
     Args:
         method: its name.
@@ -40,6 +30,42 @@ def is_protocol(method: str, protocol: RetrievalProtocol) -> bool:
     scans = 10 if method == "btc" else 1
     asked = replace(protocol, exclude_recent=None)
     return asked == RetrievalProtocol(scans_per_place=scans)
+
+
+def is_printed(result: RecognitionResult) -> bool:
+    """Returns whether the paper has such a number: map, method, protocol."""
+    return (
+        result.pair[0] in city_names()
+        and result.method in method_names()
+        and is_protocol(result.method, result.outcome.protocol)
+    )
+
+
+def mode_of(method: str) -> Mode:
+    """Returns the mode that the paper seems to have counted a method in."""
+    for key in recognition_values():
+        if key[3] == method:
+            return key[4]
+    return "all"
+
+
+def values_of(result: RecognitionResult, mode: Mode) -> Published | None:
+    """Returns the paper's values, if it counted in this mode.
+
+    None for numbers that were found by another protocol than the paper's.
+    """
+    if not is_protocol(result.method, result.outcome.protocol):
+        return None
+    return recognition_values().get((*result.pair, result.method, mode))
+
+
+def auc_over_change(method: str) -> list[tuple[float, float]]:
+    """Returns the points (TCR_sym, AUC) of a method in the paper's tables."""
+    return [
+        (tcr_between(*key[:3]), value.auc)
+        for key, value in recognition_values().items()
+        if key[3] == method
+    ]
 
 
 @cache
@@ -72,9 +98,7 @@ def tcr_between(map_name: str, first: str, second: str) -> float:
 
 
 @cache
-def recognition_values() -> dict[
-    tuple[str, str, str, str, Mode], PaperRecognition
-]:
+def recognition_values() -> dict[tuple[str, str, str, str, Mode], Published]:
     """Returns (map, database, query, method, mode) -> values."""
     return {
         (
@@ -83,7 +107,7 @@ def recognition_values() -> dict[
             row["query"],
             row["method"],
             "filtered" if row["mode"] == "filtered" else "all",
-        ): PaperRecognition(
+        ): Published(
             float(row["auc"]), float(row["recall_at_1"]), float(row["f1_max"])
         )
         for row in _rows("place_recognition.csv")
@@ -91,5 +115,5 @@ def recognition_values() -> dict[
 
 
 def _rows(name: str) -> list[dict[str, str]]:
-    text = resources.files(__name__).joinpath(name).read_text("utf-8")
+    text = resources.files(__package__).joinpath(name).read_text("utf-8")
     return list(csv.DictReader(text.splitlines()))

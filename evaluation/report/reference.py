@@ -1,0 +1,109 @@
+"""What a report may stand beside: published numbers, and claims to judge.
+
+A study of somebody's own city has none. `Reference` itself is that: nothing
+published, nothing judged. Who has numbers to compare with hands a study an
+object of a class of their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from evaluation.change.change_result import ChangeResult
+from evaluation.recognition.metrics import Mode
+from evaluation.recognition.recognition_result import RecognitionResult
+
+
+@dataclass(frozen=True)
+class Published:
+    """Published numbers of a method on a pair of drives."""
+
+    auc: float
+    recall_at_1: float
+    f1_max: float
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A claim, and what our numbers say.
+
+    Attributes:
+        claim: to be judged.
+        verdict: whether it holds here.
+        evidence: the numbers behind the verdict.
+    """
+
+    claim: str
+    verdict: str
+    evidence: str
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """Findings under a heading that says whose claims they judge."""
+
+    heading: str
+    findings: Sequence[Finding]
+
+
+class Reference:
+    """Published numbers and claims; of this class itself: none.
+
+    Attributes:
+        title: whose they are, as the report calls it.
+        counting: in which modes its methods were counted, for a caption and
+            in brief for a figure; only of use where something is published.
+    """
+
+    title: str = ""
+    counting: tuple[str, str] = ("", "")
+
+    def asks_back(self, map_name: str, earlier: str, last: str) -> bool:
+        """Returns whether the earlier stage also asks the last one."""
+        del map_name, earlier, last
+        return False
+
+    def change(self, map_name: str, stages: Sequence[str]) -> float | None:
+        """Returns the published TCR_sym of a pair of stages."""
+        del map_name, stages
+        return None
+
+    def further_changes(
+        self, map_names: Iterable[str]
+    ) -> list[tuple[str, str, float]]:
+        """Returns changes to compare with: label, stages and TCR_sym."""
+        del map_names
+        return []
+
+    def covers(self, result: RecognitionResult) -> bool:
+        """Returns whether such a number is published."""
+        del result
+        return False
+
+    def mode(self, method: str) -> Mode:
+        """Returns the mode in which a method was counted."""
+        del method
+        return "all"
+
+    def values(self, result: RecognitionResult, mode: Mode) -> Published | None:
+        """Returns what was published of this, counted in that mode."""
+        del result, mode
+        return None
+
+    def auc_over_change(self, method: str) -> list[tuple[float, float]]:
+        """Returns the published points (TCR_sym, AUC) of a method."""
+        del method
+        return []
+
+    def judge(
+        self,
+        results: Sequence[RecognitionResult],
+        changes: Sequence[ChangeResult],
+    ) -> list[Judgement]:
+        """Judges claims by our numbers; without those that cannot be."""
+        del results, changes
+        return []
+
+
+NO_REFERENCE = Reference()
