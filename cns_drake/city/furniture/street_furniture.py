@@ -5,20 +5,8 @@ The front of each faces +x.
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 
-from cns_drake.city.geometry.lofts import (
-    along_x,
-    along_y,
-    beam,
-    lathe,
-    loft,
-    side_prism,
-    tube,
-)
-from cns_drake.city.geometry.mesh import Mesh, box_mesh, boxes, merge_meshes
 from cns_drake.city.geometry.object_parts import (
     ROOT_DEPTH,
     Builder,
@@ -26,7 +14,6 @@ from cns_drake.city.geometry.object_parts import (
     block,
     one_mesh,
     post,
-    single,
 )
 from cns_drake.city.geometry.structures import (
     MeshShape,
@@ -74,7 +61,7 @@ def recycling_bins(rng: np.random.Generator) -> Model:
         )
         for k in range(count)
     ]
-    return assemble(*parts, meshes={"rubbish_container": _rubbish_container()})
+    return assemble(*parts)
 
 
 def bollard(rng: np.random.Generator) -> Model:
@@ -87,14 +74,13 @@ def bollard(rng: np.random.Generator) -> Model:
 def bicycle_rack(rng: np.random.Generator) -> Model:
     """Returns a rack of hoops along y with a few bicycles in it."""
     hoops = int(rng.integers(4, 8))
-    parts, meshes = [], {"rack_hoop": _rack_hoop()}
+    parts = []
     for k in range(hoops):
         y = 0.8 * (k - (hoops - 1) / 2)
         parts.append(
             Part(f"hoop_{k}", MeshShape("rack_hoop"), (0.0, y, 0.0), rgb=_STEEL)
         )
         if rng.uniform() < 0.55:
-            meshes["bicycle"] = _bicycle()
             lean = round(float(rng.uniform(-0.08, 0.08)), 3)
             parts.append(
                 Part(
@@ -105,13 +91,13 @@ def bicycle_rack(rng: np.random.Generator) -> Model:
                     tuple(rng.uniform(0.15, 0.6, 3).round(3).tolist()),
                 )
             )
-    return assemble(*parts, meshes=meshes)
+    return assemble(*parts)
 
 
 def bicycle(rng: np.random.Generator) -> Model:
     """Returns a parked bicycle along x."""
     colour = tuple(rng.uniform(0.15, 0.6, 3).round(3).tolist())
-    return single("bicycle", _bicycle(), colour)
+    return assemble(Part("body", MeshShape("bicycle"), rgb=colour))
 
 
 def parking_meter(rng: np.random.Generator) -> Model:
@@ -151,195 +137,23 @@ def newspaper_boxes(rng: np.random.Generator) -> Model:
         )
         for k in range(count)
     ]
-    return assemble(*parts, meshes={"newspaper_box": _newspaper_box()})
-
-
-@cache
-def _bench() -> Mesh:
-    """Returns a bench 1.8 m long on two cast frames."""
-    pieces = boxes((0.11, 1.8, 0.04), (0.16, 0.02, -0.12), (0,), (0.45,))
-    pieces += [
-        beam((x, -0.9, z), (x, 0.9, z), 0.04, 0.11)
-        for x, z in ((-0.24, 0.6), (-0.3, 0.76))
-    ]
-    for y in (-0.7, 0.7):
-        pieces += [
-            beam((0.2, y, -ROOT_DEPTH), (0.18, y, 0.43), 0.05, 0.05),
-            beam((-0.22, y, -ROOT_DEPTH), (-0.2, y, 0.43), 0.05, 0.05),
-            beam((-0.18, y, 0.43), (-0.34, y, 0.84), 0.05, 0.04),
-            beam((-0.26, y, 0.66), (0.2, y, 0.66), 0.05, 0.04),
-            beam((0.2, y, 0.43), (0.2, y, 0.66), 0.05, 0.04),
-        ]
-    return merge_meshes(*pieces)
-
-
-@cache
-def _litter_bin() -> Mesh:
-    return merge_meshes(
-        lathe([(0.16, -ROOT_DEPTH), (0.16, 0.08), (0.24, 0.7)], 10),
-        lathe([(0.27, 0.7), (0.27, 0.76)], 10),
-        lathe([(0.03, 0.76), (0.03, 0.95)], 4),
-        lathe([(0.28, 0.92), (0.24, 1.0), (0.06, 1.05)], 10),
-    )
-
-
-@cache
-def _rubbish_container() -> Mesh:
-    """Returns a four-wheeled container with a sloping lid, 1.3 m wide."""
-    body = loft(
-        [
-            [(x1, w, z), (x0, w, z), (x0, -w, z), (x1, -w, z)]
-            for x0, x1, w, z in (
-                (-0.36, 0.4, 0.58, 0.18),
-                (-0.45, 0.48, 0.66, 1.02),
-            )
-        ]
-    )
-    lid = side_prism(
-        [(-0.48, 1.02), (0.52, 1.02), (0.52, 1.08), (0.1, 1.32), (-0.48, 1.34)],
-        -0.68,
-        0.68,
-    )
-    wheels = boxes((0.16, 0.06, 0.2), (-0.3, 0.3), (-0.5, 0.5), (0.1,))
-    return merge_meshes(body, lid, *wheels)
-
-
-@cache
-def _hydrant() -> Mesh:
-    side = lathe([(0.07, -0.2), (0.07, 0.2)], 6)
-    return merge_meshes(
-        lathe(
-            [
-                (0.16, -ROOT_DEPTH),
-                (0.16, 0.06),
-                (0.11, 0.08),
-                (0.11, 0.5),
-                (0.14, 0.52),
-                (0.13, 0.62),
-                (0.05, 0.72),
-            ],
-            8,
-        ),
-        along_y(side).moved((0, 0, 0.42)),
-        along_x(side).moved((0.08, 0, 0.4)),
-    )
-
-
-@cache
-def _rack_hoop() -> Mesh:
-    """Returns an inverted U of tube, 0.7 m long, 0.8 m high."""
-    corners = [
-        (-0.35, 0, -ROOT_DEPTH),
-        (-0.35, 0, 0.72),
-        (-0.25, 0, 0.8),
-        (0.25, 0, 0.8),
-        (0.35, 0, 0.72),
-        (0.35, 0, -ROOT_DEPTH),
-    ]
-    return merge_meshes(
-        *(
-            tube(corners[k : k + 2], (0.025, 0.025), 5)
-            for k in range(len(corners) - 1)
-        )
-    )
-
-
-@cache
-def _bicycle() -> Mesh:
-    """Returns a bicycle along x, wheels 0.7 m across."""
-    hubs = {"rear": (-0.52, 0.0, 0.34), "front": (0.55, 0.0, 0.34)}
-    crank, seat, head = (-0.08, 0, 0.3), (-0.25, 0, 0.88), (0.4, 0, 0.86)
-    pieces = []
-    for hub in hubs.values():
-        angle = 2 * np.pi * np.arange(11) / 10
-        rim = np.column_stack(
-            [np.cos(angle), 0 * angle, np.sin(angle)]
-        ) * 0.33 + np.asarray(hub)
-        pieces += [tube(rim[k : k + 2], (0.02, 0.02), 3) for k in range(10)]
-        pieces += [beam(rim[k], rim[k + 5], 0.01, 0.01) for k in range(5)]
-    pieces += [
-        tube(line, (0.02, 0.02), 4)
-        for line in (
-            (hubs["rear"], crank),
-            (hubs["rear"], seat),
-            (crank, seat),
-            (crank, head),
-            (seat, head),
-            (head, hubs["front"]),
-            (head, (0.33, 0, 1.0)),
-        )
-    ]
-    pieces += [
-        tube([(0.33, -0.28, 1.0), (0.33, 0.28, 1.0)], (0.018, 0.018), 4),
-        box_mesh((0.26, 0.14, 0.06), (-0.27, 0, 0.95)),
-    ]
-    return merge_meshes(*pieces)
-
-
-@cache
-def _post_box() -> Mesh:
-    return merge_meshes(
-        lathe(
-            [
-                (0.27, -ROOT_DEPTH),
-                (0.27, 0.12),
-                (0.23, 0.14),
-                (0.23, 1.3),
-                (0.28, 1.33),
-                (0.27, 1.42),
-                (0.1, 1.55),
-            ],
-            10,
-        ),
-        box_mesh((0.06, 0.3, 0.05), (0.23, 0, 1.2)),
-    )
-
-
-@cache
-def _cabinet() -> Mesh:
-    return merge_meshes(
-        box_mesh((0.4, 0.98, 0.4), (0, 0, -0.1)),
-        box_mesh((0.34, 0.46, 1.0), (0, -0.24, 0.6)),
-        box_mesh((0.34, 0.46, 1.0), (0, 0.24, 0.6)),
-        box_mesh((0.44, 1.02, 0.06), (0, 0, 1.13)),
-        box_mesh((0.05, 0.03, 0.16), (0.18, 0.06, 0.7)),
-    )
-
-
-@cache
-def _newspaper_box() -> Mesh:
-    outline = [
-        (0.22, 0.35),
-        (0.22, 0.95),
-        (0.1, 1.1),
-        (-0.2, 1.1),
-        (-0.2, 0.35),
-    ]
-    return merge_meshes(
-        side_prism(outline, -0.22, 0.22),
-        box_mesh((0.3, 0.3, 0.4), (0, 0, 0.16)),
-        box_mesh((0.04, 0.34, 0.3), (0.22, 0, 0.72)),
-    )
+    return assemble(*parts)
 
 
 STREET_FURNITURE = {
-    "bench": one_mesh("bench", _bench, [_WOOD], y=(0.9, 1.15)),
+    "bench": one_mesh("bench", [_WOOD], y=(0.9, 1.15)),
     "stone_bench": Builder("other-object", stone_bench),
-    "litter_bin": one_mesh(
-        "litter_bin", _litter_bin, [_DARK, _GREEN, _STEEL], z=(0.9, 1.1)
-    ),
+    "litter_bin": one_mesh("litter_bin", [_DARK, _GREEN, _STEEL], z=(0.9, 1.1)),
     "recycling_bins": Builder("other-object", recycling_bins),
     "bollard": Builder("pole", bollard),
-    "hydrant": one_mesh("hydrant", _hydrant, [_RED], z=(0.95, 1.1)),
+    "hydrant": one_mesh("hydrant", [_RED], z=(0.95, 1.1)),
     "bicycle_rack": Builder("bicycle", bicycle_rack),
     "bicycle": Builder("bicycle", bicycle),
     "parking_meter": Builder("pole", parking_meter),
     "ticket_machine": Builder("other-object", ticket_machine),
-    "post_box": one_mesh(
-        "post_box", _post_box, [_RED, _YELLOW], z=(0.96, 1.06)
-    ),
+    "post_box": one_mesh("post_box", [_RED, _YELLOW], z=(0.96, 1.06)),
     "cabinet": one_mesh(
-        "cabinet", _cabinet, [(0.52, 0.55, 0.5)], y=(0.8, 1.6), z=(0.85, 1.15)
+        "cabinet", [(0.52, 0.55, 0.5)], y=(0.8, 1.6), z=(0.85, 1.15)
     ),
     "newspaper_boxes": Builder("other-object", newspaper_boxes),
 }

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from functools import cache, partial
+from functools import partial
 
 import numpy as np
 
-from cns_drake.city.geometry.lofts import lathe, tube
-from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 from cns_drake.city.geometry.object_parts import (
     Builder,
     assemble,
@@ -83,7 +81,7 @@ def curved_lamp(
                 rgb=_DARK,
             )
         )
-    return assemble(*parts, meshes={"lamp_curved_arm": _curved_arm()})
+    return assemble(*parts)
 
 
 def lantern(rng: np.random.Generator, *, height: float | None = None) -> Model:
@@ -95,7 +93,7 @@ def lantern(rng: np.random.Generator, *, height: float | None = None) -> Model:
     """
     drawn = float(rng.uniform(3.8, 4.4))
     height = drawn if height is None else height
-    parts = (
+    return assemble(
         post("base", 0.11, 0.7, rgb=_GREEN),
         post("mast", 0.05, height - 0.7, rgb=_GREEN),
         Part(
@@ -104,39 +102,6 @@ def lantern(rng: np.random.Generator, *, height: float | None = None) -> Model:
             xyz=(0.0, 0.0, height - 0.75),
             rgb=_LAMP,
         ),
-    )
-    return assemble(*parts, meshes={"lamp_lantern": _lantern_head()})
-
-
-@cache
-def _curved_arm() -> Mesh:
-    """Returns a quarter circle of tube that ends in a flat lamp."""
-    angle = np.linspace(0.0, 0.5 * np.pi, 7)
-    path = np.column_stack(
-        [1.2 * (1 - np.cos(angle)), np.zeros(7), 1.2 * np.sin(angle)]
-    )
-    pieces = [
-        tube(path[k : k + 2], (0.055, 0.055), 6) for k in range(len(path) - 1)
-    ]
-    head = lathe(
-        [(0.05, 0.08), (0.17, 0.03), (0.17, -0.03), (0.1, -0.08)][::-1], 8
-    )
-    stretched = Mesh(head.vertices * (2.2, 1.0, 1.0), head.faces)
-    return merge_meshes(*pieces, stretched.moved((1.5, 0.0, 1.19)))
-
-
-@cache
-def _lantern_head() -> Mesh:
-    return lathe(
-        [
-            (0.06, 0.0),
-            (0.12, 0.06),
-            (0.2, 0.5),
-            (0.27, 0.52),
-            (0.1, 0.68),
-            (0.03, 0.75),
-        ],
-        6,
     )
 
 

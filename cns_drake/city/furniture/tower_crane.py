@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 
-from cns_drake.city.geometry.lofts import beam
-from cns_drake.city.geometry.mesh import Mesh, box_mesh, merge_meshes
 from cns_drake.city.geometry.object_parts import Builder, assemble, bar, block
 from cns_drake.city.geometry.structures import MeshShape, Model, Part
 
 _YELLOW = (0.84, 0.66, 0.16)
 _CONCRETE = (0.62, 0.61, 0.58)
 _SECTION = 4.0
-_MAST_WIDTH = 1.6
 
 
 def tower_crane(
@@ -81,51 +76,7 @@ def tower_crane(
         bar("rope", at(trolley, hook), at(trolley, top + 0.6), 0.04),
         block("hook", (0.4, 0.5, 0.9), at(trolley, hook), heading, _YELLOW),
     ]
-    return assemble(*parts, meshes={
-        "crane_mast": _mast(),
-        "crane_jib": _jib(),
-        "crane_cab": _cab(),
-    })  # fmt: skip
-
-
-@cache
-def _mast() -> Mesh:
-    """Returns one section of a square lattice mast."""
-    h, z = _MAST_WIDTH / 2, _SECTION
-    corners = [(h, h), (-h, h), (-h, -h), (h, -h)]
-    pieces = [beam((x, y, 0), (x, y, z), 0.16, 0.16) for x, y in corners]
-    for k, (a, b) in enumerate(
-        zip(corners, corners[1:] + corners[:1], strict=True)
-    ):
-        pieces.append(beam((*a, 0), (*b, 0), 0.09, 0.09))
-        low, high = (a, b) if k % 2 else (b, a)
-        pieces.append(beam((*low, 0), (*high, z / 2), 0.08, 0.08))
-        pieces.append(beam((*high, z / 2), (*low, z), 0.08, 0.08))
-    return merge_meshes(*pieces)
-
-
-@cache
-def _jib() -> Mesh:
-    """Returns one section of a three-boom lattice jib, from x = 0."""
-    x, w, tall = _SECTION, 0.65, 1.3
-    booms = [(-w, 0.0), (w, 0.0), (0.0, tall)]
-    pieces = [beam((0, y, z), (x, y, z), 0.12, 0.12) for y, z in booms]
-    for y in (-w, w):
-        pieces += [
-            beam((0, y, 0), (x / 2, 0, tall), 0.07, 0.07),
-            beam((x / 2, 0, tall), (x, y, 0), 0.07, 0.07),
-        ]
-    pieces.append(beam((0, -w, 0), (x, w, 0), 0.06, 0.06))
-    return merge_meshes(*pieces)
-
-
-@cache
-def _cab() -> Mesh:
-    """Returns the slewing ring and the driver's cab."""
-    return merge_meshes(
-        box_mesh((2.0, 2.0, 0.6), (0, 0, 0.3)),
-        box_mesh((1.8, 1.2, 1.9), (1.6, -1.2, -0.4)),
-    )
+    return assemble(*parts)
 
 
 CRANES = {"tower_crane": Builder("other-structure", tower_crane)}

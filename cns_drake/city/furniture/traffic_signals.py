@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import cache
-
 import numpy as np
 
-from cns_drake.city.geometry.lofts import along_x, along_y, lathe, prism
-from cns_drake.city.geometry.mesh import Mesh, box_mesh, merge_meshes
 from cns_drake.city.geometry.object_parts import (
     Builder,
     assemble,
@@ -48,14 +43,13 @@ def mast_arm_light(
     arm = drawn if arm is None else arm
     height = 6.0
     head = MeshShape("signal_head_3")
-    parts = (
+    return assemble(
         post("mast", 0.11, height + 0.3, rgb=_STEEL),
         bar("arm", (0, 0, height), (arm, 0, height + 0.15), 0.06, _STEEL),
         Part("signal_0", head, xyz=(arm - 0.3, 0.1, height - 0.35), rgb=_BLACK),
         Part("signal_1", head, xyz=(0.45 * arm, 0.1, height - 0.4), rgb=_BLACK),
         Part("signal_2", head, xyz=(0.0, 0.15, 3.0), rgb=_BLACK),
     )
-    return assemble(*parts, meshes={"signal_head_3": _signal_head(3)})
 
 
 def post_light(rng: np.random.Generator) -> Model:
@@ -77,7 +71,7 @@ def _light(mast: Part, lamps: int, z: float, *others: Part) -> Model:
     """Returns a head of `lamps` at a mast, its middle at height z [m]."""
     name = f"signal_head_{lamps}"
     head = Part("signal", MeshShape(name), xyz=(0.0, 0.1, z), rgb=_BLACK)
-    return assemble(mast, head, *others, meshes={name: _signal_head(lamps)})
+    return assemble(mast, head, *others)
 
 
 def round_sign(rng: np.random.Generator) -> Model:
@@ -90,15 +84,13 @@ def round_sign(rng: np.random.Generator) -> Model:
 def triangular_sign(rng: np.random.Generator) -> Model:
     """Returns a triangular sign that faces +x."""
     height = float(rng.uniform(2.6, 3.0))
-    meshes = {"sign_triangle": _plate(3, 0.52)}
-    return _sign(height, MeshShape("sign_triangle"), 0.45, _RED, meshes)
+    return _sign(height, MeshShape("sign_triangle"), 0.45, _RED)
 
 
 def stop_sign(rng: np.random.Generator) -> Model:
     """Returns an eight-cornered stop sign that faces +x."""
     height = float(rng.uniform(2.5, 2.9))
-    meshes = {"sign_octagon": _plate(8, 0.4)}
-    return _sign(height, MeshShape("sign_octagon"), 0.4, _RED, meshes)
+    return _sign(height, MeshShape("sign_octagon"), 0.4, _RED)
 
 
 def _sign(
@@ -106,14 +98,11 @@ def _sign(
     shape: Shape,
     drop: float,
     rgb: tuple[float, float, float],
-    meshes: Mapping[str, Mesh] | None = None,
     rpy: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Model:
     """Returns a plate on a mast, its middle `drop` below the top [m]."""
     plate = Part("plate", shape, (0.05, 0.0, height - drop), rpy, rgb)
-    return assemble(
-        post("mast", 0.035, height, rgb=_STEEL), plate, meshes=meshes
-    )
+    return assemble(post("mast", 0.035, height, rgb=_STEEL), plate)
 
 
 def rectangular_sign(rng: np.random.Generator) -> Model:
@@ -157,33 +146,6 @@ def direction_board(rng: np.random.Generator) -> Model:
         post("mast_1", 0.06, height, (0.0, -side), _STEEL),
         block("plate", (0.05, width, 1.7), (0.09, 0, 3.75), rgb=_BLUE),
     )
-
-
-@cache
-def _signal_head(lamps: int) -> Mesh:
-    """Returns a signal box with its lamps; centred, facing +y."""
-    pitch = 0.3
-    tall = pitch * lamps + 0.08
-    pieces = [
-        box_mesh((0.3, 0.2, tall)),
-        box_mesh((0.52, 0.03, tall + 0.2), (0.0, -0.05, 0.0)),
-    ]
-    for k in range(lamps):
-        hood = lathe([(0.13, 0.0), (0.13, 0.18)], 8)
-        z = (k - (lamps - 1) / 2) * pitch
-        pieces.append(along_y(hood).moved((0.0, 0.09, z)))
-    return merge_meshes(*pieces)
-
-
-@cache
-def _plate(corners: int, radius: float) -> Mesh:
-    """Returns a thin regular polygon that faces +x, point or edge up."""
-    start = np.pi / 2 if corners == 3 else np.pi / corners
-    angle = start + 2 * np.pi * np.arange(corners) / corners
-    flat = prism(
-        radius * np.column_stack([np.cos(angle), np.sin(angle)]), -0.015, 0.015
-    )
-    return along_x(flat)
 
 
 TRAFFIC_SIGNALS = {

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from shapely.geometry import MultiPoint, Polygon
 
 from cns_drake.city.geometry.mesh import Mesh, box_mesh
+from cns_drake.city.geometry.object_meshes import object_mesh
 from cns_drake.city.geometry.structures import (
     BoxShape,
     CylinderShape,
@@ -100,20 +101,8 @@ def block(
     )
 
 
-def single(
-    mesh_name: str,
-    mesh: Mesh,
-    rgb: tuple[float, float, float],
-    scale: tuple[float, float, float] = (1.0, 1.0, 1.0),
-) -> Model:
-    """Returns a model of one mesh."""
-    part = Part("body", MeshShape(mesh_name, scale), rgb=rgb)
-    return assemble(part, meshes={mesh_name: mesh})
-
-
 def one_mesh(
     name: str,
-    make: Callable[[], Mesh],
     colours: Sequence[tuple[float, float, float]],
     semantic_class: str = "other-object",
     **stretch: tuple[float, float],
@@ -122,7 +111,6 @@ def one_mesh(
 
     Args:
         name: of the mesh.
-        make: returns the mesh.
         colours: to choose from.
         semantic_class: of the objects.
         stretch: x, y or z -> range of the scale along this axis.
@@ -134,7 +122,7 @@ def one_mesh(
             scale["xyz".index(axis)] = round(float(rng.uniform(low, high)), 3)
         count = len(colours)
         rgb = colours[int(rng.integers(count)) if count > 1 else 0]
-        return single(name, make(), rgb, triple(scale))
+        return assemble(Part("body", MeshShape(name, triple(scale)), rgb=rgb))
 
     return Builder(semantic_class, build)
 
@@ -145,12 +133,14 @@ def triple(values: Iterable[float]) -> tuple[float, float, float]:
     return float(x), float(y), float(z)
 
 
-def assemble(*parts: Part, meshes: Mapping[str, Mesh] | None = None) -> Model:
-    """Returns the model of some parts; its footprint comes from them.
+def assemble(*parts: Part) -> Model:
+    """Returns the model of some parts, whose meshes are `object_meshes`.
 
-    The footprint is the convex hull of all geometry below `HEADROOM`.
+    Its footprint is the convex hull of all geometry below `HEADROOM`.
     """
-    meshes = dict(meshes or {})
+    shapes = [part.shape for part in parts]
+    names = [shape.mesh for shape in shapes if isinstance(shape, MeshShape)]
+    meshes = {name: object_mesh(name) for name in names}
     return Model(parts, meshes, ground_footprint(parts, meshes))
 
 

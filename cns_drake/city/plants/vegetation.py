@@ -2,30 +2,24 @@
 
 from __future__ import annotations
 
-from functools import cache, partial
+from functools import partial
 import string
 
 import numpy as np
 
-from cns_drake.city.geometry.mesh import Mesh
+from cns_drake.city.geometry.object_meshes import object_mesh
 from cns_drake.city.geometry.object_parts import Builder, assemble, triple
 from cns_drake.city.geometry.structures import MeshShape, Model, Part
 from cns_drake.city.plants.tree_species import SPECIES
 
 # Species that may stand on a sidewalk.
-STREET_TREES = tuple(s.name for s in SPECIES.values() if s.street)
-
-_SEED = 7001
+STREET_TREES = tuple(name for name, kind in SPECIES.items() if kind.street)
 
 
-@cache
-def tree_meshes(species: str, variant: int) -> dict[str, Mesh]:
-    """Returns the wood and leaf meshes of a variant by their names."""
-    kind = SPECIES[species]
-    rng = np.random.default_rng([_SEED, kind.number, variant])
-    wood, crown = kind.grow(rng)
+def mesh_names(species: str, variant: int) -> tuple[str, str]:
+    """Returns the names of the wood and the leaves of a variant."""
     stem = f"{species}_{string.ascii_lowercase[variant]}"
-    return {f"{stem}_wood": wood, f"{stem}_crown": crown}
+    return f"{stem}_wood", f"{stem}_crown"
 
 
 def tree(
@@ -54,15 +48,14 @@ def tree(
         height = drawn_height
     if variant is None:
         variant = drawn_variant
-    meshes = tree_meshes(species, variant)
-    up = height / max(m.vertices[:, 2].max() for m in meshes.values())
+    names = wood, crown = mesh_names(species, variant)
+    up = height / max(object_mesh(n).vertices[:, 2].max() for n in names)
     # Tall trees are wider too, but less than in proportion.
     across = up**0.7 * stretch
     scale = triple(round(float(s), 3) for s in (*across, up))
-    wood, crown = meshes
     rgb = np.clip(kind.leaf_rgb * tint, 0, 1)
     rpy = (0.0, 0.0, round(yaw, 3))
-    parts = (
+    return assemble(
         Part("wood", MeshShape(wood, scale), rpy=rpy, rgb=kind.bark_rgb),
         Part(
             "crown",
@@ -71,7 +64,6 @@ def tree(
             rgb=triple(round(float(c), 3) for c in rgb),
         ),
     )
-    return assemble(*parts, meshes=meshes)
 
 
 TREES = {

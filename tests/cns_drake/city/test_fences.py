@@ -3,6 +3,7 @@ import numpy as np
 import pytest
 
 from cns_drake.city.furniture.fences import RUN_KINDS
+from cns_drake.city.geometry.object_meshes import object_mesh
 from cns_drake.city.geometry.structures import MeshShape
 from cns_drake.city.placement.objects import OBJECTS
 
@@ -65,8 +66,8 @@ def test_panels_join_without_a_gap(name, length):
 
 @pytest.mark.parametrize("name", RUN_KINDS)
 def test_panels_are_made_of_closed_solids(name):
-    for count in (1, 2):
-        mesh = RUN_KINDS[name].make(count)
+    for count in (1, 2, 4, 8):
+        mesh = object_mesh(f"{name}_x{count}")
         assert is_closed(mesh)
         assert all(volume > 0 for _, volume in solids(mesh))
 
@@ -79,7 +80,7 @@ def test_length_must_be_positive(length):
 
 def share_hit(name):
     """The share of level rays across a fence that it stops."""
-    mesh = RUN_KINDS[name].make(4)
+    mesh = object_mesh(f"{name}_x4")
     rng = np.random.default_rng(2)
     x = rng.uniform(0.3, 4 * RUN_KINDS[name].panel - 0.3, 600)
     z = rng.uniform(0.3, 0.7, 600)

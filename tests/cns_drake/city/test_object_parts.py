@@ -10,6 +10,7 @@ from cns_drake.city.geometry.object_parts import (
     assemble,
     bar,
     block,
+    ground_footprint,
     post,
     rotation,
 )
@@ -73,7 +74,7 @@ def test_footprint_holds_round_shapes_and_scaled_turned_meshes():
         ),
     )
     meshes = {"crate": box_mesh((1.0, 1.0, 0.4))}
-    footprint = assemble(*parts, meshes=meshes).footprint
+    footprint = ground_footprint(parts, meshes)
     rng = np.random.default_rng(6)
     for part in parts:
         points = surface_points(part, meshes, rng, 500)

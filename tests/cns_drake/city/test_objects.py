@@ -6,13 +6,15 @@ import pytest
 from shapely.geometry import MultiPoint
 
 from cns_drake.city.furniture.fences import RUN_KINDS
+from cns_drake.city.geometry.mesh import Mesh
+from cns_drake.city.geometry.object_meshes import FOLDER, object_mesh
 from cns_drake.city.geometry.structures import MeshShape
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plants.tree_species import SPECIES
-from cns_drake.city.plants.vegetation import tree_meshes
 from cns_drake.scene.semantics import CLASS_IDS
 
 SEEDS = range(6)
+MESHES = sorted(path.stem for path in FOLDER.glob("*.obj"))
 MOST_VISUALS = {
     **dict.fromkeys(SPECIES, 2),
     "lamp_post": 5,
@@ -33,24 +35,6 @@ def build(name, seed):
     return OBJECTS[name].build(np.random.default_rng([seed, 11]))
 
 
-@pytest.fixture(scope="module")
-def all_meshes():
-    """Every mesh of every object: name -> mesh, over many draws."""
-    meshes = {}
-    for name in SPECIES:
-        for variant in range(SPECIES[name].variants):
-            meshes.update(tree_meshes(name, variant))
-    for name in RUN_KINDS:
-        model = OBJECTS[name].build(
-            np.random.default_rng(0), length=15 * RUN_KINDS[name].panel
-        )
-        meshes.update(model.meshes)
-    for name in OBJECTS:
-        for seed in range(24):
-            meshes.update(build(name, seed).meshes)
-    return meshes
-
-
 @pytest.mark.parametrize("name", OBJECTS)
 def test_same_generator_same_bytes(name):
     a, b = build(name, 1), build(name, 1)
@@ -61,14 +45,12 @@ def test_same_generator_same_bytes(name):
     }
 
 
-def test_one_mesh_per_name(all_meshes):
-    texts = {}
+def test_every_mesh_is_used():
+    used = {f"{name}_x{count}" for name in RUN_KINDS for count in (1, 2, 4, 8)}
     for name in OBJECTS:
-        for seed in SEEDS:
-            for key, mesh in build(name, seed).meshes.items():
-                size = (len(mesh.vertices), float(mesh.vertices.sum()))
-                assert texts.setdefault(key, size) == size
-    assert set(texts) <= set(all_meshes)
+        for seed in range(40):
+            used |= set(build(name, seed).meshes)
+    assert used == set(MESHES)
 
 
 @pytest.mark.parametrize("name", OBJECTS)
@@ -111,16 +93,23 @@ def test_footprint_contains_the_geometry_near_the_ground(name):
         assert hull.buffer(0.3).covers(model.footprint)
 
 
-@pytest.mark.parametrize("name", OBJECTS)
+@pytest.mark.parametrize("name", MESHES)
 def test_meshes_obey_the_mesh_contract(name):
-    for mesh in build(name, 2).meshes.values():
-        vertices, faces = parse_obj(mesh.to_obj())
-        assert {len(face) for face in faces} <= {3, 4}
-        written = type(mesh)(vertices, faces)
-        assert out_of_plane(written) < 2e-3
-        a, b, c = (vertices[written.triangles()[:, k]] for k in range(3))
-        area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
-        assert area.min() > 0
+    vertices, faces = parse_obj(object_mesh(name).to_obj())
+    assert {len(face) for face in faces} <= {3, 4}
+    written = Mesh(vertices, faces)
+    assert out_of_plane(written) < 2e-3
+    a, b, c = (vertices[written.triangles()[:, k]] for k in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    assert area.min() > 0
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_meshes_are_as_written(name):
+    vertices, faces = parse_obj((FOLDER / f"{name}.obj").read_text())
+    mesh = object_mesh(name)
+    np.testing.assert_array_equal(mesh.vertices, vertices)
+    assert list(map(tuple, faces)) == list(mesh.faces)
 
 
 @pytest.mark.parametrize("name", MOST_VISUALS)
@@ -129,10 +118,10 @@ def test_few_visuals(name):
         assert len(build(name, seed).parts) <= MOST_VISUALS[name]
 
 
-def test_budget_of_all_meshes(all_meshes):
-    sizes = {name: len(mesh.to_obj()) for name, mesh in all_meshes.items()}
-    assert max(sizes.values()) <= 60_000
-    assert sum(sizes.values()) <= 3_000_000
+def test_budget_of_all_meshes():
+    sizes = [(FOLDER / f"{name}.obj").stat().st_size for name in MESHES]
+    assert max(sizes) <= 80_000
+    assert sum(sizes) <= 3_500_000
 
 
 @pytest.mark.parametrize(

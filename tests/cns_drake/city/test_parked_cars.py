@@ -2,7 +2,7 @@ from helpers.mesh_checks import first_hit, is_closed, solids
 import numpy as np
 import pytest
 
-from cns_drake.city.furniture.parked_cars import FORMS, vehicle_meshes
+from cns_drake.city.furniture.parked_cars import FORMS
 from cns_drake.city.geometry.structures import MeshShape
 from cns_drake.city.placement.objects import OBJECTS
 
@@ -18,6 +18,37 @@ SIZES = {
     "box_truck": ((6.0, 7.5), (2.0, 2.4), (2.8, 3.3)),
     "bus": ((10.5, 12.5), (2.4, 2.6), (2.9, 3.3)),
 }
+
+
+# x of the axles, radius of the wheels, height of the sill [m].
+WHEELS = {
+    "city_car": ((-1.18, 1.17), 0.29, 0.2),
+    "hatchback": ((-1.32, 1.3), 0.31, 0.2),
+    "saloon": ((-1.4, 1.42), 0.33, 0.19),
+    "estate": ((-1.38, 1.4), 0.32, 0.2),
+    "suv": ((-1.36, 1.36), 0.37, 0.27),
+    "pickup": ((-1.6, 1.6), 0.38, 0.33),
+    "van": ((-1.6, 1.75), 0.35, 0.25),
+    "box_truck": ((-1.75, 2.15), 0.38, 0.36),
+    "bus": ((-2.9, 2.9), 0.48, 0.3),
+}
+# x of the rear and front end of the roof of the cabin, its height [m].
+ROOFS = {
+    "city_car": (-1.5, 0.3, 1.52),
+    "hatchback": (-1.45, 0.2, 1.47),
+    "saloon": (-0.95, 0.15, 1.45),
+    "estate": (-1.9, 0.2, 1.48),
+    "suv": (-1.75, 0.35, 1.7),
+    "pickup": (-0.8, 0.5, 1.8),
+    "van": (-2.68, 1.45, 2.45),
+    "box_truck": (1.35, 2.3, 2.25),
+    "bus": (-5.5, 5.42, 3.05),
+}
+
+
+def vehicle_meshes(form):
+    """Returns the meshes of a vehicle by their names."""
+    return OBJECTS[form].build(np.random.default_rng(0)).meshes
 
 
 def all_vertices(form):
@@ -63,35 +94,37 @@ def test_triangle_budget(form):
 
 @pytest.mark.parametrize("form", FORMS)
 def test_wheels_stand_on_the_ground_and_show_in_their_arches(form):
-    outline = FORMS[form]
+    axles, radius, _ = WHEELS[form]
     meshes = vehicle_meshes(form)
     assert all_vertices(form)[:, 2].min() == pytest.approx(0.0, abs=0.02)
     trim, body = meshes[f"{form}_trim"], meshes[f"{form}_body"]
     # Level rays from the left at the height of the axles.
     n = 200
-    x = np.linspace(-outline.length / 2 + 0.1, outline.length / 2 - 0.1, n)
-    z = 0.85 * outline.wheel_radius + 0 * x
+    reach = body.vertices[:, 0].max() - 0.1
+    x = np.linspace(-reach, reach, n)
+    z = 0.85 * radius + 0 * x
     origins = np.column_stack([x, np.full(n, 5.0), z])
     d = np.tile((0.0, -1.0, 0.0), (n, 1))
     to_trim = first_hit(trim.vertices, trim.triangles(), origins, d)
     to_body = first_hit(body.vertices, body.triangles(), origins, d)
     near = to_trim < to_body
-    for axle in outline.axles:
-        in_wheel = np.abs(x - axle) < 0.8 * outline.wheel_radius
+    for axle in axles:
+        in_wheel = np.abs(x - axle) < 0.8 * radius
         assert near[in_wheel].all()
-    away = np.min([np.abs(x - a) for a in outline.axles], axis=0)
-    middle = away > 1.3 * outline.wheel_radius
-    middle &= (x > outline.axles[0]) & (x < outline.axles[1])
+    away = np.min([np.abs(x - a) for a in axles], axis=0)
+    middle = away > 1.3 * radius
+    middle &= (x > axles[0]) & (x < axles[1])
     assert middle.any()
     assert not near[middle].any()
 
 
 @pytest.mark.parametrize("form", FORMS)
 def test_rays_pass_below_the_sill_but_not_through_the_cabin(form):
-    outline = FORMS[form]
+    sill = WHEELS[form][2]
+    rear, front, roof = ROOFS[form]
     meshes = vehicle_meshes(form).values()
-    low = np.array([[0.0, 5.0, 0.6 * outline.sill]])
-    high = np.array([[np.mean(outline.cabin_roof), 5.0, outline.height - 0.3]])
+    low = np.array([[0.0, 5.0, 0.6 * sill]])
+    high = np.array([[(rear + front) / 2, 5.0, roof - 0.3]])
     d = np.array([[0.0, -1.0, 0.0]])
     for origin, passes in ((low, True), (high, False)):
         hit = min(
