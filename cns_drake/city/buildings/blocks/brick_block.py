@@ -6,7 +6,6 @@ from cns_drake.city.buildings.parts import bays, details, tiers
 from cns_drake.city.buildings.parts.facades import Band, Facade
 from cns_drake.city.buildings.parts.roof_equipment import equip_roof
 from cns_drake.city.buildings.parts.site import Assembly, Dice
-from cns_drake.city.geometry.structures import MeshShape
 
 _BRICKS = (
     (0.56, 0.33, 0.27),
@@ -122,9 +121,8 @@ def _add_fire_stairs(
     if wall.length < 9.0:
         return
     x, y = wall.point(2.8 + p.stairs_at * (wall.length - 5.6), 0.0)
-    out.share("fire_stairs_flight", details.fire_stairs_flight())
     scale = (1.0, 1.0, round(storey / details.FIRE_STAIRS_STOREY_M, 3))
-    shape = MeshShape("fire_stairs_flight", scale)
+    shape = out.shared("fire_stairs_flight", scale)
     for k in range(round((top - bottom) / storey) - 1):
         spot = (x, y, bottom + k * storey)
         part = f"fire_stairs_{k}"

@@ -7,7 +7,6 @@ outwards, z up.
 from __future__ import annotations
 
 from collections.abc import Sequence
-import functools
 import math
 
 import numpy as np
@@ -22,7 +21,6 @@ from cns_drake.city.buildings.parts.facades import (
 )
 from cns_drake.city.buildings.parts.site import Assembly, Rgb
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
-from cns_drake.city.geometry.structures import MeshShape
 
 _POST_M = 0.16
 # Depth of the windows of bays [m].
@@ -129,28 +127,13 @@ def add_railing(
     """
     p, q = wall.point(*start), wall.point(*end)
     length = float(np.hypot(*(q - p)))
-    out.share("railing_panel", railing_panel())
     out.place(
         part,
-        MeshShape("railing_panel", (round(length / RAILING_M, 3), 1.0, 1.0)),
+        out.shared("railing_panel", (round(length / RAILING_M, 3), 1.0, 1.0)),
         (*((p + q) / 2), z),
         math.atan2(*(q - p)[::-1]),
         rgb=rgb,
     )
-
-
-@functools.cache
-def railing_panel() -> Mesh:
-    """Two rails on posts along x, 0.95 m high; parts scale its length."""
-    half = RAILING_M / 2
-    rails = [
-        massing.box(-half, half, -0.03, 0.03, z, z + 0.07) for z in (0.12, 0.88)
-    ]
-    posts = [
-        massing.box(x - 0.03, x + 0.03, -0.02, 0.02, 0.0, 0.9, bottom=False)
-        for x in np.linspace(-half + 0.05, half - 0.05, 6).tolist()
-    ]
-    return merge_meshes(*rails, *posts)
 
 
 def add_bay_window(

@@ -7,14 +7,13 @@ along the wall, y outwards and z up.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
-import functools
 import math
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cns_drake.city.buildings.parts import bays, massing
-from cns_drake.city.geometry.mesh import Mesh, box_mesh, boxes, merge_meshes
+from cns_drake.city.geometry.mesh import Mesh, box_mesh, merge_meshes
 
 # Height that the shared flight of fire stairs climbs; parts scale it [m].
 FIRE_STAIRS_STOREY_M = 3.4
@@ -288,29 +287,6 @@ def steps(x0: float, x1: float, reach: float, rise: float, count: int) -> Mesh:
         top = rise * (k + 1) / count
         pieces.append(massing.box(x0, x1, 0.0, y, -massing.FOUNDATION_M, top))
     return merge_meshes(*pieces)
-
-
-@functools.cache
-def fire_stairs_flight() -> Mesh:
-    """One storey of iron fire stairs, a mesh that all buildings share.
-
-    In wall coordinates turned right-handed (x along the wall, y into it):
-    a landing 4 m long and 1.1 m deep at z = 0 with its railing, and a
-    flight up to the next one at z = `FIRE_STAIRS_STOREY_M`.
-    """
-    length, reach, high = 4.0, 1.1, FIRE_STAIRS_STOREY_M
-    end, middle = length / 2, -reach / 2
-    bars = [
-        box_mesh((length, reach, 0.08), (0.0, middle, 0.0)),
-        *boxes((length, 0.05, 0.06), (0.0,), (-reach,), (0.5, 1.0)),
-        *boxes((0.05, reach, 0.06), (-end, end), (middle,), (1.0,)),
-        *boxes((0.06, 0.06, 1.0), (-end, 0.0, end), (-reach,), (0.5,)),
-    ]
-    bars += [
-        beam((-1.6, y, 0.0), (1.4, y, high), 0.12)
-        for y in (-0.35 * reach, -0.85 * reach)
-    ]
-    return merge_meshes(*bars)
 
 
 def column(x: float, y: float, z0: float, z1: float, radius: float) -> Mesh:

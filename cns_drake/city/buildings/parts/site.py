@@ -12,6 +12,7 @@ from shapely.geometry import Polygon
 
 from cns_drake.city.buildings.parts import massing
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
+from cns_drake.city.geometry.object_meshes import object_mesh
 from cns_drake.city.geometry.structures import MeshShape, Model, Part, Shape
 
 Rgb = tuple[float, float, float]
@@ -249,9 +250,12 @@ class Assembly:
             z = z0 + k * step
             self.place(f"{part}_{k:02d}", shape, (0.0, 0.0, z), rgb=rgb)
 
-    def share(self, mesh_name: str, mesh: Mesh) -> None:
-        """Adds a mesh that other buildings use too, by its common name."""
-        self.meshes[mesh_name] = mesh
+    def shared(
+        self, mesh: str, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    ) -> MeshShape:
+        """Returns the shape of one of the `object_meshes`."""
+        self.meshes[mesh] = object_mesh(mesh)
+        return MeshShape(mesh, scale)
 
     def place(
         self,
