@@ -46,8 +46,9 @@ if TYPE_CHECKING:
     from cns_drake.sensors.measurement import MeasurementModel
     from cns_drake.sensors.odometry import Odometry, add_odometry
     from cns_drake.sensors.spinning_pattern import SpinningPattern
+    from cns_drake.simulation.run_progress import Run
     from cns_drake.simulation.sensor_recording import add_mcap_recorder
-    from cns_drake.simulation.simulation import Run, simulate
+    from cns_drake.simulation.simulation import simulate
     from cns_drake.simulation.station import make_station
 
 __all__ = [
@@ -115,7 +116,8 @@ _HOMES = {
     "cns_drake.sensors.odometry": ("Odometry", "add_odometry"),
     "cns_drake.sensors.spinning_pattern": ("SpinningPattern",),
     "cns_drake.simulation.sensor_recording": ("add_mcap_recorder",),
-    "cns_drake.simulation.simulation": ("Run", "simulate"),
+    "cns_drake.simulation.run_progress": ("Run",),
+    "cns_drake.simulation.simulation": ("simulate",),
     "cns_drake.simulation.station": ("make_station",),
 }
 

@@ -19,7 +19,7 @@ from cns_drake.command_line.options import (
 )
 
 if TYPE_CHECKING:
-    from cns_drake.simulation.simulation import Run
+    from cns_drake.simulation.run_progress import Run
 
 
 def run_sequence(

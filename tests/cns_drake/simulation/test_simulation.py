@@ -110,7 +110,7 @@ def test_a_world_that_changes_under_its_reader_is_refused(
         return world
 
     monkeypatch.setattr(
-        "cns_drake.simulation.simulation.load_stage", load_and_change
+        "cns_drake.simulation.loaded_drive.load_stage", load_and_change
     )
     with pytest.raises(InputError, match=r"stage_\d\d\.sdf: changed while"):
         simulate(scenario, tmp_path / "out")

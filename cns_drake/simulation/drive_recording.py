@@ -1,0 +1,99 @@
+"""The recording of a drive: what it says of itself, and how it is resumed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from cns_drake.base.version import __version__
+from cns_drake.recording.bag_writer import BagWriter
+from cns_drake.recording.frame_clock import START_NS
+from cns_drake.recording.mcap_recorder import (
+    make_calibration,
+    recording_topics,
+)
+from cns_drake.recording.resuming import take_over_frames
+from cns_drake.scenarios.provenance import (
+    INPUTS_KEY,
+    combined_digest,
+    dependency_versions,
+)
+from cns_drake.scenarios.scenario_files import describe_scenario
+from cns_drake.scenarios.sensor_making import sensor_pose
+from cns_drake.scene.world import World
+from cns_drake.simulation.loaded_drive import LoadedDrive
+from cns_drake.simulation.run_progress import NoteCallback, ProgressCallback
+
+
+def make_bag(
+    drive: LoadedDrive, folder: Path, *, overwrite: bool = False
+) -> BagWriter:
+    """Makes the recording of a drive, so far without messages.
+
+    Args:
+        drive: what is going to be recorded.
+        folder: to write.
+        overwrite: whether it may replace an existing recording.
+    """
+    scenario, inputs = drive.scenario, drive.inputs
+    described = describe_scenario(scenario)
+    return BagWriter(
+        folder,
+        recording_topics(scenario.lidars),
+        start_ns=START_NS,
+        attachments={
+            "scenario.json": described,
+            "structures.json": _structure_list(drive.world),
+            "calibration.json": make_calibration(
+                drive.X_BSs, sensor_pose(scenario.imu)
+            ),
+            "provenance.json": {
+                "versions": dependency_versions(),
+                "inputs_sha256": inputs,
+            },
+        },
+        # It can be simulated again, as long as all lies as it does.
+        scenario=describe_scenario(scenario, folder),
+        custom_data={
+            "cns_drake_version": __version__,
+            INPUTS_KEY: combined_digest(inputs),
+            **{
+                key: str(described[key])
+                for key in ("map", "stage", "world", "seed")
+                if key in described
+            },
+        },
+        overwrite=overwrite,
+    )
+
+
+def resume_recording(
+    bag: BagWriter,
+    drive: LoadedDrive,
+    on_frame: ProgressCallback,
+    on_note: NoteCallback,
+) -> int:
+    """Keeps what an interrupted run has recorded; returns how many frames."""
+    if not bag.follows_interruption():
+        return 0
+    name, num_frames = drive.scenario.name, drive.num_frames
+    on_note(f"{name}: found an interrupted run, reading it")
+    frames = take_over_frames(bag, recording_topics(drive.scenario.lidars))
+    on_note(
+        f"{name}: {frames} of {num_frames} frames are there, going on with "
+        "the next"
+    )
+    if frames > 0:
+        on_frame(frames, num_frames)
+    return frames
+
+
+def _structure_list(world: World) -> list[dict]:
+    return [
+        {
+            "instance": entry.instance,
+            "name": entry.name,
+            "class": entry.semantic_class,
+            "label": entry.label,
+        }
+        for entry in world.structures
+    ]

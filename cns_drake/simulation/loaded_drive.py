@@ -1,0 +1,84 @@
+"""A scenario with everything that it takes to simulate it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pydrake.math import RigidTransform
+
+from cns_drake.base.errors import InputError
+from cns_drake.motion.trajectory import Trajectory
+from cns_drake.scenarios.planning import count_frames, plan_drive
+from cns_drake.scenarios.provenance import digest_inputs
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import (
+    check_files,
+    map_folder,
+    world_file,
+)
+from cns_drake.scenarios.sensor_making import sensor_pose
+from cns_drake.scene.world import World
+from cns_drake.simulation.station import load_stage
+
+
+@dataclass(frozen=True)
+class LoadedDrive:
+    """A scenario with what it takes to run it.
+
+    Attributes:
+        scenario: with `frames` given.
+        inputs: digests of what it was read from.
+        trajectory: of the vehicle.
+        world: the stage.
+        num_frames: how many it takes.
+    """
+
+    scenario: Scenario
+    inputs: dict[str, str]
+    trajectory: Trajectory
+    world: World
+    num_frames: int
+
+    @property
+    def X_BSs(self) -> dict[str, RigidTransform]:
+        """LiDAR name -> pose of the LiDAR in base_link."""
+        lidars = self.scenario.lidars
+        return {name: sensor_pose(lidar) for name, lidar in lidars.items()}
+
+
+def load_drive(scenario: Scenario) -> LoadedDrive:
+    """Plans the drive of a scenario and loads its stage.
+
+    Raises:
+        InputError: the scenario cannot be run, or its files changed while
+            they were being read.
+    """
+    check_files(scenario)
+    inputs = digest_inputs(scenario)
+    trajectory = plan_drive(scenario)
+    num_frames = count_frames(scenario, trajectory)
+    scenario = scenario.model_copy(update={"frames": num_frames})
+    world = load_stage(scenario)
+    if digest_inputs(scenario) != inputs:
+        raise InputError(
+            f"{world_file(scenario)}: changed while it was being read"
+        )
+    return LoadedDrive(scenario, inputs, trajectory, world, num_frames)
+
+
+def load_other_stage(scenario: Scenario) -> tuple[World | None, str]:
+    """Returns the stage to compare with, and what it is called.
+
+    It is the last stage, or else the first. Where structures are left out, it
+    is the same stage with them.
+    """
+    if scenario.without:
+        whole = scenario.model_copy(update={"without": ()})
+        return load_stage(whole), "the whole city"
+    stages = list(map_folder(scenario).stages())
+    others = [stage for stage in stages if stage != scenario.stage]
+    if scenario.stage is None or not others:
+        return None, ""
+    stage = others[-1] if stages[-1] in others else others[0]
+    other = scenario.model_copy(update={"stage": stage})
+    return load_stage(other), f"stage {stage}"

@@ -1,0 +1,48 @@
+"""What a run tells while it goes on, and what it has done."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+import math
+from pathlib import Path
+
+# Reports that so many frames of so many are done.
+ProgressCallback = Callable[[int, int], None]
+# Takes what a user should know, in words.
+NoteCallback = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a simulation did.
+
+    Attributes:
+        name: of the sequence.
+        folder: the recording.
+        num_frames: frames in the recording.
+        resumed_frames: how many of them an interrupted run had recorded.
+        simulated_s: simulated time from the first frame simulated to the
+            last [s].
+        wall_s: time that took, without loading [s].
+        loading_s: time to load the stage and plan the drive [s].
+
+    Example:
+        from cns_drake import load_scenario, simulate
+
+        run = simulate(load_scenario("downtown_01"), output)
+        print(run.folder, run.real_time_factor)
+    """
+
+    name: str
+    folder: Path
+    num_frames: int
+    resumed_frames: int
+    simulated_s: float
+    wall_s: float
+    loading_s: float
+
+    @property
+    def real_time_factor(self) -> float:
+        """Simulated seconds per second."""
+        return self.simulated_s / self.wall_s if self.wall_s > 0 else math.inf
