@@ -6,15 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydrake.math import RigidTransform, RollPitchYaw
-from pydrake.multibody.math import SpatialAcceleration, SpatialVelocity
 from scipy.interpolate import PPoly
-from scipy.spatial.transform import Rotation
+
+from cns_drake.motion.frame_motion import FrameMotion, cross
 
 # Heave, roll and pitch.
 NUM_COORDINATES = 3
-
-_X, _Y, _Z = np.eye(3)
 
 
 class RideMoments(NamedTuple):
@@ -86,51 +83,33 @@ class BodyRide:
         return RideMoments(q, dq, ddq, self._pivot)
 
 
-def ride_poses(moments: RideMoments) -> tuple[np.ndarray, np.ndarray]:
-    """Returns R_FB (N, 3, 3) and p_FB (N, 3) [m]."""
+def ride_motion(moments: RideMoments) -> FrameMotion:
+    """Returns how B moves in F.
+
+    With R = R_y(pitch) R_x(roll), the roll axis turns with the pitch.
+    """
     heave, roll, pitch = moments.q.T
-    pitch_roll = np.stack([pitch, roll], axis=1)
-    R_FB = Rotation.from_euler("YX", pitch_roll).as_matrix()
-    p_FB = moments.pivot * (_X - R_FB[:, :, 0])
-    p_FB[:, 2] += heave
-    return R_FB, p_FB
-
-
-def ride_pose(moments: RideMoments, row: int = 0) -> RigidTransform:
-    """Returns X_FB at one of several times."""
-    _, p_FB = ride_poses(moments)
-    _, roll, pitch = moments.q[row]
-    return RigidTransform(RollPitchYaw(roll, pitch, 0.0), p_FB[row])
-
-
-def ride_velocity(moments: RideMoments) -> SpatialVelocity:
-    """Returns V_FB in F at the first time [rad/s, m/s]."""
-    w, _ = _rotation_rates(moments)
-    r = _from_pivot(moments)
-    return SpatialVelocity(w, moments.dq[0, 0] * _Z + np.cross(w, r))
-
-
-def ride_acceleration(moments: RideMoments) -> SpatialAcceleration:
-    """Returns A_FB in F at the first time [rad/s^2, m/s^2]."""
-    w, alpha = _rotation_rates(moments)
-    r = _from_pivot(moments)
-    a = moments.ddq[0, 0] * _Z + np.cross(alpha, r)
-    return SpatialAcceleration(alpha, a + np.cross(w, np.cross(w, r)))
-
-
-def _rotation_rates(moments: RideMoments) -> tuple[np.ndarray, np.ndarray]:
-    """Returns angular velocity and acceleration of B in F."""
-    pitch = moments.q[0, 2]
-    _, droll, dpitch = moments.dq[0]
-    _, ddroll, ddpitch = moments.ddq[0]
-    # The roll axis turns with the pitch.
-    axis = np.cos(pitch) * _X - np.sin(pitch) * _Z
-    w = dpitch * _Y + droll * axis
-    alpha = ddpitch * _Y + ddroll * axis + droll * dpitch * np.cross(_Y, axis)
-    return w, alpha
-
-
-def _from_pivot(moments: RideMoments) -> np.ndarray:
-    """Returns where the origin of B is, as seen from the pivot, in F."""
-    R_FB, _ = ride_poses(moments)
-    return -moments.pivot * R_FB[0, :, 0]
+    _, droll, dpitch = moments.dq.T
+    _, ddroll, ddpitch = moments.ddq.T
+    zero = np.zeros_like(heave)
+    (cr, sr), (cp, sp) = ((np.cos(a), np.sin(a)) for a in (roll, pitch))
+    R_FB = np.array(
+        [
+            [cp, sp * sr, sp * cr],
+            [zero, cr, -sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    ).transpose(2, 0, 1)
+    w = np.stack([droll * cp, dpitch, -droll * sp], axis=1)
+    turning = droll * dpitch
+    alpha = np.stack(
+        [ddroll * cp - turning * sp, ddpitch, -ddroll * sp - turning * cp],
+        axis=1,
+    )
+    # From the pivot to the origin of B.
+    r = -moments.pivot * R_FB[:, :, 0]
+    p, v = r + np.array([moments.pivot, 0.0, 0.0]), cross(w, r)
+    a = cross(alpha, r) + cross(w, v)
+    for vector, values in ((p, moments.q), (v, moments.dq), (a, moments.ddq)):
+        vector[:, 2] += values[:, 0]
+    return FrameMotion(R_FB, p, w, v, alpha, a)

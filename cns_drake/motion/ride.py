@@ -38,14 +38,14 @@ def ride_on_springs(
     # The path's parameter is hardly longer than the path.
     _, speeds, _ = trajectory.path_parameter(np.arange(0.0, end, _STEP))
     step = min(_STEP, _STRIDE / speeds.max())
-    frame = trajectory.frame_motion(np.arange(0.0, end, step))
+    frame = trajectory.path_motion(np.arange(0.0, end, step))
     # Of every wheel at every time.
-    p_FQ_Wset = frame.R_WF[:, :2, :2] @ masses.p_BWset.T
+    p_FQ_Wset = frame.R[:, :2, :2] @ masses.p_BWset.T
     p_WQset = frame.p[:, :2, None] + p_FQ_Wset
     heights = profile.heights(p_WQset.transpose(0, 2, 1).reshape(-1, 2))
     x, z = masses.center
     a_WG = frame.acceleration_at(np.array([x, 0.0, z]))
-    force_F = np.einsum("nji,nj->ni", frame.R_WF, a_WG - _GRAVITY_W)
+    force_F = np.einsum("nji,nj->ni", frame.R, a_WG - _GRAVITY_W)
     inputs = np.column_stack(
         [heights.reshape(len(a_WG), -1), force_F + _GRAVITY_W]
     )

@@ -15,11 +15,9 @@ from scipy.spatial.transform import Rotation
 from cns_drake.motion.body_ride import (
     BodyRide,
     RideMoments,
-    ride_acceleration,
-    ride_pose,
-    ride_poses,
-    ride_velocity,
+    ride_motion,
 )
+from cns_drake.motion.frame_motion import FrameMotion, cross
 from cns_drake.motion.path_geometry import (
     PathIntegral,
     PathJet,
@@ -31,7 +29,7 @@ from cns_drake.motion.speeds import Speeds
 from cns_drake.motion.uniform_spline import SplineDerivatives
 from cns_drake.roads.lane_path import LanePath
 
-_UP = np.array([0.0, 0.0, 1.0])
+_UP = np.array([[0.0, 0.0, 1.0]])
 
 
 @dataclass(frozen=True)
@@ -61,30 +59,6 @@ class Moments(NamedTuple):
     jet: PathJet
     section: PathSection
     ride: RideMoments | None
-
-
-class FrameMotion(NamedTuple):
-    """How the path's frame F moves in the world at N times, in the world.
-
-    Attributes:
-        p: (N, 3) origin [m].
-        R_WF: (N, 3, 3) axes.
-        w, v: (N, 3) angular [rad/s] and linear velocity [m/s].
-        alpha, a: (N, 3) angular [rad/s^2] and linear acceleration [m/s^2].
-    """
-
-    p: np.ndarray
-    R_WF: np.ndarray
-    w: np.ndarray
-    v: np.ndarray
-    alpha: np.ndarray
-    a: np.ndarray
-
-    def acceleration_at(self, p_FQ: np.ndarray) -> np.ndarray:
-        """Returns (N, 3) accelerations of a point Q fixed in F [m/s^2]."""
-        r = self.R_WF @ p_FQ
-        turning = np.cross(self.w, np.cross(self.w, r))
-        return self.a + np.cross(self.alpha, r) + turning
 
 
 class Trajectory:
@@ -139,16 +113,10 @@ class Trajectory:
         ride = None if self._ride is None else self._ride.at(t)
         return Moments(u, rate, acceleration, jet, section, ride)
 
-    def frame_motion(self, t: ArrayLike) -> FrameMotion:
-        """Returns how the path's frame F moves at (N,) times."""
+    def path_motion(self, t: ArrayLike) -> FrameMotion:
+        """Returns how the path's frame F moves in the world at (N,) times."""
         u, rate, acceleration = self.path_parameter(t)
-        jet = self._path.evaluate(u)
-        return FrameMotion(
-            jet.p,
-            _rotations(jet),
-            *_velocities(jet, rate),
-            *_accelerations(jet, rate, acceleration),
-        )
+        return _path_motion(self._path.evaluate(u), rate, acceleration)
 
     def travelled(self, t: ArrayLike) -> np.ndarray:
         """Returns the (N,) distances travelled at (N,) times [m]."""
@@ -168,16 +136,16 @@ class Trajectory:
         R_WF = _rotations(jet)
         if self._ride is None:
             return R_WF, jet.p
-        R_FB, p_FB = ride_poses(self._ride.at(t))
-        return R_WF @ R_FB, jet.p + np.einsum("nij,nj->ni", R_WF, p_FB)
+        ride = ride_motion(self._ride.at(t))
+        return R_WF @ ride.R, jet.p + np.einsum("nij,nj->ni", R_WF, ride.p)
 
     def spatial_velocity(self, t: float) -> SpatialVelocity:
         """Returns V_WB, expressed in the world [rad/s, m/s]."""
-        return spatial_velocity_at(self.at(t))
+        return motion_at(self.at(t))[1]
 
     def spatial_acceleration(self, t: float) -> SpatialAcceleration:
         """Returns A_WB, expressed in the world [rad/s^2, m/s^2]."""
-        return spatial_acceleration_at(self.at(t))
+        return motion_at(self.at(t))[2]
 
 
 def pose_at(moments: Moments, row: int = 0) -> RigidTransform:
@@ -188,42 +156,25 @@ def pose_at(moments: Moments, row: int = 0) -> RigidTransform:
     )
     if moments.ride is None:
         return X_WF
-    return X_WF @ ride_pose(moments.ride, row)
+    ride = ride_motion(moments.ride)
+    return X_WF @ RigidTransform(RotationMatrix(ride.R[row]), ride.p[row])
 
 
-def spatial_velocity_at(moment: Moments) -> SpatialVelocity:
-    """Returns V_WB at one time, expressed in the world [rad/s, m/s]."""
-    w, v = _velocities(moment.jet, moment.rate)
-    V_WF = SpatialVelocity(w[0], v[0])
+def motion_at(
+    moment: Moments,
+) -> tuple[RigidTransform, SpatialVelocity, SpatialAcceleration]:
+    """Returns X_WB, V_WB and A_WB at one time, expressed in the world."""
+    motion = _path_motion(moment.jet, moment.rate, moment.acceleration)
     if moment.ride is None:
-        return V_WF
-    R_WF, p_FB_W = _place_in_path(moment, moment.ride)
-    V_FB_W = ride_velocity(moment.ride).Rotate(R_WF)
-    return V_WF.ComposeWithMovingFrameVelocity(p_FB_W, V_FB_W)
-
-
-def spatial_acceleration_at(moment: Moments) -> SpatialAcceleration:
-    """Returns A_WB at one time, in the world [rad/s^2, m/s^2]."""
-    jet, rate = moment.jet, moment.rate
-    alpha, a = _accelerations(jet, rate, moment.acceleration)
-    A_WF = SpatialAcceleration(alpha[0], a[0])
-    if moment.ride is None:
-        return A_WF
-    R_WF, p_FB_W = _place_in_path(moment, moment.ride)
-    return A_WF.ComposeWithMovingFrameAcceleration(
-        p_FB_W,
-        _velocities(jet, rate)[0][0],
-        ride_velocity(moment.ride).Rotate(R_WF),
-        ride_acceleration(moment.ride).Rotate(R_WF),
+        X_WB = pose_at(moment)
+    else:
+        motion = motion.of_frame(ride_motion(moment.ride))
+        X_WB = RigidTransform(RotationMatrix(motion.R[0]), motion.p[0])
+    return (
+        X_WB,
+        SpatialVelocity(motion.w[0], motion.v[0]),
+        SpatialAcceleration(motion.alpha[0], motion.a[0]),
     )
-
-
-def _place_in_path(
-    moment: Moments, ride: RideMoments
-) -> tuple[RotationMatrix, np.ndarray]:
-    """Returns R_WF, and p_FB expressed in the world, at one time."""
-    R_WF = RotationMatrix(_rotations(moment.jet)[0])
-    return R_WF, R_WF @ ride_pose(ride).translation()
 
 
 def _rotations(jet: PathJet) -> np.ndarray:
@@ -232,37 +183,31 @@ def _rotations(jet: PathJet) -> np.ndarray:
     return Rotation.from_euler("ZY", yaw_pitch).as_matrix()
 
 
-def _velocities(
-    jet: PathJet, rate: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the path's (N, 3) angular and linear velocity in the world."""
-    rate = rate[:, None]
-    w = (jet.dyaw[:, None] * rate) * _UP
-    return w - (jet.dclimb[:, None] * rate) * _left(jet), jet.dp * rate
-
-
-def _accelerations(
+def _path_motion(
     jet: PathJet, rate: np.ndarray, acceleration: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Returns its (N, 3) angular and linear acceleration in the world."""
+) -> FrameMotion:
+    """Returns how the path's frame F moves in the world.
+
+    Args:
+        jet: the path at N places.
+        rate: (N,) rates of its parameter [1/s].
+        acceleration: (N,) their rates [1/s^2].
+    """
     yaw_rate, pitch_rate = jet.dyaw * rate, -jet.dclimb * rate
-    left = _left(jet)
     ddyaw = jet.ddyaw * rate**2 + jet.dyaw * acceleration
     ddclimb = jet.ddclimb * rate**2 + jet.dclimb * acceleration
-    alpha = (
-        ddyaw[:, None] * _UP
-        - ddclimb[:, None] * left
-        # The pitch axis turns with the vehicle.
-        + (yaw_rate * pitch_rate)[:, None] * np.cross(_UP, left)
-    )
+    # The pitch axis, to the left, turns with the vehicle.
+    zero = np.zeros_like(jet.yaw)
+    left = np.stack([-np.sin(jet.yaw), np.cos(jet.yaw), zero], axis=1)
+    turning = (yaw_rate * pitch_rate)[:, None] * cross(_UP, left)
     rate, acceleration = rate[:, None], acceleration[:, None]
-    return alpha, jet.ddp * rate**2 + jet.dp * acceleration
-
-
-def _left(jet: PathJet) -> np.ndarray:
-    """Returns the (N, 3) horizontal directions to the left of the path."""
-    return np.stack(
-        [-np.sin(jet.yaw), np.cos(jet.yaw), np.zeros_like(jet.yaw)], axis=1
+    return FrameMotion(
+        R=_rotations(jet),
+        p=jet.p,
+        w=yaw_rate[:, None] * _UP + pitch_rate[:, None] * left,
+        v=jet.dp * rate,
+        alpha=ddyaw[:, None] * _UP - ddclimb[:, None] * left + turning,
+        a=jet.ddp * rate**2 + jet.dp * acceleration,
     )
 
 

@@ -28,9 +28,7 @@ from cns_drake.motion.trajectory import (
     Moments,
     Trajectory,
     WheelMotion,
-    pose_at,
-    spatial_acceleration_at,
-    spatial_velocity_at,
+    motion_at,
 )
 
 # Cosine of the angle between two directions that are taken for one.
@@ -173,14 +171,15 @@ class VehicleMotion(LeafSystem):
         )
         plant.SetPositions(plant_context, self._default_q)
         moment = self._trajectory.at(context.get_time())
-        plant.SetFreeBodyPose(plant_context, base, pose_at(moment))
+        X_WB, V_WB, A_WB = motion_at(moment)
+        plant.SetFreeBodyPose(plant_context, base, X_WB)
         v = np.zeros(plant.num_velocities())
         vdot = np.zeros_like(v)
         # A floating base's velocities are V_WB, expressed in the world.
         start = base.floating_velocities_start_in_v()
         rows = slice(start, start + 6)
-        v[rows] = spatial_velocity_at(moment).get_coeffs()
-        vdot[rows] = spatial_acceleration_at(moment).get_coeffs()
+        v[rows] = V_WB.get_coeffs()
+        vdot[rows] = A_WB.get_coeffs()
         for joint, set_position, move, sign in self._joints:
             motion = move(moment)
             set_position(plant_context, sign * motion.position[0])

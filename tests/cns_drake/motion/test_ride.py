@@ -97,9 +97,9 @@ def test_steady_acceleration_tilts_the_body(sign):
     )
     trajectory = ride(straight(0.0, 600.0), Level(), speeds)
     t = trajectory.duration / 2 - sign * 5.0
-    a = trajectory.frame_motion([t]).a[0] @ [np.cos(0.4), np.sin(0.4), 0.0]
+    a = trajectory.path_motion([t]).a[0] @ [np.cos(0.4), np.sin(0.4), 0.0]
     assert a == pytest.approx(2.0 * sign, rel=0.01)
-    R_FB = trajectory.frame_motion([t]).R_WF[0].T @ trajectory.poses([t])[0][0]
+    R_FB = trajectory.path_motion([t]).R[0].T @ trajectory.poses([t])[0][0]
     pitch = np.arctan2(-R_FB[2, 0], R_FB[0, 0])
 
     # Two axles that carry the body over springs in series with tyres.
