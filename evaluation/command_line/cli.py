@@ -6,6 +6,7 @@ comes at once.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -18,6 +19,7 @@ from evaluation.command_line.protocol_options import (
     Costs,
     Gate,
     Radius,
+    overlap_of,
     with_protocol,
 )
 from evaluation.command_line.result_rows import change_rows, recognition_rows
@@ -180,6 +182,21 @@ def pr(
             " another draw of a city along the same streets.",
         ),
     ] = False,
+    truth: Annotated[
+        str,
+        typer.Option(
+            metavar="radius|overlap:PART",
+            help="What a match is: a place within the radius, or one whose"
+            " scan shows at least this part of what the query's shows.",
+        ),
+    ] = "radius",
+    overlaps: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.csv",
+            help="Write the overlap of each query with each place.",
+        ),
+    ] = None,
     json: _Json = False,
     *,
     protocol: RetrievalProtocol,
@@ -195,6 +212,9 @@ def pr(
     from evaluation.recognition import place_recognition
     from evaluation.sequences import open_sequence
 
+    protocol = replace(protocol, overlap=overlap_of(truth))
+    if overlaps is not None and protocol.overlap is None:
+        raise InputError("--overlaps: needs --truth overlap:PART")
     is_itself = database.resolve() == query.resolve()
     if protocol.exclude_recent is not None and not is_itself:
         raise InputError(
@@ -224,6 +244,9 @@ def pr(
         terminal.track,
         across_maps=across_maps,
     )
+    if overlaps is not None:
+        place_recognition.write_overlaps(result, overlaps)
+        terminal.note(f"wrote {overlaps}")
     if protocol.exclude_recent is None and is_itself:
         terminal.note(
             f"{query}: every scan finds itself (--exclude-recent leaves out"

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 import functools
 import inspect
+import math
 from typing import Annotated, Any
 
 import typer
 
+from cns_drake.base.errors import InputError
 from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,
     RetrievalProtocol,
@@ -85,6 +87,30 @@ Costs = Annotated[
         " differs from run to run.",
     ),
 ]
+
+
+def overlap_of(truth: str) -> float | None:
+    """Returns the least overlap of a match; None for matches by radius.
+
+    Args:
+        truth: `radius` or `overlap:PART`.
+
+    Raises:
+        InputError: if it is neither.
+    """
+    if truth == "radius":
+        return None
+    kind, _, part = truth.partition(":")
+    try:
+        least = float(part) if kind == "overlap" else math.nan
+    except ValueError:
+        least = math.nan
+    if not 0.0 < least <= 1.0:
+        raise InputError(
+            f"--truth: {truth!r} is neither 'radius' nor 'overlap:PART' with a"
+            " part above 0 and up to 1, such as overlap:0.5"
+        )
+    return least
 
 
 def with_protocol(command: Callable[..., None]) -> Callable[..., None]:

@@ -83,6 +83,23 @@ def recognition_rows(result: PlaceRecognition) -> Iterator[tuple[str, str]]:
     yield "F1max", f1
     number = terminal.number(metrics.curve.recall_at_full_precision)
     yield "recall at 100 % precision", number
+    outcomes = result.outcomes
+    yield (
+        "mean reciprocal rank",
+        terminal.number(outcomes.mean_reciprocal_rank),
+    )
+    if not isnan(outcomes.match_auroc):
+        yield (
+            "AUROC of queries with a match",
+            terminal.number(outcomes.match_auroc),
+        )
+    yield (
+        "AUC by radius",
+        ", ".join(
+            f"{radius:g} m {terminal.number(auc)}"
+            for radius, auc in result.auc_over_radius().items()
+        ),
+    )
     pose = result.pose
     if not isnan(pose.success):
         yield (

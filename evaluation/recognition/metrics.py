@@ -22,6 +22,7 @@ import math
 from typing import Literal
 
 import numpy as np
+from scipy.stats import rankdata
 
 Mode = Literal["all", "filtered"]
 MODES: tuple[Mode, ...] = ("all", "filtered")
@@ -71,6 +72,33 @@ class QueryOutcomes:
     def recall_at(self, rank: int) -> float:
         """Returns R@N; NaN if no query has a match."""
         return _mean(self.first_right_ranks[self.has_match] <= rank)
+
+    @property
+    def mean_reciprocal_rank(self) -> float:
+        """Mean of 1 / rank of the best true match, over queries with one.
+
+        0 for a query whose candidates hold none; NaN if no query has a match.
+        """
+        return _mean(1.0 / self.first_right_ranks[self.has_match])
+
+    @property
+    def match_auroc(self) -> float:
+        """How well the best score tells queries with a match from others.
+
+        The area under the receiver operating characteristic: the chance that
+        a query with a match has a higher best score than one without; equal
+        scores count half, and no candidate is the lowest score. NaN if all or
+        none of the queries have a match.
+        """
+        num_with = int(self.has_match.sum())
+        num_without = len(self) - num_with
+        if num_with == 0 or num_without == 0:
+            return math.nan
+        scores = np.where(np.isnan(self.best_scores), -np.inf, self.best_scores)
+        # The sum of ranks is that of Mann and Whitney's U.
+        ranks = rankdata(scores)[self.has_match].sum()
+        wins = ranks - 0.5 * num_with * (num_with + 1)
+        return float(wins / (num_with * num_without))
 
     @property
     def one_percent_rank(self) -> int:
@@ -263,6 +291,12 @@ def evaluate(
         auc_interval=auc_interval,
         recall_at_1_interval=recall_interval,
     )
+
+
+def area(outcomes: QueryOutcomes) -> float:
+    """Returns the AUC of queries, all of which count."""
+    _, tp, fp, fn = _curves(outcomes, np.ones((1, len(outcomes))))
+    return float(_area(tp / (tp + fp), _recall(tp, fn))[0])
 
 
 def _curves(

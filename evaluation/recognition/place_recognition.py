@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import csv
 from dataclasses import asdict, dataclass, replace
 import math
+from pathlib import Path
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.files import completing
 from cns_drake.base.progress import Track, silent
 from cns_drake.base.recordings.sequence import Sequence
 from evaluation.methods.method import Method
@@ -14,6 +17,7 @@ from evaluation.recognition.metrics import (
     Mode,
     PlaceRecognitionMetrics,
     QueryOutcomes,
+    area,
     evaluate,
     judge,
 )
@@ -23,6 +27,9 @@ from evaluation.recognition.protocol import (
     RetrievalProtocol,
 )
 from evaluation.recognition.retrieval import Retrieval, retrieve
+
+# At which AUC is given besides that of the protocol [m].
+RADII = (2.5, 5.0, 7.5, 10.0, 15.0, 20.0, 25.0)
 
 
 @dataclass(frozen=True)
@@ -55,6 +62,21 @@ class PlaceRecognition:
         """Returns the same outcome with its numbers in a mode."""
         return replace(self, metrics=evaluate(self.outcomes, mode))
 
+    def auc_over_radius(self) -> dict[float, float]:
+        """Returns radius of a match [m] -> AUC (mode all) if it were that.
+
+        NaN where no query has a match.
+        """
+        found = {}
+        for radius in RADII:
+            matches = self.retrieval.distances <= radius
+            outcomes = judge(
+                self.retrieval.scores, matches & self.retrieval.is_known
+            )
+            known = outcomes.has_match.any()
+            found[radius] = area(outcomes) if known else math.nan
+        return found
+
     def to_json(self) -> dict:
         """Returns all numbers; NaN becomes None."""
         metrics = self.metrics
@@ -85,6 +107,12 @@ class PlaceRecognition:
             "true_positives": metrics.num_right,
             "places": len(self.retrieval.database_frames),
             "recall_at_100_precision": metrics.curve.recall_at_full_precision,
+            "mean_reciprocal_rank": _number(self.outcomes.mean_reciprocal_rank),
+            "match_auroc": _number(self.outcomes.match_auroc),
+            "auc_over_radius": {
+                f"{radius:g}": _number(auc)
+                for radius, auc in self.auc_over_radius().items()
+            },
             "pose": {key: _number(value) for key, value in pose.items()},
             "parameters": self.parameters,
             "protocol": self.protocol.to_json(),
@@ -124,6 +152,32 @@ def run(
     )
 
 
+def write_overlaps(result: PlaceRecognition, path: Path) -> None:
+    """Writes the overlap of each query with each place as CSV.
+
+    Columns `query_frame`, `database_frame` and `overlap`.
+
+    Raises:
+        InputError: if the file cannot be written.
+    """
+    retrieval = result.retrieval
+    assert retrieval.overlaps is not None
+    with (
+        completing(path) as part,
+        open(part, "w", newline="", encoding="utf-8") as stream,
+    ):
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(["query_frame", "database_frame", "overlap"])
+        for frame, row in zip(
+            retrieval.query_frames, retrieval.overlaps, strict=True
+        ):
+            for place, value in zip(
+                retrieval.database_frames, row, strict=True
+            ):
+                text = "" if math.isnan(value) else f"{value:.6f}"
+                writer.writerow([frame, place, text])
+
+
 def judge_retrieval(
     method: Method,
     database: str,
@@ -150,6 +204,11 @@ def judge_retrieval(
             raise InputError(
                 f"{query}: never within {protocol.radius:g} m of where it was"
                 f" {protocol.exclude_recent:g} s or more before"
+            )
+        if protocol.overlap is not None:
+            raise InputError(
+                f"{query}: no place of {database} shows"
+                f" {protocol.overlap:.0%} of what a query shows"
             )
         nearest = retrieval.distances.min()
         raise InputError(

@@ -28,6 +28,9 @@ class RetrievalProtocol:
         exclude_recent: of a drive that is asked about itself: only places
             that it passed at least so long before are known [s]. None for
             drives that ask others.
+        overlap: a place is a match, wherever it is, whose scan shows at least
+            this part of what the query's shows (see `overlap_truth`), up to
+            1; None for matches by the radius.
         gate: among the best places of a query, reject those that the method's
             own pose puts farther away than the radius, see `gate`.
 
@@ -47,6 +50,7 @@ class RetrievalProtocol:
     max_range: float = 100.0
     scans_per_place: int | None = None
     exclude_recent: float | None = None
+    overlap: float | None = None
     gate: bool = False
 
     def __post_init__(self) -> None:
@@ -75,7 +79,7 @@ class RetrievalProtocol:
     def described(self) -> dict[str, float | int | None]:
         """Returns what the descriptions of a drive depend on."""
         values = asdict(self)
-        for name in ("radius", "exclude_recent", "gate"):
+        for name in ("radius", "exclude_recent", "overlap", "gate"):
             del values[name]
         return values
 
@@ -84,9 +88,12 @@ class RetrievalProtocol:
 
     def to_text(self) -> str:
         """Returns a sentence."""
+        match = f"a match within {self.radius:g} m"
+        if self.overlap is not None:
+            match = f"a match shows {self.overlap:.0%} of the query's scan"
         parts = [
             f"A query every {self.query_spacing:g} m, a place every"
-            f" {self.place_spacing:g} m, a match within {self.radius:g} m,"
+            f" {self.place_spacing:g} m, {match},"
             f" points within {self.max_range:g} m"
         ]
         if self.scans_per_place is not None:
@@ -113,12 +120,16 @@ GATE_TEXT = (
 # The defaults, which are the paper's.
 PAPER_PROTOCOL = RetrievalProtocol()
 
-# Columns of a table of results: the options that they were found with.
-PROTOCOL_COLUMNS = tuple(one.name for one in fields(RetrievalProtocol))
+# Columns of a table of results: the options that they were found with. No
+# table is of matches by overlap.
+PROTOCOL_COLUMNS = tuple(
+    one.name for one in fields(RetrievalProtocol) if one.name != "overlap"
+)
 
 
 def protocol_values(
     protocol: RetrievalProtocol,
 ) -> tuple[float | int | None, ...]:
     """Returns the values of `PROTOCOL_COLUMNS`; the gate as 0 or 1."""
-    return tuple((asdict(protocol) | {"gate": int(protocol.gate)}).values())
+    values = asdict(protocol) | {"gate": int(protocol.gate)}
+    return tuple(values[name] for name in PROTOCOL_COLUMNS)

@@ -17,6 +17,7 @@ from evaluation.recognition.description import (
     DescribedDrive,
     describe_drive,
 )
+from evaluation.recognition.overlap_truth import overlap_matrix
 from evaluation.recognition.pose_errors import (
     PoseErrors,
     checked_pose,
@@ -41,6 +42,9 @@ class Retrieval:
         distances: (Q, D) float64 between the sensor positions [m].
         matches: (Q, D) bool, which place is a true match of which query.
         pose_errors: of the best place of each query.
+        is_known: (Q, D) bool, which places a query can know.
+        overlaps: (Q, D) float64, see `overlap_truth`; None where they are not
+            the truth.
 
     Example:
         from evaluation import retrieve
@@ -55,6 +59,8 @@ class Retrieval:
     distances: np.ndarray
     matches: np.ndarray
     pose_errors: PoseErrors
+    is_known: np.ndarray
+    overlaps: np.ndarray | None = None
 
     @property
     def best_places(self) -> np.ndarray:
@@ -94,9 +100,12 @@ def retrieve(
         found = retrieve(database, query, make_method("solid", {}))
     """
     check_same_world(database, query, across_maps=across_maps)
+    overlaps = None
+    if protocol.overlap is not None:
+        overlaps = overlap_matrix(database, query, protocol, track)
     (places,) = describe_drive(database, [method], {"places"}, protocol, track)
     (queries,) = describe_drive(query, [method], {"queries"}, protocol, track)
-    return compare(method, places, queries, protocol, track)
+    return compare(method, places, queries, protocol, track, overlaps)
 
 
 def compare(
@@ -105,6 +114,7 @@ def compare(
     query: DescribedDrive,
     protocol: RetrievalProtocol = PAPER_PROTOCOL,
     track: Track = silent,
+    overlaps: np.ndarray | None = None,
 ) -> Retrieval:
     """Scores the queries of one drive against the places of another.
 
@@ -114,6 +124,8 @@ def compare(
         query: with its queries described; in the same world frame.
         protocol: that both were described by.
         track: reports progress.
+        overlaps: (Q, D), see `overlap_matrix`; needed where they are the
+            truth.
 
     Raises:
         InputError: if the method returns what it must not.
@@ -152,13 +164,20 @@ def compare(
             )
     offsets = queries.p_WSs[:, None, :] - places.p_WSs[None, :, :]
     distances = np.linalg.norm(offsets, axis=2)
+    if protocol.overlap is None:
+        matches = distances <= protocol.radius
+    else:
+        assert overlaps is not None
+        matches = overlaps >= protocol.overlap
     return Retrieval(
         query_frames=queries.frames,
         database_frames=places.frames,
         scores=scores,
         distances=distances,
-        matches=(distances <= protocol.radius) & is_known,
+        matches=matches & is_known,
         pose_errors=errors,
+        is_known=is_known,
+        overlaps=overlaps,
     )
 
 

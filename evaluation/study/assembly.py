@@ -25,6 +25,7 @@ from evaluation.report.curve_figures import (
     draw_auc_over_change,
     draw_pr_curves,
 )
+from evaluation.report.metric_table import metric_numbers
 from evaluation.report.page_data import Illustration, PageDrive
 from evaluation.report.pose_tables import pose_numbers, pose_table
 from evaluation.report.query_table import DriveTrack, query_table
@@ -88,8 +89,9 @@ def assemble(
     Files: `report.html`, which holds everything; `report.md`; `survival`,
     `tcr`, `place_recognition` and `poses`, and with costs `costs`, each as
     .csv (all numbers), .md and .tex;
-    `queries.csv` and `queries_unchanged.csv`, every query of the pairs and of
-    their controls; and what is missing in the folder `figures`.
+    `metrics.csv`, what other benchmarks report; `queries.csv` and
+    `queries_unchanged.csv`, every query of the pairs and of their controls;
+    and what is missing in the folder `figures`.
 
     Args:
         recordings: as in `plan_study`.
@@ -206,6 +208,7 @@ def _write_all(
     survival = survival_table(collected.survivals)
     poses, cost = pose_table(recognitions), cost_table(costs)
     _write_queries(collected, output)
+    _write(output / "metrics.csv", metric_numbers(recognitions).to_csv())
     written = [
         ("survival", [survival], survival_numbers(collected.survivals)),
         ("tcr", [change], change),

@@ -450,6 +450,13 @@ RECIPES = {
         after=("method", "own city"),
         prints=("heights", "AUC"),
     ),
+    "overlap": Recipe(
+        ".venv/bin/cns-eval pr --truth",
+        changes=(_FIRST, _LAST),
+        after=("own city",),
+        prints=("a match shows 50% of the query's scan",),
+        makes=("overlaps.csv",),
+    ),
     "own data": Recipe(
         ".venv/bin/cns-eval tcr kitti",
         changes=(("sequences/04", "sequences/02"),),

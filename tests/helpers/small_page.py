@@ -125,6 +125,7 @@ def _result(method, best, back=False):
         distances,
         distances <= PAPER_PROTOCOL.radius,
         PoseErrors.unknown(len(queries)),
+        np.ones(distances.shape, dtype=bool),
     )
     stages = ("04", "01") if back else ("01", "04")
     names = [f"{MAP}_{stage}" for stage in stages]

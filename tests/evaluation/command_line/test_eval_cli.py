@@ -19,6 +19,7 @@ def test_the_protocol_is_the_users(capsys, towns):
         "max_range": 100.0,
         "scans_per_place": 1,
         "exclude_recent": None,
+        "overlap": None,
         "gate": False,
     }
     options = ["--radius", "2", "--query-spacing", "20", "--max-range", "30"]
@@ -35,6 +36,7 @@ def test_the_protocol_is_the_users(capsys, towns):
         "max_range": 30.0,
         "scans_per_place": 2,
         "exclude_recent": None,
+        "overlap": None,
         "gate": False,
     }
     _, out, _ = run(capsys, *both, *options)

@@ -202,6 +202,38 @@ def test_recall_at_n():
     assert few.one_percent_rank == 1
 
 
+def test_mean_reciprocal_rank():
+    matches = np.zeros((4, 5), dtype=bool)
+    matches[0, 1] = matches[1, 3] = matches[2, 4] = True
+    scores = np.array(
+        [
+            [0.1, 0.9, 0.2, 0.3, 0.4],
+            [0.9, 0.1, 0.2, 0.8, 0.4],
+            [0.9, 0.8, 0.7, 0.6, np.nan],
+            [0.9, 0.8, 0.7, 0.6, 0.5],
+        ]
+    )
+    outcomes = judge(scores, matches)
+    # Ranks 1 and 2, one that is no candidate; the last has no match.
+    assert outcomes.mean_reciprocal_rank == pytest.approx(1.5 / 3)
+    assert np.isnan(judge(scores, matches & False).mean_reciprocal_rank)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_auroc_counts_pairs(seed):
+    rng = np.random.default_rng([seed, 2])
+    matches = rng.random((30, 4)) < 0.15
+    scores = rng.integers(0, 6, (30, 4)) / 6.0
+    scores[rng.random(30) < 0.2] = np.nan
+    outcomes = judge(scores, matches)
+    best = np.where(np.isnan(scores).all(axis=1), -1.0, scores.max(axis=1))
+    yes, no = best[matches.any(axis=1)], best[~matches.any(axis=1)]
+    wins = [(a > b) + 0.5 * (a == b) for a in yes for b in no]
+    assert outcomes.match_auroc == pytest.approx(np.mean(wins))
+    assert np.isnan(judge(scores, matches | True).match_auroc)
+    assert np.isnan(judge(scores, matches & False).match_auroc)
+
+
 def test_bootstrap_intervals():
     rng = np.random.default_rng(8)
     rows = [(rng.uniform(), rng.uniform() < 0.7, True) for _ in range(200)]

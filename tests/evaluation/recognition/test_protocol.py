@@ -135,7 +135,7 @@ def test_what_is_not_positive_is_refused(name, value):
 def test_it_is_told_with_every_number():
     protocol = RetrievalProtocol(radius=3.0, scans_per_place=4)
     values = dict(zip(PROTOCOL_COLUMNS, protocol_values(protocol), strict=True))
-    assert values == protocol.to_json()
+    assert values | {"overlap": None} == protocol.to_json()
     assert protocol.of(Means()) == protocol
     assert RetrievalProtocol().of(Means()).scans_per_place == 1
     text = protocol.to_text()

@@ -5,6 +5,7 @@ import pytest
 from cns_drake.base.errors import InputError
 from evaluation.methods import Method, MethodConfig, make_method
 from evaluation.recognition.place_recognition import run
+from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.retrieval import retrieve
 from evaluation.sequences import open_sequence
 from evaluation.sequences.sampling import (
@@ -158,6 +159,19 @@ def test_metrics_of_a_pair(tmp_path):
     assert filtered["mode"] == "filtered"
     assert filtered["f1_max"] == pytest.approx(2 * 0.75 / 1.75)
     assert len(values["recall_at_n"]) == 25
+
+
+def test_auc_over_the_radius(tmp_path):
+    database = record_line(tmp_path / "a", np.arange(0.0, 31.0, 2.5))
+    query = record_line(tmp_path / "b", np.arange(3.0, 44.0, 5.0))
+    result = run(database, query, OddOneOut())
+    found = result.auc_over_radius()
+    assert found[7.5] == result.metrics.auc
+    for radius, auc in found.items():
+        protocol = RetrievalProtocol(radius=radius)
+        other = run(database, query, OddOneOut(), protocol=protocol)
+        assert auc == other.metrics.auc
+    assert len(set(found.values())) > 2
 
 
 def test_database_far_from_every_query(tmp_path):

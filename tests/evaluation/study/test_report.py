@@ -159,6 +159,22 @@ def test_recognition_beside_the_paper(report):
         assert "0.2993" in text
 
 
+def test_metrics_of_other_benchmarks(report):
+    rows = read_csv(report / "metrics.csv")
+    audit = {
+        row["method"]: row
+        for row in read_csv(report / "place_recognition.csv")
+        if row["mode"] == "all"
+    }
+    assert {row["method"] for row in rows} == audit.keys()
+    for row in rows:
+        whole = audit[row["method"]]
+        assert row["recall_at_1"] == whole["R@1"]
+        assert row["recall_at_1_percent"] == whole["R@1%"]
+        assert row["auc_within_7.5_m"] == whole["AUC"]
+        assert float(row["mean_reciprocal_rank"]) >= float(row["recall_at_1"])
+
+
 def test_figures_for_print_and_page(report):
     stems = {
         "auc_over_tcr": "svg",
@@ -187,7 +203,7 @@ def test_report_is_the_same_whoever_works(recordings, report, tmp_path):
         reference_for=reference_for,
     )
     files = studies.report_files(tmp_path)
-    assert len(files) == 16 + 18
+    assert len(files) == 17 + 18
     assert files == studies.report_files(report)
 
 

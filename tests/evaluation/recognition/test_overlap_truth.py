@@ -1,0 +1,141 @@
+"""Overlap of scans: closed forms, and rooms that are seen as a whole."""
+
+import csv
+import json
+
+from helpers.drive_files import make_scan, write_recording, yaw_pose
+from helpers.eval_program import assert_refused
+from helpers.eval_program import run as run_program
+import numpy as np
+import pytest
+
+from cns_drake.base.errors import InputError
+from evaluation.methods import make_method
+from evaluation.recognition.overlap_truth import (
+    TOLERANCE,
+    SeenRanges,
+    overlap_matrix,
+)
+from evaluation.recognition.place_recognition import run
+from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.sequences import open_sequence
+
+# Beams of a degree, that miss the borders of cells.
+AZIMUTH, ELEVATION = np.radians(
+    np.meshgrid(np.arange(-179.7, 180.0), np.arange(-44.7, 45.0))
+)
+BEAMS = np.stack(
+    [
+        np.cos(ELEVATION) * np.cos(AZIMUTH),
+        np.cos(ELEVATION) * np.sin(AZIMUTH),
+        np.sin(ELEVATION),
+    ],
+    axis=-1,
+).reshape(-1, 3)
+
+
+def test_a_scan_shows_itself():
+    rng = np.random.default_rng(0)
+    points = rng.normal(size=(5000, 3)) * [20.0, 20.0, 2.0]
+    points = np.vstack([points, [[0, 0, 5], [0, 0, -5], [-3, 0, 0]]])
+    assert SeenRanges.of(points).share_of(points) == 1.0
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize(("off", "share"), [(-1e-9, 1.0), (1e-9, 0.0)])
+def test_the_tolerance_is_a_limit(side, off, share):
+    seen = SeenRanges.of(10.0 * BEAMS)
+    other = (10.0 + side * (TOLERANCE + off)) * BEAMS
+    assert seen.share_of(other) == share
+
+
+def test_what_is_hidden_or_not_there_is_not_shown():
+    seen = SeenRanges.of(10.0 * BEAMS)
+    assert seen.share_of(np.vstack([10.0 * BEAMS, 20.0 * BEAMS])) == 0.5
+    few = BEAMS[: len(BEAMS) // 3]
+    assert seen.share_of(np.vstack([10.0 * BEAMS, 5.0 * few])) == pytest.approx(
+        0.75, abs=1e-3
+    )
+    # Above the field of view, nothing is known.
+    assert seen.share_of(np.array([[0.5, 0.0, 10.0]])) == 0.0
+
+
+def test_nothing():
+    seen = SeenRanges.of(np.zeros((0, 3)))
+    assert seen.share_of(BEAMS) == 0.0
+    assert np.isnan(SeenRanges.of(BEAMS).share_of(np.zeros((0, 3))))
+
+
+def room_scan(X_WS, half):
+    """Returns what a sensor sees of the walls of a room about the origin."""
+    d_W = BEAMS @ X_WS[:3, :3].T
+    with np.errstate(divide="ignore"):
+        times = (np.sign(d_W) * half - X_WS[:3, 3]) / d_W
+    return BEAMS * np.where(d_W == 0.0, np.inf, times).min(axis=1)[:, None]
+
+
+@pytest.fixture(scope="module")
+def rooms(tmp_path_factory):
+    """Two drives; the last frame of either is in a larger room."""
+    folder = tmp_path_factory.mktemp("rooms")
+    drives = []
+    for name, places in (
+        ("a", [(0.0, 0.0, 0.3), (8.0, 1.0, 2.0), (16.0, 1.0, -1.0)]),
+        ("b", [(1.0, -2.0, 1.5), (9.0, 3.0, -2.5), (18.0, 0.0, 0.0)]),
+    ):
+        X_WBs = [yaw_pose(x, y, 0.0, yaw) for x, y, yaw in places]
+        scans = []
+        for number, X_WB in enumerate(X_WBs):
+            X_WS = X_WB.copy()
+            X_WS[2, 3] += 1.6
+            half = [40.0, 40.0, 9.0] if number == 2 else [30.0, 20.0, 6.0]
+            scans.append(make_scan(room_scan(X_WS, np.array(half))))
+        path = write_recording(folder / name, scans, X_WBs)
+        drives.append(path)
+    return drives
+
+
+def test_one_room_is_seen_as_a_whole_from_anywhere(rooms):
+    protocol = RetrievalProtocol(query_spacing=5.0)
+    found = overlap_matrix(*map(open_sequence, rooms), protocol)
+    assert found.shape == (3, 3)
+    # But for what is above or below the other's field of view.
+    assert found[:2, :2].min() > 0.85
+    assert found[2, 2] > 0.85
+    # Its walls are 10 or 20 m behind those of the smaller room.
+    assert found[2, :2].max() < 0.05
+    assert found[:2, 2].max() < 0.05
+
+
+def test_a_match_is_what_shows_the_same(rooms, capsys, tmp_path):
+    database, query = map(open_sequence, rooms)
+    method = make_method("solid", {})
+    protocol = RetrievalProtocol(overlap=0.5, query_spacing=5.0)
+    result = run(database, query, method, protocol=protocol)
+    expected = [[True, True, False], [True, True, False], [False, False, True]]
+    assert result.retrieval.matches.tolist() == expected
+    assert "a match shows 50% of" in result.protocol.to_text()
+    with pytest.raises(InputError, match="no place of a shows 100% of"):
+        run(
+            database,
+            query,
+            method,
+            protocol=RetrievalProtocol(overlap=1.0, query_spacing=5.0),
+        )
+    output = tmp_path / "overlaps.csv"
+    pr = ("pr", *rooms, "--method", "solid", "--query-spacing", "5")
+    status, out, _ = run_program(
+        capsys, *pr, "--truth", "overlap:0.5", "--overlaps", output, "--json"
+    )
+    assert status == 0
+    assert json.loads(out)["protocol"]["overlap"] == 0.5
+    with output.open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    np.testing.assert_allclose(
+        [float(row["overlap"]) for row in rows],
+        result.retrieval.overlaps.ravel(),
+        atol=1e-6,
+    )
+    for truth in ("overlap", "overlap:0", "overlap:1.01", "overlap:x", "near"):
+        assert_refused(capsys, [*pr, "--truth", truth], "--truth", truth)
+    assert_refused(capsys, [*pr, "--overlaps", output], "needs --truth")
