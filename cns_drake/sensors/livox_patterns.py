@@ -47,7 +47,9 @@ class _TimedPattern(BeamPattern):
     def beams(self, frame: int) -> Beams:
         firing = np.arange(self.num_firings)
         step = self.period / self.num_firings
-        d_Sset = self._directions((frame * self.num_firings + firing) * step)
+        # A float takes any frame, whatever the clock says.
+        first = float(frame * self.num_firings)
+        d_Sset = self._directions((first + firing) * step)
         return make_beams(
             d_Sset.reshape(-1, 3),
             np.tile(np.arange(self.num_lines), self.num_firings),

@@ -121,7 +121,10 @@ class MeasurementModel:
         return Returns(beams, ranges[beams], intensity)
 
     def _generator(self, purpose: int, frame: int) -> np.random.Generator:
-        key = (purpose, frame, *self.sensor_name.encode())
+        # Keys are never negative: the frames before time zero have streams
+        # of their own.
+        stream = purpose if frame >= 0 else 2**32 - 1 - purpose
+        key = (stream, abs(frame), *self.sensor_name.encode())
         return np.random.default_rng(
             np.random.SeedSequence(self.seed, spawn_key=key)
         )

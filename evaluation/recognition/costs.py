@@ -12,6 +12,7 @@ import numpy as np
 
 from evaluation.methods.method import Method
 from evaluation.recognition.description import DescribedDrive
+from evaluation.recognition.ranking import ranking
 from evaluation.recognition.scoring import score_places
 
 
@@ -77,7 +78,7 @@ def measure_cost(
             gate_radius=gate_radius,
         )
         if not np.isnan(found).all():
-            best = int(np.nanargmax(found))
+            best = int(ranking(found)[0])
             method.relative_pose(queries.descriptors[row], indexed, best)
 
     asking = [_cpu_ms(ask, row) for row in rows.tolist()]

@@ -19,6 +19,7 @@ import numpy as np
 from cns_drake.base.errors import InputError
 from evaluation.methods.method import Method
 from evaluation.recognition.pose_errors import checked_pose
+from evaluation.recognition.ranking import ranking
 
 # Chosen on development worlds, see docs/fitting.md.
 NUM_GATED = 30
@@ -63,7 +64,7 @@ def gated(
         InputError: if the method returns what are no poses.
     """
     num_candidates = int((~np.isnan(scores)).sum())
-    order = np.argsort(-scores, kind="stable")  # NaN comes last.
+    order = ranking(scores)
     best = order[: min(NUM_GATED, num_candidates)]
     if len(best) == 0:
         return scores

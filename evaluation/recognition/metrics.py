@@ -24,6 +24,8 @@ from typing import Literal
 import numpy as np
 from scipy.stats import rankdata
 
+from evaluation.recognition.ranking import ranking
+
 Mode = Literal["all", "filtered"]
 MODES: tuple[Mode, ...] = ("all", "filtered")
 
@@ -229,9 +231,7 @@ def judge(scores: np.ndarray, matches: np.ndarray) -> QueryOutcomes:
     """
     num_queries, num_places = scores.shape
     candidate = ~np.isnan(scores)
-    order = np.argsort(
-        np.where(candidate, -scores, np.inf), axis=1, kind="stable"
-    )
+    order = ranking(scores)
     ranked_right = np.take_along_axis(matches & candidate, order, axis=1)
     any_right = ranked_right.any(axis=1)
     first_right = np.full(num_queries, np.inf)

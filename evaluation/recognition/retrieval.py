@@ -27,6 +27,7 @@ from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,
     RetrievalProtocol,
 )
+from evaluation.recognition.ranking import ranking
 from evaluation.recognition.scoring import score_places
 
 
@@ -66,7 +67,7 @@ class Retrieval:
     def best_places(self) -> np.ndarray:
         """(Q,) best place of each query, the first of equal ones; -1: none."""
         candidate = ~np.isnan(self.scores)
-        best = np.where(candidate, self.scores, -np.inf).argmax(axis=1)
+        best = ranking(self.scores)[:, 0] if self.scores.size else -1
         return np.where(candidate.any(axis=1), best, -1)
 
 
@@ -153,7 +154,7 @@ def compare(
         scores[row] = found
         if np.isnan(found).all():
             continue
-        best = int(np.nanargmax(found))
+        best = int(ranking(found)[0])
         X_PQ = checked_pose(
             method,
             method.relative_pose(queries.descriptors[row], indexed, best),

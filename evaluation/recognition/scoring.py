@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+import contextlib
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from cns_drake.base.errors import InputError
 from evaluation.methods.method import Method
 from evaluation.recognition.gate import gated
+from evaluation.recognition.ranking import ranking
 
 
 def score_places(
@@ -73,9 +75,7 @@ def _reranked(
     Raises:
         InputError: if the method returns what are no scores.
     """
-    order = np.argsort(
-        np.where(np.isnan(scores), np.inf, -scores), kind="stable"
-    )
+    order = ranking(scores)
     num_candidates = int((~np.isnan(scores)).sum())
     best = order[: min(method.rerank_best, num_candidates)]
     result = np.full(len(scores), np.nan)
@@ -92,15 +92,22 @@ def _checked(
     """Returns scores (number,) as float64.
 
     Raises:
-        InputError: if they are not that.
+        InputError: if they are not that. A conversion would drop the
+            imaginary part of a complex score and the mask of a masked one.
     """
+    fault = ""
     try:
-        values = np.asarray(scores, dtype=np.float64)
-    except (TypeError, ValueError):
+        values = np.asarray(scores)
+    except ValueError:  # Rows of different lengths.
         values = np.empty(0)
-    if scores is None or values.shape != (number,):
-        raise InputError(
-            f"{method.name}: {function} returned {type(scores).__name__} of"
-            f" shape {np.shape(values)} instead of {number} numbers"
-        )
-    return values
+    if isinstance(scores, np.ma.MaskedArray):
+        fault = " with a mask (NaN says that a place is no candidate)"
+    elif values.dtype.kind in "cSU":
+        fault = f" and type {values.dtype}"
+    elif values.shape == (number,):
+        with contextlib.suppress(TypeError, ValueError):
+            return values.astype(np.float64)
+    raise InputError(
+        f"{method.name}: {function} returned {type(scores).__name__} of shape"
+        f" {values.shape}{fault} instead of {number} numbers"
+    )

@@ -127,6 +127,17 @@ def test_frame_after_frame_fills_the_gaps(preset):
     np.testing.assert_array_equal(first.d_Sset, again.d_Sset)
 
 
+@pytest.mark.parametrize("preset", ["mid-70", "avia", "mid-360"])
+def test_a_frame_of_any_number_has_beams(preset):
+    pattern = make_beam_pattern(preset)
+    for frame in (-1, -(10**9), 10**20, -(10**300)):
+        beams = pattern.beams(frame)
+        assert len(beams.column) == pattern.num_beams
+        np.testing.assert_allclose(
+            np.linalg.norm(beams.d_Sset, axis=1), 1.0, atol=1e-9
+        )
+
+
 def test_limits_of_the_field_of_view():
     whole = make_beam_pattern("vlp-16", num_columns=360)
     front = whole.within(azimuths_deg=(-30, 30), elevations_deg=(-5, 90))

@@ -127,3 +127,16 @@ def test_options_do_not_disturb_each_other():
     np.testing.assert_array_equal(
         measured.beams, losses.measure(constant(50.0), *LIMITS, 1).beams
     )
+
+
+@pytest.mark.parametrize(
+    "model", [MeasurementModel(range_noise=0.1), MeasurementModel(dropout=0.5)]
+)
+def test_frames_before_time_zero_have_noise_of_their_own(model):
+    def draw(frame):
+        returns = model.measure(constant(50.0), *LIMITS, frame)
+        return returns.beams.tobytes() + returns.ranges.tobytes()
+
+    frames = (-(10**20), -2, -1, 0, 1, 2)
+    assert len({draw(frame) for frame in frames}) == len(frames)
+    assert draw(-3) == draw(-3)

@@ -176,7 +176,21 @@ def test_folders_of_scans_know_both_stages(drives, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "scores", [None, 1.0, [1.0], np.zeros((6, 1)), "abc", [None] * 7]
+    "scores",
+    [
+        None,
+        1.0,
+        [1.0],
+        np.zeros((6, 1)),
+        "abc",
+        [None] * 7,
+        [[1.0], [1.0, 2.0]],
+        ["1"] * 6,
+        np.zeros(6) + 1j,
+        [1.0 + 1j] * 6,
+        np.ma.masked_less(np.arange(6.0), 3.0),
+        np.ma.masked_array(np.arange(6.0)),
+    ],
 )
 def test_scores_that_are_none(drives, scores):
     class Wrong(Highest):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from evaluation.recognition.metrics import evaluate, judge
+from evaluation.recognition.ranking import ranking
 
 NAN = np.nan
 
@@ -129,6 +130,18 @@ def test_tied_places_rank_in_the_order_of_the_database():
     second = judge(scores, np.array([[False, False, True]]))
     assert first.first_right_ranks.tolist() == [1.0]
     assert second.first_right_ranks.tolist() == [2.0]
+
+
+@pytest.mark.parametrize("right", [0, 1, 2, 3])
+def test_the_worst_candidate_is_before_what_is_none(right):
+    # By hand: 2 and 3 are candidates, though as bad as can be; 0, 1 are none.
+    scores = np.array([[NAN, NAN, -math.inf, -math.inf]])
+    matches = np.arange(4)[None] == right
+    outcomes = judge(scores, matches)
+    assert outcomes.best_scores.tolist() == [-math.inf]
+    expected = {2: 1.0, 3: 2.0}.get(right, math.inf)
+    assert outcomes.first_right_ranks.tolist() == [expected]
+    assert ranking(scores).tolist() == [[2, 3, 0, 1]]
 
 
 def test_no_candidate_is_never_accepted_and_a_miss():

@@ -1,0 +1,22 @@
+"""The order of places by their scores."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def ranking(scores: np.ndarray) -> np.ndarray:
+    """Returns places from the best to the worst.
+
+    Of places with equal scores the one that comes first in the database is
+    the better. Places that are no candidates come last, behind those with a
+    score of minus infinity.
+
+    Args:
+        scores: (..., D), higher is more similar; NaN is no candidate.
+
+    Returns:
+        (..., D) indices of places.
+    """
+    # NaN is sorted behind everything.
+    return np.argsort(-scores, axis=-1, kind="stable")
