@@ -60,7 +60,7 @@ def trend(
         from cns_drake.simulation.simulated_drive import SimulatedDrive
         from evaluation.study.chosen_methods import choose_methods
         from evaluation.study.trend import write_trend
-        from evaluation.study.trend_points import Asked, measure_drives
+        from evaluation.study.trend_databases import Asked, measure_drives
 
     cluster = choose_cluster(jobs, scheduler)
     methods = choose_methods(method or ())

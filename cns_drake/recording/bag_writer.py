@@ -93,6 +93,7 @@ class BagWriter:
         attachments: Mapping[str, object],
         scenario: Mapping[str, object],
         custom_data: Mapping[str, str] | None = None,
+        fingerprint: str = "",
         overwrite: bool = False,
     ):
         """Checks the target; nothing is written before the context opens.
@@ -107,6 +108,9 @@ class BagWriter:
                 kind, so that its messages can be taken over.
             scenario: what `scenario.yaml` beside the MCAP shall hold.
             custom_data: key -> text for `ros2 bag info`.
+            fingerprint: what `fingerprint.txt` shall hold, if anything. An
+                interrupted recording with another one is of another kind,
+                too.
             overwrite: whether an existing recording may be replaced. A
                 finished one is kept until the new one is complete.
 
@@ -122,6 +126,7 @@ class BagWriter:
         self._attachments = dict(attachments)
         self._scenario = scenario
         self._custom_data = dict(custom_data or {})
+        self._fingerprint = fingerprint
         self._part = part_path(self._files.mcap)
         self._counts = {topic.name: 0 for topic in self._topics}
         self._first_ns: int | None = None
@@ -247,26 +252,44 @@ class BagWriter:
         ):
             # Interrupted between the final names of the files.
             stream = PartFile(self._files.mcap)
-            if stream.starts_like(preamble.getvalue()):
+            if self._goes_on(stream, preamble):
                 os.replace(self._files.mcap, self._part)
                 return stream
             stream.close()
             self._refuse_other_recording()
         stream = PartFile(self._part)
-        if not stream.starts_like(preamble.getvalue()):
-            try:
+        try:
+            if not self._goes_on(stream, preamble):
                 self._refuse_other_recording()
                 stream.clear()
-            except BaseException:
-                stream.close()
-                raise
+            if self._fingerprint:
+                write_part(self._files.fingerprint, self._fingerprint)
+        except BaseException:
+            stream.close()
+            raise
         return stream
+
+    def _goes_on(self, stream: PartFile, preamble: io.BytesIO) -> bool:
+        """Returns whether a file as found is a beginning of this recording."""
+        if not stream.replaying:
+            return True
+        found = ""
+        for path in (
+            part_path(self._files.fingerprint),
+            self._files.fingerprint,
+        ):
+            if path.is_file():
+                found = path.read_text(encoding="utf-8", errors="replace")
+                break
+        return found == self._fingerprint and stream.starts_like(
+            preamble.getvalue()
+        )
 
     def _refuse_other_recording(self) -> None:
         if not self._overwrite:
             raise InputError(
                 f"{self._files.path}: the folder already exists and holds an "
-                "interrupted recording of another scenario, world or version "
+                "interrupted recording of another scenario, world or program "
                 "(--overwrite discards it)"
             )
 
@@ -330,17 +353,21 @@ class BagWriter:
         """Gives the finished files their final names, `metadata.yaml` last.
 
         All files are whole under their `.part` names before the first is
-        renamed. An old `metadata.yaml` goes first: it must never describe
-        the new MCAP.
+        renamed. Old ones that describe the MCAP go first: they must never
+        describe the new one.
         """
         files = self._files
         metadata = {"rosbag2_bagfile_information": self._information()}
         write_part(files.scenario, to_yaml(self._scenario))
         write_part(files.metadata, to_yaml(metadata))
-        with user_errors(files.metadata):
+        with user_errors(files.path):
             files.metadata.unlink(missing_ok=True)
-        for path in (files.mcap, files.scenario, files.metadata):
-            complete_part(path)
+            files.fingerprint.unlink(missing_ok=True)
+        complete_part(files.mcap)
+        complete_part(files.scenario)
+        if self._fingerprint:
+            complete_part(files.fingerprint)
+        complete_part(files.metadata)
 
     def _close_part(self) -> None:
         """Ends an incomplete file as well as its state allows."""

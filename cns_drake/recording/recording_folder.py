@@ -16,6 +16,8 @@ class RecordingFolder:
         path: the folder; its last part names the recording.
         mcap: the messages.
         scenario: what was recorded.
+        fingerprint: of all that it was made of; see
+            `cns_drake.scenarios.provenance`.
         metadata: what rosbag2 wants to know. It gets its name last: where it
             is, the recording is finished.
     """
@@ -24,6 +26,7 @@ class RecordingFolder:
         self.path = Path(os.path.abspath(path))
         self.mcap = self.path / f"{self.path.name}_0.mcap"
         self.scenario = self.path / "scenario.yaml"
+        self.fingerprint = self.path / "fingerprint.txt"
         self.metadata = self.path / "metadata.yaml"
 
     def is_finished(self) -> bool:
@@ -53,7 +56,7 @@ class RecordingFolder:
                     f"{self.path}: the folder already exists and holds a "
                     "finished recording (--overwrite replaces it)"
                 )
-            own = (self.mcap, self.scenario, self.metadata)
+            own = (self.mcap, self.scenario, self.fingerprint, self.metadata)
             names = {file.name for file in (*own, *map(part_path, own))}
             found = sorted(entry.name for entry in self.path.iterdir())
         if found and names.isdisjoint(found):

@@ -92,3 +92,20 @@ def count_frames(scenario: Scenario, trajectory: Trajectory) -> int:
             f"route takes only {available}"
         )
     return scenario.frames or available
+
+
+def shown_beside(scenario: Scenario) -> tuple[Scenario | None, str]:
+    """Returns what a page of a drive compares its stage with, and its name.
+
+    That is the last stage, or else the first. Where structures are left out,
+    it is the same stage with them.
+    """
+    if scenario.without:
+        whole = scenario.model_copy(update={"without": ()})
+        return whole, "the whole city"
+    stages = list(map_folder(scenario).stages())
+    others = [stage for stage in stages if stage != scenario.stage]
+    if scenario.stage is None or not others:
+        return None, ""
+    stage = others[-1] if stages[-1] in others else others[0]
+    return scenario.model_copy(update={"stage": stage}), f"stage {stage}"

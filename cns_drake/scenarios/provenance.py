@@ -10,12 +10,15 @@ import os
 from pathlib import Path
 import platform
 import re
+from xml.parsers import expat
 
 from cns_drake.base.files import user_errors
+from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
 from cns_drake.base.version import __version__
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder, world_file
 from cns_drake.scenarios.shipped import suspension_file, vehicle_file
+from cns_drake.scene.gazebo_models import ModelFinder
 
 # Whatever can have a say in a message's bytes.
 _PACKAGES = (
@@ -32,7 +35,15 @@ _PACKAGES = (
 # Where a recording's metadata keep the combined digest of its inputs.
 INPUTS_KEY = "inputs_sha256"
 
-_URI = re.compile(r"<uri>\s*([^<>\0]+?)\s*</uri>")
+# What a folder that is included as a model consists of, besides meshes.
+_OF_A_MODEL = (".sdf", ".urdf", ".config", ".xml")
+# Of mesh files by their ending, where these name others: materials, textures,
+# buffers.
+_NAMING = {
+    ".obj": re.compile(rb"^mtllib\s+(.+)$", re.MULTILINE),
+    ".mtl": re.compile(rb"^\s*map_\w+.*?(\S+)\s*$", re.MULTILINE),
+    ".gltf": re.compile(rb'"uri"\s*:\s*"([^":]+)"'),
+}
 
 
 def dependency_versions() -> dict[str, str]:
@@ -53,8 +64,8 @@ def dependency_versions() -> dict[str, str]:
 def digest_inputs(scenario: Scenario) -> dict[str, str]:
     """Returns SHA-256 digests of the files that a scenario reads.
 
-    A world counts with the meshes and models that it names by relative
-    paths; what it finds by a `package://` or `model://` URI does not count.
+    A world counts with the meshes and models that it names, and these with
+    what they name.
 
     Returns:
         `world`, `vehicle`, and `structures`, `suspension`, `roads` or
@@ -82,15 +93,42 @@ def combined_digest(inputs: dict[str, str]) -> str:
     return hashlib.sha256(json.dumps(inputs).encode()).hexdigest()
 
 
+def recording_fingerprint(scenario: Scenario, inputs: dict[str, str]) -> str:
+    """Returns the fingerprint of what a scenario records.
+
+    Where its files lie does not matter, nor does how a page shows the drive.
+
+    Args:
+        scenario: what is recorded.
+        inputs: its `digest_inputs`.
+    """
+    places = {
+        field: Path(place).name
+        for field in ("map", "world", "waypoints")
+        if (place := getattr(scenario, field)) is not None
+    }
+    return fingerprint(
+        {
+            # As text, since the order of LiDARs matters.
+            "scenario": scenario.model_copy(update=places).model_dump_json(),
+            "inputs": inputs,
+            "code": code_digest(
+                "cns_drake.simulation.simulation",
+                without=("cns_drake.pictures",),
+            ),
+        }
+    )
+
+
 def digest_file(path: Path) -> str:
-    """Returns the SHA-256 digest of a file and of the files it names.
+    """Returns the SHA-256 digest of a model and of the files that it names.
 
     Raises:
         InputError: a file cannot be read.
     """
     digest = hashlib.sha256()
-    for name in sorted(_referenced_files(path)):
-        content = _read(path.parent / name)
+    for name, file in sorted(_referenced_files(path).items()):
+        content = _read(file)
         digest.update(f"{name} {len(content)}\n".encode())
         digest.update(content)
     # The file itself comes last, without its name.
@@ -98,24 +136,86 @@ def digest_file(path: Path) -> str:
     return digest.hexdigest()
 
 
-def _referenced_files(model: Path) -> set[str]:
-    """Returns the files that an SDF file and the models in it name.
+def _referenced_files(model: Path) -> dict[str, Path]:
+    """Returns the files that a model and the files that it names refer to.
 
     Returns:
-        Paths relative to the model's folder.
+        The path relative to the model's folder, or the URI of what is found
+        elsewhere -> file.
     """
-    found: set[str] = set()
-    waiting = [model]
+    finder = ModelFinder(model)
+    found: dict[str, Path] = {}
+    waiting = [str(model)]
     while waiting:
         file = waiting.pop()
-        for uri in _URI.findall(_read(file).decode(errors="replace")):
-            place = file.parent / uri
+        folder = os.path.dirname(file)
+        for uri in _references(file):
+            place = os.path.join(folder, uri)
             name = os.path.relpath(place, model.parent)
-            # Only what is really a file: no folder, no device.
-            if name not in found and os.path.isfile(place):
-                found.add(name)
-                if place.suffix == ".sdf":
-                    waiting.append(place)
+            if not os.path.exists(place):
+                place, name = _find(finder, uri, folder), uri
+            for one in _files_at(place):
+                key = name
+                if one != place:  # It lies in the folder of a model.
+                    key = os.path.join(name, os.path.basename(one))
+                if key not in found:
+                    found[key] = Path(one)
+                    waiting.append(one)
+    return found
+
+
+def _find(finder: ModelFinder, uri: str, folder: str) -> str:
+    """Returns where a URI leads; "" if that is nowhere."""
+    with contextlib.suppress(OSError, ValueError):  # It may be no name.
+        return str(finder.find(uri, Path(folder)) or "")
+    return ""
+
+
+def _files_at(place: str) -> list[str]:
+    """Returns a file, or those of a model's folder that say what it is."""
+    if os.path.isdir(place):
+        return [
+            path
+            for name in sorted(os.listdir(place))
+            if name.endswith(_OF_A_MODEL)
+            and os.path.isfile(path := os.path.join(place, name))
+        ]
+    # Only what is really a file: no device.
+    return [place] if os.path.isfile(place) else []
+
+
+def _references(file: str) -> list[str]:
+    """Returns what a model or a mesh says of other files."""
+    ending = os.path.splitext(file)[1].lower()
+    if ending in (*_OF_A_MODEL, ".dae"):
+        return _xml_references(_read(Path(file)))
+    if ending not in _NAMING:
+        return []
+    names = _NAMING[ending].findall(_read(Path(file)))
+    return [name.decode(errors="replace").strip() for name in names]
+
+
+def _xml_references(content: bytes) -> list[str]:
+    found: list[str] = []
+    texts: list[str] = []
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        texts.clear()
+        if "filename" in attributes:  # Of URDF.
+            found.append(attributes["filename"])
+
+    def end(tag: str) -> None:
+        if tag in ("uri", "init_from") or tag.endswith("_map"):
+            found.append("".join(texts).strip())
+        texts.clear()
+
+    parser = expat.ParserCreate("utf-8")
+    parser.StartElementHandler = start
+    parser.CharacterDataHandler = texts.append
+    parser.EndElementHandler = end
+    # What is no XML is refused by whoever loads it.
+    with contextlib.suppress(expat.ExpatError):
+        parser.Parse(content, True)
     return found
 
 

@@ -62,6 +62,7 @@ def make_bag(
                 if key in described
             },
         },
+        fingerprint=drive.fingerprint,
         overwrite=overwrite,
     )
 

@@ -8,12 +8,15 @@ from pydrake.math import RigidTransform
 
 from cns_drake.base.errors import InputError
 from cns_drake.motion.trajectory import Trajectory
+from cns_drake.recording.frame_clock import frames_within
 from cns_drake.scenarios.planning import count_frames, plan_drive
-from cns_drake.scenarios.provenance import digest_inputs
+from cns_drake.scenarios.provenance import (
+    digest_inputs,
+    recording_fingerprint,
+)
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import (
     check_files,
-    map_folder,
     world_file,
 )
 from cns_drake.scenarios.sensor_making import sensor_pose
@@ -28,6 +31,7 @@ class LoadedDrive:
     Attributes:
         scenario: with `frames` given.
         inputs: digests of what it was read from.
+        fingerprint: of the recording, for `fingerprint.txt`.
         trajectory: of the vehicle.
         world: the stage.
         num_frames: how many it takes.
@@ -35,6 +39,7 @@ class LoadedDrive:
 
     scenario: Scenario
     inputs: dict[str, str]
+    fingerprint: str
     trajectory: Trajectory
     world: World
     num_frames: int
@@ -63,22 +68,12 @@ def load_drive(scenario: Scenario) -> LoadedDrive:
         raise InputError(
             f"{world_file(scenario)}: changed while it was being read"
         )
-    return LoadedDrive(scenario, inputs, trajectory, world, num_frames)
-
-
-def load_other_stage(scenario: Scenario) -> tuple[World | None, str]:
-    """Returns the stage to compare with, and what it is called.
-
-    It is the last stage, or else the first. Where structures are left out, it
-    is the same stage with them.
-    """
-    if scenario.without:
-        whole = scenario.model_copy(update={"without": ()})
-        return load_stage(whole), "the whole city"
-    stages = list(map_folder(scenario).stages())
-    others = [stage for stage in stages if stage != scenario.stage]
-    if scenario.stage is None or not others:
-        return None, ""
-    stage = others[-1] if stages[-1] in others else others[0]
-    other = scenario.model_copy(update={"stage": stage})
-    return load_stage(other), f"stage {stage}"
+    # The whole drive is the same by whichever name it is asked for.
+    whole = num_frames == frames_within(trajectory.duration)
+    lines = [
+        recording_fingerprint(scenario.model_copy(update=update), inputs)
+        for update in ({}, {"frames": None})[: 1 + whole]
+    ]
+    return LoadedDrive(
+        scenario, inputs, "\n".join(lines), trajectory, world, num_frames
+    )

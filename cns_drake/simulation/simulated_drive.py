@@ -14,17 +14,14 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cns_drake.base import poses
+from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.recordings.sequence import Sequence
-from cns_drake.base.version import __version__
 from cns_drake.motion.sweep import Sweep
 from cns_drake.motion.trajectory import pose_at
 from cns_drake.recording.frame_clock import FRAME_PERIOD, frame_stamp_ns
 from cns_drake.recording.messages import MAP_FRAME, to_quat_xyzw
 from cns_drake.scenarios.planning import count_frames, plan_drive
-from cns_drake.scenarios.provenance import (
-    combined_digest,
-    digest_inputs,
-)
+from cns_drake.scenarios.provenance import digest_inputs
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import (
     check_files,
@@ -55,11 +52,11 @@ class SimulatedDrive:
         return SimulatedSequence(self.scenario)
 
     def identity(self) -> dict:
-        """Returns scenario, the digest of all its files, and the version."""
+        """Returns scenario, and digests of all its files and of the code."""
         return {
             "simulated": self.scenario.model_dump(mode="json"),
-            "inputs": combined_digest(digest_inputs(self.scenario)),
-            "version": __version__,
+            "inputs": digest_inputs(self.scenario),
+            "code": code_digest(__name__),
         }
 
 

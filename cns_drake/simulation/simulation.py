@@ -19,19 +19,19 @@ from cns_drake.pictures.meshcat_recording import MeshcatRecorder
 from cns_drake.recording.background_writer import BackgroundWriter
 from cns_drake.recording.frame_clock import FRAME_PERIOD
 from cns_drake.recording.recording_folder import RecordingFolder
+from cns_drake.scenarios.planning import shown_beside
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.simulation.drive_recording import make_bag, resume_recording
 from cns_drake.simulation.loaded_drive import (
     LoadedDrive,
     load_drive,
-    load_other_stage,
 )
 from cns_drake.simulation.run_progress import (
     NoteCallback,
     ProgressCallback,
     Run,
 )
-from cns_drake.simulation.station import make_station
+from cns_drake.simulation.station import load_stage, make_station
 
 
 def simulate(
@@ -141,12 +141,12 @@ def _check_output(
 
 
 def _make_page(drive: LoadedDrive) -> MeshcatRecorder:
-    other_stage, other_name = load_other_stage(drive.scenario)
+    other, other_name = shown_beside(drive.scenario)
     return MeshcatRecorder(
         drive.world,
         X_BSs=drive.X_BSs,
         period=FRAME_PERIOD,
-        other_stage=other_stage,
+        other_stage=None if other is None else load_stage(other),
         other_name=other_name,
     )
 

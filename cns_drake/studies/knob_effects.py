@@ -23,11 +23,8 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.simulation.simulated_drive import SimulatedDrive
 from evaluation.study.chosen_methods import choose_methods
-from evaluation.study.trend_points import (
-    Asked,
-    TrendPoint,
-    measure_drives,
-)
+from evaluation.study.trend_databases import Asked, measure_drives
+from evaluation.study.trend_points import TrendPoint
 
 _AS_IT_IS = "as_it_is"
 # Variant of the earlier stage -> what a reader is told.

@@ -1,18 +1,18 @@
-"""The pictures of a map, as jobs: its drives, and how its streets change."""
+"""The pictures of a map: its drives, and how its streets change."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.jobs.running import Job, Tell
+from cns_drake.base.jobs.running import Job
+from cns_drake.base.jobs.step import Tell
 from cns_drake.base.map_folder import MapFolder
-from cns_drake.base.version import __version__
 from cns_drake.scenarios.provenance import digest_file, digest_inputs
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_loading import load_scenario
-from evaluation.study.parts import is_current, write_part
+from evaluation.study.parts import PartStep
 
 # Expected time to draw a stage [s].
 _STAGE_COST = 10.0
@@ -29,118 +29,87 @@ def plan_pictures(folder: Path, pictures: Path) -> list[Job]:
     """
     # Workers may run elsewhere.
     folder, pictures = folder.resolve(), pictures.absolute()
-
-    def job(
-        what: str,
-        function: Callable[..., None],
-        is_done: Callable[..., bool],
-        num_stages: int,
-    ) -> Job:
-        path = pictures / f"{folder.name}_{what}.png"
-        return Job(
-            name=f"picture {folder.name} {what}",
-            function=function,
-            arguments=(folder, path),
-            cost=_STAGE_COST * num_stages,
-            output=path,
-            is_done=is_done,
-        )
-
-    num_drives = len(MapFolder(folder).recordable_sequences())
-    jobs = [job("drives", draw_map_drives, are_drives_drawn, num_drives)]
-    if MapFolder(folder).views.is_file():
-        jobs.append(job("stages", draw_map_stages, are_stages_drawn, 2))
-    return jobs
-
-
-def draw_map_drives(folder: Path, path: Path, tell: Tell) -> None:
-    """Draws the drives of a map from above: a job.
-
-    Args:
-        folder: of the map.
-        path: the picture.
-        tell: is told nothing.
-
-    Raises:
-        InputError: see `draw_drives`.
-    """
-    del tell
-    with uninterrupted():
-        from cns_drake.pictures.aerial_pictures import draw_drives
-
-    inputs = _drives_inputs(folder)
-    scenarios = _scenarios(folder)
-    draw_drives({s.name.replace("_", " "): s for s in scenarios}, path)
-    _write_note(path, inputs)
-
-
-def are_drives_drawn(folder: Path, path: Path) -> bool:
-    """Tells whether there is nothing to do; see `draw_map_drives`."""
-    return _is_drawn(path, _drives_inputs(folder))
-
-
-def _drives_inputs(folder: Path) -> dict:
-    return {
-        s.name: [s.model_dump(mode="json"), digest_inputs(s)]
-        for s in _scenarios(folder)
+    kinds: dict[str, tuple[type[_Picture], int]] = {
+        "drives": (DrawDrives, len(MapFolder(folder).recordable_sequences()))
     }
-
-
-def _scenarios(folder: Path) -> list[Scenario]:
+    if MapFolder(folder).views.is_file():
+        kinds["stages"] = (DrawStages, 2)
     return [
-        load_scenario(file) for file in MapFolder(folder).recordable_sequences()
+        Job(
+            name=f"picture {folder.name} {what}",
+            step=draw(
+                folder,
+                pictures / f"{folder.name}_{what}.png",
+                pictures / "parts" / f"{folder.name}_{what}.data",
+            ),
+            cost=_STAGE_COST * num_stages,
+        )
+        for what, (draw, num_stages) in kinds.items()
     ]
 
 
-def draw_map_stages(folder: Path, path: Path, tell: Tell) -> None:
-    """Draws a street of a map in its first and its last stage: a job.
+@dataclass(frozen=True)
+class _Picture(PartStep):
+    """Draws a picture of a map.
 
-    Args:
+    Attributes:
         folder: of the map.
-        path: the picture.
-        tell: is told nothing.
-
-    Raises:
-        InputError: see `draw_stages`.
+        picture: to write.
+        part: says of what it was drawn.
     """
-    del tell
-    with uninterrupted():
-        from cns_drake.pictures.stage_pictures import draw_stages, load_views
 
-    inputs = _stages_inputs(folder)
-    stages = {f.stem.replace("_", " "): f for f in _two_stages(folder)}
-    draw_stages(stages, load_views(MapFolder(folder).views)["street"], path)
-    _write_note(path, inputs)
+    folder: Path
+    picture: Path
+    part: Path
 
-
-def are_stages_drawn(folder: Path, path: Path) -> bool:
-    """Tells whether there is nothing to do; see `draw_map_stages`."""
-    return _is_drawn(path, _stages_inputs(folder))
+    @property
+    def figures(self) -> tuple[Path, ...]:
+        return (self.picture,)
 
 
-def _stages_inputs(folder: Path) -> dict:
-    files = [*_two_stages(folder), MapFolder(folder).views]
-    return {file.name: digest_file(file) for file in files}
+class DrawDrives(_Picture):
+    """Draws the drives of a map from above."""
+
+    def inputs(self) -> dict[str, object]:
+        return {
+            one.name: [one.model_dump(mode="json"), digest_inputs(one)]
+            for one in self._scenarios()
+        }
+
+    def make(self, tell: Tell) -> None:
+        with uninterrupted():
+            from cns_drake.pictures.aerial_pictures import draw_drives
+
+        draw_drives(
+            {one.name.replace("_", " "): one for one in self._scenarios()},
+            self.picture,
+        )
+
+    def _scenarios(self) -> list[Scenario]:
+        return [
+            load_scenario(file)
+            for file in MapFolder(self.folder).recordable_sequences()
+        ]
 
 
-def _two_stages(folder: Path) -> tuple[Path, Path]:
-    files = list(MapFolder(folder).stages().values())
-    return files[0], files[-1]
+class DrawStages(_Picture):
+    """Draws a street of a map in its first and its last stage."""
 
+    def inputs(self) -> dict[str, object]:
+        files = [*self._two_stages(), MapFolder(self.folder).views]
+        return {file.name: digest_file(file) for file in files}
 
-def _write_note(path: Path, inputs: dict) -> None:
-    """Says what a picture was drawn of."""
-    write_part(_note_of(path), _versioned(inputs), None)
+    def make(self, tell: Tell) -> None:
+        with uninterrupted():
+            from cns_drake.pictures.stage_pictures import (
+                draw_stages,
+                load_views,
+            )
 
+        stages = {f.stem.replace("_", " "): f for f in self._two_stages()}
+        views = load_views(MapFolder(self.folder).views)
+        draw_stages(stages, views["street"], self.picture)
 
-def _is_drawn(path: Path, inputs: dict) -> bool:
-    return path.is_file() and is_current(_note_of(path), _versioned(inputs))
-
-
-def _note_of(path: Path) -> Path:
-    """Returns the part that says what a picture was drawn of."""
-    return path.parent / "parts" / f"{path.stem}.data"
-
-
-def _versioned(inputs: dict) -> dict:
-    return {**inputs, "version": __version__}
+    def _two_stages(self) -> tuple[Path, Path]:
+        files = list(MapFolder(self.folder).stages().values())
+        return files[0], files[-1]

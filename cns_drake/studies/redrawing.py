@@ -7,6 +7,7 @@ cars and furniture are drawn anew. Each such city is a map folder of its own.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 import os
 from pathlib import Path
 import shutil
@@ -17,14 +18,19 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import make_folder, part_path, user_errors
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.base.jobs.running import Job, Tell, run_jobs
+from cns_drake.base.jobs.fingerprint import code_digest
+from cns_drake.base.jobs.running import Job, run_jobs
+from cns_drake.base.jobs.step import Step, Tell
 from cns_drake.base.map_folder import STAGES_NAME, MapFolder
 from cns_drake.base.version import __version__
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.city.plan.city_plan import load_plan
+from evaluation.study.parts import is_current, write_part
 
 # How each input that is written here begins.
 _MARK = b"# Of a city drawn anew by cns-drake"
+# Says in its folder of what a city was drawn.
+_PART = "drawn.data"
 # Expected time to draw a city [s].
 _COST = 7.0
 
@@ -38,7 +44,7 @@ def redraw_cities(
 ) -> dict[int, Path]:
     """Draws the city of a map anew, with progress on stderr.
 
-    A city that is there already, of the same inputs and by the same version,
+    A city that is there already, of the same inputs and by the same program,
     is left as it is.
 
     Args:
@@ -65,11 +71,8 @@ def redraw_cities(
     jobs = [
         Job(
             name=f"city {folder.name}",
-            function=redraw_city,
-            arguments=(map_folder, stage, seed, folder),
+            step=RedrawCity(map_folder, stage, seed, folder),
             cost=_COST,
-            output=folder,
-            is_done=is_redrawn,
         )
         for seed, folder in folders.items()
     ]
@@ -77,65 +80,70 @@ def redraw_cities(
     return folders
 
 
-def redraw_city(
-    map_folder: Path, stage: str, seed: int, folder: Path, tell: Tell
-) -> None:
-    """Draws the city of a map anew: a job.
+@dataclass(frozen=True)
+class RedrawCity(Step):
+    """Draws the city of a map anew.
 
-    Args:
+    Attributes:
         map_folder: the map, with `roads.yaml` and `city.yaml`.
         stage: what to call the only stage, the whole city.
         seed: of the city.
         folder: the map folder to write; an older city drawn anew that has
-            this name is replaced.
-        tell: is told of that.
-
-    Raises:
-        InputError: the city cannot be drawn with this seed, the folder is
-            something else, or it cannot be written.
+            this name is replaced, anything else refused.
     """
-    with uninterrupted():
-        from cns_drake.city.generation.generate import generate_city
 
-    inputs = redrawn_inputs(map_folder, stage, seed)
-    part = part_path(folder)
-    # It has its final name already, which its files tell.
-    draft = part / folder.name
-    try:
-        with user_errors(folder):
-            # What a run left that was killed.
-            shutil.rmtree(part, ignore_errors=True)
-            draft.mkdir(parents=True)
-            for name, content in inputs.items():
-                (draft / name).write_bytes(content)
+    map_folder: Path
+    stage: str
+    seed: int
+    folder: Path
+
+    @property
+    def output(self) -> Path:
+        return self.folder
+
+    def is_done(self) -> bool:
+        # A folder that has its final name is complete.
+        return is_current(self.folder / _PART, self._made_of())
+
+    def run(self, tell: Tell) -> None:
+        with uninterrupted():
+            from cns_drake.city.generation.generate import generate_city
+
+        folder, made_of = self.folder, self._made_of()
+        inputs = redrawn_inputs(self.map_folder, self.stage, self.seed)
+        part = part_path(folder)
+        # It has its final name already, since its files hold that.
+        draft = part / folder.name
         try:
-            generate_city(draft)
-        except InputError as error:
-            fault = str(error).removeprefix(f"{draft}{os.sep}")
-            raise InputError(f"{map_folder}: seed {seed}: {fault}") from error
-        if _is_replaced(folder):
-            tell.note(f"{folder}: replaced, as it was of other inputs")
-        with user_errors(folder):
-            if os.path.lexists(folder):
-                os.replace(folder, part / "replaced")
-            os.replace(draft, folder)
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
+            with user_errors(folder):
+                # What a run left that was killed.
+                shutil.rmtree(part, ignore_errors=True)
+                draft.mkdir(parents=True)
+                for name, content in inputs.items():
+                    (draft / name).write_bytes(content)
+            try:
+                generate_city(draft)
+            except InputError as error:
+                fault = str(error).removeprefix(f"{draft}{os.sep}")
+                raise InputError(
+                    f"{self.map_folder}: seed {self.seed}: {fault}"
+                ) from error
+            write_part(draft / _PART, made_of, None)
+            if _is_replaced(folder):
+                tell.note(f"{folder}: replaced, as it was of other inputs")
+            with user_errors(folder):
+                if os.path.lexists(folder):
+                    os.replace(folder, part / "replaced")
+                os.replace(draft, folder)
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
 
-
-def is_redrawn(map_folder: Path, stage: str, seed: int, folder: Path) -> bool:
-    """Tells whether there is nothing to do; see `redraw_city`.
-
-    A folder that has its final name is complete, so that its inputs, which
-    name the version, tell what it is.
-    """
-    inputs = redrawn_inputs(map_folder, stage, seed)
-    with user_errors(folder):
-        return all(
-            (folder / name).is_file()
-            and (folder / name).read_bytes() == content
-            for name, content in inputs.items()
-        )
+    def _made_of(self) -> dict[str, object]:
+        inputs = redrawn_inputs(self.map_folder, self.stage, self.seed)
+        return {
+            **{name: content.decode() for name, content in inputs.items()},
+            "code": code_digest("cns_drake.city.*"),
+        }
 
 
 def redrawn_inputs(map_folder: Path, stage: str, seed: int) -> dict[str, bytes]:

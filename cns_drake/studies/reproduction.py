@@ -18,10 +18,8 @@ from cns_drake.scenarios.scenario_loading import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.simulation.simulated_drive import SimulatedDrive
 from cns_drake.studies.map_pictures import plan_pictures
-from cns_drake.studies.recording_jobs import (
-    is_recorded,
-    plan_recordings,
-)
+from cns_drake.studies.recording_jobs import plan_recordings
+from cns_drake.studies.recording_step import is_recorded
 from evaluation.paper import reference_for
 from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,

@@ -364,7 +364,7 @@ def trend(
     """
     from cns_drake.base.jobs.cluster import choose_cluster
     from evaluation.study.trend import write_trend
-    from evaluation.study.trend_points import measure_trend
+    from evaluation.study.trend_databases import measure_trend
 
     cluster = choose_cluster(jobs, scheduler)
     points = measure_trend(

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-import hashlib
 from pathlib import Path
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.jobs.fingerprint import script_digest
 from evaluation.methods import (
     Method,
     known_methods,
@@ -53,8 +53,7 @@ class MethodChoice:
             "parameters": self.make().config.model_dump(mode="json"),
         }
         if self.file is not None:
-            text = self.file.read_bytes()
-            values["file"] = hashlib.sha256(text).hexdigest()
+            values["file"] = script_digest(self.file)
         return values
 
 

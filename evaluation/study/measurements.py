@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
-from cns_drake.base.jobs.running import Tell
+from cns_drake.base.jobs.step import Tell
 from evaluation.change.change_result import ChangeResult
 from evaluation.change.drive_change import Surveyed
 from evaluation.change.drive_change import compare as compare_maps
@@ -14,166 +15,95 @@ from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.recognition.retrieval import compare as score
 from evaluation.sequences import check_same_world
 from evaluation.study.chosen_methods import MethodChoice
-from evaluation.study.code_digest import measuring_code
-from evaluation.study.parts import (
-    is_current,
-    part_digest,
-    read_part,
-    write_part,
-)
+from evaluation.study.parts import PartStep, part_digest, read_part
 from evaluation.study.recording_survey import SurveyedDrive
-from evaluation.study.study_layout import RecognitionFiles, SurveyFiles
-from evaluation.study.surveys import tracking
+from evaluation.study.study_layout import SurveyFiles
 
 
-def measure_change(
-    map_name: str,
-    stages: tuple[str, str],
-    surveys: tuple[SurveyFiles, ...],
-    result: Path,
-) -> None:
-    """Writes the `ChangeResult` of two drives.
+@dataclass(frozen=True)
+class MeasureChange(PartStep):
+    """Writes the `ChangeResult` of two drives; they must be of one world.
 
-    Args:
+    Attributes:
         map_name: of the city.
         stages: of the earlier drive, and of the later one.
         surveys: of the earlier drive, the later one, and their control if
             there is one.
-        result: to write.
-
-    Raises:
-        InputError: if the drives are of different worlds, or a file cannot
-            be read or written.
+        part: to write.
     """
-    inputs = _change_inputs(map_name, stages, surveys)
-    if is_current(result, inputs):
-        return
-    earlier, later, *controls = (
-        _to_surveyed(read_part(survey.drive)) for survey in surveys
-    )
-    control = controls[0] if controls else None
-    report = compare_maps(earlier, later, control)
-    change = ChangeResult(map_name, stages, report)
-    write_part(result, inputs, change)
+
+    map_name: str
+    stages: tuple[str, str]
+    surveys: tuple[SurveyFiles, ...]
+    part: Path
+
+    def inputs(self) -> dict[str, object]:
+        return {
+            "map": self.map_name,
+            "stages": self.stages,
+            "drives": [part_digest(survey.drive) for survey in self.surveys],
+        }
+
+    def make(self, tell: Tell) -> ChangeResult:
+        earlier, later, *controls = (
+            _to_surveyed(read_part(survey.drive)) for survey in self.surveys
+        )
+        control = controls[0] if controls else None
+        report = compare_maps(earlier, later, control)
+        return ChangeResult(self.map_name, self.stages, report)
 
 
-def is_measured(
-    map_name: str,
-    stages: tuple[str, str],
-    surveys: tuple[SurveyFiles, ...],
-    result: Path,
-) -> bool:
-    """Tells whether there is nothing to do; see `measure_change`."""
-    return is_current(result, _change_inputs(map_name, stages, surveys))
+@dataclass(frozen=True)
+class RecognisePlaces(PartStep):
+    """Writes the `RecognitionResult` of a method on two drives of one world.
 
+    It is None of a drive that is asked about itself and closes no loop.
 
-def _change_inputs(
-    map_name: str, stages: tuple[str, str], surveys: tuple[SurveyFiles, ...]
-) -> dict:
-    return {
-        "map": map_name,
-        "stages": stages,
-        "drives": [part_digest(survey.drive) for survey in surveys],
-        "code": measuring_code(),
-    }
-
-
-def recognise_places(
-    map_name: str,
-    stages: tuple[str, str],
-    surveys: tuple[SurveyFiles, SurveyFiles],
-    methods: tuple[MethodChoice, ...],
-    protocol: RetrievalProtocol,
-    files: RecognitionFiles,
-    tell: Tell,
-) -> None:
-    """Writes the `RecognitionResult`s of two drives: a job.
-
-    Of a drive that is asked about itself and closes no loop, they are None.
-
-    Args:
+    Attributes:
         map_name: of the city.
         stages: of the database, and of the query.
         surveys: likewise.
-        methods: that described both.
-        protocol: by which they did.
-        files: to write.
-        tell: is told how far it is.
-
-    Raises:
-        InputError: if the drives are of different worlds, no query has a
-            match, a method fails, or a file cannot be read or written.
+        method: that described both.
+        protocol: by which it did.
+        part: to write.
     """
-    for method in methods:
-        inputs = _recognition_inputs(
-            map_name, stages, surveys, method, protocol
+
+    map_name: str
+    stages: tuple[str, str]
+    surveys: tuple[SurveyFiles, SurveyFiles]
+    method: MethodChoice
+    protocol: RetrievalProtocol
+    part: Path
+
+    @property
+    def _described(self) -> list[Path]:
+        return [survey.described(self.method) for survey in self.surveys]
+
+    def inputs(self) -> dict[str, object]:
+        return {
+            "map": self.map_name,
+            "stages": self.stages,
+            "method": self.method.inputs(),
+            "protocol": self.protocol.to_json(),
+            "drives": [part_digest(part) for part in self._described],
+        }
+
+    def make(self, tell: Tell) -> RecognitionResult | None:
+        # The method comes first: what it kept may be of a type of its own.
+        method = self.method.make()
+        (placed, database), (placed_query, query) = map(
+            read_part, self._described
         )
-        result = files.result(method)
-        if not is_current(result, inputs):
-            found = _recognise(
-                map_name, stages, surveys, method, protocol, tell
-            )
-            write_part(result, inputs, found)
-
-
-def _recognise(
-    map_name: str,
-    stages: tuple[str, str],
-    surveys: tuple[SurveyFiles, SurveyFiles],
-    method: MethodChoice,
-    protocol: RetrievalProtocol,
-    tell: Tell,
-) -> RecognitionResult | None:
-    parts = [survey.described(method) for survey in surveys]
-    # The method comes first: what it kept may be of a type of its own.
-    comparing = method.make()
-    (placed, database), (placed_query, query) = map(read_part, parts)
-    check_same_world(placed, placed_query)
-    retrieval = score(comparing, database, query, protocol, tracking(tell))
-    if database.name == query.name and not retrieval.matches.any():
-        # A route need not close a loop.
-        tell.note(f"{query.name}: it never comes back to where it was")
-        return None
-    outcome = judge_retrieval(
-        comparing, database.name, query.name, retrieval, protocol
-    )
-    return RecognitionResult.of(map_name, stages, outcome)
-
-
-def are_recognised(
-    map_name: str,
-    stages: tuple[str, str],
-    surveys: tuple[SurveyFiles, SurveyFiles],
-    methods: tuple[MethodChoice, ...],
-    protocol: RetrievalProtocol,
-    files: RecognitionFiles,
-) -> bool:
-    """Tells whether there is nothing to do; see `recognise_places`."""
-    return all(
-        is_current(
-            files.result(method),
-            _recognition_inputs(map_name, stages, surveys, method, protocol),
+        check_same_world(placed, placed_query)
+        retrieval = score(method, database, query, self.protocol, tell.track)
+        if database.name == query.name and not retrieval.matches.any():
+            # A route need not close a loop.
+            tell.note(f"{query.name}: it never comes back to where it was")
+            return None
+        outcome = judge_retrieval(
+            method, database.name, query.name, retrieval, self.protocol
         )
-        for method in methods
-    )
-
-
-def _recognition_inputs(
-    map_name: str,
-    stages: tuple[str, str],
-    surveys: tuple[SurveyFiles, SurveyFiles],
-    method: MethodChoice,
-    protocol: RetrievalProtocol,
-) -> dict:
-    parts = [survey.described(method) for survey in surveys]
-    return {
-        "map": map_name,
-        "stages": stages,
-        "method": method.inputs(),
-        "protocol": protocol.to_json(),
-        "drives": [part_digest(part) for part in parts],
-        "code": measuring_code(),
-    }
+        return RecognitionResult.of(self.map_name, self.stages, outcome)
 
 
 def _to_surveyed(drive: SurveyedDrive) -> Surveyed:

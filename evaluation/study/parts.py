@@ -7,8 +7,8 @@ maps and takes a tenth of a second for 50 MB of spectra that hardly shrink.
 
 from __future__ import annotations
 
+import abc
 from collections.abc import Mapping
-import hashlib
 import json
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -17,16 +17,54 @@ import zstandard
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import completing, make_folder
+from cns_drake.base.jobs.fingerprint import fingerprint
+from cns_drake.base.jobs.step import Step, Tell
 from evaluation.study.plain_values import decode, encode
 
 _MAGIC = b"cns-eval part 2\n"
 _LEVEL = 1
 
 
-def digest(inputs: Mapping) -> str:
-    """Returns a short name for inputs, which must be ready for JSON."""
-    text = json.dumps(inputs, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode()).hexdigest()[:32]
+class PartStep(Step):
+    """A step that leaves a part, and perhaps figures that belong to it.
+
+    Attributes:
+        part: where the part lies.
+    """
+
+    part: Path
+
+    @property
+    def output(self) -> Path:
+        return self.part
+
+    @property
+    def figures(self) -> tuple[Path, ...]:
+        """Files that `make` writes."""
+        return ()
+
+    @abc.abstractmethod
+    def inputs(self) -> dict[str, object]:
+        """Returns all that the part is made of but code, ready for JSON.
+
+        Raises:
+            InputError: something that it is made of cannot be read.
+        """
+
+    @abc.abstractmethod
+    def make(self, tell: Tell) -> object:
+        """Returns the value of the part; see `Step.run`."""
+
+    def is_done(self) -> bool:
+        inputs = self.made_of(self.inputs())
+        return is_current(self.part, inputs) and all(
+            file.is_file() for file in self.figures
+        )
+
+    def run(self, tell: Tell) -> None:
+        # What changes while it is made shall not count as its input.
+        inputs = self.made_of(self.inputs())
+        write_part(self.part, inputs, self.make(tell))
 
 
 def write_part(path: Path, inputs: Mapping, value: object) -> None:
@@ -47,7 +85,11 @@ def write_part(path: Path, inputs: Mapping, value: object) -> None:
     data = zstandard.ZstdCompressor(level=_LEVEL, write_checksum=True).compress(
         plain
     )
-    header = {"digest": digest(inputs), "bytes": len(data), "inputs": inputs}
+    header = {
+        "digest": fingerprint(inputs),
+        "bytes": len(data),
+        "inputs": inputs,
+    }
     make_folder(path.parent)
     with completing(path) as unfinished, open(unfinished, "wb") as stream:
         stream.write(_MAGIC)
@@ -58,7 +100,7 @@ def write_part(path: Path, inputs: Mapping, value: object) -> None:
 def is_current(path: Path, inputs: Mapping) -> bool:
     """Returns whether a whole part is there that was made of these inputs."""
     try:
-        return part_digest(path) == digest(inputs)
+        return part_digest(path) == fingerprint(inputs)
     except InputError:
         return False
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from cns_drake.base.jobs.running import Job
+from cns_drake.base.jobs.step import Steps
 from evaluation.recognition.description import Role
 from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,
@@ -18,23 +19,20 @@ from evaluation.study.collection import (
     RecordingInfo,
     group_cities,
 )
+from evaluation.study.drive_source import DriveSource
 from evaluation.study.figure_files import change_stems, routes_stem
-from evaluation.study.measurements import (
-    are_recognised,
-    recognise_places,
-)
-from evaluation.study.method_costs import are_costs_measured, measure_costs
-from evaluation.study.study_layout import StudyFiles
-from evaluation.study.surveys import START_COST, survey_job, survey_name
-from evaluation.study.views import (
-    draw_city,
-    is_city_drawn,
-    is_measured_and_drawn,
-    measure_and_draw,
-)
+from evaluation.study.measurements import MeasureChange, RecognisePlaces
+from evaluation.study.method_costs import MeasureCosts
+from evaluation.study.study_layout import StudyFiles, SurveyFiles
+from evaluation.study.surveys import Survey
+from evaluation.study.views import DrawChange, DrawCity
 
-# Expected seconds of the jobs beyond their start: with 3000 scans, 250 places
-# and 150 queries.
+# Expected seconds: for a process to start and import all that it needs; for
+# the maps of a drive of 3000 scans, with 250 places and 150 queries.
+_START_COST = 2.0
+_MAP_COST = 10.0
+_ROLE_COST = {"places": 12.0, "queries": 8.0}
+# Of the other jobs, beyond their start.
 _CHANGE_COST = 6.0
 _CITY_COST = 4.0
 _COSTS_COST = 8.0
@@ -111,18 +109,14 @@ def _plan_city(
     jobs.append(
         Job(
             name=f"draw {city.name}",
-            function=draw_city,
-            arguments=(
+            step=DrawCity(
                 city.name,
                 tuple((r.stage, files.survey(r.name)) for r in stages),
                 files.figures / routes_stem(city),
-                files.drawn(routes_stem(city)),
                 files.page_drives(city.name),
             ),
             needs=_survey_names(stages),
-            cost=START_COST + _CITY_COST,
-            output=files.page_drives(city.name),
-            is_done=is_city_drawn,
+            cost=_START_COST + _CITY_COST,
         )
     )
     jobs += [_change_job(city, pair, files) for pair in city.change_pairs()]
@@ -180,21 +174,27 @@ def _change_job(
     control = city.control(*pair)
     drives = [*pair] if control is None else [*pair, control]
     earlier, later = pair
+    surveys = tuple(files.survey(one.name) for one in drives)
+    change = files.change(earlier.name, later.name)
+    first, second = change_stems(city, pair)
     return Job(
         name=f"change {city.name} {earlier.stage} > {later.stage}",
-        function=measure_and_draw,
-        arguments=(
-            city.name,
-            (earlier.stage, later.stage),
-            tuple(files.survey(one.name) for one in drives),
-            files.change(earlier.name, later.name),
-            tuple(files.figures / stem for stem in change_stems(city, pair)),
-            files.drawn(change_stems(city, pair)[0]),
+        step=Steps(
+            change,
+            (
+                MeasureChange(
+                    city.name, (earlier.stage, later.stage), surveys, change
+                ),
+                DrawChange(
+                    (surveys[0], surveys[1]),
+                    change,
+                    (files.figures / first, files.figures / second),
+                    files.drawn(first),
+                ),
+            ),
         ),
         needs=_survey_names(drives),
-        cost=START_COST + _CHANGE_COST,
-        output=files.change(earlier.name, later.name),
-        is_done=is_measured_and_drawn,
+        cost=_START_COST + _CHANGE_COST,
     )
 
 
@@ -212,21 +212,22 @@ def _recognition_job(
         for method in methods
     )
     results = files.recognition(database.name, query.name)
-    return Job(
-        name=name,
-        function=recognise_places,
-        arguments=(
+    steps = tuple(
+        RecognisePlaces(
             city.name,
             (database.stage, query.stage),
             (files.survey(database.name), files.survey(query.name)),
-            methods,
+            method,
             protocol,
-            results,
-        ),
+            results.result(method),
+        )
+        for method in methods
+    )
+    return Job(
+        name=name,
+        step=Steps(results.folder, steps),
         needs=_survey_names(pair),
-        cost=START_COST + cost,
-        output=results.folder,
-        is_done=are_recognised,
+        cost=_START_COST + cost,
     )
 
 
@@ -241,8 +242,7 @@ def _cost_job(
     database, query = pair
     return Job(
         name="costs of the methods",
-        function=measure_costs,
-        arguments=(
+        step=MeasureCosts(
             query.source,
             (files.survey(database.name), files.survey(query.name)),
             methods,
@@ -250,11 +250,38 @@ def _cost_job(
             files.costs,
         ),
         needs=others,
-        cost=START_COST + _COSTS_COST,
-        output=files.costs,
-        is_done=are_costs_measured,
+        cost=_START_COST + _COSTS_COST,
+    )
+
+
+def survey_job(
+    name: str,
+    source: DriveSource,
+    roles: Iterable[Role],
+    methods: tuple[MethodChoice, ...],
+    protocol: RetrievalProtocol,
+    files: SurveyFiles,
+    needs: tuple[str, ...] = (),
+) -> Job:
+    """Returns the job that surveys a recording.
+
+    Args:
+        name: of the recording.
+        source: see `Survey`.
+        roles: likewise.
+        methods: likewise.
+        protocol: likewise.
+        files: likewise.
+        needs: names of the jobs that make the recording.
+    """
+    survey = Survey(source, frozenset(roles), methods, protocol, files)
+    return Job(
+        name=f"survey {name}",
+        step=survey,
+        needs=needs,
+        cost=_START_COST + _MAP_COST + sum(_ROLE_COST[r] for r in survey.roles),
     )
 
 
 def _survey_names(recordings: Iterable[RecordingInfo]) -> tuple[str, ...]:
-    return tuple(survey_name(recording.name) for recording in recordings)
+    return tuple(f"survey {recording.name}" for recording in recordings)

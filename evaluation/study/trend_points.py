@@ -1,43 +1,22 @@
-"""One drive that asks, and many databases: their change and their AUC.
-
-Every database is a job of its own.
-"""
+"""A database that is asked: its change, and the AUC of each method."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 import math
 from pathlib import Path
 
-from cns_drake.base.errors import InputError
-from cns_drake.base.files import make_folder
-from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.base.jobs.running import Job, Tell, run_jobs
-from cns_drake.base.recordings.driven_way import driven_way
+from cns_drake.base.jobs.step import Tell
 from evaluation.change.tcr import temporal_change
 from evaluation.recognition.place_recognition import judge_retrieval
-from evaluation.recognition.protocol import (
-    PAPER_PROTOCOL,
-    RetrievalProtocol,
-)
+from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.retrieval import compare as score
-from evaluation.sequences import Sequence as Recorded
-from evaluation.sequences import check_same_world, open_sequence
-from evaluation.study.chosen_methods import MethodChoice, choose_methods
-from evaluation.study.drive_source import DriveSource, RecordedDrive
-from evaluation.study.parts import (
-    is_current,
-    part_digest,
-    read_part,
-    write_part,
-)
+from evaluation.sequences import check_same_world
+from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.drive_source import DriveSource
+from evaluation.study.parts import PartStep, part_digest, read_part
 from evaluation.study.recording_survey import survey_recording
-from evaluation.study.study_layout import StudyFiles, SurveyFiles
-from evaluation.study.surveys import survey_inputs, survey_job, tracking
-
-# Expected seconds for a database.
-_COST = 30.0
+from evaluation.study.study_layout import SurveyFiles
 
 
 @dataclass(frozen=True)
@@ -76,236 +55,68 @@ class TrendPoint:
 
 
 @dataclass(frozen=True)
-class Asked:
-    """A drive that is asked, and what tells the change from the route.
+class MeasureDatabase(PartStep):
+    """Writes the list of `TrendPoint`s of one database.
 
     Attributes:
-        source: opens it.
-        control: name of the drive on its route through the city of the
-            query; None if there is none.
-    """
-
-    source: DriveSource
-    control: str | None = None
-
-
-def measure_trend(
-    query: Path,
-    databases: Sequence[Path],
-    output: Path,
-    cluster: Cluster,
-    own_methods: Iterable[Path] = (),
-    protocol: RetrievalProtocol = PAPER_PROTOCOL,
-    controls: Sequence[Path] = (),
-) -> list[TrendPoint]:
-    """Returns the points of all databases and methods.
-
-    What an earlier run left, finished or not, is used as far as it belongs
-    to the same recordings and methods. Of a database only its points are
-    left, since the surveys of many would fill a disk.
-
-    Args:
-        query: the drive that asks.
-        databases: the drives that are asked.
-        output: folder for intermediate results, made if needed.
-        cluster: where the work is done.
-        own_methods: Python files with one method each, to run besides those
-            of this package.
-        protocol: of place recognition.
-        controls: drives on the routes of databases through the stage of the
-            query; each serves the databases whose route it has.
-
-    Raises:
-        InputError: a recording cannot be read, two have one name, a control
-            serves no database, or a database is of another world or shares
-            no place with the query.
-    """
-    methods = choose_methods(own_methods)
-    asking = open_sequence(query)
-    names = {asking.name}
-    if protocol.exclude_recent is not None:
-        # A drive may be asked about itself then.
-        names = set()
-    opened: dict[Path, Recorded] = {}
-    for path in (*databases, *controls):
-        sequence = open_sequence(path)
-        if sequence.name in names:
-            raise InputError(f"{path}: {sequence.name} is there twice")
-        names.add(sequence.name)
-        check_same_world(sequence, asking)
-        opened[path] = sequence
-    serving = [opened[path] for path in controls]
-    asked = {}
-    for path in databases:
-        way = driven_way(opened[path].scenario)
-        same = [
-            control.name
-            for control in serving
-            if way is not None and driven_way(control.scenario) == way
-        ]
-        asked[opened[path].name] = Asked(
-            _recorded(path), same[0] if same else None
-        )
-    used = {one.control for one in asked.values()}
-    for path in controls:
-        if opened[path].name not in used:
-            raise InputError(f"--control: {path}: no database has its route")
-    return measure_drives(
-        asking.name,
-        _recorded(query),
-        asked,
-        {opened[path].name: _recorded(path) for path in controls},
-        output,
-        cluster,
-        methods,
-        protocol,
-    )
-
-
-def measure_drives(
-    asking: str,
-    query: DriveSource,
-    databases: Mapping[str, Asked],
-    controls: Mapping[str, DriveSource],
-    output: Path,
-    cluster: Cluster,
-    methods: tuple[MethodChoice, ...],
-    protocol: RetrievalProtocol = PAPER_PROTOCOL,
-) -> list[TrendPoint]:
-    """Returns the points of drives that need not be recorded.
-
-    Args:
-        asking: name of the drive that asks.
-        query: opens it.
-        databases: name -> a drive that is asked.
-        controls: name -> what opens a control of databases.
-        output: folder for intermediate results, made if needed.
-        cluster: where the work is done.
-        methods: to run.
-        protocol: of place recognition.
-
-    Raises:
-        InputError: see `measure_trend`.
-    """
-    files = StudyFiles(output.absolute())
-    make_folder(output)
-    survey = files.survey(asking)
-    jobs = [survey_job(asking, query, {"queries"}, methods, protocol, survey)]
-    sources = {name: one.source for name, one in databases.items()}
-    sources |= controls
-    parts = {name: files.trend_points(name, asking) for name in sources}
-    jobs += [
-        Job(
-            name=f"measure {name}",
-            function=measure_database,
-            arguments=(sources[name], survey, methods, protocol, result),
-            needs=(jobs[0].name,),
-            cost=_COST,
-            output=result,
-            is_done=is_database_measured,
-        )
-        for name, result in parts.items()
-    ]
-    run_jobs(jobs, cluster)
-    points: list[TrendPoint] = []
-    for name, one in databases.items():
-        unchanged = {}
-        if one.control is not None:
-            measured = read_part(parts[one.control])
-            unchanged = {point.method: point.auc for point in measured}
-        points += [
-            replace(point, auc_unchanged=unchanged.get(point.method, math.nan))
-            for point in read_part(parts[name])
-        ]
-    return points
-
-
-def measure_database(
-    source: DriveSource,
-    query: SurveyFiles,
-    methods: tuple[MethodChoice, ...],
-    protocol: RetrievalProtocol,
-    result: Path,
-    tell: Tell,
-) -> None:
-    """Writes the points of one database: a job.
-
-    Args:
-        source: opens the database.
+        source: opens the database, which is of the world of the query.
         query: survey of the drive that asks.
         methods: to run.
         protocol: of place recognition.
-        result: to write.
-        tell: is told how far it is.
-
-    Raises:
-        InputError: if the database cannot be read, no query has a match, or
-            a file cannot be read or written.
+        part: to write.
     """
-    inputs = _inputs(source, query, methods, protocol)
-    running = [method.make() for method in methods]
-    database = survey_recording(
-        source(), {"places"}, running, protocol, tracking(tell)
-    )
-    asking = read_part(query.drive)
-    check_same_world(database.drive.placed, asking.placed)
-    change = temporal_change(
-        database.drive.coarse.centroids_W, asking.coarse.centroids_W
-    )
-    points = []
-    for choice, method in zip(methods, running, strict=True):
-        _, queries = read_part(query.described(choice))
-        places = database.described[method.name]
-        found = judge_retrieval(
-            method,
-            places.name,
-            queries.name,
-            score(method, places, queries, protocol),
-            protocol,
+
+    source: DriveSource
+    query: SurveyFiles
+    methods: tuple[MethodChoice, ...]
+    protocol: RetrievalProtocol
+    part: Path
+
+    def inputs(self) -> dict[str, object]:
+        return {
+            "drive": self.source.identity(),
+            "protocol": self.protocol.to_json(),
+            "query": part_digest(self.query.drive),
+            "queries": [
+                part_digest(self.query.described(one)) for one in self.methods
+            ],
+            "methods": [method.inputs() for method in self.methods],
+        }
+
+    def make(self, tell: Tell) -> list[TrendPoint]:
+        running = [method.make() for method in self.methods]
+        database = survey_recording(
+            self.source(), {"places"}, running, self.protocol, tell.track
         )
-        metrics = found.metrics
-        points.append(
-            TrendPoint(
-                database=places.name,
-                method=method.name,
-                tcr_sym=float(change.symmetric),
-                auc=float(metrics.auc),
-                auc_low=float(metrics.auc_interval.low),
-                auc_high=float(metrics.auc_interval.high),
-                recall_at_1=float(metrics.recall_at_1),
-                queries=metrics.num_queries,
-                with_match=metrics.num_with_match,
-                protocol=found.protocol,
+        asking = read_part(self.query.drive)
+        check_same_world(database.drive.placed, asking.placed)
+        change = temporal_change(
+            database.drive.coarse.centroids_W, asking.coarse.centroids_W
+        )
+        points = []
+        for choice, method in zip(self.methods, running, strict=True):
+            _, queries = read_part(self.query.described(choice))
+            places = database.described[method.name]
+            found = judge_retrieval(
+                method,
+                places.name,
+                queries.name,
+                score(method, places, queries, self.protocol),
+                self.protocol,
             )
-        )
-    write_part(result, inputs, points)
-
-
-def is_database_measured(
-    source: DriveSource,
-    query: SurveyFiles,
-    methods: tuple[MethodChoice, ...],
-    protocol: RetrievalProtocol,
-    result: Path,
-) -> bool:
-    """Tells whether there is nothing to do; see `measure_database`."""
-    return is_current(result, _inputs(source, query, methods, protocol))
-
-
-def _inputs(
-    source: DriveSource,
-    query: SurveyFiles,
-    methods: tuple[MethodChoice, ...],
-    protocol: RetrievalProtocol,
-) -> dict:
-    return {
-        **survey_inputs(source, frozenset({"places"}), protocol),
-        "retrieval": protocol.to_json(),
-        "query": part_digest(query.drive),
-        "queries": [part_digest(query.described(one)) for one in methods],
-        "methods": [method.inputs() for method in methods],
-    }
-
-
-def _recorded(path: Path) -> RecordedDrive:
-    return RecordedDrive(path.absolute())
+            metrics = found.metrics
+            points.append(
+                TrendPoint(
+                    database=places.name,
+                    method=method.name,
+                    tcr_sym=float(change.symmetric),
+                    auc=float(metrics.auc),
+                    auc_low=float(metrics.auc_interval.low),
+                    auc_high=float(metrics.auc_interval.high),
+                    recall_at_1=float(metrics.recall_at_1),
+                    queries=metrics.num_queries,
+                    with_match=metrics.num_with_match,
+                    protocol=found.protocol,
+                )
+            )
+        return points

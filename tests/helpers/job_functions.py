@@ -1,5 +1,7 @@
 """What jobs of the tests do; imported by the processes in which they run."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
 import os
 from pathlib import Path
 import select
@@ -7,6 +9,27 @@ import signal
 import threading
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.jobs.step import Step
+
+
+@dataclass(frozen=True)
+class Call(Step):
+    """Calls a function of this module; another says whether it has to."""
+
+    function: Callable
+    arguments: tuple = ()
+    place: Path | None = None
+    done: Callable | None = None
+
+    @property
+    def output(self):
+        return self.place
+
+    def is_done(self):
+        return self.done is not None and self.done(*self.arguments)
+
+    def run(self, tell):
+        self.function(*self.arguments, tell)
 
 
 def join(inputs, path, tell):

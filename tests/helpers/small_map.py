@@ -65,3 +65,19 @@ def scenario_values(map_folder, sequence="metropolis_04"):
     path = shipped_sequences()[sequence]
     values = yaml.safe_load(path.read_text())
     return values | {"map": str(map_folder), "name": sequence}
+
+
+def write_town(folder, routes, frames):
+    """Writes a map with a sequence for each stage, on a given route."""
+    write_small_map(folder)
+    for stage, route in routes.items():
+        values = scenario_values(folder, route) | {
+            "map": ".",
+            "stage": stage,
+            "frames": frames,
+            "lidars": {"lidar": {"columns": 16}},
+        }
+        del values["name"]
+        file = folder / f"sequence_{stage}.yaml"
+        file.write_text(yaml.safe_dump(values))
+    return folder

@@ -5,7 +5,7 @@ tests; processes would only make these slow.
 """
 
 from cns_drake.base.jobs.job_process import nothing_left
-from cns_drake.base.jobs.running import Tell
+from cns_drake.base.jobs.step import Tell
 from evaluation.paper import reference_for
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.study.assembly import assemble
@@ -14,10 +14,17 @@ from evaluation.study.plan import plan_study
 
 
 def do(jobs):
-    """Does what jobs leave to do, in their order; none needs a later one."""
+    """Does what is left to do of jobs, none of which needs a later one.
+
+    Returns:
+        The names of those that had anything to do.
+    """
+    done = []
     for job in jobs:
-        if not nothing_left(job.is_done, job.arguments):
-            job.function(*job.arguments, Tell())
+        if not nothing_left(job.step):
+            job.step.run(Tell())
+            done.append(job.name)
+    return done
 
 
 def report(recordings, output, methods=None, protocol=PAPER_PROTOCOL):

@@ -17,7 +17,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 import traceback
 
 from cns_drake.base.errors import InputError, one_line
@@ -28,12 +27,11 @@ from cns_drake.base.interrupts import (
     interrupt_on_termination,
     uninterrupted,
 )
+from cns_drake.base.jobs.step import Step, Tell
 from cns_drake.base.libraries import missing_library
 
 # How long a process may take to close its files once it is asked to end [s].
 PATIENCE = 30.0
-# How often a job tells of its progress at most [s].
-_TELL_INTERVAL = 0.5
 # Where what a job prints goes, whatever stands for it in this process.
 _STDERR = 2
 # How often a parent looks whether its job is still wanted [s].
@@ -62,30 +60,6 @@ class ProcessDiedError(Exception):
     """The process of a job was killed, or crashed, or was asked to end."""
 
 
-class Tell:
-    """How a job tells of itself; without an argument nobody listens."""
-
-    def __init__(self, send: Callable[..., None] = lambda *message: None):
-        """Takes what takes the messages: a kind and its values."""
-        self._send = send
-        self._told: float | None = None
-
-    def progress(self, done: int, total: int) -> None:
-        """Tells that so much of so much is done, in any unit."""
-        now = time.monotonic()
-        if (
-            done >= total
-            or self._told is None
-            or now - self._told >= _TELL_INTERVAL
-        ):
-            self._told = now
-            self._send("progress", int(done), int(total))
-
-    def note(self, text: str) -> None:
-        """Tells something that a user should know."""
-        self._send("note", str(text))
-
-
 def run_process(
     job: bytes,
     on_message: Callable[..., None],
@@ -94,9 +68,7 @@ def run_process(
     """Runs a job in a process of its own and waits for its end.
 
     Args:
-        job: a pickled tuple: function, arguments, what it writes (see
-            `exclusive`) or None, and what tells whether nothing is left to
-            do (see `nothing_left`).
+        job: a pickled `Step`.
         on_message: takes what the job tells; see `Tell`.
         is_wanted: asked often; where it says no, the process is ended.
 
@@ -198,7 +170,8 @@ def _run(job: bytes, tell: Tell) -> tuple[str, str]:
     """Runs a job; returns what is left to tell."""
     try:
         with uninterrupted():
-            function, arguments, output, is_done = pickle.loads(job)
+            step: Step = pickle.loads(job)
+            output = step.output
         with contextlib.ExitStack() as stack:
             if output is not None:
                 stack.enter_context(
@@ -210,8 +183,8 @@ def _run(job: bytes, tell: Tell) -> tuple[str, str]:
                         ),
                     )
                 )
-            if not nothing_left(is_done, arguments):
-                function(*arguments, tell)
+            if not nothing_left(step):
+                step.run(tell)
     except MemoryError:
         # Another time, or elsewhere, there may be enough.
         return "died", "not enough memory"
@@ -226,17 +199,10 @@ def _run(job: bytes, tell: Tell) -> tuple[str, str]:
     return "done", ""
 
 
-def nothing_left(is_done: Callable[..., bool] | None, arguments: tuple) -> bool:
-    """Tells whether a job has nothing to do, as far as it can tell.
-
-    Args:
-        is_done: answers, or raises InputError; None stands for no.
-        arguments: of the job.
-    """
-    if is_done is None:
-        return False
+def nothing_left(step: Step) -> bool:
+    """Returns whether a step has nothing to do, as far as it can find out."""
     try:
-        return is_done(*arguments)
+        return step.is_done()
     except InputError:
         return False
 

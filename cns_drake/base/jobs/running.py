@@ -1,14 +1,9 @@
-"""Many jobs, side by side, on one machine or on a cluster.
-
-A job is a function that writes files. Nothing else comes of it, so that
-whatever is interrupted, here or anywhere, goes on where it was when the same
-jobs are run again.
-"""
+"""Many jobs, side by side, on one machine or on a cluster."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Set
+from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass
 import graphlib
 import pickle
@@ -27,17 +22,13 @@ from cns_drake.base.jobs.job_process import (
     PATIENCE,
     JobError,
     ProcessDiedError,
-    Tell,
     nothing_left,
 )
+from cns_drake.base.jobs.step import Step
 from cns_drake.base.jobs.workers import Workers
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from cns_drake.base.jobs.job_progress import JobProgress
-
-__all__ = ["Job", "Tell", "run_jobs"]
 
 # How often a job is started again after its process has died.
 _RETRIES = 2
@@ -47,34 +38,22 @@ _REFRESH_INTERVAL = 0.5
 
 @dataclass(frozen=True)
 class Job:
-    """A function to be called in a process of its own.
+    """A step to be run in a process of its own.
 
     Attributes:
         name: unique, for people.
-        function: of a module, so that it can be imported anywhere. It is
-            called with the arguments and a `Tell`, and writes no file under
-            a final name that is not complete. An InputError is its way to
-            fail.
-        arguments: picklable; paths among them are absolute.
+        step: the work. Whether it is done is asked before anything runs,
+            once all that the job needs is done, which saves a process; and
+            again by the process, since another copy of the job may have come
+            before.
         needs: names of jobs that must have succeeded before.
         cost: expected time on one core [s].
-        output: the file or folder that it writes. Two copies of a job, as
-            when the connection to one is lost, never work on it at the same
-            time; see `cns_drake.base.files.exclusive`.
-        is_done: likewise of a module; called with the arguments, once all
-            that the job needs is done: whether nothing is to be done. Asked
-            before anything runs, which saves a process, and again by the
-            process, since another copy of the job may have come before. An
-            InputError stands for no: it is for the job to tell.
     """
 
     name: str
-    function: Callable[..., None]
-    arguments: tuple
+    step: Step
     needs: tuple[str, ...] = ()
     cost: float = 1.0
-    output: Path | None = None
-    is_done: Callable[..., bool] | None = None
 
 
 def run_jobs(jobs: Iterable[Job], cluster: Cluster) -> None:
@@ -139,9 +118,7 @@ def _find_done(jobs: Mapping[str, Job]) -> set[str]:
     done: set[str] = set()
     for name in _ordered(jobs):
         job = jobs[name]
-        if done.issuperset(job.needs) and nothing_left(
-            job.is_done, job.arguments
-        ):
+        if done.issuperset(job.needs) and nothing_left(job.step):
             done.add(name)
     return done
 
@@ -220,9 +197,7 @@ class _Run:
         self._submitted.add(job.name)
         self._workers.submit(
             job.name,
-            pickle.dumps(
-                (job.function, job.arguments, job.output, job.is_done)
-            ),
+            pickle.dumps(job.step),
             self._urgency[job.name],
         )
 

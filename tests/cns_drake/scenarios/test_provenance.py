@@ -13,51 +13,91 @@ from cns_drake.scenarios.provenance import (
     digest_inputs,
 )
 
-INCLUDE = "<include><uri>{}</uri></include>"
+MODEL = """<sdf version="1.9"><!-- <uri>left_out.obj</uri> --><model name="m">
+<link name="l"><visual name="v"><geometry><mesh><uri>{}</uri></mesh></geometry>
+<material><pbr><metal><albedo_map>wall.png</albedo_map></metal></pbr></material>
+</visual></link></model></sdf>"""
+# Files that a world reads, directly or not, and what they hold.
+READ = {
+    "models/hut/hut.sdf": MODEL.format("roof.obj"),
+    "models/hut/roof.obj": "mtllib roof.mtl\nv 0 0 0\n",
+    "models/hut/roof.mtl": "newmtl red\nmap_Kd -clamp on tiles.png\n",
+    "models/hut/tiles.png": "pixels",
+    "models/hut/wall.png": "more pixels",
+    "shed/model.config": '<model><sdf version="1.9">shed.sdf</sdf></model>',
+    "shed/shed.sdf": MODEL.format("<![CDATA[door & window.gltf]]>"),
+    "shed/door & window.gltf": '{"buffers": [{"uri": "door.bin"}]}',
+    "shed/door.bin": "vertices",
+    "models/tree/tree.sdf": MODEL.format(" leaves.dae "),
+    "models/tree/leaves.dae": "<a><init_from>leaf.png</init_from></a>",
+    "models/tree/leaf.png": "green pixels",
+    "a&b.obj": "v 0 0 0\n",
+    "c#d.obj": "v 0 0 0\n",
+}
+UNREAD = ["left_out.obj", "models/hut/other.obj", "shed/notes.txt"]
+URIS = [
+    " models/hut/hut.sdf ",
+    "shed",
+    "model://tree",
+    "a&amp;b.obj",
+    "c&#x23;d.obj",
+    "tiny.sdf",
+    "package://far/away.sdf",
+    "none.obj",
+    "/dev/zero",
+    "x" * 5000,
+]
 
 
 @pytest.fixture
 def scenario(tmp_path):
-    """A world that includes a model, which has a mesh, and odd names."""
+    """A world that includes models, which have meshes, and odd names."""
     folder = tmp_path / "world"
-    (folder / "models" / "hut").mkdir(parents=True)
+    folder.mkdir()
     scenario = tiny_scenario(folder)
     world = folder / "tiny.sdf"
-    uris = [
-        " models/hut/hut.sdf ",
-        "tiny.sdf",
-        "models",
-        "package://far/away.sdf",
-        "none.obj",
-        "/dev/zero",
-        "x" * 5000,
-    ]
-    world.write_text(world.read_text() + "".join(map(INCLUDE.format, uris)))
-    (folder / "models/hut/hut.sdf").write_text("<uri>roof.obj</uri>")
-    (folder / "models/hut/roof.obj").write_text("v 0 0 0")
+    named = "".join(f"<include><uri>{uri}</uri></include>" for uri in URIS)
+    text = world.read_text()
+    assert text.count("</world>") == 1
+    world.write_text(text.replace("</world>", f"{named}</world>"))
+    for name in (*READ, *UNREAD):
+        file = folder / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(READ.get(name, "anything"))
     return scenario
 
 
-def test_which_files_count(scenario, tmp_path):
+@pytest.mark.parametrize("name", [*READ, "tiny.sdf"])
+def test_each_file_that_a_world_reads_counts(scenario, tmp_path, name):
     before = digest_inputs(scenario)
     assert before.keys() == {"world", "vehicle", "waypoints"}
     assert all(len(digest) == 64 for digest in before.values())
-    folder = tmp_path / "world"
-    (folder / "unrelated.obj").write_text("v 0 0 0")
+    file = tmp_path / "world" / name
+    file.write_text(file.read_text() + "\n")
+    after = digest_inputs(scenario)
+    assert after["world"] != before["world"]
+    assert {**after, "world": ""} == {**before, "world": ""}
+    assert combined_digest(after) != combined_digest(before)
+    file.unlink()
+    if name != "tiny.sdf":
+        assert digest_inputs(scenario)["world"] != before["world"]
+
+
+def test_what_a_world_does_not_read_does_not_count(scenario, tmp_path):
+    before = digest_inputs(scenario)
+    for name in UNREAD:
+        (tmp_path / "world" / name).write_text("something else")
     assert digest_inputs(scenario) == before
-    for name, changed in [
-        ("tiny.sdf", "world"),
-        ("models/hut/hut.sdf", "world"),
-        ("models/hut/roof.obj", "world"),
-        ("tiny.csv", "waypoints"),
-    ]:
-        text = (folder / name).read_text()
-        (folder / name).write_text(text + "\n")
-        after = digest_inputs(scenario)
-        assert after[changed] != before[changed]
-        assert {**after, changed: ""} == {**before, changed: ""}
-        assert combined_digest(after) != combined_digest(before)
-        (folder / name).write_text(text)
+
+
+def test_route_and_table_count(scenario, tmp_path):
+    before = digest_inputs(scenario)
+    folder = tmp_path / "world"
+    route = folder / "tiny.csv"
+    route.write_text(route.read_text() + "\n")
+    after = digest_inputs(scenario)
+    assert after["waypoints"] != before["waypoints"]
+    assert {**after, "waypoints": ""} == {**before, "waypoints": ""}
     (folder / "structures.csv").write_text("instance,name,class\n")
     assert digest_inputs(scenario).keys() - before.keys() == {"structures"}
 

@@ -12,7 +12,8 @@ from cns_drake.scenarios.scenario_files import world_file
 from cns_drake.scenarios.scenario_loading import load_scenario, make_scenario
 from cns_drake.simulation.simulation import simulate
 from cns_drake.simulation.station import load_stage
-from cns_drake.studies.recording_jobs import is_recorded, record_all
+from cns_drake.studies.recording_jobs import record_all
+from cns_drake.studies.recording_step import is_recorded
 
 TOPICS = ("/lidar/points", "/imu/data", "/odometry", "/tf")
 

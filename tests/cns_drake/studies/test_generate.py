@@ -25,10 +25,11 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.city.generation.generate import generate_city
 from cns_drake.scenarios.scenario_loading import load_scenario
 from cns_drake.simulation.simulation import simulate
-from cns_drake.studies.recording_jobs import is_recorded, record_all
+from cns_drake.studies.recording_jobs import record_all
+from cns_drake.studies.recording_step import is_recorded
 from evaluation.change.drive_change import compare, survey
 from evaluation.sequences import open_sequence
-from evaluation.study import trend_points
+from evaluation.study import trend_databases
 
 pytestmark = pytest.mark.slow
 
@@ -199,10 +200,10 @@ def test_families_on_other_cities_share_them(town, tmp_path, monkeypatch):
     with pytest.raises(InputError, match=r"through town_c8, .* town_c7"):
         compare(survey(query), survey(other))
     monkeypatch.setattr(
-        trend_points, "run_jobs", lambda jobs, cluster: studies.do(jobs)
+        trend_databases, "run_jobs", lambda jobs, cluster: studies.do(jobs)
     )
     trend = tmp_path / "trend"
-    points = trend_points.measure_trend(query, databases, trend, ONE)
+    points = trend_databases.measure_trend(query, databases, trend, ONE)
     changes = {p.database: p.tcr_sym for p in points}
     assert changes[names[0]] == 0.0  # The very same drive.
     assert changes[names[1]] > 0.1

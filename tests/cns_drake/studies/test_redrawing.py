@@ -10,7 +10,7 @@ import yaml
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.base.jobs.running import Tell
+from cns_drake.base.jobs.step import Tell
 from cns_drake.city.generation import generate
 from cns_drake.city.generation.city_structures import make_city
 from cns_drake.city.generation.generate import (
@@ -23,9 +23,8 @@ from cns_drake.roads.network import load_road_network
 from cns_drake.scene.world import load_world, structures_in
 from cns_drake.studies import redrawing
 from cns_drake.studies.redrawing import (
-    is_redrawn,
+    RedrawCity,
     redraw_cities,
-    redraw_city,
     redrawn_inputs,
 )
 
@@ -178,14 +177,14 @@ def copied(drawn, output):
     return shutil.copytree(cities[4], output / cities[4].name)
 
 
-@pytest.mark.parametrize("change", ["plan", "roads", "version"])
+@pytest.mark.parametrize("change", ["plan", "roads", "program"])
 def test_what_was_drawn_of_something_else_is_replaced(
     town, drawn, tmp_path, monkeypatch, change
 ):
     folder = copied(drawn, tmp_path / "cities")
     (folder / "meshes" / "old.obj").touch()
-    if change == "version":
-        monkeypatch.setattr(redrawing, "__version__", "77.0")
+    if change == "program":
+        monkeypatch.setattr(redrawing, "code_digest", lambda *_: "another")
     else:
         file = town / {"plan": "city.yaml", "roads": "roads.yaml"}[change]
         text = file.read_text()
@@ -195,13 +194,12 @@ def test_what_was_drawn_of_something_else_is_replaced(
         }[change]
         assert old in text
         file.write_text(text.replace(old, new))
-    assert not is_redrawn(town, "02", 4, folder)
+    step = RedrawCity(town, "02", 4, folder)
+    assert not step.is_done()
     notes = []
-    redraw_city(
-        town, "02", 4, folder, Tell(lambda kind, text: notes.append(text))
-    )
+    step.run(Tell(lambda kind, text: notes.append(text)))
     assert notes == [f"{folder}: replaced, as it was of other inputs"]
-    assert is_redrawn(town, "02", 4, folder)
+    assert step.is_done()
     fresh = redraw_here(town, [4], tmp_path / "fresh")[4]
     assert contents(folder) == contents(fresh)
 
@@ -223,7 +221,7 @@ def test_anything_else_of_that_name_is_left_alone(town, tmp_path, other):
         redraw_here(town, [5, 4], folder.parent)
     # Nor does the job take it, if it comes up meanwhile.
     with pytest.raises(InputError, match=r"town_c4: is there already, and no"):
-        redraw_city(town, "02", 4, folder, Tell())
+        RedrawCity(town, "02", 4, folder).run(Tell())
     assert contents(tmp_path) == before
     assert [p.name for p in folder.parent.iterdir()] == ["town_c4"]
 

@@ -2,7 +2,7 @@
 
 import csv
 
-from helpers.small_map import scenario_values, write_small_map
+from helpers.small_map import write_small_map, write_town
 import pytest
 import yaml
 
@@ -20,22 +20,6 @@ from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.study.collection import find_recordings, group_cities
 
 pytestmark = pytest.mark.slow
-
-
-def write_town(folder, routes, frames):
-    """Writes a map with a sequence for each stage, on a given route."""
-    write_small_map(folder)
-    for stage, route in routes.items():
-        values = scenario_values(folder, route) | {
-            "map": ".",
-            "stage": stage,
-            "frames": frames,
-            "lidars": {"lidar": {"columns": 16}},
-        }
-        del values["name"]
-        file = folder / f"sequence_{stage}.yaml"
-        file.write_text(yaml.safe_dump(values))
-    return folder
 
 
 @pytest.fixture(scope="module")
@@ -113,7 +97,7 @@ def test_everything_is_planned_before_anything_runs(
     for job in jobs.values():
         assert jobs.keys() >= set(job.needs)
     # Each writes a place of its own, which workers anywhere find.
-    outputs = [job.output for job in jobs.values()]
+    outputs = [job.step.output for job in jobs.values()]
     assert len(set(outputs)) == len(outputs)
     assert all(output.is_absolute() for output in outputs)
     # What is recorded is not recorded again; sequences want their pages.

@@ -30,7 +30,7 @@ def test_costs_in_the_report(tmp_path, monkeypatch):
     # It has the machine alone.
     assert set(jobs[-1].needs) == {job.name for job in jobs[:-1]}
     studies.do(jobs)
-    assert jobs[-1].is_done(*jobs[-1].arguments)
+    assert jobs[-1].step.is_done()
     path = assemble(found, output, with_costs=True)
     with (output / "costs.csv").open(newline="") as stream:
         rows = {row["method"]: row for row in csv.DictReader(stream)}
@@ -40,7 +40,7 @@ def test_costs_in_the_report(tmp_path, monkeypatch):
         assert float(row["describe_ms"]) == float(row["query_ms"]) == 1.0
         assert row["scans_per_place"] == ("10" if name == "btc" else "1")
         (job,) = (j for j in jobs if j.name == "survey town_01")
-        (choice,) = (m for m in job.arguments[2] if m.name == name)
+        (choice,) = (m for m in job.step.methods if m.name == name)
         _, described = read_part(files.survey("town_01").described(choice))
         places = described.places.descriptors
         sizes = [len(pickle.dumps(one, protocol=5)) for one in places]

@@ -213,7 +213,7 @@ def test_what_is_done_needs_no_process(recordings, report, monkeypatch):
     run_jobs(jobs, Cluster())
     (report / "figures" / "routes_metropolis.webp").rename(report / "aside")
     try:
-        assert [j.name for j in jobs if not j.is_done(*j.arguments)] == [
+        assert [j.name for j in jobs if not j.step.is_done()] == [
             "draw metropolis"
         ]
     finally:

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.jobs.fingerprint import fingerprint
 from evaluation.study.parts import (
-    digest,
     is_current,
     part_digest,
     read_part,
@@ -59,7 +59,7 @@ def test_equal_inputs_and_values_give_equal_bytes(part, tmp_path):
 
 def test_a_part_belongs_to_its_inputs(part):
     assert is_current(part, INPUTS)
-    assert part_digest(part) == digest(INPUTS)
+    assert part_digest(part) == fingerprint(INPUTS)
     assert is_current(part, {**INPUTS, "roles": ["places"]})
     for other in (
         {**INPUTS, "roles": []},

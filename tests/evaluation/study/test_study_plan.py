@@ -35,7 +35,7 @@ def test_every_recording_is_surveyed_when_it_is_made(tmp_path):
         "survey metropolis_04": ("metropolis_04",),
         "survey metropolis_01_stage_04": (),
     }
-    roles = {name: sorted(job.arguments[1]) for name, job in surveys.items()}
+    roles = {name: sorted(job.step.roles) for name, job in surveys.items()}
     assert roles == {
         "survey metropolis_01": ["places"],
         "survey metropolis_02": ["places"],
@@ -104,7 +104,7 @@ def test_a_control_serves_both_ways(tmp_path):
             drives, tmp_path, reference=reference_for({"riverside"})
         )
     }
-    roles = sorted(jobs["survey riverside_01_stage_02"].arguments[1])
+    roles = sorted(jobs["survey riverside_01_stage_02"].step.roles)
     assert roles == ["places", "queries"]
     assert {
         "control riverside_01_stage_02 > riverside_02",
@@ -120,15 +120,12 @@ def test_jobs_can_go_anywhere(tmp_path, monkeypatch):
     )
     names = [job.name for job in jobs]
     assert len(set(names)) == len(names)
-    outputs = [job.output for job in jobs]
+    outputs = [job.step.output for job in jobs]
     assert len(set(outputs)) == len(outputs)
     for job in jobs:
-        assert tmp_path / "out" / "parts" in job.output.parents
+        assert tmp_path / "out" / "parts" in job.step.output.parents
         assert job.cost > 0
-        function, arguments = pickle.loads(
-            pickle.dumps((job.function, job.arguments))
-        )
-        assert (function, arguments) == (job.function, job.arguments)
+        assert pickle.loads(pickle.dumps(job.step)) == job.step
     # The paper has this map in both directions.
     assert {"riverside 01 > 02", "riverside 02 > 01"} <= set(names)
 
@@ -139,7 +136,7 @@ def test_names_of_files_stay_apart(tmp_path):
         info("a,b", "2", city="x"),
         info("a%2Cb", "3", city="x"),
     ]
-    outputs = [job.output for job in plan_study(odd, tmp_path)]
+    outputs = [job.step.output for job in plan_study(odd, tmp_path)]
     assert len({str(path).lower() for path in outputs}) == len(outputs)
     depths = {len(path.relative_to(tmp_path).parts) for path in outputs}
     assert depths == {3}

@@ -8,9 +8,9 @@ import pytest
 
 from evaluation.methods import known_methods
 from evaluation.study.collection import find_recordings
-from evaluation.study.measurements import recognise_places
+from evaluation.study.measurements import RecognisePlaces
 from evaluation.study.plan import plan_study
-from evaluation.study.surveys import survey_drive
+from evaluation.study.surveys import Survey
 
 pytestmark = pytest.mark.slow
 
@@ -22,7 +22,8 @@ def measuring_jobs(recordings, output):
     return [
         job
         for job in plan_study(find_recordings(recordings), output)
-        if job.function in (survey_drive, recognise_places)
+        if isinstance(job.step, Survey)
+        or isinstance(getattr(job.step, "steps", [None])[0], RecognisePlaces)
     ]
 
 

@@ -7,18 +7,18 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.jobs.running import Tell
-from evaluation.change.drive_change import survey
+from cns_drake.base.jobs.step import Tell
+from evaluation.change import drive_change
 from evaluation.recognition.description import describe_drive
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.sequences import Sequence, open_sequence
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.drive_source import RecordedDrive
-from evaluation.study.measurements import recognise_places
+from evaluation.study.measurements import RecognisePlaces
 from evaluation.study.parts import read_part
 from evaluation.study.recording_survey import survey_recording
-from evaluation.study.study_layout import RecognitionFiles, SurveyFiles
-from evaluation.study.surveys import survey_drive
+from evaluation.study.study_layout import SurveyFiles
+from evaluation.study.surveys import Survey
 
 pytestmark = pytest.mark.slow
 
@@ -71,6 +71,14 @@ class Source:
         return {"seed": self.seed}
 
 
+def survey(source, methods, files, roles=BOTH):
+    """Does a survey, unless there is nothing to do."""
+    step = Survey(source, roles, tuple(methods), PAPER_PROTOCOL, files)
+    if not step.is_done():
+        step.run(Tell())
+    assert step.is_done()
+
+
 def assert_equal(one, other):
     """Compares what is made of dataclasses, lists and arrays, bit by bit."""
     assert type(one) is type(other)
@@ -112,7 +120,7 @@ def files(tmp_path):
 
 def test_what_is_kept_is_what_was_found(recorded, source, files):
     choices = choose_methods()
-    survey_drive(source, BOTH, choices, PAPER_PROTOCOL, files, Tell())
+    survey(source, choices, files)
     methods = [choice.make() for choice in choices]
     found = survey_recording(recorded, BOTH, methods)
     assert_equal(read_part(files.drive), found.drive)
@@ -130,33 +138,25 @@ def test_what_is_kept_is_what_was_found(recorded, source, files):
 def test_maps_are_those_of_which_the_tcr_is_measured(folder, recorded, roles):
     methods = [choose_methods()[0].make()]
     found = survey_recording(recorded, roles, methods)
-    assert_equal(found.drive.coarse, survey(folder).voxels)
+    assert_equal(found.drive.coarse, drive_change.survey(folder).voxels)
 
 
 def test_only_what_is_missing_or_of_something_else_is_found(source, files):
     *others, btc = sorted(choose_methods(), key=lambda one: one.name == "btc")
-    survey_drive(source, BOTH, tuple(others), PAPER_PROTOCOL, files, Tell())
+    survey(source, others, files)
     stamps = {path: path.stat().st_mtime_ns for path in files.folder.iterdir()}
-    survey_drive(source, BOTH, tuple(others), PAPER_PROTOCOL, files, Tell())
+    survey(source, others, files)
     assert len(source.opened) == 1
-    survey_drive(source, BOTH, (*others, btc), PAPER_PROTOCOL, files, Tell())
+    survey(source, (*others, btc), files)
     assert len(source.opened) == 2
     for method in others:
         path = files.described(method)
         assert path.stat().st_mtime_ns == stamps[path]
-    survey_drive(
-        source, frozenset(), (*others, btc), PAPER_PROTOCOL, files, Tell()
-    )
+    survey(source, (*others, btc), files, frozenset())
     assert len(source.opened) == 3
     assert len(read_part(files.drive).frames) == 0
-    survey_drive(
-        Source(source.recorded, 7, source.opened),
-        frozenset(),
-        (),
-        PAPER_PROTOCOL,
-        files,
-        Tell(),
-    )
+    other = Source(source.recorded, 7, source.opened)
+    survey(other, (), files, frozenset())
     assert len(source.opened) == 4
 
 
@@ -183,20 +183,13 @@ def test_drives_of_two_worlds_are_not_compared(tmp_path, recorded):
 
     (solid,) = (one for one in choose_methods() if one.name == "solid")
     surveys = (SurveyFiles(tmp_path / "a"), SurveyFiles(tmp_path / "b"))
-    survey_drive(
-        Source(recorded), BOTH, (solid,), PAPER_PROTOCOL, surveys[0], Tell()
-    )
+    survey(Source(recorded), (solid,), surveys[0])
     other = Source(Elsewhere(recorded))
-    survey_drive(other, BOTH, (solid,), PAPER_PROTOCOL, surveys[1], Tell())
-    files = RecognitionFiles(tmp_path / "results")
+    survey(other, (solid,), surveys[1])
+    part = tmp_path / "results" / "solid.data"
+    step = RecognisePlaces(
+        "metropolis", ("01", "04"), surveys, solid, PAPER_PROTOCOL, part
+    )
     with pytest.raises(InputError, match="poses in frame 'utm'"):
-        recognise_places(
-            "metropolis",
-            ("01", "04"),
-            surveys,
-            (solid,),
-            PAPER_PROTOCOL,
-            files,
-            Tell(),
-        )
-    assert not files.folder.exists()
+        step.run(Tell())
+    assert not part.parent.exists()

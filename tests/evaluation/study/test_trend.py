@@ -14,9 +14,9 @@ from evaluation.methods import known_methods, make_method
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.sequences import open_sequence
-from evaluation.study import trend_points
+from evaluation.study import trend_databases, trend_points
 from evaluation.study.trend import smooth, smooth_band, write_trend
-from evaluation.study.trend_points import measure_trend
+from evaluation.study.trend_databases import measure_trend
 
 pytestmark = pytest.mark.slow
 
@@ -35,7 +35,7 @@ def points(folder, tmp_path_factory):
     databases = [folder / "metropolis_01", folder / "metropolis_04_control"]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
-            trend_points, "run_jobs", lambda jobs, cluster: studies.do(jobs)
+            trend_databases, "run_jobs", lambda jobs, cluster: studies.do(jobs)
         )
         return measure_trend(
             folder / "metropolis_04",
@@ -89,7 +89,7 @@ def test_processes_change_nothing_and_are_not_needed_twice(
     arguments = (folder / "metropolis_04", databases, tmp_path)
     assert measure_trend(*arguments, Cluster(num_workers=2)) == points
     monkeypatch.setattr(
-        trend_points, "run_jobs", lambda jobs, cluster: studies.do(jobs)
+        trend_databases, "run_jobs", lambda jobs, cluster: studies.do(jobs)
     )
     monkeypatch.setattr(
         trend_points, "survey_recording", lambda *_: pytest.fail("again")
@@ -99,7 +99,7 @@ def test_processes_change_nothing_and_are_not_needed_twice(
 
 def test_what_is_kept_is_told_by_the_control(folder, tmp_path, monkeypatch):
     monkeypatch.setattr(
-        trend_points, "run_jobs", lambda jobs, cluster: studies.do(jobs)
+        trend_databases, "run_jobs", lambda jobs, cluster: studies.do(jobs)
     )
     control = folder / "metropolis_04_control"
     found = measure_trend(

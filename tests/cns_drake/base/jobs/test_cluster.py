@@ -96,8 +96,8 @@ def test_jobs_end_with_the_client_that_wanted_them(dask, tmp_path, number):
         "from cns_drake.base.jobs.cluster import Cluster\n"
         "from cns_drake.base.jobs.running import Job, run_jobs\n"
         "address, pipe = sys.argv[1:]\n"
-        "job = Job('holds', job_functions.hold, (Path(pipe),))\n"
-        "run_jobs([job], Cluster(scheduler=address))\n"
+        "step = job_functions.Call(job_functions.hold, (Path(pipe),))\n"
+        "run_jobs([Job('holds', step)], Cluster(scheduler=address))\n"
     )
     client = subprocess.Popen(
         [sys.executable, "-c", script, dask.address, pipe],
@@ -112,10 +112,12 @@ def test_jobs_end_with_the_client_that_wanted_them(dask, tmp_path, number):
 def test_a_worker_that_dies_each_time_is_a_fault(dask, tmp_path):
     # The scheduler tries three times more, and needs as many workers.
     dask.add_workers(4)
-    job = Job("murder", job_functions.kill_worker, (tmp_path / "tries",))
+    tries = tmp_path / "tries"
+    step = job_functions.Call(job_functions.kill_worker, (tries,))
+    job = Job("murder", step)
     with pytest.raises(InputError, match="murder: every worker that ran it"):
         run_jobs([job], Cluster(scheduler=dask.address))
-    assert (tmp_path / "tries").read_text() == "xxxx"
+    assert tries.read_text() == "xxxx"
 
 
 @pytest.mark.parametrize(
@@ -179,9 +181,8 @@ def test_a_scheduler_that_asks_for_certificates(certificates, tmp_path):
             "from cns_drake.base.jobs.cluster import Cluster\n"
             "from cns_drake.base.jobs.running import Job, run_jobs\n"
             "address, path = sys.argv[1:]\n"
-            "arguments = [], Path(path)\n"
-            "run_jobs([Job('a', job_functions.join, arguments)],"
-            " Cluster(scheduler=address))\n"
+            "step = job_functions.Call(job_functions.join, ([], Path(path)))\n"
+            "run_jobs([Job('a', step)], Cluster(scheduler=address))\n"
         )
         for environment, done in ((variables, True), ({}, False)):
             path = tmp_path / f"result_{done}"

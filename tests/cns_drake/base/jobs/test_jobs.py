@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 from helpers import job_functions
 from helpers.documents import ROOT
+from helpers.job_functions import Call
 import psutil
 import pytest
 
@@ -19,17 +20,20 @@ from cns_drake.base.jobs.dask_workers import DaskWorkers, LostSchedulerError
 from cns_drake.base.jobs.job_process import (
     JobError,
     ProcessDiedError,
-    Tell,
     run_process,
 )
 from cns_drake.base.jobs.running import Job, run_jobs
+from cns_drake.base.jobs.step import Tell
 from cns_drake.base.processors import num_cores
 
 pytestmark = pytest.mark.slow
 
 
-def job(name, function, *arguments, needs=(), **options):
-    return Job(name, function, arguments, tuple(needs), **options)
+def job(
+    name, function, *arguments, needs=(), cost=1.0, output=None, is_done=None
+):
+    step = Call(function, arguments, output, is_done)
+    return Job(name, step, tuple(needs), cost)
 
 
 def test_what_is_done_starts_no_process(tmp_path, monkeypatch, capsys):
@@ -75,7 +79,7 @@ def test_a_job_asks_again_when_it_has_its_output(tmp_path):
     ):
         arguments = ([], output)
         run_process(
-            pickle.dumps((job_functions.join, arguments, output, is_done)),
+            pickle.dumps(Call(job_functions.join, arguments, output, is_done)),
             lambda *message: None,
             lambda: True,
         )
@@ -232,8 +236,9 @@ def test_nobody_else_can_reach_local_jobs(tmp_path):
         "from helpers import job_functions\n"
         "from cns_drake.base.jobs.cluster import Cluster\n"
         "from cns_drake.base.jobs.running import Job, run_jobs\n"
-        "function, path = job_functions.note_ports, Path(sys.argv[1])\n"
-        "run_jobs([Job('notes', function, (path,))], Cluster(2))\n"
+        "path = Path(sys.argv[1])\n"
+        "step = job_functions.Call(job_functions.note_ports, (path,))\n"
+        "run_jobs([Job('notes', step)], Cluster(2))\n"
         "assert 'distributed' not in sys.modules\n"
     )
     subprocess.run(
@@ -280,7 +285,7 @@ def test_a_job_that_is_not_wanted_ends(tmp_path):
 
     with pytest.raises(ProcessDiedError, match="ended with status 130"):
         run_process(
-            pickle.dumps((job_functions.hold, (pipe,), None, None)),
+            pickle.dumps(Call(job_functions.hold, (pipe,))),
             lambda *message: None,
             is_wanted,
         )
@@ -298,7 +303,8 @@ def test_a_job_ends_with_its_parent_even_if_that_is_killed(tmp_path):
             "from pathlib import Path\n"
             "from helpers import job_functions\n"
             "from cns_drake.base.jobs.job_process import run_process\n"
-            "job = (job_functions.hold, (Path(sys.argv[1]),), None, None)\n"
+            "job = job_functions.Call("
+            "job_functions.hold, (Path(sys.argv[1]),))\n"
             "run_process(pickle.dumps(job), print, lambda: True)\n",
             pipe,
         ],
@@ -327,7 +333,7 @@ def test_freed_memory_is_kept_whatever_dask_has_its_workers_do(
         output = tmp_path / name
         function = job_functions.note_variable
         run_process(
-            pickle.dumps((function, (name, output), None, None)),
+            pickle.dumps(Call(function, (name, output))),
             lambda *message: None,
             lambda: True,
         )

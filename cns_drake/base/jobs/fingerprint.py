@@ -1,0 +1,234 @@
+"""What a result depends on, as a short text: its fingerprint.
+
+Two results of equal fingerprints are the same. Code counts by the modules
+that are imported, directly or not, found in their sources: a change of any
+other module leaves a result as it is.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterable, Iterator, Mapping
+import functools
+import hashlib
+import json
+from pathlib import Path
+from typing import NamedTuple
+
+from cns_drake.base.files import user_errors
+
+# Where the packages lie, and which these are.
+_ROOT = Path(__file__).parents[3]
+_PACKAGES = ("cns_drake", "evaluation")
+
+
+def fingerprint(inputs: Mapping[str, object]) -> str:
+    """Returns a short text for inputs, which must be ready for JSON."""
+    text = json.dumps(inputs, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+@functools.cache
+def code_digest(*modules: str, without: tuple[str, ...] = ()) -> str:
+    """Returns a digest of modules and of all that they import of ours.
+
+    Data files count with the modules of their folder that name them, or the
+    folder beside the module that they are in.
+
+    Args:
+        modules: full names; `<package>.*` stands for all modules in it.
+        without: packages that do not matter, in spite of being imported.
+    """
+    named = [
+        found
+        for name in modules
+        for found in (
+            _modules_in(name.removesuffix(".*"))
+            if name.endswith(".*")
+            else (_Module(_ROOT, name),)
+        )
+    ]
+    return _digest(named, without)
+
+
+def script_digest(path: Path) -> str:
+    """Returns a digest of a Python file and of all that it imports.
+
+    That is what lies beside it, and modules of ours; other libraries do not
+    count.
+
+    Raises:
+        InputError: if a file cannot be read.
+    """
+    return _digest([_Module(path.parent, path.stem)], ())
+
+
+class _Module(NamedTuple):
+    """A module, found or not.
+
+    Attributes:
+        root: folder that its name starts from.
+        name: with dots.
+    """
+
+    root: Path
+    name: str
+
+    def file(self) -> Path | None:
+        """Returns its source; None if there is no such module."""
+        place = self.root.joinpath(*self.name.split("."))
+        for path in (
+            place / "__init__.py",
+            place.with_name(f"{place.name}.py"),
+        ):
+            if path.is_file():
+                return path
+        return None
+
+    def parents(self) -> Iterator[_Module]:
+        """Yields the packages that it is in."""
+        name = self.name
+        while name := name.rpartition(".")[0]:
+            yield _Module(self.root, name)
+
+
+class _Imports(NamedTuple):
+    """What a module imports.
+
+    Attributes:
+        names: (module, name in it or "") of each import that is run.
+        offered: name -> module, of imports for type checkers alone: in a
+            package they say where the names are that it loads when asked.
+    """
+
+    names: tuple[tuple[str, str], ...]
+    offered: Mapping[str, str]
+
+
+def _modules_in(package: str) -> Iterator[_Module]:
+    for path in _ROOT.joinpath(*package.split(".")).rglob("*.py"):
+        parts = path.relative_to(_ROOT).with_suffix("").parts
+        yield _Module(_ROOT, ".".join(parts).removesuffix(".__init__"))
+
+
+def _digest(modules: Iterable[_Module], without: tuple[str, ...]) -> str:
+    total = hashlib.sha256()
+    for name, path in sorted(_files(modules, without).items()):
+        total.update(f"{name}\n".encode())
+        with user_errors(path):
+            # Line ends may differ between the machines of a cluster.
+            total.update(path.read_bytes().replace(b"\r\n", b"\n"))
+    return total.hexdigest()[:32]
+
+
+def _files(
+    modules: Iterable[_Module], without: tuple[str, ...]
+) -> dict[str, Path]:
+    """Returns name -> path of the files that modules consist of."""
+    waiting = list(modules)
+    data: list[Path] = []
+    files: dict[_Module, Path] = {}
+    while waiting:
+        module = waiting.pop()
+        if module in files or any(
+            module.name == one or module.name.startswith(f"{one}.")
+            for one in without
+        ):
+            continue
+        path = module.file()
+        if path is None:
+            continue
+        if module.root == _ROOT:
+            data += _data_files(path)
+        files[module] = path
+        # Their initialization runs, but their data need not matter.
+        files |= {
+            parent: file
+            for parent in module.parents()
+            if (file := parent.file()) is not None
+        }
+        for one in (module, *module.parents()):
+            waiting += _imported(one)
+    found = {f"{module.name}.py": path for module, path in files.items()}
+    found |= {path.relative_to(_ROOT).as_posix(): path for path in data}
+    return found
+
+
+def _imported(module: _Module) -> Iterator[_Module]:
+    """Yields what a module imports, if it is ours or beside it."""
+    path = module.file()
+    if path is None:
+        return
+    for home, name in _read_imports(path, module.name).names:
+        own = home.partition(".")[0] in _PACKAGES
+        package = _Module(_ROOT if own else module.root, home)
+        yield package
+        if not name:
+            continue
+        inner = package._replace(name=f"{home}.{name}")
+        file = package.file()
+        if inner.file() is not None:
+            yield inner
+        elif file is not None:
+            offered = _read_imports(file, home).offered
+            if name in offered:
+                yield package._replace(name=offered[name])
+
+
+def _read_imports(path: Path, module: str) -> _Imports:
+    if path.name != "__init__.py":
+        module = module.rpartition(".")[0]
+    with user_errors(path):
+        return _find_imports(path.read_bytes(), module)
+
+
+@functools.cache
+def _find_imports(text: bytes, package: str) -> _Imports:
+    """Returns the imports in the source of a module of a package."""
+    try:
+        tree = ast.parse(text)
+    except (SyntaxError, ValueError):
+        return _Imports((), {})  # Whoever runs it says what is wrong.
+    names: list[tuple[str, str]] = []
+    offered: dict[str, str] = {}
+    waiting: list[ast.AST] = [tree]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ast.If) and _is_for_types(node.test):
+            for line in node.body:
+                for home, name in _names_of(line, package):
+                    offered[name] = home
+            waiting += node.orelse
+        elif isinstance(node, ast.Import | ast.ImportFrom):
+            names += _names_of(node, package)
+        else:  # Imports are statements: no expression holds one.
+            for block in ("body", "orelse", "finalbody", "handlers", "cases"):
+                waiting += getattr(node, block, [])
+    return _Imports(tuple(names), offered)
+
+
+def _is_for_types(test: ast.expr) -> bool:
+    return isinstance(test, ast.Name) and test.id == "TYPE_CHECKING"
+
+
+def _names_of(node: ast.AST, package: str) -> Iterator[tuple[str, str]]:
+    """Yields (module, name in it or "") of one import."""
+    if isinstance(node, ast.Import):
+        yield from ((alias.name, "") for alias in node.names)
+    elif isinstance(node, ast.ImportFrom):
+        parents = package.split(".")[: 1 - node.level or None]
+        home = ".".join([*parents, *(node.module or "").split(".")])
+        home = home.strip(".") if node.level else node.module or ""
+        yield from ((home, alias.name) for alias in node.names)
+
+
+def _data_files(module: Path) -> Iterator[Path]:
+    """Yields the files beside a module, or in folders there, that it names."""
+    text = module.read_bytes()
+    for path in sorted(module.parent.iterdir()):
+        if path.suffix == ".py" or path.name.encode() not in text:
+            continue
+        if path.is_file():
+            yield path
+        elif not (path / "__init__.py").is_file():
+            yield from (p for p in sorted(path.rglob("*")) if p.is_file())

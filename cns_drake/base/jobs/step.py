@@ -1,0 +1,117 @@
+"""A piece of work, said once: of what it is made, what it does, what it leaves.
+
+A step leaves files and nothing else, so that whatever is interrupted, here or
+anywhere, goes on where it was when the same steps are run again.
+"""
+
+from __future__ import annotations
+
+import abc
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+import time
+from typing import Any
+
+from cns_drake.base.jobs.fingerprint import code_digest
+
+# How often a step reports its progress at most [s].
+_REPORT_INTERVAL = 0.5
+
+
+class Tell:
+    """How a step reports on itself; without an argument nobody listens."""
+
+    def __init__(self, send: Callable[..., None] = lambda *message: None):
+        """Takes what takes the messages: a kind and its values."""
+        self._send = send
+        self._told: float | None = None
+
+    def progress(self, done: int, total: int) -> None:
+        """Reports that so much of so much is done, in any unit."""
+        now = time.monotonic()
+        if (
+            done >= total
+            or self._told is None
+            or now - self._told >= _REPORT_INTERVAL
+        ):
+            self._told = now
+            self._send("progress", int(done), int(total))
+
+    def note(self, text: str) -> None:
+        """Reports something that a user should know."""
+        self._send("note", str(text))
+
+    def track(
+        self, items: Iterable, description: str, total: int
+    ) -> Iterator[Any]:
+        """Reports the progress of a loop; a `cns_drake.base.progress.Track`."""
+        del description
+        for done, item in enumerate(items):
+            self.progress(done, total)
+            yield item
+
+
+class Step(abc.ABC):
+    """A piece of work that leaves files.
+
+    Each kind is a frozen dataclass of a module, so that a step can be pickled
+    and run by a process anywhere; paths in it are absolute.
+    """
+
+    @property
+    @abc.abstractmethod
+    def output(self) -> Path | None:
+        """The file or folder that it writes, if it must be alone there.
+
+        Two copies of a step, as when the connection to one is lost, never
+        work on it at the same time; see `cns_drake.base.files.exclusive`.
+        """
+
+    @abc.abstractmethod
+    def is_done(self) -> bool:
+        """Returns whether all that it leaves is there, and up to date.
+
+        Raises:
+            InputError: it cannot be found out; the step then says why.
+        """
+
+    @abc.abstractmethod
+    def run(self, tell: Tell) -> None:
+        """Does the work; leaves no file under a final name half written.
+
+        Args:
+            tell: what takes its progress.
+
+        Raises:
+            InputError: it cannot be done.
+        """
+
+    def made_of(self, inputs: Mapping[str, object]) -> dict[str, object]:
+        """Returns inputs with the digest of the code of this step."""
+        return {**inputs, "code": code_digest(type(self).__module__)}
+
+
+@dataclass(frozen=True)
+class Steps(Step):
+    """Several steps one after the other, each unless it is done.
+
+    Attributes:
+        place: the file or folder that they write; see `Step.output`.
+        steps: none needs a later one.
+    """
+
+    place: Path
+    steps: tuple[Step, ...]
+
+    @property
+    def output(self) -> Path:
+        return self.place
+
+    def is_done(self) -> bool:
+        return all(step.is_done() for step in self.steps)
+
+    def run(self, tell: Tell) -> None:
+        for step in self.steps:
+            if not step.is_done():
+                step.run(tell)

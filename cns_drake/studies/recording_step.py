@@ -1,0 +1,133 @@
+"""Recording a drive: what it takes, and whether it is there already."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import contextlib
+from dataclasses import dataclass
+from pathlib import Path
+import shutil
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import user_errors
+from cns_drake.base.interrupts import uninterrupted
+from cns_drake.base.jobs.step import Step, Tell
+from cns_drake.base.yaml_files import read_yaml
+from cns_drake.recording.recording_folder import RecordingFolder
+from cns_drake.scenarios.planning import shown_beside
+from cns_drake.scenarios.provenance import (
+    digest_file,
+    digest_inputs,
+    recording_fingerprint,
+)
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import world_file
+from evaluation.study.parts import is_current, write_part
+
+
+@dataclass(frozen=True)
+class Record(Step):
+    """Records a scenario, and saves a web page of the drive.
+
+    Attributes:
+        scenario: what to record.
+        folder: the folder of recordings.
+        overwrite: replace another recording of that name.
+        page: where to save the page, if anywhere.
+    """
+
+    scenario: Scenario
+    folder: Path
+    overwrite: bool = True
+    page: Path | None = None
+
+    @property
+    def output(self) -> Path:
+        return self.folder / self.scenario.name
+
+    def is_done(self) -> bool:
+        return is_recorded(self.scenario, self.folder) and self._is_shown()
+
+    def run(self, tell: Tell) -> None:
+        with uninterrupted():
+            from cns_drake.simulation.simulation import simulate
+
+        shown = self._shown()
+        with self._place() as (folder, overwrite):
+            simulate(
+                self.scenario,
+                folder,
+                page_file=self.page,
+                overwrite=overwrite,
+                on_frame=tell.progress,
+                on_note=tell.note,
+            )
+        if self.page is not None:
+            write_part(self._page_part, shown, None)
+
+    @contextlib.contextmanager
+    def _place(self) -> Iterator[tuple[Path, bool]]:
+        """Yields the folder to record into, and whether to overwrite there.
+
+        A recording that is up to date stays as it is when its page is made
+        anew.
+        """
+        if not is_recorded(self.scenario, self.folder):
+            yield self.folder, self.overwrite
+            return
+        spare = self.output.with_name(f"{self.output.name}.page.part")
+        try:
+            yield spare, True
+        finally:
+            with user_errors(spare):
+                shutil.rmtree(spare)
+
+    @property
+    def _page_part(self) -> Path:
+        """Says of what the page was made."""
+        assert self.page is not None
+        return self.page.parent / "parts" / f"{self.page.stem}.data"
+
+    def _is_shown(self) -> bool:
+        return self.page is None or (
+            self.page.is_file() and is_current(self._page_part, self._shown())
+        )
+
+    def _shown(self) -> dict[str, object]:
+        """Returns all that the page depends on."""
+        beside, _ = shown_beside(self.scenario)
+        return self.made_of(
+            {
+                "drive": recording_fingerprint(
+                    self.scenario, digest_inputs(self.scenario)
+                ),
+                "beside": beside and digest_file(world_file(beside)),
+            }
+        )
+
+
+def is_recorded(scenario: Scenario, folder: Path) -> bool:
+    """Returns whether a finished recording of just this scenario exists.
+
+    That is, of this scenario in the world and on the roads as they are now,
+    by the program as it is now.
+
+    Args:
+        scenario: what is recorded.
+        folder: the folder of recordings.
+
+    Raises:
+        InputError: the scenario's files cannot be read.
+    """
+    files = RecordingFolder(folder / scenario.name)
+    if not files.is_finished() or not files.mcap.is_file():
+        return False
+    try:
+        # Damaged by whatever came later, they are of no use.
+        read_yaml(files.scenario)
+        read_yaml(files.metadata)["rosbag2_bagfile_information"]
+        with user_errors(files.fingerprint):
+            known = files.fingerprint.read_text("utf-8").split()
+    except (InputError, LookupError, TypeError, UnicodeDecodeError):
+        return False
+    return recording_fingerprint(scenario, digest_inputs(scenario)) in known

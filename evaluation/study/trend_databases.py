@@ -1,0 +1,180 @@
+"""One drive that asks, and many databases: their change and their AUC.
+
+Every database is a job of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+import math
+from pathlib import Path
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.files import make_folder
+from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.running import Job, run_jobs
+from cns_drake.base.recordings.driven_way import driven_way
+from evaluation.recognition.protocol import (
+    PAPER_PROTOCOL,
+    RetrievalProtocol,
+)
+from evaluation.sequences import Sequence as Recorded
+from evaluation.sequences import check_same_world, open_sequence
+from evaluation.study.chosen_methods import MethodChoice, choose_methods
+from evaluation.study.drive_source import DriveSource, RecordedDrive
+from evaluation.study.parts import read_part
+from evaluation.study.plan import survey_job
+from evaluation.study.study_layout import StudyFiles
+from evaluation.study.trend_points import MeasureDatabase, TrendPoint
+
+# Expected seconds for a database.
+_COST = 30.0
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A drive that is asked, and what tells the change from the route.
+
+    Attributes:
+        source: opens it.
+        control: name of the drive on its route through the city of the
+            query; None if there is none.
+    """
+
+    source: DriveSource
+    control: str | None = None
+
+
+def measure_trend(
+    query: Path,
+    databases: Sequence[Path],
+    output: Path,
+    cluster: Cluster,
+    own_methods: Iterable[Path] = (),
+    protocol: RetrievalProtocol = PAPER_PROTOCOL,
+    controls: Sequence[Path] = (),
+) -> list[TrendPoint]:
+    """Returns the points of all databases and methods.
+
+    What an earlier run left, finished or not, is used as far as it belongs
+    to the same recordings and methods. Of a database only its points are
+    left, since the surveys of many would fill a disk.
+
+    Args:
+        query: the drive that asks.
+        databases: the drives that are asked.
+        output: folder for intermediate results, made if needed.
+        cluster: where the work is done.
+        own_methods: Python files with one method each, to run besides those
+            of this package.
+        protocol: of place recognition.
+        controls: drives on the routes of databases through the stage of the
+            query; each serves the databases whose route it has.
+
+    Raises:
+        InputError: a recording cannot be read, two have one name, a control
+            serves no database, or a database is of another world or shares
+            no place with the query.
+    """
+    methods = choose_methods(own_methods)
+    asking = open_sequence(query)
+    names = {asking.name}
+    if protocol.exclude_recent is not None:
+        # A drive may be asked about itself then.
+        names = set()
+    opened: dict[Path, Recorded] = {}
+    for path in (*databases, *controls):
+        sequence = open_sequence(path)
+        if sequence.name in names:
+            raise InputError(f"{path}: {sequence.name} is there twice")
+        names.add(sequence.name)
+        check_same_world(sequence, asking)
+        opened[path] = sequence
+    serving = [opened[path] for path in controls]
+    asked = {}
+    for path in databases:
+        way = driven_way(opened[path].scenario)
+        same = [
+            control.name
+            for control in serving
+            if way is not None and driven_way(control.scenario) == way
+        ]
+        asked[opened[path].name] = Asked(
+            _recorded(path), same[0] if same else None
+        )
+    used = {one.control for one in asked.values()}
+    for path in controls:
+        if opened[path].name not in used:
+            raise InputError(f"--control: {path}: no database has its route")
+    return measure_drives(
+        asking.name,
+        _recorded(query),
+        asked,
+        {opened[path].name: _recorded(path) for path in controls},
+        output,
+        cluster,
+        methods,
+        protocol,
+    )
+
+
+def measure_drives(
+    asking: str,
+    query: DriveSource,
+    databases: Mapping[str, Asked],
+    controls: Mapping[str, DriveSource],
+    output: Path,
+    cluster: Cluster,
+    methods: tuple[MethodChoice, ...],
+    protocol: RetrievalProtocol = PAPER_PROTOCOL,
+) -> list[TrendPoint]:
+    """Returns the points of drives that need not be recorded.
+
+    Args:
+        asking: name of the drive that asks.
+        query: opens it.
+        databases: name -> a drive that is asked.
+        controls: name -> what opens a control of databases.
+        output: folder for intermediate results, made if needed.
+        cluster: where the work is done.
+        methods: to run.
+        protocol: of place recognition.
+
+    Raises:
+        InputError: see `measure_trend`.
+    """
+    files = StudyFiles(output.absolute())
+    make_folder(output)
+    survey = files.survey(asking)
+    jobs = [survey_job(asking, query, {"queries"}, methods, protocol, survey)]
+    sources = {name: one.source for name, one in databases.items()}
+    sources |= controls
+    parts = {name: files.trend_points(name, asking) for name in sources}
+    jobs += [
+        Job(
+            name=f"measure {name}",
+            step=MeasureDatabase(
+                sources[name], survey, methods, protocol, part
+            ),
+            needs=(jobs[0].name,),
+            cost=_COST,
+        )
+        for name, part in parts.items()
+    ]
+    run_jobs(jobs, cluster)
+    points: list[TrendPoint] = []
+    for name, one in databases.items():
+        unchanged = {}
+        if one.control is not None:
+            measured = read_part(parts[one.control])
+            unchanged = {point.method: point.auc for point in measured}
+        points += [
+            replace(point, auc_unchanged=unchanged.get(point.method, math.nan))
+            for point in read_part(parts[name])
+        ]
+    return points
+
+
+def _recorded(path: Path) -> RecordedDrive:
+    return RecordedDrive(path.absolute())

@@ -1,0 +1,196 @@
+"""Fingerprints: which code counts for a result."""
+
+import shutil
+import subprocess
+import sys
+
+from helpers.documents import ROOT
+import pytest
+
+from cns_drake.base.jobs import fingerprint as fingerprints
+from cns_drake.base.jobs.fingerprint import (
+    code_digest,
+    fingerprint,
+    script_digest,
+)
+
+SURVEY = "evaluation.study.surveys"
+SIMULATION = "cns_drake.simulation.simulation"
+SOURCES = {
+    "evaluation/__init__.py": "import sys\n",
+    "evaluation/top.py": """
+from __future__ import annotations
+from typing import TYPE_CHECKING
+from . import level
+from .inner import first
+from evaluation.inner.second import *
+import evaluation.inner.third as third, evaluation.fourth
+if TYPE_CHECKING:
+    from evaluation import types_only
+else:
+    from evaluation import otherwise
+def late():
+    try:
+        with open("page.css") as stream:
+            from evaluation.inner import offered
+    except ImportError:
+        import evaluation.fallback
+""",
+    "evaluation/inner/__init__.py": """
+from typing import TYPE_CHECKING
+import evaluation.initial
+if TYPE_CHECKING:
+    from evaluation.hidden import offered, unasked
+    from evaluation.unasked import other
+""",
+    "evaluation/page.css": "",
+    "evaluation/page.js": "",
+    "evaluation/unrelated.py": "",
+}
+COUNTED = {
+    "evaluation/inner/first.py": "from .deep import deeper",
+    "evaluation/inner/deep/deeper.py": "from ...fifth import one",
+    "evaluation/inner/deep/__init__.py": "",
+    **{
+        f"evaluation/{name}.py": ""
+        for name in (
+            "level", "inner/second", "inner/third", "fourth", "fifth",
+            "initial", "otherwise", "hidden", "fallback",
+        )
+    },
+}  # fmt: skip
+NOT_COUNTED = {
+    f"evaluation/{name}.py": ""
+    for name in ("types_only", "unasked", "inner/unasked", "sys")
+}
+
+
+@pytest.fixture
+def packages(tmp_path, monkeypatch):
+    """A folder in which the packages are looked for."""
+    monkeypatch.setattr(fingerprints, "_ROOT", tmp_path)
+    code_digest.cache_clear()
+    yield tmp_path
+    code_digest.cache_clear()
+
+
+def differs(file, module, change="\nchanged = True\n", **options):
+    """Returns whether the digest of a module changes with a file."""
+    code_digest.cache_clear()
+    before = code_digest(module, **options)
+    content = file.read_text()
+    file.write_text(content + change)
+    code_digest.cache_clear()
+    after = code_digest(module, **options)
+    file.write_text(content)
+    return after != before
+
+
+def test_what_is_imported_in_any_way_counts(packages):
+    for name, text in (SOURCES | COUNTED | NOT_COUNTED).items():
+        path = packages / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    changing = {
+        path.relative_to(packages).as_posix()
+        for path in sorted(packages.rglob("*.*"))
+        if differs(path, "evaluation.top")
+    }
+    expected = {*SOURCES, *COUNTED} - {
+        "evaluation/unrelated.py",
+        "evaluation/page.js",
+    }
+    assert changing == expected
+    # The whole of a package.
+    assert differs(packages / "evaluation/inner/unasked.py", "evaluation.*")
+    assert not differs(
+        packages / "evaluation/inner/first.py",
+        "evaluation.top",
+        without=("evaluation.inner",),
+    )
+
+
+def test_line_ends_do_not_count(packages):
+    path = packages / "evaluation" / "top.py"
+    path.parent.mkdir()
+    path.write_bytes(b"one\ntwo\n")
+    before = code_digest("evaluation.top")
+    path.write_bytes(b"one\r\ntwo\r\n")
+    code_digest.cache_clear()
+    assert code_digest("evaluation.top") == before
+
+
+@pytest.mark.slow
+def test_of_our_own_code_the_right_modules_count(packages):
+    for name in ("cns_drake", "evaluation"):
+        shutil.copytree(
+            ROOT / name,
+            packages / name,
+            ignore=shutil.ignore_patterns("__pycache__"),
+        )
+    for path, counts, module in (
+        ("cns_drake/sensors/lidar_presets.py", True, SIMULATION),
+        ("cns_drake/sensors/lidar_presets.py", False, SURVEY),
+        ("evaluation/methods/btc.py", True, SURVEY),
+        ("evaluation/methods/btc.py", False, SIMULATION),
+        ("evaluation/report/page_template/page.css", False, SURVEY),
+        ("evaluation/report/page_template/page.css", True, "evaluation.*"),
+        ("cns_drake/pictures/page_template/drive.css", True, SIMULATION),
+        ("cns_drake/base/jobs/job_progress.py", False, SURVEY),
+    ):
+        assert differs(packages / path, module) == counts, (path, module)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "module",
+    [
+        SURVEY,
+        "evaluation.study.views",
+        "cns_drake.simulation.simulated_drive",
+        "cns_drake.studies.recording_step",
+    ],
+)
+def test_what_python_imports_is_found_in_the_sources(module, monkeypatch):
+    script = (
+        f"import sys, {module}\n"
+        "for name, module in sys.modules.items():\n"
+        "    if name.startswith(('cns_drake.', 'evaluation.')):\n"
+        "        print(name)"
+    )
+    loaded = subprocess.run(
+        [sys.executable, "-c", script],
+        check=True,
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+    ).stdout.split()
+    assert module in loaded
+    named = [fingerprints._Module(ROOT, module)]
+    found = fingerprints._files(named, ())
+    assert {f"{name}.py" for name in loaded} <= found.keys()
+
+
+def test_a_script_counts_with_what_lies_beside_it(tmp_path):
+    path = tmp_path / "own.py"
+    path.write_text("import own_help\nfrom evaluation.methods import Method\n")
+    (tmp_path / "own_help.py").write_text("from own_parts import one\n")
+    (tmp_path / "own_parts").mkdir()
+    (tmp_path / "own_parts/__init__.py").write_text("from .core import one\n")
+    (tmp_path / "own_parts/core.py").write_text("one = 1\n")
+    (tmp_path / "unused.py").write_text("")
+    before = script_digest(path)
+    for file in sorted(tmp_path.rglob("*.py")):
+        text = file.read_text()
+        file.write_text(text + "\n# Changed.\n")
+        assert (script_digest(path) != before) == (file.name != "unused.py")
+        file.write_text(text)
+    path.write_text("no Python at all")
+    assert script_digest(path) != before
+
+
+def test_inputs_in_another_order_are_the_same():
+    assert fingerprint({"a": 1, "b": [2.5, None]}) == fingerprint(
+        {"b": (2.5, None), "a": 1}
+    )
+    assert fingerprint({"a": 1}) != fingerprint({"a": 2})

@@ -1,0 +1,101 @@
+"""`cns-drake reproduce` makes anew what is stale, and nothing else."""
+
+import shutil
+
+from helpers import studies
+from helpers.documents import ROOT
+from helpers.small_map import write_town
+import pytest
+
+from cns_drake.base.jobs import fingerprint
+from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.studies import reproduction
+
+pytestmark = pytest.mark.slow
+
+DRIVES = {"town_01", "town_04", "town_01_stage_04"}
+PAGES = {"town_01", "town_04"}
+SURVEYS = {f"survey {name}" for name in DRIVES}
+DRAWN = {"draw town", "change town 01 > 04"}
+COMPARED = {"town 01 > 04"}
+CONTROL = {"control town_01_stage_04 > town_04"}
+STUDY = SURVEYS | DRAWN | COMPARED | CONTROL
+PICTURES = {"picture town drives"}
+
+
+@pytest.fixture
+def code(tmp_path, monkeypatch):
+    """A copy of the code, which stands for that which runs."""
+    for name in ("cns_drake", "evaluation"):
+        shutil.copytree(
+            ROOT / name,
+            tmp_path / "code" / name,
+            ignore=shutil.ignore_patterns("__pycache__"),
+        )
+    monkeypatch.setattr(fingerprint, "_ROOT", tmp_path / "code")
+    fingerprint.code_digest.cache_clear()
+    yield tmp_path / "code"
+    fingerprint.code_digest.cache_clear()
+
+
+@pytest.fixture
+def reproduce(tmp_path, monkeypatch):
+    """Reproduces a town; returns the names of the jobs that did anything."""
+    routes = {"01": "metropolis_04", "04": "metropolis_04"}
+    town = write_town(tmp_path / "town", routes, 60)
+    done = []
+    monkeypatch.setattr(
+        reproduction,
+        "run_jobs",
+        lambda jobs, cluster: done.append(set(studies.do(jobs))),
+    )
+
+    def run(**options):
+        reproduction.reproduce_maps(
+            [str(town)], tmp_path / "out", Cluster(), **options
+        )
+        return done[-1]
+
+    return run
+
+
+def change(file, old, new):
+    fingerprint.code_digest.cache_clear()
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new))
+
+
+def test_a_quick_study(reproduce, code, tmp_path):
+    assert reproduce(quick=True) == STUDY
+    assert reproduce(quick=True) == set()
+    # What draws the report's page measures nothing.
+    change(code / "evaluation/report/page_template/page.css", "{", "{ ")
+    assert reproduce(quick=True) == set()
+    change(code / "cns_drake/sensors/lidar_presets.py", "120.0", "10.0")
+    assert reproduce(quick=True) == STUDY
+    change(code / "evaluation/report/figures.py", "def ", "def  ")
+    assert reproduce(quick=True) == DRAWN
+    # One drive, and all that is compared with it.
+    stage = tmp_path / "town" / "stage_01.sdf"
+    change(stage, "</world>", "<!-- Changed. --></world>")
+    assert reproduce(quick=True) == {"survey town_01"} | DRAWN | COMPARED
+
+
+def test_recordings_pages_and_pictures(reproduce, code, tmp_path):
+    everything = DRIVES | STUDY | PICTURES
+    assert reproduce() == everything
+    assert reproduce() == set()
+    # A page is made anew, without the recording.
+    change(code / "cns_drake/pictures/page_template/drive.css", "{", "{ ")
+    assert reproduce() == PAGES
+    assert not list((tmp_path / "out").glob("*.part"))
+    change(code / "cns_drake/sensors/lidar_presets.py", "120.0", "10.0")
+    assert reproduce(with_pages=False) == everything
+    assert reproduce() == PAGES
+    # A page also shows the last stage.
+    stage = tmp_path / "town" / "stage_04.sdf"
+    change(stage, "</world>", "<!-- Changed. --></world>")
+    drives = {"town_04", "town_01_stage_04"}
+    assert reproduce(with_pages=False) & DRIVES == drives
+    assert reproduce() == PAGES
