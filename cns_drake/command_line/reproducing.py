@@ -9,7 +9,11 @@ import typer
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.command_line.options import Jobs, Output, Scheduler
-from evaluation.command_line.protocol_options import Costs, with_protocol
+from evaluation.command_line.protocol_options import (
+    Costs,
+    Settings,
+    with_protocol,
+)
 from evaluation.recognition.protocol import RetrievalProtocol
 
 
@@ -41,6 +45,7 @@ def reproduce(
             help="The report alone: simulate without recording.",
         ),
     ] = False,
+    parameter: Settings = None,
     costs: Costs = True,
     protocol: RetrievalProtocol,
 ) -> None:
@@ -59,6 +64,7 @@ def reproduce(
         with_pages=pages is not False,
         quick=quick,
         protocol=protocol,
+        settings=parameter or (),
         with_costs=costs,
     )
     typer.echo(report)

@@ -26,6 +26,7 @@ from evaluation.recognition.protocol import (
     RetrievalProtocol,
 )
 from evaluation.study.assembly import assemble
+from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import RecordingInfo
 from evaluation.study.plan import plan_study
 
@@ -38,6 +39,7 @@ def reproduce_maps(
     with_pages: bool = True,
     quick: bool = False,
     protocol: RetrievalProtocol = PAPER_PROTOCOL,
+    settings: Sequence[str] = (),
     with_costs: bool = False,
 ) -> Path:
     """Records the sequences of maps, evaluates them and reports.
@@ -56,6 +58,7 @@ def reproduce_maps(
         quick: make the report alone, of the same frames: what is not
             recorded yet is evaluated while it is simulated, and not recorded.
         protocol: of place recognition.
+        settings: see `choose_methods`.
         with_costs: measure what the methods cost, too.
 
     Returns:
@@ -65,6 +68,7 @@ def reproduce_maps(
         InputError: a map is not known, the folder cannot be made, or a step
             failed.
     """
+    methods = choose_methods(settings=settings)
     folders = [_map_folder(name) for name in maps or _recordable_maps()]
     sequences, controls, pictures = [], [], []
     for folder in folders:
@@ -101,7 +105,8 @@ def reproduce_maps(
     study = plan_study(
         recordings,
         report,
-        protocol=protocol,
+        methods,
+        protocol,
         with_costs=with_costs,
         reference=reference,
     )
@@ -114,6 +119,7 @@ def reproduce_maps(
     return assemble(
         recordings,
         report,
+        methods,
         pages=addresses,
         protocol=protocol,
         with_costs=with_costs,

@@ -19,6 +19,7 @@ from evaluation.command_line.protocol_options import (
     Costs,
     Gate,
     Radius,
+    Settings,
     overlap_of,
     with_protocol,
 )
@@ -304,6 +305,7 @@ def report(
     recordings: Annotated[Path, typer.Argument(metavar="DIR")],
     output: Annotated[Path, typer.Option(help="Folder to write.")],
     method: _OwnMethods = None,
+    parameter: Settings = None,
     jobs: _Jobs = None,
     scheduler: _Scheduler = None,
     costs: Costs = True,
@@ -327,6 +329,7 @@ def report(
         method or (),
         protocol,
         on_note=terminal.note,
+        settings=parameter or (),
         with_costs=costs,
         reference_for=reference_for,
     )
@@ -392,16 +395,12 @@ def _tell_notes(sequence: Sequence) -> None:
 def _make_method(
     name: str, assignments: list[str] | None, height: float
 ) -> Method:
-    from cns_drake.base.errors import InputError
     from evaluation.methods import make_method
     from evaluation.methods.own_file import load_method
+    from evaluation.study.chosen_methods import parse_setting
 
     parameters: dict[str, object] = {"sensor_height": height}
-    for assignment in assignments or []:
-        key, equals, value = assignment.partition("=")
-        if not (key and equals):
-            raise InputError(f"--set: {assignment!r} is not NAME=VALUE")
-        parameters[key] = value.split(",") if "," in value else value
+    parameters.update(map(parse_setting, assignments or []))
     if name.endswith(".py"):
         name = load_method(Path(name)).name
     return make_method(name, parameters)

@@ -79,6 +79,15 @@ _OPTIONS: dict[str, tuple[object, object]] = {
 }
 
 
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="METHOD.NAME=VALUE",
+        help="A parameter of a method; may be repeated. Several numbers are"
+        " separated by commas.",
+    ),
+]
 Costs = Annotated[
     bool,
     typer.Option(

@@ -27,6 +27,7 @@ def write_report(
     protocol: RetrievalProtocol = PAPER_PROTOCOL,
     on_note: Callable[[str], None] = lambda text: None,
     *,
+    settings: Iterable[str] = (),
     with_costs: bool = False,
     reference_for: Callable[[set[str]], Reference] = lambda maps: NO_REFERENCE,
 ) -> Path:
@@ -44,6 +45,7 @@ def write_report(
             of this package.
         protocol: of place recognition.
         on_note: is told which recordings are left out.
+        settings: see `choose_methods`.
         with_costs: measure what the methods cost, too.
         reference_for: returns what the report of some maps stands beside.
 
@@ -54,7 +56,7 @@ def write_report(
         InputError: if a recording cannot be read, or the output not be
             written.
     """
-    methods = choose_methods(own_methods)
+    methods = choose_methods(own_methods, settings)
     found = find_recordings(recordings, on_note)
     reference = reference_for({one.map_name for one in found})
     jobs = plan_study(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from cns_drake.base.errors import InputError
@@ -16,6 +16,11 @@ from evaluation.methods import (
 )
 from evaluation.methods.own_file import load_method
 
+# Of a parameter, as text.
+Setting = str | tuple[str, ...]
+
+_FORM = "METHOD.NAME=VALUE"
+
 
 @dataclass(frozen=True)
 class MethodChoice:
@@ -25,22 +30,25 @@ class MethodChoice:
         name: under which it is registered.
         file: the Python file that registers it; None for a method of this
             package.
+        settings: name and value of parameters; the others are as by default.
     """
 
     name: str
     file: Path | None = None
+    settings: tuple[tuple[str, Setting], ...] = ()
 
     def make(self) -> Method:
-        """Returns the method with its default parameters.
+        """Returns the method.
 
         Raises:
-            InputError: if its file cannot be used.
+            InputError: if its file cannot be used, or a setting is not known
+                or does not fit.
         """
         # Run once: a second run would make a second, different type of its
         # descriptions.
         if self.file is not None and self.name not in known_methods():
             load_method(self.file)
-        return make_method(self.name, {})
+        return make_method(self.name, dict(self.settings))
 
     def inputs(self) -> dict:
         """Returns what its results depend on, ready for JSON.
@@ -57,12 +65,35 @@ class MethodChoice:
         return values
 
 
-def choose_methods(files: Iterable[Path] = ()) -> tuple[MethodChoice, ...]:
+def parse_setting(text: str, form: str = "NAME=VALUE") -> tuple[str, Setting]:
+    """Returns name and value of what follows `--set`.
+
+    Args:
+        text: what follows it; commas separate several values.
+        form: of the text, for whoever gets it wrong.
+
+    Raises:
+        InputError: if it has no name or no equals sign.
+    """
+    name, equals, value = text.partition("=")
+    if not (name and equals):
+        raise InputError(f"--set: {text!r} is not {form}")
+    return name, tuple(value.split(",")) if "," in value else value
+
+
+def choose_methods(
+    files: Iterable[Path] = (), settings: Iterable[str] = ()
+) -> tuple[MethodChoice, ...]:
     """Returns the methods of this package, and those of some files.
+
+    Args:
+        files: Python files that register a method each.
+        settings: `METHOD.NAME=VALUE` of parameters that are not as by
+            default.
 
     Raises:
         InputError: if a file registers no method, or one that is there
-            already.
+            already, or a setting is not known or does not fit.
     """
     chosen = [MethodChoice(name) for name in shipped_methods()]
     stems = set()
@@ -76,4 +107,20 @@ def choose_methods(files: Iterable[Path] = ()) -> tuple[MethodChoice, ...]:
         if choice.name in {one.name for one in chosen}:
             raise InputError(f"{path}: another method is named {choice.name!r}")
         chosen.append(choice)
+    named: dict[str, dict[str, Setting]] = {one.name: {} for one in chosen}
+    for text in settings:
+        key, value = parse_setting(text, _FORM)
+        method, dot, name = key.rpartition(".")
+        if not dot:
+            raise InputError(f"--set: {text!r} is not {_FORM}")
+        if method not in named:
+            known = ", ".join(named)
+            raise InputError(f"--set: no method {method!r} (known: {known})")
+        named[method][name] = value
+    chosen = [
+        replace(one, settings=tuple(named[one.name].items())) for one in chosen
+    ]
+    for one in chosen:
+        if one.settings:
+            one.make()  # What does not fit is found before anything slow.
     return tuple(chosen)

@@ -8,10 +8,12 @@ import yaml
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.step import Tell
 from cns_drake.scenarios.scenario_loading import load_scenario
 from cns_drake.simulation.simulated_drive import SimulatedDrive
 from cns_drake.simulation.simulation import simulate
 from cns_drake.studies import reproduction
+from cns_drake.studies.recording_step import Record
 from cns_drake.studies.reproduction import (
     control_drives,
     recording_info,
@@ -44,7 +46,8 @@ def planned(monkeypatch):
         lambda jobs, cluster: runs.append({job.name: job for job in jobs}),
     )
 
-    def assemble(recordings, output, pages, **options):
+    def assemble(recordings, output, methods, pages, **options):
+        del options["reference"]  # None is there for this town.
         assert options == {"protocol": PAPER_PROTOCOL, "with_costs": False}
         runs[-1]["recordings"] = {one.name: one for one in recordings}
         runs[-1]["pages"] = pages
@@ -103,8 +106,8 @@ def test_everything_is_planned_before_anything_runs(
     # What is recorded is not recorded again; sequences want their pages.
     for scenario in (*sequences, *control_drives(sequences)):
         simulate(scenario, tmp_path)
-    (tmp_path / "pages").mkdir()
-    (tmp_path / "pages" / "town_01.html").touch()
+    page = tmp_path / "pages" / "town_01.html"
+    Record(sequences[0], tmp_path, page=page).run(Tell())
     reproduction.reproduce_maps(*arguments)
     assert names & planned[1].keys() == {"town_04"}
     assert planned[1]["pages"] == {"town_01": "../pages/town_01.html"}

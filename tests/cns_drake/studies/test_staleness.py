@@ -76,6 +76,11 @@ def test_a_quick_study(reproduce, code, tmp_path):
     assert reproduce(quick=True) == STUDY
     change(code / "evaluation/report/figures.py", "def ", "def  ")
     assert reproduce(quick=True) == DRAWN
+    # What one method makes of all drives, and their surveys as far as that.
+    options = {"quick": True, "settings": ["solid.sensor_height=1.7"]}
+    assert reproduce(**options) == SURVEYS | COMPARED | CONTROL
+    assert reproduce(**options) == set()
+    assert reproduce(quick=True) == SURVEYS | COMPARED | CONTROL
     # One drive, and all that is compared with it.
     stage = tmp_path / "town" / "stage_01.sdf"
     change(stage, "</world>", "<!-- Changed. --></world>")

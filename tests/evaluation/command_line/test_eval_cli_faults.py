@@ -27,6 +27,19 @@ def test_bad_usage(capsys, towns):
         )
 
 
+def test_bad_settings_of_a_report(capsys, towns, tmp_path):
+    report = ["report", towns, "--output", tmp_path / "out", "--set"]
+    for text, fault in (
+        ("rings=3", "'rings=3' is not METHOD.NAME=VALUE"),
+        ("solid.rings", "'solid.rings' is not METHOD.NAME=VALUE"),
+        ("bow.rings=3", "no method 'bow' (known: btc, "),
+        ("solid.x=1", "solid: no parameter 'x'"),
+        ("solid.sensor_height=high", "solid: sensor_height"),
+    ):
+        assert_refused(capsys, [*report, text], fault)
+    assert not (tmp_path / "out").exists()
+
+
 def test_bad_input(capsys, towns, tmp_path):
     town = towns / "town_01"
     cut = tmp_path / "cut.mcap"
