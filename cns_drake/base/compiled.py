@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import functools
+import hashlib
 import os
 from pathlib import Path
 from typing import TypeVar
@@ -17,17 +19,30 @@ def compiled(function: _Function) -> _Function:
 
     The code is kept between runs in the user's folder for such things, where
     uninstalling need not find it; where none can be written, each process
-    compiles anew.
+    compiles anew. Numba looks only at the file of the function itself for
+    changes: a function may call compiled ones of its own folder besides, of
+    which any change has all of the folder compiled anew.
     """
     # Numba asks where to keep code while it decorates, and asks nobody else.
     before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = before or str(_cache_folder())
+    own_folder = Path(function.__code__.co_filename).parent
+    numba.config.CACHE_DIR = str(
+        Path(before or _cache_folder()) / _state_of(own_folder)
+    )
     try:
         return numba.njit(cache=True, nogil=True)(function)
     except RuntimeError:
         return numba.njit(nogil=True)(function)
     finally:
         numba.config.CACHE_DIR = before
+
+
+@functools.cache
+def _state_of(folder: Path) -> str:
+    """Returns a short text that changes when a module in a folder does."""
+    files = sorted(folder.glob("*.py"))
+    stamps = [(f.name, f.stat().st_size, f.stat().st_mtime_ns) for f in files]
+    return hashlib.sha256(repr(stamps).encode()).hexdigest()[:16]
 
 
 def _cache_folder() -> Path:

@@ -1,0 +1,76 @@
+"""The loop over time in which vehicles and walkers are planned together."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cns_drake.base.compiled import compiled
+from cns_drake.traffic.lane_arrays import LaneArrays
+from cns_drake.traffic.lane_changing import change_lanes
+from cns_drake.traffic.presence import Presence
+from cns_drake.traffic.right_of_way import Permits, grant_ways
+from cns_drake.traffic.vehicle_state import (
+    Occupants,
+    Vehicles,
+    find_occupants,
+)
+from cns_drake.traffic.vehicle_steps import (
+    accelerations,
+    advance,
+    write_poses,
+)
+from cns_drake.traffic.walker_steps import (
+    Walkers,
+    WalkwayArrays,
+    height_of,
+    step_walkers,
+)
+
+# A driver thinks of changing lanes at every so manieth step.
+_THINKS = 10
+
+
+@compiled
+def run_steps(
+    lanes: LaneArrays,
+    vehicles: Vehicles,
+    occupants: Occupants,
+    presence: Presence,
+    permits: Permits,
+    ways: WalkwayArrays,
+    walkers: Walkers,
+    dt: float,
+    seed: int,
+    vehicle_poses: np.ndarray,
+    walker_poses: np.ndarray,
+) -> None:
+    """Lets everybody move for K steps, and writes down where they are.
+
+    Args:
+        lanes: what vehicles follow.
+        vehicles: all of them, as they begin.
+        occupants: room for their entries.
+        presence: of the ego car at K times.
+        permits: who uses what; nobody so far.
+        ways: where walkers walk.
+        walkers: all of them, as they begin.
+        dt: the step [s].
+        seed: of what is drawn on the way.
+        vehicle_poses: (K, N, 5) takes x, y, z [m], yaw, pitch [rad].
+        walker_poses: (K, M, 5) takes x, y, z [m], yaw, phase [rad].
+    """
+    for k in range(len(presence.until)):
+        write_poses(lanes, vehicles, vehicle_poses[k])
+        for i in range(len(walkers.speed)):
+            walker_poses[k, i, :2] = walkers.xy[i]
+            walker_poses[k, i, 2] = height_of(ways, walkers, i)
+            walker_poses[k, i, 3] = walkers.yaw[i]
+            walker_poses[k, i, 4] = walkers.phase[i]
+        find_occupants(occupants, lanes, vehicles, presence, k)
+        grant_ways(lanes, vehicles, occupants, presence, permits, k, dt, seed)
+        wanted, gaps = accelerations(lanes, vehicles, occupants)
+        change_lanes(lanes, vehicles, occupants, presence, k, _THINKS)
+        advance(lanes, vehicles, permits, wanted, gaps, dt, seed)
+        step_walkers(
+            ways, walkers, permits, len(lanes.first), k * dt, dt, seed + 1
+        )

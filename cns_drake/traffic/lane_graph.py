@@ -1,0 +1,138 @@
+"""Lanes that vehicles follow, the ways between them, and what crosses what."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from shapely.geometry.base import BaseGeometry
+
+# Distance of the points of a piece at most [m].
+SPACING = 0.5
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A part of what a vehicle follows: of a lane, or a way through a junction.
+
+    A vehicle enters a way only as a whole: it waits in the lane before it
+    until nothing that crosses the way is in it.
+
+    Attributes:
+        points: (N, 3) its middle in driving direction, evenly spaced [m].
+        limit: speed limit [m/s].
+        is_way: whether it is a way, not a lane.
+        after: numbers of the pieces that follow it.
+        left, right: numbers of the lanes beside it, in the same direction;
+            -1 for none.
+        junction: number of the junction of a way, of a lane the one that it
+            leads to.
+        phase: of a way, when its signal is green; -1 without a signal.
+    """
+
+    points: np.ndarray
+    limit: float
+    is_way: bool
+    after: tuple[int, ...] = ()
+    left: int = -1
+    right: int = -1
+    junction: int = -1
+    phase: int = -1
+
+    @property
+    def length(self) -> float:
+        steps = np.diff(self.points, axis=0)
+        return float(np.linalg.norm(steps, axis=1).sum())
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Where walkers cross the lanes of one road end.
+
+    Attributes:
+        line: (2, 3) from kerb to kerb [m].
+        area: what walkers on it may cover [m].
+    """
+
+    line: np.ndarray
+    area: BaseGeometry
+
+
+@dataclass(frozen=True)
+class LaneGraph:
+    """Pieces by number, and the crossings over them.
+
+    Attributes:
+        pieces: all of them.
+        crossings: where walkers cross.
+        phases: of each junction, how many phases its signals have; 1 without
+            signals.
+    """
+
+    pieces: tuple[Piece, ...]
+    crossings: tuple[Crossing, ...] = ()
+    phases: tuple[int, ...] = field(default=())
+
+    @property
+    def lanes(self) -> list[int]:
+        """Numbers of the pieces that are lanes."""
+        return [k for k, p in enumerate(self.pieces) if not p.is_way]
+
+    @property
+    def lane_length(self) -> float:
+        """Length of all lanes together [m]."""
+        return sum(self.pieces[k].length for k in self.lanes)
+
+
+def resampled(points: np.ndarray, spacing: float = SPACING) -> np.ndarray:
+    """Returns evenly spaced points (N, 3) along a polyline (M, 3) [m].
+
+    Args:
+        points: corners; those that coincide with the one before are dropped.
+        spacing: upper bound of the distance [m].
+    """
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    kept = np.concatenate([[True], steps > 1e-6])
+    points = points[kept]
+    along = np.concatenate(
+        [[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))]
+    )
+    count = max(2, int(np.ceil(along[-1] / spacing)) + 1)
+    wanted = np.linspace(0.0, along[-1], count)
+    return np.column_stack([np.interp(wanted, along, x) for x in points.T])
+
+
+def without_dead_ends(pieces: Sequence[Piece]) -> list[Piece]:
+    """Returns pieces on which a vehicle can go on for ever.
+
+    Lanes that lead nowhere go, and so does what leads to them alone, and
+    lanes to which nothing leads.
+    """
+    alive = set(range(len(pieces)))
+    while True:
+        entered = {
+            after for k in alive for after in pieces[k].after if after in alive
+        }
+        rest = {
+            k
+            for k in alive
+            if k in entered and any(a in alive for a in pieces[k].after)
+        }
+        if rest == alive:
+            break
+        alive = rest
+    number = {old: new for new, old in enumerate(sorted(alive))}
+    return [
+        Piece(
+            pieces[k].points,
+            pieces[k].limit,
+            pieces[k].is_way,
+            tuple(number[a] for a in pieces[k].after if a in alive),
+            number.get(pieces[k].left, -1),
+            number.get(pieces[k].right, -1),
+            pieces[k].junction,
+            pieces[k].phase,
+        )
+        for k in sorted(alive)
+    ]

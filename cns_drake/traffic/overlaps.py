@@ -1,0 +1,103 @@
+"""Whose boxes overlap, and who is left out so that none do."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cns_drake.base.compiled import compiled
+
+
+@compiled
+def way_out(
+    a: np.ndarray, b: np.ndarray, half_a: np.ndarray, half_b: np.ndarray
+) -> tuple[float, float]:
+    """Returns the shortest way by which b leaves a, (0, 0) if it is outside.
+
+    Args:
+        a, b: (3,) x, y of the middle [m] and heading [rad].
+        half_a, half_b: (2,) half length and half width [m].
+    """
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    turn = b[2] - a[2]
+    c, s = abs(np.cos(turn)), abs(np.sin(turn))
+    least, x, y = np.inf, 0.0, 0.0
+    for k in range(4):
+        heading = a[2] if k < 2 else b[2]
+        first, second = (half_a, half_b) if k < 2 else (half_b, half_a)
+        if k % 2 == 0:
+            axis_x, axis_y = np.cos(heading), np.sin(heading)
+            reach = first[0] + second[0] * c + second[1] * s
+        else:
+            axis_x, axis_y = -np.sin(heading), np.cos(heading)
+            reach = first[1] + second[0] * s + second[1] * c
+        along = dx * axis_x + dy * axis_y
+        inside = reach - abs(along)
+        if inside <= 0.0:
+            return 0.0, 0.0
+        if inside < least:
+            least = inside
+            sign = 1.0 if along >= 0.0 else -1.0
+            x, y = sign * inside * axis_x, sign * inside * axis_y
+    return x, y
+
+
+@compiled
+def boxes_overlap(
+    a: np.ndarray, b: np.ndarray, half_a: np.ndarray, half_b: np.ndarray
+) -> bool:
+    """Tells whether two rectangles overlap; see `way_out`."""
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    square = (half_a[0] + half_b[0]) ** 2 + (half_a[1] + half_b[1]) ** 2
+    # Half the diagonals together are at most sqrt(2) times as long.
+    if dx**2 + dy**2 > 2.0 * square:
+        return False
+    x, y = way_out(a, b, half_a, half_b)
+    return x != 0.0 or y != 0.0
+
+
+@compiled
+def find_overlaps(
+    poses: np.ndarray, half: np.ndarray, found: np.ndarray
+) -> None:
+    """Finds who ever overlaps whom.
+
+    Args:
+        poses: (K, N, 3) x, y [m], heading [rad]; NaN while there is nobody.
+        half: (N, 2) half length and half width [m].
+        found: (N, N) bool, takes the answers.
+    """
+    reach = np.sqrt(half[:, 0] ** 2 + half[:, 1] ** 2)
+    for k in range(len(poses)):
+        for i in range(len(half)):
+            x, y = poses[k, i, 0], poses[k, i, 1]
+            for j in range(i):
+                dx, dy = poses[k, j, 0] - x, poses[k, j, 1] - y
+                far = reach[i] + reach[j]
+                # Not where one of them is NaN, either.
+                if (
+                    dx * dx + dy * dy < far * far
+                    and not found[i, j]
+                    and boxes_overlap(
+                        poses[k, i], poses[k, j], half[i], half[j]
+                    )
+                ):
+                    found[i, j] = found[j, i] = True
+
+
+def whom_to_leave_out(overlaps: np.ndarray, kept: int) -> list[int]:
+    """Returns who has to go until nobody overlaps, the most involved first.
+
+    Args:
+        overlaps: (N, N) symmetric bool.
+        kept: so many at the beginning always stay.
+    """
+    overlaps = overlaps.copy()
+    out: list[int] = []
+    while True:
+        involved = overlaps.sum(axis=0)
+        involved[:kept] = 0
+        worst = int(involved.argmax()) if len(involved) else 0
+        if not len(involved) or involved[worst] == 0:
+            return sorted(out)
+        out.append(worst)
+        overlaps[worst] = overlaps[:, worst] = False

@@ -1,0 +1,235 @@
+"""The lanes of a road network as traffic follows them."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from shapely.geometry import LineString
+
+from cns_drake.roads.network import Connection, RoadNetwork
+from cns_drake.roads.road import ENDS, End, LaneRef, Road
+from cns_drake.traffic.lane_graph import (
+    Crossing,
+    LaneGraph,
+    Piece,
+    resampled,
+    without_dead_ends,
+)
+
+# Vehicles stop so far before the end of their road, where walkers cross and
+# where none do; a crossing has its middle so far from the end, and is so wide
+# [m].
+_STOP_LINE = 4.5
+_STOP_LINE_ALONE = 1.0
+CROSSING_PLACE = 1.7
+CROSSING_WIDTH = 2.4
+# Between its stop lines a lane must have room for any vehicle; a shorter one
+# is part of the ways through the junctions at its ends [m].
+_SHORTEST_LANE = 14.0
+# Nobody passes more junctions at once.
+_MOST_JUNCTIONS = 4
+# Wider roads have signals where they meet, as the city generator has it.
+_LANES_WITHOUT_SIGNAL = 2
+
+
+def make_lane_graph(network: RoadNetwork) -> LaneGraph:
+    """Returns the lanes of a network, cut at their stop lines."""
+    trims = {
+        (road.name, end): _stop_line(network, road, end)
+        for road in network.roads.values()
+        for end in ENDS
+    }
+    long = {
+        road.name
+        for road in network.roads.values()
+        if road.length - sum(trims[road.name, end] for end in ENDS)
+        >= _SHORTEST_LANE
+    }
+    lanes = [ref for ref in network.lanes() if ref.road in long]
+    number = {ref: k for k, ref in enumerate(lanes)}
+    clusters = _clusters(network, long)
+    lines = {
+        ref: network.roads[ref.road].lane_centreline(*ref[1:], 0.5)
+        for ref in network.lanes()
+    }
+    onward: dict[LaneRef, list[Connection]] = {ref: [] for ref in lines}
+    for name in network.junctions:
+        for connection in network.connections(name):
+            onward[connection.incoming].append(connection)
+    pieces: list[Piece] = []
+    for ref in lanes:
+        start, end = _trims_of(ref, trims)
+        pieces.append(
+            Piece(
+                resampled(_cut(lines[ref], start, end)),
+                network.roads[ref.road].speed_limit,
+                False,
+                left=number.get(ref._replace(lane=ref.lane - 1), -1),
+                right=number.get(ref._replace(lane=ref.lane + 1), -1),
+                junction=clusters[network.exit_junction(ref)],
+            )
+        )
+    axes = {
+        clusters[name]: junction.arms[0].heading
+        for name, junction in reversed(network.junctions.items())
+    }
+    for ref in lanes:
+        first = len(pieces)
+        junction = clusters[network.exit_junction(ref)]
+        phase = -1
+        if _has_signals(network, clusters, junction):
+            heading = _exit_heading(network, ref)
+            phase = _phase(heading - axes[junction])
+        for way, last in _ways(onward, ref, long):
+            tail_length = _trims_of(ref, trims)[1]
+            tail = _cut(lines[ref], _length(lines[ref]) - tail_length, 0)
+            head_length = _trims_of(last, trims)[0]
+            head = _cut(lines[last], 0, _length(lines[last]) - head_length)
+            between = [
+                piece
+                for connection in way
+                for piece in (
+                    connection.points,
+                    lines[connection.outgoing]
+                    if connection.outgoing != last
+                    else head,
+                )
+            ]
+            roads = {ref.road, *(c.outgoing.road for c in way)}
+            pieces.append(
+                Piece(
+                    resampled(np.concatenate([tail, *between])),
+                    min(network.roads[name].speed_limit for name in roads),
+                    True,
+                    (number[last],),
+                    junction=junction,
+                    phase=phase,
+                )
+            )
+        pieces[number[ref]] = replace(
+            pieces[number[ref]], after=tuple(range(first, len(pieces)))
+        )
+    count = max(clusters.values()) + 1
+    phases = [1] * count
+    for junction in range(count):
+        if _has_signals(network, clusters, junction):
+            phases[junction] = 2
+    return LaneGraph(
+        tuple(without_dead_ends(pieces)),
+        tuple(_crossings(network, trims)),
+        tuple(phases),
+    )
+
+
+def _stop_line(network: RoadNetwork, road: Road, end: End) -> float:
+    """Returns how far before the end of a road its vehicles stop [m]."""
+    junction = network.junctions[road.start if end == "start" else road.end]
+    crosses = len(junction.arms) >= 3 and road.length >= 2 * _STOP_LINE
+    return _STOP_LINE if crosses else _STOP_LINE_ALONE
+
+
+def _trims_of(
+    ref: LaneRef, trims: dict[tuple[str, End], float]
+) -> tuple[float, float]:
+    """Returns what is cut off a lane's entry and exit [m]."""
+    start, end = trims[ref.road, "start"], trims[ref.road, "end"]
+    return (start, end) if ref.direction == "forward" else (end, start)
+
+
+def _length(line: np.ndarray) -> float:
+    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+
+
+def _cut(line: np.ndarray, start: float, end: float) -> np.ndarray:
+    """Returns a line (N, 3) without so much of its beginning and end [m]."""
+    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    along = np.concatenate([[0.0], np.cumsum(steps)])
+    low, high = start, along[-1] - end
+    inside = along[(along > low + 1e-3) & (along < high - 1e-3)]
+    wanted = np.concatenate([[low], inside, [high]])
+    return np.column_stack([np.interp(wanted, along, x) for x in line.T])
+
+
+def _clusters(network: RoadNetwork, long: set[str]) -> dict[str, int]:
+    """Returns numbers of junctions, one for those that short roads join."""
+    group = {name: {name} for name in network.junctions}
+    for road in network.roads.values():
+        if road.name not in long:
+            joined = group[road.start] | group[road.end]
+            for name in joined:
+                group[name] = joined
+    firsts = {name: min(names) for name, names in group.items()}
+    number = {first: k for k, first in enumerate(sorted(set(firsts.values())))}
+    return {name: number[firsts[name]] for name in network.junctions}
+
+
+def _has_signals(
+    network: RoadNetwork, clusters: dict[str, int], number: int
+) -> bool:
+    return any(
+        len(junction.arms) >= 3
+        and any(
+            sum(network.roads[arm.road].lanes.values()) > _LANES_WITHOUT_SIGNAL
+            for arm in junction.arms
+        )
+        for name, junction in network.junctions.items()
+        if clusters[name] == number
+    )
+
+
+def _exit_heading(network: RoadNetwork, ref: LaneRef) -> float:
+    return network.roads[ref.road].lane_end(*ref[1:], "exit")[3]
+
+
+def _phase(angle: float) -> int:
+    """Returns 0 along the junction's first arm, either way, and 1 across."""
+    return int(abs(np.sin(angle)) > np.sin(np.pi / 4))
+
+
+def _ways(
+    onward: Mapping[LaneRef, Sequence[Connection]],
+    ref: LaneRef,
+    long: Collection[str],
+) -> Iterator[tuple[list[Connection], LaneRef]]:
+    """Yields the ways from a lane to the next that are long enough.
+
+    They pass no junction twice.
+    """
+    waiting: list[tuple[list[Connection], LaneRef]] = [([], ref)]
+    while waiting:
+        way, lane = waiting.pop(0)
+        passed = {connection.junction for connection in way}
+        for connection in onward[lane]:
+            if connection.junction in passed or len(way) == _MOST_JUNCTIONS:
+                continue
+            longer = [*way, connection]
+            if connection.outgoing.road in long:
+                yield longer, connection.outgoing
+            else:
+                waiting.append((longer, connection.outgoing))
+
+
+def _crossings(
+    network: RoadNetwork, trims: dict[tuple[str, End], float]
+) -> Iterator[Crossing]:
+    for road in network.roads.values():
+        for end in ENDS:
+            if trims[road.name, end] == _STOP_LINE:
+                line = crossing_line(road, end)
+                area = LineString(line[:, :2]).buffer(
+                    CROSSING_WIDTH / 2, cap_style="flat"
+                )
+                yield Crossing(line, area)
+
+
+def crossing_line(road: Road, end: End) -> np.ndarray:
+    """Returns where walkers cross at a road's end, (2, 3), left first [m]."""
+    station = (
+        road.first_station + CROSSING_PLACE
+        if end == "start"
+        else road.last_station - CROSSING_PLACE
+    )
+    offsets = np.array([road.half_width, -road.half_width])
+    return road.evaluate([station, station], offsets)[:, :3]

@@ -1,0 +1,460 @@
+"""One step of time for all walkers: the social force model.
+
+Helbing, Molnar, "Social force model for pedestrian dynamics", Phys. Rev. E 51
+(1995): walkers relax to the speed that they want, and keep away from each
+other and from the edges of their walkway.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cns_drake.base.compiled import compiled
+from cns_drake.traffic.counted_random import uniform
+from cns_drake.traffic.lane_graph import SPACING
+from cns_drake.traffic.overlaps import boxes_overlap
+from cns_drake.traffic.right_of_way import WALK_GROUP, Permits
+
+# Of the model: speed that is wanted, and its spread [m/s]; relaxation [s];
+# strength [m/s^2] and reach [m] of what keeps walkers, and edges, away.
+SPEED, SPREAD = 1.34, 0.26
+_RELAXATION = 0.5
+_STRENGTH, _REACH = 7.0, 0.3
+_EDGE_STRENGTH, _EDGE_REACH = 10.0, 0.2
+# Nobody goes faster than so many times what is wanted.
+_HURRY = 1.3
+# The least distance of two walkers' middles [m], and who is near.
+APART = 0.95
+_NEAR = 4.0
+# Boxes about walkers whose limbs swing [m], and what stays between them [m].
+WALKER_LENGTH, WALKER_WIDTH, _GAP = 0.84, 0.6, 0.15
+# One steps aside for whom one has ahead, as hard as this [m/s^2], if the other
+# is not as far to the side [m].
+_ASIDE, _PASSING = 4.0, 0.85
+_TO_THE_RIGHT = 0.3
+# How far ahead one looks where to go [m].
+_AHEAD = 2.0
+# A walker turns to where it goes this fast [rad/s], if it goes this fast [m/s].
+_TURN_RATE, _GOING = 2.5, 0.2
+# One stands so near to the crossing that one waits for [m].
+_AT_NODE = 1.0
+# Who may cross or go on does so this often, for each that goes on.
+_CROSSES = 0.25
+# Whoever has left a walkway goes back to it no faster [m/s].
+_BACK = 0.6
+# One turns back when somebody has been in the way for so long [s].
+_PATIENCE = 4.0
+
+
+class WalkwayArrays(NamedTuple):
+    """W walkways, and N places where they begin and end.
+
+    Attributes:
+        first, num_points: (W,) rows of a walkway in `points`, and their number.
+        points: (M, 3) [m].
+        half_width: (W,) [m].
+        start, end: (W,) places.
+        crossing: (W,) number of the crossing, -1 for none.
+        node_first, node_count: (N,) rows in `node_ways`, and their number.
+        node_ways: walkways that begin or end in a place.
+    """
+
+    first: np.ndarray
+    num_points: np.ndarray
+    points: np.ndarray
+    half_width: np.ndarray
+    start: np.ndarray
+    end: np.ndarray
+    crossing: np.ndarray
+    node_first: np.ndarray
+    node_count: np.ndarray
+    node_ways: np.ndarray
+
+
+class Walkers(NamedTuple):
+    """N walkers.
+
+    Attributes:
+        xy, velocity: (N, 2) [m, m/s].
+        yaw: where they look [rad].
+        phase: of their gait [rad].
+        way: the walkway that they are on.
+        forward: whether they go from its start to its end.
+        at: row of the walkway's points that they have come to, from its
+            start.
+        speed: that they want [m/s].
+        aside: how far to the right of the middle they keep, as a part of the
+            half width.
+        next_way: the walkway that comes next, -1 if it is not drawn yet.
+        stuck: for how long somebody has been in the way [s].
+        draws: how many random numbers each has drawn.
+    """
+
+    xy: np.ndarray
+    velocity: np.ndarray
+    yaw: np.ndarray
+    phase: np.ndarray
+    way: np.ndarray
+    forward: np.ndarray
+    at: np.ndarray
+    speed: np.ndarray
+    aside: np.ndarray
+    next_way: np.ndarray
+    stuck: np.ndarray
+    draws: np.ndarray
+
+
+@compiled
+def _row(ways: WalkwayArrays, way: int, forward: bool, at: int) -> int:
+    """Returns the row of a point that is counted in walking direction."""
+    at = min(max(at, 0), ways.num_points[way] - 1)
+    return ways.first[way] + (at if forward else ways.num_points[way] - 1 - at)
+
+
+@compiled
+def _tangent(
+    ways: WalkwayArrays, way: int, forward: bool, at: int
+) -> np.ndarray:
+    at = min(max(at, 0), ways.num_points[way] - 2)
+    a = ways.points[_row(ways, way, forward, at), :2]
+    b = ways.points[_row(ways, way, forward, at + 1), :2]
+    step = b - a
+    return step / np.sqrt(np.sum(step**2))
+
+
+@compiled
+def _draw_next(
+    ways: WalkwayArrays, walkers: Walkers, i: int, seed: int
+) -> None:
+    """Draws the next walkway; back it goes only where nothing else is."""
+    way = walkers.way[i]
+    node = ways.end[way] if walkers.forward[i] else ways.start[way]
+    first, count = ways.node_first[node], ways.node_count[node]
+    if count == 1:
+        walkers.next_way[i] = way
+        return
+    walkers.draws[i] += 1
+    total = 0.0
+    for k in range(count):
+        total += _liking(ways, ways.node_ways[first + k], way)
+    pick = uniform(seed, i, walkers.draws[i]) * total
+    for k in range(count):
+        other = ways.node_ways[first + k]
+        pick -= _liking(ways, other, way)
+        if pick < 0.0:
+            break
+    walkers.next_way[i] = other
+
+
+@compiled
+def _liking(ways: WalkwayArrays, way: int, last: int) -> float:
+    """Returns how much walkers like a way: few cross, none goes back."""
+    if way == last:
+        return 0.0
+    return 1.0 if ways.crossing[way] < 0 else _CROSSES
+
+
+@compiled
+def _may_begin(
+    ways: WalkwayArrays,
+    permits: Permits,
+    waited: np.ndarray,
+    num_pieces: int,
+    way: int,
+    t: float,
+) -> bool:
+    """Tells whether one may begin a walkway; if not, one waits for it."""
+    c = ways.crossing[way]
+    if c < 0:
+        return True
+    if permits.small[num_pieces + c] > 0:
+        return t < permits.opened[c] + WALK_GROUP
+    permits.waits[c] = min(permits.waits[c], t)
+    waited[c] = True
+    return False
+
+
+@compiled
+def step_walkers(
+    ways: WalkwayArrays,
+    walkers: Walkers,
+    permits: Permits,
+    num_pieces: int,
+    t: float,
+    dt: float,
+    seed: int,
+) -> None:
+    """Moves all walkers on.
+
+    Args:
+        ways: where they walk.
+        walkers: all of them.
+        permits: who uses the crossings.
+        num_pieces: rows of `permits` before the crossings.
+        t, dt: time and step [s].
+        seed: of the ways that are drawn.
+    """
+    count = len(walkers.speed)
+    for c in range(len(permits.waits)):
+        if permits.opened[c] + WALK_GROUP <= t and permits.opened[c] >= 0.0:
+            # Nobody's permit ends with the group's beginning.
+            permits.small[num_pieces + c] -= 1
+            permits.opened[c] = -np.inf
+            permits.closed[c] = t
+    waited = np.zeros(len(permits.waits), np.bool_)
+    force = np.zeros((count, 2))
+    is_waiting = np.zeros(count, np.bool_)
+    for i in range(count):
+        way, forward = walkers.way[i], walkers.forward[i]
+        # How far it has come along its walkway.
+        while walkers.at[i] < ways.num_points[way] - 2:
+            tangent = _tangent(ways, way, forward, walkers.at[i])
+            here = ways.points[_row(ways, way, forward, walkers.at[i]), :2]
+            if np.sum((walkers.xy[i] - here) * tangent) < SPACING:
+                break
+            walkers.at[i] += 1
+        last = ways.points[
+            _row(ways, way, forward, ways.num_points[way] - 1), :2
+        ]
+        to_end = last - walkers.xy[i]
+        tangent = _tangent(ways, way, forward, walkers.at[i])
+        is_near = (
+            walkers.at[i] >= ways.num_points[way] - 3
+            and np.sum(to_end * tangent) < _AT_NODE
+        )
+        waits = False
+        if is_near:
+            if walkers.next_way[i] < 0:
+                _draw_next(ways, walkers, i, seed)
+            after = walkers.next_way[i]
+            if _may_begin(ways, permits, waited, num_pieces, after, t):
+                _begin(ways, walkers, permits, num_pieces, i, t)
+                way, forward = walkers.way[i], walkers.forward[i]
+                tangent = _tangent(ways, way, forward, walkers.at[i])
+            else:
+                waits = is_waiting[i] = True
+        right = np.array([tangent[1], -tangent[0]])
+        half = ways.half_width[way]
+        if waits:
+            wanted = np.zeros(2)
+        else:
+            ahead = walkers.at[i] + int(_AHEAD / SPACING)
+            target = ways.points[_row(ways, way, forward, ahead), :2]
+            step = target + walkers.aside[i] * half * right - walkers.xy[i]
+            wanted = (
+                walkers.speed[i] * step / max(np.sqrt(np.sum(step**2)), 1e-6)
+            )
+        force[i] += (wanted - walkers.velocity[i]) / _RELAXATION
+        here = ways.points[_row(ways, way, forward, walkers.at[i]), :2]
+        off = np.sum((walkers.xy[i] - here) * right)
+        for side in (-1.0, 1.0):
+            room = half - side * off
+            force[i] -= (
+                side
+                * _EDGE_STRENGTH
+                * np.exp(-max(room, 0.0) / _EDGE_REACH)
+                * right
+            )
+    for c in range(len(waited)):
+        if not waited[c]:
+            permits.waits[c] = np.inf
+    for i in range(count):
+        for j in range(i):
+            x = walkers.xy[i, 0] - walkers.xy[j, 0]
+            y = walkers.xy[i, 1] - walkers.xy[j, 1]
+            square = x * x + y * y
+            if square < _NEAR**2:
+                distance = max(np.sqrt(square), 1e-3)
+                push = _STRENGTH * np.exp(-max(distance - APART, 0.0) / _REACH)
+                # A little to the right, or two who meet head on would stand.
+                push_x = push * (x - _TO_THE_RIGHT * y) / distance
+                push_y = push * (y + _TO_THE_RIGHT * x) / distance
+                force[i, 0] += push_x
+                force[i, 1] += push_y
+                force[j, 0] -= push_x
+                force[j, 1] -= push_y
+                _step_aside(walkers, force, i, -x, -y, distance)
+                _step_aside(walkers, force, j, x, y, distance)
+    for i in range(count):
+        velocity = walkers.velocity[i] + force[i] * dt
+        speed = np.sqrt(np.sum(velocity**2))
+        fastest = _HURRY * walkers.speed[i]
+        if speed > fastest:
+            velocity *= fastest / speed
+        _move(ways, walkers, i, velocity, dt)
+        speed = np.sqrt(np.sum(walkers.velocity[i] ** 2))
+        walkers.phase[i] += gait_rate(speed) * dt
+        way = walkers.way[i]
+        is_stuck = speed < _GOING and not is_waiting[i]
+        walkers.stuck[i] = walkers.stuck[i] + dt if is_stuck else 0.0
+        if walkers.stuck[i] > _PATIENCE and ways.crossing[way] < 0:
+            walkers.stuck[i] = 0.0
+            walkers.forward[i] = not walkers.forward[i]
+            walkers.at[i] = max(ways.num_points[way] - 2 - walkers.at[i], 0)
+            walkers.next_way[i] = -1
+
+
+@compiled
+def _step_aside(
+    walkers: Walkers,
+    force: np.ndarray,
+    i: int,
+    x: float,
+    y: float,
+    distance: float,
+) -> None:
+    """Pushes a walker aside whom another one is in the way of.
+
+    Args:
+        walkers: all of them.
+        force: (N, 2) to add to [m/s^2].
+        i: which one.
+        x, y: where the other is from there [m].
+        distance: of both [m].
+    """
+    c, s = np.cos(walkers.yaw[i]), np.sin(walkers.yaw[i])
+    ahead, aside = x * c + y * s, y * c - x * s
+    if ahead <= 0.0 or abs(aside) >= _PASSING:
+        return
+    push = _ASIDE * (1.0 - distance / _NEAR) * (1.0 - abs(aside) / _PASSING)
+    # Away from the other; to the right of who is straight ahead.
+    side = -1.0 if aside >= -0.05 else 1.0
+    force[i, 0] -= side * push * s
+    force[i, 1] += side * push * c
+
+
+@compiled
+def gait_rate(speed: float) -> float:
+    """Returns how fast the phase of a gait goes on [rad/s].
+
+    A stride, of two steps, is as long as 0.7 s of a walk at that speed and
+    0.4 m more.
+    """
+    return 2.0 * np.pi * speed / (0.7 * speed + 0.4)
+
+
+@compiled
+def height_of(ways: WalkwayArrays, walkers: Walkers, i: int) -> float:
+    """Returns how high the walkway is where a walker is [m]."""
+    way, forward, at = walkers.way[i], walkers.forward[i], walkers.at[i]
+    at = min(at, ways.num_points[way] - 2)
+    a = ways.points[_row(ways, way, forward, at)]
+    b = ways.points[_row(ways, way, forward, at + 1)]
+    step = b[:2] - a[:2]
+    share = np.sum((walkers.xy[i] - a[:2]) * step) / np.sum(step**2)
+    return a[2] + min(max(share, 0.0), 1.0) * (b[2] - a[2])
+
+
+@compiled
+def _begin(
+    ways: WalkwayArrays,
+    walkers: Walkers,
+    permits: Permits,
+    num_pieces: int,
+    i: int,
+    t: float,
+) -> None:
+    """Lets a walker begin its next walkway."""
+    way, after = walkers.way[i], walkers.next_way[i]
+    node = ways.end[way] if walkers.forward[i] else ways.start[way]
+    for other, change in ((way, -1), (after, 1)):
+        c = ways.crossing[other]
+        if c >= 0:
+            permits.small[num_pieces + c] += change
+            permits.closed[c] = t
+    is_back = way == after
+    walkers.forward[i] = (
+        not walkers.forward[i] if is_back else ways.start[after] == node
+    )
+    walkers.way[i] = after
+    walkers.at[i] = 0
+    walkers.next_way[i] = -1
+
+
+@compiled
+def _is_free(walkers: Walkers, i: int, x: float, y: float, yaw: float) -> bool:
+    """Tells whether a walker's box would overlap nobody's at a place."""
+    half = np.array([WALKER_LENGTH / 2 + _GAP / 2, WALKER_WIDTH / 2 + _GAP / 2])
+    reach = 4.0 * (half[0] ** 2 + half[1] ** 2)
+    a, b = np.array([x, y, yaw]), np.zeros(3)
+    for j in range(len(walkers.speed)):
+        dx, dy = walkers.xy[j, 0] - x, walkers.xy[j, 1] - y
+        if j == i or dx * dx + dy * dy > reach:
+            continue
+        b[0], b[1], b[2] = walkers.xy[j, 0], walkers.xy[j, 1], walkers.yaw[j]
+        if boxes_overlap(a, b, half, half):
+            return False
+    return True
+
+
+@compiled
+def _move(
+    ways: WalkwayArrays,
+    walkers: Walkers,
+    i: int,
+    velocity: np.ndarray,
+    dt: float,
+) -> None:
+    """Moves a walker as far as nobody is in the way.
+
+    All begin apart, and nobody makes a step by which two overlap.
+    """
+    x, y = walkers.xy[i, 0], walkers.xy[i, 1]
+    speed = np.sqrt(np.sum(velocity**2))
+    yaw = walkers.yaw[i]
+    if speed > _GOING:
+        heading = np.arctan2(velocity[1], velocity[0])
+        turn = (heading - yaw + np.pi) % (2 * np.pi) - np.pi
+        yaw += min(max(turn, -_TURN_RATE * dt), _TURN_RATE * dt)
+    walkers.xy[i, 0] += velocity[0] * dt
+    walkers.xy[i, 1] += velocity[1] * dt
+    _keep_on_way(ways, walkers, i, _BACK * dt)
+    new_x, new_y = walkers.xy[i, 0], walkers.xy[i, 1]
+    walkers.xy[i, 0], walkers.xy[i, 1] = x, y
+    if _is_free(walkers, i, new_x, new_y, yaw):
+        walkers.yaw[i] = yaw
+    elif _is_free(walkers, i, new_x, new_y, walkers.yaw[i]):
+        pass
+    else:
+        # Aside alone, else not at all.
+        c, s = np.cos(walkers.yaw[i]), np.sin(walkers.yaw[i])
+        aside = (new_y - y) * c - (new_x - x) * s
+        new_x, new_y = x - aside * s, y + aside * c
+        if not _is_free(walkers, i, new_x, new_y, walkers.yaw[i]):
+            new_x, new_y = x, y
+    walkers.xy[i, 0], walkers.xy[i, 1] = new_x, new_y
+    walkers.velocity[i, 0] = (new_x - x) / dt
+    walkers.velocity[i, 1] = (new_y - y) / dt
+
+
+@compiled
+def _keep_on_way(
+    ways: WalkwayArrays, walkers: Walkers, i: int, most: float
+) -> None:
+    """Moves a walker back who has left its walkway, by so much at most [m]."""
+    way, forward = walkers.way[i], walkers.forward[i]
+    half = ways.half_width[way]
+    best, nearest = np.inf, 0
+    low = max(walkers.at[i] - 3, 0)
+    for at in range(low, min(walkers.at[i] + 4, ways.num_points[way])):
+        place = ways.points[_row(ways, way, forward, at), :2]
+        distance = np.sum((walkers.xy[i] - place) ** 2)
+        if distance < best:
+            best, nearest = distance, at
+    place = ways.points[_row(ways, way, forward, nearest), :2]
+    tangent = _tangent(ways, way, forward, nearest)
+    right = np.array([tangent[1], -tangent[0]])
+    along = np.sum((walkers.xy[i] - place) * tangent)
+    off = np.sum((walkers.xy[i] - place) * right)
+    if nearest == ways.num_points[way] - 1:
+        along = min(along, half)
+    if nearest == 0:
+        along = max(along, -_AT_NODE - half)
+    off = min(max(off, -half), half)
+    back = place + along * tangent + off * right - walkers.xy[i]
+    distance = np.sqrt(np.sum(back**2))
+    if distance > most:
+        back *= most / distance
+    walkers.xy[i] += back

@@ -1,0 +1,51 @@
+"""Overlaps of boxes against polygons of Shapely."""
+
+import numpy as np
+import shapely
+import shapely.affinity
+
+from cns_drake.traffic.overlaps import (
+    boxes_overlap,
+    find_overlaps,
+    way_out,
+    whom_to_leave_out,
+)
+
+
+def _polygon(pose, half):
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    corners = [(1, 1), (-1, 1), (-1, -1), (1, -1)] * half
+    return shapely.Polygon(corners @ np.array([[c, s], [-s, c]]) + pose[:2])
+
+
+def test_agrees_with_shapely():
+    rng = np.random.default_rng(3)
+    for _ in range(500):
+        a, b = rng.uniform(-3, 3, 3), rng.uniform(-3, 3, 3)
+        half_a, half_b = rng.uniform(0.2, 2.0, (2, 2))
+        one, other = _polygon(a, half_a), _polygon(b, half_b)
+        expected = one.intersection(other).area > 1e-9
+        assert boxes_overlap(a, b, half_a, half_b) == expected
+        if expected:
+            # Moved by the way out, and a hair more, it is outside.
+            x, y = way_out(a, b, half_a, half_b)
+            moved = shapely.affinity.translate(other, 1.001 * x, 1.001 * y)
+            assert one.intersection(moved).area < 1e-6
+            near = shapely.affinity.translate(other, 0.9 * x, 0.9 * y)
+            assert one.intersection(near).area > 0
+
+
+def test_the_most_involved_goes_first():
+    """Of three in a row the middle one alone has to go."""
+    poses = np.array([[[0.0, 0, 0], [2.0, 0, 0], [4.0, 0, 0], [np.nan] * 3]])
+    found = np.zeros((4, 4), bool)
+    find_overlaps(poses, np.full((4, 2), 1.1), found)
+    assert found.tolist() == [
+        [False, True, False, False],
+        [True, False, True, False],
+        [False, True, False, False],
+        [False] * 4,
+    ]
+    assert whom_to_leave_out(found, 0) == [1]
+    # The first two always stay.
+    assert whom_to_leave_out(found, 2) == [2]

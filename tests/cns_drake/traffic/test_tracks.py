@@ -1,0 +1,51 @@
+"""Piecewise polynomial motions."""
+
+import numpy as np
+import pytest
+
+from cns_drake.traffic.tracks import Tracks
+
+
+@pytest.fixture
+def tracks():
+    rng = np.random.default_rng(5)
+    return Tracks(0.1, np.cumsum(rng.uniform(0, 1, (20, 3, 2)), axis=0))
+
+
+def test_values_are_the_integrals_of_rates(tracks):
+    """By Gauss and Legendre's rule, which is exact for cubics."""
+    nodes, weights = np.polynomial.legendre.leggauss(4)
+    for k in range(19):
+        for low, high in ((0.0, 0.1), (0.03, 0.08)):
+            t = 0.1 * k + low + (high - low) * (nodes + 1) / 2
+            rates = np.array([tracks.at(one)[1] for one in t])
+            moved = np.tensordot(weights, rates, 1) * (high - low) / 2
+            a, b = (tracks.at(0.1 * k + end)[0] for end in (low, high))
+            np.testing.assert_allclose(b - a, moved, atol=1e-9)
+
+
+def test_goes_through_its_values_smoothly(tracks):
+    for k in range(1, 19):
+        value, rate = tracks.at(0.1 * k)
+        np.testing.assert_allclose(value, tracks.values[k], atol=1e-9)
+        np.testing.assert_allclose(
+            rate, tracks.at(0.1 * k - 1e-9)[1], atol=1e-5
+        )
+
+
+def test_rests_before_and_after(tracks):
+    for t, row in ((-1.0, 0), (99.0, -1)):
+        value, rate = tracks.at(t)
+        np.testing.assert_allclose(value, tracks.values[row])
+        assert not rate.any()
+
+
+def test_who_comes_and_goes():
+    values = np.arange(6.0).reshape(6, 1, 1)
+    present = np.array([[0], [0], [1], [1], [1], [0]], bool)
+    tracks = Tracks(1.0, values, present)
+    seen = [bool(tracks.is_present(t)[0]) for t in (0.5, 1.5, 2.0, 3.9, 4.5)]
+    assert seen == [False, False, True, True, False]
+    # Its motion does not begin where it was not.
+    values[:2] = 1e6
+    assert tracks.at(2.5)[0] == pytest.approx(2.5)

@@ -1,0 +1,187 @@
+"""Planned traffic: nobody meets anybody, and everybody obeys the roads."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+import shapely
+
+from cns_drake.roads.network import load_road_network
+from cns_drake.roads.route import make_lane_path
+from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.shipped import shipped_maps
+from cns_drake.traffic.lane_arrays import make_lane_arrays
+from cns_drake.traffic.presence import EgoBox
+from cns_drake.traffic.road_lanes import make_lane_graph
+from cns_drake.traffic.starting_places import room_for_vehicles
+from cns_drake.traffic.traffic_plan import WALKER_SIZE, plan_traffic
+from cns_drake.traffic.walkways import make_walkways
+
+BOX = EgoBox(-1.05, 3.75, 1.03)
+
+
+@cache
+def roads(name):
+    network = load_road_network(shipped_maps()[name] / "roads.yaml")
+    graph = make_lane_graph(network)
+    return network, graph, make_walkways(network, graph)
+
+
+def ego(sequence):
+    """Returns a drive along a sequence's route at 12 m/s."""
+    scenario = load_scenario(sequence)
+    network = roads(scenario.map)[0]
+    path = make_lane_path(network, scenario.route, 0.5)
+    along = path.spacing * np.arange(len(path.points))
+    yaw = np.unwrap(
+        np.arctan2(*np.gradient(path.points[:, :2], axis=0).T[::-1])
+    )
+
+    def at(t):
+        s = 12.0 * t
+        xy = [np.interp(s, along, x) for x in path.points[:, :2].T]
+        return np.column_stack(xy), np.interp(s, along, yaw)
+
+    return at
+
+
+def plan(sequence, number, duration, seed=1):
+    _, graph, walkways = roads(load_scenario(sequence).map)
+    return plan_traffic(
+        graph,
+        walkways,
+        vehicles=number,
+        walkers=number,
+        seed=seed,
+        duration=duration,
+        ego=ego(sequence),
+        ego_box=BOX,
+    )
+
+
+def boxes(centres, yaw, size):
+    """Returns polygons of boxes (N, 2), (N,)."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    corners = [
+        (
+            centres[:, 0] + x * c - y * s,
+            centres[:, 1] + x * s + y * c,
+        )
+        for x, y in np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)])
+        * np.array(size[:2])
+        / 2
+    ]
+    return shapely.polygons(np.array(corners).transpose(2, 0, 1))
+
+
+def all_boxes(traffic, path, t):
+    """Returns everybody's box at a time, the ego car's first."""
+    xy, yaw = path(np.array([t]))
+    ahead = np.column_stack([np.cos(yaw), np.sin(yaw)])
+    middle = xy + (BOX.rear + BOX.front) / 2 * ahead
+    found = [boxes(middle, yaw, (BOX.front - BOX.rear, 2 * BOX.half_width))]
+    where = traffic.vehicles.at(t)[0]
+    found += [
+        boxes(row[None, :2], row[None, 3], kind.size)
+        for row, kind in zip(where, traffic.kinds, strict=True)
+    ]
+    where = traffic.walkers.at(t)[0]
+    found.append(boxes(where[:, :2], where[:, 3], WALKER_SIZE))
+    return np.concatenate(found)
+
+
+def meetings(traffic, path, times):
+    """Returns how many pairs overlap at any of the times."""
+    count = 0
+    for t in times:
+        found = all_boxes(traffic, path, t)
+        a, b = shapely.STRtree(found).query(found, predicate="intersects")
+        count += int((a < b).sum())
+    return count
+
+
+@pytest.mark.slow
+def test_nobody_meets_anybody_for_ten_minutes():
+    traffic = plan("downtown_03", 100, 600.0)
+    assert len(traffic.kinds) == traffic.walkers.values.shape[1] == 100
+    assert meetings(traffic, ego("downtown_03"), np.arange(0, 600, 0.7)) == 0
+
+
+@pytest.fixture(scope="module")
+def short():
+    return plan("metropolis_04", 40, 60.0)
+
+
+def test_nobody_meets_anybody(short):
+    assert short.left_out == 0
+    assert meetings(short, ego("metropolis_04"), np.arange(0, 60, 0.05)) == 0
+
+
+def test_equal_arguments_give_an_equal_plan(short):
+    again = plan("metropolis_04", 40, 60.0)
+    assert again.kinds == short.kinds
+    assert (again.vehicles.values == short.vehicles.values).all()
+    assert (again.walkers.values == short.walkers.values).all()
+    other = plan("metropolis_04", 40, 60.0, seed=2)
+    assert other.kinds != short.kinds
+
+
+def test_keeps_to_lanes_and_walkways(short):
+    network = roads("metropolis")[0]
+    lanes = network.lane_area().buffer(0.2)
+    wheels = short.vehicles.values[::10, :, :2].reshape(-1, 2)
+    assert shapely.contains_xy(lanes, *wheels.T).all()
+    walked = network.sidewalks().union(
+        shapely.union_all([c.area for c in roads("metropolis")[1].crossings])
+    )
+    feet = short.walkers.values[::10, :, :2].reshape(-1, 2)
+    assert shapely.contains_xy(walked.buffer(0.3), *feet.T).mean() > 0.99
+
+
+def test_moves_plausibly(short):
+    velocity = np.diff(short.vehicles.values[..., :3], axis=0) / 0.1
+    speed = np.linalg.norm(velocity, axis=2)
+    assert speed.max() < 1.1 * 22.4
+    assert np.abs(np.diff(speed, axis=0)).max() < 0.1 * 9.0
+    assert (speed > 0.5).mean() > 0.3
+    # They go where they look.
+    yaw = short.vehicles.values[:-1, :, 3]
+    ahead = np.cos(yaw) * velocity[..., 0] + np.sin(yaw) * velocity[..., 1]
+    assert (ahead[speed > 2] > 0.97 * speed[speed > 2]).all()
+    walking = np.linalg.norm(
+        np.diff(short.walkers.values[..., :2], axis=0), axis=2
+    )
+    assert 0.9 < np.median(walking) / 0.1 < 1.6
+    assert walking.max() / 0.1 < 4.0
+
+
+def test_seeds_mix_all_kinds():
+    traffic = plan("downtown_03", 120, 1.0)
+    classes = {kind.semantic_class for kind in traffic.kinds}
+    assert classes == {"car", "truck", "bus", "motorcyclist", "bicyclist"}
+
+
+@pytest.mark.parametrize("name", ["metropolis", "suburbia", "riverside"])
+def test_graphs_have_no_dead_end(name):
+    _, graph, _ = roads(name)
+    assert room_for_vehicles(graph) > 50
+    for piece in graph.pieces:
+        assert piece.after
+        assert all(graph.pieces[a].is_way != piece.is_way for a in piece.after)
+        for after in piece.after:
+            gap = graph.pieces[after].points[0] - piece.points[-1]
+            assert np.linalg.norm(gap) < 1e-3
+
+
+def test_ways_that_cross_exclude_each_other():
+    _, graph, _ = roads("suburbia")
+    lanes = make_lane_arrays(graph)
+    num = len(graph.pieces)
+    lines = [shapely.LineString(p.points[:, :2]) for p in graph.pieces]
+    for a in range(num):
+        for b in range(a):
+            if graph.pieces[a].is_way and graph.pieces[b].is_way:
+                meets = lines[a].distance(lines[b]) < 1.5
+                assert not meets or lanes.small[a, b]
+    assert (lanes.small == lanes.small.T).all()
+    assert (lanes.small <= lanes.large).all()
