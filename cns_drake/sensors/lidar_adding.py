@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import Any
 
-from pydrake.geometry import FrameId, GeometryId, SceneGraph
+from pydrake.geometry import FrameId, GeometryId, Role, SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, Frame, RigidBody, WeldJoint
@@ -15,7 +15,12 @@ from cns_drake.scene.geometry_revision import geometry_revision_port
 from cns_drake.sensors.beam_pattern import BeamPattern
 from cns_drake.sensors.body_motion import body_and_pose, connect_motion
 from cns_drake.sensors.lidar import Lidar
+from cns_drake.sensors.lidar_arguments import (
+    check_lidar_arguments,
+    warn_of_nothing_to_see,
+)
 from cns_drake.sensors.lidar_presets import make_beam_pattern
+from cns_drake.sensors.measurement import MeasurementModel
 
 
 def add_lidar(
@@ -29,6 +34,9 @@ def add_lidar(
     unseen: Collection[RigidBody | FrameId | GeometryId] | None = None,
     motion_distortion: bool = False,
     motion: System | None = None,
+    range_noise: float = 0.0,
+    dropout: float = 0.0,
+    seed: int = 0,
     **options: Any,
 ) -> Lidar:
     """Adds a LiDAR to a diagram and connects it to the SceneGraph.
@@ -49,6 +57,11 @@ def add_lidar(
             go on moving while it turns (see `Lidar`).
         motion: the source of the bodies' velocities then, if that is not the
             plant itself.
+        range_noise: standard deviation of the ranges [m].
+        dropout: probability that a return is lost.
+        seed: of both. What is measured depends on it, on the name and on the
+            number of the frame. `measurement` of `Lidar` takes the place of
+            these three.
         options: further arguments of `Lidar`.
 
     Returns:
@@ -58,7 +71,12 @@ def add_lidar(
     Raises:
         KeyError: there is no preset of that name.
         RuntimeError: the body is not registered with a SceneGraph.
-        ValueError: motion distortion is wanted of what is no body.
+        TypeError: an argument is not what it should be.
+        ValueError: the diagram has a system of that name, the noise cannot
+            be, or motion distortion is wanted of what is no body.
+
+    Warns:
+        UserWarning: the SceneGraph holds nothing that the LiDAR could see.
 
     Example:
         from cns_drake import add_lidar
@@ -66,6 +84,19 @@ def add_lidar(
         lidar = add_lidar(builder, scene_graph, body, X_BS, "os1-64")
         builder.ExportOutput(lidar.GetOutputPort("scan"), "scan")
     """
+    check_lidar_arguments(builder, name, body, X_PS, pattern)
+    warn_of_nothing_to_see(scene_graph, options.get("role", Role.kPerception))
+    if range_noise or dropout or seed:
+        if "measurement" in options:
+            raise ValueError(
+                "measurement: give either it or range_noise, dropout and seed"
+            )
+        options["measurement"] = MeasurementModel(
+            range_noise=range_noise,
+            dropout=dropout,
+            seed=seed,
+            sensor_name=name,
+        )
     if not isinstance(body, FrameId):
         body, X_PS = body_and_pose(body, X_PS)
     if isinstance(pattern, str):

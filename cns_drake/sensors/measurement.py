@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+import math
+import numbers
 from typing import NamedTuple
 
 import numpy as np
@@ -68,6 +70,23 @@ class MeasurementModel:
     faint_dropout: float = 0.0
     seed: int = 0
     sensor_name: str = ""
+
+    def __post_init__(self) -> None:
+        """Checks the values.
+
+        Raises:
+            ValueError: one of them cannot be.
+        """
+        for name in ("resolution", "range_noise"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ValueError(f"{name}: {value!r} is no length")
+        for name in ("dropout", "faint_dropout"):
+            value = getattr(self, name)
+            if not 0.0 <= value <= 1.0:
+                raise ValueError(f"{name}: {value!r} is no probability")
+        if not isinstance(self.seed, numbers.Integral) or self.seed < 0:
+            raise ValueError(f"seed: {self.seed!r} is no integer from 0 on")
 
     @property
     def is_random(self) -> bool:

@@ -79,6 +79,11 @@ def test_public_names_say_how_to_use_them(package, name):
     assert private_imports(example) == []
 
 
+@pytest.mark.parametrize("package", PACKAGES)
+def test_dir_shows_what_is_public(package):
+    assert dir(importlib.import_module(package)) == sorted(PUBLIC[package])
+
+
 def test_names_that_are_not_there():
     for package in PACKAGES:
         with pytest.raises(AttributeError, match="has no attribute 'nothing'"):

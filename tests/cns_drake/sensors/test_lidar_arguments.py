@@ -1,0 +1,112 @@
+"""Slips in the arguments of a LiDAR are found at the call."""
+
+import warnings
+
+import numpy as np
+from pydrake.geometry import Box, Role
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+from pydrake.systems.framework import DiagramBuilder
+import pytest
+
+from cns_drake.sensors.lidar_adding import add_lidar
+from cns_drake.sensors.measurement import MeasurementModel
+
+X_PS = RigidTransform([0.0, 0.0, 1.0])
+
+
+class Site:
+    """A wall 8 m ahead of the world's origin, or nothing."""
+
+    def __init__(self, with_wall=True):
+        self.builder = DiagramBuilder()
+        self.plant, self.scene_graph = AddMultibodyPlantSceneGraph(
+            self.builder, 0.0
+        )
+        self.world = self.plant.world_body()
+        if with_wall:
+            self.plant.RegisterVisualGeometry(
+                self.world,
+                RigidTransform([8.0, 0.0, 0.0]),
+                Box(0.2, 20.0, 6.0),
+                "wall",
+                np.full(4, 0.5),
+            )
+        self.plant.Finalize()
+
+    def add(self, body=None, pose=X_PS, pattern="vlp-16", **options):
+        return add_lidar(
+            self.builder,
+            self.scene_graph,
+            self.world if body is None else body,
+            pose,
+            pattern,
+            **options,
+        )
+
+    def ranges(self, time=0.0, **options):
+        lidar = self.add(**options)
+        root = self.builder.Build().CreateDefaultContext()
+        root.SetTime(time)
+        scan = lidar.GetOutputPort("scan").Eval(
+            lidar.GetMyContextFromRoot(root)
+        )
+        return np.linalg.norm([scan["x"], scan["y"], scan["z"]], axis=0)
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "fault"),
+    [
+        ({"body": "wall"}, TypeError, r"plant.GetBodyByName\('wall'\)"),
+        ({"body": 3}, TypeError, "body: 3 is no RigidBody"),
+        ({"pose": [0, 0, 1]}, TypeError, "X_PS: .* is no RigidTransform"),
+        ({"pattern": 16}, TypeError, "pattern: 16 is no BeamPattern"),
+        ({"pattern": "vlp-61"}, KeyError, "no LiDAR preset 'vlp-61'"),
+        ({"range_noise": -0.1}, ValueError, "range_noise: -0.1 is no length"),
+        ({"range_noise": np.nan}, ValueError, "range_noise: nan is no length"),
+        ({"dropout": 1.5}, ValueError, "dropout: 1.5 is no probability"),
+        ({"seed": -1}, ValueError, "seed: -1 is no integer"),
+        ({"seed": 0.5}, ValueError, "seed: 0.5 is no integer"),
+        (
+            {"range_noise": 0.1, "measurement": MeasurementModel()},
+            ValueError,
+            "measurement: give either it or range_noise",
+        ),
+        ({"noise": 0.1}, TypeError, "noise"),
+    ],
+)
+def test_a_slip_is_found_at_once(options, error, fault):
+    with pytest.raises(error, match=fault):
+        Site().add(**options)
+
+
+def test_each_lidar_has_a_name_of_its_own():
+    site = Site()
+    site.add(name="front")
+    with pytest.raises(ValueError, match="has a system 'front'; give each"):
+        site.add(name="front")
+    site.add(name="rear")
+
+
+def test_noise_is_that_of_a_measurement_model():
+    noise = {"range_noise": 0.05, "dropout": 0.2, "seed": 3}
+    model = MeasurementModel(**noise, sensor_name="lidar")
+    noisy = Site().ranges(**noise)
+    np.testing.assert_array_equal(noisy, Site().ranges(measurement=model))
+    exact = Site().ranges()
+    assert 0.75 < len(noisy) / len(exact) < 0.85
+    assert not np.array_equal(noisy, Site().ranges(**noise, name="other"))
+    # A turn before time zero has noise of its own.
+    earlier = Site().ranges(time=-1.0, **noise)
+    assert 0.75 < len(earlier) / len(exact) < 0.85
+    assert not np.array_equal(noisy, earlier)
+
+
+def test_nothing_to_see_is_said():
+    with pytest.warns(UserWarning, match="no geometry of Role.kPerception"):
+        Site(with_wall=False).add()
+    with pytest.warns(UserWarning, match="no geometry of Role.kProximity"):
+        Site().add(role=Role.kProximity)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        Site().add()
