@@ -8,6 +8,7 @@ import typer
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
+from cns_drake.base.terminal import note
 from cns_drake.command_line.options import Jobs, Output, Scheduler
 from evaluation.command_line.protocol_options import (
     Costs,
@@ -66,5 +67,6 @@ def reproduce(
         protocol=protocol,
         settings=parameter or (),
         with_costs=costs,
+        on_note=note,
     )
     typer.echo(report)

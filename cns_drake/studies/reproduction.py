@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -41,6 +41,7 @@ def reproduce_maps(
     protocol: RetrievalProtocol = PAPER_PROTOCOL,
     settings: Sequence[str] = (),
     with_costs: bool = False,
+    on_note: Callable[[str], None] = lambda text: None,
 ) -> Path:
     """Records the sequences of maps, evaluates them and reports.
 
@@ -60,6 +61,7 @@ def reproduce_maps(
         protocol: of place recognition.
         settings: see `choose_methods`.
         with_costs: measure what the methods cost, too.
+        on_note: is told of which cities there is nothing to compare.
 
     Returns:
         The path of the report's page.
@@ -124,6 +126,7 @@ def reproduce_maps(
         protocol=protocol,
         with_costs=with_costs,
         reference=reference,
+        on_note=on_note,
     )
 
 

@@ -141,7 +141,10 @@ def survey(path: Path, track: Track = silent) -> Surveyed:
 
 
 def survey_in_one_world(
-    paths: list[Path], when: When, track: Track = silent
+    paths: list[Path],
+    when: When,
+    track: Track = silent,
+    lidar: str | None = None,
 ) -> tuple[list[Surveyed], list[AlignmentReport]]:
     """Maps what lies at some paths, all in one world.
 
@@ -150,6 +153,7 @@ def survey_in_one_world(
             world already.
         when: whether later sequences are aligned with the first.
         track: reports progress.
+        lidar: whose scans to read, of recordings with several.
 
     Returns:
         The maps, in the order of the paths; what was aligned, and how.
@@ -157,7 +161,7 @@ def survey_in_one_world(
     Raises:
         InputError: if something cannot be read, or not be aligned.
     """
-    opened = [_open(path) for path in paths]
+    opened = [_open(path, lidar) for path in paths]
     drives = {
         i: one for i, one in enumerate(opened) if isinstance(one, Sequence)
     }
@@ -241,12 +245,12 @@ def compare(
     )
 
 
-def _open(path: Path) -> Sequence | Path:
+def _open(path: Path, lidar: str | None = None) -> Sequence | Path:
     """Returns the sequence at a path, or the path if it is a map file."""
     path = Path(path)
     if path.is_file() and is_cloud(path):
         return path
-    return open_sequence(path)
+    return open_sequence(path, lidar)
 
 
 def _survey(source: Sequence | Path, track: Track) -> Surveyed:

@@ -81,6 +81,15 @@ _Parameters = Annotated[
 _SensorHeight = Annotated[
     float, typer.Option(help="Height of the LiDAR above the ground [m].")
 ]
+_LidarName = Annotated[
+    str | None,
+    typer.Option(
+        "--lidar",
+        metavar="NAME",
+        help="Whose scans to read, of recordings with several LiDARs: those of"
+        " the topic /NAME/points.",
+    ),
+]
 _OwnMethods = Annotated[
     list[Path] | None,
     typer.Option(
@@ -122,6 +131,7 @@ def tcr(
         ),
     ] = None,
     align: _Align = AlignName.AUTO,
+    lidar: _LidarName = None,
     json: _Json = False,
 ) -> None:
     """Temporal change ratio of two drives or maps.
@@ -135,7 +145,7 @@ def tcr(
 
     paths = [path for path in (source, target, control) if path is not None]
     surveys, alignments = change.survey_in_one_world(
-        paths, align.value, terminal.track
+        paths, align.value, terminal.track, lidar
     )
     report = change.compare(
         surveys[0],
@@ -175,6 +185,7 @@ def pr(
     parameter: _Parameters = None,
     sensor_height: _SensorHeight = 1.6,
     align: _Align = AlignName.AUTO,
+    lidar: _LidarName = None,
     across_maps: Annotated[
         bool,
         typer.Option(
@@ -223,7 +234,7 @@ def pr(
             " against itself)"
         )
     chosen = _make_method(method, parameter, sensor_height)
-    places, asking = open_sequence(database), open_sequence(query)
+    places, asking = (open_sequence(path, lidar) for path in (database, query))
     for drive in (places, asking):
         _tell_notes(drive)
     alignment = in_one_world(
@@ -306,6 +317,7 @@ def report(
     output: Annotated[Path, typer.Option(help="Folder to write.")],
     method: _OwnMethods = None,
     parameter: Settings = None,
+    lidar: _LidarName = None,
     jobs: _Jobs = None,
     scheduler: _Scheduler = None,
     costs: Costs = True,
@@ -332,6 +344,7 @@ def report(
         settings=parameter or (),
         with_costs=costs,
         reference_for=reference_for,
+        lidar=lidar,
     )
     print(path)
 
@@ -355,6 +368,7 @@ def trend(
         ),
     ] = None,
     method: _OwnMethods = None,
+    lidar: _LidarName = None,
     jobs: _Jobs = None,
     scheduler: _Scheduler = None,
     *,
@@ -378,6 +392,7 @@ def trend(
         method or (),
         protocol,
         control or (),
+        lidar,
     )
     print(write_trend(points, output))
 

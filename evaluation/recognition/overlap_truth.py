@@ -6,9 +6,9 @@ of these: in the direction in which it lies from the place's sensor, the place
 has returns, and the point's distance is between that of the nearest and that
 of the farthest of them, or within `TOLERANCE` of that. Directions are cells of
 1 deg of azimuth and 2 deg of elevation, with the cells above and below, since
-beams of a spinning LiDAR lie far apart in elevation. The overlap is the part of the query's points that are
-shown. So what the place's sensor cannot see, and what is not there when it
-passes, does not count.
+beams of a spinning LiDAR lie far apart in elevation. The overlap is the part
+of the query's points that are shown. What the place's sensor cannot see, and
+what is not there when it passes, does not count.
 
 The idea is that of OverlapNet (Chen et al., RSS 2020), which compares range
 images pixel by pixel.

@@ -41,6 +41,7 @@ class PageContent:
     """All that the page shows.
 
     Attributes:
+        notes: of which cities there is nothing to compare.
         judgements: claims, judged.
         beside: whose numbers stand beside; empty for none.
         changes: TCR of all pairs.
@@ -57,6 +58,7 @@ class PageContent:
             look around in; drives without one may be left out.
     """
 
+    notes: Sequence[str]
     judgements: Sequence[Judgement]
     beside: str
     changes: Sequence[ChangeResult]
@@ -126,6 +128,7 @@ def _lead(content: PageContent) -> str:
     if content.beside:
         text += f", beside the numbers of {html.escape(content.beside)}"
     lead = f"<p>{text}.</p>"
+    lead += "".join(f"<p>{html.escape(note)}</p>" for note in content.notes)
     if content.recognitions:
         lead += (
             '<p class="links"><a href="#browser">Look at every query, one by'

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import quote
@@ -51,6 +51,7 @@ from evaluation.study.collection import (
     City,
     RecordingInfo,
     group_cities,
+    nothing_to_compare,
 )
 from evaluation.study.figure_files import (
     auc_illustration,
@@ -83,6 +84,7 @@ def assemble(
     protocol: RetrievalProtocol = PAPER_PROTOCOL,
     with_costs: bool = False,
     reference: Reference = NO_REFERENCE,
+    on_note: Callable[[str], None] = lambda text: None,
 ) -> Path:
     """Writes the report of a study whose jobs are done.
 
@@ -102,6 +104,8 @@ def assemble(
         protocol: likewise.
         with_costs: likewise.
         reference: likewise.
+        on_note: is told of which cities there is nothing to compare; the
+            report says so too.
 
     Returns:
         The path of `report.html`.
@@ -116,6 +120,11 @@ def assemble(
     cities = group_cities(recordings, reference)
     for city in cities:
         _collect(city, files, chosen, protocol, collected)
+    notes = []
+    if protocol.exclude_recent is None:
+        notes = nothing_to_compare(cities)
+    for note in notes:
+        on_note(note)
     pairs = [pair for city in cities for pair in city.recognition_pairs()]
     if collected.recognitions:
         covered = any(map(reference.covers, collected.recognitions))
@@ -134,7 +143,7 @@ def assemble(
         draw_survival(collected.survivals, shown.stem)
         collected.illustrations.insert(0, shown)
     costs = read_part(files.costs) if with_costs and pairs else []
-    return _write_all(collected, output, pages or {}, costs, reference)
+    return _write_all(collected, output, pages or {}, costs, reference, notes)
 
 
 def _collect(
@@ -199,6 +208,7 @@ def _write_all(
     pages: Mapping[str, str],
     costs: Sequence[Cost],
     reference: Reference,
+    notes: Sequence[str],
 ) -> Path:
     changes, recognitions = collected.changes, collected.recognitions
     judgements = reference.judge(recognitions, changes)
@@ -225,6 +235,7 @@ def _write_all(
     page.write_page(
         path,
         page.PageContent(
+            notes=notes,
             judgements=judgements,
             beside=reference.title
             if any(map(reference.covers, recognitions))
@@ -245,6 +256,7 @@ def _write_all(
     _write(
         output / "report.md",
         _to_markdown(
+            notes,
             survival_summary(collected.survivals),
             survival,
             judgements,
@@ -272,6 +284,7 @@ def _write_queries(collected: _Collected, output: Path) -> None:
 
 
 def _to_markdown(
+    notes: Sequence[str],
     summary: str,
     survival: Table,
     judgements: Sequence[Judgement],
@@ -283,6 +296,7 @@ def _to_markdown(
     shown: list[Illustration],
 ) -> str:
     parts = ["# Structural change and place recognition\n"]
+    parts += [f"{escape_markdown(note)}\n" for note in notes]
     if survival.rows:
         parts.append("## Which method survives the change?\n")
         parts += [f"{escape_markdown(summary)}\n", _captioned(survival)]

@@ -30,6 +30,7 @@ def write_report(
     settings: Iterable[str] = (),
     with_costs: bool = False,
     reference_for: Callable[[set[str]], Reference] = lambda maps: NO_REFERENCE,
+    lidar: str | None = None,
 ) -> Path:
     """Measures all recordings in a folder; writes tables, figures, a page.
 
@@ -44,10 +45,12 @@ def write_report(
         own_methods: Python files with one method each, to run besides those
             of this package.
         protocol: of place recognition.
-        on_note: is told which recordings are left out.
+        on_note: is told which recordings are left out, and of which cities
+            there is nothing to compare.
         settings: see `choose_methods`.
         with_costs: measure what the methods cost, too.
         reference_for: returns what the report of some maps stands beside.
+        lidar: whose scans to read, of recordings with several.
 
     Returns:
         The path of `report.html`.
@@ -57,7 +60,7 @@ def write_report(
             written.
     """
     methods = choose_methods(own_methods, settings)
-    found = find_recordings(recordings, on_note)
+    found = find_recordings(recordings, on_note, lidar)
     reference = reference_for({one.map_name for one in found})
     jobs = plan_study(
         found,
@@ -76,4 +79,5 @@ def write_report(
         protocol=protocol,
         with_costs=with_costs,
         reference=reference,
+        on_note=on_note,
     )

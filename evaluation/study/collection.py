@@ -122,7 +122,9 @@ class City:
 
 
 def find_recordings(
-    folder: Path, on_note: Callable[[str], None] = lambda text: None
+    folder: Path,
+    on_note: Callable[[str], None] = lambda text: None,
+    lidar: str | None = None,
 ) -> list[RecordingInfo]:
     """Opens all recordings in a folder and its direct subfolders.
 
@@ -135,6 +137,7 @@ def find_recordings(
     Args:
         folder: that holds them.
         on_note: is told what is left out.
+        lidar: whose scans to read, of recordings with several.
 
     Raises:
         InputError: if there is no recording of which map and stage are
@@ -146,7 +149,7 @@ def find_recordings(
     paths = _find_drives(folder)
     if not paths:
         raise InputError(f"{folder}: no recorded sequence in it")
-    placed = {path: _place(path) for path in paths}
+    placed = {path: _place(path, lidar) for path in paths}
     found = [one for one in placed.values() if one is not None]
     if not found:
         raise InputError(f"{paths[0]}: {_UNPLACED}")
@@ -154,6 +157,19 @@ def find_recordings(
         if one is None:
             on_note(f"{path}: left out: {_UNPLACED}")
     return found
+
+
+def nothing_to_compare(cities: Iterable[City]) -> list[str]:
+    """Returns a sentence for each city without a pair of stages."""
+    return [
+        f"{city.name}: nothing to compare: all drives are through stage"
+        f" {', '.join(city.stages)}. A report compares drives through two"
+        " stages: `cns-drake import --years` makes stages of a real city, and"
+        " a second drive (sequence_NN.yaml) goes through one of them."
+        " --exclude-recent compares a drive with itself."
+        for city in cities
+        if not city.change_pairs()
+    ]
 
 
 def group_cities(
@@ -207,19 +223,25 @@ def _is_exported_drive(path: Path) -> bool:
     )
 
 
-def _place(path: Path) -> RecordingInfo | None:
+def _place(path: Path, lidar: str | None) -> RecordingInfo | None:
     """Returns a recording; None if nothing tells its map and stage."""
-    sequence = open_sequence(path)
+    sequence = open_sequence(path, lidar)
     scenario = sequence.scenario or {}
     way = driven_way(scenario)
     if {"map", "stage"} <= set(scenario):
         map_name = one_line(Path(str(scenario["map"])).name)
         stage = one_line(scenario["stage"])
-        return RecordingInfo(sequence.name, path, map_name, stage, way)
-    match = _NAME.fullmatch(sequence.name)
-    if match is None:
-        return None
-    return RecordingInfo(sequence.name, path, match["map"], match["stage"], way)
+    else:
+        match = _NAME.fullmatch(sequence.name)
+        if match is None:
+            return None
+        map_name, stage = match["map"], match["stage"]
+    source = None
+    if lidar is not None:
+        source = RecordedDrive(path.absolute(), lidar)
+    return RecordingInfo(
+        sequence.name, path, map_name, stage, way, made_by=source
+    )
 
 
 def _make_city(

@@ -46,15 +46,17 @@ class RecordedDrive:
 
     Attributes:
         path: where it lies.
+        lidar: whose scans to read, of a drive with several.
     """
 
     path: Path
+    lidar: str | None = None
 
     def __call__(self) -> Sequence:
-        return open_sequence(self.path)
+        return open_sequence(self.path, self.lidar)
 
     def identity(self) -> list[list]:
-        """Returns name, size and time of change of each of its files.
+        """Returns LiDAR, and name, size and time of change of each file.
 
         Their content would be as good as the only thing to go by, but takes
         as long to read as to evaluate.
@@ -69,7 +71,8 @@ class RecordedDrive:
             raise InputError(
                 f"{self.path}: {error.strerror or error}"
             ) from error
-        return [
+        chosen: list[list] = [] if self.lidar is None else [[self.lidar]]
+        return chosen + [
             [
                 path.name,
                 file.relative_to(path).as_posix(),

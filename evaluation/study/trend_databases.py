@@ -54,6 +54,7 @@ def measure_trend(
     own_methods: Iterable[Path] = (),
     protocol: RetrievalProtocol = PAPER_PROTOCOL,
     controls: Sequence[Path] = (),
+    lidar: str | None = None,
 ) -> list[TrendPoint]:
     """Returns the points of all databases and methods.
 
@@ -71,6 +72,7 @@ def measure_trend(
         protocol: of place recognition.
         controls: drives on the routes of databases through the stage of the
             query; each serves the databases whose route it has.
+        lidar: whose scans to read, of recordings with several.
 
     Raises:
         InputError: a recording cannot be read, two have one name, a control
@@ -78,14 +80,14 @@ def measure_trend(
             no place with the query.
     """
     methods = choose_methods(own_methods)
-    asking = open_sequence(query)
+    asking = open_sequence(query, lidar)
     names = {asking.name}
     if protocol.exclude_recent is not None:
         # A drive may be asked about itself then.
         names = set()
     opened: dict[Path, Recorded] = {}
     for path in (*databases, *controls):
-        sequence = open_sequence(path)
+        sequence = open_sequence(path, lidar)
         if sequence.name in names:
             raise InputError(f"{path}: {sequence.name} is there twice")
         names.add(sequence.name)
@@ -101,7 +103,7 @@ def measure_trend(
             if way is not None and driven_way(control.scenario) == way
         ]
         asked[opened[path].name] = Asked(
-            _recorded(path), same[0] if same else None
+            _recorded(path, lidar), same[0] if same else None
         )
     used = {one.control for one in asked.values()}
     for path in controls:
@@ -109,9 +111,9 @@ def measure_trend(
             raise InputError(f"--control: {path}: no database has its route")
     return measure_drives(
         asking.name,
-        _recorded(query),
+        _recorded(query, lidar),
         asked,
-        {opened[path].name: _recorded(path) for path in controls},
+        {opened[path].name: _recorded(path, lidar) for path in controls},
         output,
         cluster,
         methods,
@@ -176,5 +178,5 @@ def measure_drives(
     return points
 
 
-def _recorded(path: Path) -> RecordedDrive:
-    return RecordedDrive(path.absolute())
+def _recorded(path: Path, lidar: str | None) -> RecordedDrive:
+    return RecordedDrive(path.absolute(), lidar)

@@ -43,6 +43,7 @@ def make_content(folder, **changed):
     ]
     without_change = _result("scan-context++", [0, 1, 4, 6, 3])
     values = {
+        "notes": [],
         "judgements": [
             Judgement(heading, [finding])
             for heading, finding in (

@@ -8,6 +8,7 @@ import typer
 
 import cns_drake
 from cns_drake.command_line import cli
+from cns_drake.sensors.lidar_presets import LIDAR_PRESETS
 from evaluation.command_line import cli as evaluation_cli
 
 PROGRAMS = {
@@ -20,6 +21,12 @@ COMMANDS = [
     for words in [(), *((name,) for name in group.commands)]
 ]
 WIDTH = 60
+
+
+def test_all_presets_are_listed():
+    options = {one.name: one for one in find("cns-drake", "simulate").params}
+    words = re.findall(r"[a-z0-9-]+", options["lidar"].help.split(":")[1])
+    assert set(words) - {"or"} == set(LIDAR_PRESETS)
 
 
 def run(capsys, program, *words):

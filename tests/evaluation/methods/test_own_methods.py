@@ -3,10 +3,12 @@
 import json
 
 from helpers import documents
-from helpers.eval_program import assert_refused, run
+from helpers.eval_program import assert_refused, make_block_scene, run
+import numpy as np
 import pytest
 
 from evaluation.methods import method
+from evaluation.methods.own_file import load_method
 
 
 def shown_method(folder):
@@ -22,7 +24,7 @@ def test_the_method_in_the_documents(capsys, towns, tmp_path, monkeypatch):
     # Others need not know of it.
     monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
     path = shown_method(tmp_path)
-    assert len(path.read_text().splitlines()) < 30
+    assert len(path.read_text().splitlines()) < 40
     both = ["pr", towns / "town_01", towns / "town_02", "--method", path]
     status, out, _ = run(capsys, *both, "--set", "rings=30", "--json")
     assert status == 0
@@ -31,6 +33,20 @@ def test_the_method_in_the_documents(capsys, towns, tmp_path, monkeypatch):
     assert values["parameters"] == {"sensor_height": 1.6, "rings": 30}
     assert values["recall_at_1"] > 0.8
     assert_refused(capsys, [*both, "--set", "rings=x"], "heights: rings")
+
+
+def test_the_shown_method_finds_turned_places(tmp_path, monkeypatch):
+    monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
+    heights = load_method(shown_method(tmp_path))()
+    scenes = [make_block_scene(seed) for seed in range(6)]
+    database = heights.build_database([heights.describe(s) for s in scenes])
+    for place, scene in enumerate(scenes):
+        turn = np.radians(60.0 * place + 9.0)
+        c, s = np.cos(turn), np.sin(turn)
+        turned = scene @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        scores = heights.score(heights.describe(turned), database)
+        assert scores.argmax() == place
+        assert scores[place] == pytest.approx(1.0, abs=0.02)
 
 
 @pytest.mark.parametrize(

@@ -247,6 +247,16 @@ def test_report_of_a_single_stage(tmp_path):
     assert path == tmp_path / "out" / "report.html"
     text = path.with_name("report.md").read_text()
     assert "routes_metropolis.png" in text
+    said = "metropolis: nothing to compare: all drives are through stage 01"
+    for name in ("report.md", "report.html"):
+        assert said in path.with_name(name).read_text()
+    told = []
+    write_report(
+        tmp_path / "in", tmp_path / "out", Cluster(1), on_note=told.append
+    )
+    (note,) = told
+    assert note.startswith(said)
+    assert "--years" in note
     assert "Temporal change ratio" not in text
     page = path.read_text()
     assert "Queries, one by one" not in page
