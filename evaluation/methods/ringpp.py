@@ -10,8 +10,9 @@ the translation.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+import functools
 import math
 from typing import Annotated
 
@@ -187,22 +188,55 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
 
         None if one of the two shows nothing.
         """
-        if len(query.filled) == 0 or database.is_empty[place]:
-            return None
+        return self.relative_poses(query, database, [place])[0]
+
+    def relative_poses(
+        self, query: Ring, database: RingDatabase, places: Sequence[int]
+    ) -> list[np.ndarray | None]:
+        if len(query.filled) == 0:
+            return [None] * len(places)
+        num_cells = self.config.cells
+        weighted = self._weigh(query)
+        query_bev = query.bev(num_cells)
+        # Places along one street are seen at few headings.
+        turned = functools.cache(
+            lambda heading: _spectrum(_rotate(query_bev, heading))
+        )
+        return [
+            None
+            if database.is_empty[place]
+            else self._pose(weighted, turned, database, place)
+            for place in places
+        ]
+
+    def _pose(
+        self,
+        weighted: np.ndarray,
+        turned: Callable[[float], np.ndarray],
+        database: RingDatabase,
+        place: int,
+    ) -> np.ndarray:
+        """Returns X_PQ (4, 4) of the query in a place that shows something.
+
+        Args:
+            weighted: see `_weigh`.
+            turned: returns the spectrum of the query's map at a heading.
+            database: of the places.
+            place: which of them.
+        """
         num_cells = self.config.cells
         correlation = self._correlate(
-            self._weigh(query) * database.conjugates[place : place + 1]
+            weighted * database.conjugates[place : place + 1]
         )
         shift = -_signed(int(correlation.argmax()), num_cells)
-        query_bev = query.bev(num_cells)
-        place_bev = database.places[place].bev(num_cells)
+        reference = _spectrum(database.places[place].bev(num_cells))
         # Rows lie 360 / (n - 1) deg apart, but since the last one repeats the
         # first, a shift stands on average for 360 / n. Spectra of opposite
         # rays are equal, which leaves two headings.
         yaw = 2.0 * math.pi * shift / num_cells
         headings = (yaw, yaw - math.pi)
         fits = [
-            _best_offset(_rotate(query_bev, heading), place_bev)
+            _best_offset(turned(heading), reference, num_cells)
             for heading in headings
         ]
         best = 1 if fits[1][0] > fits[0][0] else 0
@@ -336,26 +370,28 @@ def _rotate(image: np.ndarray, angle: float) -> np.ndarray:
     return rotated
 
 
+def _spectrum(image: np.ndarray) -> np.ndarray:
+    """Returns the spectrum of an image (n, n, C), normalised."""
+    normal = (image - image.mean()) / image.std()
+    return scipy.fft.rfft2(normal, axes=(0, 1))
+
+
 def _best_offset(
-    image: np.ndarray, reference: np.ndarray
+    image: np.ndarray, reference: np.ndarray, n: int
 ) -> tuple[float, tuple[int, int]]:
     """Returns how far an image is shifted against a reference.
 
     Args:
-        image: (n, n, C).
+        image: spectrum (n, n // 2 + 1, C).
         reference: likewise.
+        n: length of their sides.
 
     Returns:
         The correlation, summed over the magnitudes of its channels, and the
         shift (rows, columns) at which it is greatest.
     """
-    n = len(image)
-    spectra = [
-        scipy.fft.rfft2((one - one.mean()) / one.std(), axes=(0, 1))
-        for one in (image, reference)
-    ]
     correlation = np.abs(
-        scipy.fft.irfft2(spectra[0] * spectra[1].conj(), s=(n, n), axes=(0, 1))
+        scipy.fft.irfft2(image * reference.conj(), s=(n, n), axes=(0, 1))
     ).sum(axis=2)
     row, column = np.unravel_index(correlation.argmax(), correlation.shape)
     return (

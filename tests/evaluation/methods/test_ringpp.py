@@ -254,6 +254,22 @@ class TestRelativePose:
         assert abs(found[:2, 3] - X_PQ[:2, 3]).max() < 1.5 * CELL
         np.testing.assert_array_equal(found[2], [0.0, 0.0, 1.0, 0.0])
 
+    def test_several_places_at_once(self):
+        method = ring()
+        scenes = [make_scene(seed) for seed in (10, 11)]
+        nothing = np.empty((0, 3))
+        database = method.build_database(
+            [method.describe_place(s) for s in (*scenes, nothing)]
+        )
+        moved = seen_from(pose(3.0, -5.0, 120.0), scenes[0])
+        query = method.describe(moved)
+        found = method.relative_poses(query, database, [1, 2, 0, 0])
+        assert found[1] is None
+        for X_PQ, place in zip(found[::2], (1, 0), strict=True):
+            alone = method.relative_pose(query, database, place)
+            np.testing.assert_array_equal(X_PQ, alone)
+        np.testing.assert_array_equal(found[3], found[2])
+
     def test_whole_cells_are_found_exactly(self):
         method = ring()
         scan = make_scene(11)
