@@ -105,8 +105,13 @@ def import_city(
     options = ImportOptions(
         stages, year_attribute, undated, lod, seed, along, within, drive_on
     )
-    report = import_map.import_city(path, output, options, note)
-    write_table(output, note)
+    report = import_map.import_city(
+        path,
+        output,
+        options,
+        note,
+        finish=lambda folder: write_table(folder, note),
+    )
     print_rows(_rows(report, options.years))
     if not report.drives:
         note(

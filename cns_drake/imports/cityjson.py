@@ -19,14 +19,16 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_regular
 from cns_drake.base.json_text import parse_json
 from cns_drake.imports.import_faults import ImportFaults
+from cns_drake.imports.reference_systems import (
+    ReferenceSystem,
+    reference_system,
+)
 
 # A face: the corners (N, 3) of its outer ring, then those of its holes.
 Face = list[np.ndarray]
 
 # Nothing on Earth lies farther from the origin of a survey grid [m].
 _FARTHEST = 1e8
-# Reference systems in degrees, by EPSG code.
-_IN_DEGREES = {4326, 4979, 4258, 4937, 4269, 4171, 4283, 4167, 4612, 6668}
 _NESTING = {
     "MultiSurface": 0,
     "CompositeSurface": 0,
@@ -79,12 +81,12 @@ class CityFile:
 
     Attributes:
         objects: by id.
-        reference_system: as the file names it; "" if it does not.
+        system: what its coordinates mean.
         faults: what could not be read.
     """
 
     objects: dict[str, CityObject] = field(default_factory=dict)
-    reference_system: str = ""
+    system: ReferenceSystem = field(default_factory=ReferenceSystem)
     faults: ImportFaults = field(default_factory=ImportFaults)
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
@@ -109,7 +111,7 @@ def read_cityjson(path: Path) -> CityFile:
 
     Raises:
         InputError: if it cannot be read, is no CityJSON, or its coordinates
-            are not metres.
+            cannot be brought to metres.
     """
     city = CityFile()
     whole: dict = {}
@@ -123,7 +125,7 @@ def read_cityjson(path: Path) -> CityFile:
                 raise InputError(
                     f"{where}: CityJSON of version {version!r}, not 1.0 to 2.0"
                 )
-            city.reference_system = _reference_system(document, where)
+            city.system = _reference_system(document, where)
         elif kind != "CityJSONFeature" or not whole:
             raise InputError(f"{where}: type {kind!r} is not CityJSON")
         _read_objects(document, whole, where, city)
@@ -162,21 +164,14 @@ def _object(text: bytes, where: str) -> dict:
     return value
 
 
-def _reference_system(document: dict, where: str) -> str:
+def _reference_system(document: dict, where: str) -> ReferenceSystem:
     metadata = document.get("metadata")
     if not isinstance(metadata, dict):
-        return ""
+        return ReferenceSystem()
     found = metadata.get("referenceSystem", metadata.get("crs", ""))
     if isinstance(found, dict):
         found = f"EPSG:{found.get('epsg', '')}"
-    name = str(found)
-    codes = re.findall(r"\d+", name)
-    if codes and int(codes[-1]) in _IN_DEGREES:
-        raise InputError(
-            f"{where}: metadata.referenceSystem: {name} is in degrees; project"
-            " it to metres first (for example with cjio's crs_reproject)"
-        )
-    return name
+    return reference_system(str(found), f"{where}: metadata.referenceSystem")
 
 
 def _check_metres(city: CityFile, path: Path) -> None:
@@ -205,7 +200,10 @@ def _read_objects(
         return
     transform = document.get("transform", whole.get("transform"))
     vertices = _vertices(document, transform, where)
-    templates = _Templates(whole, vertices, where)
+    if not city.objects and len(vertices):
+        _settle_axes(city, vertices)
+    vertices = city.system.to_metres(vertices)
+    templates = _Templates(whole, vertices, city.system, where)
     for name, value in objects.items():
         if not isinstance(value, dict) or not isinstance(
             value.get("type"), str
@@ -233,8 +231,25 @@ def _read_objects(
         )
 
 
+def _settle_axes(city: CityFile, vertices: np.ndarray) -> None:
+    """Settles the order of coordinates, and counts what is assumed."""
+    defined = city.system
+    city.system = defined.as_used(vertices[len(vertices) // 2])
+    if city.system != defined:
+        city.faults.add(
+            "reference system with north first, but coordinates with east"
+            " first, taken so",
+            defined.name,
+        )
+    if defined.heights_assumed and not defined.is_plain:
+        city.faults.add(
+            "reference system without heights, taken in its other unit",
+            defined.name,
+        )
+
+
 def _vertices(document: dict, transform: object, where: str) -> np.ndarray:
-    """Returns the vertices (N, 3) in metres."""
+    """Returns the vertices (N, 3) in coordinates of the file."""
     points = _numbers(document.get("vertices", []), f"{where}: vertices")
     if isinstance(transform, dict):
         scale = _numbers([transform.get("scale")], f"{where}: transform.scale")
@@ -265,7 +280,13 @@ def _numbers(values: Any, where: str) -> np.ndarray:
 class _Templates:
     """Geometries that objects place somewhere."""
 
-    def __init__(self, whole: dict, vertices: np.ndarray, where: str):
+    def __init__(
+        self,
+        whole: dict,
+        vertices: np.ndarray,
+        system: ReferenceSystem,
+        where: str,
+    ):
         told = whole.get("geometry-templates")
         told = told if isinstance(told, dict) else {}
         self.geometries = told.get("templates") or []
@@ -274,6 +295,7 @@ class _Templates:
             f"{where}: geometry-templates.vertices-templates",
         )
         self.vertices = vertices
+        self.system = system
 
     def place(self, instance: dict) -> tuple[object, np.ndarray]:
         """Returns a template and its vertices in the world.
@@ -289,7 +311,8 @@ class _Templates:
             placed = self.points @ X[:3, :3].T + X[:3, 3]
         if reference < 0 or not (np.abs(placed) <= _FARTHEST).all():
             raise ValueError
-        return template, placed + self.vertices[reference]
+        in_metres = self.system.to_metres(placed)
+        return template, in_metres + self.vertices[reference]
 
 
 def _read_geometry(

@@ -1,231 +1,263 @@
-"""Two drives through the free space of a city, which overlap in part."""
+"""Two drives through a city, which overlap in part.
+
+The first is about the longest of the shortest ways. The second shares the
+middle of it, and an arm at either end leads elsewhere. What a way consists of,
+cells between buildings or lanes of streets, is the business of a `WayGraph`.
+"""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from itertools import pairwise, product
+from itertools import islice
 
 import numpy as np
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
-from scipy.spatial import cKDTree
-from shapely.geometry import LineString
 
-from cns_drake.base.errors import InputError
-from cns_drake.imports.free_space import CELL, FreeSpace
-from cns_drake.motion.control_points import POINT_SPACING
-from cns_drake.motion.path_geometry import SmoothPath
-from cns_drake.roads.u_turn import TIGHTEST_RADIUS
-from cns_drake.roads.waypoints import make_waypoint_path
+from cns_drake.imports.waypoint_drives import (
+    LONGEST,
+    SHORTEST,
+    Drive,
+    Obstacle,
+)
 
-# A path keeps away from walls as far as this [m].
-_COMFORT = 6.0
-# How much of the clearance the car that follows a path may lose [m].
-_SLACK = 0.6
-# No drive is longer, and none shorter [m].
-LONGEST = 1500.0
-_SHORTEST = 80.0
-# What the second drive has to itself at either end, at least [m].
-SHORTEST_ARM = 30.0
-# The part of the first drive that the second shares.
-_SHARED = (0.25, 0.75)
-LEAST_SHARED = 0.15
-# The rest of it is left by so much [m].
+# What the second drive has to itself at either end, at least and at most [m].
+_SHORTEST_ARM = 40.0
+_LONGEST_ARM = LONGEST / 3
+# Of the first drive: where the second joins it, from and to, and until where
+# it has left; then the same if no way of that kind is found; and how much
+# they share at least.
+_SHARED = ((0.25, 0.5, 0.75), (0.0, 0.7, 1.0))
+_LEAST_SHARED = 0.15
+# As many places to join and to leave are tried, so far apart at least [m].
+_MOST_PLACES = 12
 _APART = 10.0
-# Between waypoints at most, for the height; and from corners at least [m].
-_WAYPOINT_SPACING = 15.0
-# By how much waypoints may leave the path that was found, as tried [m].
-_SIMPLIFICATIONS = (1.5, 1.0, 0.7, 2.0, 3.0)
-# Of a running mean over so many cells, as tried.
-_STRAIGHTENED = (5, 11, 17)
+# As many ways are tried as first drive and as second drive.
+_MOST_TRIES = 30
+# As many ends of ways are looked at until one meets no place twice.
+_MOST_ENDS = 20
+# From so many pieces ways are looked for, fewer where pieces are many.
+_MOST_STARTS = 200
+_MOST_REACHED = 400_000
 
 
-@dataclass(frozen=True)
-class FreeDrive:
-    """A drive that has room.
+class WayGraph(ABC):
+    """Pieces of way, each with those that it leads into.
 
     Attributes:
-        waypoints: (N, 2) [m].
-        path: (M, 2) that a car follows [m].
+        lengths: (N,) of the pieces [m].
     """
 
-    waypoints: np.ndarray
-    path: np.ndarray
+    def __init__(
+        self,
+        lengths: np.ndarray,
+        before: np.ndarray,
+        after: np.ndarray,
+        costs: np.ndarray | None = None,
+    ):
+        """Makes the graph.
 
-    @property
-    def length(self) -> float:
-        return float(np.linalg.norm(np.diff(self.path, axis=0), axis=1).sum())
+        Args:
+            lengths: (N,) of the pieces [m].
+            before, after: (L,) numbers of pieces, each of which leads into the
+                other.
+            costs: (L,) from middle to middle; the length if None [m].
+        """
+        self.lengths = lengths
+        if costs is None:
+            costs = (lengths[before] + lengths[after]) / 2.0
+        self._links = (before, after, costs)
+        self._is_open = np.ones(len(lengths), dtype=bool)
+
+    @abstractmethod
+    def beside(self, pieces: np.ndarray, joint: int) -> np.ndarray:
+        """Returns (N,) bool: what an arm must not use.
+
+        Args:
+            pieces: that drives use already.
+            joint: the one of them where the arm begins.
+        """
+
+    @abstractmethod
+    def is_simple(self, way: Sequence[int]) -> bool:
+        """Returns whether a way comes to no place twice."""
+
+    @abstractmethod
+    def drive(self, way: Sequence[int]) -> Drive | Obstacle:
+        """Returns a drive along a way, or what is in its way."""
+
+    @abstractmethod
+    def blocked(self, way: Sequence[int], place: np.ndarray) -> np.ndarray:
+        """Returns the pieces of a way that an obstacle at (2,) blocks."""
+
+    def along(self, way: Sequence[int]) -> np.ndarray:
+        """Returns (N,) how far the end of each piece lies on a way [m]."""
+        return np.cumsum(self.lengths[list(way)])
+
+    def length(self, way: Sequence[int]) -> float:
+        """Returns the length of a way [m]."""
+        return float(self.along(way)[-1]) if len(way) else 0.0
+
+    def cut(self, way: list[int], longest: float) -> list[int]:
+        """Returns as much of a way as is no longer than that [m]."""
+        kept = int(np.searchsorted(self.along(way), longest, "right"))
+        return way[: max(1, kept)]
+
+    def links(self, closed: np.ndarray | None = None) -> csr_array:
+        """Returns costs from piece to piece, without those closed (N,)."""
+        is_open = self._is_open if closed is None else self._is_open & ~closed
+        before, after, costs = self._links
+        kept = is_open[before] & is_open[after]
+        size = (len(self.lengths), len(self.lengths))
+        pairs = (before[kept], after[kept])
+        return coo_array((costs[kept], pairs), size).tocsr()
+
+    def close(self, pieces: np.ndarray) -> None:
+        """Takes pieces out that no car can drive along."""
+        self._is_open[pieces] = False
+
+    def open_pieces(self) -> np.ndarray:
+        """Returns the numbers of the pieces that are not closed."""
+        return np.flatnonzero(self._is_open)
 
 
-class _Graph:
-    """Cells with room, each linked to the eight beside it."""
-
-    def __init__(self, space: FreeSpace):
-        wide = space.clearance >= space.least
-        self.row, self.column = np.nonzero(wide)
-        self.xy = space.middle(self.row, self.column)
-        number = np.full(wide.shape, -1)
-        number[wide] = np.arange(len(self.row))
-        clearance = space.clearance[wide]
-        # The nearer a wall, the dearer, up to four times.
-        price = 1.0 + (1.0 - np.minimum(clearance / _COMFORT, 1.0)) * 3.0
-        starts, ends = [], []
-        for down, right in ((0, 1), (1, 0), (1, 1), (1, -1)):
-            a = number[: wide.shape[0] - down]
-            b = number[down:]
-            if right > 0:
-                a, b = a[:, :-1], b[:, 1:]
-            elif right < 0:
-                a, b = a[:, 1:], b[:, :-1]
-            linked = (a >= 0) & (b >= 0)
-            starts.append(a[linked])
-            ends.append(b[linked])
-        start, end = np.concatenate(starts), np.concatenate(ends)
-        length = np.linalg.norm(self.xy[start] - self.xy[end], axis=1)
-        cost = length * (price[start] + price[end]) / 2.0
-        size = len(self.row)
-        self.links = coo_array((cost, (start, end)), (size, size)).tocsr()
-
-    def without(self, closed: np.ndarray) -> coo_array:
-        """Returns the links between cells that are not closed (N,) bool."""
-        links = self.links.tocoo()
-        open_ = ~closed[links.row] & ~closed[links.col]
-        return coo_array(
-            (links.data[open_], (links.row[open_], links.col[open_])),
-            links.shape,
-        ).tocsr()
-
-    def farthest(self, links: coo_array, start: int) -> np.ndarray:
-        """Returns the cells from a start to the farthest that it reaches."""
-        cost, before = dijkstra(
-            links, directed=False, indices=start, return_predecessors=True
-        )
-        at = int(np.where(np.isfinite(cost), cost, -1.0).argmax())
-        cells = [at]
-        while at != start:
-            at = int(before[at])
-            cells.append(at)
-        return np.array(cells[::-1])
-
-
-def find_drives(space: FreeSpace) -> list[FreeDrive]:
-    """Returns two drives, or one, or none, as there is room.
-
-    The first is about the longest of the shortest paths: it meets no place
-    twice. The second shares its middle, and begins and ends elsewhere.
-    """
-    graph = _Graph(space)
-    if len(graph.row) == 0:
+def find_drives(graph: WayGraph) -> list[Drive]:
+    """Returns two drives that share a part, or one, or none."""
+    for _ in range(_MOST_TRIES):
+        way = _longest(graph)
+        if graph.length(way) < SHORTEST:
+            return []
+        first = graph.drive(way)
+        if isinstance(first, Drive):
+            break
+        graph.close(graph.blocked(way, first.place))
+    else:
         return []
-    _, part = connected_components(graph.links, directed=False)
-    start = int((part == np.bincount(part).argmax()).argmax())
-    end = int(graph.farthest(graph.links, start)[-1])
-    cells = _shortened(graph, graph.farthest(graph.links, end))
-    first = make_drive(graph.xy[cells], space)
-    if first is None:
-        return []
-    for candidate in _seconds(graph, cells):
-        second = make_drive(graph.xy[candidate], space)
-        if second is not None:
+    for candidate in islice(_seconds(graph, way), _MOST_TRIES):
+        second = graph.drive(candidate)
+        if isinstance(second, Drive):
             return [first, second]
     return [first]
 
 
-def _travelled(xy: np.ndarray) -> np.ndarray:
-    steps = np.linalg.norm(np.diff(xy, axis=0), axis=1)
-    return np.concatenate([[0.0], np.cumsum(steps)])
+def _longest(graph: WayGraph) -> list[int]:
+    """Returns about the longest of the shortest ways, [] if there is none."""
+    pieces = graph.open_pieces()
+    if len(pieces) == 0:
+        return []
+    links = graph.links()
+    _, part = connected_components(links, directed=False)
+    largest = np.bincount(part[pieces], graph.lengths[pieces]).argmax()
+    number = int(np.clip(_MOST_REACHED // len(pieces), 1, _MOST_STARTS))
+    starts = [
+        int((part[pieces] == largest).argmax()),
+        *range(0, len(pieces), -(-len(pieces) // number))[1:],
+    ]
+    into = links.T.tocsr()
+    best: list[int] = []
+    begins: dict[int, None] = {}
+    for start in (int(pieces[k]) for k in starts):
+        begins[start] = None
+        begins[_farthest(graph, into, start)[-1]] = None
+    for begin in begins:
+        way = _farthest(graph, links, begin)
+        if graph.length(way) > graph.length(best) + 1e-6:
+            best = way
+    return best
 
 
-def _shortened(graph: _Graph, cells: np.ndarray) -> np.ndarray:
-    return cells[_travelled(graph.xy[cells]) <= LONGEST]
-
-
-def _seconds(graph: _Graph, cells: np.ndarray) -> Iterator[np.ndarray]:
-    """Yields paths that share a part of a drive, best first."""
-    along = _travelled(graph.xy[cells])
-    first, last = np.searchsorted(along, np.array(_SHARED) * along[-1])
-    shared = np.arange(first, last + 1)
-    half, step = len(shared) // 2, max(1, int(_APART / CELL))
-    # Where it leaves the first drive, a street must lead away.
-    nothing = np.zeros(0, dtype=int)
-    for k in (*shared[:half:step], None):
-        head = nothing if k is None else _away(graph, cells, k, nothing)
-        if head is None:
-            continue
-        for m in (*shared[: half - 1 : -step], None):
-            tail = nothing if m is None else _away(graph, cells, m, head)
-            if tail is None or (k is None and m is None):
-                continue
-            begin = first if k is None else k
-            end = last if m is None else m
-            if along[end] - along[begin] < LEAST_SHARED * along[-1]:
-                continue
-            parts = [head[:0:-1], cells[begin : end + 1], tail[1:]]
-            yield _shortened(graph, np.concatenate(parts))
-
-
-def _away(
-    graph: _Graph, cells: np.ndarray, k: int, taken: np.ndarray
-) -> np.ndarray | None:
-    """Returns a path that leaves a drive at one of its cells, or None."""
-    driven = graph.xy[np.concatenate([cells, taken])]
-    from_drive, _ = cKDTree(driven).query(graph.xy, distance_upper_bound=_APART)
-    here = np.linalg.norm(graph.xy - graph.xy[cells[k]], axis=1)
-    closed = np.isfinite(from_drive) & (here > 1.5 * _APART)
-    path = graph.farthest(graph.without(closed), int(cells[k]))
-    length = _travelled(graph.xy[path])[-1]
-    if length < SHORTEST_ARM:
-        return None
-    return path[_travelled(graph.xy[path]) <= LONGEST / 3]
-
-
-def make_drive(
-    xy: np.ndarray,
-    space: FreeSpace,
-    tolerances: Sequence[float] = _SIMPLIFICATIONS,
-) -> FreeDrive | None:
-    """Returns a drive with as few waypoints as there is room, or None.
+def _farthest(
+    graph: WayGraph, links: csr_array, start: int, longest: float = LONGEST
+) -> list[int]:
+    """Returns the longest way from a piece that meets no place twice.
 
     Args:
-        xy: (N, 2) places that it is to pass, about 1 m apart [m].
-        space: where a car has room.
-        tolerances: by how much its waypoints may leave them, as tried [m].
+        graph: of all pieces.
+        links: of those that may be used; transposed, the way is one that
+            leads to the piece, told backwards.
+        start: the piece.
+        longest: as much of the way is returned [m].
     """
-    for straightened, tolerance in product(_STRAIGHTENED, tolerances):
-        if len(xy) < 4 * straightened:
-            return None
-        kernel = np.ones(straightened) / straightened
-        smooth = np.column_stack(
-            [np.convolve(column, kernel, mode="valid") for column in xy.T]
-        )
-        line = LineString(smooth).simplify(tolerance)
-        waypoints = _densified(np.array(line.coords))
-        xyz = np.column_stack([waypoints, np.zeros(len(waypoints))])
-        try:
-            path = make_waypoint_path(xyz, POINT_SPACING)
-        except InputError:
-            continue
-        bend, _ = SmoothPath(path.points, path.spacing).tightest_bend()
-        points = path.points[:, :2]
-        if (
-            bend >= TIGHTEST_RADIUS
-            and (space.clearance_at(points) >= space.least - _SLACK).all()
-        ):
-            drive = FreeDrive(waypoints, points)
-            return drive if drive.length >= _SHORTEST else None
-    return None
+    cost, before = dijkstra(links, indices=start, return_predecessors=True)
+    cost = np.where(np.isfinite(cost), cost + graph.lengths / 2.0, -1.0)
+    most = min(_MOST_ENDS, len(cost))
+    ends = np.argpartition(-cost, most - 1)[:most]
+    for end in ends[np.argsort(-cost[ends], kind="stable")].tolist():
+        if cost[end] < 0.0:
+            break
+        way = [end]
+        while way[-1] != start:
+            way.append(int(before[way[-1]]))
+        way.reverse()
+        way = graph.cut(way, longest)
+        if graph.is_simple(way):
+            return way
+    return [start]
 
 
-def _densified(corners: np.ndarray) -> np.ndarray:
-    """Returns waypoints with others between those that lie far apart."""
-    points = [corners[:1]]
-    for a, b in pairwise(corners):
-        length = float(np.linalg.norm(b - a))
-        number = int((length - _WAYPOINT_SPACING) // _WAYPOINT_SPACING)
-        if number > 0:
-            # None near the corners, whose arcs need room.
-            parts = np.linspace(0.0, 1.0, number + 2)[1:-1]
-            points.append(a + parts[:, None] * (b - a))
-        points.append(b[None])
-    return np.concatenate(points)
+def _seconds(graph: WayGraph, first: list[int]) -> Iterator[list[int]]:
+    """Yields ways that share the middle of another, best first."""
+    along = np.concatenate([[0.0], graph.along(first)])
+    part = along / along[-1]
+    every = np.arange(len(first))
+    for low, middle, high in _SHARED:
+        begins = every[(part[:-1] >= low) & (part[:-1] <= middle)]
+        ends = every[(part[1:] >= 1.0 - middle) & (part[1:] <= high)][::-1]
+        for begin in (*_some(begins, along), None):
+            start = begin if begin is not None else _nearest(part[:-1], low)
+            head: list[int] = []
+            if begin is not None:
+                head = _arm(graph, first, first[begin], backwards=True)
+                if not head:
+                    continue
+            for end in (*_some(ends, along), None):
+                stop = end if end is not None else _nearest(part[1:], high)
+                if begin is None and end is None:
+                    continue
+                if part[stop + 1] - part[start] < _LEAST_SHARED:
+                    continue
+                tail: list[int] = []
+                if end is not None:
+                    tail = _arm(graph, [*first, *head], first[end])
+                    if not tail:
+                        continue
+                way = [*head[:0:-1], *first[start : stop + 1], *tail[1:]]
+                way = graph.cut(way, LONGEST)
+                if graph.is_simple(way):
+                    yield way
+
+
+def _nearest(values: np.ndarray, wanted: float) -> int:
+    return int(np.abs(values - wanted).argmin())
+
+
+def _some(places: np.ndarray, along: np.ndarray) -> list[int]:
+    """Returns no more places than are tried, apart from each other."""
+    kept: list[int] = []
+    for place in places.tolist():
+        if not kept or abs(along[place] - along[kept[-1]]) >= _APART:
+            kept.append(place)
+    return kept[:: -(-len(kept) // _MOST_PLACES) or 1]
+
+
+def _arm(
+    graph: WayGraph, used: Sequence[int], joint: int, backwards: bool = False
+) -> list[int]:
+    """Returns the longest way from a piece, or to it.
+
+    Args:
+        graph: of all pieces.
+        used: pieces of the drives.
+        joint: the piece of them where the way begins.
+        backwards: whether it ends there instead.
+
+    Returns:
+        The way from the joint on, backwards if it ends there; empty if it is
+        too short.
+    """
+    links = graph.links(graph.beside(np.array(used), joint))
+    if backwards:
+        links = links.T.tocsr()
+    way = _farthest(graph, links, joint, _LONGEST_ARM)
+    return way if graph.length(way[1:]) >= _SHORTEST_ARM else []

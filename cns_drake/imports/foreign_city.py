@@ -60,12 +60,14 @@ class ForeignCity:
 
     Attributes:
         structures: in the world of the map.
-        origin: where that lies in the file's coordinates, x, y, z [m], or
-            latitude and longitude [deg].
+        origin: where that lies in the file's coordinates, as metres east,
+            north and up, or latitude and longitude [deg].
         reference_system: of the origin, as the file names it.
         faults: what was repaired or left out.
         streets: whose lanes are known; drives are looked for in them.
         keeps_left: whether the file says that traffic does.
+        axes: what the file's coordinates are, unless they are metres, east,
+            north and up.
     """
 
     structures: list[Imported]
@@ -74,6 +76,7 @@ class ForeignCity:
     faults: ImportFaults
     streets: Sequence[Street] = ()
     keeps_left: bool = False
+    axes: tuple[str, ...] = ()
 
 
 def make_imported(

@@ -2,34 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import (
     binary_closing,
+    binary_fill_holes,
     distance_transform_edt,
     label,
 )
+import shapely
+from shapely import STRtree
 
 from cns_drake.imports.foreign_city import Imported
 from cns_drake.imports.import_ground import Ground
+from cns_drake.imports.surface_sampling import surface_samples
 
 CELL = 1.0  # [m]
-# A car passes below what hangs higher than this above the ground [m].
+# A car passes below what hangs higher than this above the ground, and over
+# what is no higher than a kerb [m].
 _HEADROOM = 3.5
+_KERB = 0.3
 # From the middle of a path to a wall, and to the edge of a road, at least [m].
 _FROM_WALL = 2.5
 _FROM_EDGE = 1.6
+# How much of that the car that follows a path may lose [m].
+_SLACK = 0.6
+# From the middle of the car to what it would hit, at least [m].
+_HALF_CAR = 1.1
 # Half of the widest street; what is wider open is outside the city [m].
 _HALF_STREET = 20.0
 _SAMPLE_SPACING = 0.5
 # From the middle of a city room is looked for at most so far: no drive is
 # longer [m].
 _FARTHEST = 1500.0
-# Of an edge that is not parted before, and points at once.
-_MOST_STEPS = 256
-_AT_ONCE = 1_000_000
 # Roads are used where they hold at least so much connected room [m^2].
 _LEAST_ROAD = 800.0
 
@@ -44,12 +51,14 @@ class FreeSpace:
             cell to what stands nearest [m]; 0 where no car may be.
         on_roads: whether only roads of the file count.
         least: the clearance that a path needs [m].
+        walls: what a car could hit, seen from above.
     """
 
     low: np.ndarray
     clearance: np.ndarray
     on_roads: bool
     least: float
+    walls: STRtree
 
     def cells(self, xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Returns row and column of places (N, 2), clipped to the grid."""
@@ -63,6 +72,17 @@ class FreeSpace:
     def clearance_at(self, xy: np.ndarray) -> np.ndarray:
         """Returns the clearance at places (N, 2) [m]."""
         return self.clearance[self.cells(xy)]
+
+    def obstacle(self, path: np.ndarray) -> np.ndarray | None:
+        """Returns the first (2,) place of a path where a car has no room.
+
+        Args:
+            path: (N, 2) places, close together [m].
+        """
+        narrow = self.clearance_at(path) < self.least - _SLACK
+        hit = self.walls.query(shapely.points(path), "dwithin", _HALF_CAR)[0]
+        narrow[hit] = True
+        return path[narrow.argmax()] if narrow.any() else None
 
     def middle(self, row: np.ndarray, column: np.ndarray) -> np.ndarray:
         """Returns the middles (N, 2) of cells [m]."""
@@ -84,6 +104,7 @@ def find_free_space(
     blocked = np.zeros(shape, dtype=bool)
     roads = np.zeros(shape, dtype=bool)
     water = np.zeros(shape, dtype=bool)
+    walls = [np.zeros((0, 3, 3))]
     for one in structures:
         if one.structure.semantic_class == "road":
             grid = roads
@@ -93,21 +114,29 @@ def find_free_space(
             continue
         else:
             grid = blocked
-        highest, low_down = -np.inf, []
-        for points in surface_samples(
-            one.triangles, _SAMPLE_SPACING, (low, high)
-        ):
+        triangles = one.triangles
+        if grid is blocked:
+            corners = triangles.reshape(-1, 3)
+            above = corners[:, 2] - ground.height(corners[:, :2])
+            if above.max() < _KERB:
+                continue
+            lowest = above.reshape(-1, 3).min(axis=1)
+            highest = above.reshape(-1, 3).max(axis=1)
+            triangles = triangles[lowest < _HEADROOM]
+            walls.append(
+                one.triangles[(lowest < _HEADROOM) & (highest > _KERB)]
+            )
+        cells = [np.zeros(0, dtype=int)]
+        for points in surface_samples(triangles, _SAMPLE_SPACING, (low, high)):
             if grid is blocked:
                 above = points[:, 2] - ground.height(points[:, :2])
-                highest = max(highest, above.max())
                 points = points[above < _HEADROOM]
             column, row = np.floor((points[:, :2] - low) / CELL).astype(int).T
-            low_down.append(np.unique(row * shape[1] + column))
-        # What is no higher than a kerb is driven over.
-        if grid is blocked and highest < 0.3:
-            continue
-        for cells in low_down:
-            grid.ravel()[cells] = True
+            cells.append(np.unique(row * shape[1] + column))
+        covered = np.concatenate(cells)
+        if one.structure.semantic_class == "building":
+            covered = _filled(covered, shape[1])
+        grid.ravel()[covered] = True
     free = ~(blocked | (water & ~roads))
     on_roads = False
     paved = binary_closing(roads, iterations=1) & ~blocked
@@ -116,7 +145,32 @@ def find_free_space(
     elif blocked.any():
         free &= _between(blocked)
     least = _FROM_EDGE if on_roads else _FROM_WALL
-    return FreeSpace(low, _clearance(free), on_roads, least)
+    outlines = np.concatenate(walls)[:, [0, 1, 2, 0], :2]
+    return FreeSpace(
+        low,
+        _clearance(free),
+        on_roads,
+        least,
+        STRtree(np.asarray(shapely.linearrings(outlines))),
+    )
+
+
+def _filled(cells: np.ndarray, columns: int) -> np.ndarray:
+    """Returns cells (N,) of a grid, and those that they enclose.
+
+    Args:
+        cells: row times `columns`, plus column.
+        columns: of the grid.
+    """
+    if len(cells) == 0:
+        return cells
+    row, column = np.divmod(cells, columns)
+    first = np.array([row.min(), column.min()])
+    shape = np.array([row.max(), column.max()]) - first + 1
+    walls = np.zeros(shape, dtype=bool)
+    walls[row - first[0], column - first[1]] = True
+    row, column = np.nonzero(binary_fill_holes(walls))
+    return (row + first[0]) * columns + column + first[1]
 
 
 def _clearance(free: np.ndarray) -> np.ndarray:
@@ -152,59 +206,3 @@ def _window(structures: Sequence[Imported]) -> tuple[np.ndarray, np.ndarray]:
     low = np.maximum(boxes[:, 0].min(axis=0), middle - _FARTHEST)
     high = np.minimum(boxes[:, 1].max(axis=0), middle + _FARTHEST)
     return np.floor(low), np.maximum(high, np.floor(low))
-
-
-def surface_samples(
-    triangles: np.ndarray,
-    spacing: float,
-    window: tuple[np.ndarray, np.ndarray] | None = None,
-) -> Iterator[np.ndarray]:
-    """Yields points (N, 3) on triangles (M, 3, 3), edges included [m].
-
-    No place on a triangle is farther from all of them than the spacing. There
-    are not more than about a million at once.
-
-    Args:
-        triangles: to sample.
-        spacing: of the points [m].
-        window: (2,) least and greatest x and y; what is outside is left out.
-    """
-    for part, number in _in_pieces(triangles, spacing, window):
-        i, j = np.meshgrid(np.arange(number + 1), np.arange(number + 1))
-        inside = i + j <= number
-        u, v = i[inside] / number, j[inside] / number
-        weights = np.stack([1.0 - u - v, u, v], axis=1)
-        most = max(1, _AT_ONCE // len(weights))
-        for first in range(0, len(part), most):
-            some = part[first : first + most]
-            points = np.einsum("kc,mcx->mkx", weights, some).reshape(-1, 3)
-            if window is not None:
-                low, high = window
-                xy = points[:, :2]
-                points = points[((xy >= low) & (xy <= high)).all(axis=1)]
-            if len(points):
-                yield points
-
-
-def _in_pieces(
-    triangles: np.ndarray,
-    spacing: float,
-    window: tuple[np.ndarray, np.ndarray] | None,
-) -> Iterator[tuple[np.ndarray, int]]:
-    """Yields triangles of a size, and into how many steps to part an edge."""
-    while len(triangles):
-        if window is not None:
-            low, high = window
-            xy = triangles[:, :, :2]
-            is_near = (xy.max(axis=1) >= low) & (xy.min(axis=1) <= high)
-            triangles = triangles[is_near.all(axis=1)]
-        edges = triangles - np.roll(triangles, 1, axis=1)
-        longest = np.linalg.norm(edges, axis=2).max(axis=1)
-        steps = np.maximum(1, np.ceil(longest / spacing)).astype(int)
-        for number in np.unique(steps[steps <= _MOST_STEPS]):
-            yield triangles[steps == number], int(number)
-        # Large ones in four, so that what is far of them is left out.
-        a, b, c = np.moveaxis(triangles[steps > _MOST_STEPS], 1, 0)
-        ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
-        quarters = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
-        triangles = np.concatenate([np.stack(q, axis=1) for q in quarters])

@@ -7,8 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 from scipy.ndimage import gaussian_filter
+from shapely.geometry import Point
 
 from cns_drake.city.geometry.mesh import Mesh
+from cns_drake.city.geometry.structures import (
+    MeshShape,
+    Model,
+    Part,
+    Structure,
+)
+from cns_drake.imports.foreign_city import Imported
+from cns_drake.imports.surface_sampling import surface_samples
 
 # Of the grid of a guessed ground, and how far it reaches beyond the city [m].
 CELL = 4.0
@@ -19,6 +28,8 @@ _MOST_CELLS = 500
 # so that pavements are seen and not it [m].
 _SMOOTHING = 1.5
 _DEPTH = 0.1
+# Of flat things on the ground every such corner helps to find its height.
+_EVERY_CORNER = 7
 
 
 class Ground:
@@ -105,3 +116,46 @@ def feet_of(solids: Sequence[np.ndarray]) -> np.ndarray:
         corners = triangles.reshape(-1, 3)
         found.append(corners[corners[:, 2].argmin()])
     return np.array(found).reshape(-1, 3)
+
+
+def ground_of(structures: Sequence[Imported]) -> Ground:
+    """Returns the ground of a city: its terrain, or one below its feet."""
+    corners = np.concatenate(
+        [one.triangles.reshape(-1, 3) for one in structures]
+    )
+    terrain = [one for one in structures if one.kind == "TINRelief"]
+    if terrain:
+        feet = [one.triangles.reshape(-1, 3) for one in terrain]
+    else:
+        feet = [feet_of([o.triangles for o in structures if not o.is_ground])]
+        feet += [
+            one.triangles.reshape(-1, 3)[::_EVERY_CORNER]
+            for one in structures
+            if one.is_ground
+        ]
+    return guess_ground(np.concatenate(feet), corners)
+
+
+def bottom_of(
+    structures: Sequence[Imported], ground: Ground
+) -> list[Structure]:
+    """Returns the guessed ground, where the file has no terrain."""
+    if any(one.kind == "TINRelief" for one in structures):
+        return []
+    taken = {one.structure.name for one in structures}
+    name = "ground"
+    while name in taken:
+        name += "_"
+    # Streets and water are to be seen, and not the guess above them.
+    lowered = ground
+    spacing = ground.cell / 2.0
+    for one in structures:
+        if one.is_ground:
+            for points in surface_samples(one.triangles, spacing):
+                lowered = lowered.below(points)
+    model = Model(
+        (Part("surface", MeshShape(name)),),
+        {name: lowered.to_mesh()},
+        Point(0.0, 0.0).buffer(1.0),
+    )
+    return [Structure(name, "terrain", model, (0.0, 0.0, 0.0))]

@@ -64,8 +64,9 @@ def import_cityjson(
     return ForeignCity(
         import_structures(city, origin, lod, year_attribute),
         tuple(float(value) for value in origin),
-        city.reference_system,
+        city.system.name,
         city.faults,
+        axes=() if city.system.is_plain else city.system.axes,
     )
 
 

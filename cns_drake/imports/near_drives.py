@@ -14,40 +14,41 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.base.errors import InputError
 from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.structures import MeshShape
-from cns_drake.imports.drive_search import FreeDrive
 from cns_drake.imports.foreign_city import Imported
 from cns_drake.imports.import_faults import ImportFaults
+from cns_drake.imports.waypoint_drives import Drive, driven_path
 from cns_drake.motion.control_points import POINT_SPACING
-from cns_drake.motion.path_geometry import SmoothPath
 from cns_drake.roads.u_turn import TIGHTEST_RADIUS
 from cns_drake.roads.waypoints import load_waypoint_path, read_waypoints
 
 
-def drive_along(path: Path) -> FreeDrive:
+def drive_along(path: Path) -> Drive:
     """Returns a drive along waypoints of a file; heights are left aside.
 
     Raises:
         InputError: if the file cannot be used, or a bend is too tight.
     """
     points, _ = read_waypoints(path)
-    driven = load_waypoint_path(path, POINT_SPACING)
-    smooth = SmoothPath(driven.points, driven.spacing)
-    radius, (x, y, _) = smooth.tightest_bend()
+    control = load_waypoint_path(path, POINT_SPACING).points[:, :2]
+    driven, radii = driven_path(control)
+    radius, (x, y) = radii.min(), driven[radii.argmin()]
     if radius < TIGHTEST_RADIUS:
         raise InputError(
             f"{path}: a bend of {radius:.2f} m radius at {x:.1f}, {y:.1f}, "
             f"the car turns within {TIGHTEST_RADIUS:.2f} m at the tightest"
         )
-    return FreeDrive(points[:, :2], driven.points[:, :2])
+    return Drive(points[:, :2], control)
 
 
 def keep_near(
     structures: Sequence[Imported],
-    drives: Sequence[FreeDrive],
+    drives: Sequence[Drive],
     distance: float,
     faults: ImportFaults,
-) -> list[Imported]:
+) -> list[Imported | None]:
     """Returns the structures, and of terrain the part, near drives.
+
+    What is not near is None.
 
     Args:
         structures: of the city.
@@ -58,12 +59,13 @@ def keep_near(
     """
     ways = MultiLineString([drive.path for drive in drives])
     shapely.prepare(ways)
-    kept = []
+    kept: list[Imported | None] = []
     for one in structures:
         corners = one.triangles.reshape(-1, 3)
         if not _near(corners[None], ways, distance)[0]:
             name = one.structure.name
             faults.add("structure far from the drives, left out", name)
+            kept.append(None)
         elif one.kind == "TINRelief":
             kept.append(_cropped(one, ways, distance))
         else:

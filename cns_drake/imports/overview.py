@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Protocol
 
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
@@ -12,6 +11,7 @@ import numpy as np
 
 from cns_drake.imports.foreign_city import Imported
 from cns_drake.imports.free_space import CELL, FreeSpace
+from cns_drake.imports.waypoint_drives import Drive
 from cns_drake.scene.semantics import CLASS_RGB
 
 _DPI = 130
@@ -19,20 +19,11 @@ _INCHES = 9.0
 _ROUTE_COLOURS = ("#d7191c", "#2c7bb6")
 
 
-class _Drive(Protocol):
-    """What is driven."""
-
-    @property
-    def path(self) -> np.ndarray:
-        """Its places from above (N, 2) [m]."""
-        ...
-
-
 def draw_overview(
     path: Path,
     structures: Sequence[Imported],
     space: FreeSpace | None,
-    drives: Sequence[_Drive],
+    drives: Sequence[Drive],
 ) -> None:
     """Draws what stands, where a car has room, and the drives [m].
 

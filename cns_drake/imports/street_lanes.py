@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array
 
 # Nobody turns more sharply from one street into another.
 _SHARPEST_TURN_DEG = 125.0
@@ -81,33 +80,19 @@ def make_lanes(streets: Sequence[Street]) -> list[Lane]:
     return [lane for lane in lanes if lane.length > 0.0]
 
 
-class LaneGraph:
-    """Lanes, and which of them lead into which."""
-
-    def __init__(self, lanes: Sequence[Lane]):
-        self.lanes = lanes
-        self.length = np.array([lane.length for lane in lanes])
-        starts: defaultdict[int, list[int]] = defaultdict(list)
-        for number, lane in enumerate(lanes):
-            starts[lane.begin].append(number)
-        pairs = [
-            (number, after)
-            for number, lane in enumerate(lanes)
-            for after in starts[lane.end]
-            if _leads_on(lane, lanes[after])
-        ]
-        rows, columns = np.array(pairs, dtype=int).reshape(-1, 2).T
-        self.rows, self.columns = rows, columns
-
-    def links(self, closed: Sequence[int] = ()) -> csr_array:
-        """Returns costs from lane to lane, without those that are closed."""
-        open_ = np.ones(len(self.lanes), dtype=bool)
-        open_[list(closed)] = False
-        kept = open_[self.rows] & open_[self.columns]
-        rows, columns = self.rows[kept], self.columns[kept]
-        cost = (self.length[rows] + self.length[columns]) / 2.0
-        shape = (len(self.lanes), len(self.lanes))
-        return coo_array((cost, (rows, columns)), shape).tocsr()
+def lane_links(lanes: Sequence[Lane]) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the numbers of lanes, and of those that they lead into."""
+    starts: defaultdict[int, list[int]] = defaultdict(list)
+    for number, lane in enumerate(lanes):
+        starts[lane.begin].append(number)
+    pairs = [
+        (number, after)
+        for number, lane in enumerate(lanes)
+        for after in starts[lane.end]
+        if _leads_on(lane, lanes[after])
+    ]
+    before, after = np.array(pairs, dtype=int).reshape(-1, 2).T
+    return before, after
 
 
 def _leads_on(lane: Lane, after: Lane) -> bool:

@@ -30,15 +30,13 @@ from cns_drake.imports.opendrive.imported_streets import (
     lane_polygon,
 )
 from cns_drake.imports.opendrive.lane_bands import LaneBand, lane_bands
-from cns_drake.imports.opendrive.lane_drives import (
-    LaneDrive,
-    find_lane_drives,
-)
+from cns_drake.imports.opendrive.lane_drives import find_lane_drives
 from cns_drake.imports.opendrive.road_heights import RoadHeights
 from cns_drake.imports.opendrive.road_levels import split_levels
 from cns_drake.imports.opendrive.road_model import RoadMap
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.thing_structures import thing_structures
+from cns_drake.imports.waypoint_drives import Drive
 
 # Of sidewalks, where the file does not tell [m].
 _KERB = 0.1
@@ -73,7 +71,7 @@ class Town:
     city: City
     stages: Stages
     streets: ImportedStreets
-    drives: list[LaneDrive]
+    drives: list[Drive]
     kinds: dict[str, int]
     faults: ImportFaults
 

@@ -221,6 +221,14 @@ def set_in(*keys):
             ),
             "is in degrees; project it",
         ),
+        (
+            broken(set_in("metadata", "referenceSystem", "EPSG:3031")),
+            "EPSG:3031 (WGS 84 / Antarctic Polar Stereographic) has the axes",
+        ),
+        (
+            broken(set_in("metadata", "referenceSystem", "the moon's")),
+            "referenceSystem: the moon's is no reference system that is known",
+        ),
         (broken(set_in("CityObjects", "a", "geometry", [])), "no object has a"),
     ],
 )
@@ -232,6 +240,79 @@ def test_files_that_are_none(tmp_path, text, fault):
     assert str(info.value).startswith(str(path))
     assert fault in str(info.value)
     assert "\n" not in str(info.value)
+
+
+FOOT = 1200 / 3937  # The survey foot of the United States.
+NORTH_FIRST = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+
+
+@pytest.mark.parametrize(
+    ("system", "place", "matrix"),
+    [
+        # The city of New York, heights too in feet.
+        ("EPSG:2263", (980000, 190000, 40), FOOT * np.eye(3)),
+        ("EPSG:2263+5703", (980000, 190000, 40), np.diag([FOOT, FOOT, 1.0])),
+        ("EPSG:2263+6360", (980000, 190000, 40), FOOT * np.eye(3)),
+        # Wellington: northing, easting; and as most programs write it.
+        ("EPSG:2193", (5427000, 1749000, 10), NORTH_FIRST),
+        ("EPSG:2193", (1749000, 5427000, 10), np.eye(3)),
+        # Prague: southing, westing.
+        (
+            "urn:ogc:def:crs:EPSG::5513",
+            (1043000, 743000, 10),
+            np.array([[0, -1, 0], [-1, 0, 0], [0, 0, 1]]),
+        ),
+        (
+            "https://www.opengis.net/def/crs/EPSG/0/7415",
+            (85e3, 446e3, 3),
+            np.eye(3),
+        ),
+        # A depth below the sea of the Netherlands.
+        ("EPSG:28992+5706", (85e3, 446e3, 3), np.diag([1.0, 1.0, -1.0])),
+    ],
+)
+def test_coordinates_are_metres_east_north_up(tmp_path, system, place, matrix):
+    city = CityWriter(origin=place)
+    city.metadata = {"referenceSystem": system}
+    city.box("a", 10.0, -5.0, (4.0, 3.0, 2.0), z=0.5)
+    read = read_cityjson(city.write(tmp_path / "city.json"))
+    (geometry,) = read.objects["a"].geometries
+    corners = np.concatenate([face[0] for face in geometry.faces])
+    expected = np.array(
+        [
+            np.add(place, (10 + i, -5 + j, 0.5 + k))
+            for i in (0, 4) for j in (0, 3) for k in (0, 2)
+        ]
+    ) @ np.array(matrix).T  # fmt: skip
+    np.testing.assert_allclose(
+        np.unique(np.round(corners, 6), axis=0),
+        np.unique(np.round(expected, 6), axis=0),
+        atol=2e-6,
+    )
+    as_used = "coordinates with east first" in str(read.faults.rows())
+    assert as_used == (place == (1749000, 5427000, 10))
+
+
+def test_templates_have_the_unit_of_the_system(tmp_path):
+    city = CityWriter(origin=(980000, 190000, 40))
+    city.metadata = {"referenceSystem": "EPSG:2263"}
+    shape = CityWriter()
+    faces = shape.box_faces(0, 0, 0, (1, 1, 1))
+    city.templates = {
+        "templates": [{"type": "MultiSurface", "lod": 2, "boundaries": faces}],
+        "vertices-templates": [[v / 1000 for v in p] for p in shape.vertices],
+    }
+    instance = {
+        "type": "GeometryInstance",
+        "template": 0,
+        "boundaries": [city.vertex(100, 0, 0)],
+        "transformationMatrix": np.diag([2.0, 2.0, 2.0, 1.0]).ravel().tolist(),
+    }
+    city.add("tree", "SolitaryVegetationObject", instance)
+    read = read_cityjson(city.write(tmp_path / "city.json"))
+    low, high = read.bounds()
+    np.testing.assert_allclose(low, np.array([980100, 190000, 40]) * FOOT)
+    np.testing.assert_allclose(high - low, 2.0 * FOOT)
 
 
 def test_degrees_without_a_word(tmp_path):

@@ -5,11 +5,16 @@ import numpy as np
 import pytest
 from shapely.geometry import LineString, Point
 
+from cns_drake.base.errors import InputError
 from cns_drake.imports.import_map import import_city
 from cns_drake.imports.import_report import DriveOn, ImportOptions
 from cns_drake.imports.openstreetmap import import_openstreetmap
 from cns_drake.imports.osm_tags import driven_ways, is_marked, lanes_beside
-from cns_drake.imports.street_lanes import LaneGraph, Street, make_lanes
+from cns_drake.imports.street_lanes import Street, lane_links, make_lanes
+from cns_drake.imports.waypoint_drives import driven_path
+from cns_drake.motion.control_points import POINT_SPACING
+from cns_drake.motion.path_geometry import SmoothPath
+from cns_drake.roads.waypoints import make_waypoint_path
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_loading import load_scenario
 
@@ -17,7 +22,7 @@ STEP = 90.0
 WIDTH = 8.0
 
 
-def write_grid(path, one_way=(), columns=4, rows=3, **extra):
+def write_grid(path, one_way=(), columns=4, rows=3, more=None, **extra):
     """Streets on a grid; those named, "x0" or "y2", are one-way.
 
     Returns the way's tags and line, by name.
@@ -46,6 +51,8 @@ def write_grid(path, one_way=(), columns=4, rows=3, **extra):
     for k, m in ((0, 0), (columns - 2, rows - 2)):
         x, y = low + STEP * (np.array([k, m]) + 0.5)
         osm.box(x - 15, y - 15, 30, 30, building="yes")
+    if more is not None:
+        more(osm)
     osm.write(path)
     return streets
 
@@ -134,10 +141,10 @@ def test_lanes_are_cut_where_streets_meet():
     assert ends == [
         (1, 3, 20.0), (3, 1, 20.0), (3, 4, 10.0), (4, 3, 10.0), (5, 3, 20.0),
     ]  # fmt: skip
-    graph = LaneGraph(lanes)
+    links = lane_links(lanes)
     leads = {
         (lanes[a].begin, lanes[a].end, lanes[b].end)
-        for a, b in zip(graph.rows, graph.columns, strict=True)
+        for a, b in zip(*links, strict=True)
     }
     # Nobody turns round, nor into the one-way street.
     assert leads == {(1, 3, 4), (4, 3, 1), (5, 3, 1), (5, 3, 4)}
@@ -156,11 +163,11 @@ def test_a_roundabout_is_driven_one_way():
             street([(15, 0), (60, 0)], [10, 2]),
         ]
     )
-    graph = LaneGraph(lanes)
+    links = lane_links(lanes)
     (start,) = (k for k, lane in enumerate(lanes) if lane.begin == 1)
     after = {
         (lanes[k].begin, lanes[k].end)
-        for a, k in zip(graph.rows, graph.columns, strict=True)
+        for a, k in zip(*links, strict=True)
         if a == start
     }
     # From the west on to the east by the south: counter-clockwise.
@@ -251,3 +258,95 @@ def test_a_place_on_another_continent_is_no_way_to_go(tmp_path):
         tmp_path / "city.osm", tmp_path / "town", ImportOptions()
     )
     assert all(length < 300.0 for length in report.drives)
+
+
+@pytest.mark.parametrize("barrier", ["house", "house around", "fence"])
+def test_no_drive_goes_through_a_wall(tmp_path, barrier):
+    streets = write_grid(tmp_path / "plain.osm")
+    import_city(tmp_path / "plain.osm", tmp_path / "plain", ImportOptions())
+    (first, _), _ = drives_of(tmp_path / "plain")
+    # In the way of the drive, on a street between two junctions.
+    name, line = max(
+        ((name, line) for name, (_, line) in streets.items()),
+        key=lambda item: sum(
+            item[1].distance(Point(p)) < 5.0 for p in first[::10]
+        ),
+    )
+    middle = line.interpolate(STEP / 2)
+    x, y = middle.x, middle.y
+    shape = {
+        "house": Point(x, y).buffer(9.0, cap_style="square"),
+        # Hollow: a wall of less than a metre at either side.
+        "house around": LineString([(x - 30, y), (x + 30, y)])
+        if name[0] == "y"
+        else LineString([(x, y - 30), (x, y + 30)]),
+        "fence": LineString([(x - 12, y - 12), (x + 12, y + 12)]),
+    }[barrier]
+    if barrier == "house around":
+        shape = shape.buffer(7.0, cap_style="flat")
+
+    def add_barrier(osm):
+        if barrier == "fence":
+            osm.way(shape.coords, barrier="fence")
+        else:
+            osm.way(shape.exterior.coords[:-1], closed=True, building="yes")
+
+    write_grid(tmp_path / "city.osm", more=add_barrier)
+    report = import_city(
+        tmp_path / "city.osm", tmp_path / "town", ImportOptions()
+    )
+    assert len(report.drives) == 2
+    for places, _ in drives_of(tmp_path / "town"):
+        assert LineString(places).distance(shape) > 1.0
+
+
+def test_a_path_is_as_the_vehicle_drives_it():
+    rng = np.random.default_rng(4)
+    for _ in range(5):
+        steps = np.column_stack([rng.uniform(15, 25, 12), rng.normal(0, 9, 12)])
+        waypoints = np.column_stack([np.cumsum(steps, axis=0), np.zeros(12)])
+        path = make_waypoint_path(waypoints, POINT_SPACING)
+        smooth = SmoothPath(path.points, path.spacing)
+        radius, place = smooth.tightest_bend()
+        driven, radii = driven_path(path.points[:, :2])
+        assert radii.min() == pytest.approx(radius, rel=0.01)
+        assert np.linalg.norm(driven[radii.argmin()] - place[:2]) < 0.3
+        u = np.linspace(0.0, smooth.end, len(driven))
+        np.testing.assert_allclose(
+            driven, smooth.evaluate(u).p[:, :2], atol=1e-9
+        )
+
+
+@pytest.mark.parametrize("columns", [2, 3, 5])
+def test_no_import_refuses_its_own_drives(tmp_path, columns):
+    write_grid(
+        tmp_path / "city.osm", columns=columns, rows=2, start_date="1790"
+    )
+    for name, years in (("a", (1800, 1900, 2020)), ("b", (2020,))):
+        report = import_city(
+            tmp_path / "city.osm", tmp_path / name, ImportOptions(years)
+        )
+        assert len(list((tmp_path / name).glob("route_*"))) == len(
+            report.drives
+        )
+        for path in (tmp_path / name).glob("*_0?.yaml"):
+            assert plan_drive(load_scenario(path)).length > 80.0
+
+
+def test_an_import_that_fails_leaves_no_folder(tmp_path):
+    write_grid(tmp_path / "city.osm")
+
+    def fail(folder):
+        assert (folder / "stage_01.sdf").exists()
+        assert folder.name == "town"
+        raise InputError("no")
+
+    def run(finish):
+        source, output = tmp_path / "city.osm", tmp_path / "town"
+        import_city(source, output, ImportOptions(), finish=finish)
+
+    with pytest.raises(InputError, match="no"):
+        run(fail)
+    assert {path.name for path in tmp_path.iterdir()} == {"city.osm"}
+    run(lambda folder: None)
+    assert (tmp_path / "town" / "stage_01.sdf").exists()

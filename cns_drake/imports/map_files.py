@@ -1,0 +1,101 @@
+"""The files of an imported city."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+import os
+from pathlib import Path
+import shutil
+
+import yaml
+
+from cns_drake.base.files import part_path, user_errors
+from cns_drake.city.generation.generate import TABLE_NAME, structure_table
+from cns_drake.city.generation.sdf import MESH_FOLDER, stage_sdf
+from cns_drake.city.geometry.structures import Structure
+from cns_drake.imports.foreign_city import ForeignCity
+from cns_drake.imports.import_report import ImportOptions
+from cns_drake.imports.staged_city import StagedCity
+
+
+@contextmanager
+def map_draft(output: Path) -> Iterator[Path]:
+    """Gives a folder of the same name, which takes the place when all is well.
+
+    Raises:
+        InputError: if it cannot be written.
+    """
+    part = part_path(output)
+    draft = part / output.resolve().name
+    try:
+        with user_errors(output):
+            shutil.rmtree(part, ignore_errors=True)
+            (draft / MESH_FOLDER).mkdir(parents=True)
+            yield draft
+            os.replace(draft, output)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def write_world(
+    draft: Path, source: Path, city: StagedCity, bottom: Sequence[Structure]
+) -> None:
+    """Writes the stages, their meshes and the table of structures.
+
+    Args:
+        draft: the map's folder, which has its name.
+        source: the file that the city was read from.
+        city: all structures.
+        bottom: the ground below them, at all stages.
+    """
+    structures = [*bottom, *(one.structure for one in city.kept)]
+    (draft / TABLE_NAME).write_text(structure_table(structures), "utf-8")
+    for stage, some in city.standing.items():
+        text = stage_sdf(
+            f"{draft.name}_{stage}",
+            [*bottom, *(one.structure for one in some)],
+            comment=f"Imported by cns-drake from {source.name}.",
+        )
+        (draft / f"stage_{stage}.sdf").write_text(text, "utf-8")
+    # Trees of a kind share theirs.
+    meshes = {
+        name: mesh
+        for structure in structures
+        for name, mesh in structure.model.meshes.items()
+    }
+    for name, mesh in meshes.items():
+        path = draft / MESH_FOLDER / f"{name}.obj"
+        path.write_text(mesh.to_obj(), "utf-8")
+
+
+def write_facts(
+    draft: Path,
+    source: Path,
+    city: ForeignCity,
+    options: ImportOptions,
+    stages: Sequence[str],
+) -> None:
+    """Writes where the map comes from, and where it lies."""
+    facts = {
+        "source": source.name,
+        "reference_system": city.reference_system or "not told",
+        **({"axes": list(city.axes)} if city.axes else {}),
+        "origin": list(city.origin),
+        "lod": options.lod if options.lod is not None else "highest",
+        "years": dict(zip(stages, options.years, strict=False)),
+        "left_out_or_repaired": {
+            kind: number for kind, number, _ in city.faults.rows()
+        },
+    }
+    comment = (
+        "# Where this map comes from. A place of the map plus the origin is"
+        " one of the\n# source [m].\n"
+    )
+    if city.axes:
+        comment += (
+            "# Places of the source are brought to metres east, north and up"
+            " first.\n"
+        )
+    text = yaml.safe_dump(facts, sort_keys=False, allow_unicode=True)
+    (draft / "import.yaml").write_text(comment + text, "utf-8")

@@ -1,0 +1,158 @@
+"""Coordinates of a file as metres, east, north and up.
+
+By the definition of the file's reference system, which pyproj looks up: the
+order and the direction of its axes, and their units.
+https://www.cityjson.org/specs/2.0.1/#referencesystem-crs
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pyproj
+from pyproj.exceptions import CRSError, ProjError
+
+from cns_drake.base.errors import InputError
+
+# Direction of an axis -> row of east, north, up, and its sign.
+_ROWS = {
+    "east": (0, 1.0),
+    "west": (0, -1.0),
+    "north": (1, 1.0),
+    "south": (1, -1.0),
+    "up": (2, 1.0),
+    "down": (2, -1.0),
+}
+# A city lies within the area of its system, or so near it [deg].
+_NEAR_AREA_DEG = 0.5
+_PLAIN = ("east [metre]", "north [metre]", "up [metre]")
+
+
+@dataclass(frozen=True)
+class ReferenceSystem:
+    """What the three coordinates of a file mean.
+
+    Attributes:
+        name: as the file has it; "" if it has none.
+        axes: what each coordinate is, in words.
+        matrix: (3, 3) from coordinates to metres east, north and up.
+        heights_assumed: whether the system has no heights of its own, so that
+            theirs are taken to have the unit of the other coordinates.
+    """
+
+    name: str = ""
+    axes: tuple[str, str, str] = _PLAIN
+    matrix: tuple[tuple[float, ...], ...] = (
+        (1.0, 0.0, 0.0),
+        (0.0, 1.0, 0.0),
+        (0.0, 0.0, 1.0),
+    )
+    heights_assumed: bool = False
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether the coordinates are metres, east, north, up already."""
+        return self.axes == _PLAIN
+
+    def to_metres(self, points: np.ndarray) -> np.ndarray:
+        """Returns coordinates (N, 3) as metres east, north and up (N, 3)."""
+        if self.is_plain:
+            return points
+        return points @ np.array(self.matrix).T
+
+    def as_used(self, point: np.ndarray) -> ReferenceSystem:
+        """Returns the system as a file uses it.
+
+        Many programs write east first whatever the definition says. That is
+        so where a point lies in the area of use of the system with its first
+        two coordinates exchanged, and only then.
+
+        Args:
+            point: (3,) coordinates of the file.
+        """
+        if not self.axes[0].startswith(("north", "south")):
+            return self
+        system = pyproj.CRS.from_user_input(self.name)
+        area = system.area_of_use
+        to_degrees = pyproj.Transformer.from_crs(
+            system, "OGC:CRS84", always_xy=False
+        )
+
+        def is_inside(first: float, second: float) -> bool:
+            longitude, latitude = to_degrees.transform(first, second)
+            return area is not None and bool(
+                area.west - _NEAR_AREA_DEG
+                <= longitude
+                <= area.east + _NEAR_AREA_DEG
+                and area.south - _NEAR_AREA_DEG
+                <= latitude
+                <= area.north + _NEAR_AREA_DEG
+            )
+
+        first, second = float(point[0]), float(point[1])
+        if is_inside(first, second) or not is_inside(second, first):
+            return self
+        exchanged = np.array(self.matrix)[:, [1, 0, 2]]
+        axes = (self.axes[1], self.axes[0], self.axes[2])
+        return replace(
+            self, axes=axes, matrix=tuple(map(tuple, exchanged.tolist()))
+        )
+
+
+def reference_system(name: str, where: str) -> ReferenceSystem:
+    """Returns what a reference system says of coordinates.
+
+    Args:
+        name: an EPSG code, or a URL or URN of one, as the file has it.
+        where: what an error begins with.
+
+    Raises:
+        InputError: naming the system, if it is not known, is in degrees, or
+            has axes that are not east, north and up.
+    """
+    if not name:
+        return ReferenceSystem()
+    try:
+        system = pyproj.CRS.from_user_input(name)
+    except (CRSError, ProjError) as error:
+        raise InputError(
+            f"{where}: {name} is no reference system that is known (such as"
+            " https://www.opengis.net/def/crs/EPSG/0/7415)"
+        ) from error
+    parts = system.sub_crs_list or [system]
+    axes = [axis for part in parts for axis in part.axis_info]
+    if any(part.is_geographic for part in parts):
+        raise InputError(
+            f"{where}: {name} is in degrees; project it to metres first (for"
+            " example with cjio's crs_reproject)"
+        )
+    rows = [_ROWS.get(axis.direction, (-1, 0.0)) for axis in axes]
+    heights_assumed = len(axes) == 2
+    if heights_assumed:
+        rows.append((2, 1.0))
+    if sorted(row for row, _ in rows) != [0, 1, 2]:
+        told = ", ".join(f"{a.name} ({a.direction})" for a in axes)
+        raise InputError(
+            f"{where}: {name} ({system.name}) has the axes {told}, which are"
+            " not east, north and up; reproject the file first"
+        )
+    units = [(axis.unit_conversion_factor, axis.unit_name) for axis in axes]
+    if heights_assumed:
+        units.append(units[0])
+    matrix = np.zeros((3, 3))
+    for column, ((row, sign), (unit, _)) in enumerate(
+        zip(rows, units, strict=True)
+    ):
+        matrix[row, column] = sign * unit
+    directions = [axis.direction for axis in axes] + ["up"] * heights_assumed
+    first, second, third = (
+        f"{direction} [{unit}]"
+        for direction, (_, unit) in zip(directions, units, strict=True)
+    )
+    return ReferenceSystem(
+        name,
+        (first, second, third),
+        tuple(map(tuple, matrix.tolist())),
+        heights_assumed,
+    )

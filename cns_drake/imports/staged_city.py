@@ -1,0 +1,146 @@
+"""What of an imported city stands at which stage."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cns_drake.base.errors import InputError
+from cns_drake.city.generation.generate import MAX_STRUCTURES
+from cns_drake.imports.building_years import stage_names, stands_at
+from cns_drake.imports.foreign_city import ForeignCity, Imported
+from cns_drake.imports.import_faults import ImportFaults
+from cns_drake.imports.import_report import ImportOptions
+from cns_drake.imports.near_drives import keep_near
+from cns_drake.imports.waypoint_drives import Drive
+
+# From the middle of a city [m].
+_FARTHEST = 10_000.0
+
+
+@dataclass(frozen=True)
+class StagedCity:
+    """The structures of a city, stage by stage.
+
+    Attributes:
+        standing: stage -> its structures.
+        kept: those that stand at some stage.
+        undated: how many buildings have no year.
+    """
+
+    standing: dict[str, list[Imported]]
+    kept: list[Imported]
+    undated: int
+
+    def near(
+        self, drives: Sequence[Drive], distance: float, faults: ImportFaults
+    ) -> StagedCity:
+        """Returns the city without what lies far from drives.
+
+        Args:
+            drives: of the city.
+            distance: see `keep_near` [m].
+            faults: counts what is left out.
+
+        Raises:
+            InputError: if nothing is near, or there is no drive.
+        """
+        if not drives:
+            raise InputError("--within: no drive was found, give one: --along")
+        cut = dict(
+            zip(
+                self.kept,
+                keep_near(self.kept, drives, distance, faults),
+                strict=True,
+            )
+        )
+        kept = [one for one in cut.values() if one is not None]
+        if not kept:
+            raise InputError(
+                f"--within: nothing stands within {distance:g} m of the drives"
+            )
+        standing = {
+            stage: [new for one in some if (new := cut[one]) is not None]
+            for stage, some in self.standing.items()
+        }
+        return replace(self, standing=standing, kept=kept)
+
+
+def stage_city(
+    source: object, city: ForeignCity, options: ImportOptions
+) -> StagedCity:
+    """Returns what stands at the stages that were asked for.
+
+    Args:
+        source: by which errors name the file.
+        city: all of it; its faults count what stands at no stage.
+        options: the years, and what becomes of buildings without any.
+
+    Raises:
+        InputError: if nothing ever stands, or too much.
+    """
+    found = _together(city)
+    if not found:
+        raise InputError(f"{source}: no object has a surface")
+    standing = {
+        stage: [
+            one
+            for one in found
+            if not _has_years(one)
+            or stands_at(one.year, k, options.years, options.undated)
+        ]
+        for k, stage in enumerate(stage_names(options.years))
+    }
+    ever = {one for some in standing.values() for one in some}
+    for one in found:
+        if one not in ever:
+            when = (
+                "without a year"
+                if one.year is None
+                else "built after the last stage"
+            )
+            city.faults.add(f"building {when}, left out", one.structure.name)
+    kept = [one for one in found if one in ever]
+    if len(kept) >= MAX_STRUCTURES:
+        raise InputError(
+            f"{source}: {len(kept)} objects are more than instance ids can"
+            f" count ({MAX_STRUCTURES})"
+        )
+    if not kept:
+        raise InputError(f"{source}: nothing stands at any stage")
+    undated = sum(one.year is None for one in found if _has_years(one))
+    return StagedCity(standing, kept, undated)
+
+
+def _together(city: ForeignCity) -> list[Imported]:
+    """Returns the structures of a city without those that lie far away."""
+    if not city.structures:
+        return []
+    boxes = np.array(
+        [
+            (one.triangles.min(axis=(0, 1)), one.triangles.max(axis=(0, 1)))
+            for one in city.structures
+        ]
+    )
+    middle = np.median(boxes.mean(axis=1), axis=0)
+    kept = []
+    for one, reach in zip(
+        city.structures, np.abs(boxes - middle).max(axis=(1, 2)), strict=True
+    ):
+        if reach <= _FARTHEST:
+            kept.append(one)
+        else:
+            kind = f"object more than {_FARTHEST / 1000:g} km away, left out"
+            city.faults.add(kind, one.structure.name)
+    return kept
+
+
+def _has_years(one: Imported) -> bool:
+    """Returns whether a structure may be missing at a stage.
+
+    Where no year is given, buildings alone are taken to have one.
+    """
+    is_building = one.kind.startswith("Building")
+    return not one.is_ground and (one.year is not None or is_building)
