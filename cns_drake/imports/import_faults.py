@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 
+_LONGEST = 100
+
 
 class ImportFaults:
     """What was repaired or left out, with one example of each kind."""
@@ -20,8 +22,9 @@ class ImportFaults:
             example: name of the object that has it.
             number: how many.
         """
+        kind = _printable(kind)
         self._counts[kind] += number
-        self._examples.setdefault(kind, example)
+        self._examples.setdefault(kind, _printable(example))
 
     def rows(self) -> list[tuple[str, int, str]]:
         """Returns kind, how many, and an example, most frequent first."""
@@ -31,3 +34,9 @@ class ImportFaults:
                 self._counts.items(), key=lambda item: (-item[1], item[0])
             )
         ]
+
+
+def _printable(text: str) -> str:
+    """Returns a text of a file without what would upset a terminal."""
+    shown = "".join(c if c.isprintable() else " " for c in text)
+    return shown if len(shown) <= _LONGEST else f"{shown[: _LONGEST - 3]}..."

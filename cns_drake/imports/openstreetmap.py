@@ -7,27 +7,29 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+import re
 
 import numpy as np
-from shapely.geometry import LineString, Point, Polygon
-from shapely.strtree import STRtree
+from shapely.geometry import LineString, Point
 
 from cns_drake.base.errors import InputError
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.plants.vegetation import tree
-from cns_drake.imports.building_years import construction_year
 from cns_drake.imports.extrusions import extruded, flat_surface
 from cns_drake.imports.foreign_city import (
     LAWN,
-    RED_ROOF,
     WATER,
     ForeignCity,
     Imported,
     make_imported,
 )
 from cns_drake.imports.import_faults import ImportFaults
+from cns_drake.imports.osm_buildings import make_buildings, standing_buildings
+from cns_drake.imports.osm_lengths import length
 from cns_drake.imports.osm_places import Local, parts_of, sound_parts
 from cns_drake.imports.osm_reading import (
+    OsmArea,
+    OsmFeatures,
     OsmWay,
     Tags,
     is_building,
@@ -39,18 +41,10 @@ from cns_drake.imports.osm_streets import (
     drivable_streets,
     street_surfaces,
 )
-from cns_drake.imports.osm_tags import (
-    area_kind,
-    heights,
-    length,
-)
+from cns_drake.imports.osm_tags import area_kind, told
 
-# Of the Earth, WGS 84 [m].
-_SEMI_MAJOR = 6378137.0
-_FLATTENING = 1.0 / 298.257223563
-_SIDEWALK = 2.0
-_KERB = 0.12
-_LEAST_AREA = 0.01  # [m^2]
+# Of barriers and trees [m].
+_TALLEST = 150.0
 _HEDGE = (0.8, 1.2)
 _WALL = (0.2, 1.6)
 # A file of a whole country would not end.
@@ -66,10 +60,11 @@ def import_openstreetmap(path: Path, year_attribute: str | None) -> ForeignCity:
     """
     features = read_openstreetmap(path)
     faults = features.faults
-    buildings = [one for one in features.areas if is_building(one[1])]
+    buildings = [one for one in features.areas if is_building(one.tags)]
+    buildings = list(standing_buildings(buildings, faults))
     if not buildings:
         raise InputError(f"{path}: no building in it")
-    bounds = np.array([p.bounds for _, _, ps in buildings for p in ps])
+    bounds = np.array([p.bounds for one in buildings for p in one.polygons])
     low, high = bounds[:, :2].min(axis=0), bounds[:, 2:].max(axis=0)
     longitude, latitude = np.round((low + high) / 2.0, 6).tolist()
     local = Local(longitude, latitude)
@@ -80,13 +75,14 @@ def import_openstreetmap(path: Path, year_attribute: str | None) -> ForeignCity:
             f" most {_LARGEST / 1000:.0f} km"
         )
     found = [
-        *_buildings(buildings, local, year_attribute, faults),
+        *make_buildings(buildings, local, year_attribute, faults),
         *street_surfaces(features.ways, local, faults),
         *crossing_stripes(features.crossings, features.ways, local, faults),
         *_lands(features.areas, local, faults),
         *_barriers(features.ways, local, faults),
-        *_trees(features.trees, local),
+        *_trees(features.trees, local, faults),
     ]
+    _count_unused(features, found)
     return ForeignCity(
         found,
         (latitude, longitude),
@@ -100,66 +96,27 @@ def import_openstreetmap(path: Path, year_attribute: str | None) -> ForeignCity:
     )
 
 
-def _buildings(
-    told: Iterable[tuple[str, Tags, list[Polygon]]],
-    local: Local,
-    year_attribute: str | None,
-    faults: ImportFaults,
-) -> Iterator[Imported]:
-    """Yields buildings; one that has parts is what these are."""
-    outlines: list[tuple[str, Tags, Polygon]] = []
-    parts: list[tuple[str, Tags, Polygon]] = []
-    for name, tags, polygons in told:
-        for polygon in polygons:
-            for one in sound_parts(local.polygon(polygon), name, faults):
-                group = parts if is_told(tags, "building:part") else outlines
-                group.append((name, tags, one))
-    of_outline: dict[int, list[tuple[str, Tags, Polygon]]] = {}
-    tree_of_outlines = STRtree([one for _, _, one in outlines])
-    alone = []
-    for part in parts:
-        inside = tree_of_outlines.query(
-            part[2].representative_point(), predicate="within"
-        )
-        if len(inside):
-            of_outline.setdefault(int(inside.min()), []).append(part)
-        else:
-            alone.append([part])
-    groups = [
-        ((name, tags), of_outline.get(k, [(name, tags, one)]))
-        for k, (name, tags, one) in enumerate(outlines)
-    ]
-    groups += [((some[0][0], some[0][1]), some) for some in alone]
-    taken: dict[str, int] = {}
-    for (name, tags), members in groups:
-        walls, roofs = [], []
-        for _, own, polygon in members:
-            low, high, roof = heights(own)
-            wall, top = extruded(
-                polygon,
-                low,
-                high,
-                name,
-                faults,
-                own.get("roof:shape", "flat"),
-                roof,
-            )
-            walls.append(wall)
-            roofs.append(top)
-        taken[name] = taken.get(name, 0) + 1
-        number = f"_{taken[name]}" if taken[name] > 1 else ""
-        yield make_imported(
-            f"building_{name}{number}",
-            "building",
-            "Building",
-            {"body": np.concatenate(walls), "roof": np.concatenate(roofs)},
-            {"roof": RED_ROOF},
-            construction_year(tags, year_attribute),
-        )
+def _count_unused(features: OsmFeatures, found: Iterable[Imported]) -> None:
+    """Counts what is in the file and has no place in the city, by kind.
+
+    Buildings that are left out are counted where that is decided.
+    """
+    used = {
+        name
+        for one in found
+        for name in re.findall(r"_([nwr]-?\d+)", one.structure.name)
+    }
+    used |= {one.name for one in features.areas if is_building(one.tags)}
+    for name, kind in features.kinds.items():
+        is_relation_of_parts = kind == "relation of type building"
+        if name not in used and not is_relation_of_parts:
+            if kind.startswith(("building=", "building:part=")):
+                continue
+            features.faults.add(f"{kind}, left out", name)
 
 
 def _lands(
-    areas: Iterable[tuple[str, Tags, list[Polygon]]],
+    areas: Iterable[OsmArea],
     local: Local,
     faults: ImportFaults,
 ) -> Iterator[Imported]:
@@ -197,7 +154,8 @@ def _barriers(
             (width, usual), semantic_class = _WALL, "fence"
         else:
             continue
-        high = length(tags.get("height")) or usual
+        where = (name, faults)
+        high = told(tags, "height", length, _TALLEST, where) or usual
         strip = LineString(local(line)).buffer(width / 2.0, cap_style="flat")
         solids = [
             np.concatenate(extruded(polygon, 0.0, high, name, faults))
@@ -215,16 +173,19 @@ def _barriers(
 
 
 def _trees(
-    told: Iterable[tuple[str, Tags, tuple[float, float]]], local: Local
+    trees: Iterable[tuple[str, Tags, tuple[float, float]]],
+    local: Local,
+    faults: ImportFaults,
 ) -> Iterator[Imported]:
-    for name, tags, place in told:
+    for name, tags, place in trees:
         x, y = local(np.array([place]))[0].tolist()
         needles = tags.get("leaf_type") == "needleleaved"
         model = tree(
             # Editors give negative numbers to what is new.
             np.random.default_rng([abs(int(name[1:]))]),
             species="spruce" if needles else "lime_tree",
-            height=length(tags.get("height")) or None,
+            height=told(tags, "height", length, _TALLEST, (name, faults))
+            or None,
         )
         structure = Structure(
             f"tree_{name}",

@@ -16,6 +16,62 @@ from cns_drake.imports.import_faults import ImportFaults
 
 Tags = Mapping[str, str]
 
+_LETTERS = {"Node": "n", "Way": "w", "Relation": "r"}
+# Tags that say what a thing is, the more telling first
+# (https://wiki.openstreetmap.org/wiki/Map_features).
+_TELLING = (
+    "building",
+    "building:part",
+    "highway",
+    "railway",
+    "aeroway",
+    "aerialway",
+    "waterway",
+    "barrier",
+    "natural",
+    "landuse",
+    "leisure",
+    "amenity",
+    "man_made",
+    "historic",
+    "tourism",
+    "shop",
+    "office",
+    "craft",
+    "healthcare",
+    "emergency",
+    "power",
+    "telecom",
+    "public_transport",
+    "advertising",
+    "traffic_sign",
+    "traffic_calming",
+    "entrance",
+    "indoor",
+    "military",
+    "geological",
+    "playground",
+    "sport",
+    "route",
+    "boundary",
+    "place",
+    "area:highway",
+)
+# Before the key of what is not there any more, or not yet.
+_LIFECYCLE = (
+    "abandoned",
+    "construction",
+    "demolished",
+    "destroyed",
+    "disused",
+    "historic",
+    "planned",
+    "proposed",
+    "razed",
+    "removed",
+    "was",
+)
+
 
 class OsmWay(NamedTuple):
     """A way: its id, tags, places [deg] and the numbers of its nodes."""
@@ -26,24 +82,35 @@ class OsmWay(NamedTuple):
     nodes: tuple[int, ...]
 
 
+class OsmArea(NamedTuple):
+    """An area: its id, tags and polygons [deg]."""
+
+    name: str
+    tags: Tags
+    polygons: list[Polygon]
+
+
 @dataclass
 class OsmFeatures:
     """What a file holds, places as longitude and latitude [deg].
 
     Attributes:
-        areas: id, tags and polygons.
+        areas: closed ways and multipolygons.
         ways: with all of their places that are in the file.
         trees: id, tags and place.
         crossings: number of the node, and tags.
+        kinds: id of each thing that has tags -> what it is; nodes have `n`
+            before their number, ways `w` and relations `r`.
         faults: what could not be read.
     """
 
-    areas: list[tuple[str, Tags, list[Polygon]]] = field(default_factory=list)
+    areas: list[OsmArea] = field(default_factory=list)
     ways: list[OsmWay] = field(default_factory=list)
     trees: list[tuple[str, Tags, tuple[float, float]]] = field(
         default_factory=list
     )
     crossings: list[tuple[int, Tags]] = field(default_factory=list)
+    kinds: dict[str, str] = field(default_factory=dict)
     faults: ImportFaults = field(default_factory=ImportFaults)
 
 
@@ -62,19 +129,22 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
         reader = osmium.FileProcessor(str(path)).with_locations().with_areas()
         for one in reader:
             tags = {tag.k: tag.v for tag in one.tags}
+            if tags and not isinstance(one, osmium.osm.Area):
+                letter = _LETTERS[type(one).__name__]
+                features.kinds[f"{letter}{one.id}"] = thing_kind(tags)
             if isinstance(one, osmium.osm.Area):
                 polygons = _polygons(one)
                 if polygons:
                     kind = "w" if one.from_way() else "r"
                     name = f"{kind}{one.orig_id()}"
-                    features.areas.append((name, tags, polygons))
+                    features.areas.append(OsmArea(name, tags, polygons))
             elif isinstance(one, osmium.osm.Way) and tags:
                 name = f"w{one.id}"
                 if is_building(tags):
                     told[name] = None
                 nodes = [n for n in one.nodes if n.location.valid()]
                 missing = len(one.nodes) - len(nodes)
-                if missing and "highway" in tags:
+                if missing and name not in told:
                     features.faults.add(
                         "place of a way that is not in the file, left out",
                         name,
@@ -117,6 +187,20 @@ def _polygons(area: Any) -> list[Polygon]:
         ]
         found.append(Polygon([(n.lon, n.lat) for n in outer], holes))
     return found
+
+
+def thing_kind(tags: Tags) -> str:
+    """Returns what a thing is, by its first tag that says so."""
+    for key in _TELLING:
+        if is_told(tags, key):
+            return f"{key}={tags[key]}"
+    if any(key.startswith("addr:") for key in tags):
+        return "address"
+    for key in tags:
+        stage, _, rest = key.partition(":")
+        if stage in _LIFECYCLE and rest:
+            return f"{stage}:{rest}"
+    return f"relation of type {tags['type']}" if "type" in tags else "other"
 
 
 def is_told(tags: Tags, name: str) -> bool:

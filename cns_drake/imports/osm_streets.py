@@ -40,7 +40,8 @@ def street_surfaces(
     for name, tags, line, _ in ways:
         if is_told(tags, "tunnel") or is_told(tags, "area"):
             continue
-        width, narrow = street_width(tags), path_width(tags)
+        width = street_width(tags, (name, faults))
+        narrow = path_width(tags)
         if width is None and narrow is None:
             continue
         course = LineString(local(line))

@@ -5,8 +5,11 @@ https://wiki.openstreetmap.org/wiki/Map_features
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 import re
+
+from cns_drake.imports.import_faults import ImportFaults
+from cns_drake.imports.osm_lengths import count, length
 
 STOREY = 3.0  # [m]
 LANE = 3.0  # [m]
@@ -49,60 +52,141 @@ _PATHS = {
     "cycleway": 2.5,
     "steps": 2.0,
 }
-_FEET = re.compile(r"\s*(\d+(?:\.\d+)?)'(?:\s*(\d+(?:\.\d+)?)\")?\s*$")
-_METRES = re.compile(r"\s*(-?\d+(?:[.,]\d+)?)\s*(?:m|metres?|meters?)?\s*$")
-# No building is taller, no street wider [m].
-_MOST = 1000.0
+# What no building or street exceeds: the tallest stands 828 m high.
+_TALLEST = 850.0  # [m]
+_LOWEST = 0.1  # [m]
+_MOST_LEVELS = 170
+_WIDEST = 60.0  # [m]
+_MOST_LANES = 16
+# What `building` says of one that is not there, and the keys that say so.
+_ABSENT = {
+    "demolished": "demolished",
+    "destroyed": "demolished",
+    "razed": "demolished",
+    "removed": "demolished",
+    "collapsed": "demolished",
+    "proposed": "proposed",
+    "planned": "proposed",
+    "construction": "unfinished",
+}
 
 
-def length(text: str | None) -> float | None:
-    """Returns a length in metres; None if it is not told or is no length."""
+def told(
+    tags: Mapping[str, str],
+    key: str,
+    read: Callable[[str], float | None],
+    most: float,
+    where: tuple[str, ImportFaults] | None,
+    least: float = 0.0,
+) -> float | None:
+    """Returns what a tag tells, None if it does not.
+
+    Args:
+        tags: of a thing.
+        key: of the tag.
+        read: the way in which its value is written.
+        most: nothing has more.
+        where: name of the thing, and what counts values that are not
+            understood or beyond reason; None if they are counted elsewhere.
+        least: nothing has less.
+    """
+    text = tags.get(key)
     if text is None:
         return None
-    feet = _FEET.match(text)
-    if feet:
-        return 0.3048 * (float(feet[1]) + float(feet[2] or 0.0) / 12.0)
-    metres = _METRES.match(text)
-    if metres is None:
-        return None
-    value = float(metres[1].replace(",", "."))
-    return value if 0.0 <= value <= _MOST else None
+    value = read(text)
+    if value is not None and least <= value <= most:
+        return value
+    if where is not None:
+        name, faults = where
+        kind = f"{key} not understood or beyond reason, the usual one taken"
+        faults.add(kind, name)
+    return None
 
 
-def heights(tags: Mapping[str, str]) -> tuple[float, float, float]:
+def heights(
+    tags: Mapping[str, str], where: tuple[str, ImportFaults] | None = None
+) -> tuple[float, float, float]:
     """Returns lowest and highest point of a building, and its roof's height.
 
     All from the ground [m].
+
+    Args:
+        tags: of the building.
+        where: see `told`.
     """
-    levels = length(tags.get("building:levels"))
-    roof = length(tags.get("roof:height"))
+
+    def metres(key: str, least: float = 0.0) -> float | None:
+        return told(tags, key, length, _TALLEST, where, least)
+
+    def number(key: str, least: float = 0.0) -> float | None:
+        return told(tags, key, count, _MOST_LEVELS, where, least)
+
+    roof_levels = number("roof:levels")
+    # No level is one where the roof has some.
+    levels = number("building:levels", 0.0 if roof_levels else 0.5)
+    roof = metres("roof:height")
     if roof is None:
-        storeys = length(tags.get("roof:levels")) or 1.0
-        roof = STOREY * storeys
+        roof = STOREY * (roof_levels or 1.0)
         if tags.get("roof:shape", "flat") == "flat":
             roof = 0.0
-    high = length(tags.get("height"))
+    high = (
+        metres("height", _LOWEST)
+        or metres("building:height", _LOWEST)
+        or metres("est_height", _LOWEST)
+    )
     if high is None:
         if levels is None:
             levels = _USUAL_LEVELS.get(tags.get("building", ""), _LEVELS)
-        high = STOREY * levels + roof
-    low = length(tags.get("min_height"))
+        high = STOREY * levels + (roof or STOREY * (roof_levels or 0.0))
+    low = metres("min_height")
     if low is None:
-        low = STOREY * (length(tags.get("building:min_level")) or 0.0)
+        low = STOREY * (number("building:min_level") or 0.0)
     high = max(high, 1.0)
+    if low >= high and where is not None:
+        name, faults = where
+        faults.add("building that begins above its top, lowered", name)
     low = min(low, high - 0.5)
     return low, high, min(roof, high - low - 0.1)
 
 
-def street_width(tags: Mapping[str, str]) -> float | None:
-    """Returns the width of a street for cars; None if it is none [m]."""
+def why_absent(tags: Mapping[str, str]) -> str | None:
+    """Returns why a building of a file does not stand; None if it does."""
+    kinds = [tags.get("building", ""), tags.get("building:part", "")]
+    kinds += [key for key in _ABSENT if tags.get(key) == "yes"]
+    for kind in kinds:
+        if kind in _ABSENT:
+            return _ABSENT[kind]
+    layer = tags.get("layer", "")
+    if (
+        tags.get("location") in ("underground", "underwater")
+        or tags.get("tunnel", "no") not in ("no", "building_passage")
+        or re.fullmatch(r"-\d+(\.\d+)?", layer)
+        or (
+            tags.get("building:levels") == "0"
+            and count(tags.get("building:levels:underground"))
+            and not count(tags.get("roof:levels"))
+        )
+    ):
+        return "underground"
+    return None
+
+
+def street_width(
+    tags: Mapping[str, str], where: tuple[str, ImportFaults] | None = None
+) -> float | None:
+    """Returns the width of a street for cars; None if it is none [m].
+
+    Args:
+        tags: of a way.
+        where: see `told`.
+    """
     kind = tags.get("highway", "").removesuffix("_link")
     if kind not in _STREETS:
         return None
-    width = length(tags.get("width"))
+    width = told(tags, "width", length, _WIDEST, where)
     if width:
         return width
-    lanes = length(tags.get("lanes"))
+    lanes = told(tags, "lanes", count, _MOST_LANES, where)
     if lanes:
         return LANE * lanes + 0.5
     usual = _STREETS[kind]
@@ -135,7 +219,7 @@ def lanes_beside(tags: Mapping[str, str], width: float) -> float:
         tags: of the street.
         width: of its carriageway [m].
     """
-    lanes = length(tags.get("lanes"))
+    lanes = told(tags, "lanes", count, _MOST_LANES, None)
     if not lanes:
         lanes = 2.0 if all(driven_ways(tags)) else 1.0
     # Where two cars cannot pass, both keep to the middle.
@@ -160,7 +244,7 @@ def path_width(tags: Mapping[str, str]) -> float | None:
     usual = _PATHS.get(tags.get("highway", ""))
     if usual is None:
         return None
-    return length(tags.get("width")) or usual
+    return told(tags, "width", length, _WIDEST, None) or usual
 
 
 def sidewalk_sides(tags: Mapping[str, str]) -> tuple[bool, bool]:

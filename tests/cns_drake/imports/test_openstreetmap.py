@@ -13,11 +13,12 @@ from cns_drake.imports.extrusions import extruded
 from cns_drake.imports.import_faults import ImportFaults
 from cns_drake.imports.import_map import ImportOptions, import_city
 from cns_drake.imports.openstreetmap import import_openstreetmap
+from cns_drake.imports.osm_lengths import count, length
 from cns_drake.imports.osm_tags import (
     heights,
-    length,
     sidewalk_sides,
     street_width,
+    why_absent,
 )
 
 
@@ -174,9 +175,28 @@ def test_trees_water_and_hedges(tmp_path):
         ("12,5", 12.5),
         ("40'", 12.192),
         ("5'6\"", 1.6764),
+        ("12'6\"", 3.81),
+        ("12' 6\"", 3.81),
+        ("12’6”", 3.81),
+        ("12 ft", 3.6576),
+        ("12ft 6in", 3.81),
+        ("12.5M", 12.5),
+        ("12,5 m", 12.5),
+        ("~15", 15.0),
+        ("ca. 15 m", 15.0),
+        ("10 - 12", 12.0),
+        ("9;12.5", 12.5),
+        ("150 cm", 1.5),
+        ("0.01 mi", 16.09344),
+        ("-5", None),
+        ("12 parsecs", None),
+        ("12 m high", None),
+        ("", None),
+        (";", None),
+        ("9;tall", None),
         ("tall", None),
         ("1e300", None),
-        ("99999", None),
+        ("99999", 99999.0),
         (None, None),
     ],
 )
@@ -276,3 +296,166 @@ def test_new_things_of_editors_have_negative_numbers(tmp_path, number):
     path.write_text(text)
     _, found = read(path)
     assert f"tree_n{number}" in found
+
+
+@pytest.mark.parametrize(
+    ("text", "number"),
+    [
+        ("3", 3.0), ("2.5", 2.5), ("2,5", 2.5), ("3;4", 4.0), ("1; 2;3", 3.0),
+        ("3-4", 4.0), ("3 – 5", 5.0), ("3 to 4", 4.0), ("~4", 4.0),
+        ("many", None), ("-2", None), ("3 m", None), ("3;x", None),
+    ],
+)  # fmt: skip
+def test_levels(text, number):
+    assert count(text) == number
+
+
+@pytest.mark.parametrize(
+    "tags",
+    [
+        {"height": "-5"},
+        {"height": "0"},
+        {"height": "851"},
+        {"height": "tall"},
+        {"building:levels": "1000"},
+        {"building:levels": "0"},
+        {"building:levels": "some"},
+        {"min_height": "1e9"},
+        {"roof:height": "x"},
+    ],
+)
+def test_heights_that_cannot_be_are_the_usual_and_counted(tags):
+    faults = ImportFaults()
+    assert heights(tags, ("w7", faults)) == heights({})
+    ((kind, number, example),) = faults.rows()
+    (key,) = tags
+    assert kind.startswith(f"{key} not understood or beyond reason")
+    assert (number, example) == (1, "w7")
+
+
+def test_levels_in_the_roof_are_above_the_others():
+    tags = {"building:levels": "2", "roof:levels": "1"}
+    assert heights(tags)[1] == 9.0
+    assert heights(tags | {"roof:shape": "gabled"}) == (0.0, 9.0, 3.0)
+    assert heights({"building:levels": "0", "roof:levels": "1"})[1] == 3.0
+
+
+@pytest.mark.parametrize(
+    ("tags", "why"),
+    [
+        ({"building": "yes", "location": "underground"}, "underground"),
+        ({"building": "yes", "layer": "-1"}, "underground"),
+        ({"building": "yes", "tunnel": "yes"}, "underground"),
+        (
+            {
+                "building": "garage",
+                "building:levels": "0",
+                "building:levels:underground": "2",
+            },
+            "underground",
+        ),
+        ({"building": "demolished"}, "demolished"),
+        ({"building": "house", "demolished": "yes"}, "demolished"),
+        ({"building": "proposed"}, "proposed"),
+        ({"building": "yes", "proposed": "yes"}, "proposed"),
+        ({"building": "construction", "construction": "house"}, "unfinished"),
+        ({"building": "ruins", "layer": "1"}, None),
+        ({"building": "yes", "tunnel": "building_passage"}, None),
+        (
+            {
+                "building": "house",
+                "building:levels": "0",
+                "roof:levels": "1",
+                "building:levels:underground": "1",
+            },
+            None,
+        ),
+        ({"building": "yes", "demolished": "no"}, None),
+    ],
+)
+def test_which_buildings_stand(tmp_path, tags, why):
+    assert why_absent(tags) == why
+    osm = OsmWriter()
+    osm.box(0, 0, 10, 10, building="yes")
+    osm.box(40, 0, 10, 10, **{k.replace(":", "__"): v for k, v in tags.items()})
+    city, found = read(osm.write(tmp_path / "city.osm"))
+    assert len(found) == (1 if why else 2)
+    kinds = {kind: number for kind, number, _ in city.faults.rows()}
+    expected = {f"{why} building, left out": 1} if why else {}
+    assert kinds == expected
+
+
+def height_above(one, x, y):
+    """Returns the intervals of a solid above a place, from its faces [m]."""
+    a, b, c = np.moveaxis(one.triangles, 1, 0)
+    p = np.array([x, y])
+    u, v, w = (q[:, :2] - p for q in (a, b, c))
+    cross = lambda s, t: s[:, 0] * t[:, 1] - s[:, 1] * t[:, 0]  # noqa: E731
+    sides = np.stack([cross(u, v), cross(v, w), cross(w, u)])
+    area = sides.sum(axis=0)
+    inside = ((sides > 0).all(axis=0) | (sides < 0).all(axis=0)) & (
+        np.abs(area) > 1e-9
+    )
+    z = (
+        sides[1] * a[:, 2] + sides[2] * b[:, 2] + sides[0] * c[:, 2]
+    ) / np.where(inside, area, 1.0)
+    return sorted(np.round(z[inside], 3).tolist())
+
+
+def test_a_part_takes_the_place_of_what_it_covers(tmp_path):
+    osm = OsmWriter()
+    # Another house, so that the origin is in between.
+    osm.box(-60, -10, 20, 20, building="yes", height="6")
+    tower = osm.box(20, -10, 40, 20, building="yes", height="30")
+    osm.box(20, -10, 10, 20, building__part="yes", height="40",
+            min_height="30")  # fmt: skip
+    porch = osm.box(20, 40, 40, 20, building="yes", height="10")
+    osm.box(20, 40, 40, 10, building__part="yes", height="9")
+    osm.box(20, 50, 40, 10, building__part="yes", height="8", min_height="4")
+    # The origin is the middle: (0, 25).
+    _, found = read(osm.write(tmp_path / "city.osm"))
+    one = found[f"building_w{tower}"]
+    # The block below the part stands, and the rest of the outline.
+    assert height_above(one, 25.0, -25.0) == [30.0, 30.0, 40.0]
+    assert height_above(one, 45.0, -25.0) == [30.0]
+    expected = 30.0 * 800 + 10.0 * 200
+    assert volume(one.triangles) == pytest.approx(expected, rel=2e-3)
+    # Parts that are all of a building leave room below an overhang.
+    one = found[f"building_w{porch}"]
+    assert height_above(one, 40.0, 20.0) == [9.0]
+    assert height_above(one, 40.0, 30.0) == [4.0, 8.0]
+
+
+def test_what_has_no_place_in_the_city_is_counted(tmp_path):
+    osm = OsmWriter()
+    osm.box(0, 0, 10, 10, building="yes", name="&#10;[red]x")
+    for k in range(3):
+        osm.node(20 + k, 0, highway="street_lamp")
+    osm.node(30, 0, amenity="bench")
+    osm.node(30, 1, natural="tree")
+    osm.node(30, 2, addr__housenumber="7")
+    osm.node(30, 3, shop="&#10;&#x202e;[bold]" + "x" * 200)
+    street = [osm.node(x, 30) for x in (0, 40)]
+    street.append(osm.node(80, 30, highway="crossing", crossing="unmarked"))
+    osm.way_of(street, highway="residential")
+    osm.way([(0, 60), (90, 60)], natural="coastline")
+    osm.way([(0, 50), (90, 50)], demolished__railway="rail")
+    water = osm.way([(0, 70), (90, 70)], waterway="river")
+    osm.relation({"": [water]}, type="waterway", name="a")
+    path = osm.write(tmp_path / "city.osm")
+    city, _ = read(path)
+    counts = {kind: number for kind, number, _ in city.faults.rows()}
+    (hostile,) = [kind for kind in counts if kind.startswith("shop=")]
+    assert hostile.isprintable()
+    assert len(hostile) <= 100
+    del counts[hostile]
+    assert counts == {
+        "highway=street_lamp, left out": 3,
+        "amenity=bench, left out": 1,
+        "address, left out": 1,
+        "highway=crossing, left out": 1,
+        "natural=coastline, left out": 1,
+        "demolished:railway, left out": 1,
+        "waterway=river, left out": 1,
+        "relation of type waterway, left out": 1,
+    }

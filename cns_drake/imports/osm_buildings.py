@@ -1,0 +1,148 @@
+"""Buildings of OpenStreetMap and their parts.
+
+https://wiki.openstreetmap.org/wiki/Simple_3D_Buildings
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely.geometry import Polygon
+from shapely.strtree import STRtree
+
+from cns_drake.imports.building_years import construction_year
+from cns_drake.imports.extrusions import extruded
+from cns_drake.imports.foreign_city import RED_ROOF, Imported, make_imported
+from cns_drake.imports.import_faults import ImportFaults
+from cns_drake.imports.osm_places import Local, parts_of, sound_parts
+from cns_drake.imports.osm_reading import OsmArea, Tags, is_told
+from cns_drake.imports.osm_tags import heights, why_absent
+
+# Parts that leave no more of an outline than this are all of the building.
+_ALL_OF_IT = 0.9
+# What parts leave of an outline is of no account where it is so narrow [m].
+_SLIVER = 0.25
+
+
+@dataclass(frozen=True)
+class _Block:
+    """A solid of a building: where, from and to which height, its roof."""
+
+    name: str
+    tags: Tags
+    polygon: Polygon
+    low: float
+    high: float
+    roof: float
+
+    def replaced(self, polygon: Polygon, low: float, high: float) -> _Block:
+        """Returns a block with a flat roof that is left of this one."""
+        plain = {k: v for k, v in self.tags.items() if k != "roof:shape"}
+        return _Block(self.name, plain, polygon, low, high, 0.0)
+
+
+def standing_buildings(
+    areas: Iterable[OsmArea], faults: ImportFaults
+) -> Iterator[OsmArea]:
+    """Yields the buildings and parts that stand above the ground."""
+    for one in areas:
+        absent = why_absent(one.tags)
+        if absent is None:
+            yield one
+        else:
+            faults.add(f"{absent} building, left out", one.name)
+
+
+def make_buildings(
+    told: Iterable[OsmArea],
+    local: Local,
+    year_attribute: str | None,
+    faults: ImportFaults,
+) -> Iterator[Imported]:
+    """Yields buildings; parts take the place of what they cover of them."""
+    outlines: list[_Block] = []
+    parts: list[_Block] = []
+    for name, tags, polygons in told:
+        low, high, roof = heights(tags, (name, faults))
+        group = parts if is_told(tags, "building:part") else outlines
+        for polygon in polygons:
+            for one in sound_parts(local.polygon(polygon), name, faults):
+                group.append(_Block(name, tags, one, low, high, roof))
+    of_outline: dict[int, list[_Block]] = {}
+    tree_of_outlines = STRtree([one.polygon for one in outlines])
+    alone = []
+    for part in parts:
+        inside = tree_of_outlines.query(
+            part.polygon.representative_point(), predicate="within"
+        )
+        if len(inside):
+            of_outline.setdefault(int(inside.min()), []).append(part)
+        else:
+            alone.append([part])
+    groups = [
+        (one, _with_parts(one, of_outline.get(k, [])))
+        for k, one in enumerate(outlines)
+    ]
+    groups += [(some[0], some) for some in alone]
+    taken: dict[str, int] = {}
+    for whole, blocks in groups:
+        walls, roofs = [], []
+        for block in blocks:
+            wall, top = extruded(
+                block.polygon,
+                block.low,
+                block.high,
+                whole.name,
+                faults,
+                block.tags.get("roof:shape", "flat"),
+                block.roof,
+            )
+            walls.append(wall)
+            roofs.append(top)
+        taken[whole.name] = taken.get(whole.name, 0) + 1
+        copy = taken[whole.name]
+        number = f"_{copy}" if copy > 1 else ""
+        yield make_imported(
+            f"building_{whole.name}{number}",
+            "building",
+            "Building",
+            {"body": np.concatenate(walls), "roof": np.concatenate(roofs)},
+            {"roof": RED_ROOF},
+            construction_year(whole.tags, year_attribute),
+        )
+
+
+def _with_parts(outline: _Block, parts: list[_Block]) -> list[_Block]:
+    """Returns the blocks of a building.
+
+    Where parts cover an outline, they are the building. Where they leave some
+    of it, that stands as the outline says; then they are additions to it, and
+    it also stands below those of them that begin above the ground.
+    """
+    if not parts:
+        return [outline]
+    covered = shapely.union_all([part.polygon for part in parts])
+    rest = outline.polygon.difference(covered.buffer(0.01))
+    blocks = list(parts)
+    if rest.area > (1.0 - _ALL_OF_IT) * outline.polygon.area:
+        by_bottom = sorted(parts, key=lambda part: part.low)
+        below = rest
+        for part in by_bottom:
+            # What no part that begins lower covers already.
+            shadow = part.polygon.difference(below)
+            top = min(part.low, outline.high)
+            if top > outline.low:
+                blocks += [
+                    outline.replaced(piece, outline.low, top)
+                    for piece in parts_of(shadow)
+                ]
+            below = shapely.union(below, part.polygon)
+    blocks += [
+        outline.replaced(piece, outline.low, outline.high)
+        for piece in parts_of(rest)
+        if not piece.buffer(-_SLIVER).is_empty
+    ]
+    return blocks
