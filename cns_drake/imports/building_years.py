@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+import datetime
 from enum import Enum
 from itertools import pairwise
 import re
 from typing import Any
 
 from cns_drake.base.errors import InputError
+from cns_drake.imports.import_faults import ImportFaults
 
 # The usual attributes, small letters, most telling first: 3DBAG, CityGML,
 # 3D BAG's forerunners, OpenStreetMap.
@@ -25,6 +27,10 @@ _USUAL = (
     "baujahr",
     "start_date",
 )
+# Written where the year is not known; the second in Dutch registers alone.
+_PLACEHOLDER = 9999
+_DUTCH_PLACEHOLDER = 1005
+_DUTCH = ("oorspronkelijkbouwjaar", "bouwjaar")
 _YEAR = re.compile(r"(?<!\d)(\d{3,4})(?!\d)")
 
 
@@ -37,21 +43,36 @@ class Undated(str, Enum):
 
 
 def construction_year(
-    attributes: Mapping[str, Any], attribute: str | None
+    attributes: Mapping[str, Any],
+    attribute: str | None,
+    name: str = "",
+    faults: ImportFaults | None = None,
 ) -> int | None:
     """Returns the year in which something was built, if it is told.
 
     Args:
         attributes: of the object.
         attribute: that tells it; one of the usual ones if None.
+        name: of the object.
+        faults: counts what stands in place of a year, and years to come.
     """
+    faults = faults or ImportFaults()
     if attribute is not None:
-        return _year(attributes.get(attribute))
-    lower = {name.lower(): value for name, value in attributes.items()}
-    for name in _USUAL:
-        year = _year(lower.get(name))
-        if year is not None:
-            return year
+        given = {attribute: attributes.get(attribute)}
+    else:
+        lower = {key.lower(): value for key, value in attributes.items()}
+        given = {key: lower[key] for key in _USUAL if key in lower}
+    for key, value in given.items():
+        year = _year(value)
+        if year is None:
+            continue
+        is_dutch = key.lower() in _DUTCH
+        if year == _PLACEHOLDER or (is_dutch and year == _DUTCH_PLACEHOLDER):
+            faults.add(f"{year} in place of a year, taken as none", name)
+            continue
+        if year > datetime.date.today().year:
+            faults.add("year after today", name)
+        return year
     return None
 
 
@@ -61,7 +82,7 @@ def _year(value: object) -> int | None:
     if isinstance(value, (int, float)):
         return int(value) if 1 <= value <= 9999 else None
     match = _YEAR.search(str(value))
-    return int(match[1]) if match else None
+    return (int(match[1]) or None) if match else None
 
 
 def stage_names(years: Sequence[int]) -> list[str]:

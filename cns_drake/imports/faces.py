@@ -14,6 +14,8 @@ from cns_drake.imports.import_faults import ImportFaults
 
 # A face is no face if it has less area [m^2].
 _LEAST_AREA = 1e-5
+# A face whose corners lie farther from its plane is bent [m].
+_BENT = 0.05
 # Corners are told apart by millimetres.
 _MM = 1000.0
 
@@ -45,6 +47,9 @@ def face_triangles(
     holes = [hole for hole in holes if len(hole) >= 3]
     if len(outer) == 3 and not holes:
         return outer[None]
+    heights = (outer - outer[0]) @ normal
+    if np.ptp(heights) > 2.0 * _BENT * np.linalg.norm(normal):
+        faults.add("face that is not plane, folded between its corners", name)
     if len(outer) == 4 and not holes and _is_convex(outer, normal):
         return outer[[[0, 1, 2], [0, 2, 3]]]
     return _filled(_Plane(normal, rings), outer, holes, name, faults)

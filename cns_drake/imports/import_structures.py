@@ -166,7 +166,10 @@ def _make(
         return None
     first = city.objects[root]
     semantic_class, rgb = _class_of(first.kind)
-    years = [construction_year(m.attributes, year_attribute) for m in members]
+    years = [
+        construction_year(one.attributes, year_attribute, name, city.faults)
+        for one in members
+    ]
     known = [year for year in years if year is not None]
     return make_imported(
         name,

@@ -111,7 +111,7 @@ def make_buildings(
             "Building",
             {"body": np.concatenate(walls), "roof": np.concatenate(roofs)},
             {"roof": RED_ROOF},
-            construction_year(whole.tags, year_attribute),
+            construction_year(whole.tags, year_attribute, whole.name, faults),
         )
 
 

@@ -19,6 +19,7 @@ from cns_drake.imports.opendrive.plan_view import (
     Shape,
     Spiral,
 )
+from cns_drake.imports.opendrive.road_links import count_dangling_links
 from cns_drake.imports.opendrive.road_model import (
     Cubics,
     ImportedRoad,
@@ -35,6 +36,7 @@ _KNOWN = frozenset(
         "arc",
         "border",
         "center",
+        "connection",
         "cornerLocal",
         "cornerRoad",
         "elevation",
@@ -43,6 +45,7 @@ _KNOWN = frozenset(
         "geometry",
         "header",
         "height",
+        "junction",
         "lane",
         "laneOffset",
         "laneSection",
@@ -50,6 +53,7 @@ _KNOWN = frozenset(
         "lateralProfile",
         "left",
         "line",
+        "link",
         "object",
         "objects",
         "outline",
@@ -57,6 +61,7 @@ _KNOWN = frozenset(
         "paramPoly3",
         "planView",
         "poly3",
+        "predecessor",
         "repeat",
         "right",
         "road",
@@ -65,6 +70,7 @@ _KNOWN = frozenset(
         "signals",
         "speed",
         "spiral",
+        "successor",
         "superelevation",
         "type",
         "width",
@@ -116,6 +122,7 @@ def read_roads(path: Path, faults: ImportFaults) -> RoadMap:
             together += road.length
     if not roads:
         raise InputError(f"{path}: no road in it")
+    count_dangling_links(top, faults)
     if together > _LONGEST_TOGETHER:
         raise InputError(
             f"{path}: {together / 1000:.0f} km of roads, at most"

@@ -86,3 +86,16 @@ def test_a_face_that_is_not_quite_flat_keeps_its_corners():
     triangles = face_triangles([points], "one", ImportFaults())
     heights = {round(z, 6) for z in triangles.reshape(-1, 3)[:, 2].tolist()}
     assert heights == {0.0, 0.3}
+
+
+@pytest.mark.parametrize("size", [0.09, 0.11])
+def test_faces_that_are_bent_are_counted(size):
+    # A corner lifted by h is h / 2 from the plane through the middle.
+    faults = ImportFaults()
+    ring = np.array([(0, 0, 0), (4, 0, size), (4, 4, 0), (0, 4, size)], float)
+    triangles = face_triangles([ring], "a", faults)
+    # Folded, and nowhere farther from the corners' heights.
+    assert len(triangles) == 2
+    assert set(map(tuple, triangles.reshape(-1, 3))) == set(map(tuple, ring))
+    counted = ("face that is not plane, folded between its corners", 1, "a")
+    assert faults.rows() == ([counted] if size > 0.1 else [])

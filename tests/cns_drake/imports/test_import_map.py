@@ -245,11 +245,43 @@ def test_options_that_cannot_be(tmp_path, capsys, options, fault):
         ({"oorspronkelijkbouwjaar": 0}, None),
         ({"oorspronkelijkbouwjaar": True}, None),
         ({"height": 1932}, None),
+        ({"oorspronkelijkbouwjaar": 9999}, None),
+        ({"bouwjaar": 1005, "start_date": "1932"}, 1932),
+        ({"year_built": "1005"}, 1005),
+        ({"start_date": "0000"}, None),
         ({"yearOfConstruction": "19321"}, None),
     ],
 )
 def test_years_are_found(attributes, year):
     assert construction_year(attributes, None) == year
+
+
+def test_years_that_are_none_or_to_come_are_counted(tmp_path):
+    city = CityWriter()
+    years = (9999, 1005, 9998, 1950, None)
+    for k, year in enumerate(years):
+        city.box(
+            f"house_{k}", 40.0 * k, 0.0, (20.0, 20.0, 6.0),
+            attributes={"oorspronkelijkbouwjaar": year},
+        )  # fmt: skip
+    source = city.write(tmp_path / "city.json")
+    for undated, more in (
+        (Undated.FIRST, set()),
+        (Undated.NEVER, {("building without a year, left out", 3, "house_0")}),
+    ):
+        report = import_city(
+            source,
+            tmp_path / undated.value,
+            ImportOptions((1900, 2000), undated=undated),
+        )
+        assert report.undated == 3
+        assert set(report.faults) == {
+            ("9999 in place of a year, taken as none", 1, "house_0"),
+            ("1005 in place of a year, taken as none", 1, "house_1"),
+            ("year after today", 1, "house_2"),
+            ("building built after the last stage, left out", 1, "house_2"),
+            *more,
+        }
 
 
 def test_a_year_of_one_s_own():

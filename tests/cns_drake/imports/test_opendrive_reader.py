@@ -222,3 +222,50 @@ def test_a_lane_of_nothing_among_others_is_paved(tmp_path):
     path = write_roads(tmp_path / "a.xodr", road("1", 50.0, [LINE], [lanes]))
     (one,) = read_roads(path, ImportFaults()).roads
     assert [b.kind for b in lane_bands(one)] == ["enclosed", "shoulder", "none"]
+
+
+def lane_link(end, number):
+    return f'<link><{end} id="{number}"/></link>'
+
+
+def test_links_to_nothing_are_counted(tmp_path):
+    linked = (
+        lane(1, "driving", 3.5),
+        lane(-1, "driving", 3.5, more=lane_link("successor", -2)),
+    )
+    fine = (lane(-1, "driving", 3.5, more=lane_link("predecessor", -1)),)
+    link = (
+        '<link><predecessor elementType="road" elementId="99999"/>'
+        '<successor elementType="road" elementId="2" contactPoint="start"/>'
+        "</link>"
+    )
+    junction = (
+        '<link><predecessor elementType="road" elementId="1"'
+        ' contactPoint="end"/><successor elementType="junction"'
+        ' elementId="{}"/></link>'
+    )
+    more = (
+        '<junction id="7"><connection id="0" incomingRoad="2"'
+        ' connectingRoad="0"/><connection id="1" incomingRoad="2"'
+        ' connectingRoad="3"/></junction>'
+    )
+    path = write_roads(
+        tmp_path / "a.xodr",
+        straight("1", 0, 0, 50, 0, lanes=linked, more=link),
+        straight("2", 50, 0, 90, 0, lanes=fine, more=junction.format(7)),
+        straight("3", 90, 0, 99, 0, junction="8", more=junction.format(9)),
+        more,
+    )
+    faults = ImportFaults()
+    assert len(read_roads(path, faults).roads) == 3
+    assert set(faults.rows()) == {
+        ("link to a road that is not in the file", 1, "1"),
+        ("link to a lane that is not in the file", 1, "1"),
+        (
+            "connection of a junction with a road that is not in the file",
+            1,
+            "junction 7",
+        ),
+        ("road of a junction that is not in the file", 1, "3"),
+        ("link to a junction that is not in the file", 1, "3"),
+    }
