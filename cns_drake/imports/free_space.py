@@ -100,43 +100,14 @@ def find_free_space(
     """
     low, high = _window(structures)
     size = np.ceil((high - low) / CELL).astype(int) + 1
-    shape = (int(size[1]), int(size[0]))
-    blocked = np.zeros(shape, dtype=bool)
-    roads = np.zeros(shape, dtype=bool)
-    water = np.zeros(shape, dtype=bool)
-    walls = [np.zeros((0, 3, 3))]
+    grid = _Grid(low, high, (int(size[1]), int(size[0])))
+    roads, water = grid.empty(), grid.empty()
     for one in structures:
         if one.structure.semantic_class == "road":
-            grid = roads
+            roads[grid.cells(one.triangles)] = True
         elif one.kind.startswith("Water"):
-            grid = water
-        elif one.is_ground:
-            continue
-        else:
-            grid = blocked
-        triangles = one.triangles
-        if grid is blocked:
-            corners = triangles.reshape(-1, 3)
-            above = corners[:, 2] - ground.height(corners[:, :2])
-            if above.max() < _KERB:
-                continue
-            lowest = above.reshape(-1, 3).min(axis=1)
-            highest = above.reshape(-1, 3).max(axis=1)
-            triangles = triangles[lowest < _HEADROOM]
-            walls.append(
-                one.triangles[(lowest < _HEADROOM) & (highest > _KERB)]
-            )
-        cells = [np.zeros(0, dtype=int)]
-        for points in surface_samples(triangles, _SAMPLE_SPACING, (low, high)):
-            if grid is blocked:
-                above = points[:, 2] - ground.height(points[:, :2])
-                points = points[above < _HEADROOM]
-            column, row = np.floor((points[:, :2] - low) / CELL).astype(int).T
-            cells.append(np.unique(row * shape[1] + column))
-        covered = np.concatenate(cells)
-        if one.structure.semantic_class == "building":
-            covered = _filled(covered, shape[1])
-        grid.ravel()[covered] = True
+            water[grid.cells(one.triangles)] = True
+    blocked, walls = _blocked(structures, ground, grid)
     free = ~(blocked | (water & ~roads))
     on_roads = False
     paved = binary_closing(roads, iterations=1) & ~blocked
@@ -145,7 +116,7 @@ def find_free_space(
     elif blocked.any():
         free &= _between(blocked)
     least = _FROM_EDGE if on_roads else _FROM_WALL
-    outlines = np.concatenate(walls)[:, [0, 1, 2, 0], :2]
+    outlines = walls[:, [0, 1, 2, 0], :2]
     return FreeSpace(
         low,
         _clearance(free),
@@ -155,22 +126,80 @@ def find_free_space(
     )
 
 
-def _filled(cells: np.ndarray, columns: int) -> np.ndarray:
-    """Returns cells (N,) of a grid, and those that they enclose.
+@dataclass(frozen=True)
+class _Grid:
+    """Cells of a window.
 
-    Args:
-        cells: row times `columns`, plus column.
-        columns: of the grid.
+    Attributes:
+        low, high: (2,) corners of the window [m].
+        shape: rows and columns.
     """
-    if len(cells) == 0:
-        return cells
-    row, column = np.divmod(cells, columns)
+
+    low: np.ndarray
+    high: np.ndarray
+    shape: tuple[int, int]
+
+    def empty(self) -> np.ndarray:
+        return np.zeros(self.shape, dtype=bool)
+
+    def cells(
+        self, triangles: np.ndarray, ground: Ground | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Returns rows and columns that triangles (M, 3, 3) cover.
+
+        Args:
+            triangles: in the window or not [m].
+            ground: above which only what a car could hit counts; all if None.
+        """
+        found = [np.zeros((2, 0), dtype=int)]
+        window = (self.low, self.high)
+        for points in surface_samples(triangles, _SAMPLE_SPACING, window):
+            if ground is not None:
+                above = points[:, 2] - ground.height(points[:, :2])
+                points = points[above < _HEADROOM]
+            cells = ((points[:, :2] - self.low) / CELL).astype(int)
+            found.append(cells.T[::-1])
+        row, column = np.concatenate(found, axis=1)
+        return row, column
+
+
+def _blocked(
+    structures: Sequence[Imported], ground: Ground, grid: _Grid
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the cells that are blocked, and (M, 3, 3) what blocks them.
+
+    The insides of buildings are blocked too.
+    """
+    blocked = grid.empty()
+    walls = [np.zeros((0, 3, 3))]
+    for one in structures:
+        if one.is_ground or one.kind.startswith("Water"):
+            continue
+        corners = one.triangles.reshape(-1, 3)
+        above = corners[:, 2] - ground.height(corners[:, :2])
+        if above.max() < _KERB:
+            continue
+        lowest = above.reshape(-1, 3).min(axis=1)
+        highest = above.reshape(-1, 3).max(axis=1)
+        is_low = lowest < _HEADROOM
+        walls.append(one.triangles[is_low & (highest > _KERB)])
+        row, column = grid.cells(one.triangles[is_low], ground)
+        if one.structure.semantic_class == "building" and len(row):
+            row, column = _filled(row, column)
+        blocked[row, column] = True
+    return blocked, np.concatenate(walls)
+
+
+def _filled(
+    row: np.ndarray, column: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns cells (N,), one or more, and those that they enclose."""
     first = np.array([row.min(), column.min()])
     shape = np.array([row.max(), column.max()]) - first + 1
     walls = np.zeros(shape, dtype=bool)
     walls[row - first[0], column - first[1]] = True
     row, column = np.nonzero(binary_fill_holes(walls))
-    return (row + first[0]) * columns + column + first[1]
+    return row + first[0], column + first[1]
 
 
 def _clearance(free: np.ndarray) -> np.ndarray:

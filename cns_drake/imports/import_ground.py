@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
@@ -17,7 +17,6 @@ from cns_drake.city.geometry.structures import (
     Structure,
 )
 from cns_drake.imports.foreign_city import Imported
-from cns_drake.imports.surface_sampling import surface_samples
 
 # Of the grid of a guessed ground, and how far it reaches beyond the city [m].
 CELL = 4.0
@@ -28,6 +27,9 @@ _MOST_CELLS = 500
 # so that pavements are seen and not it [m].
 _SMOOTHING = 1.5
 _DEPTH = 0.1
+# Of an edge that is not parted before, and points at once.
+_MOST_STEPS = 256
+_AT_ONCE = 1_000_000
 # Of flat things on the ground every such corner helps to find its height.
 _EVERY_CORNER = 7
 
@@ -151,7 +153,7 @@ def bottom_of(
     spacing = ground.cell / 2.0
     for one in structures:
         if one.is_ground:
-            for points in surface_samples(one.triangles, spacing):
+            for points in _lattice(one.triangles, spacing):
                 lowered = lowered.below(points)
     model = Model(
         (Part("surface", MeshShape(name)),),
@@ -159,3 +161,33 @@ def bottom_of(
         Point(0.0, 0.0).buffer(1.0),
     )
     return [Structure(name, "terrain", model, (0.0, 0.0, 0.0))]
+
+
+def _lattice(triangles: np.ndarray, spacing: float) -> Iterator[np.ndarray]:
+    """Yields points (N, 3) on triangles (M, 3, 3), as dense in all directions.
+
+    No place on a triangle is farther from all of them than the spacing.
+
+    Args:
+        triangles: to sample [m].
+        spacing: of the points [m].
+    """
+    while len(triangles):
+        edges = triangles - np.roll(triangles, 1, axis=1)
+        longest = np.linalg.norm(edges, axis=2).max(axis=1)
+        steps = np.maximum(1, np.ceil(longest / spacing)).astype(int)
+        for number in np.unique(steps[steps <= _MOST_STEPS]):
+            part = triangles[steps == number]
+            i, j = np.meshgrid(np.arange(number + 1), np.arange(number + 1))
+            inside = i + j <= number
+            u, v = i[inside] / number, j[inside] / number
+            weights = np.stack([1.0 - u - v, u, v], axis=1)
+            most = max(1, _AT_ONCE // len(weights))
+            for first in range(0, len(part), most):
+                some = part[first : first + most]
+                yield np.einsum("kc,mcx->mkx", weights, some).reshape(-1, 3)
+        # Large ones in four.
+        a, b, c = np.moveaxis(triangles[steps > _MOST_STEPS], 1, 0)
+        ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+        quarters = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
+        triangles = np.concatenate([np.stack(q, axis=1) for q in quarters])
