@@ -11,8 +11,9 @@ import shutil
 import yaml
 
 from cns_drake.base.files import part_path, user_errors
-from cns_drake.city.generation.generate import TABLE_NAME, structure_table
-from cns_drake.city.generation.sdf import MESH_FOLDER, stage_sdf
+from cns_drake.base.map_folder import MESH_FOLDER, STRUCTURES_NAME, stage_name
+from cns_drake.city.generation.generate import structure_table
+from cns_drake.city.generation.sdf import stage_sdf
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.imports.foreign_city import ForeignCity
 from cns_drake.imports.import_report import ImportOptions
@@ -50,14 +51,14 @@ def write_world(
         bottom: the ground below them, at all stages.
     """
     structures = [*bottom, *(one.structure for one in city.kept)]
-    (draft / TABLE_NAME).write_text(structure_table(structures), "utf-8")
+    (draft / STRUCTURES_NAME).write_text(structure_table(structures), "utf-8")
     for stage, some in city.standing.items():
         text = stage_sdf(
             f"{draft.name}_{stage}",
             [*bottom, *(one.structure for one in some)],
             comment=f"Imported by cns-drake from {source.name}.",
         )
-        (draft / f"stage_{stage}.sdf").write_text(text, "utf-8")
+        (draft / stage_name(stage)).write_text(text, "utf-8")
     # Trees of a kind share theirs.
     meshes = {
         name: mesh
