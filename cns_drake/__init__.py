@@ -45,6 +45,8 @@ if TYPE_CHECKING:
     )
     from cns_drake.sensors.measurement import MeasurementModel
     from cns_drake.sensors.odometry import Odometry, add_odometry
+    from cns_drake.sensors.returns.calibrated import CalibratedReturns
+    from cns_drake.sensors.returns.weather import Weather
     from cns_drake.sensors.spinning_pattern import SpinningPattern
     from cns_drake.simulation.run_progress import Run
     from cns_drake.simulation.sensor_recording import add_mcap_recorder
@@ -55,6 +57,7 @@ __all__ = [
     "LIDAR_PRESETS",
     "BagWriter",
     "BeamPattern",
+    "CalibratedReturns",
     "DirectionPattern",
     "Imu",
     "InputError",
@@ -68,6 +71,7 @@ __all__ = [
     "Scenario",
     "SpinningPattern",
     "VehicleMotion",
+    "Weather",
     "World",
     "__version__",
     "add_imu",
@@ -114,6 +118,8 @@ _HOMES = {
     "cns_drake.sensors.livox_patterns": ("NoddingPattern", "RosettePattern"),
     "cns_drake.sensors.measurement": ("MeasurementModel",),
     "cns_drake.sensors.odometry": ("Odometry", "add_odometry"),
+    "cns_drake.sensors.returns.calibrated": ("CalibratedReturns",),
+    "cns_drake.sensors.returns.weather": ("Weather",),
     "cns_drake.sensors.spinning_pattern": ("SpinningPattern",),
     "cns_drake.simulation.sensor_recording": ("add_mcap_recorder",),
     "cns_drake.simulation.run_progress": ("Run",),

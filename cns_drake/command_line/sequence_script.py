@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from cns_drake.base import terminal
 from cns_drake.base.interrupts import uninterrupted
@@ -19,6 +19,7 @@ from cns_drake.command_line.options import (
 )
 
 if TYPE_CHECKING:
+    from cns_drake.scenarios.weather_config import WeatherConfig
     from cns_drake.simulation.run_progress import Run
 
 
@@ -28,6 +29,8 @@ def run_sequence(
     *,
     frames: int | None = None,
     lidar: str | None = None,
+    returns: Literal["ideal", "calibrated"] | None = None,
+    weather: WeatherConfig | None = None,
     recording: Path | None = None,
     graphviz: Path | None = None,
     overwrite: bool = False,
@@ -39,6 +42,8 @@ def run_sequence(
         output: the folder of recordings.
         frames: record only so many frames.
         lidar: preset that replaces the scenario's LiDARs.
+        returns: `ideal` or `calibrated`, in place of the scenario's.
+        weather: in place of the scenario's.
         recording: where to save a web page of the drive.
         graphviz: where to save the Diagram as Graphviz text.
         overwrite: replace an existing recording.
@@ -61,6 +66,8 @@ def run_sequence(
     scenario = load_scenario(name_or_file)
     if lidar is not None:
         scenario = scenario.with_lidar_preset(lidar)
+    if returns is not None:
+        scenario = scenario.with_returns(returns, weather)
     if frames is not None:
         scenario = scenario.model_copy(update={"frames": frames})
     with show_progress() as progress:

@@ -22,6 +22,13 @@ from cns_drake.command_line.options import (
     Recording,
     Scheduler,
 )
+from cns_drake.command_line.return_options import (
+    Fog,
+    Rain,
+    Returns,
+    Snowfall,
+    choose_returns,
+)
 
 
 def simulate(
@@ -35,6 +42,10 @@ def simulate(
     output: Output,
     frames: Frames = None,
     lidar: LidarPreset = None,
+    returns: Returns = None,
+    fog: Fog = None,
+    rain: Rain = 0.0,
+    snowfall: Snowfall = 0.0,
     recording: Recording = None,
     graphviz: Graphviz = None,
     overwrite: Overwrite = False,
@@ -46,11 +57,14 @@ def simulate(
     with uninterrupted():
         from cns_drake.command_line.sequence_script import run_sequence
 
+    chosen, weather = choose_returns(returns, fog, rain, snowfall)
     run_sequence(
         scenario,
         output,
         frames=frames,
         lidar=lidar,
+        returns=chosen,
+        weather=weather,
         recording=recording,
         graphviz=graphviz,
         overwrite=overwrite,
@@ -72,6 +86,13 @@ def scan(
         Path, typer.Option(help="Where to save: .pcd, .bin or .npy.")
     ],
     lidar: Annotated[str, LIDAR_OPTION] = "cns",
+    returns: Returns = None,
+    seed: Annotated[
+        int, typer.Option(min=0, metavar="N", help="Seed of noise and weather.")
+    ] = 0,
+    fog: Fog = None,
+    rain: Rain = 0.0,
+    snowfall: Snowfall = 0.0,
     model_path: Annotated[
         list[Path] | None,
         typer.Option(
@@ -87,7 +108,8 @@ def scan(
         from pydrake.math import RigidTransform, RollPitchYaw
 
         from cns_drake.scenarios.lidar_config import make_lidar_config
-        from cns_drake.scenarios.sensor_making import make_pattern
+        from cns_drake.scenarios.sensor_making import make_pattern, make_returns
+        from cns_drake.scenarios.weather_config import WeatherConfig
         from cns_drake.scene.surfaces import LARGEST_SIZE
         from cns_drake.scene.world import load_world
         from cns_drake.simulation.scanning import (
@@ -101,12 +123,16 @@ def scan(
     if max(map(abs, pose)) > LARGEST_SIZE:
         raise InputError(f"--pose: {pose} is beyond {LARGEST_SIZE:g} m or rad")
     check_ending(output)
-    pattern = make_pattern(make_lidar_config(lidar))
+    config = make_lidar_config(lidar)
+    pattern = make_pattern(config)
     X_WS = RigidTransform(RollPitchYaw(*pose[3:]), pose[:3])
     loaded = load_world(world, model_paths=model_path or ())
     for text in loaded.notes:
         note(text)
-    points = scan_world(loaded, X_WS, pattern)
+    chosen, weather = choose_returns(returns, fog, rain, snowfall)
+    config = config.model_copy(update={"returns": chosen or "ideal"})
+    model = make_returns(config, weather or WeatherConfig(), "lidar", seed)
+    points = scan_world(loaded, X_WS, pattern, model)
     save_scan(points, output)
     typer.echo(f"{output}: {len(points)} points")
 

@@ -16,6 +16,7 @@ import numpy as np
 from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
 
+from cns_drake.ray_casting.facing import face_origins
 from cns_drake.ray_casting.group_motion import Motion
 from cns_drake.ray_casting.half_spaces import cast_on_planes
 from cns_drake.ray_casting.ray_groups import (
@@ -47,11 +48,23 @@ class RayHits:
         geometry: (N,) int32 index into the scene's geometries, -1 for a miss.
         normals_W: (N, 3) float32 unit normal in the world, facing the ray's
             origin, zero for a miss; (N, 0) unless asked for.
+        is_outside: (N,) whether the ray met the outside of a surface, by its
+            winding; (0,) unless normals are asked for.
     """
 
     ranges: np.ndarray
     geometry: np.ndarray
     normals_W: np.ndarray
+    is_outside: np.ndarray
+
+    def take(self, rows: np.ndarray) -> RayHits:
+        """Returns what the rays of some rows met; they have normals."""
+        return RayHits(
+            self.ranges[rows],
+            self.geometry[rows],
+            self.normals_W[rows],
+            self.is_outside[rows],
+        )
 
 
 class RayCastingScene:
@@ -176,26 +189,49 @@ class RayCastingScene:
         hits = self._scene.cast_rays(rays, with_normals)
         if self._planes:
             cast_on_planes(self._planes, rays, hits)
-        normals_W = hits.normals
+        is_outside = np.zeros(0, bool)
         if with_normals:
-            normals_W = self._face_rays(hits, rays)
+            is_outside = self._face_rays(hits, rays)
         return RayHits(
-            hits.ranges, self._index_of_slot.take(hits.owner), normals_W
+            hits.ranges,
+            self._index_of_slot.take(hits.owner),
+            hits.normals,
+            is_outside,
         )
 
     def _face_rays(self, hits: Hits, rays: Rays) -> np.ndarray:
-        """Returns unit world normals, turned towards the rays' origins."""
-        normals = hits.normals
-        for row, placed in enumerate(self._groups):
-            if not placed.is_merged_world:
-                of_group = hits.group == row
-                # Normals transform by the inverse transpose.
-                normals[of_group] @= np.linalg.inv(placed.X_OL[:, :3])
-        length = np.linalg.norm(normals, axis=1, keepdims=True)
-        normals /= np.where(length > 0.0, length, 1.0)
-        away = np.einsum("ij,ij->i", normals, rays.d_Oset()) > 0.0
-        normals[away] *= -1.0
-        return normals
+        """Turns normals towards the rays' origins; see `face_origins`.
+
+        Returns:
+            (N,) whether each ray has met the outside of a surface.
+        """
+        is_outside = np.zeros(len(hits.group), bool)
+        maps = [
+            np.eye(3)
+            if group.is_merged_world
+            # Normals transform by the inverse transpose.
+            else np.linalg.inv(group.X_OL[:, :3]).T
+            for group in self._groups
+        ]
+        face_origins(
+            hits.normals,
+            hits.group,
+            np.reshape(maps, (-1, 3, 3)),
+            rays.R_OSset,
+            rays.d_Sset,
+            is_outside,
+        )
+        return is_outside
+
+
+def join_hits(first: RayHits, second: RayHits) -> RayHits:
+    """Returns the hits of two casts with normals, one after the other."""
+    return RayHits(
+        np.concatenate([first.ranges, second.ranges]),
+        np.concatenate([first.geometry, second.geometry]),
+        np.concatenate([first.normals_W, second.normals_W]),
+        np.concatenate([first.is_outside, second.is_outside]),
+    )
 
 
 def _assign_slots(

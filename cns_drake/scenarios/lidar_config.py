@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Annotated, Literal
+
 from pydantic import (
     Field,
+    PlainSerializer,
     ValidationError,
     field_validator,
     model_validator,
@@ -11,7 +14,9 @@ from pydantic import (
 
 from cns_drake.base.errors import InputError, describe_validation_error
 from cns_drake.scenarios.mount import Mount, Triple
+from cns_drake.scenarios.section import field_off_by_default
 from cns_drake.sensors.lidar_presets import LIDAR_PRESETS
+from cns_drake.sensors.returns.echo_choice import Echoes
 
 
 class LidarConfig(Mount):
@@ -29,6 +34,9 @@ class LidarConfig(Mount):
             falling linearly with intensity to none for full intensity.
         motion_distortion: whether each column is cast from the sensor's pose
             at its own firing time, instead of all from that at the stamp.
+        returns: `ideal`, or `calibrated` by the data sheet of the unit: what
+            returns, how far off, and how bright.
+        echoes: which echoes of a beam calibrated returns report.
     """
 
     xyz: Triple = (0.0, 0.0, 1.6)
@@ -42,6 +50,10 @@ class LidarConfig(Mount):
     dropout: float = Field(default=0.0, ge=0.0, le=1.0)
     faint_dropout: float = Field(default=0.0, ge=0.0, le=1.0)
     motion_distortion: bool = False
+    returns: Literal["ideal", "calibrated"] = field_off_by_default("ideal")
+    echoes: Annotated[Echoes, PlainSerializer(lambda echoes: echoes.value)] = (
+        field_off_by_default(Echoes.STRONGEST)
+    )
 
     @field_validator("preset")
     @classmethod
@@ -50,6 +62,19 @@ class LidarConfig(Mount):
             known = ", ".join(LIDAR_PRESETS)
             raise ValueError(f"unknown preset '{preset}'; known: {known}")
         return preset
+
+    @model_validator(mode="after")
+    def _check_returns(self) -> LidarConfig:
+        if self.returns == "ideal":
+            if self.echoes != Echoes.STRONGEST:
+                raise ValueError("echoes: choices need returns: calibrated")
+            return self
+        for field in ("range_noise", "dropout", "faint_dropout"):
+            if getattr(self, field):
+                raise ValueError(
+                    f"{field}: calibrated returns have their own; leave it out"
+                )
+        return self
 
     @model_validator(mode="after")
     def _check_unit(self) -> LidarConfig:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
-from pydantic import Field, PrivateAttr, field_validator
+from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from cns_drake.motion.speeds import Speeds
 from cns_drake.roads.route import Route
@@ -18,6 +18,8 @@ from cns_drake.scenarios.imu_config import ImuConfig
 from cns_drake.scenarios.lidar_config import LidarConfig
 from cns_drake.scenarios.ride_config import RideConfig
 from cns_drake.scenarios.section import Name, Section, field_off_by_default
+from cns_drake.scenarios.weather_config import WeatherConfig
+from cns_drake.sensors.returns.echo_choice import Echoes
 
 # A default is checked as well: a field that is missing may be needed.
 _Optional = Field(default=None, validate_default=True)
@@ -48,6 +50,7 @@ class Scenario(Section):
         ride: how springs and the road move the body.
         lidars: the LiDARs by name; the name gives frame and topic.
         imu: the IMU.
+        weather: fog, rain and snowfall, for LiDARs with calibrated returns.
         frames: how many frames to record; all of the route by default.
         seed: of everything random: the noise of LiDARs that have any.
 
@@ -96,6 +99,7 @@ class Scenario(Section):
         default={"lidar": LidarConfig()}, min_length=1
     )
     imu: ImuConfig = ImuConfig()
+    weather: WeatherConfig = field_off_by_default(WeatherConfig())
     frames: int | None = Field(default=None, ge=1)
     seed: int = Field(default=0, ge=0)
 
@@ -110,6 +114,16 @@ class Scenario(Section):
             raise ValueError(f"'{taken.pop()}' is the name of another frame")
         return lidars
 
+    @model_validator(mode="after")
+    def _check_weather(self) -> Scenario:
+        ideal = [n for n, c in self.lidars.items() if c.returns == "ideal"]
+        if ideal and not self.weather.weather().is_clear:
+            raise ValueError(
+                "weather: ideal returns feel none; give lidars."
+                f"{ideal[0]}.returns: calibrated"
+            )
+        return self
+
     def __eq__(self, other: object) -> bool:
         """Tells whether two are the same, wherever they were read from."""
         if not isinstance(other, Scenario):
@@ -120,6 +134,32 @@ class Scenario(Section):
     def source(self) -> str:
         """What errors begin with: its file, or else its name."""
         return str(self._file or self.name)
+
+    def with_returns(
+        self,
+        returns: Literal["ideal", "calibrated"],
+        weather: WeatherConfig | None = None,
+    ) -> Scenario:
+        """Returns the scenario with other returns of every LiDAR.
+
+        Args:
+            returns: see `LidarConfig`. Noise and losses of ideal returns go
+                where they are calibrated, weather where they are ideal.
+            weather: in place of the scenario's.
+        """
+        if returns == "ideal":
+            update: dict = {"returns": returns, "echoes": Echoes.STRONGEST}
+            weather = WeatherConfig()
+        else:
+            off = ("range_noise", "dropout", "faint_dropout")
+            update = {"returns": returns, **dict.fromkeys(off, 0.0)}
+        lidars = {
+            name: config.model_copy(update=update)
+            for name, config in self.lidars.items()
+        }
+        return self.model_copy(
+            update={"lidars": lidars, "weather": weather or self.weather}
+        )
 
     def with_lidar_preset(self, preset: str) -> Scenario:
         """Returns the scenario with the unit of every LiDAR replaced.

@@ -9,9 +9,11 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from cns_drake.recording.frame_clock import FRAME_PERIOD
 from cns_drake.scenarios.lidar_config import LidarConfig
 from cns_drake.scenarios.mount import Mount
+from cns_drake.scenarios.weather_config import WeatherConfig
 from cns_drake.sensors.beam_pattern import BeamPattern
 from cns_drake.sensors.lidar_presets import make_beam_pattern
 from cns_drake.sensors.measurement import MeasurementModel
+from cns_drake.sensors.returns.calibrated import CalibratedReturns
 
 
 def sensor_pose(mount: Mount) -> RigidTransform:
@@ -28,6 +30,28 @@ def make_pattern(config: LidarConfig) -> BeamPattern:
         num_columns=config.columns,
         min_range=config.min_range,
         max_range=config.max_range,
+    )
+
+
+def make_returns(
+    config: LidarConfig, weather: WeatherConfig, name: str, seed: int
+) -> CalibratedReturns | None:
+    """Returns how a LiDAR measures like a real unit; None for ideal returns.
+
+    Args:
+        config: the LiDAR.
+        weather: in which it measures.
+        name: its name.
+        seed: of the scenario.
+    """
+    if config.returns == "ideal":
+        return None
+    return CalibratedReturns.of_preset(
+        config.preset,
+        echoes=config.echoes,
+        weather=weather.weather(),
+        seed=seed,
+        sensor_name=name,
     )
 
 

@@ -15,6 +15,7 @@ from pydrake.geometry import (
     Ellipsoid,
     FrameId,
     GeometryId,
+    GeometryProperties,
     HalfSpace,
     Mesh,
     MeshcatCone,
@@ -63,6 +64,8 @@ class PerceptionGeometry:
         X_FG: its pose in F.
         surface: its shape in G.
         rgb: diffuse colour, None where the model gives none.
+        reflectivity: the property ("lidar", "reflectivity"), 0 to 1; None
+            where there is none.
     """
 
     geometry_id: GeometryId
@@ -71,6 +74,7 @@ class PerceptionGeometry:
     X_FG: RigidTransform
     surface: Surface
     rgb: tuple[float, float, float] | None
+    reflectivity: float | None = None
 
     @property
     def structure(self) -> str:
@@ -137,6 +141,7 @@ class _Record(NamedTuple):
     pose: bytes
     shape: tuple
     rgb: tuple[float, float, float] | None
+    reflectivity: float | None
 
 
 class GeometryReader:
@@ -188,6 +193,7 @@ class GeometryReader:
                             ),
                             surface=_surface(record.name, shape, meshes),
                             rgb=record.rgb,
+                            reflectivity=record.reflectivity,
                         ),
                     )
                 self._known[geometry_id] = entry
@@ -207,17 +213,34 @@ class GeometryReader:
             inspector.GetFrameId(geometry_id),
             inspector.GetPoseInFrame(geometry_id).GetAsMatrix34().tobytes(),
             _shape_key(inspector.GetShape(geometry_id)),
-            self._diffuse_rgb(inspector, geometry_id),
+            *self._appearance(name, inspector, geometry_id),
         )
 
-    def _diffuse_rgb(
-        self, inspector: SceneGraphInspector, geometry_id: GeometryId
-    ) -> tuple[float, float, float] | None:
+    def _appearance(
+        self, name: str, inspector: SceneGraphInspector, geometry_id: GeometryId
+    ) -> tuple[tuple[float, float, float] | None, float | None]:
+        """Returns colour and reflectivity, None where the model has none."""
         properties = inspector.GetProperties(geometry_id, self._role)
-        if not properties.HasProperty("phong", "diffuse"):
-            return None
-        rgba = properties.GetProperty("phong", "diffuse")
-        return (rgba.r(), rgba.g(), rgba.b())
+        reflectivity = None
+        if properties.HasProperty("lidar", "reflectivity"):
+            reflectivity = float(
+                properties.GetProperty("lidar", "reflectivity")
+            )
+            if not 0.0 <= reflectivity <= 1.0:
+                raise InputError(
+                    f"geometry '{name}': lidar/reflectivity: {reflectivity} "
+                    "is not within 0 to 1"
+                )
+        return _diffuse_rgb(properties), reflectivity
+
+
+def _diffuse_rgb(
+    properties: GeometryProperties,
+) -> tuple[float, float, float] | None:
+    if not properties.HasProperty("phong", "diffuse"):
+        return None
+    rgba = properties.GetProperty("phong", "diffuse")
+    return (rgba.r(), rgba.g(), rgba.b())
 
 
 def _shape_key(shape: Shape) -> tuple:

@@ -4,6 +4,7 @@
 # trained networks of that dataset understand our labels unchanged.
 CLASS_IDS = {
     "unlabeled": 0,
+    "outlier": 1,
     "car": 10,
     "bicycle": 11,
     "bus": 13,
@@ -39,6 +40,7 @@ OTHER_MOVING_ID = 259
 # lightness as well as in hue.
 CLASS_RGB = {
     "unlabeled": (0.55, 0.55, 0.55),
+    "outlier": (0.75, 0.78, 0.82),
     "car": (0.30, 0.45, 0.75),
     "bicycle": (0.35, 0.60, 0.80),
     "bus": (0.30, 0.45, 0.75),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+import math
 from pathlib import Path
 
 from cns_drake.base.csv_files import read_records
@@ -21,11 +22,14 @@ class StructureEntry:
         instance: id from 1 to 65535; 0 stands for no structure.
         name: the structure's name.
         semantic_class: a key of `CLASS_IDS`.
+        reflectivity: of its surfaces near 900 nm, 0 to 1; None where its
+            class and colours say it.
     """
 
     instance: int
     name: str
     semantic_class: str
+    reflectivity: float | None = None
 
     @property
     def label(self) -> int:
@@ -69,6 +73,8 @@ class StructureTable:
 def load_structure_table(path: Path) -> StructureTable:
     """Reads a CSV file with columns `instance`, `name` and `class`.
 
+    A column `reflectivity` may be there; a cell of it may be empty.
+
     Raises:
         InputError: the file lacks a column or a row is not usable.
     """
@@ -96,5 +102,24 @@ def load_structure_table(path: Path) -> StructureTable:
         if not name or name in entries:
             raise InputError(f"{where}: name: '{name}' is not a new name")
         instances.add(instance)
-        entries[name] = StructureEntry(instance, name, semantic_class)
+        entries[name] = StructureEntry(
+            instance,
+            name,
+            semantic_class,
+            _reflectivity(row.get("reflectivity", ""), where),
+        )
     return StructureTable(entries.values())
+
+
+def _reflectivity(text: str, where: str) -> float | None:
+    if not text:
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 <= value <= 1.0:
+        raise InputError(
+            f"{where}: reflectivity: {text!r} is not a number from 0 to 1"
+        )
+    return value

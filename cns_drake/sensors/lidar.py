@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from functools import cached_property
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
@@ -15,8 +16,12 @@ from pydrake.systems.framework import Context, LeafSystem, ValueProducer
 from cns_drake.ray_casting.group_motion import Motion
 from cns_drake.scene.structure_table import StructureTable
 from cns_drake.sensors.beam_pattern import POINT_DTYPE, BeamPattern, Beams
-from cns_drake.sensors.measurement import IDEAL, MeasurementModel
+from cns_drake.sensors.measurement import IDEAL, MeasurementModel, Returns
 from cns_drake.sensors.point_assembly import BeamTable, assemble_points
+from cns_drake.sensors.returns.calibrated import (
+    CalibratedReturns,
+    CalibratedTurn,
+)
 from cns_drake.sensors.seen_geometry import SeenGeometry, Sight
 
 
@@ -79,6 +84,7 @@ class Lidar(LeafSystem):
         pattern: BeamPattern,
         *,
         measurement: MeasurementModel = IDEAL,
+        returns: CalibratedReturns | None = None,
         with_sweep: bool = False,
         moving_bodies: Mapping[FrameId, int] | None = None,
         role: Role = Role.kPerception,
@@ -94,6 +100,8 @@ class Lidar(LeafSystem):
             X_PS: pose of the sensor in P.
             pattern: the beams.
             measurement: what it makes of true ranges.
+            returns: how it measures like a real unit; then `measurement`
+                gives the resolution alone. None for ideal returns.
             with_sweep: whether the port `sweep` tells its poses.
             moving_bodies: frame -> index of the body of it in the port
                 `body_spatial_velocities`, which there is if this is given.
@@ -112,6 +120,7 @@ class Lidar(LeafSystem):
         self._X_PS = X_PS
         self._pattern = pattern
         self._measurement = measurement
+        self._returns = returns
         sight = Sight(
             role,
             parent_frame_id,
@@ -243,18 +252,8 @@ class Lidar(LeafSystem):
             times = times[columns]
             if len(p_WSset) > 1:
                 p_WSset, R_WSset = p_WSset[columns], R_WSset[columns]
-        hits = seen.scene.cast_rays(
-            p_WSset,
-            turn.d_Sset_cast,
-            self._measurement.reach(self._pattern.max_range),
-            R_WSset=R_WSset,
-            times=times,
-        )
-        beams, ranges, intensity = self._measurement.measure(
-            hits.ranges.take(turn.table.place),
-            self._pattern.min_range,
-            self._pattern.max_range,
-            frame,
+        met, (beams, ranges, intensity) = self._measure(
+            seen, turn, p_WSset, R_WSset, times, frame
         )
         # Zeros, so that the padding between fields is defined, too.
         scan = np.zeros(len(beams), POINT_DTYPE)
@@ -264,12 +263,50 @@ class Lidar(LeafSystem):
             beams,
             ranges,
             intensity,
-            hits.geometry,
+            met,
             seen.label,
             seen.instance,
             np.float32(self._measurement.resolution),
         )
         output.set_value(scan)
+
+    def _measure(
+        self,
+        seen: SeenGeometry,
+        turn: _Turn,
+        p_WSset: np.ndarray,
+        R_WSset: np.ndarray,
+        times: np.ndarray,
+        frame: int,
+    ) -> tuple[np.ndarray, Returns]:
+        """Returns what each return has met, and the returns."""
+        assert seen.scene is not None
+        if self._returns is not None:
+            reported = self._returns.measure(
+                seen.scene,
+                seen.materials(is_wet=self._returns.is_wet),
+                self._pattern,
+                turn.calibrated,
+                p_WSset,
+                R_WSset,
+                times,
+                frame,
+            )
+            return reported.geometry, Returns(*reported[:3])
+        hits = seen.scene.cast_rays(
+            p_WSset,
+            turn.d_Sset_cast,
+            self._measurement.reach(self._pattern.max_range),
+            R_WSset=R_WSset,
+            times=times,
+        )
+        returns = self._measurement.measure(
+            hits.ranges.take(turn.table.place),
+            self._pattern.min_range,
+            self._pattern.max_range,
+            frame,
+        )
+        return hits.geometry[turn.table.place[returns.beams]], returns
 
     def _frame(self, context: Context) -> int:
         return round(context.get_time() / self._pattern.period)
@@ -295,7 +332,11 @@ class Lidar(LeafSystem):
             self._revision.ticket(),
             *self._pose_prerequisites(),
         }
-        if self._measurement.is_random or not self._pattern.repeats:
+        if (
+            self._measurement.is_random
+            or self._returns is not None
+            or not self._pattern.repeats
+        ):
             prerequisites.add(self.time_ticket())
         return prerequisites
 
@@ -355,6 +396,10 @@ class _Turn:
             beams.t_ns,
             np.argsort(beams.packet_order),
         )
+
+    @cached_property
+    def calibrated(self) -> CalibratedTurn:
+        return CalibratedTurn(self.beams)
 
 
 def _fill(point_cloud: PointCloud, p_FRset: np.ndarray) -> None:

@@ -21,6 +21,7 @@ from cns_drake.sensors.lidar_arguments import (
 )
 from cns_drake.sensors.lidar_presets import make_beam_pattern
 from cns_drake.sensors.measurement import MeasurementModel
+from cns_drake.sensors.returns.calibrated import CalibratedReturns
 
 
 def add_lidar(
@@ -37,6 +38,7 @@ def add_lidar(
     range_noise: float = 0.0,
     dropout: float = 0.0,
     seed: int = 0,
+    returns: CalibratedReturns | str = "ideal",
     **options: Any,
 ) -> Lidar:
     """Adds a LiDAR to a diagram and connects it to the SceneGraph.
@@ -59,9 +61,11 @@ def add_lidar(
             plant itself.
         range_noise: standard deviation of the ranges [m].
         dropout: probability that a return is lost.
-        seed: of both. What is measured depends on it, on the name and on the
-            number of the frame. `measurement` of `Lidar` takes the place of
-            these three.
+        seed: of both, and of calibrated returns. What is measured depends on
+            it, on the name and on the number of the frame. `measurement` of
+            `Lidar` takes the place of these three.
+        returns: `ideal`, `calibrated` by the data sheet of a preset, or a
+            model of one's own.
         options: further arguments of `Lidar`.
 
     Returns:
@@ -73,7 +77,8 @@ def add_lidar(
         RuntimeError: the body is not registered with a SceneGraph.
         TypeError: an argument is not what it should be.
         ValueError: the diagram has a system of that name, the noise cannot
-            be, or motion distortion is wanted of what is no body.
+            be, motion distortion is wanted of what is no body, or calibrated
+            returns of what is no preset.
 
     Warns:
         UserWarning: the SceneGraph holds nothing that the LiDAR could see.
@@ -86,17 +91,9 @@ def add_lidar(
     """
     check_lidar_arguments(builder, name, body, X_PS, pattern)
     warn_of_nothing_to_see(scene_graph, options.get("role", Role.kPerception))
-    if range_noise or dropout or seed:
-        if "measurement" in options:
-            raise ValueError(
-                "measurement: give either it or range_noise, dropout and seed"
-            )
-        options["measurement"] = MeasurementModel(
-            range_noise=range_noise,
-            dropout=dropout,
-            seed=seed,
-            sensor_name=name,
-        )
+    _choose_measuring(
+        options, pattern, returns, name, range_noise, dropout, seed
+    )
     if not isinstance(body, FrameId):
         body, X_PS = body_and_pose(body, X_PS)
     if isinstance(pattern, str):
@@ -129,6 +126,44 @@ def add_lidar(
         port = "body_spatial_velocities"
         connect_motion(builder, motion, body, {port: lidar.GetInputPort(port)})
     return lidar
+
+
+def _choose_measuring(
+    options: dict[str, Any],
+    pattern: BeamPattern | str,
+    returns: CalibratedReturns | str,
+    name: str,
+    range_noise: float,
+    dropout: float,
+    seed: int,
+) -> None:
+    """Sets the options of `Lidar` that say how it measures."""
+    if returns == "calibrated" and isinstance(pattern, str):
+        returns = CalibratedReturns.of_preset(
+            pattern, seed=seed, sensor_name=name
+        )
+    if isinstance(returns, CalibratedReturns):
+        if range_noise or dropout:
+            raise ValueError(
+                "range_noise, dropout: calibrated returns have their own"
+            )
+        options["returns"] = returns
+    elif returns != "ideal":
+        raise ValueError(
+            f"returns: {returns!r}: give 'ideal', 'calibrated' with the name "
+            "of a preset as pattern, or CalibratedReturns"
+        )
+    elif range_noise or dropout or seed:
+        if "measurement" in options:
+            raise ValueError(
+                "measurement: give either it or range_noise, dropout and seed"
+            )
+        options["measurement"] = MeasurementModel(
+            range_noise=range_noise,
+            dropout=dropout,
+            seed=seed,
+            sensor_name=name,
+        )
 
 
 def connect_lidar(

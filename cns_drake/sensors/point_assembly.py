@@ -10,6 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from cns_drake.base.compiled import compiled
+from cns_drake.scene.semantics import CLASS_IDS
+
+# The class of points that no structure has sent back.
+SCATTERED_LABEL = CLASS_IDS["outlier"]
 
 
 class BeamTable(NamedTuple):
@@ -35,7 +39,7 @@ def assemble_points(
     beams: np.ndarray,
     ranges: np.ndarray,
     intensity: np.ndarray,
-    geometry: np.ndarray,
+    met: np.ndarray,
     label: np.ndarray,
     instance: np.ndarray,
     step: np.float32,
@@ -48,8 +52,8 @@ def assemble_points(
         beams: (N,) the beams that returned something.
         ranges: (N,) float32 measured along them [m].
         intensity: (N,) float32.
-        geometry: (num_beams,) int32 what the beams met, in the order of
-            casting: an index into
+        met: (N,) int32 what sent each return, negative for the weather, or
+            an index into
         label: uint8 classes, and
         instance: uint16 structures.
         step: coordinates are rounded to multiples of it [m]; not
@@ -64,7 +68,6 @@ def assemble_points(
             x = np.rint(x / step) * step
             y = np.rint(y / step) * step
             z = np.rint(z / step) * step
-        met = geometry[table.place[beam]]
         point = scan[k]
         point.x = x
         point.y = y
@@ -72,5 +75,8 @@ def assemble_points(
         point.intensity = intensity[k]
         point.ring = table.ring[beam]
         point.t = table.t_ns[beam]
-        point.label = label[met]
-        point.instance = instance[met]
+        if met[k] < 0:
+            point.label, point.instance = SCATTERED_LABEL, 0
+        else:
+            point.label = label[met[k]]
+            point.instance = instance[met[k]]

@@ -24,6 +24,7 @@ from cns_drake.scene.perception_geometry import (
     PerceptionGeometry,
 )
 from cns_drake.scene.structure_table import StructureTable
+from cns_drake.sensors.returns.materials import Materials, find_materials
 
 
 class Sight(NamedTuple):
@@ -69,6 +70,7 @@ class SeenGeometry:
         self._built: tuple[PerceptionGeometry, ...] = ()
         self._X_WAs: dict[FrameId, RigidTransform] = {}
         self.scene: RayCastingScene | None = None
+        self._materials: Materials | None = None
 
     def __deepcopy__(self, memo: dict) -> SeenGeometry:
         return SeenGeometry(self._sight)
@@ -102,6 +104,18 @@ class SeenGeometry:
             self.scene.set_frame_poses(query_object.GetPoseInWorld, motions)
         self._revision = revision
 
+    def materials(self, *, is_wet: bool) -> Materials:
+        """Returns the materials of the geometries of `scene`.
+
+        Args:
+            is_wet: whether water lies on the ground; the same at each call.
+        """
+        if self._materials is None:
+            self._materials = find_materials(
+                self._built, self._table, is_wet=is_wet
+            )
+        return self._materials
+
     def _read(self, inspector: SceneGraphInspector) -> None:
         unseen = self._sight.unseen
         if unseen is None:
@@ -130,6 +144,7 @@ class SeenGeometry:
     def _build(self, query_object: QueryObject) -> None:
         names = [geometry.structure for geometry in self._geometries]
         table = self._sight.structures.completed(names)
+        self._table, self._materials = table, None
         self.label = np.array([table[n].label for n in names], np.uint8)
         self.instance = np.array([table[n].instance for n in names], np.uint16)
         world = query_object.inspector().world_frame_id()

@@ -10,11 +10,15 @@ from cns_drake.scenarios.lidar_config import LidarConfig
 from cns_drake.scenarios.sensor_making import (
     make_measurement,
     make_pattern,
+    make_returns,
     sensor_pose,
 )
+from cns_drake.scenarios.weather_config import WeatherConfig
 from cns_drake.scene.world import World
 from cns_drake.sensors.lidar import Lidar
 from cns_drake.sensors.lidar_adding import add_lidar
+
+CLEAR = WeatherConfig()
 
 
 def apply_lidar_config(
@@ -24,6 +28,7 @@ def apply_lidar_config(
     trajectory: Trajectory,
     *,
     name: str,
+    weather: WeatherConfig = CLEAR,
     seed: int = 0,
     num_threads: int = 1,
 ) -> Lidar:
@@ -37,6 +42,7 @@ def apply_lidar_config(
         world: the stage with the vehicle.
         trajectory: of the vehicle.
         name: of the LiDAR.
+        weather: in which it measures.
         seed: of its noise.
         num_threads: how many threads cast its rays.
     """
@@ -50,6 +56,7 @@ def apply_lidar_config(
         pattern,
         name=name,
         measurement=make_measurement(config, name, seed),
+        returns=make_returns(config, weather, name, seed) or "ideal",
         unseen=[plant.get_body(k) for k in plant.GetBodyIndices(world.vehicle)],
         with_sweep=config.motion_distortion,
         structures=world.structures,

@@ -22,11 +22,15 @@ from cns_drake.base.files import (
 from cns_drake.scene.world import World
 from cns_drake.sensors.beam_pattern import BeamPattern
 from cns_drake.sensors.lidar import Lidar
+from cns_drake.sensors.returns.calibrated import CalibratedReturns
 from cns_drake.simulation.still_world import make_still_world
 
 
 def scan_world(
-    world: World, X_WS: RigidTransform, pattern: BeamPattern
+    world: World,
+    X_WS: RigidTransform,
+    pattern: BeamPattern,
+    returns: CalibratedReturns | None = None,
 ) -> np.ndarray:
     """Returns one scan, taken with the world's models as they start.
 
@@ -34,6 +38,7 @@ def scan_world(
         world: what to scan.
         X_WS: the sensor's pose in the world.
         pattern: the beams.
+        returns: how a real unit measures; None for ideal returns.
 
     Returns:
         Structured array of `POINT_DTYPE`, in the sensor frame.
@@ -42,6 +47,7 @@ def scan_world(
         world.scene_graph.world_frame_id(),
         X_WS,
         pattern,
+        returns=returns,
         structures=world.structures,
         anchored_frames=world.anchored_frames(),
     )

@@ -95,6 +95,7 @@ def make_station(
             world,
             trajectory,
             name=name,
+            weather=scenario.weather,
             seed=scenario.seed,
             num_threads=num_threads,
         )

@@ -17,6 +17,7 @@ from cns_drake.scenarios import scenario, variation
 from cns_drake.scenarios.imu_config import ImuConfig
 from cns_drake.scenarios.lidar_config import LidarConfig
 from cns_drake.scenarios.ride_config import RideConfig
+from cns_drake.scenarios.weather_config import WeatherConfig
 from cns_drake.sensors.lidar_presets import LIDAR_PRESETS
 from evaluation.methods import MethodConfig, make_method, shipped_methods
 
@@ -45,6 +46,7 @@ TABLES = [
     ("scenarios", "### Speeds", Speeds, None),
     ("scenarios", "### Ride", RideConfig, None),
     ("scenarios", "### LiDARs", LidarConfig, None),
+    ("scenarios", "### Weather", WeatherConfig, None),
     ("scenarios", "### IMU", ImuConfig, None),
     ("scenarios", "## Families", variation.Family, None),
     ("scenarios", "### Routes by lot", variation.DrawnRoutes, None),

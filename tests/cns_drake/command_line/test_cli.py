@@ -114,6 +114,43 @@ def test_scan(files, tmp_path):
     assert np.abs(x_W - 7.5).min() < 1e-5
 
 
+def test_scan_with_calibrated_returns(files, tmp_path):
+    scans = {}
+    for name, words in {
+        "first": ("--returns", "calibrated", "--seed", 3),
+        "again": ("--returns", "calibrated", "--seed", 3),
+        "other": ("--returns", "calibrated", "--seed", 4),
+        "fog": ("--fog", 30, "--seed", 3),
+    }.items():
+        path = tmp_path / f"{name}.npy"
+        words = (*POSE, "--output", path, "--lidar", "vlp-16", *words)
+        assert run("scan", files / "good.sdf", *words).returncode == 0
+        scans[name] = np.load(path)
+    assert scans["first"].tobytes() == scans["again"].tobytes()
+    assert scans["first"].tobytes() != scans["other"].tobytes()
+    assert len(scans["fog"]) != len(scans["first"])
+    # Calibrated reflectivity in whole numbers.
+    intensity = scans["first"][:, 3]
+    assert intensity.max() > 1.0
+    np.testing.assert_array_equal(intensity, np.rint(intensity))
+
+
+@pytest.mark.parametrize(
+    ("words", "fault"),
+    [
+        (("--fog", 2), "--fog: "),
+        (("--rain", -1), "--rain: "),
+        (("--returns", "ideal", "--rain", 1), "--returns ideal: weather"),
+    ],
+)
+def test_weather_that_cannot_be(files, tmp_path, words, fault):
+    output = ("--output", tmp_path / "a.npy")
+    result = run("scan", files / "good.sdf", *POSE, *output, *words)
+    assert result.returncode == 2
+    (line,) = result.stderr.splitlines()
+    assert line.startswith(f"cns-drake: error: {fault}")
+
+
 def test_diagram_script(tmp_path):
     script = DIAGRAMS / "metropolis_04.py"
     result = run("--output", tmp_path, "--frames", 2, script=script)

@@ -19,6 +19,7 @@ from cns_drake.scenarios.scenario_files import (
 from cns_drake.scenarios.scenario_loading import load_scenario, make_scenario
 from cns_drake.scenarios.sensor_making import make_pattern, sensor_pose
 from cns_drake.scenarios.shipped import recordable_sequences
+from cns_drake.scenarios.weather_config import WeatherConfig
 
 
 def test_shipped_sequences_load():
@@ -85,6 +86,24 @@ def test_preset_replaces_the_lidar_where_it_is():
         scenario.with_lidar_preset("os2-128")
 
 
+def test_returns_and_weather_are_replaced(small_map):
+    noisy = {"lidars": {"a": {"range_noise": 0.02, "dropout": 0.1}}}
+    scenario = make_scenario(scenario_values(small_map) | noisy, "test")
+    fog = WeatherConfig(visibility=80.0)
+    foggy = scenario.with_returns("calibrated", fog)
+    assert foggy.weather == fog
+    assert foggy.lidars["a"] == LidarConfig(returns="calibrated")
+    # What is written is read again.
+    values = foggy.model_dump(mode="json")
+    assert make_scenario(values, "test") == foggy
+    clear = foggy.with_returns("ideal")
+    assert clear.lidars["a"] == LidarConfig()
+    # Without these fields a scenario is written as before there were any.
+    dumped = clear.model_dump(mode="json")
+    assert "weather" not in dumped
+    assert {"returns", "echoes"}.isdisjoint(dumped["lidars"]["a"])
+
+
 @pytest.mark.parametrize(
     ("change", "fault"),
     [
@@ -103,6 +122,17 @@ def test_preset_replaces_the_lidar_where_it_is():
         ({"lidars": {"a": {"dropout": 1.1}}}, r"a.dropout: .*less"),
         ({"lidars": {"a": {"faint_dropout": -1}}}, r"a.faint_dropout: "),
         ({"lidars": {"a": {"motion_distortion": "x"}}}, r"motion_distortion"),
+        ({"lidars": {"a": {"returns": "real"}}}, r"a.returns: .*'calibrated'"),
+        ({"lidars": {"a": {"echoes": "dual"}}}, r"echoes: choices need ret"),
+        (
+            {"lidars": {"a": {"returns": "calibrated", "dropout": 0.1}}},
+            r"lidars.a: dropout: calibrated returns have their own",
+        ),
+        ({"weather": {"rain": -1}}, r"weather.rain: .*greater"),
+        (
+            {"weather": {"visibility": 80}, "lidars": {"a": {}}},
+            r"weather: ideal returns feel none; give lidars.a.returns",
+        ),
         (
             {"lidars": {"a": {"max_range": 0.5}}},
             r"lidars.a: min_range 0.8 is not below max_range 0.5",

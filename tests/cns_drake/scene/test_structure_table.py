@@ -28,6 +28,15 @@ def test_reads_what_the_columns_say(tmp_path):
     ]
 
 
+def test_reflectivities_are_optional(tmp_path):
+    path = write(
+        tmp_path,
+        "instance,name,class,reflectivity\n1,a,building,0.8\n2,b,building,\n",
+    )
+    table = load_structure_table(path)
+    assert [table[name].reflectivity for name in "ab"] == [0.8, None]
+
+
 def test_unlisted_structures_get_free_ids_in_order():
     table = StructureTable([StructureEntry(5, "hall", "building")])
     completed = table.completed(["b", "hall", "a", "b"])
@@ -63,6 +72,13 @@ def test_more_structures_than_ids():
             "line 3: name: 'a'",
         ),
         ("instance,name,class\n1,a,castle\n", "line 2: class: 'castle'"),
+        *(
+            (
+                f"instance,name,class,reflectivity\n1,a,building,{value}\n",
+                f"line 2: reflectivity: '{value}' is not a number from 0 to 1",
+            )
+            for value in ("dark", "1.01", "-0.01", "nan")
+        ),
     ],
 )
 def test_faults_name_file_line_and_field(tmp_path, text, fault):

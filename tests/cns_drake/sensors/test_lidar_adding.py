@@ -1,6 +1,7 @@
 """LiDARs in Diagrams with a MultibodyPlant: what they see and hide."""
 
 from helpers.lidar_stage import FORWARD, ahead
+from helpers.plates import facing, plate
 import numpy as np
 from pydrake.common.value import AbstractValue
 from pydrake.geometry import (
@@ -9,6 +10,7 @@ from pydrake.geometry import (
     GeometryFrame,
     GeometryInstance,
     PerceptionProperties,
+    SceneGraph,
     Sphere,
 )
 from pydrake.math import RigidTransform, RollPitchYaw
@@ -218,3 +220,50 @@ def test_it_is_added_to_a_body_or_a_frame():
     assert [scan["x"].tolist() for scan in scans[:2]] == [[6.5], [5.5]]
     assert lidars[2].pattern == make_beam_pattern("vlp-16", 0.05)
     np.testing.assert_allclose(scans[2]["x"], 6.5, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "options", "fault"),
+    [
+        (make_beam_pattern("vlp-16"), {"returns": "calibrated"}, "of a preset"),
+        ("vlp-16", {"returns": "real"}, "'real': give 'ideal'"),
+        ("vlp-16", {"returns": "calibrated", "dropout": 0.1}, "their own"),
+    ],
+)
+def test_returns_that_cannot_be(pattern, options, fault):
+    scene_graph, place, X_PS = SceneGraph(), None, RigidTransform()
+    builder = DiagramBuilder()
+    builder.AddSystem(scene_graph)
+    place = scene_graph.world_frame_id()
+    with (
+        pytest.warns(UserWarning),
+        pytest.raises(ValueError, match=fault),
+    ):
+        add_lidar(builder, scene_graph, place, X_PS, pattern, **options)
+
+
+def test_calibrated_returns_of_a_preset():
+    measured = {}
+    for seed in (1, 2):
+        builder = DiagramBuilder()
+        scene_graph = builder.AddSystem(SceneGraph())
+        source = scene_graph.RegisterSource("wall")
+        scene_graph.RegisterAnchoredGeometry(
+            source, plate("wall", 0.5, facing(9.0))
+        )
+        lidar = add_lidar(
+            builder,
+            scene_graph,
+            scene_graph.world_frame_id(),
+            RigidTransform(),
+            "vlp-16",
+            returns="calibrated",
+            seed=seed,
+        )
+        context = builder.Build().CreateDefaultContext()
+        measured[seed] = lidar.GetOutputPort("scan").Eval(
+            lidar.GetMyContextFromRoot(context)
+        )
+    first, second = (np.median(scan["intensity"]) for scan in measured.values())
+    assert first == second > 1.0
+    assert measured[1].tobytes() != measured[2].tobytes()

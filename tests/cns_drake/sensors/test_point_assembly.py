@@ -22,12 +22,13 @@ def test_points_are_what_numpy_makes_of_the_beams(step):
     beams = np.flatnonzero(rng.random(num) < 0.7)
     ranges = rng.uniform(1.0, 90.0, len(beams)).astype(np.float32)
     intensity = rng.random(len(beams), np.float32)
-    geometry = rng.integers(0, 9, num).astype(np.int32)
+    met = rng.integers(0, 9, len(beams)).astype(np.int32)
+    met[:3] = -2  # What the weather sent back.
     label = rng.integers(0, 255, 9).astype(np.uint8)
     instance = rng.integers(0, 60_000, 9).astype(np.uint16)
     scan = np.zeros(len(beams), POINT_DTYPE)
     assemble_points(
-        scan, table, beams, ranges, intensity, geometry, label, instance,
+        scan, table, beams, ranges, intensity, met, label, instance,
         np.float32(step),
     )  # fmt: skip
     expected = table.d_Sset[beams] * ranges[:, None]
@@ -36,9 +37,10 @@ def test_points_are_what_numpy_makes_of_the_beams(step):
         expected = np.rint(expected / np.float32(step)) * np.float32(step)
     for axis, name in enumerate("xyz"):
         np.testing.assert_array_equal(scan[name], expected[:, axis])
-    met = geometry[table.place[beams]]
     np.testing.assert_array_equal(scan["intensity"], intensity)
     np.testing.assert_array_equal(scan["ring"], pattern.ring[beams])
     np.testing.assert_array_equal(scan["t"], pattern.t_ns[beams])
-    np.testing.assert_array_equal(scan["label"], label[met])
-    np.testing.assert_array_equal(scan["instance"], instance[met])
+    np.testing.assert_array_equal(scan["label"][3:], label[met[3:]])
+    np.testing.assert_array_equal(scan["instance"][3:], instance[met[3:]])
+    assert (scan["label"][:3] == 1).all()
+    assert (scan["instance"][:3] == 0).all()

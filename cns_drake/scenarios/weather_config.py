@@ -1,0 +1,26 @@
+"""The weather of a scenario."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from cns_drake.scenarios.section import Section
+from cns_drake.sensors.returns.weather import Weather
+
+
+class WeatherConfig(Section):
+    """The weather, which all LiDARs with calibrated returns feel.
+
+    Attributes:
+        visibility: meteorological visibility in fog [m]; no fog by default.
+        rain: rate of rain [mm/h].
+        snowfall: rate of snowfall, as water [mm/h].
+    """
+
+    visibility: float | None = Field(default=None, ge=5.0, le=1e6)
+    rain: float = Field(default=0.0, ge=0.0, le=300.0)
+    snowfall: float = Field(default=0.0, ge=0.0, le=300.0)
+
+    def weather(self) -> Weather:
+        """Returns what a LiDAR feels."""
+        return Weather(self.visibility, self.rain, self.snowfall)

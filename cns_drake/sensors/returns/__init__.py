@@ -1,0 +1,1 @@
+"""What a real unit makes of the light that comes back."""

@@ -1,0 +1,272 @@
+"""A LiDAR that measures like the unit of its data sheet, in any weather."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from cns_drake.ray_casting.ray_casting_scene import (
+    RayCastingScene,
+    RayHits,
+    join_hits,
+)
+from cns_drake.sensors.beam_pattern import BeamPattern, Beams
+from cns_drake.sensors.returns.counter_random import frame_key
+from cns_drake.sensors.returns.echo_choice import Echoes
+from cns_drake.sensors.returns.echoes import (
+    Light,
+    Receiver,
+    Reported,
+    choice_of,
+    report_echoes,
+)
+from cns_drake.sensors.returns.footprint import (
+    NUM_SUB_RAYS,
+    find_edges,
+    sub_directions,
+)
+from cns_drake.sensors.returns.materials import Materials
+from cns_drake.sensors.returns.propagation import (
+    Ways,
+    follow,
+    leaf_depths,
+)
+from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS, UnitSheet
+from cns_drake.sensors.returns.weather import (
+    Scattering,
+    Weather,
+    tabulate_scattering,
+)
+
+CLEAR = Weather()
+
+
+@dataclass(frozen=True)
+class CalibratedReturns:
+    """Makes returns by the data sheet of a unit.
+
+    Random numbers depend on the seed, the name of the sensor, the frame and
+    the beam alone.
+
+    Attributes:
+        sheet: of the unit.
+        echoes: which echoes of a beam it reports.
+        weather: in which it measures.
+        seed: of what is random.
+        sensor_name: makes one LiDAR differ from another.
+
+    Example:
+        from cns_drake import CalibratedReturns
+
+        returns = CalibratedReturns.of_preset("os1-64", seed=7)
+    """
+
+    sheet: UnitSheet
+    echoes: Echoes = Echoes.STRONGEST
+    weather: Weather = CLEAR
+    seed: int = 0
+    sensor_name: str = ""
+
+    @classmethod
+    def of_preset(
+        cls,
+        preset: str,
+        *,
+        echoes: Echoes | str = Echoes.STRONGEST,
+        weather: Weather = CLEAR,
+        seed: int = 0,
+        sensor_name: str = "",
+    ) -> CalibratedReturns:
+        """Returns the model of a preset's unit.
+
+        Args:
+            preset: a key of `LIDAR_PRESETS`.
+            echoes, weather, seed, sensor_name: see the class.
+
+        Raises:
+            KeyError: there is no such preset.
+            ValueError: there is no such choice of echoes.
+        """
+        return cls(
+            UNIT_SHEETS[preset], Echoes(echoes), weather, seed, sensor_name
+        )
+
+    @property
+    def is_wet(self) -> bool:
+        """Whether water lies on the ground."""
+        return self.weather.rain > 0.0
+
+    def reach(self, max_range: float) -> float:
+        """Returns how far rays are cast [m].
+
+        Farther than what is reported, since the range noise can bring a
+        surface there into reach.
+        """
+        return max_range + 8.0 * self.sheet.range_noise
+
+    @cached_property
+    def _scatterings(self) -> dict[float, Scattering]:
+        return {}
+
+    def _receiver(self, pattern: BeamPattern) -> Receiver:
+        sheet = self.sheet
+        scattering = self._scatterings.get(pattern.min_range)
+        if scattering is None:
+            scattering = _no_scattering()
+            if not self.weather.is_clear:
+                scattering = tabulate_scattering(
+                    self.weather,
+                    sheet.budget,
+                    sheet.divergence,
+                    sheet.resolution,
+                    pattern.min_range,
+                )
+            self._scatterings[pattern.min_range] = scattering
+        return Receiver(
+            sheet.budget,
+            self.weather.extinction,
+            sheet.resolution,
+            pattern.min_range,
+            pattern.max_range,
+            sheet.retro_from,
+            choice_of(self.echoes),
+            scattering,
+        )
+
+    def measure(
+        self,
+        scene: RayCastingScene,
+        materials: Materials,
+        pattern: BeamPattern,
+        turn: CalibratedTurn,
+        p_WSset: np.ndarray,
+        R_WSset: np.ndarray,
+        times: np.ndarray,
+        frame: int,
+    ) -> Reported:
+        """Returns what the unit reports of a turn.
+
+        Args:
+            scene: casts rays.
+            materials: of the scene's geometries.
+            pattern: of the beams.
+            turn: the beams of this turn.
+            p_WSset: (K, 3) positions of S; ray i of the order of casting
+                starts at position i mod K.
+            R_WSset: (K, 3, 3) its orientations, taken in turn likewise.
+            times: (T,) parts of the turn, taken in turn likewise.
+            frame: number of the turn.
+        """
+        key = frame_key(self.seed, self.sensor_name, frame)
+        reach = self.reach(pattern.max_range)
+        hits = scene.cast_rays(
+            p_WSset,
+            turn.d_Sset,
+            reach,
+            R_WSset=R_WSset,
+            times=times,
+            with_normals=True,
+        )
+
+        def cast(
+            p_Wset: np.ndarray, d_Wset: np.ndarray, when: np.ndarray
+        ) -> RayHits:
+            return scene.cast_rays(
+                p_Wset, d_Wset, reach, times=when, with_normals=True
+            )
+
+        edges = self._find_edges(turn, R_WSset, hits)
+        rows = np.arange(len(turn.beam))
+        p_W = p_WSset[rows % len(p_WSset)]
+        d_W = np.einsum("nij,nj->ni", R_WSset[rows % len(R_WSset)], turn.d_Sset)
+        when = np.asarray(times, np.float32)[rows % len(times)]
+        whole = np.flatnonzero(~edges & (hits.geometry >= 0))
+        rows = np.concatenate(
+            [whole, np.repeat(np.flatnonzero(edges), NUM_SUB_RAYS)]
+        )
+        sub = np.zeros(len(rows), np.int64)
+        sub[len(whole) :] = np.arange(len(rows) - len(whole)) % NUM_SUB_RAYS
+        energy = np.ones(len(rows))
+        energy[len(whole) :] /= NUM_SUB_RAYS
+        d_sub = self._sub_directions(key, turn, d_W, np.flatnonzero(edges))
+        depth = np.empty(len(rows))
+        leaf_depths(key, turn.beam[rows], sub, depth)
+        ways = Ways(
+            turn.beam[rows],
+            sub,
+            p_W[rows],
+            np.concatenate([d_W[whole], d_sub]),
+            when[rows],
+            np.zeros(len(rows)),
+            energy,
+            depth,
+            np.full(len(rows), -1),
+        )
+        # From one place, where they have one, which is faster.
+        p_sub = ways.p_Wset[len(whole) :] if len(p_WSset) > 1 else p_WSset
+        sub_hits = cast(p_sub, d_sub, ways.time[len(whole) :])
+        light = follow(
+            ways,
+            join_hits(hits.take(whole), sub_hits),
+            materials,
+            self.sheet.budget,
+            self.sheet.divergence,
+            cast,
+        )
+        return report_echoes(
+            Light.sorted(light), self._receiver(pattern), key, len(turn.beam)
+        )
+
+    def _find_edges(
+        self, turn: CalibratedTurn, R_WSset: np.ndarray, hits: RayHits
+    ) -> np.ndarray:
+        """Returns (N,) which beams lie next to an edge."""
+        is_edge = np.zeros(len(turn.beam), bool)
+        for order in turn.orders:
+            find_edges(
+                order,
+                turn.d_Sset,
+                R_WSset,
+                hits.ranges,
+                hits.normals_W,
+                self.sheet.divergence,
+                is_edge,
+            )
+        return is_edge
+
+    def _sub_directions(
+        self,
+        key: np.uint64,
+        turn: CalibratedTurn,
+        d_Wset: np.ndarray,
+        edges: np.ndarray,
+    ) -> np.ndarray:
+        """Returns (`NUM_SUB_RAYS` M, 3) directions for M beams."""
+        d_sub = np.empty((len(edges), NUM_SUB_RAYS, 3))
+        sub_directions(
+            key, turn.beam[edges], d_Wset[edges], self.sheet.divergence, d_sub
+        )
+        return d_sub.reshape(-1, 3)
+
+
+class CalibratedTurn:
+    """The beams of a turn in the order of casting.
+
+    Attributes:
+        d_Sset: (N, 3) directions in the order of casting.
+        beam: (N,) number of each beam, in firing order.
+        orders: orders of the rays in which neighbours follow each other: that
+            of casting, and that of firing.
+    """
+
+    def __init__(self, beams: Beams):
+        self.beam = np.asarray(beams.packet_order, np.int64)
+        self.d_Sset = np.ascontiguousarray(beams.d_Sset[self.beam])
+        self.orders = (np.arange(len(self.beam)), np.argsort(self.beam))
+
+
+def _no_scattering() -> Scattering:
+    nothing = np.zeros(0)
+    return Scattering(nothing, nothing, np.zeros((0, 1)), nothing, nothing)

@@ -1,0 +1,158 @@
+"""What surfaces do with light near 900 nm.
+
+A structure's class says what it is made of, the name of its part where that
+differs, its colour how bright it is. Reflectivities of diffuse materials are
+those of the ECOSTRESS spectral library (Meerdink et al., 2019) near 0.9 um,
+rounded; of markings, signs and plates they follow from the minimum
+coefficients of EN 1436 (R_L 150 mcd/m2/lx at 30 m) and EN 12899-1 (class RA1,
+70 cd/lx/m2), times pi.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from cns_drake.scene.perception_geometry import PerceptionGeometry
+from cns_drake.scene.structure_table import StructureTable
+from cns_drake.sensors.returns.closed_surfaces import is_closed
+
+# Kinds of materials.
+LAMBERT, RETRO, GLASS, LEAVES = range(4)
+
+# Class -> reflectivity of a dark and of a bright colour; equal where the
+# colour says nothing near 900 nm.
+_BY_CLASS = {
+    "unlabeled": (0.15, 0.65),
+    "outlier": (0.15, 0.65),
+    "car": (0.05, 0.80),
+    "bicycle": (0.10, 0.50),
+    "bus": (0.05, 0.80),
+    "truck": (0.05, 0.80),
+    "other-vehicle": (0.05, 0.80),
+    "person": (0.20, 0.60),
+    "road": (0.15, 0.15),
+    "parking": (0.15, 0.15),
+    "sidewalk": (0.30, 0.30),
+    "other-ground": (0.25, 0.35),
+    "building": (0.20, 0.60),
+    "fence": (0.20, 0.50),
+    "other-structure": (0.20, 0.60),
+    "vegetation": (0.50, 0.50),
+    "trunk": (0.30, 0.30),
+    "terrain": (0.45, 0.45),
+    "pole": (0.20, 0.50),
+    "traffic-sign": (0.20, 0.50),
+    "other-object": (0.10, 0.70),
+}
+# Diffuse light from dust on a pane, and from water.
+_GLASS_DUST = 0.02
+_WATER = 0.02
+_BARK = 0.30
+_MARKINGS = 0.47
+_SHEETING = 220.0
+_PLATE = 160.0
+# Leaf area in a volume of leaves [1/m]: crowns and hedges of cities (Hosoi
+# and Omasa, 2006, found 0.5 to 2.5 in crowns).
+_LEAF_AREA_DENSITY = 1.5
+# How wet ground reflects: a film of n = 1.33 sends light back that a rough
+# surface has scattered once (Angstrom, 1925).
+_FILM_INNER = 1.0 - (1.0 - 0.066) / 1.33**2
+_WET_CLASSES = {"road", "parking", "sidewalk", "other-ground"}
+
+
+class Materials(NamedTuple):
+    """What each of G geometries is made of.
+
+    Attributes:
+        kind: (G,) uint8, `LAMBERT`, `RETRO`, `GLASS` or `LEAVES`; the last
+            of what is a volume of leaves, and not of single leaves.
+        reflectivity: (G,) float32, of a retro-reflector in units of a
+            Lambertian target of reflectivity 1 that faces the beam.
+        leaf_area_density: (G,) float32 [1/m].
+    """
+
+    kind: np.ndarray
+    reflectivity: np.ndarray
+    leaf_area_density: np.ndarray
+
+
+def find_materials(
+    geometries: Sequence[PerceptionGeometry],
+    structures: StructureTable,
+    *,
+    is_wet: bool,
+) -> Materials:
+    """Returns the materials of geometries.
+
+    The perception property ("lidar", "reflectivity") wins over the column
+    `reflectivity` of a table of structures, and that over class and colour.
+
+    Args:
+        geometries: what is seen.
+        structures: has all of them.
+        is_wet: whether water lies on what is ground.
+    """
+    table = [_material(geometry, structures) for geometry in geometries]
+    if is_wet:
+        table = [
+            (kind, _wet(rho), density)
+            if structures[geometry.structure].semantic_class in _WET_CLASSES
+            and kind == LAMBERT
+            else (kind, rho, density)
+            for geometry, (kind, rho, density) in zip(
+                geometries, table, strict=True
+            )
+        ]
+    kinds, rhos, densities = zip(*table, strict=True) if table else ((),) * 3
+    return Materials(
+        np.array(kinds, np.uint8),
+        np.array(rhos, np.float32),
+        np.array(densities, np.float32),
+    )
+
+
+def _material(
+    geometry: PerceptionGeometry, structures: StructureTable
+) -> tuple[int, float, float]:
+    entry = structures[geometry.structure]
+    given = geometry.reflectivity
+    if given is None:
+        given = entry.reflectivity
+    if given is not None:
+        return LAMBERT, given, 0.0
+    dark, bright = _BY_CLASS[entry.semantic_class]
+    part = geometry.name.rpartition("/")[2]
+    words = set(part.split("_"))
+    if words & {"glass", "panes", "windows"}:
+        return GLASS, _GLASS_DUST, 0.0
+    if geometry.structure.startswith("markings"):
+        return RETRO, _MARKINGS, 0.0
+    if entry.semantic_class == "traffic-sign" and words & {"plate", "blade"}:
+        return RETRO, _SHEETING, 0.0
+    if "plate" in words:
+        return RETRO, _PLATE, 0.0
+    if "water" in words or geometry.structure.endswith("_water"):
+        return LAMBERT, _WATER, 0.0
+    if entry.semantic_class == "vegetation":
+        if words & {"wood", "trunk", "box", "pot", "edge"}:
+            return LAMBERT, _BARK, 0.0
+        kind = LEAVES if is_closed(geometry.surface) else LAMBERT
+        return kind, bright, _LEAF_AREA_DENSITY
+    return LAMBERT, dark + (bright - dark) * _brightness(geometry.rgb), 0.0
+
+
+def _brightness(rgb: tuple[float, float, float] | None) -> float:
+    """Returns the part of white light that a colour reflects, 0 to 1."""
+    if rgb is None:
+        return 0.5
+    return float(np.clip(np.dot(rgb, (0.2126, 0.7152, 0.0722)), 0.0, 1.0))
+
+
+def _wet(reflectivity: float) -> float:
+    """Returns the reflectivity of what is covered with a film of water."""
+    return (
+        reflectivity * (1.0 - _FILM_INNER) / (1.0 - _FILM_INNER * reflectivity)
+    )

@@ -1,0 +1,224 @@
+"""Fog, rain and snowfall: what they take from a beam and send back.
+
+Rain and snow are drops of random size and place. Their number in a volume
+follows Marshall and Palmer (1948) and Gunn and Marshall (1958),
+
+    N(D) = N_0 exp(-L D) [1/(m3 mm)]
+
+with N_0 = 8000 and L = 4.1 R^-0.21 for rain, N_0 = 7600 R^-0.87 and
+L = 2.55 R^-0.48 for snow; D in mm, the rate R in mm/h of water. Extinction is
+that of geometric optics, with twice the area of each drop. What a drop sends
+back is that of LISA (Kilic et al., 2021).
+
+Fog is a medium: alpha = ln 20 / V by the meteorological visibility V, and a
+back-scatter coefficient of 0.046 / V [1/(m sr)] (Rasshofer et al., 2011).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from cns_drake.base.compiled import compiled
+from cns_drake.sensors.returns.link_budget import (
+    LinkBudget,
+    detection_probability,
+    target_snr,
+)
+
+# Diameters of drops that matter: smaller ones send back nothing that a unit
+# could detect [mm].
+_DIAMETERS_MM = np.geomspace(0.05, 12.0, 120)
+_WATER_INDEX = 1.328
+_FLAKE_REFLECTIVITY = 0.9
+# Distances at which scattering is tabulated [m].
+_DISTANCES = np.geomspace(0.3, 60.0, 96)
+# The aperture of a unit: the radius of a beam where it begins [m].
+_APERTURE = 0.004
+# The receiver sees nothing of the beam before the first distance, and all of
+# it behind the second one [m]. Surfaces are bright enough all the same.
+_OVERLAP = (1.0, 3.0)
+
+
+@dataclass(frozen=True)
+class Weather:
+    """The weather of a drive; the air is clear unless told otherwise.
+
+    Attributes:
+        visibility: meteorological visibility in fog, None without fog [m].
+        rain: rate [mm/h].
+        snowfall: rate as water [mm/h].
+
+    Raises:
+        ValueError: if a value makes no sense.
+
+    Example:
+        from cns_drake import Weather
+
+        print(Weather(visibility=100.0, rain=5.0).extinction)
+    """
+
+    visibility: float | None = None
+    rain: float = 0.0
+    snowfall: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.visibility is not None and not 5.0 <= self.visibility < 1e6:
+            raise ValueError(
+                f"visibility: {self.visibility} is not within 5 m and 1000 km"
+            )
+        for name in ("rain", "snowfall"):
+            rate = getattr(self, name)
+            if not 0.0 <= rate <= 300.0:
+                raise ValueError(f"{name}: {rate} is not within 0 to 300 mm/h")
+
+    @property
+    def is_clear(self) -> bool:
+        return self.visibility is None and self.rain == self.snowfall == 0.0
+
+    @property
+    def extinction(self) -> float:
+        """alpha [1/m]."""
+        fog = 0.0
+        if self.visibility is not None:
+            fog = math.log(20.0) / self.visibility
+        return fog + sum(
+            _extinction(number) for number, _ in self._drops() if number.any()
+        )
+
+    def _drops(self) -> list[tuple[np.ndarray, float]]:
+        """Returns N(D) of each kind of drops, and its reflectivity."""
+        kinds = []
+        if self.rain > 0.0:
+            slope = 4.1 * self.rain**-0.21
+            fresnel = ((_WATER_INDEX - 1.0) / (_WATER_INDEX + 1.0)) ** 2
+            kinds.append((8000.0 * np.exp(-slope * _DIAMETERS_MM), fresnel))
+        if self.snowfall > 0.0:
+            slope = 2.55 * self.snowfall**-0.48
+            number = 7600.0 * self.snowfall**-0.87
+            kinds.append(
+                (
+                    number * np.exp(-slope * _DIAMETERS_MM),
+                    _FLAKE_REFLECTIVITY,
+                )
+            )
+        return kinds
+
+
+def _extinction(number: np.ndarray) -> float:
+    area_mm2 = np.pi / 4.0 * _DIAMETERS_MM**2
+    return 2e-6 * float(np.trapezoid(number * area_mm2, _DIAMETERS_MM))
+
+
+class Scattering(NamedTuple):
+    """Echoes of drops and fog that a unit detects.
+
+    Attributes:
+        distances: (R,) rising [m].
+        counts: (R,) mean number of detected echoes of drops that are nearer
+            than each distance.
+        energies: (R, Q) quantiles of the energy of such an echo, at each
+            distance.
+        fog_energies: (R,) energy of the echo of fog, by where it is; 0
+            without fog.
+        fog_counts: (R,) part of the fog's light that comes from nearer than
+            each distance.
+    """
+
+    distances: np.ndarray
+    counts: np.ndarray
+    energies: np.ndarray
+    fog_energies: np.ndarray
+    fog_counts: np.ndarray
+
+
+_QUANTILES = (np.arange(16) + 0.5) / 16
+
+
+def tabulate_scattering(
+    weather: Weather,
+    budget: LinkBudget,
+    divergence: float,
+    resolution: float,
+    min_range: float,
+) -> Scattering:
+    """Returns what a unit detects of the weather itself.
+
+    Drops are a Poisson process in distance and diameter. Each is detected by
+    the probability of its own SNR, which thins it to another such process.
+
+    Args:
+        weather: which.
+        budget: of the unit.
+        divergence: half angle of a beam [rad].
+        resolution: length of a pulse, there and back [m].
+        min_range: nothing nearer is measured [m].
+    """
+    distances = _DISTANCES[min_range < _DISTANCES]
+    distances = np.concatenate([[min_range], distances])
+    radius = _APERTURE + divergence * distances
+    overlap = np.interp(distances, _OVERLAP, (0.0, 1.0))
+    rate = np.zeros(len(distances))
+    weights = np.zeros((len(distances), 0))
+    energies = np.zeros((len(distances), 0))
+    alpha = weather.extinction
+    steps = np.gradient(_DIAMETERS_MM)
+    for number, reflectivity in weather._drops():
+        part = np.minimum(
+            (_DIAMETERS_MM * 1e-3 / (2.0 * radius[:, None])) ** 2, 1.0
+        )
+        energy = reflectivity * part * overlap[:, None]
+        detected = _detected(budget, alpha, energy, distances)
+        density = number * steps * detected * np.pi * radius[:, None] ** 2
+        rate += density.sum(axis=1)
+        weights = np.hstack([weights, density])
+        energies = np.hstack([energies, energy])
+    fog_energies, fog_rate = np.zeros((2, len(distances)))
+    if weather.visibility is not None:
+        # A Lambertian target of reflectivity 1 has a coefficient of 1 / pi.
+        fog_energies = np.pi * 0.046 / weather.visibility * resolution * overlap
+        fog_rate = overlap * np.exp(-2.0 * alpha * distances) / distances**2
+    fog_counts = _integral(distances, fog_rate)
+    return Scattering(
+        distances,
+        _integral(distances, rate),
+        _quantiles(energies, weights),
+        fog_energies,
+        fog_counts / max(fog_counts[-1], 1e-300),
+    )
+
+
+@compiled
+def _detected(
+    budget: LinkBudget,
+    extinction: float,
+    energy: np.ndarray,
+    distances: np.ndarray,
+) -> np.ndarray:
+    """Returns the probability of detection of each (distance, diameter)."""
+    result = np.empty_like(energy)
+    for i in range(energy.shape[0]):
+        for j in range(energy.shape[1]):
+            snr = target_snr(budget, extinction, energy[i, j], distances[i])
+            result[i, j] = detection_probability(snr)
+    return result
+
+
+def _integral(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    steps = 0.5 * (y[1:] + y[:-1]) * np.diff(x)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def _quantiles(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Returns weighted quantiles of each row."""
+    result = np.zeros((len(values), len(_QUANTILES)))
+    for row, (value, weight) in enumerate(zip(values, weights, strict=True)):
+        if weight.sum() > 0.0:
+            order = np.argsort(value)
+            share = np.cumsum(weight[order])
+            place = np.searchsorted(share, _QUANTILES * share[-1])
+            result[row] = value[order][place]
+    return result

@@ -1,0 +1,179 @@
+"""Wide beams, leaves and panes, against closed forms."""
+
+from helpers.plates import ahead, beside, facing, plate, scan, unit
+import numpy as np
+from pydrake.geometry import Box, Sphere
+from pydrake.math import RigidTransform, RollPitchYaw
+import pytest
+from scipy import stats
+from scipy.special import erf
+
+from cns_drake.scene.structure_table import StructureEntry, StructureTable
+from cns_drake.scene.surfaces import TriangleSurface
+from cns_drake.sensors.returns.closed_surfaces import is_closed
+from cns_drake.sensors.returns.echo_choice import Echoes
+from cns_drake.sensors.returns.propagation import pane_shares
+from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS
+
+TREE = StructureTable([StructureEntry(1, "tree", "vegetation")])
+HOUSE = StructureTable(
+    [
+        StructureEntry(1, "house", "building"),
+        StructureEntry(2, "behind", "building", 0.5),
+        StructureEntry(3, "side", "building", 0.5),
+    ]
+)
+
+
+@pytest.mark.parametrize("part", [-0.8, -0.3, 0.01, 0.2, 0.7])
+def test_the_share_of_an_edge_is_that_of_the_beams_profile(part):
+    """A dark plate covers the right of every beam up to an edge."""
+    sheet = UNIT_SHEETS["os0-128"]
+    distance = 10.0
+    edge = part * distance * sheet.divergence
+    near = plate("near", 0.4, facing(distance, edge - 5.0), (0.1, 10.0, 40.0))
+    # So near behind that both are one echo, whose energy gives the share.
+    far = plate("far", 0.0, facing(distance + 0.3))
+    # A neighbour beyond the edge, so that the beam counts as next to one.
+    off = 3.0 * sheet.divergence
+    pattern = beside(5_000, off if part >= 0.0 else -off)
+    points = scan([near, far], pattern, unit("os0-128"))
+    points = points[points["ring"] == 0]
+    share = points["intensity"].sum() / 40.0 / 5_000
+    expected = 0.5 * (1.0 + erf(np.sqrt(2.0) * part))
+    assert share == pytest.approx(expected, abs=0.02)
+
+
+def test_no_sub_rays_where_there_is_no_edge():
+    """Beams that meet one plane, though at a slant, have its exact range."""
+    X_WG = RigidTransform(RollPitchYaw(0.0, 0.0, 1.2), [9.0, 0.0, 0.0])
+    fan = ahead(2_000, spread=0.2)
+    target = plate("wall", 0.8, X_WG)
+    points = scan([target], fan, unit())
+    # Twice the noise of a range at this SNR, where sub-rays would be at all
+    # distances that the beam's width spans.
+    normal = X_WG.rotation().matrix()[:, 0]
+    p = np.stack([points[axis] for axis in "xyz"], axis=1) - [9.0, 0.0, 0.0]
+    assert np.abs(np.abs(p @ normal) - 0.05).max() < 0.05
+
+
+@pytest.mark.parametrize("shape", [Sphere(6.0), Box(12.0, 12.0, 12.0)])
+def test_depths_in_a_crown_are_exponential(shape):
+    crown = plate(
+        "tree/leaves", None, RigidTransform([16.0, 0.0, 0.0]), shape=shape
+    )
+    points = scan([crown], ahead(4_000), unit(), structures=TREE)
+    depth = points["x"] - 10.0
+    # G LAD; a way of 12 m lets e^-9 of the rays out again.
+    result = stats.kstest(depth[depth < 11.0], stats.expon(scale=1 / 0.75).cdf)
+    assert result.pvalue > 1e-3
+    assert len(points) > 3_950
+    assert (points["instance"] == 1).all()
+
+
+def test_some_light_gets_through_a_thin_crown():
+    crown = plate(
+        "tree/leaves", None, RigidTransform([10.5, 0, 0]), (1.0, 8.0, 8.0)
+    )
+    wall = plate("behind", 0.5, facing(20.0))
+    points = scan([crown, wall], ahead(8_000), unit(), structures=TREE)
+    through = np.mean(points["x"] > 19.0)
+    assert through == pytest.approx(np.exp(-0.75), abs=0.02)
+
+
+def test_single_leaves_are_no_volume():
+    corners = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1.0)])
+    faces = np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)])
+    assert is_closed(TriangleSurface(corners, faces))
+    assert not is_closed(TriangleSurface(corners, faces[:3]))
+
+
+def test_panes_share_light_by_fresnel():
+    reflected, through = pane_shares(np.array([1.0]))
+    # Of n = 1.52: 4.3 % a face, 0.918 through a pane, 0.843 there and back.
+    face = (0.52 / 2.52) ** 2
+    assert face == pytest.approx(0.043, abs=5e-4)
+    assert through == pytest.approx((1 - face) / (1 + face))
+    assert through[0] == pytest.approx(0.918, abs=5e-4)
+    assert through[0] ** 2 == pytest.approx(0.843, abs=5e-4)
+    np.testing.assert_allclose(reflected + through, 1.0)
+    # Brewster's angle: the light along the plane of incidence all gets in.
+    brewster = np.array([np.cos(np.arctan(1.52))])
+    reflected, _ = pane_shares(brewster)
+    inner = np.sqrt(1.0 - (1.0 - brewster**2) / 1.52**2)
+    across = ((brewster - 1.52 * inner) / (brewster + 1.52 * inner)) ** 2
+    np.testing.assert_allclose(reflected, across / (1.0 + across))
+
+
+def test_a_pane_shows_what_stands_behind():
+    tilt = RigidTransform(RollPitchYaw(0.0, 0.0, 0.5), [8.0, 0.0, 0.0])
+    pane = plate("house/glass", None, tilt, (0.0001, 40.0, 40.0))
+    wall = plate("behind", None, facing(15.0))
+    points = scan([pane, wall], ahead(500), unit(), structures=HOUSE)
+    assert np.median(points["x"]) == pytest.approx(15.0, abs=0.02)
+    # There and back through the box, which is too thin to be two panes.
+    _, through = pane_shares(np.array([np.cos(0.5)]))
+    assert np.median(points["intensity"]) == np.rint(50.0 * through[0] ** 2)
+
+
+def test_a_pane_mirrors_with_the_whole_way_as_range():
+    angle = np.deg2rad(75.0)
+    X_WG = RigidTransform(RollPitchYaw(0.0, 0.0, angle), [6.0, 0.0, 0.0])
+    pane = plate("house/glass", None, X_WG, (1e-5, 30.0, 30.0))
+    # Light goes on at twice the rest to a right angle, to a wall aside.
+    wall = plate(
+        "side", None, RigidTransform([0.0, 5.05, 0.0]), (400.0, 0.1, 400.0)
+    )
+    points = scan(
+        [pane, wall],
+        ahead(500),
+        unit("avia", echoes=Echoes.LAST),
+        structures=HOUSE,
+    )
+    turned = np.pi - 2.0 * angle
+    assert len(points) > 450
+    normal = np.array([-np.cos(angle), -np.sin(angle)])
+    d = np.array([1.0, 0.0]) - 2.0 * normal[0] * normal
+    assert abs(np.arctan2(d[1], d[0])) == pytest.approx(turned)
+    if d[1] > 0.0:
+        assert np.median(points["x"]) == pytest.approx(
+            6.0 + 5.0 / np.sin(turned), abs=0.05
+        )
+
+
+def test_a_pane_at_right_angles_blinds():
+    pane = plate("house/glass", None, facing(10.0), (1e-4, 40.0, 40.0))
+    points = scan([pane], ahead(200), unit(), structures=HOUSE)
+    assert (points["intensity"] > 100.0).all()
+
+
+def test_retro_reflectors_shine_at_any_angle():
+    signs = StructureTable([StructureEntry(1, "sign_001", "traffic-sign")])
+    bright = []
+    for tilt in (0.0, 0.6):
+        X_WG = RigidTransform(RollPitchYaw(0.0, 0.0, tilt), [30.0, 0.0, 0.0])
+        plate_ = plate("sign_001/plate", None, X_WG)
+        points = scan([plate_], ahead(100), unit(), structures=signs)
+        bright.append(np.median(points["intensity"]))
+    assert bright[0] == bright[1] > 100.0
+
+
+@pytest.mark.parametrize("echoes", list(Echoes))
+def test_which_echoes_are_reported(echoes):
+    """Half of each beam meets a dark plate, the rest a bright one behind."""
+    sheet = UNIT_SHEETS["os1-64"]
+    near = plate("near", 0.2, facing(10.0, -4.9999), (0.1, 10.0, 40.0))
+    far = plate("far", 0.9, facing(13.0))
+    pattern = beside(1_000, 3.0 * sheet.divergence)
+    points = scan([near, far], pattern, unit(echoes=echoes))
+    points = points[points["ring"] == 0]
+    ranges = np.round(points["x"])
+    assert {10.0, 13.0} >= set(ranges)
+    if echoes is Echoes.DUAL:
+        assert len(points) > 1_800
+        assert (np.diff(points["t"].astype(int)) >= 0).all()
+        assert np.mean(ranges == 10.0) == pytest.approx(0.5, abs=0.06)
+    else:
+        assert len(points) <= 1_000
+        wanted = 10.0 if echoes is Echoes.FIRST else 13.0
+        assert np.mean(ranges == wanted) > 0.85

@@ -1,0 +1,145 @@
+"""Weather: counts of drops, and what must not depend on what."""
+
+from helpers.plates import ahead, facing, plate, scan, unit
+import numpy as np
+from pydrake.math import RigidTransform
+import pytest
+from scipy import integrate
+
+from cns_drake.scene.semantics import CLASS_IDS
+from cns_drake.scene.structure_table import StructureEntry, StructureTable
+from cns_drake.sensors.returns.counter_random import frame_key, normal, uniform
+from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS
+from cns_drake.sensors.returns.weather import Weather, tabulate_scattering
+
+OUTLIER = CLASS_IDS["outlier"]
+
+
+def test_extinction_of_rain_is_that_of_geometric_optics():
+    rate = 10.0
+    slope = 4.1 * rate**-0.21
+    # 2 pi / 4 D^2 N(D), in closed form: 2 / slope^3.
+    expected = 2e-6 * np.pi / 4.0 * 8000.0 * 2.0 / slope**3
+    assert Weather(rain=rate).extinction == pytest.approx(expected, rel=0.01)
+    # 0.0016 / m at 10 mm/h.
+    assert expected == pytest.approx(0.0016, abs=1e-4)
+    assert Weather(100.0).extinction == pytest.approx(np.log(20.0) / 100.0)
+    assert Weather().extinction == 0.0
+
+
+def test_the_table_of_drops_is_an_integral():
+    sheet = UNIT_SHEETS["os1-64"]
+    weather = Weather(snowfall=0.3)
+    table = tabulate_scattering(
+        weather, sheet.budget, sheet.divergence, sheet.resolution, 0.5
+    )
+    rate = np.gradient(table.counts, table.distances)
+    total = integrate.trapezoid(rate, table.distances)
+    assert total == pytest.approx(table.counts[-1], rel=0.02)
+    assert (np.diff(table.counts) >= 0.0).all()
+    assert table.counts[0] == 0.0
+
+
+@pytest.mark.parametrize(
+    "weather", [Weather(rain=10.0), Weather(rain=60.0), Weather(snowfall=0.2)]
+)
+def test_counts_of_drops_are_poisson(weather):
+    """Beams without a target show the first of a Poisson number of drops."""
+    sheet = UNIT_SHEETS["os1-64"]
+    num_beams = 40_000
+    far = plate("far", 0.5, RigidTransform([0.0, 0.0, -300.0]), (1, 1, 1))
+    points = scan([far], ahead(num_beams), unit(weather=weather))
+    table = tabulate_scattering(
+        weather, sheet.budget, sheet.divergence, sheet.resolution, 0.3
+    )
+    expected = num_beams * (1.0 - np.exp(-table.counts[-1]))
+    assert len(points) == pytest.approx(expected, abs=4.0 * expected**0.5)
+    assert (points["label"] == OUTLIER).all()
+    assert (points["instance"] == 0).all()
+
+
+def test_drops_hide_nothing_that_is_brighter():
+    weather = Weather(rain=20.0)
+    wall = plate("wall", 0.8, facing(8.0))
+    points = scan([wall], ahead(5_000), unit(weather=weather))
+    assert np.mean(points["label"] != OUTLIER) > 0.98
+
+
+def test_fog_shows_where_nothing_else_does():
+    far = plate("far", 0.5, RigidTransform([0.0, 0.0, -300.0]), (1, 1, 1))
+    counts = [
+        len(scan([far], ahead(2_000), unit(weather=Weather(visibility))))
+        for visibility in (30.0, 100.0, 300.0, 3_000.0)
+    ]
+    assert counts == sorted(counts, reverse=True)
+    assert counts[0] > 1_600
+    assert counts[-1] == 0
+
+
+def test_zero_rates_are_clear_air():
+    wall = plate("wall", 0.3, facing(30.0))
+    clear = scan([wall], ahead(3_000), unit())
+    zero = scan([wall], ahead(3_000), unit(weather=Weather(None, 0.0, 0.0)))
+    assert clear.tobytes() == zero.tobytes()
+
+
+def test_wet_asphalt_is_darker():
+    table = StructureTable([StructureEntry(1, "road", "road")])
+    road = plate("road", None, facing(10.0))
+    dry, wet = (
+        np.median(
+            scan([road], ahead(100), unit(weather=weather), structures=table)[
+                "intensity"
+            ]
+        )
+        for weather in (Weather(), Weather(rain=1.0))
+    )
+    assert dry == 15.0
+    # rho (1 - p) / (1 - p rho), p = 1 - (1 - 0.066) / 1.33^2, and the drops
+    # in between.
+    assert wet == pytest.approx(8.5, abs=0.6)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("visibility", 1.0), ("rain", -1.0), ("snowfall", 1e4), ("rain", np.nan)],
+)
+def test_senseless_weather(field, value):
+    with pytest.raises(ValueError, match=field):
+        Weather(**{field: value})
+
+
+def test_each_beam_has_a_draw_of_its_own():
+    weather = Weather(200.0, 5.0, 0.1)
+    wall = plate("wall", 0.2, facing(35.0))
+    returns = unit(weather=weather)
+    pattern = ahead(2_000, spread=0.1)
+    first = scan([wall], pattern, returns, frame=7)
+    assert first.tobytes() == scan([wall], pattern, returns, 7).tobytes()
+    assert first.tobytes() != scan([wall], pattern, returns, 8).tobytes()
+    # Something else that half of the beams meet changes none of the others.
+    near = plate("z_near", 0.5, facing(5.0, 20.0 + 0.5), (0.1, 40.0, 40.0))
+    other = scan([wall, near], pattern, returns, 7)
+    kept, same = other[other["y"] < -0.2], first[first["y"] < -0.2]
+    assert len(same) > 500
+    np.testing.assert_array_equal(kept, same)
+    # Nor does the name or the seed of another sensor give the same.
+    for change in ({"seed": 6}, {"sensor_name": "rear"}):
+        others = scan([wall], pattern, unit(weather=weather, **change), 7)
+        assert others.tobytes() != first.tobytes()
+
+
+def test_numbers_by_counter_are_uniform_and_independent():
+    key = frame_key(3, "lidar", -5)
+    values = np.array(
+        [
+            [uniform(key, beam, draw) for draw in range(4)]
+            for beam in range(9000)
+        ]
+    )
+    assert abs(values.mean() - 0.5) < 0.005
+    np.testing.assert_allclose(np.cov(values.T), np.eye(4) / 12.0, atol=0.003)
+    normals = np.array([normal(key, beam, 4) for beam in range(9000)])
+    assert abs(normals.mean()) < 0.04
+    assert normals.std() == pytest.approx(1.0, abs=0.03)
+    assert frame_key(3, "lidar", 5) != key != frame_key(3, "rear", -5)

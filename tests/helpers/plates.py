@@ -1,0 +1,86 @@
+"""A LiDAR with calibrated returns before surfaces of known reflectivity."""
+
+import numpy as np
+from pydrake.geometry import (
+    Box,
+    GeometryInstance,
+    PerceptionProperties,
+    SceneGraph,
+)
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import DiagramBuilder
+
+from cns_drake.sensors.free_patterns import DirectionPattern
+from cns_drake.sensors.lidar import Lidar
+from cns_drake.sensors.lidar_adding import connect_lidar
+from cns_drake.sensors.returns.calibrated import CalibratedReturns
+
+
+def plate(name, reflectivity, X_WG, size=(0.1, 400.0, 400.0), shape=None):
+    """Returns a surface: a plate, whose near face is that at lesser x."""
+    instance = GeometryInstance(X_WG, shape or Box(*size), name)
+    properties = PerceptionProperties()
+    if reflectivity is not None:
+        properties.AddProperty("lidar", "reflectivity", reflectivity)
+    instance.set_perception_properties(properties)
+    return instance
+
+
+def facing(distance, offset=0.0):
+    """Returns the pose of a plate whose near face is so far ahead."""
+    return RigidTransform([distance + 0.05, offset, 0.0])
+
+
+def ahead(num_beams, spread=1e-4, max_range=400.0):
+    """Returns beams that all go along x, but for a tiny fan."""
+    angle = np.linspace(-spread, spread, num_beams)
+    d_Sset = np.stack(
+        [np.cos(angle), np.sin(angle), np.zeros(num_beams)], axis=1
+    )
+    return DirectionPattern(
+        d_Sset, min_range=0.3, max_range=max_range, period=0.05
+    )
+
+
+def beside(num_beams, angle):
+    """Returns beams that go along x, each followed by one off by an angle.
+
+    Those have odd numbers as their ring.
+    """
+    angles = np.tile([0.0, angle], num_beams)
+    d_Sset = np.stack(
+        [np.cos(angles), np.sin(angles), np.zeros(2 * num_beams)], axis=1
+    )
+    rings = np.tile([0, 1], num_beams)
+    return DirectionPattern(
+        d_Sset, min_range=0.3, max_range=400.0, period=0.05, rings=rings
+    )
+
+
+def scan(instances, pattern, returns, frame=0, structures=None):
+    """Returns the scan of a LiDAR in the world's origin."""
+    builder = DiagramBuilder()
+    scene_graph = builder.AddNamedSystem("scene_graph", SceneGraph())
+    source = scene_graph.RegisterSource("plates")
+    for instance in instances:
+        scene_graph.RegisterAnchoredGeometry(source, instance)
+    lidar = builder.AddNamedSystem(
+        "lidar",
+        Lidar(
+            scene_graph.world_frame_id(),
+            RigidTransform(),
+            pattern,
+            returns=returns,
+            structures=structures,
+        ),
+    )
+    connect_lidar(builder, scene_graph, lidar)
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    context.SetTime(frame * pattern.period)
+    return lidar.GetOutputPort("scan").Eval(lidar.GetMyContextFromRoot(context))
+
+
+def unit(preset="os1-64", **options):
+    """Returns the returns of a preset."""
+    return CalibratedReturns.of_preset(preset, **{"seed": 5, **options})
