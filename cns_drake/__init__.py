@@ -35,6 +35,7 @@ if TYPE_CHECKING:
         make_flash_pattern,
     )
     from cns_drake.sensors.imu import Imu, add_imu
+    from cns_drake.sensors.imu_noise import ImuNoise
     from cns_drake.sensors.lidar import Lidar
     from cns_drake.sensors.lidar_adding import add_lidar
     from cns_drake.sensors.lidar_presets import LIDAR_PRESETS, make_beam_pattern
@@ -60,6 +61,7 @@ __all__ = [
     "CalibratedReturns",
     "DirectionPattern",
     "Imu",
+    "ImuNoise",
     "InputError",
     "Lidar",
     "McapRecorder",
@@ -111,6 +113,7 @@ _HOMES = {
         "make_flash_pattern",
     ),
     "cns_drake.sensors.imu": ("Imu", "add_imu"),
+    "cns_drake.sensors.imu_noise": ("ImuNoise",),
     "cns_drake.sensors.lidar": ("Lidar",),
     "cns_drake.sensors.lidar_adding": ("add_lidar",),
     "cns_drake.sensors.lidar_presets": ("LIDAR_PRESETS", "make_beam_pattern"),

@@ -11,16 +11,21 @@ from cns_drake.recording.frame_clock import FRAME_PERIOD
 
 
 def frame_progress(
-    progress: Progress, task: TaskID
+    progress: Progress, task: TaskID, period: float = FRAME_PERIOD
 ) -> Callable[[int, int], None]:
     """Returns a callback that shows the frames of a simulation.
 
     It is `count_progress` with simulated time and real-time factor.
+
+    Args:
+        progress: where to show it.
+        task: as which task.
+        period: time between frames [s].
     """
 
     def note(done: int, new: int, elapsed: float) -> str:
-        factor = new * FRAME_PERIOD / max(elapsed, 1e-9)
-        simulated = done * FRAME_PERIOD
+        factor = new * period / max(elapsed, 1e-9)
+        simulated = done * period
         return f"{simulated:.1f} s simulated, {factor:.1f} x real time"
 
     return count_progress(progress, task, note)

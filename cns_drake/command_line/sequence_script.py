@@ -60,6 +60,7 @@ def run_sequence(
     """
     with uninterrupted():  # Slow to import, not needed for `--help`.
         from cns_drake.base.processors import num_cores
+        from cns_drake.scenarios.rates import frame_period
         from cns_drake.scenarios.scenario_loading import load_scenario
         from cns_drake.simulation.simulation import simulate
 
@@ -72,7 +73,7 @@ def run_sequence(
         scenario = scenario.model_copy(update={"frames": frames})
     with show_progress() as progress:
         task = progress.add_task(scenario.name, total=None, note="loading")
-        on_frame = frame_progress(progress, task)
+        on_frame = frame_progress(progress, task, frame_period(scenario.lidars))
         run = simulate(
             scenario,
             output,

@@ -16,6 +16,7 @@ from cns_drake.base.recordings.mcap_sequence import McapSequence
 from cns_drake.export.drive_layout import (
     Layout,
     checked_name,
+    imu_files,
     join_rows,
     scenario_files,
     unit_quaternions,
@@ -66,7 +67,7 @@ def _inner_files(sequence: McapSequence) -> dict[str, str]:
             ),
             ",",
         )
-    return files | scenario_files(sequence)
+    return files | imu_files(sequence) | scenario_files(sequence)
 
 
 def _scan_files(
@@ -99,6 +100,8 @@ CNS = Layout(
         " and specific force [m/s^2] in its own axes",
         "<Map>/<Sequence>/pcd/<t>.pcd": "x, y, z [m] and intensity, float32,"
         " in the LiDAR's frame",
+        "<Map>/<Sequence>/imu.yaml": "noise of the IMU, if it has noise, as"
+        " Kalibr has it",
         "<Map>/<Sequence>/scenario.yaml": "what was simulated",
     },
     drive_folder=_drive_folder,

@@ -76,6 +76,11 @@ def scenario_files(
     return {"scenario.yaml": to_yaml(scenario)}
 
 
+def imu_files(sequence: McapSequence) -> dict[str, str]:
+    """Returns `imu.yaml`, the IMU's noise for Kalibr, if it has noise."""
+    return {} if sequence.kalibr is None else {"imu.yaml": sequence.kalibr}
+
+
 def structure_files(sequence: McapSequence) -> dict[str, str]:
     """Returns `structures.json`, what the instances are, if it is known."""
     if sequence.instances is None:

@@ -17,6 +17,7 @@ from cns_drake.base.cloud_writing import encode_bin, encode_labels
 from cns_drake.base.recordings.mcap_sequence import McapSequence
 from cns_drake.export.drive_layout import (
     Layout,
+    imu_files,
     join_rows,
     scenario_files,
     seconds,
@@ -72,6 +73,7 @@ def _inner_files(sequence: McapSequence) -> dict[str, str]:
             f"{name}: {_rows(X[None])}" for name, X in calibration.items()
         ),
         "first_pose.txt": _rows(sequence.X_WS[:1]),
+        **imu_files(sequence),
         **structure_files(sequence),
         **scenario_files(sequence, _name(sequence)),
     }
@@ -120,6 +122,8 @@ KITTI = Layout(
         " map",
         "sequences/<NN>/structures.json": "what the instances are, and in"
         " which other stage they are absent, if asked for",
+        "sequences/<NN>/imu.yaml": "noise of the IMU, if it has noise, as"
+        " Kalibr has it",
         "sequences/<NN>/scenario.yaml": "what was simulated",
     },
     drive_folder=_drive_folder,

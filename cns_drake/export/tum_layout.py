@@ -15,6 +15,7 @@ from cns_drake.base.recordings.mcap_sequence import McapSequence
 from cns_drake.export.drive_layout import (
     Layout,
     checked_name,
+    imu_files,
     seconds,
     unit_quaternions,
 )
@@ -35,6 +36,7 @@ def _inner_files(sequence: McapSequence) -> dict[str, str]:
         "lidar.tum": _rows(
             sequence.stamps_ns, X_WS[:, :3, 3], R_WS.as_quat(canonical=True)
         ),
+        **imu_files(sequence),
     }
 
 
@@ -57,6 +59,8 @@ TUM = Layout(
         " and metres",
         "<sequence>/lidar.tum": "pose of the LiDAR in the world, likewise, a"
         " row a scan",
+        "<sequence>/imu.yaml": "noise of the IMU, if it has noise, as Kalibr"
+        " has it",
     },
     drive_folder=_drive_folder,
     outer_files=lambda sequence: {},

@@ -118,6 +118,13 @@ class Trajectory:
         u, rate, acceleration = self.path_parameter(t)
         return _path_motion(self._path.evaluate(u), rate, acceleration)
 
+    def body_motion(self, t: ArrayLike) -> FrameMotion:
+        """Returns how the vehicle frame B moves in the world at (N,) times."""
+        motion = self.path_motion(t)
+        if self._ride is None:
+            return motion
+        return motion.of_frame(ride_motion(self._ride.at(t)))
+
     def travelled(self, t: ArrayLike) -> np.ndarray:
         """Returns the (N,) distances travelled at (N,) times [m]."""
         return self._travelled.evaluate(self.at(t).section)

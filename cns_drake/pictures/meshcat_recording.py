@@ -53,6 +53,7 @@ class MeshcatRecorder(LeafSystem):
         *,
         X_BSs: Mapping[str, RigidTransform],
         period: float,
+        num_frames: int | None = None,
         other_stage: World | None = None,
         other_name: str = "the other stage",
         scan_spacing: float = 15.0,
@@ -63,6 +64,7 @@ class MeshcatRecorder(LeafSystem):
             world: the stage, with the vehicle.
             X_BSs: LiDAR name -> pose of its frame S in B.
             period: time between frames [s].
+            num_frames: how many frames to take down, if not all.
             other_stage: the stage to show the difference to.
             other_name: what the page calls it.
             scan_spacing: way between two scans that are shown [m].
@@ -74,6 +76,7 @@ class MeshcatRecorder(LeafSystem):
         self._X_BSs = dict(X_BSs)
         self._scan_spacing = scan_spacing
         self._way_to_scan = 0.0
+        self._num_frames = num_frames
         self.drive = Drive(
             period, X_WFs={frame_id: [] for frame_id in moving_frames(world)}
         )
@@ -114,6 +117,8 @@ class MeshcatRecorder(LeafSystem):
         complete_part(path)
 
     def _publish(self, context: Context) -> EventStatus:
+        if len(self.drive.X_WBs) == self._num_frames:
+            return EventStatus.DidNothing()
         query_object = self._geometry_query.Eval(context)
         for frame_id, X_WFs in self.drive.X_WFs.items():
             # Copies: what the ports give may be overwritten at the next step.

@@ -92,6 +92,7 @@ class BagWriter:
         start_ns: int,
         attachments: Mapping[str, object],
         scenario: Mapping[str, object],
+        beside: Mapping[str, object] | None = None,
         custom_data: Mapping[str, str] | None = None,
         fingerprint: str = "",
         overwrite: bool = False,
@@ -103,10 +104,13 @@ class BagWriter:
             topics: every topic, in the order of the file's channels.
             start_ns: time of the first message, also the nominal time of
                 the attachments [ns].
-            attachments: file name -> JSON value, put before all messages.
+            attachments: file name -> value, put before all messages; as YAML
+                if the name ends with `.yaml`, and else as JSON.
                 They tell whether an interrupted recording is of the same
                 kind, so that its messages can be taken over.
             scenario: what `scenario.yaml` beside the MCAP shall hold.
+            beside: name of a further file beside the MCAP -> what it shall
+                hold, as YAML.
             custom_data: key -> text for `ros2 bag info`.
             fingerprint: what `fingerprint.txt` shall hold, if anything. An
                 interrupted recording with another one is of another kind,
@@ -125,6 +129,10 @@ class BagWriter:
         self._start_ns = start_ns
         self._attachments = dict(attachments)
         self._scenario = scenario
+        self._beside = {
+            self._files.path / name: value
+            for name, value in (beside or {}).items()
+        }
         self._custom_data = dict(custom_data or {})
         self._fingerprint = fingerprint
         self._part = part_path(self._files.mcap)
@@ -312,8 +320,7 @@ class BagWriter:
                 self._start_ns,
                 self._start_ns,
                 name,
-                "application/json",
-                _to_json(value),
+                *_encode(name, value),
             )
         schema_ids = {
             message_type: writer.register_schema(
@@ -360,11 +367,14 @@ class BagWriter:
         metadata = {"rosbag2_bagfile_information": self._information()}
         write_part(files.scenario, to_yaml(self._scenario))
         write_part(files.metadata, to_yaml(metadata))
+        for path, value in self._beside.items():
+            write_part(path, to_yaml(value))
         with user_errors(files.path):
             files.metadata.unlink(missing_ok=True)
             files.fingerprint.unlink(missing_ok=True)
         complete_part(files.mcap)
-        complete_part(files.scenario)
+        for path in (*self._beside, files.scenario):
+            complete_part(path)
         if self._fingerprint:
             complete_part(files.fingerprint)
         complete_part(files.metadata)
@@ -409,6 +419,9 @@ class BagWriter:
         )
 
 
-def _to_json(value: Any) -> bytes:
+def _encode(name: str, value: Any) -> tuple[str, bytes]:
+    """Returns the media type and the content of an attachment."""
+    if name.endswith(".yaml"):
+        return "application/yaml", to_yaml(value).encode()
     text = json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False)
-    return text.encode()
+    return "application/json", text.encode()

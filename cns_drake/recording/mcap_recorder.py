@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-import math
 from typing import Any, NamedTuple
 
 from pydrake.common.value import Value
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import (
     Context,
     EventStatus,
@@ -22,10 +21,10 @@ from pydrake.systems.sensors import (
 )
 
 from cns_drake.base.recordings import ros_types
+from cns_drake.base.recordings.point_layouts import to_labels, to_layout
 from cns_drake.recording import messages
 from cns_drake.recording.background_writer import BackgroundWriter
 from cns_drake.recording.bag_writer import BagWriter
-from cns_drake.recording.frame_clock import frame_stamp_ns
 from cns_drake.recording.image_messages import (
     CAMERA_INFO,
     ENCODINGS,
@@ -34,6 +33,7 @@ from cns_drake.recording.image_messages import (
     make_image,
 )
 from cns_drake.recording.rosbag2_metadata import Topic
+from cns_drake.recording.schedule import Schedule, make_schedule
 
 _TF_STATIC = Topic("/tf_static", ros_types.TF, latched=True)
 _TF = Topic("/tf", ros_types.TF)
@@ -41,8 +41,8 @@ _ODOMETRY = Topic("/odometry", ros_types.ODOMETRY)
 _IMU = Topic("/imu/data", ros_types.IMU)
 
 # Events of a periodic schedule come at exact multiples of the period; only
-# the rounding of that product separates their times from a frame's.
-_FRAME_TOLERANCE = 1e-6
+# the rounding of that product separates their times from a tick's, in ticks.
+_TICK_TOLERANCE = 1e-3
 
 _IMAGES = {
     "color": ImageRgba8U,
@@ -74,6 +74,7 @@ class McapRecorder(LeafSystem):
         - odometry
         - specific_force
         - angular_velocity
+        - R_WI (if it is declared)
         - <lidar>_scan (one for each LiDAR)
         - <lidar>_pose (for each LiDAR without a fixed place)
         - <camera>_color (one for each camera)
@@ -87,6 +88,8 @@ class McapRecorder(LeafSystem):
       `V_WB_B` (SpatialVelocity expressed in B).
     - `specific_force`: of I, expressed in I, vector of size 3 [m/s^2].
     - `angular_velocity`: w_WI_I, vector of size 3 [rad/s].
+    - `R_WI`: abstract, a RotationMatrix; without this port the orientation of
+      I is that of the odometry.
     - `<lidar>_scan`: abstract, structured array of points expressed in S.
     - `<lidar>_pose`: abstract, X_WS.
     - `<camera>_color`, `_depth`, `_label`: images as Drake's RgbdSensor gives
@@ -94,11 +97,12 @@ class McapRecorder(LeafSystem):
 
     What is not connected is not recorded.
 
-    The system has no state. Frame i is what the inputs show at i * period;
-    it is written by a periodic publish event from time zero on, or by a
-    forced publish at such a time. The inputs must be wired straight to
-    continuous outputs: a publish sees the state before any update at the
-    same time, so a hold in front would make every message one period old.
+    The system has no state. Tick i is at i * period of its schedule. What is
+    due then is written as the inputs show it, by a periodic publish event
+    from time zero on, or by a forced publish at such a time. The inputs must
+    be wired straight to continuous outputs: a publish sees the state before
+    any update at the same time, so a hold in front would make every message
+    one period old.
 
     Example:
         from cns_drake import McapRecorder
@@ -115,7 +119,11 @@ class McapRecorder(LeafSystem):
         X_BSs: Mapping[str, RigidTransform | None],
         X_BI: RigidTransform | None = None,
         cameras: Mapping[str, RecordedCamera] | None = None,
-        period: float,
+        period: float | None = None,
+        schedule: Schedule | None = None,
+        layouts: Mapping[str, str] | None = None,
+        imu_variances: tuple[float, float] = (0.0, 0.0),
+        with_orientation: bool = False,
         start_ns: int = 0,
     ):
         """Declares the ports and the schedule.
@@ -127,8 +135,17 @@ class McapRecorder(LeafSystem):
                 fixed place there.
             X_BI: pose of the imu frame I in B, None if it has none.
             cameras: camera name -> camera.
-            period: time between frames [s].
-            start_ns: the stamp of frame 0 [ns].
+            period: time between frames [s], if all sensors have one; or
+            schedule: when each topic is due, by name.
+            layouts: LiDAR name -> layout of its points (see
+                `point_layouts`), `cns` unless given.
+            imu_variances: of specific force [m^2/s^4] and angular velocity
+                [rad^2/s^2].
+            with_orientation: whether there is a port `R_WI`.
+            start_ns: the stamp of time zero [ns].
+
+        Raises:
+            ValueError: there is neither a period nor a schedule, or both.
         """
         super().__init__()
         self._bag = bag
@@ -137,8 +154,18 @@ class McapRecorder(LeafSystem):
             self._X_BCs[messages.IMU_FRAME] = X_BI
         self._X_BI = X_BI
         self._cameras = dict(cameras or {})
-        self._period = period
+        self._layouts = dict(layouts or {})
+        self._imu_variances = imu_variances
         self._start_ns = start_ns
+        if (period is None) == (schedule is None):
+            raise ValueError("a recorder needs a period or a schedule")
+        if period is not None:
+            topics = recording_topics(
+                X_BSs, camera_names=self._cameras, layouts=self._layouts
+            )
+            schedule = make_schedule({topic.name: period for topic in topics})
+        assert schedule is not None
+        self._schedule = schedule
 
         self._odometry = self.DeclareAbstractInputPort(
             "odometry", Value(object())
@@ -147,6 +174,11 @@ class McapRecorder(LeafSystem):
         self._angular_velocity = self.DeclareVectorInputPort(
             "angular_velocity", 3
         )
+        self._R_WI = None
+        if with_orientation:
+            self._R_WI = self.DeclareAbstractInputPort(
+                "R_WI", Value(RotationMatrix())
+            )
         self._scans = {
             name: self.DeclareAbstractInputPort(f"{name}_scan", Value(object()))
             for name in X_BSs
@@ -167,7 +199,9 @@ class McapRecorder(LeafSystem):
             }
             self._poses[name] = (self._declare_pose(name), camera.X_BC)
         self.DeclarePeriodicPublishEvent(
-            period_sec=period, offset_sec=0.0, publish=self._publish
+            period_sec=self._schedule.period,
+            offset_sec=0.0,
+            publish=self._publish,
         )
         self.DeclareForcedPublishEvent(self._publish)
 
@@ -177,17 +211,35 @@ class McapRecorder(LeafSystem):
         )
 
     def _publish(self, context: Context) -> EventStatus:
-        frame = self._frame_index(context.get_time())
-        stamp_ns = frame_stamp_ns(
-            frame, start_ns=self._start_ns, period=self._period
-        )
-        odometry = _eval(self._odometry, context)
-        if frame == 0 and self._X_BCs:
+        tick = self._tick(context.get_time())
+        stamp_ns = self._start_ns + self._schedule.time_ns(tick)
+        due = set(self._schedule.due(tick))
+        if tick == 0 and self._X_BCs:
             # Latched, hence once; in the first frame rather than before it,
             # so that the recorder needs no memory of having written it.
             tf = messages.make_tf(messages.BASE_FRAME, self._X_BCs, stamp_ns)
             self._write(_TF_STATIC, tf, stamp_ns, 0)
         outgoing: dict[Topic, Any] = {}
+        if _TF.name in due or _ODOMETRY.name in due:
+            outgoing |= self._locate(context, stamp_ns)
+        if _IMU.name in due:
+            outgoing |= self._feel(context, stamp_ns)
+        for name in self._scans:
+            if _points_topic(name).name in due:
+                outgoing |= self._scan(context, name, stamp_ns)
+        for name in self._cameras:
+            if _camera_info_topic(name).name in due:
+                outgoing |= self._photograph(context, name, stamp_ns)
+        for topic, message in outgoing.items():
+            if topic.name in due:
+                number = tick // self._schedule.steps[topic.name]
+                self._write(topic, message, stamp_ns, number)
+        return EventStatus.Succeeded()
+
+    def _locate(self, context: Context, stamp_ns: int) -> dict[Topic, Any]:
+        """Returns the messages that tell where all is."""
+        outgoing = {}
+        odometry = _eval(self._odometry, context)
         X_WCs = {
             name: port.Eval(context) @ X_PC
             for name, (port, X_PC) in self._poses.items()
@@ -203,26 +255,49 @@ class McapRecorder(LeafSystem):
             outgoing[_ODOMETRY] = messages.make_odometry(
                 odometry.X_WB, odometry.V_WB_B, stamp_ns
             )
+        return outgoing
+
+    def _feel(self, context: Context, stamp_ns: int) -> dict[Topic, Any]:
+        """Returns the message of the IMU."""
         angular_velocity = _eval(self._angular_velocity, context)
         specific_force = _eval(self._specific_force, context)
-        if angular_velocity is not None or specific_force is not None:
-            R_WI = None
-            if odometry is not None and self._X_BI is not None:
+        if angular_velocity is None and specific_force is None:
+            return {}
+        R_WI = None
+        if self._R_WI is not None:
+            R_WI = _eval(self._R_WI, context)
+        elif self._X_BI is not None:
+            odometry = _eval(self._odometry, context)
+            if odometry is not None:
                 R_WI = odometry.X_WB.rotation() @ self._X_BI.rotation()
-            outgoing[_IMU] = messages.make_imu(
-                R_WI, angular_velocity, specific_force, stamp_ns
+        return {
+            _IMU: messages.make_imu(
+                R_WI,
+                angular_velocity,
+                specific_force,
+                stamp_ns,
+                self._imu_variances,
             )
-        for name, port in self._scans.items():
-            scan = _eval(port, context)
-            if scan is not None:
-                outgoing[_points_topic(name)] = messages.make_point_cloud(
-                    scan, name, stamp_ns
-                )
-        for name in self._cameras:
-            outgoing |= self._photograph(context, name, stamp_ns)
-        for topic, message in outgoing.items():
-            self._write(topic, message, stamp_ns, frame)
-        return EventStatus.Succeeded()
+        }
+
+    def _scan(
+        self, context: Context, name: str, stamp_ns: int
+    ) -> dict[Topic, Any]:
+        """Returns the messages of a LiDAR."""
+        scan = _eval(self._scans[name], context)
+        if scan is None:
+            return {}
+        layout = self._layouts.get(name, "cns")
+        outgoing = {
+            _points_topic(name): messages.make_point_cloud(
+                to_layout(scan, layout), name, stamp_ns
+            )
+        }
+        if layout != "cns":
+            outgoing[_labels_topic(name)] = messages.make_point_cloud(
+                to_labels(scan), name, stamp_ns
+            )
+        return outgoing
 
     def _photograph(
         self, context: Context, name: str, stamp_ns: int
@@ -248,15 +323,14 @@ class McapRecorder(LeafSystem):
             topic.name, stamp_ns, ros_types.serialize(message), sequence
         )
 
-    def _frame_index(self, time: float) -> int:
-        frame = round(time / self._period)
-        if not math.isclose(
-            time, frame * self._period, abs_tol=_FRAME_TOLERANCE
-        ):
+    def _tick(self, time: float) -> int:
+        ticks = time / self._schedule.period
+        if abs(ticks - round(ticks)) > _TICK_TOLERANCE:
             raise ValueError(
-                f"time {time} s is no multiple of the period {self._period} s"
+                f"time {time} s is no multiple of the period "
+                f"{self._schedule.period} s"
             )
-        return frame
+        return round(ticks)
 
 
 def _eval(port: InputPort, context: Context) -> Any:
@@ -270,6 +344,7 @@ def recording_topics(
     camera_names: Iterable[str] = (),
     with_imu: bool = True,
     with_odometry: bool = True,
+    layouts: Mapping[str, str] | None = None,
 ) -> tuple[Topic, ...]:
     """Returns the topics of a recording.
 
@@ -278,13 +353,18 @@ def recording_topics(
         camera_names: of its cameras.
         with_imu: whether it has an IMU.
         with_odometry: whether it has odometry.
+        layouts: LiDAR name -> layout of its points, if not `cns`.
 
     Example:
         from cns_drake import recording_topics
 
         topics = recording_topics(["lidar"])
     """
-    topics = [_points_topic(name) for name in lidar_names]
+    topics = []
+    for name in lidar_names:
+        topics.append(_points_topic(name))
+        if (layouts or {}).get(name, "cns") != "cns":
+            topics.append(_labels_topic(name))
     for name in camera_names:
         topics += [_image_topic(name, kind) for kind in ENCODINGS]
         topics.append(_camera_info_topic(name))
@@ -320,6 +400,10 @@ def make_calibration(
 
 def _points_topic(lidar_name: str) -> Topic:
     return Topic(f"/{lidar_name}/points", ros_types.POINT_CLOUD)
+
+
+def _labels_topic(lidar_name: str) -> Topic:
+    return Topic(f"/{lidar_name}/labels", ros_types.POINT_CLOUD)
 
 
 def _image_topic(camera_name: str, kind: str) -> Topic:

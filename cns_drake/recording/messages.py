@@ -72,8 +72,9 @@ def make_imu(
     angular_velocity: np.ndarray | None,
     specific_force: np.ndarray | None,
     stamp_ns: int,
+    variances: tuple[float, float] = (0.0, 0.0),
 ) -> Any:
-    """Returns an Imu message of an ideal sensor.
+    """Returns an Imu message.
 
     Args:
         R_WI: orientation of the imu frame I in the map W.
@@ -81,31 +82,37 @@ def make_imu(
         specific_force: what an accelerometer feels, expressed in I, shape
             (3,) [m/s^2]; at rest on level ground +9.81 along z.
         stamp_ns: the time of the measurement [ns].
+        variances: of each axis of the specific force [m^2/s^4] and of the
+            angular velocity [rad^2/s^2].
 
     Returns:
-        The message; its covariances are zero, since nothing is uncertain,
-        but begin with -1 for what is None, as ROS has it.
+        The message. The orientation is exact, and its covariance zero. The
+        covariance of what is None begins with -1, as ROS has it.
     """
     zero = np.zeros(3)
     return message_class(IMU)(
         header=make_header(IMU_FRAME, stamp_ns),
         orientation=_make_quaternion(R_WI or RotationMatrix()),
-        orientation_covariance=_certainty(R_WI),
+        orientation_covariance=_covariance(R_WI, 0.0),
         angular_velocity=_make_vector(
             zero if angular_velocity is None else angular_velocity
         ),
-        angular_velocity_covariance=_certainty(angular_velocity),
+        angular_velocity_covariance=_covariance(angular_velocity, variances[1]),
         linear_acceleration=_make_vector(
             zero if specific_force is None else specific_force
         ),
-        linear_acceleration_covariance=_certainty(specific_force),
+        linear_acceleration_covariance=_covariance(
+            specific_force, variances[0]
+        ),
     )
 
 
-def _certainty(value: object) -> np.ndarray:
-    """Returns the covariance of what is exact, or None."""
+def _covariance(value: object, variance: float) -> np.ndarray:
+    """Returns the covariance, row by row, of a value, which may be None."""
     covariance = np.zeros(9)
-    covariance[0] = -1.0 if value is None else 0.0
+    covariance[::4] = variance
+    if value is None:
+        covariance[0] = -1.0
     return covariance
 
 

@@ -5,39 +5,61 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from cns_drake.recording.bag_writer import BagWriter, RecordedMessage
-from cns_drake.recording.frame_clock import frame_stamp_ns
+from cns_drake.recording.frame_clock import START_NS
 from cns_drake.recording.rosbag2_metadata import Topic
+from cns_drake.recording.schedule import Schedule
 
 
-def take_over_frames(bag: BagWriter, topics: Sequence[Topic]) -> int:
+def take_over_frames(
+    bag: BagWriter,
+    topics: Sequence[Topic],
+    schedule: Schedule,
+    frame_topic: str,
+) -> int:
     """Writes the complete frames of an interrupted run into its successor.
 
-    A frame has one message on every topic, latched topics only in frame 0.
+    A frame has all messages that are due from one message on `frame_topic`
+    until the next; latched topics have one message, at tick 0.
 
     Args:
         bag: an open bag, to which nothing has been written.
         topics: the bag's topics.
+        schedule: when each of them that is not latched is due, by name.
+        frame_topic: with one message a frame.
 
     Returns:
         How many frames there are, from frame 0 on.
     """
-    frames = 0
+    frames = tick = 0
     frame: list[RecordedMessage] = []
+    missing = {topic.name for topic in topics if topic.latched}
+    missing.update(schedule.due(0))
+    # Nothing is due after the end of all streams, if they have one.
+    last = None
+    if schedule.ends.keys() >= schedule.steps.keys():
+        last = max(schedule.ends.values())
     for message in bag.interrupted():
-        expected = {
-            topic.name for topic in topics if not topic.latched or frames == 0
-        }
-        stamp_ns = frame_stamp_ns(frames)
         if (
-            message.topic not in expected - {other.topic for other in frame}
-            or message.stamp_ns != stamp_ns
-            or message.sequence != frames
+            message.topic not in missing
+            or message.stamp_ns != START_NS + schedule.time_ns(tick)
+            or message.sequence != tick // schedule.steps.get(message.topic, 1)
         ):
             break
         frame.append(message)
-        if len(frame) == len(expected):
-            for complete in frame:
-                bag.write(*complete)
-            frames += 1
-            frame.clear()
+        missing.remove(message.topic)
+        while not missing and tick != last:
+            tick += 1
+            missing.update(schedule.due(tick))
+            if frame_topic in missing:
+                frames += _write(bag, frame)
+    if not missing:
+        frames += _write(bag, frame)
     return frames
+
+
+def _write(bag: BagWriter, frame: list[RecordedMessage]) -> int:
+    """Writes a complete frame; returns 1."""
+    for message in frame:
+        bag.write(*message)
+    frame.clear()
+    return 1

@@ -3,9 +3,31 @@
 from __future__ import annotations
 
 from cns_drake.scenarios.mount import Mount, Triple
+from cns_drake.scenarios.section import field_off_by_default
 
 
 class ImuConfig(Mount):
-    """An ideal IMU."""
+    """An IMU, ideal and with one sample a scan unless told otherwise.
+
+    Attributes:
+        rate: samples per second.
+        kalibr: a file of Kalibr with its noise; see `read_kalibr`.
+        accelerometer_turn_on_bias: standard deviation of its bias at the
+            start [m/s^2].
+        gyroscope_turn_on_bias: likewise [rad/s].
+        accelerometer_range: the most that an axis measures [m/s^2].
+        gyroscope_range: likewise [rad/s].
+    """
 
     xyz: Triple = (-1.0, 0.0, 1.6)
+    rate: int | None = field_off_by_default(None)
+    kalibr: str | None = field_off_by_default(None)
+    accelerometer_turn_on_bias: float = field_off_by_default(0.0, ge=0.0)
+    gyroscope_turn_on_bias: float = field_off_by_default(0.0, ge=0.0)
+    accelerometer_range: float | None = field_off_by_default(None, gt=0.0)
+    gyroscope_range: float | None = field_off_by_default(None, gt=0.0)
+
+    @property
+    def is_ideal(self) -> bool:
+        """Whether it measures exactly, once a scan."""
+        return self == ImuConfig(xyz=self.xyz, rpy_deg=self.rpy_deg)

@@ -13,6 +13,7 @@ from pydantic import (
 )
 
 from cns_drake.base.errors import InputError, describe_validation_error
+from cns_drake.base.recordings.point_layouts import LayoutName
 from cns_drake.scenarios.mount import Mount, Triple
 from cns_drake.scenarios.section import field_off_by_default
 from cns_drake.sensors.lidar_presets import LIDAR_PRESETS
@@ -37,6 +38,9 @@ class LidarConfig(Mount):
         returns: `ideal`, or `calibrated` by the data sheet of the unit: what
             returns, how far off, and how bright.
         echoes: which echoes of a beam calibrated returns report.
+        rate: turns per second.
+        layout: of the points in a recording; see
+            `cns_drake.base.recordings.point_layouts`.
     """
 
     xyz: Triple = (0.0, 0.0, 1.6)
@@ -54,6 +58,8 @@ class LidarConfig(Mount):
     echoes: Annotated[Echoes, PlainSerializer(lambda echoes: echoes.value)] = (
         field_off_by_default(Echoes.STRONGEST)
     )
+    rate: Literal[5, 10, 20] = field_off_by_default(20)
+    layout: LayoutName = field_off_by_default("cns")
 
     @field_validator("preset")
     @classmethod

@@ -15,6 +15,7 @@ from xml.parsers import expat
 from cns_drake.base.files import user_errors
 from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
 from cns_drake.base.version import __version__
+from cns_drake.scenarios.imu_making import KALIBR_FILE, describe_kalibr
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder, world_file
 from cns_drake.scenarios.shipped import suspension_file, vehicle_file
@@ -68,9 +69,10 @@ def digest_inputs(scenario: Scenario) -> dict[str, str]:
     what they name.
 
     Returns:
-        `world`, `vehicle`, and `structures`, `suspension`, `roads` or
-        `waypoints` where there are such -> hexadecimal digest. It depends on
-        contents and on the relative names alone, not on where the files lie.
+        `world`, `vehicle`, and `structures`, `suspension`, `roads`,
+        `waypoints` or `kalibr` where there are such -> hexadecimal digest. It
+        depends on contents and on the relative names alone, not on where the
+        files lie.
 
     Raises:
         InputError: a file cannot be read.
@@ -85,7 +87,12 @@ def digest_inputs(scenario: Scenario) -> dict[str, str]:
         inputs["waypoints"] = Path(scenario.waypoints)
     else:
         inputs["roads"] = map_folder(scenario).roads
-    return {name: digest_file(path) for name, path in inputs.items()}
+    digests = {name: digest_file(path) for name, path in inputs.items()}
+    kalibr = describe_kalibr(scenario)
+    if kalibr is not None:
+        text = json.dumps(kalibr).encode()
+        digests["kalibr"] = hashlib.sha256(text).hexdigest()
+    return digests
 
 
 def combined_digest(inputs: dict[str, str]) -> str:
@@ -102,11 +109,14 @@ def recording_fingerprint(scenario: Scenario, inputs: dict[str, str]) -> str:
         scenario: what is recorded.
         inputs: its `digest_inputs`.
     """
-    places = {
+    places: dict[str, object] = {
         field: Path(place).name
         for field in ("map", "world", "waypoints")
         if (place := getattr(scenario, field)) is not None
     }
+    if scenario.imu.kalibr is not None:
+        update = {"kalibr": KALIBR_FILE}
+        places["imu"] = scenario.imu.model_copy(update=update)
     return fingerprint(
         {
             # As text, since the order of LiDARs matters.

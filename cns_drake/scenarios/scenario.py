@@ -5,7 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, PrivateAttr, field_validator, model_validator
+from pydantic import (
+    Field,
+    PrivateAttr,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from cns_drake.motion.speeds import Speeds
 from cns_drake.roads.route import Route
@@ -16,6 +22,8 @@ from cns_drake.scenarios.alternatives import (
 )
 from cns_drake.scenarios.imu_config import ImuConfig
 from cns_drake.scenarios.lidar_config import LidarConfig
+from cns_drake.scenarios.odometry_config import OdometryConfig
+from cns_drake.scenarios.rates import check_rate, fastest_rate
 from cns_drake.scenarios.ride_config import RideConfig
 from cns_drake.scenarios.section import Name, Section, field_off_by_default
 from cns_drake.scenarios.weather_config import WeatherConfig
@@ -51,6 +59,7 @@ class Scenario(Section):
         lidars: the LiDARs by name; the name gives frame and topic.
         imu: the IMU.
         weather: fog, rain and snowfall, for LiDARs with calibrated returns.
+        odometry: the exact motion of the vehicle.
         frames: how many frames to record; all of the route by default.
         seed: of everything random: the noise of LiDARs that have any.
 
@@ -100,6 +109,7 @@ class Scenario(Section):
     )
     imu: ImuConfig = ImuConfig()
     weather: WeatherConfig = field_off_by_default(WeatherConfig())
+    odometry: OdometryConfig = field_off_by_default(OdometryConfig())
     frames: int | None = Field(default=None, ge=1)
     seed: int = Field(default=0, ge=0)
 
@@ -113,6 +123,24 @@ class Scenario(Section):
         if taken:
             raise ValueError(f"'{taken.pop()}' is the name of another frame")
         return lidars
+
+    @field_validator("imu")
+    @classmethod
+    def _check_imu_rate(cls, imu: ImuConfig, info: ValidationInfo) -> ImuConfig:
+        if imu.rate is not None and "lidars" in info.data:
+            check_rate(imu.rate, fastest_rate(info.data["lidars"]))
+        return imu
+
+    @field_validator("odometry")
+    @classmethod
+    def _check_odometry_rate(
+        cls, odometry: OdometryConfig, info: ValidationInfo
+    ) -> OdometryConfig:
+        if odometry.rate is not None and "lidars" in info.data:
+            # Every scan has a pose of its own.
+            fastest = fastest_rate(info.data["lidars"])
+            check_rate(odometry.rate, fastest, multiple_of=fastest)
+        return odometry
 
     @model_validator(mode="after")
     def _check_weather(self) -> Scenario:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.map_folder import MapFolder
+from cns_drake.scenarios.imu_making import KALIBR_FILE, imu_rate
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.shipped import shipped_maps
 
@@ -44,6 +45,12 @@ def check_files(scenario: Scenario, source: object = None) -> None:
         file = getattr(scenario, field)
         if file is not None and not os.path.isfile(file):
             raise InputError(f"{source}: {field}: {file}: no such file")
+    if scenario.imu.kalibr is not None:
+        if not os.path.isfile(scenario.imu.kalibr):
+            raise InputError(
+                f"{source}: imu.kalibr: {scenario.imu.kalibr}: no such file"
+            )
+        imu_rate(scenario)
     if scenario.map is None:
         return
     folder = map_folder(scenario)
@@ -65,7 +72,8 @@ def describe_scenario(scenario: Scenario, folder: Path | None = None) -> dict:
     """Returns the fields of a scenario that are given, ready for JSON.
 
     Where a map, world or waypoints lie is no part of what is driven; their
-    content has a digest (see `provenance`).
+    content has a digest (see `provenance`). The noise of an IMU lies in a
+    file of a fixed name beside the scenario.
 
     Args:
         scenario: what to describe.
@@ -80,4 +88,6 @@ def describe_scenario(scenario: Scenario, folder: Path | None = None) -> dict:
         values[field] = Path(place).name
         if folder is not None:
             values[field] = os.path.relpath(place, folder.resolve())
+    if scenario.imu.kalibr is not None:
+        values["imu"]["kalibr"] = KALIBR_FILE
     return values

@@ -85,6 +85,10 @@ def read_scenario_file(path: Path) -> Scenario:
                 values[field] = str((path.parent / place).resolve())
             except ValueError as error:
                 raise InputError(f"{path}: {field}: {error}") from error
+    imu = values.get("imu")
+    if isinstance(imu, dict) and isinstance(imu.get("kalibr"), str):
+        kalibr = str((path.parent / imu["kalibr"]).resolve())
+        values["imu"] = {**imu, "kalibr": kalibr}
     scenario = make_scenario(values, path)
     scenario._file = path
     return scenario

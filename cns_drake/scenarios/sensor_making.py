@@ -6,7 +6,6 @@ import math
 
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from cns_drake.recording.frame_clock import FRAME_PERIOD
 from cns_drake.scenarios.lidar_config import LidarConfig
 from cns_drake.scenarios.mount import Mount
 from cns_drake.scenarios.weather_config import WeatherConfig
@@ -23,10 +22,10 @@ def sensor_pose(mount: Mount) -> RigidTransform:
 
 
 def make_pattern(config: LidarConfig) -> BeamPattern:
-    """Returns the beams of one turn, which takes one frame."""
+    """Returns the beams of one turn."""
     return make_beam_pattern(
         config.preset,
-        FRAME_PERIOD,
+        1.0 / config.rate,
         num_columns=config.columns,
         min_range=config.min_range,
         max_range=config.max_range,

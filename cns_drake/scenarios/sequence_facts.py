@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from cns_drake.recording.frame_clock import frames_within
 from cns_drake.scenarios.planning import plan_drive
+from cns_drake.scenarios.rates import frame_period
 from cns_drake.scenarios.scenario import Scenario
 
 
@@ -32,7 +33,7 @@ def sequence_facts(scenario: Scenario) -> SequenceFacts:
         InputError: the drive cannot be planned; see `plan_drive`.
     """
     trajectory = plan_drive(scenario)
-    frames = frames_within(trajectory.duration)
+    frames = frames_within(trajectory.duration, frame_period(scenario.lidars))
     return SequenceFacts(
         length=trajectory.length,
         duration=trajectory.duration,

@@ -1,33 +1,60 @@
-"""An ideal IMU: Drake's accelerometer and gyroscope, wired."""
+"""An IMU: Drake's accelerometer and gyroscope, wired, with errors if any."""
 
-# No postponed hints: the reference resolves those of a NamedTuple nowhere.
-from typing import NamedTuple
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+import math
 
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import Frame, RigidBody
-from pydrake.systems.framework import DiagramBuilder, System
+from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 from pydrake.systems.sensors import Accelerometer, Gyroscope
 
 from cns_drake.sensors.body_motion import body_and_pose, connect_motion
+from cns_drake.sensors.imu_noise import ImuNoise
+from cns_drake.sensors.noisy_imu import NoisyImu
 
 
-class Imu(NamedTuple):
-    """The two systems of an IMU in frame I.
+@dataclass(frozen=True)
+class Imu:
+    """The systems of an IMU in frame I.
+
+    It unpacks into accelerometer and gyroscope.
 
     Attributes:
         accelerometer: its `measurement` is the specific force in I, at rest
-            +9.81 along the upward axis [m/s^2].
-        gyroscope: its `measurement` is the angular velocity w_WI_I [rad/s].
+            +9.81 along the upward axis [m/s^2], without errors.
+        gyroscope: its `measurement` is the angular velocity w_WI_I [rad/s],
+            without errors.
+        rate: samples per second, None if it has no rate of its own.
+        noise: its errors, None if it is ideal.
+        noisy: the system that adds them, None if it is ideal.
 
     Example:
         from cns_drake import add_imu
 
         imu = add_imu(builder, body, X_BI)
-        port = imu.gyroscope.get_measurement_output_port()
+        port = imu.ports()["angular_velocity"]
     """
 
     accelerometer: Accelerometer
     gyroscope: Gyroscope
+    rate: float | None = None
+    noise: ImuNoise | None = None
+    noisy: NoisyImu | None = None
+
+    def __iter__(self) -> Iterator[System]:
+        yield self.accelerometer
+        yield self.gyroscope
+
+    def ports(self) -> dict[str, OutputPort]:
+        """Returns `specific_force` and `angular_velocity`, as measured."""
+        names = ("specific_force", "angular_velocity")
+        if self.noisy is not None:
+            return {name: self.noisy.GetOutputPort(name) for name in names}
+        ideal = [one.get_measurement_output_port() for one in self]
+        return dict(zip(names, ideal, strict=True))
 
 
 def add_imu(
@@ -35,6 +62,8 @@ def add_imu(
     body: RigidBody | Frame,
     X_PI: RigidTransform,
     *,
+    rate: float | None = None,
+    noise: ImuNoise | None = None,
     motion: System | None = None,
     name: str = "imu",
 ) -> Imu:
@@ -45,16 +74,26 @@ def add_imu(
         body: P, the body that carries the IMU, or a frame fixed on it, of a
             finalized plant.
         X_PI: pose of the IMU in P.
+        rate: how many samples per second a recorder takes; by default as many
+            as it takes frames [1/s].
+        noise: its errors, which need a rate.
         motion: the source of body poses, velocities and accelerations, if
             that is not the plant itself.
-        name: the systems are named `<name>_accelerometer` and
-            `<name>_gyroscope`.
+        name: the systems are named `<name>_accelerometer`,
+            `<name>_gyroscope` and `<name>_noise`.
+
+    Raises:
+        ValueError: there is noise without a rate, or the rate is none.
 
     Example:
         from cns_drake import add_imu
 
         accelerometer, gyroscope = add_imu(builder, body, X_BI)
     """
+    if rate is not None and not 0.0 < rate < math.inf:
+        raise ValueError(f"an IMU of {rate} samples a second")
+    if noise is not None and rate is None:
+        raise ValueError("noise of an IMU needs its rate")
     body, X_BI = body_and_pose(body, X_PI)
     # The accelerometer assumes no gravity unless it is told.
     gravity = body.GetParentPlant().gravity_field().gravity_vector()
@@ -73,4 +112,10 @@ def add_imu(
     port = accelerometer.get_body_accelerations_input_port()
     inputs = {"body_spatial_accelerations": port}
     connect_motion(builder, motion, body, inputs)
-    return Imu(accelerometer, gyroscope)
+    imu = Imu(accelerometer, gyroscope, rate, noise)
+    if noise is None or rate is None:
+        return imu
+    noisy = builder.AddNamedSystem(f"{name}_noise", NoisyImu(noise, rate))
+    for port_name, port in imu.ports().items():
+        builder.Connect(port, noisy.GetInputPort(port_name))
+    return replace(imu, noisy=noisy)

@@ -9,6 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cns_drake.sensors.noise_draws import noise_generator
+
 # Intensity falls with distance as in CARLA's ray-cast LiDAR with its default
 # atmosphere: exp(-a d), a = 0.004 / m (docs/ref_sensors of CARLA).
 _ATTENUATION_PER_M = 0.004
@@ -140,13 +142,7 @@ class MeasurementModel:
         return Returns(beams, ranges[beams], intensity)
 
     def _generator(self, purpose: int, frame: int) -> np.random.Generator:
-        # Keys are never negative: the frames before time zero have streams
-        # of their own.
-        stream = purpose if frame >= 0 else 2**32 - 1 - purpose
-        key = (stream, abs(frame), *self.sensor_name.encode())
-        return np.random.default_rng(
-            np.random.SeedSequence(self.seed, spawn_key=key)
-        )
+        return noise_generator(self.seed, self.sensor_name, purpose, frame)
 
 
 # Measures exactly.

@@ -7,15 +7,18 @@ from pathlib import Path
 from cns_drake.base.version import __version__
 from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.frame_clock import START_NS
-from cns_drake.recording.mcap_recorder import (
-    make_calibration,
-    recording_topics,
-)
+from cns_drake.recording.mcap_recorder import make_calibration
 from cns_drake.recording.resuming import take_over_frames
+from cns_drake.scenarios.imu_making import KALIBR_FILE, describe_kalibr
 from cns_drake.scenarios.provenance import (
     INPUTS_KEY,
     combined_digest,
     dependency_versions,
+)
+from cns_drake.scenarios.recording_schedule import (
+    drive_schedule,
+    first_points_topic,
+    scenario_topics,
 )
 from cns_drake.scenarios.scenario_files import describe_scenario
 from cns_drake.scenarios.sensor_making import sensor_pose
@@ -36,9 +39,11 @@ def make_bag(
     """
     scenario, inputs = drive.scenario, drive.inputs
     described = describe_scenario(scenario)
+    kalibr = describe_kalibr(scenario)
+    imu_files = {} if kalibr is None else {KALIBR_FILE: kalibr}
     return BagWriter(
         folder,
-        recording_topics(scenario.lidars),
+        scenario_topics(scenario),
         start_ns=START_NS,
         attachments={
             "scenario.json": described,
@@ -50,9 +55,11 @@ def make_bag(
                 "versions": dependency_versions(),
                 "inputs_sha256": inputs,
             },
+            **imu_files,
         },
         # It can be simulated again, as long as all lies as it does.
         scenario=describe_scenario(scenario, folder),
+        beside=imu_files,
         custom_data={
             "cns_drake_version": __version__,
             INPUTS_KEY: combined_digest(inputs),
@@ -78,7 +85,12 @@ def resume_recording(
         return 0
     name, num_frames = drive.scenario.name, drive.num_frames
     on_note(f"{name}: found an interrupted run, reading it")
-    frames = take_over_frames(bag, recording_topics(drive.scenario.lidars))
+    frames = take_over_frames(
+        bag,
+        scenario_topics(drive.scenario),
+        drive_schedule(drive.scenario),
+        first_points_topic(drive.scenario),
+    )
     on_note(
         f"{name}: {frames} of {num_frames} frames are there, going on with "
         "the next"

@@ -14,6 +14,7 @@ from cns_drake.scenarios.provenance import (
     digest_inputs,
     recording_fingerprint,
 )
+from cns_drake.scenarios.rates import frame_period
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import (
     check_files,
@@ -69,7 +70,9 @@ def load_drive(scenario: Scenario) -> LoadedDrive:
             f"{world_file(scenario)}: changed while it was being read"
         )
     # The whole drive is the same by whichever name it is asked for.
-    whole = num_frames == frames_within(trajectory.duration)
+    whole = num_frames == frames_within(
+        trajectory.duration, frame_period(scenario.lidars)
+    )
     lines = [
         recording_fingerprint(scenario.model_copy(update=update), inputs)
         for update in ({}, {"frames": None})[: 1 + whole]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+import math
 from pathlib import Path
 
 from pydrake.math import RigidTransform
@@ -16,6 +17,8 @@ from cns_drake.recording.mcap_recorder import (
     make_calibration,
     recording_topics,
 )
+from cns_drake.recording.rosbag2_metadata import Topic
+from cns_drake.recording.schedule import Schedule, make_schedule
 from cns_drake.sensors.imu import Imu
 from cns_drake.sensors.lidar import Lidar
 from cns_drake.sensors.odometry import OdometrySensor
@@ -25,7 +28,8 @@ def add_mcap_recorder(
     builder: DiagramBuilder,
     folder: Path | str,
     *,
-    period: float,
+    period: float | None = None,
+    rates: Mapping[str, float] | None = None,
     lidars: Collection[Lidar] = (),
     cameras: Mapping[str, RgbdSensor] | None = None,
     imu: Imu | None = None,
@@ -41,10 +45,16 @@ def add_mcap_recorder(
     odometry `/odometry`. Sensors on the body of the odometry have their place
     there in `/tf_static`, all others where they are in `/tf`.
 
+    Sensors may be recorded at rates of their own: those that `rates` names,
+    an IMU that has a rate, and, without a period, each LiDAR once a turn.
+
     Args:
         builder: of the diagram that holds the sensors.
         folder: the rosbag2 folder to write.
-        period: time between frames [s].
+        period: time between frames of all other sensors [s]; by default a
+            turn of the first LiDAR.
+        rates: name of a LiDAR or a camera, `imu` or `odometry` -> messages
+            per second.
         lidars: to record; each has a name of its own.
         cameras: name -> camera.
         imu: to record, if any.
@@ -59,6 +69,7 @@ def add_mcap_recorder(
 
     Raises:
         InputError: the folder must not be used.
+        ValueError: a rate is of no sensor, or there is no period.
 
     Example:
         from cns_drake import add_mcap_recorder
@@ -76,14 +87,15 @@ def add_mcap_recorder(
             imu.gyroscope.body_index(), imu.gyroscope.pose()
         )
     fixed = {key: X_BS for key, X_BS in X_BSs.items() if X_BS is not None}
+    topics = recording_topics(
+        X_BSs,
+        camera_names=cameras,
+        with_imu=imu is not None,
+        with_odometry=odometry is not None,
+    )
     bag = BagWriter(
         Path(folder),
-        recording_topics(
-            X_BSs,
-            camera_names=cameras,
-            with_imu=imu is not None,
-            with_odometry=odometry is not None,
-        ),
+        topics,
         start_ns=start_ns,
         attachments={"calibration.json": make_calibration(fixed, X_BI)},
         scenario={},
@@ -96,7 +108,10 @@ def add_mcap_recorder(
             X_BSs=X_BSs,
             X_BI=X_BI,
             cameras={key: _describe(c) for key, c in cameras.items()},
-            period=period,
+            schedule=_make_schedule(
+                topics, _periods(period, rates or {}, lidars, cameras, imu)
+            ),
+            imu_variances=_variances(imu),
             start_ns=start_ns,
         ),
     )
@@ -112,13 +127,64 @@ def add_mcap_recorder(
     if odometry is not None:
         ports["odometry"] = odometry.GetOutputPort("odometry")
     if imu is not None:
-        accelerometer, gyroscope = imu
-        ports["specific_force"] = accelerometer.get_measurement_output_port()
-        ports["angular_velocity"] = gyroscope.get_measurement_output_port()
+        ports |= imu.ports()
     for key, port in ports.items():
         if recorder.HasInputPort(key):
             builder.Connect(port, recorder.GetInputPort(key))
     return bag
+
+
+def _periods(
+    period: float | None,
+    rates: Mapping[str, float],
+    lidars: Collection[Lidar],
+    cameras: Mapping[str, RgbdSensor],
+    imu: Imu | None,
+) -> dict[str, float]:
+    """Returns name of a sensor -> time between its messages [s].
+
+    Raises:
+        ValueError: a rate is of no sensor, or there is no period.
+    """
+    turns = {lidar.get_name(): lidar.pattern.period for lidar in lidars}
+    if period is None and not turns:
+        raise ValueError("a recording without a LiDAR needs a period")
+    usual = period or next(iter(turns.values()))
+    periods = dict.fromkeys((*turns, *cameras, "imu", "odometry"), usual)
+    if period is None:
+        periods |= turns
+    if imu is not None and imu.rate is not None:
+        periods["imu"] = 1.0 / imu.rate
+    for name, rate in rates.items():
+        if name not in periods:
+            raise ValueError(
+                f"rates: no sensor '{name}'; there are: {', '.join(periods)}"
+            )
+        if not 0.0 < rate < math.inf:
+            raise ValueError(f"rates: {name}: {rate} a second")
+        periods[name] = 1.0 / rate
+    return periods
+
+
+def _make_schedule(
+    topics: Collection[Topic], periods: Mapping[str, float]
+) -> Schedule:
+    """Returns when each topic is due, of sensors with periods [s]."""
+    by_topic = {}
+    for topic in topics:
+        if topic.latched:
+            continue
+        sensor = topic.name.split("/")[1]
+        # Of all frames that move, as often as any of them is recorded.
+        moving = [one for name, one in periods.items() if name != "imu"]
+        by_topic[topic.name] = periods.get(sensor, min(moving))
+    return make_schedule(by_topic)
+
+
+def _variances(imu: Imu | None) -> tuple[float, float]:
+    if imu is None or imu.noise is None or imu.rate is None:
+        return 0.0, 0.0
+    return imu.noise.variances(imu.rate)
 
 
 def _place_of(

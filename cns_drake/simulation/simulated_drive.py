@@ -18,10 +18,11 @@ from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.recordings.sequence import Sequence
 from cns_drake.motion.sweep import Sweep
 from cns_drake.motion.trajectory import pose_at
-from cns_drake.recording.frame_clock import FRAME_PERIOD, frame_stamp_ns
+from cns_drake.recording.frame_clock import frame_stamp_ns
 from cns_drake.recording.messages import MAP_FRAME, to_quat_xyzw
 from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.provenance import digest_inputs
+from cns_drake.scenarios.rates import frame_period
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import (
     check_files,
@@ -76,6 +77,7 @@ class SimulatedSequence(Sequence):
         self.name = scenario.name
         self.world_frame = MAP_FRAME
         self._scenario = scenario
+        self._period = frame_period(scenario.lidars)
         self._trajectory = plan_drive(scenario)
         self._num_frames = count_frames(scenario, self._trajectory)
         name, config = next(iter(scenario.lidars.items()))
@@ -105,7 +107,10 @@ class SimulatedSequence(Sequence):
 
     @cached_property
     def stamps_ns(self) -> np.ndarray:
-        stamps = [frame_stamp_ns(frame) for frame in range(len(self))]
+        stamps = [
+            frame_stamp_ns(frame, period=self._period)
+            for frame in range(len(self))
+        ]
         return np.array(stamps, np.int64)
 
     @cached_property
@@ -119,7 +124,7 @@ class SimulatedSequence(Sequence):
 
     @cached_property
     def _X_WBs(self) -> list[RigidTransform]:
-        times = FRAME_PERIOD * np.arange(len(self))
+        times = self._period * np.arange(len(self))
         moments = self._trajectory.at(times)
         found = [pose_at(moments, frame) for frame in range(len(self))]
         # By way of quaternions, as a plant and a recording have it: to the
@@ -141,14 +146,14 @@ class SimulatedSequence(Sequence):
         if self._is_random:
             # Only noise depends on the time as such; at a new one, the
             # SceneGraph computes everything anew.
-            self._context.SetTime(index * FRAME_PERIOD)
+            self._context.SetTime(index * self._period)
         self._lidar.GetInputPort("sweep").FixValue(context, self._sweep(index))
         return self._lidar.GetOutputPort("scan").Eval(context)
 
     def _sweep(self, index: int) -> Sweep:
         """Returns where the sensor is during a frame."""
         if self._column_t is not None:
-            times = index * FRAME_PERIOD + self._column_t
+            times = index * self._period + self._column_t
             return Sweep(*self._trajectory.poses(times)).of_frame(self._X_BS)
         X_WS = self._X_WBs[index] @ self._X_BS
         return Sweep(X_WS.rotation().matrix()[None], X_WS.translation()[None])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import math
 from pathlib import Path
 import time
 
@@ -17,9 +18,13 @@ from cns_drake.base.files import (
 from cns_drake.base.interrupts import interrupts_wait
 from cns_drake.pictures.meshcat_recording import MeshcatRecorder
 from cns_drake.recording.background_writer import BackgroundWriter
-from cns_drake.recording.frame_clock import FRAME_PERIOD
 from cns_drake.recording.recording_folder import RecordingFolder
 from cns_drake.scenarios.planning import shown_beside
+from cns_drake.scenarios.rates import frame_period
+from cns_drake.scenarios.recording_schedule import (
+    drive_schedule,
+    first_points_topic,
+)
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.simulation.drive_recording import make_bag, resume_recording
 from cns_drake.simulation.loaded_drive import (
@@ -107,10 +112,7 @@ def simulate(
             strike()
             loaded = time.perf_counter()
             simulated_s = _advance(
-                diagram,
-                writer,
-                range(resumed_frames, drive.num_frames),
-                tell_frames,
+                diagram, writer, drive, resumed_frames, tell_frames
             )
         finished = time.perf_counter()
         if page is not None and page_file is not None:
@@ -145,7 +147,8 @@ def _make_page(drive: LoadedDrive) -> MeshcatRecorder:
     return MeshcatRecorder(
         drive.world,
         X_BSs=drive.X_BSs,
-        period=FRAME_PERIOD,
+        period=frame_period(drive.scenario.lidars),
+        num_frames=drive.num_frames,
         other_stage=None if other is None else load_stage(other),
         other_name=other_name,
     )
@@ -160,7 +163,8 @@ def _save_graphviz(diagram: Diagram, file: Path | None) -> None:
 def _advance(
     diagram: Diagram,
     writer: BackgroundWriter,
-    frames: range,
+    drive: LoadedDrive,
+    first: int,
     on_frame: Callable[[int], None],
 ) -> float:
     """Simulates frames and lets what they record be written.
@@ -168,25 +172,30 @@ def _advance(
     Args:
         diagram: the station.
         writer: of its recording.
-        frames: to simulate, up to the last one of the drive.
+        drive: what is simulated, up to its last frame.
+        first: the first frame to simulate.
         on_frame: takes how many frames of the drive are done, after each.
 
     Returns:
         Simulated time from the first of them to the last [s].
     """
-    if not frames:
+    if first >= drive.num_frames:
         return 0.0
+    scenario = drive.scenario
+    period = frame_period(scenario.lidars)
+    schedule = drive_schedule(scenario)
 
     def monitor(context: Context) -> None:
-        done = round(context.get_time() / FRAME_PERIOD) + 1
-        on_frame(min(done, frames.stop))
+        done = math.floor(context.get_time() / period + 1e-6) + 1
+        on_frame(min(done, drive.num_frames))
 
     simulator = Simulator(diagram)
     simulator.set_monitor(monitor)
-    # Frame k is recorded at k periods; ending with the last one's time, no
-    # rounding can add or drop a frame.
-    begin, end = frames.start * FRAME_PERIOD, (frames.stop - 1) * FRAME_PERIOD
-    simulator.get_mutable_context().SetTime(begin)
+    # All is recorded at ticks; ending with the last one's time, no rounding
+    # can add or drop a message.
+    begin = first * schedule.steps[first_points_topic(scenario)]
+    end = max(schedule.ends.values())
+    simulator.get_mutable_context().SetTime(begin * schedule.period)
     with writer:
-        simulator.AdvanceTo(end)
-    return end - begin
+        simulator.AdvanceTo(end * schedule.period)
+    return (end - begin) * schedule.period

@@ -12,16 +12,21 @@ from cns_drake.motion.vehicle_motion import VehicleMotion
 from cns_drake.pictures.meshcat_recording import MeshcatRecorder
 from cns_drake.recording.background_writer import BackgroundWriter
 from cns_drake.recording.bag_writer import BagWriter
-from cns_drake.recording.frame_clock import FRAME_PERIOD, START_NS
+from cns_drake.recording.frame_clock import START_NS
 from cns_drake.recording.mcap_recorder import McapRecorder
+from cns_drake.scenarios.imu_making import imu_rate, make_imu_noise
 from cns_drake.scenarios.planning import plan_drive
+from cns_drake.scenarios.recording_schedule import (
+    drive_schedule,
+    point_layouts,
+)
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import world_file
 from cns_drake.scenarios.sensor_making import sensor_pose
 from cns_drake.scenarios.shipped import vehicle_file
 from cns_drake.scene.world import World, load_world
-from cns_drake.sensors.imu import add_imu
 from cns_drake.sensors.odometry import add_odometry
+from cns_drake.simulation.imu_applying import apply_imu_config
 from cns_drake.simulation.lidar_applying import apply_lidar_config
 
 
@@ -40,11 +45,13 @@ def make_station(
     prescribes where the vehicle is, `geometry_pose` passes that on to the
     SceneGraph; a `Lidar` for each entry of `scenario.lidars` under its name
     (with a `<lidar>_sweep` if it moves while it turns), an accelerometer and
-    a gyroscope, and `odometry` measure; `mcap_recorder` and
+    a gyroscope (or `imu` and `imu_noise`, if the IMU has a rate or errors of
+    its own), and `odometry` measure; `mcap_recorder` and
     `meshcat_recorder` take down what they measure.
 
     Exported output ports: `<lidar>_scan`, `specific_force`,
-    `angular_velocity`, `odometry`, `geometry_query`.
+    `angular_velocity`, `odometry`, `geometry_query`; and `R_WI` of such an
+    IMU.
 
     Args:
         scenario: what to build.
@@ -100,9 +107,7 @@ def make_station(
             num_threads=num_threads,
         )
         measured[f"{name}_scan"] = lidar.GetOutputPort("scan")
-    accelerometer, gyroscope = add_imu(builder, base, X_BI, motion=motion)
-    measured["specific_force"] = accelerometer.get_measurement_output_port()
-    measured["angular_velocity"] = gyroscope.get_measurement_output_port()
+    measured |= apply_imu_config(scenario, builder, base, trajectory, motion)
     odometry = add_odometry(builder, base, motion=motion)
     measured["odometry"] = odometry.GetOutputPort("odometry")
 
@@ -112,7 +117,12 @@ def make_station(
             bag,
             X_BSs=X_BSs,
             X_BI=X_BI,
-            period=FRAME_PERIOD,
+            schedule=drive_schedule(scenario),
+            layouts=point_layouts(scenario),
+            imu_variances=make_imu_noise(scenario).variances(
+                imu_rate(scenario)
+            ),
+            with_orientation="R_WI" in measured,
             start_ns=START_NS,
         )
     for name, recorder in recorders.items():

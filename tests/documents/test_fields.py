@@ -16,6 +16,7 @@ from cns_drake.roads.route import RouteLeg
 from cns_drake.scenarios import scenario, variation
 from cns_drake.scenarios.imu_config import ImuConfig
 from cns_drake.scenarios.lidar_config import LidarConfig
+from cns_drake.scenarios.odometry_config import OdometryConfig
 from cns_drake.scenarios.ride_config import RideConfig
 from cns_drake.scenarios.weather_config import WeatherConfig
 from cns_drake.sensors.lidar_presets import LIDAR_PRESETS
@@ -48,6 +49,7 @@ TABLES = [
     ("scenarios", "### LiDARs", LidarConfig, None),
     ("scenarios", "### Weather", WeatherConfig, None),
     ("scenarios", "### IMU", ImuConfig, None),
+    ("scenarios", "### Odometry", OdometryConfig, None),
     ("scenarios", "## Families", variation.Family, None),
     ("scenarios", "### Routes by lot", variation.DrawnRoutes, None),
     *(

@@ -6,9 +6,13 @@ from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.frame_clock import START_NS, frame_stamp_ns
 from cns_drake.recording.mcap_recorder import recording_topics
 from cns_drake.recording.resuming import take_over_frames
+from cns_drake.recording.schedule import make_schedule
 
 TOPICS = recording_topics(["lidar"])
 FRAMES = 50
+SCHEDULE = make_schedule(
+    {topic.name: 0.05 for topic in TOPICS if not topic.latched}
+)
 
 
 def open_bag(folder, title="drive", **kwargs):
@@ -25,7 +29,7 @@ def open_bag(folder, title="drive", **kwargs):
 def record(folder, frames=FRAMES, size=60, **kwargs):
     """Records, or goes on recording; returns the frames taken over."""
     with open_bag(folder, **kwargs) as bag:
-        taken_over = take_over_frames(bag, TOPICS)
+        taken_over = take_over_frames(bag, TOPICS, SCHEDULE, "/tf")
         for frame in range(taken_over, frames):
             write_frame(bag, frame, size)
     return taken_over

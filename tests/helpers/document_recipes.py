@@ -314,6 +314,7 @@ RECIPES = {
         after=("scenario", "start a city"),
         prints=("recordings/drive: 2 frames",),
     ),
+    "noise of an IMU": Recipe("accelerometer_noise_density", file="imu.yaml"),
     "scenario of a world": Recipe("world: town/", file="tour.yaml"),
     "waypoints": Recipe("x,y", file="tour.csv"),
     "tour": Recipe(

@@ -17,20 +17,23 @@ from cns_drake.base.recordings import mcap_messages, ros_types
 from cns_drake.base.recordings.mcap_file import McapFile
 from cns_drake.base.recordings.mcap_messages import xyz, xyzw
 from cns_drake.base.recordings.motion import IMU_DTYPE, ODOMETRY_DTYPE
-from cns_drake.base.recordings.point_cloud2 import to_points
+from cns_drake.base.recordings.point_cloud2 import to_points, to_records
+from cns_drake.base.recordings.point_layouts import from_layout
 from cns_drake.base.recordings.sequence import Sequence, index_instances
 
 _LIDAR_TOPIC = "/lidar/points"
 _ODOMETRY_TOPIC = "/odometry"
 _IMU_TOPIC = "/imu/data"
 _TF_STATIC_TOPIC = "/tf_static"
+_KALIBR = "imu.yaml"
 
 
 class McapSequence(Sequence):
     """A recording on the topics /lidar/points, /odometry and /tf_static.
 
     Without `/lidar/points` the only topic of point clouds takes its place;
-    of several LiDARs, `lidar` chooses one. The topic /imu/data is optional.
+    of several LiDARs, `lidar` chooses one. The topic /imu/data is optional, and
+    so is /<lidar>/labels with `label` and `instance` of the same points.
     Scan i is the i-th message of that topic by log time. Its pose is
     that of the `/odometry` message with exactly the same stamp, composed
     with the sensor's place on the vehicle from `/tf_static`; nothing is
@@ -63,6 +66,10 @@ class McapSequence(Sequence):
             _ODOMETRY_TOPIC: ros_types.ODOMETRY,
             _TF_STATIC_TOPIC: ros_types.TF,
         }
+        labels = self._lidar_topic.removesuffix("points") + "labels"
+        self._labels_topic = labels if labels in self._file.topics else None
+        if self._labels_topic is not None:
+            self._message_types[labels] = ros_types.POINT_CLOUD
         if _IMU_TOPIC in self._file.topics:
             self._message_types[_IMU_TOPIC] = ros_types.IMU
         for topic, message_type in self._message_types.items():
@@ -134,11 +141,45 @@ class McapSequence(Sequence):
         try:
             points = to_points(message)
             point_arrays.check_near(points, point_arrays.FARTHEST_RETURN)
-            return points
+            return from_layout(points, self._labels(index, message))
         except ValueError as error:
             raise InputError(
                 f"{self._path}: {self._lidar_topic}: scan {index} at"
                 f" {mcap_messages.stamp_ns(message.header)} ns: {error}"
+            ) from error
+
+    def _labels(self, index: int, cloud: Any) -> np.ndarray | None:
+        """Returns the labels of a scan that has a topic for them.
+
+        Raises:
+            ValueError: if they are not of that scan.
+        """
+        topic = self._labels_topic
+        if topic is None:
+            return None
+        places = self._file.locate(topic)
+        if len(places) != len(self):
+            raise ValueError(f"{topic}: {len(places)} for {len(self)} scans")
+        message = self._message(topic, places[index])
+        if message.header.stamp != cloud.header.stamp:
+            raise ValueError(
+                f"{topic}: number {index} has another stamp than the scan"
+            )
+        return to_records(message)
+
+    @property
+    def kalibr(self) -> str | None:
+        """Kalibr's file of the IMU's noise, if the IMU has noise.
+
+        Raises:
+            InputError: if it is no text.
+        """
+        data = self._file.attachment(_KALIBR)
+        try:
+            return None if data is None else data.decode()
+        except UnicodeDecodeError as error:
+            raise InputError(
+                f"{self._path}: attachment {_KALIBR}: no text"
             ) from error
 
     @property
@@ -356,6 +397,7 @@ class McapSequence(Sequence):
             topic
             for topic, kinds in self._file.topics.items()
             if any(kind.startswith(ros_types.POINT_CLOUD) for kind in kinds)
+            and not topic.endswith("/labels")
         ]
 
     def _check_topic(self, topic: str, message_type: str) -> None:

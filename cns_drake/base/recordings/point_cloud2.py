@@ -52,6 +52,25 @@ def to_points(message: Any) -> np.ndarray:
         if name not in (dtype.names or ()) or dtype[name].kind != "f":
             raise ValueError(f"the point cloud has no field {name} of floats")
     _check_apart(dtype)
+    return _records(message, dtype)
+
+
+def to_records(message: Any) -> np.ndarray:
+    """Returns the records of a cloud that may have no coordinates.
+
+    Args:
+        message: a deserialised PointCloud2.
+
+    Returns:
+        (height * width,) under the message's field names.
+
+    Raises:
+        ValueError: if the message contradicts itself.
+    """
+    return _records(message, _record_type(message))
+
+
+def _records(message: Any, dtype: np.dtype) -> np.ndarray:
     data = np.frombuffer(message.data, dtype=np.uint8)
     if message.row_step < message.width * message.point_step:
         raise ValueError("the point cloud's rows overlap")

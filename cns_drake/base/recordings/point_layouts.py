@@ -1,0 +1,178 @@
+"""Layouts of points: our own, and those of drivers that others read.
+
+`ouster` is that of the driver of Ouster's units with `ring` as uint8, which
+LIO-SAM and FAST-LIO2 ask for; `velodyne` is PointXYZIRT of the ROS 2 driver of
+Velodyne's; `autoware` is PointXYZIRCAEDT. Labels and instances have no place
+in them: they come in a message of their own.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+import numpy as np
+
+LayoutName = Literal["cns", "ouster", "velodyne", "autoware"]
+LAYOUT_NAMES: tuple[str, ...] = get_args(LayoutName)
+
+_XYZ = [("x", "<f4", 0), ("y", "<f4", 4), ("z", "<f4", 8)]
+_LABEL_FIELDS = ("label", "instance")
+_NS_PER_S = 1e9
+_MM_PER_M = 1e3
+_LONGEST_NS = 2.0**32
+# Of Autoware: the only, and strongest, return of a beam.
+_SINGLE_STRONGEST = 1
+
+
+def _make_dtype(fields: list[tuple[str, str, int]], size: int) -> np.dtype:
+    names, formats, offsets = zip(*_XYZ, *fields, strict=True)
+    return np.dtype(
+        {
+            "names": list(names),
+            "formats": list(formats),
+            "offsets": list(offsets),
+            "itemsize": size,
+        }
+    )
+
+
+# PCL pads a position to 16 bytes, and a point to a multiple of that.
+_OUSTER = _make_dtype(
+    [
+        ("intensity", "<f4", 16),
+        ("t", "<u4", 20),
+        ("reflectivity", "<u2", 24),
+        ("ring", "u1", 26),
+        ("ambient", "<u2", 28),
+        ("range", "<u4", 32),
+    ],
+    48,
+)
+_VELODYNE = _make_dtype(
+    [("intensity", "<f4", 12), ("ring", "<u2", 16), ("time", "<f4", 18)], 22
+)
+_AUTOWARE = _make_dtype(
+    [
+        ("intensity", "u1", 12),
+        ("return_type", "u1", 13),
+        ("channel", "<u2", 14),
+        ("azimuth", "<f4", 16),
+        ("elevation", "<f4", 20),
+        ("distance", "<f4", 24),
+        ("time_stamp", "<u4", 28),
+    ],
+    32,
+)
+
+
+def to_layout(points: np.ndarray, layout: str) -> np.ndarray:
+    """Returns points in a layout.
+
+    Args:
+        points: (N,) with the fields x y z intensity ring t; intensities from
+            0 to 1.
+        layout: one of `LAYOUT_NAMES`; `cns` is the layout that the points
+            have.
+
+    Returns:
+        (N,). Ranges are in millimetres for `ouster`; `t` and `time_stamp` in
+        nanoseconds and `time` in seconds, since the message's stamp; azimuths
+        from 0 to 2 pi, from x to y; `reflectivity` and the intensity of
+        `autoware` from 0 to 255.
+    """
+    if layout == "cns":
+        return points
+    if layout == "ouster":
+        made = _start(points, _OUSTER)
+        made["intensity"] = points["intensity"]
+        made["t"] = points["t"]
+        made["reflectivity"] = _to_byte(points["intensity"])
+        made["ring"] = points["ring"]
+        made["range"] = np.rint(_MM_PER_M * _distance(points))
+        return made
+    if layout == "velodyne":
+        made = _start(points, _VELODYNE)
+        made["intensity"] = points["intensity"]
+        made["ring"] = points["ring"]
+        made["time"] = points["t"] / _NS_PER_S
+        return made
+    made = _start(points, _AUTOWARE)
+    x, y, z = (points[axis].astype(float) for axis in "xyz")
+    made["intensity"] = _to_byte(points["intensity"])
+    made["return_type"] = _SINGLE_STRONGEST
+    made["channel"] = points["ring"]
+    made["azimuth"] = np.arctan2(y, x) % (2.0 * np.pi)
+    made["elevation"] = np.arctan2(z, np.hypot(x, y))
+    made["distance"] = _distance(points)
+    made["time_stamp"] = points["t"]
+    return made
+
+
+def to_labels(points: np.ndarray) -> np.ndarray:
+    """Returns the labels and instances of points alone, (N,)."""
+    dtype = np.dtype([(name, points.dtype[name]) for name in _LABEL_FIELDS])
+    labels = np.empty(len(points), dtype)
+    for name in _LABEL_FIELDS:
+        labels[name] = points[name]
+    return labels
+
+
+def from_layout(
+    points: np.ndarray, labels: np.ndarray | None = None
+) -> np.ndarray:
+    """Returns points with the fields of this project beside their own.
+
+    Args:
+        points: (N,) in any layout.
+        labels: (N,) records of other fields of the same points, if any.
+
+    Returns:
+        (N,). `velodyne` has `t` [ns] in place of `time` [s]; `autoware` has
+        `t` and `ring` in place of `time_stamp` and `channel`, and
+        intensities from 0 to 1. Where nothing changes, `points` itself.
+
+    Raises:
+        ValueError: if the labels are not those of as many points.
+    """
+    names = points.dtype.names or ()
+    columns = {name: points[name] for name in names}
+    if {"time_stamp", "channel", "intensity"} <= set(names):
+        columns["t"] = columns.pop("time_stamp")
+        columns["ring"] = columns.pop("channel")
+        columns["intensity"] = points["intensity"] / np.float32(255.0)
+    elif "time" in names and "t" not in names:
+        t_ns = np.rint(points["time"].astype(float) * _NS_PER_S)
+        # Some drivers count backwards from the last point, or since 1970.
+        if ((t_ns >= 0.0) & (t_ns < _LONGEST_NS)).all():
+            columns["t"] = t_ns.astype(np.uint32)
+            del columns["time"]
+    if labels is not None:
+        if len(labels) != len(points):
+            raise ValueError(f"{len(points)} points, but {len(labels)} labels")
+        columns |= {name: labels[name] for name in labels.dtype.names or ()}
+    if list(columns) == list(names):
+        return points
+    made = np.empty(
+        len(points),
+        [(name, column.dtype) for name, column in columns.items()],
+    )
+    for name, column in columns.items():
+        made[name] = column
+    return made
+
+
+def _start(points: np.ndarray, dtype: np.dtype) -> np.ndarray:
+    """Returns as many points with the same coordinates, else zeros."""
+    made = np.zeros(len(points), dtype)
+    for axis in "xyz":
+        made[axis] = points[axis]
+    return made
+
+
+def _to_byte(intensity: np.ndarray) -> np.ndarray:
+    return np.rint(255.0 * np.clip(intensity, 0.0, 1.0))
+
+
+def _distance(points: np.ndarray) -> np.ndarray:
+    x, y, z = (points[axis].astype(float) for axis in "xyz")
+    return np.sqrt(x * x + y * y + z * z)

@@ -1,0 +1,75 @@
+"""When the sensors of a drive are recorded."""
+
+from __future__ import annotations
+
+import math
+
+from cns_drake.recording.mcap_recorder import recording_topics
+from cns_drake.recording.rosbag2_metadata import Topic
+from cns_drake.recording.schedule import Schedule, make_schedule
+from cns_drake.scenarios.imu_making import imu_rate
+from cns_drake.scenarios.rates import fastest_rate, frame_period
+from cns_drake.scenarios.scenario import Scenario
+
+# A time is a multiple of a period up to rounding, in periods.
+_TOLERANCE = 1e-6
+
+
+def point_layouts(scenario: Scenario) -> dict[str, str]:
+    """Returns LiDAR name -> layout of its points."""
+    return {name: one.layout for name, one in scenario.lidars.items()}
+
+
+def scenario_topics(scenario: Scenario) -> tuple[Topic, ...]:
+    """Returns the topics of a scenario's recording."""
+    return recording_topics(scenario.lidars, layouts=point_layouts(scenario))
+
+
+def first_points_topic(scenario: Scenario) -> str:
+    """Returns the topic whose scans number the frames."""
+    return scenario_topics(scenario)[0].name
+
+
+def drive_schedule(scenario: Scenario) -> Schedule:
+    """Returns when each topic of a scenario has messages.
+
+    Where the scenario has a number of frames, LiDARs end with the last one.
+    An IMU or odometry with a rate of its own goes on until that scan is
+    complete, so that its samples enclose every scan.
+
+    Raises:
+        InputError: Kalibr's file cannot be used.
+    """
+    fastest = fastest_rate(scenario.lidars)
+    odometry = scenario.odometry.rate or fastest
+    rates = {
+        "/imu/data": imu_rate(scenario),
+        "/odometry": odometry,
+        "/tf": odometry,
+    }
+    for topic in scenario_topics(scenario):
+        if not topic.latched and topic.name not in rates:
+            rates[topic.name] = scenario.lidars[topic.name.split("/")[1]].rate
+    periods = {name: 1.0 / rate for name, rate in rates.items()}
+    if scenario.frames is None:
+        return make_schedule(periods)
+    last_scan = (scenario.frames - 1) * frame_period(scenario.lidars)
+    complete = max(
+        (math.floor(last_scan * one.rate + _TOLERANCE) + 1) / one.rate
+        for one in scenario.lidars.values()
+    )
+    until = dict.fromkeys(periods, last_scan)
+    if not scenario.imu.is_ideal:
+        until["/imu/data"] = complete
+    if scenario.odometry.rate is not None:
+        until["/odometry"] = until["/tf"] = complete
+    # The first sample that is not before the end.
+    return make_schedule(
+        periods,
+        {
+            name: math.ceil(time * rates[name] - _TOLERANCE) / rates[name]
+            if time == complete
+            else time
+            for name, time in until.items()
+        },
+    )

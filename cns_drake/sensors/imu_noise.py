@@ -1,0 +1,175 @@
+"""The errors of an IMU, as functions of the number of a sample."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cns_drake.sensors.noise_draws import noise_generator
+
+# What random numbers are for. The names of an IMU and a LiDAR of a user's own
+# diagram may be equal, so these differ from a LiDAR's purposes.
+_TURN_ON, _WHITE, _WALK_AT_BLOCK, _WALK_STEPS = range(16, 20)
+# Samples that are drawn at once.
+_BLOCK = 1024
+# The random walk is drawn for so many blocks: a century at 1,000 samples a
+# second.
+_MOST_BLOCKS = 1 << 32
+
+
+@dataclass(frozen=True)
+class ImuNoise:
+    """How an IMU errs; ideal unless told otherwise.
+
+    The model is Kalibr's: a measurement is w + b + n with white noise n and
+    a bias b that walks at random. For samples dt apart, n has the standard
+    deviation density / sqrt(dt) and b grows by one of random_walk * sqrt(dt)
+    (Kalibr, "IMU noise model"). All three axes of a sensor err alike and
+    independently.
+
+    Attributes:
+        accelerometer_noise_density: of its white noise [m/s^2/sqrt(Hz)].
+        accelerometer_random_walk: of its bias [m/s^3/sqrt(Hz)].
+        gyroscope_noise_density: of its white noise [rad/s/sqrt(Hz)].
+        gyroscope_random_walk: of its bias [rad/s^2/sqrt(Hz)].
+        accelerometer_turn_on_bias: standard deviation of the bias at time
+            zero [m/s^2].
+        gyroscope_turn_on_bias: likewise [rad/s].
+        accelerometer_range: no axis measures more, either way [m/s^2].
+        gyroscope_range: likewise [rad/s].
+        seed: of all that is random.
+        sensor_name: makes the errors of one IMU differ from another's.
+
+    Example:
+        from cns_drake import ImuNoise
+
+        noise = ImuNoise(gyroscope_noise_density=1e-3, seed=7)
+    """
+
+    accelerometer_noise_density: float = 0.0
+    accelerometer_random_walk: float = 0.0
+    gyroscope_noise_density: float = 0.0
+    gyroscope_random_walk: float = 0.0
+    accelerometer_turn_on_bias: float = 0.0
+    gyroscope_turn_on_bias: float = 0.0
+    accelerometer_range: float = np.inf
+    gyroscope_range: float = np.inf
+    seed: int = 0
+    sensor_name: str = "imu"
+
+    def variances(self, rate: float) -> tuple[float, float]:
+        """Returns the variances of white noise in samples.
+
+        Args:
+            rate: samples per second [1/s].
+
+        Returns:
+            Of the specific force [m^2/s^4] and the angular velocity
+            [rad^2/s^2], for each axis.
+        """
+        return (
+            self.accelerometer_noise_density**2 * rate,
+            self.gyroscope_noise_density**2 * rate,
+        )
+
+
+class ImuErrors:
+    """What an IMU's noise adds to its samples.
+
+    The error of a sample depends on its number, and on nothing that was
+    asked for before: the random walk is a Brownian motion that is known at
+    time zero and at one far away, and drawn in between by halving intervals
+    (Levy's construction), so that no sample needs those before it.
+    """
+
+    def __init__(self, noise: ImuNoise, rate: float):
+        """Prepares the errors.
+
+        Args:
+            noise: their sizes.
+            rate: samples per second [1/s].
+        """
+        self._noise = noise
+        pairs = (
+            (noise.accelerometer_noise_density, noise.gyroscope_noise_density),
+            (noise.accelerometer_random_walk, noise.gyroscope_random_walk),
+            (noise.accelerometer_turn_on_bias, noise.gyroscope_turn_on_bias),
+            (noise.accelerometer_range, noise.gyroscope_range),
+        )
+        white, walk, turn_on, self._range = np.repeat(pairs, 3, axis=1)
+        self._white = white * np.sqrt(rate)
+        self._walk = walk / np.sqrt(rate)
+        self._turn_on = turn_on * self._draw(_TURN_ON, 0, 1)[0]
+        self._block_number: int | None = None
+        self._block = np.empty((_BLOCK, 6))
+
+    def measure(self, sample: int, exact: np.ndarray) -> np.ndarray:
+        """Returns what is measured of exact values.
+
+        Args:
+            sample: number of the sample, that at time zero is 0.
+            exact: (6,) specific force [m/s^2] and angular velocity [rad/s].
+        """
+        measured = exact + self.at(sample)
+        return np.clip(measured, -self._range, self._range)
+
+    def at(self, sample: int) -> np.ndarray:
+        """Returns the error of a sample, (6,) as in `measure`."""
+        number, place = divmod(sample, _BLOCK)
+        if number != self._block_number:
+            self._block = self.of_block(number)
+            self._block_number = number
+        return self._block[place]
+
+    def of_block(self, number: int) -> np.ndarray:
+        """Returns the errors of many samples.
+
+        Args:
+            number: of a block of 1024 samples.
+
+        Returns:
+            (1024, 6) errors from sample 1024 * number on.
+        """
+        errors = np.tile(self._turn_on, (_BLOCK, 1))
+        if self._walk.any():
+            errors += self._walk * self._walk_in_block(number)
+        if self._white.any():
+            errors += self._white * self._draw(_WHITE, number, _BLOCK)
+        return errors
+
+    def _walk_in_block(self, number: int) -> np.ndarray:
+        """Returns (1024, 6) of a walk of standard normal steps."""
+        start = self._walk_at_block(number)
+        end = self._walk_at_block(number + 1)
+        steps = self._draw(_WALK_STEPS, number, _BLOCK)
+        free = np.vstack([np.zeros(6), np.cumsum(steps, axis=0)])
+        # A walk that is known at both ends: a straight line takes out what a
+        # free one misses there.
+        part = np.arange(_BLOCK)[:, None] / _BLOCK
+        return start + free[:-1] + part * (end - start - free[-1])
+
+    def _walk_at_block(self, number: int) -> np.ndarray:
+        """Returns the walk (6,) where a block begins."""
+        low, high = 0, _MOST_BLOCKS if number > 0 else -_MOST_BLOCKS
+        at_low = np.zeros(6)
+        at_high = np.sqrt(_BLOCK * _MOST_BLOCKS) * self._node(high)
+        while number != low:
+            middle = (low + high) // 2
+            spread = 0.5 * np.sqrt(_BLOCK * abs(high - low))
+            at_middle = (at_low + at_high) / 2 + spread * self._node(middle)
+            if abs(number) < abs(middle):
+                high, at_high = middle, at_middle
+            else:
+                low, at_low = middle, at_middle
+        return at_low
+
+    def _node(self, block: int) -> np.ndarray:
+        return self._draw(_WALK_AT_BLOCK, block, 1)[0]
+
+    def _draw(self, purpose: int, index: int, count: int) -> np.ndarray:
+        """Returns (count, 6) standard normal numbers."""
+        generator = noise_generator(
+            self._noise.seed, self._noise.sensor_name, purpose, index
+        )
+        return generator.standard_normal((count, 6))

@@ -1,0 +1,61 @@
+"""A system that adds the errors of an IMU to what an ideal one measures."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from pydrake.systems.framework import BasicVector, Context, LeafSystem
+
+from cns_drake.sensors.imu_noise import ImuErrors, ImuNoise
+
+# A sample's time is a multiple of the period up to rounding.
+_SAMPLE_TOLERANCE = 1e-6
+
+
+class NoisyImu(LeafSystem):
+    """Adds noise to specific force and angular velocity.
+
+    .. pydrake_system::
+
+        name: NoisyImu
+        input_ports:
+        - specific_force
+        - angular_velocity
+        output_ports:
+        - specific_force
+        - angular_velocity
+
+    All ports are vectors of size 3, expressed in the IMU's frame [m/s^2,
+    rad/s]. Sample k is that at k / rate; between samples, the error of the
+    last one holds.
+    """
+
+    def __init__(self, noise: ImuNoise, rate: float):
+        """Declares the ports.
+
+        Args:
+            noise: the errors' sizes.
+            rate: samples per second [1/s].
+        """
+        super().__init__()
+        self._errors = ImuErrors(noise, rate)
+        self._rate = rate
+        names = ("specific_force", "angular_velocity")
+        self._inputs = [self.DeclareVectorInputPort(name, 3) for name in names]
+        for place, name in enumerate(names):
+            self.DeclareVectorOutputPort(
+                name,
+                3,
+                lambda context, output, place=place: self._calc(
+                    place, context, output
+                ),
+                {self._inputs[place].ticket(), self.time_ticket()},
+            )
+
+    def _calc(self, place: int, context: Context, output: BasicVector) -> None:
+        sample = math.floor(context.get_time() * self._rate + _SAMPLE_TOLERANCE)
+        exact = np.zeros(6)
+        rows = slice(3 * place, 3 * place + 3)
+        exact[rows] = self._inputs[place].Eval(context)
+        output.SetFromVector(self._errors.measure(sample, exact)[rows])

@@ -1,0 +1,143 @@
+"""Layouts of points against what drivers document, and back."""
+
+import numpy as np
+import pytest
+
+from cns_drake.base.recordings.point_cloud2 import to_points, to_records
+from cns_drake.base.recordings.point_layouts import (
+    from_layout,
+    to_labels,
+    to_layout,
+)
+from cns_drake.base.recordings.ros_types import (
+    POINT_CLOUD,
+    deserialize,
+    serialize,
+)
+from cns_drake.recording.messages import make_point_cloud
+from cns_drake.sensors.beam_pattern import POINT_DTYPE
+
+# sensor_msgs/PointField: UINT8 2, UINT16 4, UINT32 6, FLOAT32 7.
+XYZ = [("x", 0, 7), ("y", 4, 7), ("z", 8, 7)]
+FIELDS = {
+    # ouster_ros::Point of LIO-SAM and FAST-LIO2: 16 bytes of a position.
+    "ouster": (
+        48,
+        [
+            *XYZ,
+            ("intensity", 16, 7),
+            ("t", 20, 6),
+            ("reflectivity", 24, 4),
+            ("ring", 26, 2),
+            ("ambient", 28, 4),
+            ("range", 32, 6),
+        ],
+    ),
+    # velodyne_pointcloud: packed.
+    "velodyne": (
+        22,
+        [*XYZ, ("intensity", 12, 7), ("ring", 16, 4), ("time", 18, 7)],
+    ),
+    # Nebula's PointXYZIRCAEDT.
+    "autoware": (
+        32,
+        [
+            *XYZ,
+            ("intensity", 12, 2),
+            ("return_type", 13, 2),
+            ("channel", 14, 4),
+            ("azimuth", 16, 7),
+            ("elevation", 20, 7),
+            ("distance", 24, 7),
+            ("time_stamp", 28, 6),
+        ],
+    ),
+}
+
+
+@pytest.fixture
+def points():
+    rng = np.random.default_rng(1)
+    points = np.zeros(500, POINT_DTYPE)
+    for axis in "xyz":
+        points[axis] = rng.uniform(-60.0, 60.0, 500)
+    points["intensity"] = rng.uniform(0.0, 1.0, 500)
+    points["ring"] = rng.integers(0, 128, 500)
+    points["t"] = np.sort(rng.integers(0, 100_000_000, 500))
+    points["label"] = rng.integers(0, 100, 500)
+    points["instance"] = rng.integers(0, 65536, 500)
+    return points
+
+
+def sent(points):
+    """Returns points as a message, by way of its bytes."""
+    data = serialize(make_point_cloud(points, "lidar", 10**18))
+    return deserialize(data, POINT_CLOUD)
+
+
+@pytest.mark.parametrize("layout", FIELDS)
+def test_fields_lie_where_readers_look(points, layout):
+    message = sent(to_layout(points, layout))
+    point_step, fields = FIELDS[layout]
+    assert message.point_step == point_step
+    assert fields == [
+        (field.name, field.offset, field.datatype) for field in message.fields
+    ]
+    assert message.is_dense
+    assert message.height == 1
+
+
+@pytest.mark.parametrize("layout", ["cns", *FIELDS])
+def test_points_come_back(points, layout):
+    labels = None if layout == "cns" else to_records(sent(to_labels(points)))
+    read = from_layout(to_points(sent(to_layout(points, layout))), labels)
+    for name in ("x", "y", "z", "ring", "label", "instance"):
+        np.testing.assert_array_equal(read[name], points[name])
+    # A float32 of a tenth of a second resolves 7 ns, a byte 1/255.
+    t_error_ns = 4 if layout == "velodyne" else 0
+    assert read["t"].dtype == np.uint32
+    np.testing.assert_allclose(
+        read["t"].astype(float), points["t"], rtol=0, atol=t_error_ns
+    )
+    step = 1 / 255 if layout == "autoware" else 0.0
+    np.testing.assert_allclose(
+        read["intensity"], points["intensity"], rtol=0, atol=step / 2 + 1e-6
+    )
+
+
+def test_what_is_derived(points):
+    p = np.stack([points[axis].astype(float) for axis in "xyz"], axis=1)
+    distance = np.linalg.norm(p, axis=1)
+    ouster = to_layout(points, "ouster")
+    np.testing.assert_allclose(ouster["range"], 1000.0 * distance, atol=0.51)
+    np.testing.assert_allclose(
+        ouster["reflectivity"], 255.0 * points["intensity"], atol=0.51
+    )
+    autoware = to_layout(points, "autoware")
+    np.testing.assert_allclose(autoware["distance"], distance, rtol=1e-6)
+    azimuth, elevation = autoware["azimuth"], autoware["elevation"]
+    assert azimuth.min() >= 0.0
+    assert azimuth.max() <= 2.0 * np.pi
+    along = np.stack(
+        [
+            np.cos(elevation) * np.cos(azimuth),
+            np.cos(elevation) * np.sin(azimuth),
+            np.sin(elevation),
+        ],
+        axis=1,
+    )
+    np.testing.assert_allclose(along * distance[:, None], p, atol=1e-4)
+    assert set(autoware["return_type"]) == {1}
+
+
+def test_points_of_others_stay_as_they_are():
+    """Times before the stamp, or since 1970, are no `t`."""
+    for time in (-0.05, 1.7e9):
+        points = np.zeros(3, [("x", "f4"), ("time", "f8"), ("ring", "u2")])
+        points["time"] = time
+        assert from_layout(points) is points
+
+
+def test_labels_of_another_scan(points):
+    with pytest.raises(ValueError, match="500 points, but 499 labels"):
+        from_layout(points, to_labels(points)[1:])

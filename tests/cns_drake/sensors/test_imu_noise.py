@@ -1,0 +1,135 @@
+"""The errors of an IMU against Kalibr's model of them."""
+
+from dataclasses import replace
+
+from helpers.allan import allan_deviation, tolerance
+import numpy as np
+import pytest
+
+from cns_drake.sensors.imu_noise import ImuErrors, ImuNoise
+
+RATE = 100
+HOURS = 3 * 3600.0
+BLOCK = 1024
+# Kalibr's example of an ADIS16448.
+WHITE = ImuNoise(
+    accelerometer_noise_density=0.01, gyroscope_noise_density=0.005, seed=3
+)
+WALK = ImuNoise(
+    accelerometer_random_walk=2e-4, gyroscope_random_walk=4e-6, seed=4
+)
+
+
+def stand(noise, duration=HOURS):
+    """Returns what an IMU at rest measures wrongly, (N, 6)."""
+    errors = ImuErrors(noise, RATE)
+    blocks = int(duration * RATE) // BLOCK
+    return np.concatenate([errors.of_block(k) for k in range(blocks)])
+
+
+@pytest.fixture(scope="module")
+def white():
+    return stand(WHITE)
+
+
+@pytest.fixture(scope="module")
+def walk():
+    return stand(WALK)
+
+
+def test_white_noise_has_its_density_at_one_second(white):
+    expected = np.repeat([0.01, 0.005], 3)
+    found = allan_deviation(white, RATE, 1.0)
+    np.testing.assert_allclose(found, expected, rtol=tolerance(HOURS, 1.0))
+    slope = np.log(allan_deviation(white, RATE, 4.0) / found) / np.log(4.0)
+    np.testing.assert_allclose(slope, -0.5, atol=0.04)
+
+
+def test_the_walk_has_its_density_at_three_seconds(walk):
+    expected = np.repeat([2e-4, 4e-6], 3)
+    found = allan_deviation(walk, RATE, 3.0)
+    np.testing.assert_allclose(found, expected, rtol=tolerance(HOURS, 3.0))
+    slope = np.log(allan_deviation(walk, RATE, 12.0) / found) / np.log(4.0)
+    np.testing.assert_allclose(slope, 0.5, atol=0.06)
+
+
+def test_the_walk_starts_at_zero_and_spreads_as_the_root_of_time():
+    ends = []
+    for seed in range(200):
+        errors = ImuErrors(replace(WALK, seed=seed), RATE)
+        assert not errors.at(0).any()
+        ends.append(errors.at(50 * BLOCK + 300)[:3])
+    time = (50 * BLOCK + 300) / RATE
+    # 600 independent numbers: 3 standard errors are 9 %.
+    assert np.std(ends) == pytest.approx(2e-4 * np.sqrt(time), rel=0.09)
+
+
+def test_the_walk_has_no_jump_between_blocks(walk):
+    steps = np.diff(walk, axis=0)
+    between = steps[BLOCK - 1 :: BLOCK]
+    assert len(between) > 1000
+    ratio = between.std(axis=0) / steps.std(axis=0)
+    # Three standard errors of a thousand steps.
+    np.testing.assert_allclose(ratio, 1.0, atol=0.07)
+    neighbours = np.corrcoef(steps[:-1, 0], steps[1:, 0])[0, 1]
+    assert abs(neighbours) < 3.0 / np.sqrt(len(steps))
+
+
+@pytest.mark.parametrize("first", [0, 5 * BLOCK - 3, -BLOCK - 2, 10**9])
+def test_a_sample_depends_on_its_number_alone(first):
+    noise = replace(WHITE, accelerometer_random_walk=1e-3)
+    samples = list(range(first, first + 6))
+    ahead = ImuErrors(noise, RATE)
+    forwards = [ahead.at(sample) for sample in samples]
+    behind = ImuErrors(noise, RATE)
+    backwards = [behind.at(sample) for sample in samples[::-1]]
+    np.testing.assert_array_equal(forwards, backwards[::-1])
+    assert len(np.unique(forwards)) == 6 * len(samples)
+
+
+def test_seed_and_name_make_a_difference():
+    found = {
+        tuple(ImuErrors(noise, RATE).at(7))
+        for noise in (
+            WHITE,
+            replace(WHITE, seed=9),
+            replace(WHITE, sensor_name="other"),
+        )
+    }
+    assert len(found) == 3
+
+
+def test_turn_on_bias_stays_and_differs_between_runs():
+    drawn = []
+    for seed in range(300):
+        noise = ImuNoise(
+            accelerometer_turn_on_bias=0.2,
+            gyroscope_turn_on_bias=0.01,
+            seed=seed,
+        )
+        errors = ImuErrors(noise, RATE)
+        np.testing.assert_array_equal(errors.at(0), errors.at(10**7))
+        drawn.append(errors.at(0))
+    spread = np.reshape(drawn, (300, 2, 3)).std(axis=(0, 2))
+    # 900 independent numbers: 3 standard errors are 7 %.
+    np.testing.assert_allclose(spread, [0.2, 0.01], rtol=0.07)
+
+
+def test_what_is_measured_ends_at_the_range():
+    noise = ImuNoise(accelerometer_range=20.0, gyroscope_range=0.5)
+    exact = np.array([19.999, 20.001, -25.0, 0.499, -0.501, 3.0])
+    measured = ImuErrors(noise, RATE).measure(5, exact)
+    np.testing.assert_array_equal(
+        measured, [19.999, 20.0, -20.0, 0.499, -0.5, 0.5]
+    )
+
+
+def test_an_ideal_imu_errs_by_nothing():
+    assert not ImuErrors(ImuNoise(), RATE).of_block(3).any()
+
+
+def test_variances_of_samples_are_those_of_messages(white):
+    assert WHITE.variances(RATE) == (0.01**2 * RATE, 0.005**2 * RATE)
+    np.testing.assert_allclose(
+        white.var(axis=0), np.repeat(WHITE.variances(RATE), 3), rtol=0.01
+    )

@@ -1,0 +1,275 @@
+"""Sensors at rates of their own, in recordings of a tiny drive."""
+
+import json
+import shutil
+
+from helpers.tiny_drive import tiny_scenario, write_scenario
+from mcap.reader import make_reader
+import numpy as np
+import pytest
+from rosbags.highlevel import AnyReader
+import yaml
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.recordings.mcap_sequence import McapSequence
+from cns_drake.export.exporting import export_sequence
+from cns_drake.recording.frame_clock import START_NS
+from cns_drake.scenarios.scenario_files import check_files
+from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.simulation.simulation import simulate
+from cns_drake.studies.recording_step import is_recorded
+
+KALIBR = {
+    "accelerometer_noise_density": 0.01,
+    "accelerometer_random_walk": 0.0002,
+    "gyroscope_noise_density": 0.005,
+    "gyroscope_random_walk": 4.0e-06,
+    "rostopic": "/imu0",
+    "update_rate": 250.0,
+}
+UNIT = {"preset": "vlp-16", "columns": 8}
+FRAMES = 12
+LIDARS = {
+    "lidar": {**UNIT, "rate": 10, "range_noise": 0.02},
+    "rear": {**UNIT, "rate": 20, "layout": "velodyne"},
+    "slow": {**UNIT, "rate": 5, "layout": "autoware"},
+}
+
+
+def make(folder, **changes):
+    folder.mkdir(exist_ok=True)
+    kalibr = folder / "adis.yaml"
+    kalibr.write_text(yaml.safe_dump(KALIBR))
+    values = {
+        "lidars": LIDARS,
+        "imu": {"rate": 400, "kalibr": str(kalibr), "accelerometer_range": 50},
+        "odometry": {"rate": 100},
+        "frames": FRAMES,
+    }
+    return tiny_scenario(folder, **(values | changes))
+
+
+@pytest.fixture(scope="module")
+def scenario(tmp_path_factory):
+    return make(tmp_path_factory.mktemp("tiny"))
+
+
+@pytest.fixture(scope="module")
+def recording(scenario, tmp_path_factory):
+    return simulate(scenario, tmp_path_factory.mktemp("whole")).folder
+
+
+def stamps_ns(folder):
+    """Returns topic -> times [ns] in the order of the file."""
+    found = {}
+    last_ns = 0
+    with open(folder / f"{folder.name}_0.mcap", "rb") as stream:
+        for _, channel, message in make_reader(stream).iter_messages(
+            log_time_order=False
+        ):
+            assert message.log_time >= last_ns
+            last_ns = message.log_time
+            times = found.setdefault(channel.topic, [])
+            times.append(message.log_time - START_NS)
+    return found
+
+
+def even(rate, end_ns):
+    """Returns the times from zero to an end, that included [ns]."""
+    return list(range(0, end_ns + 1, 10**9 // rate))
+
+
+def test_every_topic_has_its_rate(recording):
+    found = stamps_ns(recording)
+    last_scan_ns = (FRAMES - 1) * 100_000_000
+    # The slow LiDAR's last scan begins at 1 s and takes 0.2 s.
+    complete_ns = 1_200_000_000
+    assert found == {
+        "/lidar/points": even(10, last_scan_ns),
+        "/rear/points": even(20, last_scan_ns),
+        "/rear/labels": even(20, last_scan_ns),
+        "/slow/points": even(5, last_scan_ns),
+        "/slow/labels": even(5, last_scan_ns),
+        "/imu/data": even(400, complete_ns),
+        "/odometry": even(100, complete_ns),
+        "/tf": even(100, complete_ns),
+        "/tf_static": [0],
+    }
+
+
+def test_samples_enclose_every_scan(recording):
+    for lidar in LIDARS:
+        sequence = McapSequence(recording, lidar)
+        first, last = sequence.imu["stamp_ns"][[0, -1]]
+        for stamp_ns, scan in zip(sequence.stamps_ns, sequence, strict=True):
+            assert first <= stamp_ns
+            assert stamp_ns + scan["t"].max() <= last
+
+
+def test_turns_take_their_time(recording):
+    for lidar, config in LIDARS.items():
+        t_ns = McapSequence(recording, lidar).scan(1)["t"]
+        # The last of eight columns, of which some return nothing.
+        assert 0.7e9 / config["rate"] < t_ns.max() < 1e9 / config["rate"]
+
+
+def test_layouts_hold_the_same_points(recording, tmp_path):
+    lidars = {"lidar": LIDARS["lidar"]} | {
+        name: {**LIDARS[name], "layout": "cns"} for name in ("rear", "slow")
+    }
+    plain = simulate(make(tmp_path, lidars=lidars), tmp_path / "out").folder
+    for lidar in ("rear", "slow"):
+        one, other = (McapSequence(p, lidar) for p in (recording, plain))
+        assert len(one) == len(other) > 3
+        for scan, expected in zip(one, other, strict=True):
+            assert len(scan) > 10
+            for name in ("x", "y", "z", "ring", "label", "instance"):
+                np.testing.assert_array_equal(scan[name], expected[name])
+            np.testing.assert_allclose(
+                scan["t"].astype(float), expected["t"], rtol=0, atol=8
+            )
+
+
+def test_interrupted_anywhere_it_goes_on_to_the_same_bytes(
+    scenario, recording, tmp_path
+):
+    mcap = (recording / "tiny_01_0.mcap").read_bytes()
+    resumed = []
+    for size in (len(mcap), len(mcap) // 2, len(mcap) * 9 // 10):
+        output = tmp_path / str(size)
+        folder = output / "tiny_01"
+        folder.mkdir(parents=True)
+        (folder / "tiny_01_0.mcap.part").write_bytes(mcap[:size])
+        shutil.copy(
+            recording / "fingerprint.txt", folder / "fingerprint.txt.part"
+        )
+        run = simulate(scenario, output)
+        resumed.append(run.resumed_frames)
+        assert (folder / "tiny_01_0.mcap").read_bytes() == mcap
+        assert (folder / "imu.yaml").is_file()
+    assert resumed[0] == FRAMES
+    assert 0 < min(resumed) < FRAMES
+
+
+def test_a_shorter_run_begins_alike(scenario, recording, tmp_path):
+    short = scenario.model_copy(update={"frames": 5})
+    cut = McapSequence(simulate(short, tmp_path).folder)
+    whole = McapSequence(recording)
+    # Until the longest of its scans is complete.
+    assert len(cut.imu) == round(0.6 * 400) + 1
+    np.testing.assert_array_equal(cut.imu, whole.imu[: len(cut.imu)])
+    np.testing.assert_array_equal(
+        cut.odometry, whole.odometry[: len(cut.odometry)]
+    )
+
+
+def test_errors_are_those_of_kalibrs_file(recording, tmp_path):
+    """Against the same drive without noise, within three standard errors."""
+    imu = {"rate": 400}
+    ideal = simulate(make(tmp_path, imu=imu), tmp_path / "out").folder
+    noisy, exact = (McapSequence(p).imu for p in (recording, ideal))
+    for name, density in (("specific_force", 0.01), ("angular_velocity", 5e-3)):
+        errors = noisy[name] - exact[name]
+        expected = density * np.sqrt(400)
+        # 1443 numbers of each kind.
+        assert errors.std() == pytest.approx(expected, rel=0.06)
+        # Drawn for each axis.
+        axes = np.corrcoef(errors.T)[np.triu_indices(3, 1)]
+        assert np.abs(axes).max() < 0.15
+
+
+def test_messages_tell_their_variances(recording):
+    with AnyReader([recording]) as reader:
+        imu = [one for one in reader.connections if one.topic == "/imu/data"]
+        connection, _, data = next(reader.messages(imu))
+        message = reader.deserialize(data, connection.msgtype)
+    np.testing.assert_allclose(
+        message.linear_acceleration_covariance,
+        np.diag([0.01**2 * 400] * 3).ravel(),
+    )
+    np.testing.assert_allclose(
+        message.angular_velocity_covariance,
+        np.diag([0.005**2 * 400] * 3).ravel(),
+    )
+    assert not message.orientation_covariance.any()
+
+
+def test_kalibrs_file_travels_with_the_recording(recording, tmp_path):
+    expected = KALIBR | {"update_rate": 400.0, "rostopic": "/imu/data"}
+    assert yaml.safe_load((recording / "imu.yaml").read_text()) == expected
+    assert yaml.safe_load(McapSequence(recording).kalibr) == expected
+    for layout in ("cns", "kitti", "tum"):
+        drive = export_sequence(recording, layout, tmp_path / layout)
+        assert yaml.safe_load((drive / "imu.yaml").read_text()) == expected
+
+
+def test_a_recording_can_be_simulated_again(scenario, recording, tmp_path):
+    assert is_recorded(scenario, recording.parent)
+    again = load_scenario(recording / "scenario.yaml")
+    folder = simulate(again, tmp_path).folder
+    name = "tiny_01_0.mcap"
+    assert (folder / name).read_bytes() == (recording / name).read_bytes()
+
+
+def test_another_noise_is_another_recording(scenario, recording, tmp_path):
+    shutil.copytree(recording, tmp_path / "tiny_01")
+    assert is_recorded(scenario, tmp_path)
+    other = tmp_path / "other.yaml"
+    other.write_text(json.dumps(KALIBR | {"gyroscope_noise_density": 1.0}))
+    imu = scenario.imu.model_copy(update={"kalibr": str(other)})
+    assert not is_recorded(scenario.model_copy(update={"imu": imu}), tmp_path)
+
+
+def test_the_rate_may_be_kalibrs(tmp_path):
+    scenario = make(tmp_path, imu={"kalibr": str(tmp_path / "adis.yaml")})
+    folder = simulate(scenario, tmp_path / "out").folder
+    assert stamps_ns(folder)["/imu/data"] == even(250, 1_200_000_000)
+
+
+@pytest.mark.parametrize(
+    ("changes", "fault"),
+    [
+        ({"imu": {"rate": 300}}, r"imu: rate: 300 .* such as 256 or 320$"),
+        ({"imu": {"rate": 2000}}, r"imu: rate: 2000 .* 20 to 1000 .* 1000$"),
+        ({"imu": {"rate": 10}}, r"imu: rate: 10 .* such as 20$"),
+        ({"odometry": {"rate": 50}}, r"odometry: rate: 50 .* 40 or 80$"),
+        ({"lidars": {"lidar": {"rate": 15}}}, r"lidars\.lidar\.rate: .*5, 10"),
+        ({"lidars": {"lidar": {"layout": "pcl"}}}, r"layout: .*'autoware'"),
+    ],
+)
+def test_rates_that_cannot_be(tmp_path, changes, fault):
+    with pytest.raises(InputError, match=fault):
+        make(tmp_path, **changes)
+
+
+@pytest.mark.parametrize(
+    ("values", "fault"),
+    [
+        (None, r"imu\.kalibr: .*adis\.yaml: no such file"),
+        ([1], r"adis\.yaml: no mapping"),
+        (KALIBR | {"update_rate": 333.0}, r"adis\.yaml: update_rate: 333 "),
+        (KALIBR | {"noise": 1.0}, r"adis\.yaml: noise: "),
+        (
+            KALIBR | {"gyroscope_random_walk": -1.0},
+            r"adis\.yaml: gyroscope_random_walk: ",
+        ),
+        (
+            {"accelerometer_noise_density": 0.1},
+            r"adis\.yaml: accelerometer_random_walk: Field required",
+        ),
+    ],
+)
+def test_files_of_kalibr_that_cannot_be_used(tmp_path, values, fault):
+    scenario = make(tmp_path, imu={"kalibr": str(tmp_path / "adis.yaml")})
+    if values is None:
+        (tmp_path / "adis.yaml").unlink()
+    else:
+        (tmp_path / "adis.yaml").write_text(yaml.safe_dump(values))
+    with pytest.raises(InputError, match=fault):
+        check_files(scenario)
+
+
+def test_paths_are_relative_to_the_scenario(tmp_path):
+    scenario = make(tmp_path, imu={"kalibr": "adis.yaml"})
+    read = load_scenario(write_scenario(scenario, tmp_path))
+    assert read.imu.kalibr == str((tmp_path / "adis.yaml").resolve())
