@@ -97,6 +97,12 @@ class Survival:
         return self.changed.pair
 
     @property
+    def full_precision(self) -> float:
+        """Recall at full precision, with the change."""
+        curve = self.changed.metrics["all"].curve
+        return curve.recall_at_full_precision
+
+    @property
     def protocol(self) -> RetrievalProtocol:
         """By which both were found."""
         return self.changed.outcome.protocol

@@ -14,7 +14,12 @@ from evaluation.recognition.metrics import (
     PlaceRecognitionMetrics,
 )
 from evaluation.recognition.recognition_result import RecognitionResult
-from evaluation.report.drawing import method_style, plain, save
+from evaluation.report.drawing import (
+    method_entry,
+    method_style,
+    plain,
+    save,
+)
 from evaluation.report.method_titles import in_table_order, title
 from evaluation.report.reference import NO_REFERENCE, Reference
 
@@ -79,6 +84,7 @@ def draw_auc_over_change(
     figure = Figure(figsize=(3.4 * count, 3.7), layout="constrained")
     panels = figure.subplots(1, count, sharex=True, sharey=True)
     methods = in_table_order(result.method for result in results)
+    with_line = set()
     for axes, mode in zip(panels, MODES, strict=False):
         for index, method in enumerate(methods):
             points = [
@@ -88,7 +94,8 @@ def draw_auc_over_change(
             ]
             # Side by side, so that intervals of one pair do not hide.
             shift = 0.0008 * (index - 0.5 * (len(methods) - 1))
-            _draw_points(axes, method, points, shift)
+            if _draw_points(axes, method, points, shift):
+                with_line.add(method)
         axes.set_title(f"this report, {mode} queries", fontsize=9)
     if with_reference:
         for method in methods:
@@ -101,7 +108,14 @@ def draw_auc_over_change(
         axes.set(xlabel=r"TCR$_\mathrm{sym}$", ylim=(0.0, 1.02))
         axes.grid(alpha=0.3)
     panels[0].set_ylabel("AUC")
-    panels[0].legend(fontsize=7, framealpha=0.8)
+    panels[0].legend(
+        handles=[
+            method_entry(method, with_line=method in with_line)
+            for method in methods
+        ],
+        fontsize=7,
+        framealpha=0.8,
+    )
     save(figure, stem, "svg")
 
 
@@ -132,9 +146,10 @@ def _draw_points(
     method: str,
     points: Sequence[tuple[float, PlaceRecognitionMetrics]],
     shift: float,
-) -> None:
+) -> bool:
+    """Draws a method's points; returns whether there is a line, too."""
     if not points:
-        return
+        return False
     colour, style, marker = method_style(method)
     points = sorted(points, key=lambda point: point[0])
     x = np.array([change for change, _ in points]) + shift
@@ -153,9 +168,8 @@ def _draw_points(
         linestyle="none",
         capsize=2,
         linewidth=1.0,
-        label=plain(title(method)),
     )
-    _draw_line(axes, x, y, colour, style)
+    return _draw_line(axes, x, y, colour, style)
 
 
 def _draw_published(
@@ -171,12 +185,13 @@ def _draw_published(
 
 def _draw_line(
     axes: Axes, x: np.ndarray, y: np.ndarray, colour: str, style: str
-) -> None:
-    """Draws the least-squares line, where there are enough points."""
+) -> bool:
+    """Draws the least-squares line; False if there are too few points."""
     if len(x) < _LEAST_POINTS or np.ptp(x) == 0.0:
-        return
+        return False
     slope, offset = np.polyfit(x, y, 1)
     ends = np.array([x.min(), x.max()])
     axes.plot(
         ends, slope * ends + offset, color=colour, linestyle=style, alpha=0.7
     )
+    return True

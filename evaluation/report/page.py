@@ -150,6 +150,11 @@ def _summary(content: PageContent) -> str:
     parts = ['<h2>Summary</h2><ul class="facts">']
     parts += [f"<li>{what} <b>{n}</b></li>" for what, n in facts]
     parts.append("</ul>")
+    if content.changes:
+        parts.append(
+            "<p>TCR_sym says how much changed between two drives: 0 where"
+            " nothing did, 1 where everything did.</p>"
+        )
     for one in content.judgements:
         parts.append(f"<h3>{html.escape(one.heading)}</h3>")
         parts.append(_judged(one.findings))

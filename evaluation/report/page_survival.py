@@ -34,8 +34,8 @@ def survival_section(survivals: Sequence[Survival], figure: str) -> str:
     return (
         "<h2>Which method survives the change?</h2>"
         f"<p>{summary}</p>"
-        f'<div class="survival">{figure}{auc}</div>'
         f"<p>{html.escape(SURVIVAL_CAPTION)}</p>"
+        f'<div class="survival">{figure}{auc}</div>'
         f"<details><summary>The same of R@1</summary>{recall}</details>"
     )
 
@@ -46,12 +46,15 @@ def _table(
     kept_of: Callable[[Survival], Kept],
 ) -> str:
     """Returns a table as narrow as a phone, with a body for each pair."""
-    names = (metric, "without change", "with change", "kept")
+    names = (
+        *(metric, "without change", "with change", "kept"),
+        "recall at full precision",
+    )
     header = "".join(f'<th scope="col">{name}</th>' for name in names)
     bodies = []
     for (map_name, *stages), group in by_pair(survivals).items():
         name = html.escape(f"{map_name} {' → '.join(stages)}")
-        rows = [f'<tr><th colspan="4" scope="rowgroup">{name}</th></tr>']
+        rows = [f'<tr><th colspan="5" scope="rowgroup">{name}</th></tr>']
         rows += [_row(one, kept_of(one)) for one in group]
         bodies.append(f"<tbody>{''.join(rows)}</tbody>")
     return (
@@ -71,5 +74,6 @@ def _row(one: Survival, kept: Kept) -> str:
     name = html.escape(title(one.method))
     return (
         f'<tr><th scope="row">{name}</th><td>{before}</td>'
-        f"<td>{kept.changed:.3f}</td><td>{share}</td></tr>"
+        f"<td>{kept.changed:.3f}</td><td>{share}</td>"
+        f"<td>{one.full_precision:.3f}</td></tr>"
     )

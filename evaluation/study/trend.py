@@ -21,8 +21,8 @@ from evaluation.recognition.protocol import (
     PROTOCOL_COLUMNS,
     protocol_values,
 )
-from evaluation.report.drawing import method_style, plain, save
-from evaluation.report.method_titles import in_table_order, title
+from evaluation.report.drawing import method_entry, method_style, save
+from evaluation.report.method_titles import in_table_order
 from evaluation.study.trend_points import TrendPoint
 
 # Of the kernel that smooths over TCR_sym, as part of its range; and how the
@@ -100,7 +100,14 @@ def draw_trend(points: Sequence[TrendPoint], stem: Path) -> None:
         )
         panels[1].set_ylim(bottom=0.0)
         panels[1].axhline(1.0, color="gray", linewidth=0.8)
-    panels[0].legend(fontsize=8, framealpha=0.8)
+    panels[0].legend(
+        handles=[
+            method_entry(method, with_line=True)
+            for method in in_table_order(point.method for point in points)
+        ],
+        fontsize=8,
+        framealpha=0.8,
+    )
     save(figure, stem, "svg")
 
 
@@ -122,18 +129,11 @@ def _draw_panel(
         x, y = np.array(known).T
         axes.plot(x, y, marker, color=colour, markersize=3.5, alpha=0.55, mew=0)
         if len(x) < _LEAST_POINTS or np.ptp(x) == 0.0:
-            axes.plot([], [], style, color=colour, label=plain(title(method)))
             continue
         grid = np.linspace(x[0], x[-1], _GRID)
         low, high = smooth_band(x, y, grid)
         axes.fill_between(grid, low, high, color=colour, alpha=0.18, lw=0)
-        axes.plot(
-            grid,
-            smooth(x, y, grid),
-            style,
-            color=colour,
-            label=plain(title(method)),
-        )
+        axes.plot(grid, smooth(x, y, grid), style, color=colour)
     axes.set(xlabel=r"TCR$_\mathrm{sym}$", ylabel=label)
     axes.grid(alpha=0.3)
 

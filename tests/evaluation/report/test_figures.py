@@ -83,6 +83,9 @@ def test_no_line_through_fewer_than_five_points(
         assert len(figure.axes) == panels
         styles = [line.get_linestyle() for line in figure.axes[0].lines]
         assert ("--" in styles) is has_line
+        (entry,) = figure.axes[0].get_legend().legend_handles
+        assert entry.get_marker() == "s"
+        assert entry.get_linestyle() == ("--" if has_line else "None")
 
 
 def test_points_of_pictures_know_their_voxels():

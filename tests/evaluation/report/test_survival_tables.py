@@ -25,6 +25,7 @@ def make(method, database, before, after, interval=(0.25, 0.75)):
         unchanged=SimpleNamespace() if has_control else None,
         control=f"town_{database}_stage_03" if has_control else None,
         auc=kept,
+        full_precision=0.125,
         recall_at_1=Kept(before, before, Interval(*interval)),
         protocol=RetrievalProtocol(radius=5.0, scans_per_place=10),
     )
@@ -50,7 +51,7 @@ def test_numbers():
     first, last = table.to_csv().splitlines()[1:]
     assert first.startswith("town,01,03,btc,0.8,0.4,0.5,0.25,0.75,")
     protocol = "5.0,10.0,5.0,100.0,10,,0"
-    assert first.endswith(f",town_01_stage_03,{protocol}")
+    assert first.endswith(f",0.125,town_01_stage_03,{protocol}")
     # Without a control, nothing but what was measured.
     assert last.startswith("town,00,03,btc,,0.5,,,,,")
     assert last.endswith(f",,{protocol}")
@@ -91,6 +92,7 @@ def test_section_of_the_page():
     assert "<svg/>" in text
     assert "a&lt;b" in text
     assert "<td>0.800</td><td>0.400</td><td><b>50 %</b>" in text
+    assert "<td>0.125</td></tr>" in text
 
 
 def test_figure_shows_the_pairs_that_have_a_control(monkeypatch, tmp_path):
