@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cns_drake.base.angles import wrapped
+
 # A fillet may overrun its segment by this much, so that two arcs can meet in
 # one point although corners are written down in centimetres [m].
 _FIT_TOLERANCE = 0.02
@@ -54,7 +56,7 @@ class Centreline:
         if np.any(lengths < 1e-6):
             raise ValueError("two consecutive points coincide")
         headings = np.arctan2(edges[:, 1], edges[:, 0])
-        turns = (np.diff(headings) + np.pi) % (2 * np.pi) - np.pi
+        turns = wrapped(np.diff(headings))
         tangents = np.concatenate(
             [[0.0], radii * np.abs(np.tan(turns / 2)), [0.0]]
         )

@@ -14,6 +14,7 @@ from shapely import STRtree
 from shapely.geometry import MultiPolygon
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.base.angles import wrapped
 from cns_drake.base.errors import InputError
 from cns_drake.roads import carriageway
 from cns_drake.roads.centreline import Centreline, blend
@@ -230,7 +231,7 @@ class RoadNetwork:
 
 def _turn_deg(a: Sequence[float], b: Sequence[float]) -> float:
     """Returns how far b's heading lies left of a's, both (x, y, z, heading)."""
-    return float(np.degrees((b[3] - a[3] + np.pi) % (2 * np.pi) - np.pi))
+    return float(np.degrees(wrapped(b[3] - a[3])))
 
 
 def _classify(angle_deg: float, num_arms: int) -> Turn:

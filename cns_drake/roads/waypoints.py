@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
+from cns_drake.base.angles import wrapped
 from cns_drake.base.csv_files import read_rows
 from cns_drake.base.errors import InputError
 from cns_drake.roads.centreline import Centreline
@@ -149,7 +150,7 @@ def _rounded(
     check_length(curve.length, source)
     edges = np.diff(corners[:, :2], axis=0)
     headings = np.arctan2(edges[:, 1], edges[:, 0])
-    turns = np.abs((np.diff(headings) + np.pi) % (2 * np.pi) - np.pi)
+    turns = np.abs(wrapped(np.diff(headings)))
     count = int(np.ceil(curve.length / _DENSE_SPACING)) + 1
     along = np.linspace(0.0, curve.length, count)
     # Where the curve passes each corner: the middle of its arc.

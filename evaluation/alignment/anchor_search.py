@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cns_drake.base.angles import wrapped
 from cns_drake.base.progress import Track
 from evaluation.alignment.submaps import Submaps
 from evaluation.methods.scan_context import ScanContext
@@ -165,8 +166,8 @@ def _trials(candidates: Candidates) -> list[tuple[float, np.ndarray]]:
     fits = (
         (apart > _BASELINE)
         & (np.abs(apart - np.linalg.norm(from_T, axis=1)) < _NEAR)
-        & (np.abs(_wrap(turns - candidates.turn[one])) < _TURN)
-        & (np.abs(_wrap(turns - candidates.turn[two])) < _TURN)
+        & (np.abs(wrapped(turns - candidates.turn[one])) < _TURN)
+        & (np.abs(wrapped(turns - candidates.turn[two])) < _TURN)
     )
     chosen = np.flatnonzero(fits)
     if len(chosen) > _MOST_TRIALS:
@@ -187,7 +188,7 @@ def _agrees(
     """Returns (M,) bool, which pairs a guess brings together."""
     p_T = _turned(candidates.p_S, turn) + move
     off = np.linalg.norm((p_T - candidates.p_T)[:, :2], axis=1)
-    return (off < _NEAR) & (np.abs(_wrap(candidates.turn - turn)) < _TURN)
+    return (off < _NEAR) & (np.abs(wrapped(candidates.turn - turn)) < _TURN)
 
 
 def _fit(candidates: Candidates, pairs: np.ndarray) -> tuple[float, np.ndarray]:
@@ -214,7 +215,3 @@ def _turned(p: np.ndarray, turn: float) -> np.ndarray:
 
 def _heading(X: np.ndarray) -> float:
     return float(np.arctan2(X[1, 0], X[0, 0]))
-
-
-def _wrap(angle: np.ndarray) -> np.ndarray:
-    return (angle + np.pi) % (2.0 * np.pi) - np.pi

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+import math
+from typing import TypeVar
 
 import numpy as np
 import shapely
+from shapely.affinity import affine_transform
 from shapely.geometry import MultiPolygon, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
@@ -14,6 +17,7 @@ from cns_drake.city.geometry.triangulation import triangulate
 
 # Height above W's origin [m] at arrays of x and y [m].
 HeightMap = Callable[[np.ndarray, np.ndarray], np.ndarray]
+Shape = TypeVar("Shape", bound=BaseGeometry)
 
 # Polygons are snapped to whole millimetres like the meshes, so that shapes
 # which share an edge keep sharing it.
@@ -25,6 +29,12 @@ _SLIVER = 0.01
 def snap(geometry: BaseGeometry) -> BaseGeometry:
     """Returns the geometry with coordinates in whole millimetres."""
     return shapely.set_precision(geometry, _GRID)
+
+
+def placed(shape: Shape, xy: Sequence[float], yaw: float) -> Shape:
+    """Returns a shape turned about the origin [rad], then moved by xy [m]."""
+    c, s = math.cos(yaw), math.sin(yaw)
+    return affine_transform(shape, [c, -s, s, c, *xy])
 
 
 def polygons_of(geometry: BaseGeometry) -> list[Polygon]:

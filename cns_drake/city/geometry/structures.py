@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 import math
 
-from shapely.affinity import affine_transform
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry.mesh import Mesh
+from cns_drake.city.geometry.polygons import placed
 
 
 @dataclass(frozen=True)
@@ -101,9 +101,7 @@ class Structure:
     @property
     def footprint_W(self) -> BaseGeometry:
         """The ground area of the model, in the world [m]."""
-        c, s = math.cos(self.yaw), math.sin(self.yaw)
-        x, y, _ = self.xyz
-        return affine_transform(self.model.footprint, [c, -s, s, c, x, y])
+        return placed(self.model.footprint, self.xyz[:2], self.yaw)
 
     def p_WP(
         self, p_SP: tuple[float, float, float]

@@ -6,13 +6,13 @@ from dataclasses import dataclass, field
 import math
 
 import numpy as np
-from shapely.affinity import affine_transform
 from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.errors import InputError
 from cns_drake.city.buildings import ARCHETYPES, sample
 from cns_drake.city.buildings.parts.site import Site
+from cns_drake.city.geometry.polygons import placed
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.ground.districts import District
 from cns_drake.city.placement.draft import Draft
@@ -149,8 +149,7 @@ def _single_house(
         else Polygon(plan.outline)
     )
     yaw = math.radians(plan.yaw_deg)
-    c, s = math.cos(yaw), math.sin(yaw)
-    area = affine_transform(footprint, [c, -s, s, c, *plan.at])
+    area = placed(footprint, plan.at, yaw)
     if not district.area.contains(area):
         raise InputError(f"{fault_at}.at: reaches out of the district")
     if not draft.is_free(area, _YARD):

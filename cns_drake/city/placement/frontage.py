@@ -8,10 +8,12 @@ import math
 
 import numpy as np
 import shapely
-from shapely.affinity import affine_transform
 from shapely.geometry import LineString, Point, Polygon, box
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import linemerge
+
+from cns_drake.base.angles import wrapped
+from cns_drake.city.geometry.polygons import placed
 
 # A line that turns by more than this at one vertex has a corner there [rad].
 _CORNER = math.radians(25)
@@ -51,8 +53,7 @@ class Lot:
     @property
     def footprint_W(self) -> Polygon:
         """The rectangle in W [m]."""
-        c, s = math.cos(self.yaw), math.sin(self.yaw)
-        return affine_transform(self.footprint, [c, -s, s, c, self.x, self.y])
+        return placed(self.footprint, (self.x, self.y), self.yaw)
 
 
 @dataclass(frozen=True)
@@ -127,7 +128,7 @@ def lot_at(
     away = np.array([-along[1], along[0]])
     yaw = math.atan2(along[1], along[0])
     ends = (station_at(line, s) for s in (start + _SHORT, end - _SHORT))
-    if any(abs(_turn(at.yaw, yaw)) > _BEND for at in ends):
+    if any(abs(wrapped(at.yaw - yaw)) > _BEND for at in ends):
         return None
     # On a line that bends around the street the chord comes closer to it
     # than the line, so the front steps back by as much.
@@ -138,11 +139,6 @@ def lot_at(
     step_back = max(0.0, *(float(p @ away) for p in between))
     centre = (a + b) / 2 + away * (depth / 2 + step_back)
     return Lot(float(centre[0]), float(centre[1]), yaw, chord, depth)
-
-
-def _turn(to: float, origin: float) -> float:
-    """Returns the angle from one heading to another, in [-pi, pi)."""
-    return (to - origin + math.pi) % (2 * math.pi) - math.pi
 
 
 def _street_on_right(line: LineString, streets: BaseGeometry) -> LineString:
@@ -158,8 +154,8 @@ def _split_at_corners(line: LineString) -> list[LineString]:
     coordinates = np.array(line.coords)[:, :2]
     edges = np.diff(coordinates, axis=0)
     heading = np.arctan2(edges[:, 1], edges[:, 0])
-    turn = (np.diff(heading) + math.pi) % (2 * math.pi) - math.pi
-    corners = np.flatnonzero(np.abs(turn) > _CORNER) + 1
+    turns = wrapped(np.diff(heading))
+    corners = np.flatnonzero(np.abs(turns) > _CORNER) + 1
     closed = bool(np.allclose(coordinates[0], coordinates[-1]))
     if closed and len(corners):
         # Start a closed line at a corner, so that no piece is cut in two.
@@ -168,9 +164,7 @@ def _split_at_corners(line: LineString) -> list[LineString]:
             [coordinates[shift:-1], coordinates[: shift + 1]]
         )
         corners = corners[1:] - shift
-        last_turn = heading[0] - heading[-1]
-        last_turn = (last_turn + math.pi) % (2 * math.pi) - math.pi
-        if abs(last_turn) > _CORNER:
+        if abs(wrapped(float(heading[0] - heading[-1]))) > _CORNER:
             corners = np.sort([*corners, len(edges) - shift])
     bounds = [0, *(int(c) for c in corners), len(coordinates) - 1]
     return [

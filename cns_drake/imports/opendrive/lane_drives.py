@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from cns_drake.base.angles import wrapped
 from cns_drake.imports.drive_search import WayGraph, find_drives
 from cns_drake.imports.opendrive.lane_bands import LaneBand
 from cns_drake.imports.opendrive.lane_kinds import DRIVEN
@@ -56,7 +57,7 @@ class BandGraph(WayGraph):
             near = cKDTree(starts).query_ball_point(ends, _NEAR)
             for k, some in enumerate(near):
                 for m in sorted(some):
-                    turn = (first[m] - last[k] + np.pi) % (2 * np.pi) - np.pi
+                    turn = wrapped(first[m] - last[k])
                     if m != k and abs(turn) < _ASTRAY:
                         pairs.append((k, m))
         before, after = np.array(pairs, dtype=int).reshape(-1, 2).T

@@ -8,10 +8,10 @@ import zlib
 
 import numpy as np
 import shapely
-from shapely.affinity import affine_transform
 from shapely.geometry import Polygon, box
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.city.geometry.polygons import placed
 from cns_drake.city.geometry.structures import Model, Structure
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plants.vegetation import tree
@@ -149,9 +149,7 @@ def _solid(
             if length == width == 0.0:
                 faults.add("object without a size, left out", name)
                 return None
-        yaw = heading + thing.heading
-        c, sine = math.cos(yaw), math.sin(yaw)
-        polygon = affine_transform(footprint, [c, -sine, sine, c, x, y])
+        polygon = placed(footprint, (x, y), heading + thing.heading)
     if high < _LEAST_HEIGHT:
         faults.add("object without a height, left out", name)
         return None

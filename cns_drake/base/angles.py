@@ -1,0 +1,14 @@
+"""Angles in the plane."""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+import numpy as np
+
+Angle = TypeVar("Angle", float, np.ndarray)
+
+
+def wrapped(angle: Angle) -> Angle:
+    """Returns an angle, or each of an array, in [-pi, pi) [rad]."""
+    return (angle + np.pi) % (2 * np.pi) - np.pi
