@@ -16,6 +16,7 @@ from cns_drake.base.files import (
     write_part,
 )
 from cns_drake.base.interrupts import interrupts_wait
+from cns_drake.base.recordings.sequence import Sequence
 from cns_drake.pictures.meshcat_recording import MeshcatRecorder
 from cns_drake.recording.background_writer import BackgroundWriter
 from cns_drake.recording.recording_folder import RecordingFolder
@@ -26,6 +27,7 @@ from cns_drake.scenarios.recording_schedule import (
     first_points_topic,
 )
 from cns_drake.scenarios.scenario import Scenario
+from cns_drake.simulation.drive_in_progress import DriveInProgress
 from cns_drake.simulation.drive_recording import make_bag, resume_recording
 from cns_drake.simulation.loaded_drive import (
     LoadedDrive,
@@ -47,6 +49,7 @@ def simulate(
     graphviz_file: Path | None = None,
     overwrite: bool = False,
     num_threads: int = 1,
+    reader: Callable[[Sequence], None] | None = None,
     on_frame: ProgressCallback = lambda done, total: None,
     on_note: NoteCallback = lambda text: None,
 ) -> Run:
@@ -65,6 +68,10 @@ def simulate(
         overwrite: replace an existing recording of that name.
         num_threads: how many threads cast the rays of a LiDAR; the recording
             does not depend on it.
+        reader: reads the drive while it is recorded, each scan of the first
+            LiDAR once and in order, and raises nothing; what it leaves is
+            simulated all the same. It is called for a recording that begins
+            with the first frame only.
         on_frame: is told about progress.
         on_note: is told what was found of an interrupted run, and of the
             world's table of structures.
@@ -112,7 +119,7 @@ def simulate(
             strike()
             loaded = time.perf_counter()
             simulated_s = _advance(
-                diagram, writer, drive, resumed_frames, tell_frames
+                diagram, writer, drive, resumed_frames, tell_frames, reader
             )
         finished = time.perf_counter()
         if page is not None and page_file is not None:
@@ -166,6 +173,7 @@ def _advance(
     drive: LoadedDrive,
     first: int,
     on_frame: Callable[[int], None],
+    reader: Callable[[Sequence], None] | None,
 ) -> float:
     """Simulates frames and lets what they record be written.
 
@@ -175,6 +183,7 @@ def _advance(
         drive: what is simulated, up to its last frame.
         first: the first frame to simulate.
         on_frame: takes how many frames of the drive are done, after each.
+        reader: see `simulate`.
 
     Returns:
         Simulated time from the first of them to the last [s].
@@ -197,5 +206,9 @@ def _advance(
     end = max(schedule.ends.values())
     simulator.get_mutable_context().SetTime(begin * schedule.period)
     with writer:
+        if reader is not None and first == 0:
+            in_progress = DriveInProgress(drive, simulator)
+            reader(in_progress)
+            in_progress.raise_fault()
         simulator.AdvanceTo(end * schedule.period)
     return (end - begin) * schedule.period

@@ -12,6 +12,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import user_errors
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.jobs.step import Step, Tell
+from cns_drake.base.recordings.sequence import Sequence
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.recording.recording_folder import RecordingFolder
 from cns_drake.scenarios.planning import shown_beside
@@ -23,6 +24,8 @@ from cns_drake.scenarios.provenance import (
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import world_file
 from evaluation.study.parts import is_current, write_part
+from evaluation.study.recording_survey import RecordingSurvey
+from evaluation.study.surveys import Survey
 
 
 @dataclass(frozen=True)
@@ -34,12 +37,15 @@ class Record(Step):
         folder: the folder of recordings.
         overwrite: replace another recording of that name.
         page: where to save the page, if anywhere.
+        survey: of the recording, which is found while it is made; or, where
+            an interrupted recording is taken over, by whoever needs it.
     """
 
     scenario: Scenario
     folder: Path
     overwrite: bool = True
     page: Path | None = None
+    survey: Survey | None = None
 
     @property
     def output(self) -> Path:
@@ -52,27 +58,42 @@ class Record(Step):
         with uninterrupted():
             from cns_drake.simulation.simulation import simulate
 
-        shown = self._shown()
-        with self._place() as (folder, overwrite):
+        shown = None if self.page is None else self._shown()
+        is_new = not is_recorded(self.scenario, self.folder)
+        survey = self.survey if is_new else None
+        found: list[RecordingSurvey] = []
+
+        def read(drive: Sequence) -> None:
+            assert survey is not None
+            methods = survey.methods if survey.roles else ()
+            # What is wrong comes up again in the survey's own job.
+            with contextlib.suppress(Exception):
+                found.append(survey.find(drive, methods, Tell()))
+
+        with self._place(is_new) as (folder, overwrite):
             simulate(
                 self.scenario,
                 folder,
                 page_file=self.page,
                 overwrite=overwrite,
+                reader=None if survey is None else read,
                 on_frame=tell.progress,
                 on_note=tell.note,
             )
-        if self.page is not None:
+        for one in found:
+            assert survey is not None
+            survey.write(one)
+        if shown is not None:
             write_part(self._page_part, shown, None)
 
     @contextlib.contextmanager
-    def _place(self) -> Iterator[tuple[Path, bool]]:
+    def _place(self, is_new: bool) -> Iterator[tuple[Path, bool]]:
         """Yields the folder to record into, and whether to overwrite there.
 
         A recording that is up to date stays as it is when its page is made
         anew.
         """
-        if not is_recorded(self.scenario, self.folder):
+        if is_new:
             yield self.folder, self.overwrite
             return
         spare = self.output.with_name(f"{self.output.name}.page.part")

@@ -9,7 +9,7 @@ from pathlib import Path
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.base.jobs.running import run_jobs
+from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.base.recordings.driven_way import driven_way
 from cns_drake.scenarios.scenario import Scenario
@@ -19,7 +19,7 @@ from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.simulation.simulated_drive import SimulatedDrive
 from cns_drake.studies.map_pictures import plan_pictures
 from cns_drake.studies.recording_jobs import plan_recordings
-from cns_drake.studies.recording_step import is_recorded
+from cns_drake.studies.recording_step import Record, is_recorded
 from evaluation.paper import reference_for
 from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,
@@ -29,6 +29,7 @@ from evaluation.study.assembly import assemble
 from evaluation.study.chosen_methods import choose_methods
 from evaluation.study.collection import RecordingInfo
 from evaluation.study.plan import plan_study
+from evaluation.study.surveys import Survey
 
 
 def reproduce_maps(
@@ -112,6 +113,7 @@ def reproduce_maps(
         with_costs=with_costs,
         reference=reference,
     )
+    jobs = [_surveyed(job, study) for job in jobs]
     run_jobs([*jobs, *study, *pictures], cluster)
     addresses = {
         name: f"../pages/{page.name}"
@@ -128,6 +130,16 @@ def reproduce_maps(
         reference=reference,
         on_note=on_note,
     )
+
+
+def _surveyed(recording: Job, study: Sequence[Job]) -> Job:
+    """Returns the job of a recording that finds its survey on the way."""
+    for job in study:
+        if recording.name in job.needs and isinstance(job.step, Survey):
+            assert isinstance(recording.step, Record)
+            step = replace(recording.step, survey=job.step)
+            return replace(recording, step=step, cost=recording.cost + job.cost)
+    return recording
 
 
 def _sequences(folder: Path) -> list[Scenario]:

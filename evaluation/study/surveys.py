@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from cns_drake.base.jobs.step import Step, Tell
+from cns_drake.base.recordings.sequence import Sequence
 from evaluation.recognition.description import Role
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.drive_source import DriveSource
 from evaluation.study.parts import is_current, write_part
-from evaluation.study.recording_survey import survey_recording
+from evaluation.study.recording_survey import RecordingSurvey, survey_recording
 from evaluation.study.study_layout import SurveyFiles
 
 
@@ -42,21 +43,47 @@ class Survey(Step):
         return not any(self._missing())
 
     def run(self, tell: Tell) -> None:
-        described, maps = self._missing()
-        methods = [method for method in self.methods if method in described]
-        survey = survey_recording(
-            self.source(),
+        described, _ = self._missing()
+        self.write(self.find(self.source(), described, tell))
+
+    def find(
+        self,
+        drive: Sequence,
+        methods: Iterable[MethodChoice],
+        tell: Tell,
+    ) -> RecordingSurvey:
+        """Returns the survey of a drive, described by some of the methods.
+
+        Args:
+            drive: that of the source, or the same while it is made.
+            methods: to describe it; none if it has no role.
+            tell: what takes the progress.
+
+        Raises:
+            InputError: see `survey_recording`.
+        """
+        return survey_recording(
+            drive,
             self.roles,
             [method.make() for method in methods],
             self.protocol,
             tell.track,
         )
-        for method in methods:
-            # Each is let go when it is written.
-            value = survey.drive.placed, survey.described.pop(method.name)
-            write_part(self.files.described(method), described[method], value)
+
+    def write(self, found: RecordingSurvey) -> None:
+        """Writes what is missing of the survey, as far as it was found.
+
+        Raises:
+            InputError: a file cannot be written.
+        """
+        described, maps = self._missing()
+        for method, inputs in described.items():
+            if method.name in found.described:
+                # Each is let go when it is written.
+                value = found.drive.placed, found.described.pop(method.name)
+                write_part(self.files.described(method), inputs, value)
         for name, inputs in maps.items():
-            write_part(getattr(self.files, name), inputs, getattr(survey, name))
+            write_part(getattr(self.files, name), inputs, getattr(found, name))
 
     def _missing(
         self,

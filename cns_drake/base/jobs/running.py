@@ -179,19 +179,26 @@ class _Run:
         raise FailedJobsError("; ".join(parts))
 
     def _submit_ready(self) -> None:
-        ready = sorted(
-            (
-                job
-                for job in self._waiting.values()
-                if self._done.issuperset(job.needs)
-            ),
-            key=lambda job: -self._urgency[job.name],
-        )
-        if self._slots is not None:
-            ready = ready[: max(self._slots - len(self._submitted), 0)]
-        for job in ready:
+        """Submits what there is room for, the most urgent first."""
+        while (job := self._most_urgent()) is not None:
             del self._waiting[job.name]
-            self._submit(job)
+            # What it needs may have left nothing to do.
+            if job.needs and nothing_left(job.step):
+                self._done.add(job.name)
+                self._shown.end(job.name)
+            else:
+                self._submit(job)
+
+    def _most_urgent(self) -> Job | None:
+        """Returns the next job, if there is one and there is room for it."""
+        if self._slots is not None and len(self._submitted) >= self._slots:
+            return None
+        ready = (
+            job
+            for job in self._waiting.values()
+            if self._done.issuperset(job.needs)
+        )
+        return max(ready, key=lambda job: self._urgency[job.name], default=None)
 
     def _submit(self, job: Job) -> None:
         self._submitted.add(job.name)

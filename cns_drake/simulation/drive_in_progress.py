@@ -1,0 +1,54 @@
+"""A drive that is read while it is recorded."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.systems.analysis import Simulator
+
+from cns_drake.scenarios.recording_schedule import (
+    drive_schedule,
+    first_points_topic,
+)
+from cns_drake.simulation.loaded_drive import LoadedDrive
+from cns_drake.simulation.planned_sequence import PlannedSequence
+
+
+class DriveInProgress(PlannedSequence):
+    """The scans of the first LiDAR, just as they are recorded.
+
+    The simulation advances to the frame of the scan that is asked for.
+    """
+
+    def __init__(self, drive: LoadedDrive, simulator: Simulator):
+        """Takes the station of a drive, whose first frame is still to come."""
+        super().__init__(drive.scenario, drive.trajectory, drive.num_frames)
+        self._simulator = simulator
+        self._lidar = next(iter(drive.scenario.lidars))
+        schedule = drive_schedule(drive.scenario)
+        self._steps = schedule.steps[first_points_topic(drive.scenario)]
+        self._tick = schedule.period
+        self._fault: BaseException | None = None
+
+    def raise_fault(self) -> None:
+        """Raises what the simulation raised, whatever its reader made of it."""
+        if self._fault is not None:
+            raise self._fault
+
+    def scan(self, index: int) -> np.ndarray:
+        """Advances to a frame and returns its scan.
+
+        Raises:
+            ValueError: the simulation is beyond the frame, or the vehicle is
+                not where it was planned to be.
+        """
+        simulator = self._simulator
+        try:
+            simulator.AdvanceTo(index * self._steps * self._tick)
+        except BaseException as error:
+            self._fault = error
+            raise
+        context, diagram = simulator.get_context(), simulator.get_system()
+        X_WB = diagram.GetOutputPort("odometry").Eval(context).X_WB
+        if not X_WB.IsExactlyEqualTo(self.X_WBs[index]):
+            raise ValueError(f"frame {index}: not where it was planned")
+        return diagram.GetOutputPort(f"{self._lidar}_scan").Eval(context)
