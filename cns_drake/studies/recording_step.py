@@ -60,7 +60,7 @@ class Record(Step):
 
         shown = None if self.page is None else self._shown()
         is_new = not is_recorded(self.scenario, self.folder)
-        survey = self.survey if is_new else None
+        survey = self.survey if is_new and self._is_first_read() else None
         found: list[RecordingSurvey] = []
 
         def read(drive: Sequence) -> None:
@@ -85,6 +85,11 @@ class Record(Step):
             survey.write(one)
         if shown is not None:
             write_part(self._page_part, shown, None)
+
+    def _is_first_read(self) -> bool:
+        """Returns whether it is the first LiDAR's scans that are surveyed."""
+        first, *others = self.scenario.lidars
+        return first == "lidar" or not others
 
     @contextlib.contextmanager
     def _place(self, is_new: bool) -> Iterator[tuple[Path, bool]]:

@@ -43,8 +43,8 @@ class Survey(Step):
         return not any(self._missing())
 
     def run(self, tell: Tell) -> None:
-        described, _ = self._missing()
-        self.write(self.find(self.source(), described, tell))
+        missing = self._missing()
+        self._write(self.find(self.source(), missing[0], tell), *missing)
 
     def find(
         self,
@@ -76,7 +76,14 @@ class Survey(Step):
         Raises:
             InputError: a file cannot be written.
         """
-        described, maps = self._missing()
+        self._write(found, *self._missing())
+
+    def _write(
+        self,
+        found: RecordingSurvey,
+        described: Mapping[MethodChoice, Mapping],
+        maps: Mapping[str, Mapping],
+    ) -> None:
         for method, inputs in described.items():
             if method.name in found.described:
                 # Each is let go when it is written.

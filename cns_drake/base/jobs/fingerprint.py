@@ -74,17 +74,6 @@ class _Module(NamedTuple):
     root: Path
     name: str
 
-    def file(self) -> Path | None:
-        """Returns its source; None if there is no such module."""
-        place = self.root.joinpath(*self.name.split("."))
-        for path in (
-            place / "__init__.py",
-            place.with_name(f"{place.name}.py"),
-        ):
-            if path.is_file():
-                return path
-        return None
-
     def parents(self) -> Iterator[_Module]:
         """Yields the packages that it is in."""
         name = self.name
@@ -103,6 +92,50 @@ class _Imports(NamedTuple):
 
     names: tuple[tuple[str, str], ...]
     offered: Mapping[str, str]
+
+
+class _Sources:
+    """Finds and reads modules, each once."""
+
+    def __init__(self) -> None:
+        self._files: dict[_Module, Path | None] = {}
+        self._imports: dict[_Module, _Imports] = {}
+
+    def file(self, module: _Module) -> Path | None:
+        """Returns the source of a module; None if there is none."""
+        if module not in self._files:
+            place = module.root.joinpath(*module.name.split("."))
+            self._files[module] = None
+            for path in (place / "__init__.py", Path(f"{place}.py")):
+                if path.is_file():
+                    self._files[module] = path
+                    break
+        return self._files[module]
+
+    def imported(self, module: _Module) -> Iterator[_Module]:
+        """Yields what a module imports, if it is ours or beside it."""
+        for home, name in self._imports_of(module).names:
+            own = home.partition(".")[0] in _PACKAGES
+            package = _Module(_ROOT if own else module.root, home)
+            yield package
+            inner = package._replace(name=f"{home}.{name}")
+            if name and self.file(inner) is not None:
+                yield inner
+            elif name in (offered := self._imports_of(package).offered):
+                yield package._replace(name=offered[name])
+
+    def _imports_of(self, module: _Module) -> _Imports:
+        if module not in self._imports:
+            self._imports[module] = _Imports((), {})
+            path = self.file(module)
+            if path is not None:
+                package = module.name
+                if path.name != "__init__.py":
+                    package = package.rpartition(".")[0]
+                with user_errors(path):
+                    text = path.read_bytes()
+                self._imports[module] = _find_imports(text, package)
+        return self._imports[module]
 
 
 def _modules_in(package: str) -> Iterator[_Module]:
@@ -125,61 +158,32 @@ def _files(
     modules: Iterable[_Module], without: tuple[str, ...]
 ) -> dict[str, Path]:
     """Returns name -> path of the files that modules consist of."""
+    sources = _Sources()
     waiting = list(modules)
-    data: list[Path] = []
-    files: dict[_Module, Path] = {}
+    done: set[_Module] = set()
+    found: dict[str, Path] = {}
     while waiting:
         module = waiting.pop()
-        if module in files or any(
-            module.name == one or module.name.startswith(f"{one}.")
-            for one in without
-        ):
+        path = sources.file(module)
+        if module in done or path is None or _is_in(module, without):
             continue
-        path = module.file()
-        if path is None:
-            continue
+        done.add(module)
         if module.root == _ROOT:
-            data += _data_files(path)
-        files[module] = path
-        # Their initialization runs, but their data need not matter.
-        files |= {
-            parent: file
-            for parent in module.parents()
-            if (file := parent.file()) is not None
-        }
+            for file in _data_files(path):
+                found[file.relative_to(_ROOT).as_posix()] = file
+        # Packages that it is in run, too; their data need not matter.
         for one in (module, *module.parents()):
-            waiting += _imported(one)
-    found = {f"{module.name}.py": path for module, path in files.items()}
-    found |= {path.relative_to(_ROOT).as_posix(): path for path in data}
+            source = sources.file(one)
+            if source is not None:
+                found[f"{one.name}.py"] = source
+                waiting += sources.imported(one)
     return found
 
 
-def _imported(module: _Module) -> Iterator[_Module]:
-    """Yields what a module imports, if it is ours or beside it."""
-    path = module.file()
-    if path is None:
-        return
-    for home, name in _read_imports(path, module.name).names:
-        own = home.partition(".")[0] in _PACKAGES
-        package = _Module(_ROOT if own else module.root, home)
-        yield package
-        if not name:
-            continue
-        inner = package._replace(name=f"{home}.{name}")
-        file = package.file()
-        if inner.file() is not None:
-            yield inner
-        elif file is not None:
-            offered = _read_imports(file, home).offered
-            if name in offered:
-                yield package._replace(name=offered[name])
-
-
-def _read_imports(path: Path, module: str) -> _Imports:
-    if path.name != "__init__.py":
-        module = module.rpartition(".")[0]
-    with user_errors(path):
-        return _find_imports(path.read_bytes(), module)
+def _is_in(module: _Module, packages: Iterable[str]) -> bool:
+    return f"{module.name}.".startswith(
+        tuple(f"{package}." for package in packages)
+    )
 
 
 @functools.cache
