@@ -32,6 +32,7 @@ from cns_drake.base.files import (
 from cns_drake.base.recordings import ros_types
 from cns_drake.base.version import __version__
 from cns_drake.recording.mcap_recovery import Fault, read_records
+from cns_drake.recording.message_order import MessageOrder
 from cns_drake.recording.part_file import PartFile
 from cns_drake.recording.recording_folder import RecordingFolder
 from cns_drake.recording.rosbag2_metadata import (
@@ -136,6 +137,8 @@ class BagWriter:
         self._custom_data = dict(custom_data or {})
         self._fingerprint = fingerprint
         self._part = part_path(self._files.mcap)
+        self._order = MessageOrder(folder, self._topics)
+        self._is_open = False
         self._counts = {topic.name: 0 for topic in self._topics}
         self._first_ns: int | None = None
         self._last_ns: int | None = None
@@ -163,6 +166,7 @@ class BagWriter:
         except BaseException:
             self._close_part()
             raise
+        self._is_open = True
         return self
 
     def __exit__(
@@ -177,6 +181,7 @@ class BagWriter:
             InputError: if the files cannot be completed, e.g. on a full
                 disk; nothing has got a final name then.
         """
+        self._is_open = False
         if exception_type is not None:
             self._close_part()
             return
@@ -227,6 +232,8 @@ class BagWriter:
     ) -> None:
         """Appends one message; messages must come in the order of time.
 
+        A latched message that is there already is left out.
+
         Args:
             topic: name of one of the topics.
             stamp_ns: the message's time [ns].
@@ -234,8 +241,17 @@ class BagWriter:
             sequence: the message's number on its topic.
 
         Raises:
-            InputError: if the file cannot be written, e.g. on a full disk.
+            InputError: if the file cannot be written, e.g. on a full disk, or
+                the message does not go on in time.
+            RuntimeError: the recording is not open.
         """
+        if not self._is_open:
+            raise RuntimeError(
+                f"{self._files.path}: the recording is not open; simulate "
+                "within its `with` block"
+            )
+        if not self._order.takes(topic, stamp_ns):
+            return
         channel_id = self._channel_ids[topic]
         with self._writing():
             if stamp_ns - self._flushed_ns >= _FLUSH_PERIOD_NS:

@@ -97,7 +97,7 @@ class McapRecorder(LeafSystem):
 
     What is not connected is not recorded.
 
-    The system has no state. Tick i is at i * period of its schedule. What is
+    Tick i is at i * period of its schedule. What is
     due then is written as the inputs show it, by a periodic publish event
     from time zero on, or by a forced publish at such a time. The inputs must
     be wired straight to continuous outputs: a publish sees the state before
@@ -157,6 +157,7 @@ class McapRecorder(LeafSystem):
         self._layouts = dict(layouts or {})
         self._imu_variances = imu_variances
         self._start_ns = start_ns
+        self._has_begun = False
         if (period is None) == (schedule is None):
             raise ValueError("a recorder needs a period or a schedule")
         if period is not None:
@@ -214,11 +215,12 @@ class McapRecorder(LeafSystem):
         tick = self._tick(context.get_time())
         stamp_ns = self._start_ns + self._schedule.time_ns(tick)
         due = set(self._schedule.due(tick))
-        if tick == 0 and self._X_BCs:
-            # Latched, hence once; in the first frame rather than before it,
-            # so that the recorder needs no memory of having written it.
+        if self._X_BCs and not self._has_begun:
+            # In the first frame, whichever that is. A bag takes latched
+            # messages once: one that goes on has this already.
             tf = messages.make_tf(messages.BASE_FRAME, self._X_BCs, stamp_ns)
             self._write(_TF_STATIC, tf, stamp_ns, 0)
+        self._has_begun = True
         outgoing: dict[Topic, Any] = {}
         if _TF.name in due or _ODOMETRY.name in due:
             outgoing |= self._locate(context, stamp_ns)

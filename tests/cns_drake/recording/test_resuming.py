@@ -162,7 +162,6 @@ def test_a_file_without_metadata_of_another_kind_is_kept(folder, whole):
         {"stamp_ns": frame_stamp_ns(1) + 1},
         {"sequence": 2},
         {"topic": "/tf_static"},
-        {"topic": "/imu/data"},
     ],
 )
 def test_frames_that_are_no_frames_are_not_taken_over(folder, fault):
