@@ -43,7 +43,10 @@ class Schedule:
 
     def time_ns(self, tick: int) -> int:
         """Returns the time of a tick since the start [ns]."""
-        return round(tick * self.tick * _NS_PER_S)
+        # Rounded in whole numbers: fractions take longer than a message.
+        numerator, denominator = self.tick.as_integer_ratio()
+        doubled = 2 * tick * numerator * _NS_PER_S + denominator
+        return doubled // (2 * denominator)
 
 
 def make_schedule(

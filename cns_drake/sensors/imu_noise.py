@@ -112,7 +112,7 @@ class ImuErrors:
             exact: (6,) specific force [m/s^2] and angular velocity [rad/s].
         """
         measured = exact + self.at(sample)
-        return np.clip(measured, -self._range, self._range)
+        return np.minimum(np.maximum(measured, -self._range), self._range)
 
     def at(self, sample: int) -> np.ndarray:
         """Returns the error of a sample, (6,) as in `measure`."""
