@@ -488,5 +488,7 @@ NOT_RUN = {
     "them; `.ci/run` runs all",
     "ros2 bag": "needs ROS 2; test_mcap_recorder and others read "
     "recordings with rosbags' reader of rosbag2 folders",
+    "rko_lio output": "a program that is no part of this project; test_rko_lio "
+    "runs it on a short drive",
     "@misc{song2025city": "a citation",
 }

@@ -1,0 +1,68 @@
+"""RKO-LIO, as published, finds a drive on springs from LiDAR and IMU.
+
+RKO-LIO reads the folder itself, frames and extrinsics included. It would go
+astray on wrong axes, units, stamps, gravity or places of the sensors, and on
+an IMU that does not feel what the LiDAR sees.
+"""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from cns_drake.base import poses
+from cns_drake.recording.frame_clock import START_NS
+from cns_drake.scenarios.planning import plan_drive
+from cns_drake.scenarios.ride_config import RideConfig
+from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.simulation.simulation import simulate
+
+pytestmark = pytest.mark.slow
+
+# The first eight seconds of the drive, a start from rest.
+SECONDS = 8
+
+
+def test_rko_lio_finds_the_drive(tmp_path, capsys):
+    base = load_scenario("metropolis_04").with_lidar_preset("os1-128")
+    lidar = base.lidars["lidar"].model_copy(
+        update={"motion_distortion": True, "columns": 512}
+    )
+    scenario = base.model_copy(
+        update={
+            "frames": 20 * SECONDS,
+            "lidars": {"lidar": lidar},
+            "ride": RideConfig(roughness="A"),
+        }
+    )
+    folder = simulate(scenario, tmp_path / "recordings").folder
+    command = [sys.executable, "-m", "rko_lio.cli", folder, "-d", "rosbag"]
+    command += ["--imu", "/imu/data", "--lidar", "/lidar/points"]
+    command += ["--base_frame", "base_link", "--log"]
+    command += ["-o", tmp_path / "found", "-n", "drive"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    (table,) = (tmp_path / "found").rglob("*_tum.txt")
+    rows = np.loadtxt(table)
+    found = poses.make_pose(
+        poses.rotation_from_quaternion(rows[:, 4:]), rows[:, 1:4]
+    )
+
+    # Where the car is at the times for which RKO-LIO says it, ends of scans.
+    times = rows[:, 0] - START_NS * 1e-9
+    exact = poses.make_pose(*plan_drive(scenario).poses(times))
+    assert len(found) >= 20 * SECONDS - 2
+    found, exact = (poses.inverse(X[0]) @ X for X in (found, exact))
+    length = np.linalg.norm(exact[-1, :3, 3])
+    assert length > 50.0
+    errors = np.linalg.norm(found[:, :3, 3] - exact[:, :3, 3], axis=1)
+    turn = exact[-1, :3, :3].T @ found[-1, :3, :3]
+    angle_deg = np.degrees(np.arccos(min((np.trace(turn) - 1.0) / 2.0, 1.0)))
+    with capsys.disabled():
+        print(
+            f"\nRKO-LIO: {errors[-1]:.2f} m and {angle_deg:.2f} deg off"
+            f" after {length:.1f} m"
+        )
+    assert errors.max() < 0.02 * length
+    assert angle_deg < 1.0
