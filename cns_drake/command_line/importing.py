@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,6 +17,9 @@ from cns_drake.imports.import_report import DriveOn, ImportOptions
 
 if TYPE_CHECKING:
     from cns_drake.imports.import_report import ImportReport
+
+# Part of the buildings that the first stage of a city without years lacks.
+_GROW = 0.3
 
 
 def import_city(
@@ -59,7 +63,8 @@ def import_city(
         int,
         typer.Option(
             min=0,
-            help="Of the buildings along roads that have none (OpenDRIVE).",
+            help="Of what is drawn by lot: by --grow, and the buildings along "
+            "roads that have none (OpenDRIVE).",
         ),
     ] = 0,
     along: Annotated[
@@ -86,6 +91,22 @@ def import_city(
             "neither this nor OpenStreetMap tells.",
         ),
     ] = None,
+    grow: Annotated[
+        float | None,
+        typer.Option(
+            min=0.01,
+            max=0.9,
+            metavar="PART",
+            help="A first stage in which that part of the buildings is not "
+            "there yet, or lower, by lot; 0.3 where there are no --years.",
+        ),
+    ] = None,
+    plain: Annotated[
+        bool,
+        typer.Option(
+            "--plain", help="Only what the file has: nothing drawn by lot."
+        ),
+    ] = False,
 ) -> None:
     """Make a map of a real city.
 
@@ -102,8 +123,20 @@ def import_city(
         raise InputError(f"give one file, not {' '.join(source)}")
     path = Path(paths[0])
     stages = tuple(sorted([*(years or ()), *more]))
+    if plain and grow is not None:
+        raise InputError("--grow: --plain has nothing drawn by lot")
+    if not plain and not stages and path.suffix != ".xodr" and grow is None:
+        grow = _GROW
     options = ImportOptions(
-        stages, year_attribute, undated, lod, seed, along, within, drive_on
+        stages,
+        year_attribute,
+        undated,
+        lod,
+        seed,
+        along,
+        within,
+        drive_on,
+        grow,
     )
     report = import_map.import_city(
         path,
@@ -113,11 +146,34 @@ def import_city(
         finish=lambda folder: write_table(folder, note),
     )
     print_rows(_rows(report, options.years))
+    for line in _shortcomings(report, output, options):
+        note(f"{output}: {line}")
+
+
+def _shortcomings(
+    report: ImportReport, output: Path, options: ImportOptions
+) -> Iterator[str]:
+    """Yields what a study of the map would lack, and what to do."""
+    waypoints = (
+        f"draw waypoints on {output / 'from_above.png'} (docs/imports.md)"
+    )
     if not report.drives:
-        note(
-            f"{output}: no street wide and long enough was found; draw"
-            f" waypoints on {output / 'from_above.png'} (docs/imports.md)"
+        yield f"no street wide and long enough was found; {waypoints}"
+    elif len(report.drives) == 1 and options.along is None:
+        yield f"no second way that shares a part of the first; {waypoints}"
+    if len(report.stages) == 1:
+        yield "one stage: give --years or --grow to study change"
+    elif options.years and report.undated > report.dated:
+        numbers = list(report.stages.values())
+        yield (
+            f"{report.dated} of {report.dated + report.undated} buildings have"
+            f" a year; from stage to stage {_differences(numbers)} structures"
+            " more stand; --grow draws what changes by lot"
         )
+
+
+def _differences(numbers: list[int]) -> str:
+    return ", ".join(str(b - a) for a, b in pairwise(numbers))
 
 
 def _rows(

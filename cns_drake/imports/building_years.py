@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 import datetime
 from enum import Enum
 from itertools import pairwise
-import re
 from typing import Any
 
 from cns_drake.base.errors import InputError
 from cns_drake.imports.import_faults import ImportFaults
+from cns_drake.imports.told_dates import told_year
 
 # The usual attributes, small letters, most telling first: 3DBAG, CityGML,
 # 3D BAG's forerunners, OpenStreetMap.
@@ -31,7 +31,6 @@ _USUAL = (
 _PLACEHOLDER = 9999
 _DUTCH_PLACEHOLDER = 1005
 _DUTCH = ("oorspronkelijkbouwjaar", "bouwjaar")
-_YEAR = re.compile(r"(?<!\d)(\d{3,4})(?!\d)")
 
 
 class Undated(str, Enum):
@@ -81,8 +80,7 @@ def _year(value: object) -> int | None:
         return None
     if isinstance(value, (int, float)):
         return int(value) if 1 <= value <= 9999 else None
-    match = _YEAR.search(str(value))
-    return (int(match[1]) or None) if match else None
+    return told_year(str(value))
 
 
 def stage_names(years: Sequence[int]) -> list[str]:
@@ -100,18 +98,25 @@ def stage_names(years: Sequence[int]) -> list[str]:
 
 
 def stands_at(
-    year: int | None, stage: int, years: Sequence[int], undated: Undated
+    year: int | None,
+    until: int | None,
+    stage: int,
+    years: Sequence[int],
+    undated: Undated,
 ) -> bool:
     """Tells whether something stands at a stage.
 
     Args:
         year: in which it was built; None if it is not known.
+        until: in which it was demolished, if it was.
         stage: number of the stage, from 0 on.
-        years: of the stages; without any, all stands.
+        years: of the stages; without any, all stands that does today.
         undated: what becomes of it without a year.
     """
     if not years:
-        return True
+        return until is None or until > datetime.date.today().year
+    if until is not None and years[stage] >= until:
+        return False
     if year is not None:
         return year <= years[stage]
     if undated is Undated.FIRST:

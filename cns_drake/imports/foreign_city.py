@@ -36,12 +36,14 @@ class Imported:
         year: in which it was built, if it is told.
         triangles: (M, 3, 3) of what a car could hit or drive over, in the
             world [m].
+        until: year in which it was demolished, if it was.
     """
 
     structure: Structure
     kind: str
     year: int | None
     triangles: np.ndarray
+    until: int | None = None
 
     @property
     def is_ground(self) -> bool:
@@ -86,6 +88,7 @@ def make_imported(
     surfaces: Mapping[str, np.ndarray],
     colours: Mapping[str, Rgb | None],
     year: int | None = None,
+    until: int | None = None,
 ) -> Imported:
     """Returns a structure of triangles in the world.
 
@@ -97,6 +100,7 @@ def make_imported(
             out, not all are empty.
         colours: part -> diffuse colour; that of the class where it has none.
         year: in which it was built, if it is told.
+        until: in which it was demolished, if it was.
     """
     filled = {part: some for part, some in surfaces.items() if len(some)}
     triangles = np.concatenate(list(filled.values()))
@@ -109,7 +113,7 @@ def make_imported(
         MultiPoint(triangles.reshape(-1, 3)[:, :2]).convex_hull,
     )
     structure = Structure(name, semantic_class, model, (0.0, 0.0, 0.0))
-    return Imported(structure, kind, year, triangles)
+    return Imported(structure, kind, year, triangles, until)
 
 
 def _to_mesh(triangles: np.ndarray) -> Mesh:

@@ -17,6 +17,7 @@ from cns_drake.imports.drive_search import find_drives
 from cns_drake.imports.foreign_city import ForeignCity
 from cns_drake.imports.free_drives import CellGraph
 from cns_drake.imports.free_space import FreeSpace, find_free_space
+from cns_drake.imports.grown_city import grow
 from cns_drake.imports.import_faults import ImportFaults
 from cns_drake.imports.import_ground import Ground, bottom_of, ground_of
 from cns_drake.imports.import_report import DriveOn, ImportOptions, ImportReport
@@ -63,6 +64,9 @@ def import_city(
         return _import_roads(source, output, options, progress, finish)
     city = _read(source, options)
     staged = stage_city(source, city, options)
+    growth = None
+    if options.grow is not None:
+        staged, growth = grow(staged, options.grow, options.seed)
     progress(f"{len(staged.kept)} structures; looking for streets")
     ground = ground_of(staged.kept)
     space = find_free_space(staged.kept, ground)
@@ -74,7 +78,7 @@ def import_city(
     progress(f"writing {output}")
     with map_draft(output) as draft:
         write_world(draft, source, staged, bottom_of(staged.kept, ground))
-        write_facts(draft, source, city, options, list(staged.standing))
+        write_facts(draft, source, city, options, list(staged.standing), growth)
         write_drives(
             draft,
             _titles(staged, options),
@@ -97,9 +101,12 @@ def _check(source: Path, output: Path, options: ImportOptions) -> None:
             ("--lod", options.lod is not None, "without any"),
             ("--along", options.along, "taken whole"),
             ("--within", options.within is not None, "taken whole"),
+            ("--grow", options.grow is not None, "which has two stages"),
         ):
             if value:
                 raise InputError(f"{option}: {source} is a road network, {why}")
+    if options.grow is not None and options.years:
+        raise InputError("--grow: --years say already what is built when")
     if os.path.lexists(output):
         raise InputError(f"{output}: is there already")
     name = output.resolve().name
@@ -168,6 +175,8 @@ def _lifted(
 def _titles(city: StagedCity, options: ImportOptions) -> dict[str, str]:
     """Returns stage -> when it is, in words that a title ends with."""
     when = [f" in {year}" for year in options.years] or [""]
+    if options.grow is not None:
+        when = [", not all of it built", ""]
     return dict(zip(city.standing, when, strict=True))
 
 
@@ -179,6 +188,7 @@ def _report(
         triangles=sum(len(one.triangles) for one in city.kept),
         stages={stage: len(some) for stage, some in city.standing.items()},
         undated=city.undated,
+        dated=city.dated,
         drives=tuple(drive.length for drive in drives),
         faults=faults.rows(),
     )

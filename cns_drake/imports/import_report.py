@@ -26,8 +26,11 @@ class ImportOptions:
             ones if None.
         undated: what becomes of buildings without a year.
         lod: level of detail; the highest of each object if None.
-        seed: of what is drawn where a file of roads has no buildings.
+        seed: of what is drawn: by `grow`, and where a file of roads has no
+            buildings.
         along: waypoints of a drive, in place of two that are proposed.
+        grow: part of the buildings that a stage before the only one lacks, or
+            has lower, by lot; no such stage if None.
         drive_on: side of the streets; that which the file tells, or the
             right, if None.
         within: how far from the drives a structure may lie; anywhere if None
@@ -42,6 +45,7 @@ class ImportOptions:
     along: Path | None = None
     within: float | None = None
     drive_on: DriveOn | None = None
+    grow: float | None = None
 
 
 @dataclass(frozen=True)
@@ -52,7 +56,7 @@ class ImportReport:
         kinds: type of object -> how many structures.
         triangles: of all.
         stages: stage -> how many structures stand.
-        undated: buildings without a year.
+        undated, dated: buildings without a year, and with one.
         drives: lengths of the proposed drives [m].
         faults: kind, how many, example.
     """
@@ -61,5 +65,6 @@ class ImportReport:
     triangles: int
     stages: dict[str, int]
     undated: int
+    dated: int
     drives: tuple[float, ...]
     faults: list[tuple[str, int, str]]

@@ -16,6 +16,7 @@ from cns_drake.city.generation.generate import structure_table
 from cns_drake.city.generation.sdf import stage_sdf
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.imports.foreign_city import ForeignCity
+from cns_drake.imports.grown_city import Growth
 from cns_drake.imports.import_report import ImportOptions
 from cns_drake.imports.staged_city import StagedCity
 
@@ -76,8 +77,9 @@ def write_facts(
     city: ForeignCity,
     options: ImportOptions,
     stages: Sequence[str],
+    growth: Growth | None,
 ) -> None:
-    """Writes where the map comes from, and where it lies."""
+    """Writes where the map comes from, where it lies, and what was drawn."""
     facts = {
         "source": source.name,
         "reference_system": city.reference_system or "not told",
@@ -85,6 +87,7 @@ def write_facts(
         "origin": list(city.origin),
         "lod": options.lod if options.lod is not None else "highest",
         "years": dict(zip(stages, options.years, strict=False)),
+        **_drawn(options, growth),
         "left_out_or_repaired": {
             kind: number for kind, number, _ in city.faults.rows()
         },
@@ -100,3 +103,17 @@ def write_facts(
         )
     text = yaml.safe_dump(facts, sort_keys=False, allow_unicode=True)
     (draft / "import.yaml").write_text(comment + text, "utf-8")
+
+
+def _drawn(options: ImportOptions, growth: Growth | None) -> dict:
+    """Returns what was drawn by lot, if anything was."""
+    if growth is None:
+        return {}
+    return {
+        "first_stage_by_lot": {
+            "grow": options.grow,
+            "seed": options.seed,
+            "missing": list(growth.missing),
+            "part_of_height": growth.lower,
+        }
+    }

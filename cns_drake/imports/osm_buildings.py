@@ -20,6 +20,7 @@ from cns_drake.imports.import_faults import ImportFaults
 from cns_drake.imports.osm_places import Local, parts_of, sound_parts
 from cns_drake.imports.osm_reading import OsmArea, Tags, is_told
 from cns_drake.imports.osm_tags import heights, why_absent
+from cns_drake.imports.told_dates import told_year
 
 # Parts that leave no more of an outline than this are all of the building.
 _ALL_OF_IT = 0.9
@@ -47,10 +48,16 @@ class _Block:
 def standing_buildings(
     areas: Iterable[OsmArea], faults: ImportFaults
 ) -> Iterator[OsmArea]:
-    """Yields the buildings and parts that stand above the ground."""
+    """Yields the buildings and parts that stand or stood above the ground.
+
+    What does not stand any more has to tell until when it did.
+    """
     for one in areas:
         absent = why_absent(one.tags)
-        if absent is None:
+        is_past = absent == "demolished" and told_year(
+            one.tags.get("end_date", "")
+        )
+        if absent is None or is_past:
             yield one
         else:
             faults.add(f"{absent} building, left out", one.name)
@@ -112,6 +119,7 @@ def make_buildings(
             {"body": np.concatenate(walls), "roof": np.concatenate(roofs)},
             {"roof": RED_ROOF},
             construction_year(whole.tags, year_attribute, whole.name, faults),
+            told_year(whole.tags.get("end_date", "")),
         )
 
 

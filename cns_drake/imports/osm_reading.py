@@ -57,7 +57,8 @@ _TELLING = (
     "place",
     "area:highway",
 )
-# Before the key of what is not there any more, or not yet.
+# Before the key of what is not there any more; and of that, or not yet.
+_GONE = ("demolished", "destroyed", "historic", "razed", "removed", "was")
 _LIFECYCLE = (
     "abandoned",
     "construction",
@@ -209,5 +210,15 @@ def is_told(tags: Tags, name: str) -> bool:
 
 
 def is_building(tags: Tags) -> bool:
-    """Tells whether a building or a part of one is meant."""
-    return is_told(tags, "building") or is_told(tags, "building:part")
+    """Tells whether a building or a part of one is meant.
+
+    Also one that stood until a date that is told.
+    """
+    return (
+        is_told(tags, "building")
+        or is_told(tags, "building:part")
+        or (
+            "end_date" in tags
+            and any(is_told(tags, f"{stage}:building") for stage in _GONE)
+        )
+    )

@@ -151,6 +151,8 @@ def heights(
 
 def why_absent(tags: Mapping[str, str]) -> str | None:
     """Returns why a building of a file does not stand; None if it does."""
+    if not ("building" in tags or "building:part" in tags):
+        return "demolished"
     kinds = [tags.get("building", ""), tags.get("building:part", "")]
     kinds += [key for key in _ABSENT if tags.get(key) == "yes"]
     for kind in kinds:

@@ -28,11 +28,13 @@ class StagedCity:
         standing: stage -> its structures.
         kept: those that stand at some stage.
         undated: how many buildings have no year.
+        dated: how many have one.
     """
 
     standing: dict[str, list[Imported]]
     kept: list[Imported]
     undated: int
+    dated: int
 
     def near(
         self, drives: Sequence[Drive], distance: float, faults: ImportFaults
@@ -89,19 +91,15 @@ def stage_city(
             one
             for one in found
             if not _has_years(one)
-            or stands_at(one.year, k, options.years, options.undated)
+            or stands_at(one.year, one.until, k, options.years, options.undated)
         ]
         for k, stage in enumerate(stage_names(options.years))
     }
     ever = {one for some in standing.values() for one in some}
     for one in found:
         if one not in ever:
-            when = (
-                "without a year"
-                if one.year is None
-                else "built after the last stage"
-            )
-            city.faults.add(f"building {when}, left out", one.structure.name)
+            kind = f"building {_why_never(one, options)}, left out"
+            city.faults.add(kind, one.structure.name)
     kept = [one for one in found if one in ever]
     if len(kept) >= MAX_STRUCTURES:
         raise InputError(
@@ -110,8 +108,9 @@ def stage_city(
         )
     if not kept:
         raise InputError(f"{source}: nothing stands at any stage")
-    undated = sum(one.year is None for one in found if _has_years(one))
-    return StagedCity(standing, kept, undated)
+    years = [one.year for one in found if _has_years(one)]
+    undated = years.count(None)
+    return StagedCity(standing, kept, undated, len(years) - undated)
 
 
 def _together(city: ForeignCity) -> list[Imported]:
@@ -137,10 +136,23 @@ def _together(city: ForeignCity) -> list[Imported]:
     return kept
 
 
+def _why_never(one: Imported, options: ImportOptions) -> str:
+    """Returns why a building stands at no stage."""
+    first = options.years[0] if options.years else None
+    if one.until is not None and (first is None or one.until <= first):
+        return "demolished before the first stage" if first else "demolished"
+    if one.year is None:
+        return "without a year"
+    if options.years and one.year > options.years[-1]:
+        return "built after the last stage"
+    return "that stood between stages"
+
+
 def _has_years(one: Imported) -> bool:
     """Returns whether a structure may be missing at a stage.
 
     Where no year is given, buildings alone are taken to have one.
     """
     is_building = one.kind.startswith("Building")
-    return not one.is_ground and (one.year is not None or is_building)
+    is_dated = one.year is not None or one.until is not None
+    return not one.is_ground and (is_dated or is_building)

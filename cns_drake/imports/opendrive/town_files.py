@@ -98,6 +98,7 @@ def write_town(
             for stage in stages
         },
         undated=0,
+        dated=0,
         drives=tuple(drive.length for drive in town.drives),
         faults=town.faults.rows(),
     )

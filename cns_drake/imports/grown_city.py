@@ -1,0 +1,158 @@
+"""A first stage of a city without years, in which less is built, by lot."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+import hashlib
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from shapely import STRtree
+
+from cns_drake.city.geometry.structures import MeshShape
+from cns_drake.imports.foreign_city import Imported
+from cns_drake.imports.staged_city import StagedCity
+
+# Buildings so near each other are of one block [m].
+_SAME_BLOCK = 4.0
+# Of the buildings that change, the part that is drawn block by block, and the
+# part that is lower at first, the others are not there.
+_BY_BLOCK = 0.5
+_LOWER = 1.0 / 3.0
+# Only what is so high can have been lower; it has this part of its height [m].
+_LEAST_HEIGHT = 7.0
+_HEIGHTS = (0.4, 0.7)
+
+
+@dataclass(frozen=True)
+class Growth:
+    """What was drawn.
+
+    Attributes:
+        missing: buildings that are not there at the first stage.
+        lower: building -> the part of its height that it has there.
+    """
+
+    missing: tuple[str, ...]
+    lower: dict[str, float]
+
+
+def grow(city: StagedCity, part: float, seed: int) -> tuple[StagedCity, Growth]:
+    """Returns a city with a stage before its only one.
+
+    The lot is drawn by the names of buildings, so that it is the same
+    whatever else a file holds.
+
+    Args:
+        city: of one stage.
+        part: of its buildings that are not there at first, or lower.
+        seed: of the lot.
+    """
+    (last,) = city.standing.values()
+    buildings = [one for one in last if one.kind.startswith("Building")]
+    chosen = _drawn(buildings, round(part * len(buildings)), seed)
+    taken = {one.structure.name for one in city.kept}
+    missing: list[str] = []
+    lower: dict[str, float] = {}
+    variants: dict[Imported, Imported | None] = {}
+    for one in chosen:
+        name = one.structure.name
+        z = one.triangles[:, :, 2]
+        if np.ptp(z) >= _LEAST_HEIGHT and _lot(seed, "lower", name) < _LOWER:
+            low, high = _HEIGHTS
+            share = low + (high - low) * _lot(seed, "height", name)
+            lower[name] = round(share, 2)
+            variants[one] = _lowered(one, lower[name], taken)
+        else:
+            missing.append(name)
+            variants[one] = None
+    first = [new for one in last if (new := variants.get(one, one)) is not None]
+    extra = [new for new in variants.values() if new is not None]
+    grown = replace(
+        city,
+        standing={"01": first, "02": last},
+        kept=[*city.kept, *extra],
+    )
+    return grown, Growth(tuple(sorted(missing)), dict(sorted(lower.items())))
+
+
+def _drawn(
+    buildings: Sequence[Imported], number: int, seed: int
+) -> list[Imported]:
+    """Returns as many buildings, about half of them block by block."""
+    blocks: dict[int, list[Imported]] = {}
+    for block, one in zip(_blocks(buildings), buildings, strict=True):
+        blocks.setdefault(block, []).append(one)
+
+    def lot_of_block(members: list[Imported]) -> float:
+        name = min(one.structure.name for one in members)
+        return _lot(seed, "block", name)
+
+    chosen: list[Imported] = []
+    for members in sorted(blocks.values(), key=lot_of_block):
+        if len(chosen) >= _BY_BLOCK * number:
+            break
+        if 1 < len(members) <= number - len(chosen):
+            chosen += members
+    left = set(buildings) - set(chosen)
+    singles = sorted(
+        left, key=lambda one: _lot(seed, "single", one.structure.name)
+    )
+    return chosen + singles[: number - len(chosen)]
+
+
+def _blocks(buildings: Sequence[Imported]) -> np.ndarray:
+    """Returns the number of the block (N,) of each building."""
+    if not buildings:
+        return np.zeros(0, dtype=int)
+    outlines = [one.structure.model.footprint for one in buildings]
+    near = STRtree(outlines).query(np.array(outlines), "dwithin", _SAME_BLOCK)
+    links = coo_array(
+        (np.ones(near.shape[1]), (near[0], near[1])),
+        (len(outlines), len(outlines)),
+    )
+    _, block = connected_components(links, directed=False)
+    return np.asarray(block)
+
+
+def _lowered(one: Imported, share: float, taken: set[str]) -> Imported:
+    """Returns a building with a part of its height, under a new name."""
+    suffix = "_lower"
+    while f"{one.structure.name}{suffix}" in taken:
+        suffix += "_"
+    bottom = float(one.triangles[:, :, 2].min())
+    scale = np.array([1.0, 1.0, share])
+    move = np.array([0.0, 0.0, (1.0 - share) * bottom])
+    model = one.structure.model
+    meshes = {
+        f"{name}{suffix}": replace(mesh, vertices=mesh.vertices * scale + move)
+        for name, mesh in model.meshes.items()
+    }
+    parts = tuple(
+        replace(
+            part, shape=replace(part.shape, mesh=f"{part.shape.mesh}{suffix}")
+        )
+        if isinstance(part.shape, MeshShape)
+        else part
+        for part in model.parts
+    )
+    structure = replace(
+        one.structure,
+        name=f"{one.structure.name}{suffix}",
+        model=replace(model, parts=parts, meshes=meshes),
+    )
+    return Imported(
+        structure,
+        f"{one.kind}, lower at first",
+        one.year,
+        one.triangles * scale + move,
+    )
+
+
+def _lot(seed: int, purpose: str, name: str) -> float:
+    """Returns a number from 0 to 1 that depends on these alone."""
+    text = f"{seed}/{purpose}/{name}".encode()
+    digest = hashlib.blake2b(text, digest_size=8).digest()
+    return int.from_bytes(digest, "big") / 2.0**64
