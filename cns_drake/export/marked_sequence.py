@@ -14,7 +14,7 @@ from cns_drake.base.map_folder import MapFolder
 from cns_drake.base.recordings.mcap_sequence import McapSequence
 from cns_drake.base.recordings.scenario_file import read_scenario
 from cns_drake.scenarios.shipped import shipped_maps
-from cns_drake.scene.semantics import MOVING_IDS, OTHER_MOVING_ID
+from cns_drake.scene.semantics import moving_id
 from cns_drake.scene.structure_table import load_structure_table
 from cns_drake.scene.world import load_world, structures_in
 
@@ -91,7 +91,7 @@ class MarkedSequence(McapSequence):
     def _absent_by_label(self) -> dict[int, list[int]]:
         groups = defaultdict(list)
         for instance, entry in self._absent.items():
-            label = MOVING_IDS.get(entry.get("class", ""), OTHER_MOVING_ID)
+            label = moving_id(entry.get("class", ""))
             groups[label].append(instance)
         return groups
 

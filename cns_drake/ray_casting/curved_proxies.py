@@ -50,6 +50,14 @@ def circumscribe(surface: CurvedSurface) -> TriangleSurface:
     return tessellate(CylinderSurface(radius, length), _SIDES)
 
 
+def ball_about(p_OSset: np.ndarray) -> tuple[np.ndarray, float] | None:
+    """Returns centre and radius of a ball about (K, 3) places, if any."""
+    if len(p_OSset) == 0:
+        return None
+    center = (p_OSset.min(axis=0) + p_OSset.max(axis=0)) / 2.0
+    return center, float(np.linalg.norm(p_OSset - center, axis=1).max())
+
+
 class NearCurvedShapes:
     """Tells whether rays start near the curved shapes of a group."""
 
@@ -68,22 +76,37 @@ class NearCurvedShapes:
             rows.append([*X_LG.translation(), *axis, half, reach])
         self._group = group
         self._shapes = np.array(rows).reshape(-1, 8)
+        self._is_rigid = np.array_equal(group.X_FL[:3, :3], np.eye(3))
+        # A ball about L's origin with all of them.
+        shapes = self._shapes
+        self._radius = float(
+            np.max(
+                np.linalg.norm(shapes[:, :3], axis=1)
+                + shapes[:, 6]
+                + shapes[:, 7],
+                initial=0.0,
+            )
+        )
 
-    def contain(self, p_OSset: np.ndarray) -> bool:
-        """Tells whether a ball about all origins meets a shape's polyhedron.
+    def contain(self, center: np.ndarray, spread: float) -> bool:
+        """Tells whether a ball meets a shape's polyhedron.
 
         Args:
-            p_OSset: (K, 3) origins of rays.
+            center: (3,) of a ball about all origins of rays, in O.
+            spread: its radius.
         """
-        if len(p_OSset) == 0:
-            return False
-        center = (p_OSset.min(axis=0) + p_OSset.max(axis=0)) / 2.0
-        spread = np.linalg.norm(p_OSset - center, axis=1).max()
-        spread += self._travel()
         X_OL = self._group.X_OL
+        if self._group.motion is None and self._is_rigid:
+            dx, dy, dz = (center - X_OL[:, 3]).tolist()
+            far = self._radius + spread
+            if dx * dx + dy * dy + dz * dz > far * far:
+                return False
+        spread += self._travel()
         R_LO = np.linalg.inv(X_OL[:, :3])
         p_LS = R_LO @ (center - X_OL[:, 3])
-        return _is_near(self._shapes, p_LS, spread * np.linalg.norm(R_LO))
+        return _is_near(
+            self._shapes, p_LS, spread * float(np.linalg.norm(R_LO))
+        )
 
     def _travel(self) -> float:
         """Returns how far a shape goes at most during a turn."""

@@ -14,7 +14,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from cns_drake.ray_casting.curved_proxies import NearCurvedShapes
+from cns_drake.ray_casting.curved_proxies import NearCurvedShapes, ball_about
 from cns_drake.ray_casting.embree_hierarchy import EmbreeHierarchy
 from cns_drake.ray_casting.embree_primitives import (
     PROXY_OWNER,
@@ -70,7 +70,8 @@ class EmbreeScene:
         if not self._near:
             return hits
         again = np.flatnonzero(hits.owner == PROXY_OWNER)
-        if any(shapes.contain(rays.p_OSset) for shapes in self._near):
+        ball = ball_about(rays.p_OSset)
+        if ball and any(shapes.contain(*ball) for shapes in self._near):
             again = np.arange(len(rays.d_Sset))
         if len(again):
             rest = rays.select(again, rays.max_ranges_of(again))

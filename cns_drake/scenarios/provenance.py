@@ -85,7 +85,7 @@ def digest_inputs(scenario: Scenario) -> dict[str, str]:
         inputs["suspension"] = suspension_file()
     if scenario.waypoints is not None:
         inputs["waypoints"] = Path(scenario.waypoints)
-    else:
+    if scenario.waypoints is None or not scenario.traffic.is_off:
         inputs["roads"] = map_folder(scenario).roads
     digests = {name: digest_file(path) for name, path in inputs.items()}
     kalibr = describe_kalibr(scenario)

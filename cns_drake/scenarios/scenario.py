@@ -26,6 +26,7 @@ from cns_drake.scenarios.odometry_config import OdometryConfig
 from cns_drake.scenarios.rates import check_rate, fastest_rate
 from cns_drake.scenarios.ride_config import RideConfig
 from cns_drake.scenarios.section import Name, Section, field_off_by_default
+from cns_drake.scenarios.traffic_config import TrafficConfig
 from cns_drake.scenarios.weather_config import WeatherConfig
 from cns_drake.sensors.returns.echo_choice import Echoes
 
@@ -56,6 +57,7 @@ class Scenario(Section):
         u_turns: whether the vehicle turns round where waypoints double back.
         speeds: how fast.
         ride: how springs and the road move the body.
+        traffic: who else moves.
         lidars: the LiDARs by name; the name gives frame and topic.
         imu: the IMU.
         weather: fog, rain and snowfall, for LiDARs with calibrated returns.
@@ -104,6 +106,7 @@ class Scenario(Section):
     ] = False
     speeds: Speeds
     ride: RideConfig = field_off_by_default(RideConfig())
+    traffic: TrafficConfig = field_off_by_default(TrafficConfig())
     lidars: dict[Name, LidarConfig] = Field(
         default={"lidar": LidarConfig()}, min_length=1
     )

@@ -8,9 +8,12 @@ CLASS_IDS = {
     "car": 10,
     "bicycle": 11,
     "bus": 13,
+    "motorcycle": 15,
     "truck": 18,
     "other-vehicle": 20,
     "person": 30,
+    "bicyclist": 31,
+    "motorcyclist": 32,
     "road": 40,
     "parking": 44,
     "sidewalk": 48,
@@ -30,11 +33,19 @@ CLASS_IDS = {
 # kind of goes with its "moving-other-vehicle".
 MOVING_IDS = {
     "car": 252,
+    "bicyclist": 253,
     "person": 254,
+    "motorcyclist": 255,
     "bus": 257,
     "truck": 258,
 }
 OTHER_MOVING_ID = 259
+
+
+def moving_id(semantic_class: str) -> int:
+    """Returns SemanticKITTI's id of a class that moves."""
+    return MOVING_IDS.get(semantic_class, OTHER_MOVING_ID)
+
 
 # Colours by class for pictures and the 3-D page, chosen to differ in
 # lightness as well as in hue.
@@ -44,9 +55,12 @@ CLASS_RGB = {
     "car": (0.30, 0.45, 0.75),
     "bicycle": (0.35, 0.60, 0.80),
     "bus": (0.30, 0.45, 0.75),
+    "motorcycle": (0.45, 0.40, 0.70),
     "truck": (0.30, 0.45, 0.75),
     "other-vehicle": (0.30, 0.45, 0.75),
     "person": (0.85, 0.35, 0.25),
+    "bicyclist": (0.75, 0.30, 0.45),
+    "motorcyclist": (0.65, 0.25, 0.55),
     "road": (0.33, 0.33, 0.36),
     "parking": (0.42, 0.40, 0.44),
     "sidewalk": (0.68, 0.66, 0.63),

@@ -11,7 +11,7 @@ from cns_drake.base.csv_files import read_records
 from cns_drake.base.errors import InputError
 from cns_drake.scene.semantics import CLASS_IDS
 
-_MAX_INSTANCE = 2**16 - 1
+MAX_INSTANCE = 2**16 - 1
 
 
 @dataclass(frozen=True)
@@ -55,17 +55,26 @@ class StructureTable:
     def __getitem__(self, name: str) -> StructureEntry:
         return self._by_name[name]
 
+    @property
+    def last_instance(self) -> int:
+        """The highest id in use, 0 for none."""
+        return max((entry.instance for entry in self), default=0)
+
+    def joined(self, other: StructureTable) -> StructureTable:
+        """Returns the table with the entries of another besides."""
+        return StructureTable([*self, *other])
+
     def completed(self, names: Iterable[str]) -> StructureTable:
         """Returns the table with an entry for each of the names."""
         entries = list(self)
-        free = max((entry.instance for entry in entries), default=0) + 1
+        free = self.last_instance + 1
         for name in sorted(set(names) - self._by_name.keys()):
             entries.append(StructureEntry(free, name, "unlabeled"))
             free += 1
-        if free - 1 > _MAX_INSTANCE:
+        if free - 1 > MAX_INSTANCE:
             raise InputError(
                 f"the world has {free - 1} structures, but an instance id "
-                f"has room for {_MAX_INSTANCE}"
+                f"has room for {MAX_INSTANCE}"
             )
         return StructureTable(entries)
 
@@ -89,10 +98,10 @@ def load_structure_table(path: Path) -> StructureTable:
             raise InputError(
                 f"{where}: instance: {row['instance']!r} is not a number"
             ) from None
-        if not 1 <= instance <= _MAX_INSTANCE or instance in instances:
+        if not 1 <= instance <= MAX_INSTANCE or instance in instances:
             raise InputError(
                 f"{where}: instance: {instance} is not a new number from "
-                f"1 to {_MAX_INSTANCE}"
+                f"1 to {MAX_INSTANCE}"
             )
         if semantic_class not in CLASS_IDS:
             raise InputError(

@@ -18,7 +18,7 @@ POINT_DTYPE = np.dtype(
         ("intensity", "<f4"),
         ("ring", "<u2"),
         ("t", "<u4"),
-        ("label", "u1"),
+        ("label", "<u2"),
         ("instance", "<u2"),
     ],
     align=True,

@@ -36,6 +36,7 @@ class Lidar(LeafSystem):
         - geometry_revision (optional)
         - sweep (if it is declared)
         - body_spatial_velocities (if it is declared)
+        - moving_instances (optional)
         output_ports:
         - scan
         - point_cloud_S
@@ -64,6 +65,9 @@ class Lidar(LeafSystem):
     other bodies of that plant keep their velocities for the turn: each beam
     is cast at its own firing time, from where S is then, on what is where
     then. Points are expressed in S at that time, too.
+
+    `moving_instances` (abstract, the instance ids of structures) says what
+    moves: its points have the label of the moving class.
 
     Drake cannot cast rays, so the system reads shapes and poses from the
     QueryObject and casts on a hierarchy of its own, in which what changed is
@@ -138,6 +142,9 @@ class Lidar(LeafSystem):
         )
         self._revision = self.DeclareAbstractInputPort(
             "geometry_revision", Value(object())
+        )
+        self._moving = self.DeclareAbstractInputPort(
+            "moving_instances", Value(np.zeros(0, np.uint16))
         )
         self._sweep = None
         if with_sweep:
@@ -264,7 +271,7 @@ class Lidar(LeafSystem):
             ranges,
             intensity,
             met,
-            seen.label,
+            self._labels(context, seen),
             seen.instance,
             np.float32(self._measurement.resolution),
         )
@@ -308,6 +315,13 @@ class Lidar(LeafSystem):
         )
         return hits.geometry[turn.table.place[returns.beams]], returns
 
+    def _labels(self, context: Context, seen: SeenGeometry) -> np.ndarray:
+        """Returns the class of each geometry, as what moves has it."""
+        if not self._moving.HasValue(context):
+            return seen.label
+        moves = np.isin(seen.instance, self._moving.Eval(context))
+        return np.where(moves, seen.moving_label, seen.label)
+
     def _frame(self, context: Context) -> int:
         return round(context.get_time() / self._pattern.period)
 
@@ -330,6 +344,7 @@ class Lidar(LeafSystem):
         prerequisites = {
             self._geometry_query.ticket(),
             self._revision.ticket(),
+            self._moving.ticket(),
             *self._pose_prerequisites(),
         }
         if (

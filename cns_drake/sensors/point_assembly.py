@@ -54,7 +54,7 @@ def assemble_points(
         intensity: (N,) float32.
         met: (N,) int32 what sent each return, negative for the weather, or
             an index into
-        label: uint8 classes, and
+        label: uint16 classes, and
         instance: uint16 structures.
         step: coordinates are rounded to multiples of it [m]; not
             rounded if 0.

@@ -23,6 +23,7 @@ from cns_drake.scene.perception_geometry import (
     GeometryReader,
     PerceptionGeometry,
 )
+from cns_drake.scene.semantics import moving_id
 from cns_drake.scene.structure_table import StructureTable
 from cns_drake.sensors.returns.materials import Materials, find_materials
 
@@ -58,7 +59,8 @@ class SeenGeometry:
     Attributes:
         scene: casts rays, None before the first update; its geometry indices
             select from:
-        label: (num_geometries,) uint8 class of each geometry.
+        label: (num_geometries,) uint16 class of each geometry.
+        moving_label: (num_geometries,) uint16 its class while it moves.
         instance: (num_geometries,) uint16 structure of each geometry.
     """
 
@@ -145,7 +147,10 @@ class SeenGeometry:
         names = [geometry.structure for geometry in self._geometries]
         table = self._sight.structures.completed(names)
         self._table, self._materials = table, None
-        self.label = np.array([table[n].label for n in names], np.uint8)
+        self.label = np.array([table[n].label for n in names], np.uint16)
+        self.moving_label = np.array(
+            [moving_id(table[n].semantic_class) for n in names], np.uint16
+        )
         self.instance = np.array([table[n].instance for n in names], np.uint16)
         world = query_object.inspector().world_frame_id()
         anchored = self._sight.anchored_frames | {world}

@@ -17,6 +17,8 @@ from cns_drake.scenarios.weather_config import WeatherConfig
 from cns_drake.scene.world import World
 from cns_drake.sensors.lidar import Lidar
 from cns_drake.sensors.lidar_adding import add_lidar
+from cns_drake.traffic.traffic_adding import connect_traffic
+from cns_drake.traffic.traffic_motion import TrafficMotion
 
 CLEAR = WeatherConfig()
 
@@ -29,6 +31,7 @@ def apply_lidar_config(
     *,
     name: str,
     weather: WeatherConfig = CLEAR,
+    traffic: TrafficMotion | None = None,
     seed: int = 0,
     num_threads: int = 1,
 ) -> Lidar:
@@ -43,11 +46,17 @@ def apply_lidar_config(
         trajectory: of the vehicle.
         name: of the LiDAR.
         weather: in which it measures.
+        traffic: what else moves there.
         seed: of its noise.
         num_threads: how many threads cast its rays.
     """
     plant = world.plant
     pattern = make_pattern(config)
+    distorts = config.motion_distortion
+    moving = None
+    if traffic is not None and distorts:
+        # They go on moving while it turns.
+        moving = traffic.moving_frames
     lidar = add_lidar(
         builder,
         world.scene_graph,
@@ -58,12 +67,15 @@ def apply_lidar_config(
         measurement=make_measurement(config, name, seed),
         returns=make_returns(config, weather, name, seed) or "ideal",
         unseen=[plant.get_body(k) for k in plant.GetBodyIndices(world.vehicle)],
-        with_sweep=config.motion_distortion,
+        with_sweep=distorts,
+        moving_bodies=moving,
         structures=world.structures,
         anchored_frames=world.anchored_frames(),
         num_threads=num_threads,
     )
-    if config.motion_distortion:
+    if traffic is not None:
+        connect_traffic(builder, traffic, lidar, distorts)
+    if distorts:
         sweep = builder.AddNamedSystem(
             f"{name}_sweep",
             VehicleSweep(trajectory, pattern.column_t_ns * 1e-9),

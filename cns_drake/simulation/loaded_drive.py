@@ -22,7 +22,12 @@ from cns_drake.scenarios.scenario_files import (
 )
 from cns_drake.scenarios.sensor_making import sensor_pose
 from cns_drake.scene.world import World
+from cns_drake.simulation.scenario_traffic import (
+    plan_scenario_traffic,
+    with_traffic,
+)
 from cns_drake.simulation.station import load_stage
+from cns_drake.traffic.traffic_plan import TrafficPlan
 
 
 @dataclass(frozen=True)
@@ -36,6 +41,7 @@ class LoadedDrive:
         trajectory: of the vehicle.
         world: the stage.
         num_frames: how many it takes.
+        traffic: what else moves, if anything does.
     """
 
     scenario: Scenario
@@ -44,6 +50,7 @@ class LoadedDrive:
     trajectory: Trajectory
     world: World
     num_frames: int
+    traffic: TrafficPlan | None = None
 
     @property
     def X_BSs(self) -> dict[str, RigidTransform]:
@@ -65,6 +72,10 @@ def load_drive(scenario: Scenario) -> LoadedDrive:
     num_frames = count_frames(scenario, trajectory)
     scenario = scenario.model_copy(update={"frames": num_frames})
     world = load_stage(scenario)
+    traffic = None
+    if not scenario.traffic.is_off:
+        traffic = plan_scenario_traffic(scenario, trajectory)
+        world = with_traffic(world, traffic)
     if digest_inputs(scenario) != inputs:
         raise InputError(
             f"{world_file(scenario)}: changed while it was being read"
@@ -78,5 +89,11 @@ def load_drive(scenario: Scenario) -> LoadedDrive:
         for update in ({}, {"frames": None})[: 1 + whole]
     ]
     return LoadedDrive(
-        scenario, inputs, "\n".join(lines), trajectory, world, num_frames
+        scenario,
+        inputs,
+        "\n".join(lines),
+        trajectory,
+        world,
+        num_frames,
+        traffic,
     )

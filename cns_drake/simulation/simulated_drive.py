@@ -27,7 +27,12 @@ from cns_drake.scenarios.sensor_making import (
 from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar import Lidar
 from cns_drake.simulation.planned_sequence import PlannedSequence
+from cns_drake.simulation.scenario_traffic import (
+    plan_scenario_traffic,
+    with_traffic,
+)
 from cns_drake.simulation.still_world import make_still_world
+from cns_drake.traffic.traffic_adding import make_traffic
 
 
 @dataclass(frozen=True)
@@ -77,23 +82,39 @@ class SimulatedSequence(PlannedSequence):
         self._is_random = measurement.is_random
         # No LiDAR sees the vehicle that carries it.
         world = load_world(world_file(scenario), without=scenario.without)
+        traffic = None
+        if not scenario.traffic.is_off:
+            plan = plan_scenario_traffic(scenario, self._trajectory)
+            world = with_traffic(world, plan)
+            traffic = make_traffic(
+                world.scene_graph,
+                plan,
+                seed=scenario.traffic.seed,
+                structures=world.structures,
+                turn=FRAME_PERIOD,
+            )
+        self._has_traffic = traffic is not None
+        distorts = self._column_t is not None
         self._lidar = Lidar(
             world.scene_graph.world_frame_id(),
             RigidTransform(),
             pattern,
             measurement=measurement,
             with_sweep=True,
+            moving_bodies=(
+                traffic.moving_frames if traffic and distorts else None
+            ),
             structures=world.structures,
             anchored_frames=world.anchored_frames(),
         )
-        self._diagram = make_still_world(world, self._lidar)
+        self._diagram = make_still_world(world, self._lidar, traffic)
         self._context = self._diagram.CreateDefaultContext()
 
     def scan(self, index: int) -> np.ndarray:
         context = self._lidar.GetMyMutableContextFromRoot(self._context)
-        if self._is_random:
-            # Only noise depends on the time as such; at a new one, the
-            # SceneGraph computes everything anew.
+        if self._is_random or self._has_traffic:
+            # Only noise and traffic depend on the time as such; at a new one,
+            # the SceneGraph computes everything anew.
             self._context.SetTime(index * self.period)
         self._lidar.GetInputPort("sweep").FixValue(context, self._sweep(index))
         return self._lidar.GetOutputPort("scan").Eval(context)

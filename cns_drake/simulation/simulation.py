@@ -92,6 +92,8 @@ def simulate(
     with interrupts_wait() as strike:
         # What can be found wrong at once is found before anything slow.
         _check_output(folder, (page_file, graphviz_file), overwrite)
+        if not scenario.traffic.is_off:
+            on_note(f"{scenario.name}: planning the traffic")
         drive = load_drive(scenario)
         for text in drive.world.notes:
             on_note(text)
@@ -111,6 +113,7 @@ def simulate(
                 drive.scenario,
                 world=drive.world,
                 trajectory=drive.trajectory,
+                traffic=drive.traffic,
                 bag=writer,
                 page=page,
                 num_threads=num_threads,

@@ -28,6 +28,12 @@ from cns_drake.scene.world import World, load_world
 from cns_drake.sensors.odometry import add_odometry
 from cns_drake.simulation.imu_applying import apply_imu_config
 from cns_drake.simulation.lidar_applying import apply_lidar_config
+from cns_drake.simulation.scenario_traffic import (
+    plan_scenario_traffic,
+    with_traffic,
+)
+from cns_drake.traffic.traffic_adding import add_traffic
+from cns_drake.traffic.traffic_plan import TrafficPlan
 
 
 def make_station(
@@ -35,6 +41,7 @@ def make_station(
     *,
     world: World | None = None,
     trajectory: Trajectory | None = None,
+    traffic: TrafficPlan | None = None,
     bag: BagWriter | BackgroundWriter | None = None,
     page: MeshcatRecorder | None = None,
     num_threads: int = 1,
@@ -43,11 +50,11 @@ def make_station(
 
     Systems: `scene_graph` holds the stage and the vehicle, `vehicle_motion`
     prescribes where the vehicle is, `geometry_pose` passes that on to the
-    SceneGraph; a `Lidar` for each entry of `scenario.lidars` under its name
-    (with a `<lidar>_sweep` if it moves while it turns), an accelerometer and
-    a gyroscope (or `imu` and `imu_noise`, if the IMU has a rate or errors of
-    its own), and `odometry` measure; `mcap_recorder` and
-    `meshcat_recorder` take down what they measure.
+    SceneGraph; `traffic` moves all else; a `Lidar` for each entry of
+    `scenario.lidars` under its name (with a `<lidar>_sweep` if it moves while
+    it turns), an accelerometer and a gyroscope (or `imu` and `imu_noise`, if
+    the IMU has a rate or errors of its own), and `odometry` measure;
+    `mcap_recorder` and `meshcat_recorder` take down what they measure.
 
     Exported output ports: `<lidar>_scan`, `specific_force`,
     `angular_velocity`, `odometry`, `geometry_query`; and `R_WI` of such an
@@ -58,6 +65,8 @@ def make_station(
         world: the stage with the vehicle, if already loaded; its SceneGraph
             passes to the Diagram.
         trajectory: the drive, if already planned.
+        traffic: of the scenario, if already planned; the world's structures
+            then have it, too (see `with_traffic`).
         bag: an open recording of the scenario's topics.
         page: a recorder of the same world for a web page.
         num_threads: how many threads cast the rays of a LiDAR.
@@ -74,6 +83,9 @@ def make_station(
     """
     world = world or load_stage(scenario)
     trajectory = trajectory or plan_drive(scenario)
+    if traffic is None and not scenario.traffic.is_off:
+        traffic = plan_scenario_traffic(scenario, trajectory)
+        world = with_traffic(world, traffic)
     X_BSs = {name: sensor_pose(one) for name, one in scenario.lidars.items()}
     X_BI = sensor_pose(scenario.imu)
     plant = world.plant
@@ -93,6 +105,16 @@ def make_station(
         scene_graph.get_source_pose_port(plant.get_source_id()),
     )
 
+    moving = None
+    if traffic is not None:
+        moving = add_traffic(
+            builder,
+            scene_graph,
+            traffic,
+            seed=scenario.traffic.seed,
+            structures=world.structures,
+            turn=FRAME_PERIOD,
+        )
     # What is measured, by name: also the names of the exported ports.
     measured = {"geometry_query": scene_graph.get_query_output_port()}
     for name, config in scenario.lidars.items():
@@ -103,6 +125,7 @@ def make_station(
             trajectory,
             name=name,
             weather=scenario.weather,
+            traffic=moving,
             seed=scenario.seed,
             num_threads=num_threads,
         )

@@ -1,4 +1,4 @@
-"""A LiDAR in a world in which nothing moves but the LiDAR."""
+"""A LiDAR in a world in which nothing moves but the LiDAR and traffic."""
 
 from __future__ import annotations
 
@@ -9,9 +9,15 @@ from pydrake.systems.rendering import MultibodyPositionToGeometryPose
 from cns_drake.scene.world import World
 from cns_drake.sensors.lidar import Lidar
 from cns_drake.sensors.lidar_adding import connect_lidar
+from cns_drake.traffic.traffic_adding import connect_traffic, place_traffic
+from cns_drake.traffic.traffic_motion import TrafficMotion
 
 
-def make_still_world(world: World, lidar: Lidar) -> Diagram:
+def make_still_world(
+    world: World,
+    lidar: Lidar,
+    traffic: TrafficMotion | None = None,
+) -> Diagram:
     """Makes the Diagram of a world whose models stay as they start.
 
     What does not move need not be computed anew for every scan: for the
@@ -20,6 +26,7 @@ def make_still_world(world: World, lidar: Lidar) -> Diagram:
     Args:
         world: the stage; its SceneGraph passes to the Diagram.
         lidar: in it; what is not connected of it can be fixed.
+        traffic: what moves nevertheless, with its geometry in the world.
     """
     plant = world.plant
     builder = DiagramBuilder()
@@ -36,4 +43,8 @@ def make_still_world(world: World, lidar: Lidar) -> Diagram:
         scene_graph.get_source_pose_port(plant.get_source_id()),
     )
     connect_lidar(builder, scene_graph, lidar)
+    if traffic is not None:
+        place_traffic(builder, scene_graph, traffic)
+        goes_on = lidar.HasInputPort("body_spatial_velocities")
+        connect_traffic(builder, traffic, lidar, goes_on)
     return builder.Build()

@@ -14,7 +14,7 @@ from cns_drake.city.geometry.object_parts import Builder, assemble, triple
 from cns_drake.city.geometry.structures import MeshShape, Model, Part
 
 # Paint colours, roughly as often as they are seen on the road.
-_PAINTS = (
+PAINTS = (
     (0.85, 0.85, 0.84),
     (0.85, 0.85, 0.84),
     (0.12, 0.12, 0.13),
@@ -27,8 +27,8 @@ _PAINTS = (
     (0.2, 0.32, 0.26),
     (0.58, 0.52, 0.42),
 )
-_TRIM = (0.13, 0.15, 0.17)
-_WHITE = (0.85, 0.85, 0.84)
+TRIM = (0.13, 0.15, 0.17)
+WHITE = (0.85, 0.85, 0.84)
 
 # Body type -> semantic class.
 FORMS = {
@@ -53,10 +53,10 @@ def car(rng: np.random.Generator, *, form: str) -> Model:
     """
     size = rng.uniform(0.97, 1.03, 3)
     scale = triple(round(float(s), 3) for s in size)
-    paint = _PAINTS[int(rng.integers(len(_PAINTS)))]
-    colours = {"body": paint, "trim": _TRIM}
+    paint = PAINTS[int(rng.integers(len(PAINTS)))]
+    colours = {"body": paint, "trim": TRIM}
     if form == "box_truck":
-        colours["box"] = _WHITE
+        colours["box"] = WHITE
     parts = [
         Part(name, MeshShape(f"{form}_{name}", scale), rgb=rgb)
         for name, rgb in colours.items()

@@ -8,6 +8,7 @@ import pytest
 
 from cns_drake.ray_casting.curved_proxies import (
     NearCurvedShapes,
+    ball_about,
     circumscribe,
 )
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
@@ -67,12 +68,12 @@ def test_nearness_covers_the_polyhedron(surface):
     group.place(np.zeros(3), lambda frame: RigidTransform())
     near = NearCurvedShapes(group)
     for p_G in hull.p_GVset[:: max(1, len(hull.p_GVset) // 50)]:
-        assert near.contain((X_WG @ p_G)[None])
+        assert near.contain(*ball_about((X_WG @ p_G)[None]))
     # And a ball about several origins that only together reach it.
     far = X_WG @ np.array([0.0, 0.0, 30.0])
-    assert not near.contain(far[None])
+    assert not near.contain(*ball_about(far[None]))
     other_side = X_WG @ np.array([0.0, 0.0, -30.0])
-    assert near.contain(np.stack([far, other_side]))
+    assert near.contain(*ball_about(np.stack([far, other_side])))
 
 
 @pytest.mark.parametrize(("excess", "expected"), [(-1e-6, True), (1e-6, False)])
@@ -84,7 +85,9 @@ def test_nearness_ends_at_a_tenth_of_the_radius(excess, expected):
     distance = 1.1 * 0.8 + 2e-3 + excess
     for p_G in ([distance, 0.0, 0.7], [0.0, 0.0, -1.0 - distance]):
         p_O = X_WG @ np.array(p_G) - [5.0, 1.0, 0.0]
-        assert NearCurvedShapes(group).contain(p_O[None]) == expected
+        assert (
+            NearCurvedShapes(group).contain(*ball_about(p_O[None])) == expected
+        )
 
 
 def geometry(surface, X_FG):

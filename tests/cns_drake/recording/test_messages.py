@@ -64,7 +64,7 @@ def test_point_cloud_holds_the_records_under_their_names_and_offsets():
         ("intensity", 12, 7, 1),
         ("ring", 16, 4, 1),
         ("t", 20, 6, 1),
-        ("label", 24, 2, 1),
+        ("label", 24, 4, 1),
         ("instance", 26, 4, 1),
     ]
     np.testing.assert_array_equal(cloud.data.view(POINT_DTYPE), points)

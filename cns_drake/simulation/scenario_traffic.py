@@ -1,0 +1,96 @@
+"""The traffic that a scenario asks for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import os
+
+import numpy as np
+
+from cns_drake.base.errors import InputError
+from cns_drake.motion.trajectory import Trajectory
+from cns_drake.recording.frame_clock import FRAME_PERIOD
+from cns_drake.roads.network import load_road_network
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import map_folder
+from cns_drake.scene.world import World
+from cns_drake.traffic.presence import EgoBox
+from cns_drake.traffic.road_lanes import make_lane_graph
+from cns_drake.traffic.starting_places import room_for_vehicles
+from cns_drake.traffic.traffic_adding import traffic_structures
+from cns_drake.traffic.traffic_plan import TrafficPlan, plan_traffic
+from cns_drake.traffic.walkways import make_walkways
+
+# Of the car in worlds/vehicle.sdf, mirrors and wheels included [m].
+EGO_BOX = EgoBox(rear=-1.05, front=3.75, half_width=1.05)
+
+
+def plan_scenario_traffic(
+    scenario: Scenario, trajectory: Trajectory
+) -> TrafficPlan:
+    """Plans the traffic of a scenario.
+
+    Args:
+        scenario: with traffic.
+        trajectory: of its vehicle.
+
+    Raises:
+        InputError: the map has no roads or sidewalks, or they do not hold so
+            many.
+    """
+    wanted = scenario.traffic
+    where = f"{scenario.source}: traffic"
+    if scenario.world is not None:
+        raise InputError(f"{where}: a world has no roads; give a map with some")
+    roads = map_folder(scenario).roads
+    if not os.path.isfile(roads):
+        raise InputError(
+            f"{where}: the map has no roads: {roads}: no such file"
+        )
+    network = load_road_network(roads)
+    graph = make_lane_graph(network)
+    room = room_for_vehicles(graph)
+    if wanted.vehicles > room:
+        raise InputError(
+            f"{where}: vehicles: {wanted.vehicles} asked for, the roads hold "
+            f"{room}"
+        )
+    walkways = make_walkways(network, graph)
+    if wanted.walkers and not walkways:
+        raise InputError(f"{where}: walkers: the map has no sidewalks")
+
+    def ego(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        R_WB, p_WB = trajectory.poses(np.minimum(t, trajectory.duration))
+        return p_WB[:, :2], np.unwrap(np.arctan2(R_WB[:, 1, 0], R_WB[:, 0, 0]))
+
+    plan = plan_traffic(
+        graph,
+        walkways,
+        vehicles=wanted.vehicles,
+        walkers=wanted.walkers,
+        seed=wanted.seed,
+        # Of the whole drive, of which the frames are a part.
+        duration=trajectory.duration + FRAME_PERIOD,
+        ego=ego,
+        ego_box=EGO_BOX,
+    )
+    if wanted.vehicles and not plan.kinds:
+        raise InputError(f"{where}: the car leaves no room for vehicles")
+    return plan
+
+
+def with_traffic(world: World, plan: TrafficPlan) -> World:
+    """Returns a world whose table and notes tell of traffic, too.
+
+    Raises:
+        InputError: there are more structures than ids.
+    """
+    table = world.structures
+    entries = traffic_structures(plan, table.last_instance + 1)
+    notes = world.notes
+    if plan.left_out:
+        notes += (
+            f"traffic: {plan.left_out} fewer than asked for: they had no way "
+            "past the others",
+        )
+    return replace(world, structures=table.joined(entries), notes=notes)

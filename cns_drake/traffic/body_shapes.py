@@ -1,0 +1,233 @@
+"""What vehicles and walkers look like: bodies of simple shapes and meshes."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cns_drake.city.furniture.parked_cars import PAINTS, TRIM, WHITE
+from cns_drake.traffic.vehicle_kinds import VehicleKind
+
+Rgb = tuple[float, float, float]
+_CLOTHES: tuple[Rgb, ...] = (
+    (0.16, 0.18, 0.25),
+    (0.35, 0.1, 0.12),
+    (0.2, 0.3, 0.24),
+    (0.5, 0.45, 0.36),
+    (0.65, 0.66, 0.68),
+    (0.1, 0.1, 0.11),
+)
+_SKIN: tuple[Rgb, ...] = ((0.85, 0.68, 0.57), (0.55, 0.38, 0.28))
+_METAL: Rgb = (0.3, 0.31, 0.33)
+
+
+class BodyShape(NamedTuple):
+    """One shape of a body, in the frame of its limb.
+
+    Attributes:
+        name: of the shape.
+        kind: "mesh", "box", "capsule" or "cylinder".
+        size: of a box; of capsules and cylinders radius and length of their
+            straight part; of meshes nothing [m].
+        mesh: name of one of the city's meshes.
+        start, end: ends of the axis of a capsule or cylinder, the middle of
+            all else is at the first [m].
+        rgb: its colour.
+    """
+
+    name: str
+    kind: str
+    size: tuple[float, ...]
+    mesh: str
+    start: tuple[float, float, float]
+    end: tuple[float, float, float]
+    rgb: Rgb
+
+
+class Limb(NamedTuple):
+    """A part of a body that moves as one: it swings about its y axis.
+
+    Attributes:
+        name: of the limb.
+        joint: its origin in the body's frame [m].
+        swing: how far it swings at a walk, negative where it begins
+            backwards [rad].
+        shapes: what it looks like.
+    """
+
+    name: str
+    joint: tuple[float, float, float]
+    swing: float
+    shapes: tuple[BodyShape, ...]
+
+
+def _mesh(name: str, mesh: str, rgb: Rgb) -> BodyShape:
+    return BodyShape(name, "mesh", (), mesh, (0, 0, 0), (0, 0, 0), rgb)
+
+
+def _box(
+    name: str,
+    size: tuple[float, float, float],
+    middle: tuple[float, float, float],
+    rgb: Rgb,
+) -> BodyShape:
+    return BodyShape(name, "box", size, "", middle, middle, rgb)
+
+
+def _round(
+    kind: str,
+    name: str,
+    radius: float,
+    start: tuple[float, float, float],
+    end: tuple[float, float, float],
+    rgb: Rgb,
+) -> BodyShape:
+    length = float(np.linalg.norm(np.subtract(end, start)))
+    return BodyShape(name, kind, (radius, length), "", start, end, rgb)
+
+
+def vehicle_limbs(
+    kind: VehicleKind, rng: np.random.Generator
+) -> tuple[Limb, ...]:
+    """Returns the one limb of a vehicle; its frame is on the ground below
+    the middle of its box.
+
+    Args:
+        kind: of the vehicle.
+        rng: draws the colours.
+    """
+    paint = PAINTS[int(rng.integers(len(PAINTS)))]
+    if kind.name in ("bicycle", "motorcycle"):
+        shapes = _two_wheeler(kind.name, paint, rng)
+    else:
+        name = kind.name
+        found = [
+            _mesh("body", f"{name}_body", paint),
+            _mesh("trim", f"{name}_trim", TRIM),
+        ]
+        if name == "box_truck":
+            found.append(_mesh("box", f"{name}_box", WHITE))
+        shapes = tuple(found)
+    return (Limb("body", (0.0, 0.0, 0.0), 0.0, shapes),)
+
+
+def _two_wheeler(
+    name: str, paint: Rgb, rng: np.random.Generator
+) -> tuple[BodyShape, ...]:
+    """Returns a bicycle or a motorcycle with its rider."""
+    coat = _CLOTHES[int(rng.integers(len(_CLOTHES)))]
+    heavy = name == "motorcycle"
+    radius, width = (0.31, 0.13) if heavy else (0.34, 0.04)
+    axle = 0.72 if heavy else 0.52
+    seat = 0.82 if heavy else 0.95
+    shapes = [
+        _round(
+            "cylinder",
+            f"wheel_{k}",
+            radius,
+            (x, -width / 2, radius),
+            (x, width / 2, radius),
+            TRIM,
+        )
+        for k, x in enumerate((-axle, axle))
+    ]
+    if heavy:
+        shapes += [
+            _box("engine", (0.6, 0.32, 0.4), (0.0, 0.0, 0.45), _METAL),
+            _box("tank", (0.55, 0.3, 0.22), (0.2, 0.0, 0.76), paint),
+            _box("seat", (0.7, 0.26, 0.12), (-0.38, 0.0, 0.74), TRIM),
+        ]
+    else:
+        bars = (
+            ((-axle, 0, radius), (-0.2, 0, 0.9)),
+            ((-0.2, 0, 0.85), (0.4, 0, 0.85)),
+            ((0.4, 0, 0.95), (axle, 0, radius)),
+            ((-0.12, 0, 0.3), (0.4, 0, 0.82)),
+        )
+        shapes += [
+            _round("capsule", f"frame_{k}", 0.02, start, end, paint)
+            for k, (start, end) in enumerate(bars)
+        ]
+    hip, shoulder = (-0.25, 0.0, seat + 0.08), (0.0, 0.0, seat + 0.5)
+    skin = _SKIN[int(rng.integers(len(_SKIN)))]
+    head = (0.06, 0.0, seat + 0.75)
+    shapes += [
+        _round("capsule", "torso", 0.15, hip, shoulder, coat),
+        _round(
+            "capsule", "head", 0.1, head, (0.06, 0, seat + 0.8),
+            TRIM if heavy else skin,
+        ),
+    ]  # fmt: skip
+    for side, y in (("left", 0.17), ("right", -0.17)):
+        knee, foot = (0.15, y, seat - 0.12), (0.0, y, 0.4)
+        hip_joint = (-0.2, y, seat)
+        shapes += [
+            _round("capsule", f"{side}_thigh", 0.07, hip_joint, knee, TRIM),
+            _round("capsule", f"{side}_shank", 0.055, knee, foot, TRIM),
+            _round(
+                "capsule", f"{side}_arm", 0.045, (0.0, y, seat + 0.45),
+                (0.42, 1.4 * y, seat + 0.1), coat,
+            ),
+        ]  # fmt: skip
+    return tuple(shapes)
+
+
+def walker_limbs(rng: np.random.Generator) -> tuple[Limb, ...]:
+    """Returns the five limbs of a walker, of ten capsules together.
+
+    The body's frame is on the ground, x where the walker looks. An arm
+    swings with the leg of the other side.
+
+    Args:
+        rng: draws size and colours.
+    """
+    h = float(rng.uniform(0.92, 1.06))
+    coat, trousers = (
+        _CLOTHES[int(k)] for k in rng.integers(len(_CLOTHES), size=2)
+    )
+    skin = _SKIN[int(rng.integers(len(_SKIN)))]
+    trunk = (
+        _round(
+            "capsule", "torso", 0.16 * h, (0, 0, 1.0 * h), (0, 0, 1.27 * h),
+            coat,
+        ),
+        _round(
+            "capsule", "head", 0.095 * h, (0.01, 0, 1.53 * h),
+            (0.01, 0, 1.58 * h), skin,
+        ),
+    )  # fmt: skip
+    limbs = [Limb("trunk", (0.0, 0.0, 0.0), 0.0, trunk)]
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        knee, ankle = (0.03, 0.0, -0.42 * h), (0.0, 0.0, -0.82 * h)
+        limbs.append(
+            Limb(
+                f"{side}_leg",
+                (0.0, 0.09 * sign, 0.9 * h),
+                0.36 * sign,
+                (
+                    _round(
+                        "capsule", "thigh", 0.075 * h, (0, 0, 0), knee,
+                        trousers,
+                    ),
+                    _round(
+                        "capsule", "shank", 0.055 * h, knee, ankle, trousers
+                    ),
+                ),
+            )
+        )  # fmt: skip
+        elbow, hand = (-0.02, 0.0, -0.29 * h), (0.06, 0.0, -0.52 * h)
+        limbs.append(
+            Limb(
+                f"{side}_arm",
+                (0.0, 0.2 * sign * h, 1.36 * h),
+                -0.36 * sign,
+                (
+                    _round(
+                        "capsule", "upper", 0.045 * h, (0, 0, 0), elbow, coat
+                    ),
+                    _round("capsule", "lower", 0.038 * h, elbow, hand, coat),
+                ),
+            )
+        )
+    return tuple(limbs)

@@ -1,0 +1,221 @@
+"""Adding traffic to a diagram."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from pydrake.geometry import (
+    Box,
+    Capsule,
+    Cylinder,
+    FrameId,
+    GeometryFrame,
+    GeometryInstance,
+    IllustrationProperties,
+    Mesh,
+    PerceptionProperties,
+    Rgba,
+    SceneGraph,
+    Shape,
+    SourceId,
+)
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.systems.framework import DiagramBuilder, System
+
+from cns_drake.base.errors import InputError
+from cns_drake.city.geometry.object_meshes import FOLDER
+from cns_drake.scene.structure_table import (
+    MAX_INSTANCE,
+    StructureEntry,
+    StructureTable,
+)
+from cns_drake.traffic.body_shapes import (
+    BodyShape,
+    Limb,
+    vehicle_limbs,
+    walker_limbs,
+)
+from cns_drake.traffic.traffic_motion import TrafficBody, TrafficMotion
+from cns_drake.traffic.traffic_plan import TrafficPlan
+
+
+def traffic_structures(plan: TrafficPlan, first: int = 1) -> StructureTable:
+    """Returns a name, an instance id and a class for everybody in a plan.
+
+    Args:
+        plan: who there is.
+        first: the lowest id.
+
+    Raises:
+        InputError: there are not as many ids.
+    """
+    names = [
+        (f"traffic_{kind.name}_{k:03d}", kind.semantic_class)
+        for k, kind in enumerate(plan.kinds, 1)
+    ]
+    num_walkers = plan.walkers.values.shape[1]
+    names += [(f"walker_{k:03d}", "person") for k in range(1, num_walkers + 1)]
+    if first + len(names) - 1 > MAX_INSTANCE:
+        raise InputError(
+            f"traffic: {len(names)} bodies and {first - 1} structures are "
+            f"more than instance ids can count ({MAX_INSTANCE})"
+        )
+    return StructureTable(
+        StructureEntry(first + k, name, semantic_class)
+        for k, (name, semantic_class) in enumerate(names)
+    )
+
+
+def make_traffic(
+    scene_graph: SceneGraph,
+    plan: TrafficPlan,
+    *,
+    seed: int = 0,
+    structures: StructureTable | None = None,
+    turn: float = 0.05,
+    name: str = "traffic",
+) -> TrafficMotion:
+    """Gives a SceneGraph vehicles and walkers, and returns what moves them.
+
+    Args:
+        scene_graph: takes their geometry, on frames of a source of its own.
+        plan: who is where.
+        seed: of colours and sizes.
+        structures: gives everybody an instance id, among others; by default
+            `traffic_structures` of the plan.
+        turn: how long the turn of a LiDAR takes that sees them move [s].
+        name: of the source.
+    """
+    if structures is None:
+        structures = traffic_structures(plan)
+    entries = [structures[entry.name] for entry in traffic_structures(plan)]
+    source = scene_graph.RegisterSource(name)
+    bodies = []
+    for k, entry in enumerate(entries):
+        rng = np.random.default_rng([seed, k])
+        if k < len(plan.kinds):
+            limbs = vehicle_limbs(plan.kinds[k], rng)
+        else:
+            limbs = walker_limbs(rng)
+        frames = _register(scene_graph, source, entry.name, limbs)
+        bodies.append(
+            TrafficBody(
+                entry.instance, entry.name, entry.semantic_class, limbs, frames
+            )
+        )
+    return TrafficMotion(plan, bodies, source, turn)
+
+
+def add_traffic(
+    builder: DiagramBuilder,
+    scene_graph: SceneGraph,
+    plan: TrafficPlan,
+    *,
+    name: str = "traffic",
+    **options: Any,
+) -> TrafficMotion:
+    """Adds vehicles and walkers to a diagram.
+
+    Args:
+        builder: of the diagram that holds `scene_graph`.
+        scene_graph: takes their geometry.
+        plan: who is where.
+        name: of the system, and of the source of geometry.
+        options: further arguments of `make_traffic`.
+
+    Returns:
+        The system; its port `geometry_pose` is connected.
+
+    Example:
+        from cns_drake import add_traffic
+
+        traffic = add_traffic(builder, scene_graph, plan)
+    """
+    traffic = make_traffic(scene_graph, plan, name=name, **options)
+    place_traffic(builder, scene_graph, traffic, name)
+    return traffic
+
+
+def place_traffic(
+    builder: DiagramBuilder,
+    scene_graph: SceneGraph,
+    traffic: TrafficMotion,
+    name: str = "traffic",
+) -> None:
+    """Adds what `make_traffic` returned to the diagram of its SceneGraph."""
+    builder.AddNamedSystem(name, traffic)
+    builder.Connect(
+        traffic.GetOutputPort("geometry_pose"),
+        scene_graph.get_source_pose_port(traffic.source_id),
+    )
+
+
+def connect_traffic(
+    builder: DiagramBuilder,
+    traffic: TrafficMotion,
+    lidar: System,
+    goes_on: bool = False,
+) -> None:
+    """Connects what a LiDAR has to be told of traffic.
+
+    Args:
+        builder: of the diagram.
+        traffic: what moves.
+        lidar: labels what moves as moving.
+        goes_on: whether it sees traffic go on while it turns; then it was
+            made with the `moving_frames` of `traffic` as `moving_bodies`.
+    """
+    wanted = ["moving_instances"]
+    wanted += ["body_spatial_velocities"] if goes_on else []
+    for port in wanted:
+        builder.Connect(traffic.GetOutputPort(port), lidar.GetInputPort(port))
+
+
+def _register(
+    scene_graph: SceneGraph,
+    source: SourceId,
+    name: str,
+    limbs: Sequence[Limb],
+) -> tuple[FrameId, ...]:
+    frames = []
+    for limb in limbs:
+        frame = scene_graph.RegisterFrame(
+            source, GeometryFrame(f"{name}_{limb.name}")
+        )
+        frames.append(frame)
+        for one in limb.shapes:
+            geometry = scene_graph.RegisterGeometry(
+                source,
+                frame,
+                GeometryInstance(
+                    _pose(one), _shape(one), f"{name}/{limb.name}_{one.name}"
+                ),
+            )
+            for properties in (
+                PerceptionProperties(),
+                IllustrationProperties(),
+            ):
+                properties.AddProperty("phong", "diffuse", Rgba(*one.rgb, 1.0))
+                scene_graph.AssignRole(source, geometry, properties)
+    return tuple(frames)
+
+
+def _shape(one: BodyShape) -> Shape:
+    if one.kind == "mesh":
+        return Mesh(str(FOLDER / f"{one.mesh}.obj"))
+    if one.kind == "box":
+        return Box(*one.size)
+    if one.kind == "cylinder":
+        return Cylinder(*one.size)
+    return Capsule(*one.size)
+
+
+def _pose(one: BodyShape) -> RigidTransform:
+    """Returns the pose of a shape in its limb."""
+    start, end = np.array(one.start, float), np.array(one.end, float)
+    if not (end - start).any():
+        return RigidTransform(start)
+    R = RotationMatrix.MakeFromOneVector(end - start, 2)
+    return RigidTransform(R, (start + end) / 2)

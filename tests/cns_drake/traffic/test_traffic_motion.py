@@ -1,0 +1,201 @@
+"""Traffic in a diagram: poses, labels, and points on the bodies."""
+
+import numpy as np
+from pydrake.geometry import Role, SceneGraph
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.systems.framework import DiagramBuilder
+import pytest
+
+from cns_drake.scene.perception_geometry import read_perception_geometry
+from cns_drake.sensors.lidar import Lidar
+from cns_drake.sensors.lidar_adding import connect_lidar
+from cns_drake.sensors.lidar_presets import make_beam_pattern
+from cns_drake.traffic.body_states import bodies_at
+from cns_drake.traffic.tracks import Tracks
+from cns_drake.traffic.traffic_adding import (
+    connect_traffic,
+    make_traffic,
+    place_traffic,
+    traffic_structures,
+)
+from cns_drake.traffic.traffic_motion import MOVING_SPEED
+from cns_drake.traffic.traffic_plan import WALKER_SIZE, TrafficPlan
+from cns_drake.traffic.vehicle_kinds import KINDS
+
+T = 2.0
+
+
+def make_plan():
+    """A bus that turns, a slow car, a bicycle; one walks and one stands."""
+    t = 0.1 * np.arange(60)
+    zero = np.zeros_like(t)
+    kinds = [
+        next(k for k in KINDS if k.name == n) for n in ("bus", "suv", "bicycle")
+    ]
+    angle = 0.3 * t
+    bus = [20 * np.sin(angle), 30 - 20 * np.cos(angle), zero, angle, zero]
+    car = [12 + 0.9 * MOVING_SPEED * t, zero - 8, zero, zero, zero - 0.05]
+    bicycle = [zero - 9, 4 * t - 4, zero + 0.2, zero + np.pi / 2, zero]
+    walker = [5 - 1.3 * t, zero + 4, zero, zero + np.pi, 6 * t]
+    stands = [zero + 3, zero - 3, zero, zero + 1, zero + 1.5]
+    return TrafficPlan(
+        tuple(kinds),
+        Tracks(0.1, np.array([bus, car, bicycle]).transpose(2, 0, 1)),
+        Tracks(0.1, np.array([walker, stands]).transpose(2, 0, 1)),
+    )
+
+
+def make_diagram(plan, goes_on):
+    builder = DiagramBuilder()
+    scene_graph = builder.AddSystem(SceneGraph())
+    structures = traffic_structures(plan, 101)
+    traffic = make_traffic(
+        scene_graph, plan, seed=4, structures=structures, turn=0.05
+    )
+    X_WS = RigidTransform(
+        RotationMatrix.MakeZRotation(0.4), np.array([0.5, 0.2, 1.4])
+    )
+    lidar = builder.AddNamedSystem(
+        "lidar",
+        Lidar(
+            scene_graph.world_frame_id(),
+            X_WS,
+            make_beam_pattern("os1-128", 0.05),
+            structures=structures,
+            moving_bodies=traffic.moving_frames if goes_on else None,
+        ),
+    )
+    place_traffic(builder, scene_graph, traffic)
+    connect_lidar(builder, scene_graph, lidar)
+    connect_traffic(builder, traffic, lidar, goes_on)
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    context.SetTime(T)
+    scan = lidar.GetOutputPort("scan").Eval(lidar.GetMyContextFromRoot(context))
+    return scan, traffic, scene_graph, X_WS, diagram, context
+
+
+@pytest.fixture(scope="module", params=[False, True])
+def scanned(request):
+    return (*make_diagram(make_plan(), request.param), request.param)
+
+
+def test_labels_and_instances(scanned):
+    """Only what is faster than the threshold has a moving class."""
+    scan = scanned[0]
+    expected = {101: 257, 102: 10, 103: 253, 104: 254, 105: 30}
+    found = {
+        int(i): set(scan["label"][scan["instance"] == i].tolist())
+        for i in np.unique(scan["instance"])
+    }
+    assert found == {i: {label} for i, label in expected.items()}
+
+
+def test_points_lie_on_the_bodies_at_their_own_time(scanned):
+    """Put back by the pose of its limb, each point is on a surface of it."""
+    scan, traffic, scene_graph, X_WS, _, _, goes_on = scanned
+    inspector = scene_graph.model_inspector()
+    by_frame = {}
+    for geometry in read_perception_geometry(inspector):
+        by_frame.setdefault(geometry.frame_id, []).append(geometry)
+    p_SR = np.stack([scan[c] for c in "xyz"], axis=1).astype(float)
+    p_WR = X_WS.multiply(p_SR.T).T
+    limbs = list(traffic.moving_frames)
+    owner = np.repeat(
+        np.arange(101, 106), [1, 1, 1, *([len(limbs[3:]) // 2] * 2)]
+    )
+    worst = {}
+    for row in np.random.default_rng(1).choice(len(scan), 300, replace=False):
+        t = T + (scan["t"][row] * 1e-9 if goes_on else 0.0)
+        R_WL, p_WL = traffic._limbs.poses(bodies_at(make_plan(), t))
+        distances = [
+            _distance(geometry, R_WL[k].T @ (p_WR[row] - p_WL[k]))
+            for k, frame in enumerate(limbs)
+            if owner[k] == scan["instance"][row]
+            for geometry in by_frame[frame]
+        ]
+        instance = int(scan["instance"][row])
+        worst[instance] = max(worst.get(instance, 0.0), min(distances))
+    # Coordinates are exact but for single precision; a limb that swings goes
+    # its way from beginning to end of a turn straight.
+    assert set(worst) == {101, 102, 103, 104, 105}
+    for instance, distance in worst.items():
+        assert distance < (4e-3 if instance == 104 and goes_on else 1e-3)
+
+
+def _distance(geometry, p_F):
+    """Returns how far a place of F is from a geometry's surface."""
+    p_G = geometry.X_FG.inverse() @ p_F
+    surface = geometry.surface
+    if hasattr(surface, "triangles"):
+        return _distance_to_triangles(surface.p_GVset[surface.triangles], p_G)
+    half = surface.length / 2
+    off = np.hypot(p_G[0], p_G[1])
+    if type(surface).__name__ == "CapsuleSurface":
+        beyond = max(abs(p_G[2]) - half, 0.0)
+        return abs(np.hypot(off, beyond) - surface.radius)
+    side, end = abs(off - surface.radius), abs(abs(p_G[2]) - half)
+    on_side = side if abs(p_G[2]) <= half + 1e-3 else np.inf
+    return min(on_side, end if off <= surface.radius + 1e-3 else np.inf)
+
+
+def _distance_to_triangles(corners, p):
+    """Returns the distance to the nearest triangle (N, 3, 3)."""
+    a, b, c = corners.transpose(1, 0, 2)
+    normal = np.cross(b - a, c - a)
+    size = np.linalg.norm(normal, axis=1)
+    normal = normal / np.maximum(size, 1e-12)[:, None]
+    height = np.sum((p - a) * normal, axis=1)
+    foot = p - height[:, None] * normal
+    inside = np.ones(len(a), bool)
+    edge = np.full(len(a), np.inf)
+    for u, v in ((a, b), (b, c), (c, a)):
+        inside &= np.sum(np.cross(v - u, foot - u) * normal, axis=1) >= -1e-9
+        along = np.sum((p - u) * (v - u), axis=1)
+        along /= np.maximum(np.sum((v - u) ** 2, axis=1), 1e-12)
+        near = u + np.clip(along, 0, 1)[:, None] * (v - u)
+        edge = np.minimum(edge, np.linalg.norm(p - near, axis=1))
+    return float(np.min(np.where(inside, np.abs(height), edge)))
+
+
+def test_points_in_boxes_are_those_of_instances(scanned):
+    scan, traffic, _, X_WS, _, context, goes_on = scanned
+    if goes_on:
+        return
+    objects = traffic.GetOutputPort("objects").Eval(
+        traffic.GetMyContextFromRoot(context)
+    )
+    assert [one.instance for one in objects] == [101, 102, 103, 104, 105]
+    p_WR = X_WS.multiply(np.stack([scan[c] for c in "xyz"]).astype(float))
+    for one in objects:
+        p_OR = one.X_WO.inverse().multiply(p_WR)
+        half = np.array(one.size)[:, None] / 2
+        inside = (np.abs(p_OR) <= half + 1e-3).all(axis=0)
+        own = scan["instance"] == one.instance
+        np.testing.assert_array_equal(inside, own)
+    moving = [one.instance for one in objects if one.is_moving]
+    assert moving == [101, 103, 104]
+    np.testing.assert_allclose(np.linalg.norm(objects[0].v_WO), 6.0, rtol=2e-4)
+    assert objects[0].yaw_rate == pytest.approx(0.3, rel=1e-6)
+
+
+def test_limbs_stay_in_the_walkers_box():
+    plan = make_plan()
+    scene_graph = SceneGraph()
+    traffic = make_traffic(scene_graph, plan, seed=9)
+    inspector = scene_graph.model_inspector()
+    half = np.array(WALKER_SIZE) / 2
+    for t in np.linspace(1, 2, 21):
+        states = bodies_at(plan, t)
+        R_WL, p_WL = traffic._limbs.poses(states)
+        for frame, k in traffic.moving_frames.items():
+            body = traffic._limbs.body[k]
+            if body < 3:
+                continue
+            for g in inspector.GetGeometries(frame, Role.kPerception):
+                shape, X = inspector.GetShape(g), inspector.GetPoseInFrame(g)
+                for end in (-1, 1):
+                    p_L = X @ np.array([0, 0, end * shape.length() / 2])
+                    p_W = p_WL[k] + R_WL[k] @ p_L - states.p_WB[body]
+                    p_B = states.R_WB[body].T @ p_W - (0, 0, half[2])
+                    assert (np.abs(p_B) + shape.radius() <= half + 1e-9).all()
