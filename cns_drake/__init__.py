@@ -50,9 +50,11 @@ if TYPE_CHECKING:
     from cns_drake.sensors.returns.weather import Weather
     from cns_drake.sensors.spinning_pattern import SpinningPattern
     from cns_drake.simulation.run_progress import Run
+    from cns_drake.simulation.scenario_traffic import plan_scenario_traffic
     from cns_drake.simulation.sensor_recording import add_mcap_recorder
     from cns_drake.simulation.simulation import simulate
     from cns_drake.simulation.station import make_station
+    from cns_drake.traffic.traffic_adding import add_traffic
 
 __all__ = [
     "LIDAR_PRESETS",
@@ -81,6 +83,7 @@ __all__ = [
     "add_lidar_view",
     "add_mcap_recorder",
     "add_odometry",
+    "add_traffic",
     "load_scenario",
     "load_world",
     "make_beam_pattern",
@@ -88,6 +91,7 @@ __all__ = [
     "make_scenario",
     "make_station",
     "plan_drive",
+    "plan_scenario_traffic",
     "recording_topics",
     "run_script",
     "run_sequence",
@@ -127,7 +131,9 @@ _HOMES = {
     "cns_drake.simulation.sensor_recording": ("add_mcap_recorder",),
     "cns_drake.simulation.run_progress": ("Run",),
     "cns_drake.simulation.simulation": ("simulate",),
+    "cns_drake.simulation.scenario_traffic": ("plan_scenario_traffic",),
     "cns_drake.simulation.station": ("make_station",),
+    "cns_drake.traffic.traffic_adding": ("add_traffic",),
 }
 
 

@@ -31,6 +31,7 @@ def run_sequence(
     lidar: str | None = None,
     returns: Literal["ideal", "calibrated"] | None = None,
     weather: WeatherConfig | None = None,
+    traffic: int | None = None,
     recording: Path | None = None,
     graphviz: Path | None = None,
     overwrite: bool = False,
@@ -44,6 +45,8 @@ def run_sequence(
         lidar: preset that replaces the scenario's LiDARs.
         returns: `ideal` or `calibrated`, in place of the scenario's.
         weather: in place of the scenario's.
+        traffic: how many vehicles, and how many walkers, in place of the
+            scenario's.
         recording: where to save a web page of the drive.
         graphviz: where to save the Diagram as Graphviz text.
         overwrite: replace an existing recording.
@@ -69,6 +72,8 @@ def run_sequence(
         scenario = scenario.with_lidar_preset(lidar)
     if returns is not None:
         scenario = scenario.with_returns(returns, weather)
+    if traffic is not None:
+        scenario = scenario.with_traffic(traffic)
     if frames is not None:
         scenario = scenario.model_copy(update={"frames": frames})
     with show_progress() as progress:

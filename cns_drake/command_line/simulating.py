@@ -46,6 +46,16 @@ def simulate(
     fog: Fog = None,
     rain: Rain = 0.0,
     snowfall: Snowfall = 0.0,
+    traffic: Annotated[
+        int | None,
+        typer.Option(
+            min=0,
+            max=2000,
+            metavar="N",
+            help="So many vehicles, and as many walkers, in place of the "
+            "scenario's.",
+        ),
+    ] = None,
     recording: Recording = None,
     graphviz: Graphviz = None,
     overwrite: Overwrite = False,
@@ -65,6 +75,7 @@ def simulate(
         lidar=lidar,
         returns=chosen,
         weather=weather,
+        traffic=traffic,
         recording=recording,
         graphviz=graphviz,
         overwrite=overwrite,

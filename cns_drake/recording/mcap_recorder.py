@@ -32,6 +32,7 @@ from cns_drake.recording.image_messages import (
     make_camera_info,
     make_image,
 )
+from cns_drake.recording.object_messages import make_detections
 from cns_drake.recording.rosbag2_metadata import Topic
 from cns_drake.recording.schedule import Schedule, make_schedule
 
@@ -39,6 +40,8 @@ _TF_STATIC = Topic("/tf_static", ros_types.TF, latched=True)
 _TF = Topic("/tf", ros_types.TF)
 _ODOMETRY = Topic("/odometry", ros_types.ODOMETRY)
 _IMU = Topic("/imu/data", ros_types.IMU)
+OBJECTS_TOPIC = "/objects"
+_OBJECTS = Topic(OBJECTS_TOPIC, ros_types.DETECTIONS_3D)
 
 # Events of a periodic schedule come at exact multiples of the period; only
 # the rounding of that product separates their times from a tick's, in ticks.
@@ -75,6 +78,7 @@ class McapRecorder(LeafSystem):
         - specific_force
         - angular_velocity
         - R_WI (if it is declared)
+        - objects (if it is declared)
         - <lidar>_scan (one for each LiDAR)
         - <lidar>_pose (for each LiDAR without a fixed place)
         - <camera>_color (one for each camera)
@@ -90,6 +94,7 @@ class McapRecorder(LeafSystem):
     - `angular_velocity`: w_WI_I, vector of size 3 [rad/s].
     - `R_WI`: abstract, a RotationMatrix; without this port the orientation of
       I is that of the odometry.
+    - `objects`: abstract, of each a `RecordedObject`.
     - `<lidar>_scan`: abstract, structured array of points expressed in S.
     - `<lidar>_pose`: abstract, X_WS.
     - `<camera>_color`, `_depth`, `_label`: images as Drake's RgbdSensor gives
@@ -124,6 +129,7 @@ class McapRecorder(LeafSystem):
         layouts: Mapping[str, str] | None = None,
         imu_variances: tuple[float, float] = (0.0, 0.0),
         with_orientation: bool = False,
+        with_objects: bool = False,
         start_ns: int = 0,
     ):
         """Declares the ports and the schedule.
@@ -142,6 +148,7 @@ class McapRecorder(LeafSystem):
             imu_variances: of specific force [m^2/s^4] and angular velocity
                 [rad^2/s^2].
             with_orientation: whether there is a port `R_WI`.
+            with_objects: whether there is a port `objects`.
             start_ns: the stamp of time zero [ns].
 
         Raises:
@@ -179,6 +186,11 @@ class McapRecorder(LeafSystem):
         if with_orientation:
             self._R_WI = self.DeclareAbstractInputPort(
                 "R_WI", Value(RotationMatrix())
+            )
+        self._objects = None
+        if with_objects:
+            self._objects = self.DeclareAbstractInputPort(
+                "objects", Value(object())
             )
         self._scans = {
             name: self.DeclareAbstractInputPort(f"{name}_scan", Value(object()))
@@ -226,6 +238,11 @@ class McapRecorder(LeafSystem):
             outgoing |= self._locate(context, stamp_ns)
         if _IMU.name in due:
             outgoing |= self._feel(context, stamp_ns)
+        objects = self._objects
+        if objects is not None and objects.HasValue(context):
+            outgoing[_OBJECTS] = make_detections(
+                objects.Eval(context), stamp_ns
+            )
         for name in self._scans:
             if _points_topic(name).name in due:
                 outgoing |= self._scan(context, name, stamp_ns)
@@ -347,6 +364,7 @@ def recording_topics(
     with_imu: bool = True,
     with_odometry: bool = True,
     layouts: Mapping[str, str] | None = None,
+    with_objects: bool = False,
 ) -> tuple[Topic, ...]:
     """Returns the topics of a recording.
 
@@ -356,6 +374,7 @@ def recording_topics(
         with_imu: whether it has an IMU.
         with_odometry: whether it has odometry.
         layouts: LiDAR name -> layout of its points, if not `cns`.
+        with_objects: whether it has boxes of what moves.
 
     Example:
         from cns_drake import recording_topics
@@ -372,6 +391,7 @@ def recording_topics(
         topics.append(_camera_info_topic(name))
     topics += [_IMU] if with_imu else []
     topics += [_ODOMETRY] if with_odometry else []
+    topics += [_OBJECTS] if with_objects else []
     return (*topics, _TF, _TF_STATIC)
 
 

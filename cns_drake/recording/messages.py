@@ -94,11 +94,11 @@ def make_imu(
         header=make_header(IMU_FRAME, stamp_ns),
         orientation=_make_quaternion(R_WI or RotationMatrix()),
         orientation_covariance=_covariance(R_WI, 0.0),
-        angular_velocity=_make_vector(
+        angular_velocity=make_vector(
             zero if angular_velocity is None else angular_velocity
         ),
         angular_velocity_covariance=_covariance(angular_velocity, variances[1]),
-        linear_acceleration=_make_vector(
+        linear_acceleration=make_vector(
             zero if specific_force is None else specific_force
         ),
         linear_acceleration_covariance=_covariance(
@@ -129,13 +129,10 @@ def make_odometry(
     Returns:
         The message; its covariances are zero, since nothing is uncertain.
     """
-    pose = message_class("geometry_msgs/msg/Pose")(
-        position=_make_point(X_WB.translation()),
-        orientation=_make_quaternion(X_WB.rotation()),
-    )
+    pose = make_pose(X_WB)
     twist = message_class("geometry_msgs/msg/Twist")(
-        linear=_make_vector(V_WB_B.translational()),
-        angular=_make_vector(V_WB_B.rotational()),
+        linear=make_vector(V_WB_B.translational()),
+        angular=make_vector(V_WB_B.rotational()),
     )
     return message_class(ODOMETRY)(
         header=make_header(MAP_FRAME, stamp_ns),
@@ -167,7 +164,7 @@ def make_tf(
                 header=make_header(parent, stamp_ns),
                 child_frame_id=child,
                 transform=transform(
-                    translation=_make_vector(X_PC.translation()),
+                    translation=make_vector(X_PC.translation()),
                     rotation=_make_quaternion(X_PC.rotation()),
                 ),
             )
@@ -196,12 +193,21 @@ def make_header(frame_id: str, stamp_ns: int) -> Any:
     )
 
 
+def make_pose(X: RigidTransform) -> Any:
+    """Returns a pose."""
+    return message_class("geometry_msgs/msg/Pose")(
+        position=_make_point(X.translation()),
+        orientation=_make_quaternion(X.rotation()),
+    )
+
+
 def _make_quaternion(R: RotationMatrix) -> Any:
     x, y, z, w = to_quat_xyzw(R)
     return message_class("geometry_msgs/msg/Quaternion")(x=x, y=y, z=z, w=w)
 
 
-def _make_vector(xyz: np.ndarray) -> Any:
+def make_vector(xyz: np.ndarray) -> Any:
+    """Returns a vector of three numbers."""
     return message_class("geometry_msgs/msg/Vector3")(
         x=float(xyz[0]), y=float(xyz[1]), z=float(xyz[2])
     )

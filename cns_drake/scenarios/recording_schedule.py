@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 
-from cns_drake.recording.mcap_recorder import recording_topics
+from cns_drake.recording.mcap_recorder import (
+    OBJECTS_TOPIC,
+    recording_topics,
+)
 from cns_drake.recording.rosbag2_metadata import Topic
 from cns_drake.recording.schedule import Schedule, make_schedule
 from cns_drake.scenarios.imu_making import imu_rate
@@ -22,7 +25,11 @@ def point_layouts(scenario: Scenario) -> dict[str, str]:
 
 def scenario_topics(scenario: Scenario) -> tuple[Topic, ...]:
     """Returns the topics of a scenario's recording."""
-    return recording_topics(scenario.lidars, layouts=point_layouts(scenario))
+    return recording_topics(
+        scenario.lidars,
+        layouts=point_layouts(scenario),
+        with_objects=not scenario.traffic.is_off,
+    )
 
 
 def first_points_topic(scenario: Scenario) -> str:
@@ -46,10 +53,13 @@ def drive_schedule(scenario: Scenario) -> Schedule:
         "/imu/data": imu_rate(scenario),
         "/odometry": odometry,
         "/tf": odometry,
+        OBJECTS_TOPIC: fastest,
     }
     for topic in scenario_topics(scenario):
         if not topic.latched and topic.name not in rates:
             rates[topic.name] = scenario.lidars[topic.name.split("/")[1]].rate
+    if scenario.traffic.is_off:
+        del rates[OBJECTS_TOPIC]
     periods = {name: 1.0 / rate for name, rate in rates.items()}
     if scenario.frames is None:
         return make_schedule(periods)

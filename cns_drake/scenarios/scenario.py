@@ -192,6 +192,17 @@ class Scenario(Section):
             update={"lidars": lidars, "weather": weather or self.weather}
         )
 
+    def with_traffic(self, number: int) -> Scenario:
+        """Returns the scenario with other traffic, of the same seed.
+
+        Args:
+            number: of vehicles, and of walkers.
+        """
+        traffic = TrafficConfig(
+            vehicles=number, walkers=number, seed=self.traffic.seed
+        )
+        return self.model_copy(update={"traffic": traffic})
+
     def with_lidar_preset(self, preset: str) -> Scenario:
         """Returns the scenario with the unit of every LiDAR replaced.
 

@@ -37,6 +37,12 @@ def plan_scenario_traffic(
     Raises:
         InputError: the map has no roads or sidewalks, or they do not hold so
             many.
+
+    Example:
+        from cns_drake import load_scenario, plan_drive, plan_scenario_traffic
+
+        scenario = load_scenario("metropolis_04").with_traffic(60)
+        plan = plan_scenario_traffic(scenario, plan_drive(scenario))
     """
     wanted = scenario.traffic
     where = f"{scenario.source}: traffic"

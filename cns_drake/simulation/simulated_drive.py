@@ -84,14 +84,14 @@ class SimulatedSequence(PlannedSequence):
         world = load_world(world_file(scenario), without=scenario.without)
         traffic = None
         if not scenario.traffic.is_off:
-            plan = plan_scenario_traffic(scenario, self._trajectory)
+            plan = plan_scenario_traffic(scenario, trajectory)
             world = with_traffic(world, plan)
             traffic = make_traffic(
                 world.scene_graph,
                 plan,
                 seed=scenario.traffic.seed,
                 structures=world.structures,
-                turn=FRAME_PERIOD,
+                turn=self.period,
             )
         self._has_traffic = traffic is not None
         distorts = self._column_t is not None

@@ -16,6 +16,7 @@ from cns_drake.recording.frame_clock import START_NS
 from cns_drake.recording.mcap_recorder import McapRecorder
 from cns_drake.scenarios.imu_making import imu_rate, make_imu_noise
 from cns_drake.scenarios.planning import plan_drive
+from cns_drake.scenarios.rates import frame_period
 from cns_drake.scenarios.recording_schedule import (
     drive_schedule,
     point_layouts,
@@ -57,8 +58,8 @@ def make_station(
     `mcap_recorder` and `meshcat_recorder` take down what they measure.
 
     Exported output ports: `<lidar>_scan`, `specific_force`,
-    `angular_velocity`, `odometry`, `geometry_query`; and `R_WI` of such an
-    IMU.
+    `angular_velocity`, `odometry`, `geometry_query`; `R_WI` of such an
+    IMU; and with traffic `objects`.
 
     Args:
         scenario: what to build.
@@ -113,7 +114,7 @@ def make_station(
             traffic,
             seed=scenario.traffic.seed,
             structures=world.structures,
-            turn=FRAME_PERIOD,
+            turn=frame_period(scenario.lidars),
         )
     # What is measured, by name: also the names of the exported ports.
     measured = {"geometry_query": scene_graph.get_query_output_port()}
@@ -134,6 +135,9 @@ def make_station(
     odometry = add_odometry(builder, base, motion=motion)
     measured["odometry"] = odometry.GetOutputPort("odometry")
 
+    if moving is not None:
+        measured["objects"] = moving.GetOutputPort("objects")
+
     recorders = {"meshcat_recorder": page}
     if bag is not None:
         recorders["mcap_recorder"] = McapRecorder(
@@ -145,6 +149,7 @@ def make_station(
             imu_variances=make_imu_noise(scenario).variances(
                 imu_rate(scenario)
             ),
+            with_objects=moving is not None,
             with_orientation="R_WI" in measured,
             start_ns=START_NS,
         )
