@@ -14,6 +14,8 @@ import numpy as np
 import shapely
 from shapely.geometry import LinearRing, Polygon
 
+from cns_drake.base.compiled import compiled
+
 _MM = 1000.0
 # A corner or point as whole millimetres.
 _Point = tuple[int, int]
@@ -155,51 +157,76 @@ def _is_between(p: _Point, q: _Point, c: _Point) -> bool:
 
 def _cut_ears(ring: list[_Point]) -> list[tuple[_Point, _Point, _Point]]:
     """Returns triangles that fill a ring, which may touch itself."""
-    points = np.array(ring, dtype=np.int64)
-    left = list(range(len(ring)))
-    triangles = []
-    start = 0
-    while len(left) > 3:
-        for step in range(len(left)):
-            k = (start + step) % len(left)
-            a, b, c = left[k - 1], left[k], left[(k + 1) % len(left)]
-            if _is_ear(points, left, a, b, c):
-                triangles.append((ring[a], ring[b], ring[c]))
-                left.pop(k)
+    triangles, is_whole = _ears(np.array(ring, dtype=np.int64))
+    if not is_whole:
+        raise ValueError("the polygon crosses itself")
+    return [(ring[a], ring[b], ring[c]) for a, b, c in triangles.tolist()]
+
+
+@compiled
+def _ears(points: np.ndarray) -> tuple[np.ndarray, bool]:
+    """Returns numbers of corners (M, 3), and whether they fill the ring.
+
+    Args:
+        points: (N, 2) corners of the ring in whole millimetres, fewer than
+            10^9 from each other, so that no product overflows.
+    """
+    left = np.arange(len(points))
+    count, found, start = len(points), 0, 0
+    triangles = np.empty((max(count - 2, 0), 3), dtype=np.int64)
+    while count > 3:
+        is_cut = False
+        for step in range(count):
+            k = (start + step) % count
+            a, b, c = left[(k - 1) % count], left[k], left[(k + 1) % count]
+            if _is_ear(points, left[:count], a, b, c):
+                triangles[found] = a, b, c
+                found += 1
+                left[k : count - 1] = left[k + 1 : count].copy()
+                count -= 1
                 # Going on behind the ear avoids fans of thin triangles.
                 start = k
+                is_cut = True
                 break
-        else:
-            if all(
-                _cross(ring[left[0]], ring[left[1]], ring[i]) == 0 for i in left
-            ):
-                return triangles
-            raise ValueError("the polygon crosses itself")
-    first, second, third = (ring[i] for i in left)
-    if _cross(first, second, third) > 0:
-        triangles.append((first, second, third))
-    return triangles
+        if not is_cut:
+            for i in left[:count]:
+                if _side(points, left[0], left[1], i) != 0:
+                    return triangles[:found], False
+            return triangles[:found], True
+    if count == 3 and _side(points, left[0], left[1], left[2]) > 0:
+        triangles[found] = left[0], left[1], left[2]
+        found += 1
+    return triangles[:found], True
 
 
+@compiled
 def _is_ear(
-    points: np.ndarray, left: list[int], a: int, b: int, c: int
+    points: np.ndarray, left: np.ndarray, a: int, b: int, c: int
 ) -> bool:
-    """Tells whether the corner b is convex and nothing lies in its ear."""
-    pa, pb, pc = points[[a, b, c]]
-    if _cross(pa, pb, pc) <= 0:
+    """Returns whether the corner b is convex and nothing lies in its ear."""
+    if _side(points, a, b, c) <= 0:
         return False
-    others = points[left]
-    is_corner = (
-        (others == pa).all(1) | (others == pb).all(1) | (others == pc).all(1)
-    )
-    others = others[~is_corner]
-    inside = np.ones(len(others), dtype=bool)
-    for u, v in ((pa, pb), (pb, pc), (pc, pa)):
-        side = (v[0] - u[0]) * (others[:, 1] - u[1]) - (v[1] - u[1]) * (
-            others[:, 0] - u[0]
-        )
-        inside &= side >= 0
-    return not inside.any()
+    for i in left:
+        is_corner = False
+        for j in (a, b, c):
+            if points[i, 0] == points[j, 0] and points[i, 1] == points[j, 1]:
+                is_corner = True
+        if (
+            not is_corner
+            and _side(points, a, b, i) >= 0
+            and _side(points, b, c, i) >= 0
+            and _side(points, c, a, i) >= 0
+        ):
+            return False
+    return True
+
+
+@compiled
+def _side(points: np.ndarray, a: int, b: int, c: int) -> int:
+    """Returns twice the area of a triangle, positive counter-clockwise."""
+    return (points[b, 0] - points[a, 0]) * (points[c, 1] - points[a, 1]) - (
+        points[b, 1] - points[a, 1]
+    ) * (points[c, 0] - points[a, 0])
 
 
 def _flip(
