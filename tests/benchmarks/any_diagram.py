@@ -31,7 +31,7 @@ from pydrake.systems.framework import DiagramBuilder
 from cns_drake import Lidar, load_world, make_beam_pattern
 from cns_drake.sensors.lidar_adding import connect_lidar
 
-WORLD = Path("worlds/downtown/stage_04.sdf")
+WORLD = Path(__file__).parents[2] / "worlds/downtown/stage_04.sdf"
 PATTERN = make_beam_pattern("os1-128")
 ROUNDS = 15
 

@@ -67,6 +67,8 @@ def print_growth(sequence: str, frames: int) -> None:
         ),
         on_frame,
     )
+    if len(seen) < 2:
+        raise SystemExit(f"--long {frames}: too few frames, take at least 300")
     done, resident = np.array(seen).T
     slope = np.polyfit(done, resident, 1)[0]
     print(

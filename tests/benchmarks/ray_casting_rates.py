@@ -97,7 +97,7 @@ def benchmark(sequence: str, rounds: int, folder: Path) -> None:
     }
     limit = build_limit(folder)
     if limit is not None:
-        kept = EmbreeHierarchy(*_all_in_one(geometries, stands))
+        kept = _all_in_one(geometries, stands)
         for name, hierarchy in (
             ("limit (C), same shapes", kept),
             ("limit (C), triangles only", scene._scene._flat),
@@ -123,18 +123,16 @@ def benchmark(sequence: str, rounds: int, folder: Path) -> None:
 
 
 def _all_in_one(geometries, stands):
-    """Returns the still groups with all that is in them, uncut."""
-    _, groups = group_geometries(geometries, stands, still)
+    """Returns a hierarchy of the still groups with curved shapes as such."""
+    _, groups = group_geometries(enumerate(geometries), stands, still)
     for group in groups:
         group.place(np.zeros(3), still)
-    parts = {
-        row: [
-            *(p for p in merge_flat(group.members) if p.mask == SOLID),
-            *merge_curved(group.members),
-        ]
-        for row, group in enumerate(groups)
-    }
-    return groups, parts
+
+    def merge(members):
+        solid = [part for part in merge_flat(members) if part.mask == SOLID]
+        return [*solid, *merge_curved(members)]
+
+    return EmbreeHierarchy(groups, merge, 1)
 
 
 def _limit_variant(limit, hierarchy, p_WO, poses, d_S, reach):

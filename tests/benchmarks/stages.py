@@ -17,6 +17,7 @@ from cns_drake.ray_casting.open3d_scene import Open3dScene
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.ray_casting.ray_groups import group_geometries
 from cns_drake.scenarios.planning import plan_drive
+from cns_drake.scenarios.scenario_files import world_file
 from cns_drake.scenarios.scenario_loading import load_scenario
 from cns_drake.scene.perception_geometry import (
     PerceptionGeometry,
@@ -28,7 +29,7 @@ from cns_drake.scene.world import load_world
 
 def read_stage(sequence: str) -> list[PerceptionGeometry]:
     """Returns the geometry of a sequence's stage."""
-    world = load_world(load_scenario(sequence).world_file)
+    world = load_world(world_file(load_scenario(sequence)))
     return read_perception_geometry(world.scene_graph.model_inspector())
 
 
@@ -60,7 +61,11 @@ class Open3dStage:
     def __init__(self, geometries: Sequence[PerceptionGeometry]):
         """Builds the scene."""
         stands = {geometry.frame_id for geometry in geometries}
-        self._p_WO, groups = group_geometries(geometries, stands, still)
+        self._p_WO, groups = group_geometries(
+            enumerate(geometries), stands, still
+        )
+        for group in groups:
+            group.place(self._p_WO, still)
         # It would say that it stands in for Embree.
         with contextlib.redirect_stderr(io.StringIO()):
             self.scene = Open3dScene(groups[:1], num_threads=1)._scenes[0]

@@ -46,6 +46,8 @@ def main() -> None:
     parser.add_argument("sequence", nargs="?", default="downtown_04")
     parser.add_argument("--runs", type=int, default=8)
     options = parser.parse_args()
+    if options.runs < 2:
+        parser.error("--runs: the first one warms the caches, so at least 2")
     with tempfile.TemporaryDirectory() as folder:
         writing = [f"--output={folder}/recordings", "--overwrite"]
         for arguments in (
