@@ -1,4 +1,4 @@
-"""The building stock: parametric buildings, one archetype a module.
+"""The building stock: parametric buildings, one archetype a module; landmarks.
 
 `sample` draws an archetype's parameters and builds it:
 
@@ -17,6 +17,7 @@ from shapely.geometry import Polygon
 
 from cns_drake.city.buildings import blocks, houses, public, shops, towers
 from cns_drake.city.buildings.archetypes import ARCHETYPES
+from cns_drake.city.buildings.landmarks import LANDMARKS, add_landmark
 from cns_drake.city.buildings.parts.site import Assembly, Dice, Site
 from cns_drake.city.geometry.structures import Model
 
@@ -71,6 +72,10 @@ def sample(
     site = Site(footprint, name, frozenset(blind_edges))
     if not kind.party_walls:
         site = site.detached(kind.overhang)
+    if archetype in LANDMARKS:
+        assembly = Assembly(site, rng)
+        add_landmark(assembly, archetype, height)
+        return assembly.finish(footprint)
     module = _MODULES[archetype]
     parameters = module.Parameters(Dice(site, height, rng))
     assembly = Assembly(site, rng, parameters.rgb)

@@ -12,17 +12,25 @@ from cns_drake.city.geometry.mesh import Mesh
 FOLDER = Path(__file__).parents[1] / "object_meshes"
 
 
-@cache
 def object_mesh(name: str) -> Mesh:
     """Returns the mesh of this name.
 
     Raises:
         FileNotFoundError: there is none.
     """
+    return read_mesh(FOLDER / f"{name}.obj")
+
+
+@cache
+def read_mesh(path: Path) -> Mesh:
+    """Returns the mesh of an OBJ file of the city generator's own.
+
+    Raises:
+        FileNotFoundError: there is none.
+    """
     vertices: list[list[float]] = []
     faces: list[tuple[int, ...]] = []
-    text = (FOLDER / f"{name}.obj").read_text(encoding="utf-8")
-    for line in text.splitlines():
+    for line in path.read_text(encoding="utf-8").splitlines():
         kind, *values = line.split()
         if kind == "v":
             vertices.append([float(value) for value in values])

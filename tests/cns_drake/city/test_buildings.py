@@ -21,6 +21,7 @@ from cns_drake.city import buildings
 from cns_drake.city.buildings import ARCHETYPES, sample
 from cns_drake.city.buildings.archetypes import GROUND_OVERHANG_M, HEAD_ROOM_M
 from cns_drake.city.buildings.blocks import brick_block
+from cns_drake.city.buildings.landmarks import LANDMARKS
 from cns_drake.city.buildings.parts.massing import FOUNDATION_M
 from cns_drake.city.buildings.parts.site import Dice, Site
 from cns_drake.city.buildings.towers import hotel, office
@@ -86,7 +87,9 @@ def test_every_builder_has_a_row_of_what_it_can_fill():
     folder = Path(buildings.__file__).parent
     rooms = ("blocks", "houses", "public", "shops", "towers")
     modules = {file.stem for room in rooms for file in folder.glob(f"{room}/*")}
-    assert modules - {"__init__", "__pycache__"} == set(ARCHETYPES)
+    modules -= {"__init__", "__pycache__"}
+    assert not modules & set(LANDMARKS)
+    assert modules | set(LANDMARKS) == set(ARCHETYPES)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -1,13 +1,12 @@
 import math
 
-from helpers.mesh_checks import is_closed, out_of_plane, volume
+from helpers.mesh_checks import is_closed, volume
 from helpers.winding import winding_numbers
 import numpy as np
 import pytest
 from shapely.geometry import Point, Polygon, box
 
 from cns_drake.city.buildings.parts import details, massing, outlines
-from cns_drake.city.buildings.parts.helix import ramp_turn
 from cns_drake.city.geometry.mesh import merge_meshes
 
 _C, _S = math.cos(0.7), math.sin(0.7)
@@ -176,20 +175,6 @@ def test_gable_roof_is_closed():
 def test_clockwise_outline_is_refused():
     with pytest.raises(ValueError, match="clockwise"):
         massing.flat(TURNED[::-1], 0.0)
-
-
-def test_ramp_turn_is_closed_and_climbs_by_its_rise():
-    turn = ramp_turn(12.0, 6.0, 3.0, 0.3, 1.0, start=0.4)
-    assert is_closed(turn)
-    assert out_of_plane(turn) < 1e-9
-    # Chords of 15 degrees; a trough of 0.3 m under two rails of 0.2 m.
-    ring = 0.5 * 24 * math.sin(2 * math.pi / 24)
-    rails = (144 - 11.8**2) + (6.2**2 - 36)
-    expected = ring * (0.3 * (144 - 36) + 1.0 * rails)
-    assert volume(turn) == pytest.approx(expected, rel=4e-3)
-    heights = turn.vertices[:, 2]
-    assert heights.min() == pytest.approx(-0.3)
-    assert heights.max() == pytest.approx(3.0 + 1.0)
 
 
 @pytest.mark.parametrize(

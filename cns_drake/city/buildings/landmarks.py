@@ -1,0 +1,110 @@
+"""Landmarks: archetypes whose buildings are data, a few models of each.
+
+A folder of `landmark_models`, called after its archetype and a letter, has the
+meshes of one model as OBJ files, and `model.yaml`:
+
+    size: [50, 30]        # of its lot, about the origin [m]
+    overhang: [1.5, 1.5]  # of its eaves beyond the lot, along x and y [m]
+    height: 17            # [m]
+    parts:
+    - name: walls         # of the visual
+      mesh: walls         # in the folder, or one of the `object_meshes`
+      xyz: [0, 0, 1.8]    # [m]; also `yaw`, in quarter turns [rad]; `scale`
+      rgb: [0.8, 0.74, 0.64]
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from pydantic import BaseModel
+import yaml
+
+from cns_drake.city.buildings.parts.site import Assembly, Rgb, pick
+from cns_drake.city.geometry.mesh import Mesh
+from cns_drake.city.geometry.object_meshes import read_mesh
+from cns_drake.city.geometry.object_parts import triple
+from cns_drake.city.geometry.structures import MeshShape
+
+_MODELS = Path(__file__).parent / "landmark_models"
+_Triple = tuple[float, float, float]
+
+
+class _Part(BaseModel):
+    name: str
+    mesh: str
+    xyz: _Triple = (0.0, 0.0, 0.0)
+    yaw: float = 0.0
+    scale: _Triple = (1.0, 1.0, 1.0)
+    rgb: Rgb
+
+
+class _Model(BaseModel):
+    size: tuple[float, float]
+    overhang: tuple[float, float]
+    height: float
+    parts: list[_Part]
+
+
+def _folders() -> dict[str, list[Path]]:
+    folders = defaultdict(list)
+    for path in sorted(_MODELS.glob("*/model.yaml")):
+        folders[path.parent.name.rsplit("_", 1)[0]].append(path.parent)
+    return dict(folders)
+
+
+# Archetype -> folders of its models.
+LANDMARKS = _folders()
+
+
+def add_landmark(out: Assembly, archetype: str, height: float) -> None:
+    """Adds one of the models of a landmark, drawn by lot.
+
+    A model is stretched to the lot and the height that are asked for.
+
+    Args:
+        out: the building, on a rectangle.
+        archetype: a key of `LANDMARKS`.
+        height: of the building [m].
+    """
+    x0, y0, x1, y1 = out.site.bounds
+    folder = pick(out.rng, LANDMARKS[archetype])
+    model = _read(folder)
+    lot, size = np.array((x1 - x0, y1 - y0)), np.array(model.size)
+    # What overhangs must not reach further out of a wider lot.
+    reach = np.where(lot > size, 2 * np.array(model.overhang), 0.0)
+    stretch = np.array([*(lot + reach) / (size + reach), height / model.height])
+    middle = np.array(((x0 + x1) / 2, (y0 + y1) / 2, 0.0))
+    for part in model.parts:
+        quarters = round(part.yaw / (np.pi / 2))
+        along = stretch[[1, 0, 2]] if quarters % 2 else stretch
+        path = folder / f"{part.mesh}.obj"
+        if path.exists():
+            name = f"{out.site.name}_{part.mesh}"
+            if name not in out.meshes:
+                out.define(part.mesh, _stretched(read_mesh(path), along))
+            shape = MeshShape(name)
+        else:
+            shape = out.shared(
+                part.mesh, triple(np.round(along * part.scale, 4))
+            )
+        out.place(
+            part.name, shape, middle + stretch * part.xyz, part.yaw, part.rgb
+        )
+
+
+@cache
+def _read(folder: Path) -> _Model:
+    text = (folder / "model.yaml").read_text(encoding="utf-8")
+    return _Model.model_validate(yaml.safe_load(text))
+
+
+def _stretched(mesh: Mesh, along: np.ndarray) -> Mesh:
+    """Returns a stretched mesh, its foundation as deep as it was."""
+    vertices = mesh.vertices * along
+    below = mesh.vertices[:, 2] < 0.0
+    vertices[below, 2] = mesh.vertices[below, 2]
+    return Mesh(vertices, mesh.faces)
