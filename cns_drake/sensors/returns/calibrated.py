@@ -16,7 +16,6 @@ from cns_drake.sensors.beam_pattern import BeamPattern, Beams
 from cns_drake.sensors.returns.counter_random import frame_key
 from cns_drake.sensors.returns.echo_choice import Echoes
 from cns_drake.sensors.returns.echoes import (
-    Light,
     Receiver,
     Reported,
     choice_of,
@@ -27,6 +26,7 @@ from cns_drake.sensors.returns.footprint import (
     find_edges,
     sub_directions,
 )
+from cns_drake.sensors.returns.light import Light
 from cns_drake.sensors.returns.materials import Materials
 from cns_drake.sensors.returns.propagation import (
     Ways,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 import math
 from typing import NamedTuple
 
@@ -11,6 +10,7 @@ import numpy as np
 from cns_drake.base.compiled import compiled
 from cns_drake.sensors.returns.counter_random import normal, uniform
 from cns_drake.sensors.returns.echo_choice import Echoes
+from cns_drake.sensors.returns.light import Light
 from cns_drake.sensors.returns.link_budget import (
     CERTAIN_SNR,
     LinkBudget,
@@ -37,42 +37,6 @@ _FULL_INTENSITY = 255.0
 
 _CHOICE = {one: number for number, one in enumerate(Echoes)}
 _FIRST, _STRONGEST, _LAST, _DUAL = range(4)
-
-
-class Light(NamedTuple):
-    """N parts of the light that comes back, sorted by beam and distance.
-
-    Attributes:
-        beam: (N,) int32.
-        distance: (N,) float64, as the unit sees it by the time of flight [m].
-        energy: (N,) float64: reflectivity, cosine of incidence, and the part
-            of the beam that got there and back.
-        geometry: (N,) int32 what sent it back.
-    """
-
-    beam: np.ndarray
-    distance: np.ndarray
-    energy: np.ndarray
-    geometry: np.ndarray
-
-    @classmethod
-    def sorted(
-        cls,
-        parts: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]],
-    ) -> Light:
-        """Returns the light of several parts, given as fields."""
-        beam, distance, energy, geometry = (
-            np.concatenate(values) for values in zip(*parts, strict=True)
-        )
-        unsorted = cls(
-            beam.astype(np.int32),
-            distance.astype(float),
-            energy.astype(float),
-            geometry.astype(np.int32),
-        )
-        order = np.zeros(len(beam), np.int64)
-        _sort(unsorted.beam, unsorted.distance, order)
-        return cls(*(values[order] for values in unsorted))
 
 
 class Receiver(NamedTuple):
@@ -113,28 +77,6 @@ class Reported(NamedTuple):
     distance: np.ndarray
     intensity: np.ndarray
     geometry: np.ndarray
-
-
-@compiled
-def _sort(beam: np.ndarray, distance: np.ndarray, order: np.ndarray) -> None:
-    """Fills in the order by beam and distance; equal ones keep theirs."""
-    if not len(beam):
-        return
-    begin = np.zeros(beam.max() + 2, np.int64)
-    for one in beam:
-        begin[one + 1] += 1
-    begin = np.cumsum(begin)
-    size = np.zeros(len(begin), np.int64)
-    for i in range(len(beam)):
-        # The few of a beam, by insertion.
-        place = begin[beam[i]] + size[beam[i]]
-        size[beam[i]] += 1
-        while (
-            place > begin[beam[i]] and distance[order[place - 1]] > distance[i]
-        ):
-            order[place] = order[place - 1]
-            place -= 1
-        order[place] = i
 
 
 def choice_of(echoes: Echoes) -> int:

@@ -1,0 +1,68 @@
+"""The light that comes back along the beams of a turn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from cns_drake.base.compiled import compiled
+
+
+class Light(NamedTuple):
+    """N parts of the light that comes back, sorted by beam and distance.
+
+    Attributes:
+        beam: (N,) int32.
+        distance: (N,) float64, as the unit sees it by the time of flight [m].
+        energy: (N,) float64: reflectivity, cosine of incidence, and the part
+            of the beam that got there and back.
+        geometry: (N,) int32 what sent it back.
+    """
+
+    beam: np.ndarray
+    distance: np.ndarray
+    energy: np.ndarray
+    geometry: np.ndarray
+
+    @classmethod
+    def sorted(
+        cls,
+        parts: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]],
+    ) -> Light:
+        """Returns the light of several parts, given as fields."""
+        beam, distance, energy, geometry = (
+            np.concatenate(values) for values in zip(*parts, strict=True)
+        )
+        unsorted = cls(
+            beam.astype(np.int32),
+            distance.astype(float),
+            energy.astype(float),
+            geometry.astype(np.int32),
+        )
+        order = np.zeros(len(beam), np.int64)
+        _sort(unsorted.beam, unsorted.distance, order)
+        return cls(*(values[order] for values in unsorted))
+
+
+@compiled
+def _sort(beam: np.ndarray, distance: np.ndarray, order: np.ndarray) -> None:
+    """Fills in the order by beam and distance; equal ones keep theirs."""
+    if not len(beam):
+        return
+    begin = np.zeros(beam.max() + 2, np.int64)
+    for one in beam:
+        begin[one + 1] += 1
+    begin = np.cumsum(begin)
+    size = np.zeros(len(begin), np.int64)
+    for i in range(len(beam)):
+        # The few of a beam, by insertion.
+        place = begin[beam[i]] + size[beam[i]]
+        size[beam[i]] += 1
+        while (
+            place > begin[beam[i]] and distance[order[place - 1]] > distance[i]
+        ):
+            order[place] = order[place - 1]
+            place -= 1
+        order[place] = i
