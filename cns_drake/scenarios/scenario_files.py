@@ -33,6 +33,8 @@ def world_file(scenario: Scenario) -> Path:
 def check_files(scenario: Scenario, source: object = None) -> None:
     """Checks that the map and its stage, or the other files, exist.
 
+    With traffic the map needs roads.
+
     Args:
         scenario: what names them.
         source: the file that errors begin with; by default the scenario's.
@@ -51,7 +53,12 @@ def check_files(scenario: Scenario, source: object = None) -> None:
                 f"{source}: imu.kalibr: {scenario.imu.kalibr}: no such file"
             )
         imu_rate(scenario)
+    has_traffic = not scenario.traffic.is_off
     if scenario.map is None:
+        if has_traffic:
+            raise InputError(
+                f"{source}: traffic: a world has no roads; give a map with some"
+            )
         return
     folder = map_folder(scenario)
     if not os.path.isdir(folder.path):
@@ -65,6 +72,11 @@ def check_files(scenario: Scenario, source: object = None) -> None:
         raise InputError(
             f"{source}: stage: map '{scenario.map}' has no stage "
             f"'{scenario.stage}'; it has: {stages}"
+        )
+    if has_traffic and not os.path.isfile(folder.roads):
+        raise InputError(
+            f"{source}: traffic: the map has no roads: {folder.roads}: no such "
+            "file"
         )
 
 

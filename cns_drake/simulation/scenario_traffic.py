@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-import os
 
 import numpy as np
 
@@ -12,11 +11,14 @@ from cns_drake.motion.trajectory import Trajectory
 from cns_drake.recording.frame_clock import FRAME_PERIOD
 from cns_drake.roads.network import load_road_network
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import map_folder
+from cns_drake.scenarios.scenario_files import check_files, map_folder
 from cns_drake.scene.world import World
 from cns_drake.traffic.presence import EgoBox
 from cns_drake.traffic.road_lanes import make_lane_graph
-from cns_drake.traffic.starting_places import room_for_vehicles
+from cns_drake.traffic.starting_places import (
+    room_for_vehicles,
+    room_for_walkers,
+)
 from cns_drake.traffic.traffic_adding import traffic_structures
 from cns_drake.traffic.traffic_plan import TrafficPlan, plan_traffic
 from cns_drake.traffic.walkways import make_walkways
@@ -46,14 +48,8 @@ def plan_scenario_traffic(
     """
     wanted = scenario.traffic
     where = f"{scenario.source}: traffic"
-    if scenario.world is not None:
-        raise InputError(f"{where}: a world has no roads; give a map with some")
-    roads = map_folder(scenario).roads
-    if not os.path.isfile(roads):
-        raise InputError(
-            f"{where}: the map has no roads: {roads}: no such file"
-        )
-    network = load_road_network(roads)
+    check_files(scenario)
+    network = load_road_network(map_folder(scenario).roads)
     graph = make_lane_graph(network)
     room = room_for_vehicles(graph)
     if wanted.vehicles > room:
@@ -62,8 +58,14 @@ def plan_scenario_traffic(
             f"{room}"
         )
     walkways = make_walkways(network, graph)
-    if wanted.walkers and not walkways:
+    room = room_for_walkers(walkways)
+    if wanted.walkers and not room:
         raise InputError(f"{where}: walkers: the map has no sidewalks")
+    if wanted.walkers > room:
+        raise InputError(
+            f"{where}: walkers: {wanted.walkers} asked for, the sidewalks hold "
+            f"{room}"
+        )
 
     def ego(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         R_WB, p_WB = trajectory.poses(np.minimum(t, trajectory.duration))

@@ -25,6 +25,8 @@ from cns_drake.traffic.walkways import Walkway
 _SPACE = 9.0
 # Vehicles begin with this part of what may be driven.
 _PART_OF_SPEED = 0.5
+# So much of a sidewalk holds one walker [m].
+_WALKER_SPACE = 3.0
 # As many places are drawn before a vehicle is given up.
 _TRIES = 200
 
@@ -36,6 +38,16 @@ def room_for_vehicles(graph: LaneGraph) -> int:
     return int(
         sum(graph.pieces[k].length // (mean + 2 * _SPACE) for k in graph.lanes)
     )
+
+
+def room_for_walkers(walkways: Sequence[Walkway]) -> int:
+    """Returns how many walkers sidewalks hold so that all can walk."""
+    length = sum(
+        np.linalg.norm(np.diff(way.points, axis=0), axis=1).sum()
+        for way in walkways
+        if way.crossing < 0
+    )
+    return int(length // _WALKER_SPACE)
 
 
 def place_vehicles(

@@ -1,0 +1,90 @@
+"""Traffic that a scenario asks for and its map cannot hold."""
+
+import re
+
+from helpers.small_city import ROADS
+from helpers.small_map import write_small_map
+from helpers.tiny_drive import tiny_scenario, write_scenario
+import pytest
+
+from cns_drake.base.errors import InputError
+from cns_drake.scenarios.planning import plan_drive
+from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.traffic_config import TrafficConfig
+from cns_drake.simulation.loaded_drive import load_drive
+from cns_drake.simulation.scenario_traffic import plan_scenario_traffic
+
+
+@pytest.fixture
+def town(tmp_path):
+    folder = write_small_map(tmp_path / "town")
+    (folder / "roads.yaml").write_text(ROADS)
+    return folder
+
+
+def scenario_of(town, **traffic):
+    place = {"world": None, "map": str(town), "stage": "04"}
+    return tiny_scenario(town.parent, traffic=traffic, frames=2, **place)
+
+
+def fault(scenario, **traffic):
+    """Returns the one line by which so much traffic is refused."""
+    wanted = TrafficConfig(**traffic)
+    with pytest.raises(InputError) as error:
+        load_drive(scenario.model_copy(update={"traffic": wanted}))
+    assert "\n" not in str(error.value)
+    return str(error.value)
+
+
+def test_a_world_has_no_roads(tmp_path):
+    scenario = tiny_scenario(tmp_path)
+    expected = "tiny_01: traffic: a world has no roads; give a map with some"
+    assert fault(scenario, vehicles=1) == expected
+    # Not even where a file of that name lies beside the world.
+    (tmp_path / "roads.yaml").write_text(ROADS)
+    assert fault(scenario, vehicles=1) == expected
+    with pytest.raises(InputError, match=re.escape(expected)):
+        plan_scenario_traffic(scenario.with_traffic(1), plan_drive(scenario))
+    # A file is refused when it is read.
+    file = write_scenario(scenario.with_traffic(1), tmp_path)
+    with pytest.raises(InputError, match=f"{file}: traffic: a world has no"):
+        load_scenario(file)
+
+
+def test_a_map_without_roads(town):
+    scenario = scenario_of(town)
+    roads = town / "roads.yaml"
+    roads.unlink()
+    assert fault(scenario, walkers=1) == (
+        f"tiny_01: traffic: the map has no roads: {roads}: no such file"
+    )
+
+
+def test_a_map_without_sidewalks(town):
+    (town / "roads.yaml").write_text(
+        ROADS.replace("sidewalk: 3.0", "sidewalk: 0.5")
+    )
+    assert fault(scenario_of(town), walkers=1) == (
+        "tiny_01: traffic: walkers: the map has no sidewalks"
+    )
+
+
+@pytest.mark.parametrize(
+    ("who", "where"), [("vehicles", "roads"), ("walkers", "sidewalks")]
+)
+def test_too_many_and_as_many_as_possible(town, who, where):
+    """What the line says there is room for is really accepted."""
+    text = fault(scenario_of(town), **{who: 2000})
+    found = re.fullmatch(
+        rf"tiny_01: traffic: {who}: 2000 asked for, the {where} hold (\d+)",
+        text,
+    )
+    room = int(found[1])
+    assert f" {room + 1} asked for" in fault(
+        scenario_of(town), **{who: room + 1}
+    )
+    scenario = scenario_of(town, **{who: room})
+    plan = plan_scenario_traffic(scenario, plan_drive(scenario))
+    count = len(plan.kinds) + plan.walkers.values.shape[1]
+    assert count + plan.left_out == room
+    assert count > room // 2
