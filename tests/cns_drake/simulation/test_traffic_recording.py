@@ -1,0 +1,123 @@
+"""Recordings with traffic: interrupted, cut short, exported."""
+
+import shutil
+
+from helpers.small_city import ROADS
+from helpers.small_map import write_small_map
+from helpers.tiny_drive import tiny_scenario
+from mcap.reader import make_reader
+import numpy as np
+import pytest
+
+from cns_drake.base.recordings.mcap_sequence import McapSequence
+from cns_drake.export.exporting import export_sequence
+from cns_drake.scene.semantics import MOVING_IDS
+from cns_drake.simulation.simulation import simulate
+
+pytestmark = pytest.mark.slow
+
+# More than a chunk of the recording holds.
+FRAMES = 30
+UNIT = {
+    "preset": "vlp-16",
+    "columns": 64,
+    "range_noise": 0.02,
+    "motion_distortion": True,
+}
+
+
+@pytest.fixture(scope="module")
+def scenario(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("traffic")
+    town = write_small_map(folder / "town")
+    (town / "roads.yaml").write_text(ROADS)
+    # The ids of traffic follow this one: they need more than a byte.
+    with (town / "structures.csv").open("a") as table:
+        table.write("300,mast,pole\n")
+    return tiny_scenario(
+        folder,
+        world=None,
+        map=str(town),
+        stage="04",
+        traffic={"vehicles": 20, "walkers": 60},
+        lidars={"lidar": UNIT},
+        frames=FRAMES,
+    )
+
+
+@pytest.fixture(scope="module")
+def recording(scenario, tmp_path_factory):
+    # As deep as others: the way to the map is recorded.
+    return simulate(scenario, tmp_path_factory.mktemp("whole")).folder
+
+
+@pytest.fixture(scope="module")
+def moving(recording):
+    """Instance -> label of what moves in any scan of the recording."""
+    found = {}
+    for scan in McapSequence(recording):
+        rows = scan[scan["label"] >= min(MOVING_IDS.values())]
+        found.update(
+            zip(rows["instance"].tolist(), rows["label"].tolist(), strict=True)
+        )
+    return found
+
+
+def messages(folder):
+    """Returns topic, time and bytes of all messages."""
+    path = folder / f"{folder.name}_0.mcap"
+    with path.open("rb") as stream:
+        return [
+            (channel.topic, message.log_time, message.data)
+            for _, channel, message in make_reader(stream).iter_messages()
+        ]
+
+
+def test_a_resumed_recording_has_the_same_bytes(scenario, recording, tmp_path):
+    name = recording.name
+    mcap = (recording / f"{name}_0.mcap").read_bytes()
+    resumed = []
+    for k, part in enumerate((0.95, 1.0)):
+        folder = tmp_path / str(k) / name
+        folder.mkdir(parents=True)
+        (folder / f"{name}_0.mcap.part").write_bytes(
+            mcap[: int(part * len(mcap))]
+        )
+        shutil.copy(
+            recording / "fingerprint.txt", folder / "fingerprint.txt.part"
+        )
+        resumed.append(simulate(scenario, folder.parent).resumed_frames)
+        assert (folder / f"{name}_0.mcap").read_bytes() == mcap
+    assert resumed[-1] == FRAMES
+    assert 0 < min(resumed) < FRAMES
+
+
+def test_a_shorter_recording_begins_alike(scenario, recording, tmp_path):
+    """The plan of traffic is that of the whole drive."""
+    short = scenario.model_copy(update={"frames": 5})
+    cut = messages(simulate(short, tmp_path).folder)
+    whole = messages(recording)
+    assert {topic for topic, _, _ in cut} >= {"/objects", "/lidar/points"}
+    assert cut == [one for one in whole if one[1] <= cut[-1][1]]
+
+
+def test_kitti_has_moving_labels_and_instances(recording, moving, tmp_path):
+    # Cars and people are seen, and a class that needs more than a byte.
+    assert {252, 254} < set(moving.values())
+    assert max(moving.values()) > 255
+    assert min(moving) > 300
+    folder = export_sequence(recording, "kitti", tmp_path)
+    drive = McapSequence(recording)
+    names = {i: one["class"] for i, one in drive.instances.items()}
+    for instance, label in moving.items():
+        assert label == MOVING_IDS[names[instance]]
+    exported = {}
+    for k, scan in enumerate(drive):
+        stored = np.fromfile(folder / f"labels/{k:06d}.label", "<u4")
+        np.testing.assert_array_equal(stored & 0xFFFF, scan["label"])
+        np.testing.assert_array_equal(stored >> 16, scan["instance"])
+        rows = stored[(stored & 0xFFFF) >= 252]
+        exported.update(
+            zip((rows >> 16).tolist(), (rows & 0xFFFF).tolist(), strict=True)
+        )
+    assert exported == moving
