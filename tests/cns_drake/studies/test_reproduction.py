@@ -48,6 +48,7 @@ def planned(monkeypatch):
 
     def assemble(recordings, output, methods, pages, **options):
         del options["reference"]  # None is there for this town.
+        assert callable(options.pop("on_note"))
         assert options == {"protocol": PAPER_PROTOCOL, "with_costs": False}
         runs[-1]["recordings"] = {one.name: one for one in recordings}
         runs[-1]["pages"] = pages
