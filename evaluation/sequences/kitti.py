@@ -86,9 +86,16 @@ class KittiSequence(FileSequence):
         check_increasing(times_path, stamps_ns, "row")
         poses_path = _poses_path(path)
         X_C0C = _read_poses(poses_path)
+        rows = len(stamps_ns), len(X_C0C)
         notes: list[str] = []
         stamps_ns = _rows_of_scans(times_path, stamps_ns, numbers, notes)
         X_C0C = _rows_of_scans(poses_path, X_C0C, numbers, notes)
+        # With gaps, one table may have a row a number, the other a row a scan.
+        gaps = numbers != list(range(len(files)))
+        if rows[0] != rows[1] and not gaps:
+            raise InputError(
+                f"{poses_path}: {rows[1]} rows, but {rows[0]} in {times_path}"
+            )
         calibration = path / "calib.txt"
         X_CS = np.eye(4)
         if calibration.exists():

@@ -226,6 +226,12 @@ def replace(name, old, new):
     return change
 
 
+def repeat_pose(root, folder):
+    path = root / "poses" / "07.txt"
+    path.write_text(path.read_text() + path.read_text().splitlines()[-1])
+    return path
+
+
 def eleven_columns(root, folder):
     path = root / "poses" / "07.txt"
     lines = path.read_text().splitlines()
@@ -243,6 +249,7 @@ def eleven_columns(root, folder):
         (replace("times.txt", "1.036224e-01", "1.03e-0-1"), "no time"),
         (replace("poses", "1.0", "5.0"), "row 1: no rotation"),
         (replace("poses", "1.0", "nan"), "row 1: a number is not finite"),
+        (repeat_pose, "7 rows, but 6 in .*times.txt"),
         (eleven_columns, "rows of 11 numbers instead of 12"),
         (replace("calib.txt", "Tr:", "Tr_velo_to_cam:"), "Tr: missing"),
         (replace("calib.txt", "Tr: ", "Tr: 0 "), "Tr: 13 numbers"),
