@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 import functools
 import hashlib
-import os
 from pathlib import Path
 from typing import TypeVar
 
 import numba
+
+from cns_drake.base.cache_folder import cache_folder
 
 _Function = TypeVar("_Function", bound=Callable)
 
@@ -27,7 +28,7 @@ def compiled(function: _Function) -> _Function:
     before = numba.config.CACHE_DIR
     own_folder = Path(function.__code__.co_filename).parent
     numba.config.CACHE_DIR = str(
-        Path(before or _cache_folder()) / _state_of(own_folder)
+        Path(before or cache_folder() / "compiled") / _state_of(own_folder)
     )
     try:
         return numba.njit(cache=True, nogil=True)(function)
@@ -43,10 +44,3 @@ def _state_of(folder: Path) -> str:
     files = sorted(folder.glob("*.py"))
     stamps = [(f.name, f.stat().st_size, f.stat().st_mtime_ns) for f in files]
     return hashlib.sha256(repr(stamps).encode()).hexdigest()[:16]
-
-
-def _cache_folder() -> Path:
-    """Returns where the XDG base directory specification has it."""
-    base = os.environ.get("XDG_CACHE_HOME", "")
-    folder = Path(base) if os.path.isabs(base) else Path("~/.cache")
-    return Path(os.path.expanduser(folder)) / "cns-drake" / "compiled"

@@ -1,3 +1,3 @@
 """The version of the release, which recordings and reports carry."""
 
-__version__ = "0.1.0"
+__version__ = "1.0.0"

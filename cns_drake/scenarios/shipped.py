@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 
 from cns_drake.base.map_folder import MapFolder, sequence_name
+from cns_drake.scenarios.worlds_archive import unpacked
 
 
+@functools.cache
 def worlds_folder() -> Path:
     """Returns the folder of shipped maps.
 
-    In a wheel it lies inside the package, in a checkout beside it.
+    In a checkout it lies beside the package. A wheel has an archive of it,
+    which is unpacked to the user's cache.
+
+    Raises:
+        InputError: if the cache cannot be written.
     """
     package = Path(__file__).resolve().parents[1]
-    inside = package / "worlds"
-    return inside if inside.is_dir() else package.parent / "worlds"
+    archive = package / "worlds.tar.xz"
+    return unpacked(archive) if archive.exists() else package.parent / "worlds"
 
 
 def vehicle_file() -> Path:

@@ -156,8 +156,10 @@ def test_dependencies():
 def test_what_is_installed_is_what_ci_installs():
     script = (documents.ROOT / ".ci/run").read_text()
     (command,) = (code for code in CODES if code.startswith("apt install "))
+    image = (documents.ROOT / "Dockerfile").read_text()
     for package in command.split()[2:]:
         assert f" {package} " in script
+        assert f" {package} " in image
     assert "npm ci" in script
     # It takes the line itself out of the README.
     pattern = re.search(r"grep -m1 '([^']+)' README\.md", script)[1]

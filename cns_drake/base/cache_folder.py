@@ -1,0 +1,16 @@
+"""Where a user's machine keeps what can be made again."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+
+def cache_folder() -> Path:
+    """Returns cns-drake's folder in the cache of the user.
+
+    Source: the XDG base directory specification. The folder may not exist.
+    """
+    base = os.environ.get("XDG_CACHE_HOME", "")
+    folder = Path(base) if os.path.isabs(base) else Path("~/.cache")
+    return Path(os.path.expanduser(folder)) / "cns-drake"

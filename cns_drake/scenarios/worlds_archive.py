@@ -1,0 +1,53 @@
+"""Unpacking of the shipped worlds, which a wheel holds as one archive."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+import shutil
+import tarfile
+import tempfile
+
+from cns_drake.base.cache_folder import cache_folder
+from cns_drake.base.errors import InputError
+
+
+def unpacked(archive: Path) -> Path:
+    """Returns a folder with the files of an archive; it is unpacked once.
+
+    The folder is in the user's cache, and its name has a digest of the
+    archive: each release has its own. Processes may call this side by side.
+
+    Args:
+        archive: a tar file, compressed in any way.
+
+    Raises:
+        InputError: if the cache cannot be written.
+    """
+    digest = hashlib.sha256(archive.read_bytes()).hexdigest()[:16]
+    folder = cache_folder() / f"{archive.name.partition('.')[0]}-{digest}"
+    if not folder.is_dir():
+        try:
+            _unpack(archive, folder)
+        except OSError as error:
+            raise InputError(
+                f"{folder}: {error.strerror or error}; the shipped worlds are "
+                "unpacked there: name another folder in XDG_CACHE_HOME"
+            ) from error
+    return folder
+
+
+def _unpack(archive: Path, folder: Path) -> None:
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    part = Path(tempfile.mkdtemp(prefix=f"{folder.name}.", dir=folder.parent))
+    try:
+        with tarfile.open(archive) as tar:
+            tar.extractall(part, filter="data")
+        part.chmod(0o755)
+        try:
+            part.rename(folder)
+        except OSError:
+            if not folder.is_dir():  # Else another process was faster.
+                raise
+    finally:
+        shutil.rmtree(part, ignore_errors=True)

@@ -1,0 +1,76 @@
+"""The wheel is small, and runs the main job where there is no checkout."""
+
+import os
+from pathlib import Path
+import subprocess
+import sys
+import venv
+import zipfile
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("wheel")
+    run(
+        *(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps"),
+        *("--no-build-isolation", "--wheel-dir", folder, ROOT),
+    )
+    (wheel,) = folder.glob("*.whl")
+    return wheel
+
+
+def run(*command, **options):
+    done = subprocess.run(
+        list(map(str, command)), capture_output=True, text=True, **options
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.mark.slow
+def test_it_is_small_and_has_its_notices(wheel):
+    assert wheel.stat().st_size < 10e6
+    with zipfile.ZipFile(wheel) as files:
+        names = {Path(name).name for name in files.namelist()}
+        (metadata,) = (n for n in files.namelist() if n.endswith("/METADATA"))
+        said = files.read(metadata).decode()
+    assert {"LICENSE", "NOTICE.md", "py.typed"} <= names
+    assert "\nLicense-Expression: BSD-3-Clause\n" in said
+    assert "\nVersion: 1.0.0\n" in said
+
+
+@pytest.mark.slow
+def test_it_runs_the_main_job_without_the_checkout(wheel, tmp_path):
+    venv.create(tmp_path / "venv", symlinks=True)
+    (site,) = (tmp_path / "venv").glob("lib/*/site-packages")
+    # What the package needs, but not the package of the checkout.
+    needed = [path for path in sys.path if path.endswith("-packages")]
+    (site / "needed.pth").write_text("\n".join(needed) + "\n")
+    python = tmp_path / "venv/bin/python"
+    pip = (sys.executable, "-m", "pip", "--python", python, "install")
+    run(*pip, "--quiet", "--no-deps", "--force-reinstall", wheel)
+    options = {
+        "cwd": tmp_path,
+        "env": {
+            "PATH": os.environ["PATH"],
+            "HOME": str(tmp_path),
+            "XDG_CACHE_HOME": str(tmp_path / "cache"),
+        },
+    }
+    where = run(
+        python, "-c", "import cns_drake; print(cns_drake.__file__)", **options
+    )
+    assert where.startswith(str(site))
+    run(
+        *(python, "-m", "cns_drake", "simulate", "metropolis_04"),
+        *("--frames", "2", "--output", "output"),
+        **options,
+    )
+    drive = "output/metropolis_04"
+    said = run(tmp_path / "venv/bin/cns-eval", "tcr", drive, drive, **options)
+    assert "TCR_sym" in said
+    assert list(tmp_path.glob("cache/cns-drake/worlds-*/metropolis/roads.yaml"))
