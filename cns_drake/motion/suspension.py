@@ -10,7 +10,6 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import PrismaticJoint
-from scipy.signal import cont2discrete
 
 from cns_drake.base.errors import InputError, describe_validation_error
 from cns_drake.base.yaml_files import read_yaml
@@ -217,6 +216,9 @@ class Suspension:
         )
         D = np.zeros((len(C), B.shape[1]))
         D[-NUM_COORDINATES:] = B[rates]
+        # Slow to import, and needed by drives with a ride alone.
+        from scipy.signal import cont2discrete
+
         A, B, C, D, _ = cont2discrete((A, B, C, D), step, method="foh")
         driven = inputs @ B.T
         states = np.empty((len(inputs), 2 * size))

@@ -22,7 +22,6 @@ import math
 from typing import Literal
 
 import numpy as np
-from scipy.stats import rankdata
 
 from evaluation.recognition.ranking import ranking
 
@@ -97,8 +96,13 @@ class QueryOutcomes:
         if num_with == 0 or num_without == 0:
             return math.nan
         scores = np.where(np.isnan(self.best_scores), -np.inf, self.best_scores)
-        # The sum of ranks is that of Mann and Whitney's U.
-        ranks = rankdata(scores)[self.has_match].sum()
+        # The sum of ranks is that of Mann and Whitney's U; equal scores share
+        # the mean of their ranks.
+        _, of_score, counts = np.unique(
+            scores, return_inverse=True, return_counts=True
+        )
+        mean_ranks = np.cumsum(counts) - 0.5 * (counts - 1)
+        ranks = mean_ranks[of_score][self.has_match].sum()
         wins = ranks - 0.5 * num_with * (num_with + 1)
         return float(wins / (num_with * num_without))
 

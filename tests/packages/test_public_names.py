@@ -49,6 +49,20 @@ def test_importing_a_package_loads_nothing_heavy(package):
     assert {"numpy", "pydrake", "pydantic", "typer"}.isdisjoint(loaded)
 
 
+@pytest.mark.parametrize(
+    "module",
+    ["cns_drake.simulation.simulation", "evaluation.study.measurements"],
+)
+def test_jobs_start_without_slow_statistics(module):
+    # Each job is a process of its own: what its modules load is paid often.
+    code = f"import {module}, sys; print(*sys.modules)"
+    loaded = subprocess.check_output(
+        [sys.executable, "-c", code], cwd=ROOT, text=True
+    ).split()
+    assert module in loaded
+    assert {"scipy.stats", "scipy.signal", "matplotlib"}.isdisjoint(loaded)
+
+
 @pytest.mark.parametrize("package", PACKAGES)
 def test_type_checkers_see_the_same_names(package):
     tree = ast.parse((ROOT / package / "__init__.py").read_text())
