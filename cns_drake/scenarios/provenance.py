@@ -85,8 +85,13 @@ def digest_inputs(scenario: Scenario) -> dict[str, str]:
         inputs["suspension"] = suspension_file()
     if scenario.waypoints is not None:
         inputs["waypoints"] = Path(scenario.waypoints)
-    if scenario.waypoints is None or not scenario.traffic.is_off:
-        inputs["roads"] = map_folder(scenario).roads
+    roads = map_folder(scenario).roads
+    if (
+        scenario.waypoints is None
+        or not scenario.traffic.is_off
+        or (not scenario.transient.is_off and roads.is_file())
+    ):
+        inputs["roads"] = roads
     digests = {name: digest_file(path) for name, path in inputs.items()}
     kalibr = describe_kalibr(scenario)
     if kalibr is not None:

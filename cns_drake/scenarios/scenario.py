@@ -8,11 +8,13 @@ from typing import Annotated, Literal
 from pydantic import (
     Field,
     PrivateAttr,
+    ValidationError,
     ValidationInfo,
     field_validator,
     model_validator,
 )
 
+from cns_drake.base.errors import InputError, describe_validation_error
 from cns_drake.motion.speeds import Speeds
 from cns_drake.roads.route import Route
 from cns_drake.scenarios.alternatives import (
@@ -27,6 +29,7 @@ from cns_drake.scenarios.rates import check_rate, fastest_rate
 from cns_drake.scenarios.ride_config import RideConfig
 from cns_drake.scenarios.section import Name, Section, field_off_by_default
 from cns_drake.scenarios.traffic_config import TrafficConfig
+from cns_drake.scenarios.transient_config import TransientConfig
 from cns_drake.scenarios.weather_config import WeatherConfig
 from cns_drake.sensors.returns.echo_choice import Echoes
 
@@ -58,6 +61,7 @@ class Scenario(Section):
         speeds: how fast.
         ride: how springs and the road move the body.
         traffic: who else moves.
+        transient: what came and went since the stage was built.
         lidars: the LiDARs by name; the name gives frame and topic.
         imu: the IMU.
         weather: fog, rain and snowfall, for LiDARs with calibrated returns.
@@ -107,6 +111,9 @@ class Scenario(Section):
     speeds: Speeds
     ride: RideConfig = field_off_by_default(RideConfig())
     traffic: TrafficConfig = field_off_by_default(TrafficConfig())
+    transient: TransientConfig = Field(
+        default=TransientConfig(), exclude_if=lambda value: value.is_off
+    )
     lidars: dict[Name, LidarConfig] = Field(
         default={"lidar": LidarConfig()}, min_length=1
     )
@@ -202,6 +209,23 @@ class Scenario(Section):
             vehicles=number, walkers=number, seed=self.traffic.seed
         )
         return self.model_copy(update={"traffic": traffic})
+
+    def with_transient(self, **changes: float) -> Scenario:
+        """Returns the scenario with some switches of `transient` set.
+
+        Raises:
+            InputError: there is no such switch, or its value is not usable.
+        """
+        values = self.transient.model_dump() | changes
+        try:
+            transient = TransientConfig.model_validate(values)
+        except ValidationError as error:
+            raise InputError(
+                describe_validation_error(
+                    f"{self.source}: transient", error, TransientConfig
+                )
+            ) from None
+        return self.model_copy(update={"transient": transient})
 
     def with_lidar_preset(self, preset: str) -> Scenario:
         """Returns the scenario with the unit of every LiDAR replaced.

@@ -24,12 +24,15 @@ class StructureEntry:
         semantic_class: a key of `CLASS_IDS`.
         reflectivity: of its surfaces near 900 nm, 0 to 1; None where its
             class and colours say it.
+        causes: why it is not as it is in the stage's file: switches of a
+            scenario's `transient`.
     """
 
     instance: int
     name: str
     semantic_class: str
     reflectivity: float | None = None
+    causes: tuple[str, ...] = ()
 
     @property
     def label(self) -> int:

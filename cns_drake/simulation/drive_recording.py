@@ -107,6 +107,7 @@ def _structure_list(world: World) -> list[dict]:
             "name": entry.name,
             "class": entry.semantic_class,
             "label": entry.label,
+            **({"causes": list(entry.causes)} if entry.causes else {}),
         }
         for entry in world.structures
     ]

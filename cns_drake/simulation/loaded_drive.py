@@ -26,7 +26,7 @@ from cns_drake.simulation.scenario_traffic import (
     plan_scenario_traffic,
     with_traffic,
 )
-from cns_drake.simulation.station import load_stage
+from cns_drake.simulation.stage_loading import load_stage
 from cns_drake.traffic.traffic_plan import TrafficPlan
 
 
@@ -71,7 +71,7 @@ def load_drive(scenario: Scenario) -> LoadedDrive:
     trajectory = plan_drive(scenario)
     num_frames = count_frames(scenario, trajectory)
     scenario = scenario.model_copy(update={"frames": num_frames})
-    world = load_stage(scenario)
+    world = load_stage(scenario, trajectory=trajectory)
     traffic = None
     if not scenario.traffic.is_off:
         traffic = plan_scenario_traffic(scenario, trajectory)

@@ -18,19 +18,18 @@ from cns_drake.scenarios.provenance import digest_inputs
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import (
     check_files,
-    world_file,
 )
 from cns_drake.scenarios.sensor_making import (
     make_measurement,
     make_pattern,
 )
-from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar import Lidar
 from cns_drake.simulation.planned_sequence import PlannedSequence
 from cns_drake.simulation.scenario_traffic import (
     plan_scenario_traffic,
     with_traffic,
 )
+from cns_drake.simulation.stage_loading import load_stage
 from cns_drake.simulation.still_world import make_still_world
 from cns_drake.traffic.traffic_adding import make_traffic
 
@@ -81,7 +80,7 @@ class SimulatedSequence(PlannedSequence):
         measurement = make_measurement(config, name, scenario.seed)
         self._is_random = measurement.is_random
         # No LiDAR sees the vehicle that carries it.
-        world = load_world(world_file(scenario), without=scenario.without)
+        world = load_stage(scenario, with_vehicle=False, trajectory=trajectory)
         traffic = None
         if not scenario.traffic.is_off:
             plan = plan_scenario_traffic(scenario, trajectory)

@@ -38,7 +38,8 @@ from cns_drake.simulation.run_progress import (
     ProgressCallback,
     Run,
 )
-from cns_drake.simulation.station import load_stage, make_station
+from cns_drake.simulation.stage_loading import load_stage
+from cns_drake.simulation.station import make_station
 
 
 def simulate(

@@ -22,10 +22,8 @@ from cns_drake.scenarios.recording_schedule import (
     point_layouts,
 )
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import world_file
 from cns_drake.scenarios.sensor_making import sensor_pose
-from cns_drake.scenarios.shipped import vehicle_file
-from cns_drake.scene.world import World, load_world
+from cns_drake.scene.world import World
 from cns_drake.sensors.odometry import add_odometry
 from cns_drake.simulation.imu_applying import apply_imu_config
 from cns_drake.simulation.lidar_applying import apply_lidar_config
@@ -33,6 +31,7 @@ from cns_drake.simulation.scenario_traffic import (
     plan_scenario_traffic,
     with_traffic,
 )
+from cns_drake.simulation.stage_loading import load_stage
 from cns_drake.traffic.traffic_adding import add_traffic
 from cns_drake.traffic.traffic_plan import TrafficPlan
 
@@ -82,8 +81,8 @@ def make_station(
         context = diagram.CreateDefaultContext()
         scan = diagram.GetOutputPort("lidar_scan").Eval(context)
     """
-    world = world or load_stage(scenario)
     trajectory = trajectory or plan_drive(scenario)
+    world = world or load_stage(scenario, trajectory=trajectory)
     if traffic is None and not scenario.traffic.is_off:
         traffic = plan_scenario_traffic(scenario, trajectory)
         world = with_traffic(world, traffic)
@@ -161,13 +160,6 @@ def make_station(
     diagram = builder.Build()
     diagram.set_name(scenario.name)
     return diagram
-
-
-def load_stage(scenario: Scenario) -> World:
-    """Loads the stage of a scenario with the vehicle in it."""
-    return load_world(
-        world_file(scenario), vehicle=vehicle_file(), without=scenario.without
-    )
 
 
 def _connect(

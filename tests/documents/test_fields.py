@@ -19,6 +19,7 @@ from cns_drake.scenarios.lidar_config import LidarConfig
 from cns_drake.scenarios.odometry_config import OdometryConfig
 from cns_drake.scenarios.ride_config import RideConfig
 from cns_drake.scenarios.traffic_config import TrafficConfig
+from cns_drake.scenarios.transient_config import TransientConfig
 from cns_drake.scenarios.weather_config import WeatherConfig
 from cns_drake.sensors.lidar_presets import LIDAR_PRESETS
 from evaluation.methods import MethodConfig, make_method, shipped_methods
@@ -48,6 +49,7 @@ TABLES = [
     ("scenarios", "### Speeds", Speeds, None),
     ("scenarios", "### Ride", RideConfig, None),
     ("scenarios", "### Traffic", TrafficConfig, None),
+    ("scenarios", "### Transient", TransientConfig, None),
     ("scenarios", "### LiDARs", LidarConfig, None),
     ("scenarios", "### Weather", WeatherConfig, None),
     ("scenarios", "### IMU", ImuConfig, None),

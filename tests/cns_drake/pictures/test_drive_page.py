@@ -21,7 +21,8 @@ from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.scenarios.sensor_making import sensor_pose
 from cns_drake.scene.world import load_world
-from cns_drake.simulation.station import load_stage, make_station
+from cns_drake.simulation.stage_loading import load_stage
+from cns_drake.simulation.station import make_station
 
 PERIOD = 0.5
 NUM_FRAMES = 21

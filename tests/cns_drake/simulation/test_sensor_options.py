@@ -10,7 +10,8 @@ from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_loading import make_scenario
 from cns_drake.scenarios.sensor_making import make_pattern, sensor_pose
 from cns_drake.simulation.simulation import simulate
-from cns_drake.simulation.station import load_stage, make_station
+from cns_drake.simulation.stage_loading import load_stage
+from cns_drake.simulation.station import make_station
 from evaluation.sequences import open_sequence
 from evaluation.sequences.deskewing import deskew
 

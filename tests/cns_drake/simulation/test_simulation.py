@@ -11,7 +11,7 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.scenarios.scenario_files import world_file
 from cns_drake.scenarios.scenario_loading import load_scenario, make_scenario
 from cns_drake.simulation.simulation import simulate
-from cns_drake.simulation.station import load_stage
+from cns_drake.simulation.stage_loading import load_stage
 from cns_drake.studies.recording_jobs import record_all
 from cns_drake.studies.recording_step import is_recorded
 
@@ -103,8 +103,8 @@ def test_a_world_that_changes_under_its_reader_is_refused(
     folder = write_small_map(tmp_path / "map")
     scenario = make_scenario(scenario_values(folder) | {"frames": 2}, "test")
 
-    def load_and_change(scenario):
-        world = load_stage(scenario)
+    def load_and_change(scenario, **options):
+        world = load_stage(scenario, **options)
         world_file(scenario).write_text(
             world_file(scenario).read_text() + "<!-- changed -->"
         )

@@ -1,0 +1,267 @@
+"""Parked cars that have left, stand elsewhere in their bay, or are others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw
+import shapely
+from shapely import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from cns_drake.city.furniture.parked_cars import PARKED_CARS
+from cns_drake.city.geometry.object_parts import part_triangles
+from cns_drake.city.geometry.structures import Model
+from cns_drake.transient.draws import draws
+from cns_drake.transient.scene_editing import SceneEditing
+from cns_drake.transient.standing import (
+    GROUND_CLASSES,
+    Obstacles,
+    Standing,
+)
+
+CAUSE = "parked_cars"
+CLASSES = frozenset({"car", "truck", "bus"})
+# Of the bays that change: the car is gone; it is the same one, elsewhere. In
+# all others there is another.
+_GONE = 0.3
+_MOVED = 0.2
+# A bay has at most so much room before and behind a car, and beside it [m].
+_LENGTHWISE = 0.5
+_SIDEWAYS = 0.25
+# Cars are turned against their bay by at most [rad].
+_SKEW = 0.03
+# Cars stand this far from all else [m].
+_GAP = 0.05
+# A car that moved lies at least this far from where it was [m].
+_LEAST_MOVE = 0.1
+_TRIES = 12
+# What may park: shares, relative to each other.
+_FORMS = {
+    "city_car": 3,
+    "hatchback": 4,
+    "saloon": 3,
+    "estate": 3,
+    "suv": 3,
+    "pickup": 1,
+    "van": 2,
+}
+
+
+class Bay:
+    """The room that a parked car has, none of which another's bay has.
+
+    Attributes:
+        middle: (2,) of the car [m].
+        yaw: of its long axis [rad].
+        front, back, left, right: how far the bay reaches from there [m].
+    """
+
+    def __init__(self, car: Standing):
+        """A bay as large as the car.
+
+        Args:
+            car: that stands in it.
+        """
+        hull = shapely.MultiPoint(car.p_WPs[:, :2])
+        corners = shapely.get_coordinates(hull.minimum_rotated_rectangle)[:4]
+        sides = np.diff(corners, axis=0)[:2]
+        lengths = np.linalg.norm(sides, axis=1)
+        along = sides[int(lengths.argmax())]
+        self.middle = corners.mean(axis=0)
+        self.yaw = float(np.arctan2(along[1], along[0]))
+        self.front = self.back = float(lengths.max()) / 2
+        self.left = self.right = float(lengths.min()) / 2
+
+    def box(self, beyond: np.ndarray | float = 0.0) -> Polygon:
+        """Returns the bay seen from above, reaching so much further [m].
+
+        Args:
+            beyond: of front, back, left and right.
+        """
+        reach = np.array([self.front, self.back, self.left, self.right])
+        front, back, left, right = reach + beyond
+        c, s = np.cos(self.yaw), np.sin(self.yaw)
+        corners = np.array(
+            [(front, left), (-back, left), (-back, -right), (front, -right)]
+        )
+        return Polygon(corners @ np.array([[c, s], [-s, c]]) + self.middle)
+
+    def grow(self, car: Standing, cars: Obstacles, others: Obstacles) -> None:
+        """Grows towards what is around it, half the way towards other cars.
+
+        Args:
+            car: that stands in it.
+            cars: all cars.
+            others: what else a car must not touch.
+        """
+        own = (car.name,)
+        box = self.box()
+        growth = np.zeros(4)
+        for k, most in enumerate((_LENGTHWISE,) * 2 + (_SIDEWAYS,) * 2):
+            reach = np.zeros(4)
+            reach[k] = 2 * most + _GAP
+            around = self.box(reach)
+            room = min(
+                cars.distance(box, around, own) / 2,
+                others.distance(box, around, own),
+                most + _GAP,
+            )
+            growth[k] = max(room - _GAP, 0.0)
+        self.front += float(growth[0])
+        self.back += float(growth[1])
+        self.left += float(growth[2])
+        self.right += float(growth[3])
+
+    def place(
+        self, half_size: np.ndarray, rng: np.random.Generator
+    ) -> tuple[np.ndarray, float] | None:
+        """Returns middle and yaw of a car in the bay, None where it is too big.
+
+        Args:
+            half_size: (2,) half its length and width [m].
+            rng: draws where.
+        """
+        skew = float(rng.uniform(-_SKEW, _SKEW))
+        across, turned = rng.uniform(size=2), rng.uniform() < 0.5
+        c, s = np.cos(skew), abs(np.sin(skew))
+        half = np.array(
+            [
+                half_size[0] * c + half_size[1] * s,
+                half_size[0] * s + half_size[1] * c,
+            ]
+        )
+        low = half - (self.back, self.right)
+        high = np.array([self.front, self.left]) - half
+        if (low > high).any():
+            return None
+        c, s = np.cos(self.yaw), np.sin(self.yaw)
+        offset = np.array([[c, -s], [s, c]]) @ (low + across * (high - low))
+        yaw = self.yaw + skew + np.pi * turned
+        return self.middle + offset, float(yaw)
+
+
+def make_bays(
+    things: Mapping[str, Standing], kept_free: BaseGeometry
+) -> dict[str, Bay]:
+    """Returns the bays of all parked cars, by the cars' names.
+
+    Args:
+        things: all that stands.
+        kept_free: where no bay may grow to, seen from above [m].
+    """
+    cars = {n: t for n, t in things.items() if t.semantic_class in CLASSES}
+    bays = {name: Bay(car) for name, car in cars.items()}
+    if not bays:
+        return {}
+    standing = Obstacles((n, bay.box()) for n, bay in bays.items())
+    others = Obstacles(
+        [
+            ("", kept_free),
+            *(
+                (name, thing.footprint)
+                for name, thing in things.items()
+                if thing.semantic_class not in CLASSES | GROUND_CLASSES
+            ),
+        ]
+    )
+    grown = {}
+    for name, car in cars.items():
+        grown[name] = Bay(car)
+        grown[name].grow(car, standing, others)
+    # Of two that meet at a corner, both stay as they are.
+    boxes = [bay.box() for bay in grown.values()]
+    names = list(grown)
+    first, second = shapely.STRtree(boxes).query(boxes, "intersects")
+    for a, b in zip(first, second, strict=True):
+        if a != b:
+            grown[names[a]] = bays[names[a]]
+    return grown
+
+
+def change_parked_cars(
+    editing: SceneEditing,
+    things: Mapping[str, Standing],
+    bays: Mapping[str, Bay],
+    part: float,
+    seed: int,
+) -> None:
+    """Changes a part of the parked cars.
+
+    Args:
+        editing: of the world.
+        things: all that stands.
+        bays: of its cars.
+        part: how many of them, from 0 to 1.
+        seed: of what is drawn.
+    """
+    if not bays:
+        editing.note("parked_cars: the world has no car, truck or bus")
+    for name, bay in bays.items():
+        rng = draws(seed, CAUSE, name)
+        if rng.uniform() >= part:
+            continue
+        car, fate = things[name], rng.uniform()
+        if fate < _GONE:
+            editing.remove(car, CAUSE)
+        elif fate < _GONE + _MOVED:
+            editing.move(car, _moved(bay, car, rng), _new_name(name), CAUSE)
+        else:
+            _replace(editing, car, bay, rng)
+
+
+def _new_name(name: str) -> str:
+    return f"parked_{name}"
+
+
+def _moved(bay: Bay, car: Standing, rng: np.random.Generator) -> RigidTransform:
+    """Returns where the points of a car go that stands elsewhere by now."""
+    own = Bay(car)
+    half_size = np.array([own.front, own.left])
+    middle, yaw = own.middle, own.yaw + np.pi  # At least the other way round.
+    for _ in range(_TRIES):
+        found = bay.place(half_size, rng)
+        if (
+            found is not None
+            and np.linalg.norm(found[0] - own.middle) >= _LEAST_MOVE
+        ):
+            middle, yaw = found
+            break
+    X_WC = RigidTransform(RollPitchYaw(0, 0, own.yaw), [*own.middle, 0])
+    X_new = RigidTransform(RollPitchYaw(0, 0, yaw), [*middle, 0])
+    return X_new @ X_WC.inverse()
+
+
+def _replace(
+    editing: SceneEditing, car: Standing, bay: Bay, rng: np.random.Generator
+) -> None:
+    """Puts another car into a bay, or none if the bay is too small."""
+    forms = list(_FORMS)
+    shares = np.array(list(_FORMS.values()), float)
+    for k in rng.choice(len(forms), len(forms), False, shares / shares.sum()):
+        builder = PARKED_CARS[forms[k]]
+        model = builder.build(rng)
+        low, high = _extent(model)
+        found = bay.place((high - low) / 2, rng)
+        if found is None:
+            continue
+        middle, yaw = found
+        R = RollPitchYaw(0, 0, yaw)
+        # The middle of the car is not quite the origin of its model.
+        offset = R.ToRotationMatrix() @ [*((low + high) / 2), 0.0]
+        X_WS = RigidTransform(R, [*middle, car.bottom] - offset)
+        editing.remove(car, CAUSE)
+        editing.add(
+            _new_name(car.name), builder.semantic_class, model, X_WS, CAUSE
+        )
+        return
+    editing.remove(car, CAUSE)
+
+
+def _extent(model: Model) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the lowest and highest x and y of a car's model [m]."""
+    corners = np.concatenate(
+        [part_triangles(part, model.meshes)[0] for part in model.parts]
+    )[:, :2]
+    return corners.min(axis=0), corners.max(axis=0)

@@ -1,0 +1,43 @@
+"""All that comes and goes, put into a world."""
+
+from __future__ import annotations
+
+from shapely.geometry.base import BaseGeometry
+
+from cns_drake.scenarios.transient_config import TransientConfig
+from cns_drake.scene.world import World
+from cns_drake.transient.bays_refilled import change_parked_cars, make_bays
+from cns_drake.transient.furniture import move_furniture
+from cns_drake.transient.leaves import thin_leaves
+from cns_drake.transient.scene_editing import SceneEditing
+from cns_drake.transient.standing import read_standing
+
+
+def change_world(
+    world: World, config: TransientConfig, kept_free: BaseGeometry
+) -> World:
+    """Returns a world in which time has passed.
+
+    Args:
+        world: not yet a part of a diagram; its SceneGraph is changed.
+        config: what came and went.
+        kept_free: where vehicles drive, seen from above [m]; nothing new
+            stands there.
+
+    Raises:
+        InputError: a mesh cannot be read, or there are more structures than
+            instance ids.
+    """
+    if config.is_off:
+        return world
+    editing = SceneEditing(world)
+    things = read_standing(world)
+    seed = config.seed
+    if config.parked_cars > 0.0:
+        bays = make_bays(things, kept_free)
+        change_parked_cars(editing, things, bays, config.parked_cars, seed)
+    if config.leaves < 1.0:
+        thin_leaves(editing, things, config.leaves, seed)
+    if config.furniture > 0.0:
+        move_furniture(editing, things, kept_free, config.furniture, seed)
+    return editing.finish()

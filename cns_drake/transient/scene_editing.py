@@ -1,0 +1,280 @@
+"""Changing a loaded world, and keeping account of why."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from pydrake.common import MemoryFile
+from pydrake.geometry import (
+    Box,
+    Convex,
+    Cylinder,
+    GeometryInstance,
+    IllustrationProperties,
+    InMemoryMesh,
+    Mesh,
+    PerceptionProperties,
+    Rgba,
+    Shape,
+    Sphere,
+)
+from pydrake.math import RigidTransform, RollPitchYaw
+
+from cns_drake.base.errors import InputError
+from cns_drake.city.geometry.object_meshes import FOLDER
+from cns_drake.city.geometry.structures import (
+    BoxShape,
+    CylinderShape,
+    MeshShape,
+    Model,
+    Part,
+    SphereShape,
+)
+from cns_drake.scene.structure_table import (
+    MAX_INSTANCE,
+    StructureEntry,
+    StructureTable,
+)
+from cns_drake.scene.surfaces import TriangleSurface
+from cns_drake.scene.world import World
+from cns_drake.transient.standing import Standing, StandingPart
+
+
+class SceneEditing:
+    """Takes things out of a world and puts others into it."""
+
+    def __init__(self, world: World):
+        """Begins with a world as it is.
+
+        Args:
+            world: not yet a part of a diagram; its SceneGraph is changed.
+        """
+        self._world = world
+        self._source = world.plant.get_source_id()
+        # Name -> class and reflectivity.
+        self._added: dict[str, tuple[str, float | None]] = {}
+        self._causes: defaultdict[str, list[str]] = defaultdict(list)
+        self._notes: list[str] = []
+
+    def note(self, text: str) -> None:
+        """Keeps what a user should know of the changes."""
+        self._notes.append(f"transient: {text}")
+
+    def blame(self, structure: str, cause: str) -> None:
+        """Keeps by which switch a structure changed."""
+        if cause not in self._causes[structure]:
+            self._causes[structure].append(cause)
+
+    def remove(self, thing: Standing, cause: str) -> None:
+        """Takes a structure away."""
+        for part in thing.parts:
+            self.remove_part(part)
+        self.blame(thing.name, cause)
+
+    def remove_part(self, part: StandingPart) -> None:
+        """Takes a part of a structure away."""
+        self._world.scene_graph.RemoveGeometry(
+            self._source, part.geometry.geometry_id
+        )
+
+    def move(
+        self, thing: Standing, X_new: RigidTransform, name: str, cause: str
+    ) -> None:
+        """Puts a structure elsewhere, as another one of a new name.
+
+        Args:
+            thing: that is taken away.
+            X_new: where its points go in the world.
+            name: of what stands there.
+            cause: the switch.
+        """
+        for part in thing.parts:
+            self._copy_part(part, X_new @ part.X_WG, f"{name}/{part.name}")
+        self.remove(thing, cause)
+        old = self._world.structures[thing.name]
+        self._added[name] = (old.semantic_class, old.reflectivity)
+        self.blame(name, cause)
+
+    def shift_part(self, part: StandingPart, p_W: np.ndarray) -> None:
+        """Moves a part of a structure that keeps its name.
+
+        Args:
+            part: which.
+            p_W: (3,) by how much, in the world [m].
+        """
+        X_new = RigidTransform(np.asarray(p_W, float)) @ part.X_WG
+        name = f"{part.geometry.structure}/{part.name}"
+        self._copy_part(part, X_new, name)
+        self.remove_part(part)
+
+    def add(
+        self,
+        name: str,
+        semantic_class: str,
+        model: Model,
+        X_WS: RigidTransform,
+        cause: str,
+    ) -> None:
+        """Puts up something new.
+
+        Args:
+            name: of the structure, which no other has.
+            semantic_class: a key of `CLASS_IDS`.
+            model: what it looks like, of the city generator's meshes.
+            X_WS: its pose in the world.
+            cause: the switch.
+        """
+        for part in model.parts:
+            self._register(
+                f"{name}/{part.name}",
+                X_WS @ RigidTransform(RollPitchYaw(*part.rpy), part.xyz),
+                _shape(part, model),
+                *_colours(part.rgb or (0.5, 0.5, 0.5)),
+            )
+        self._added[name] = (semantic_class, None)
+        self.blame(name, cause)
+
+    def replace_triangles(self, part: StandingPart, kept: np.ndarray) -> None:
+        """Leaves some of the triangles of a part.
+
+        Args:
+            part: whose surface is of triangles.
+            kept: indices of those that stay.
+        """
+        surface = part.geometry.surface
+        assert isinstance(surface, TriangleSurface)
+        triangles = surface.triangles[kept]
+        if len(triangles):
+            # Unscaled, parts of one mesh have one mesh again.
+            scale = self._scale(part)
+            if np.prod(scale) < 0.0:
+                triangles = triangles[:, ::-1]
+            self._register(
+                f"{part.geometry.structure}/{part.name}",
+                part.X_WG,
+                memory_mesh(surface.p_GVset / scale, triangles, scale),
+                *self._properties(part),
+            )
+        self.remove_part(part)
+
+    def finish(self) -> World:
+        """Returns the world with its table and notes brought up to date.
+
+        Raises:
+            InputError: there are more structures than instance ids.
+        """
+        table = self._world.structures
+        first = table.last_instance + 1
+        if first + len(self._added) - 1 > MAX_INSTANCE:
+            raise InputError(
+                f"transient: {len(self._added)} new structures and "
+                f"{first - 1} others are more than instance ids can count "
+                f"({MAX_INSTANCE})"
+            )
+        entries = [
+            *table,
+            *(
+                StructureEntry(first + k, name, *self._added[name])
+                for k, name in enumerate(sorted(self._added))
+            ),
+        ]
+        return replace(
+            self._world,
+            structures=StructureTable(
+                replace(entry, causes=tuple(self._causes[entry.name]))
+                if entry.name in self._causes
+                else entry
+                for entry in entries
+            ),
+            notes=(*self._world.notes, *self._notes),
+        )
+
+    def _properties(
+        self, part: StandingPart
+    ) -> tuple[PerceptionProperties, IllustrationProperties | None]:
+        inspector = self._world.scene_graph.model_inspector()
+        geometry_id = part.geometry.geometry_id
+        return (
+            inspector.GetPerceptionProperties(geometry_id),
+            inspector.GetIllustrationProperties(geometry_id),
+        )
+
+    def _scale(self, part: StandingPart) -> np.ndarray:
+        inspector = self._world.scene_graph.model_inspector()
+        shape = inspector.GetShape(part.geometry.geometry_id)
+        # Of all shapes that become triangles, boxes and cones have none.
+        if not isinstance(shape, Mesh | Convex):
+            return np.ones(3)
+        return np.array(shape.scale3())
+
+    def _copy_part(
+        self, part: StandingPart, X_WG: RigidTransform, name: str
+    ) -> None:
+        inspector = self._world.scene_graph.model_inspector()
+        shape = inspector.GetShape(part.geometry.geometry_id)
+        self._register(name, X_WG, shape, *self._properties(part))
+
+    def _register(
+        self,
+        name: str,
+        X_WG: RigidTransform,
+        shape: Shape,
+        seen: PerceptionProperties,
+        shown: IllustrationProperties | None,
+    ) -> None:
+        scene_graph = self._world.scene_graph
+        geometry = scene_graph.RegisterGeometry(
+            self._source,
+            scene_graph.world_frame_id(),
+            GeometryInstance(X_WG, shape, name),
+        )
+        scene_graph.AssignRole(self._source, geometry, seen)
+        if shown is not None:
+            scene_graph.AssignRole(self._source, geometry, shown)
+
+
+def memory_mesh(
+    vertices: np.ndarray, triangles: np.ndarray, scale: np.ndarray
+) -> Mesh:
+    """Returns a mesh that lies in no file; equal ones are one to readers.
+
+    Args:
+        vertices: (N, 3) before they are scaled [m].
+        triangles: (M, 3) vertex indices.
+        scale: (3,) along the axes.
+    """
+    used, corners = np.unique(triangles, return_inverse=True)
+    lines = [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in vertices[used]]
+    lines += [
+        f"f {a} {b} {c}" for a, b, c in (corners.reshape(-1, 3) + 1).tolist()
+    ]
+    text = "\n".join(lines) + "\n"
+    file = MemoryFile(text.encode(), ".obj", "mesh")
+    return Mesh(InMemoryMesh(mesh_file=file), scale)
+
+
+def _colours(
+    rgb: Iterable[float],
+) -> tuple[PerceptionProperties, IllustrationProperties]:
+    seen, shown = PerceptionProperties(), IllustrationProperties()
+    for properties in (seen, shown):
+        properties.AddProperty("phong", "diffuse", Rgba(*rgb, 1.0))
+    return seen, shown
+
+
+def _shape(part: Part, model: Model) -> Shape:
+    """Returns the shape of a part of the city generator's."""
+    shape = part.shape
+    if isinstance(shape, BoxShape):
+        return Box(*shape.size)
+    if isinstance(shape, CylinderShape):
+        return Cylinder(shape.radius, shape.length)
+    if isinstance(shape, SphereShape):
+        return Sphere(shape.radius)
+    assert isinstance(shape, MeshShape)
+    file: Path = FOLDER / f"{shape.mesh}.obj"
+    return Mesh(str(file), np.array(shape.scale))

@@ -1,0 +1,125 @@
+"""A street with parked cars, trees, poles and walls, for tests of change."""
+
+import numpy as np
+
+from cns_drake.city.geometry.object_meshes import FOLDER
+
+_WORLD = """<?xml version="1.0"?>
+<sdf version="1.9">
+  <world name="street">
+    <model name="street">
+      <static>true</static>
+      <pose>{origin}</pose>
+      <link name="street">{visuals}</link>
+    </model>
+  </world>
+</sdf>
+"""
+_VISUAL = """
+        <visual name="{name}">
+          <pose>{pose}</pose>
+          <geometry>{shape}</geometry>
+        </visual>"""
+# The street lies turned, away from the origin of the world.
+ORIGIN = (30.0, -12.0, 0.4, 0.0, 0.0, 0.35)
+COLUMNS = 20
+
+
+def _numbers(values):
+    return " ".join(f"{value:.6g}" for value in values)
+
+
+def mesh_shape(name, scale=(1, 1, 1)):
+    return (
+        f"<mesh><uri>{FOLDER / name}.obj</uri>"
+        f"<scale>{_numbers(scale)}</scale></mesh>"
+    )
+
+
+def box_shape(*size):
+    return f"<box><size>{_numbers(size)}</size></box>"
+
+
+def pole_shape(radius, length):
+    return (
+        f"<cylinder><radius>{radius}</radius><length>{length}</length>"
+        "</cylinder>"
+    )
+
+
+def visual(name, shape, *pose):
+    return _VISUAL.format(
+        name=name, shape=shape, pose=_numbers([*pose, *[0] * (6 - len(pose))])
+    )
+
+
+def write_transient_town(folder):
+    """Writes a world and its table; returns the path of the world.
+
+    Along x: cars side by side at y = 8, cars nose to tail at y = 3, lamps and
+    signs at y = 5, trees and shrubs at y = 12, houses beyond.
+    """
+    rng = np.random.default_rng(3)
+    # What lies farthest out stays, and so do the coordinates of casting.
+    edge = pole_shape(0.1, 1)
+    visuals = [
+        visual("west/edge", edge, -200, -200),
+        visual("east/edge", edge, 200, 200),
+        visual("road/plate", box_shape(200, 6, 1), 0, 0, -0.5),
+        visual("lawn/plate", box_shape(200, 40, 1), 0, 23, -0.45),
+    ]
+    rows = {"west": "fence", "east": "fence", "road": "road", "lawn": "terrain"}
+    forms = ("hatchback", "estate", "suv", "van")
+    for k in range(COLUMNS):
+        form = forms[int(rng.integers(len(forms)))]
+        scale = rng.uniform(0.97, 1.03, 3)
+        dx, dy, skew = rng.uniform(-1, 1, 3) * (0.1, 0.15, 0.02)
+        places = {
+            f"car_{k:03d}": (
+                2.7 * k + dx,
+                8 + dy,
+                0.05,
+                0,
+                0,
+                np.pi / 2 + skew,
+            ),
+            f"car_{k + COLUMNS:03d}": (6.4 * k + dy - 40, 3.2, 0, 0, 0, skew),
+        }
+        for name, pose in places.items():
+            for part in ("body", "trim"):
+                shape = mesh_shape(f"{form}_{part}", scale)
+                visuals.append(visual(f"{name}/{part}", shape, *pose))
+            rows[name] = "car"
+        tree, tall = f"tree_{k:03d}", rng.uniform(0.8, 1.2, 3)
+        for part in ("wood", "crown"):
+            shape = mesh_shape(f"lime_tree_a_{part}", tall)
+            visuals.append(visual(f"{tree}/{part}", shape, 5 * k, 13.5, 0.05))
+        rows[tree] = "vegetation"
+        name = f"shrub_{k:03d}"
+        shape = mesh_shape("shrub_a", tall)
+        visuals.append(visual(f"{name}/leaves", shape, 5 * k + 2.5, 12.5, 0.05))
+        rows[name] = "vegetation"
+        name = f"lamp_{k:03d}"
+        visuals += [
+            visual(f"{name}/mast", pole_shape(0.08, 6), 5 * k, 5, 3),
+            visual(f"{name}/arm", box_shape(0.1, 1.5, 0.1), 5 * k, 4.3, 6),
+        ]
+        rows[name] = "pole"
+        name = f"sign_{k:03d}"
+        visuals.append(
+            visual(
+                f"{name}/plate", box_shape(0.6, 0.05, 2.4), 5 * k + 2, 5.2, 1
+            )
+        )
+        rows[name] = "traffic-sign"
+        if k % 4 == 0:
+            name = f"house_{k:03d}"
+            shape = box_shape(15, 8, 9)
+            visuals.append(visual(f"{name}/body", shape, 5 * k, 24, 4))
+            rows[name] = "building"
+    text = _WORLD.format(origin=_numbers(ORIGIN), visuals="".join(visuals))
+    (folder / "street.sdf").write_text(text)
+    lines = ["instance,name,class"]
+    lines += [f"{k},{n},{c}" for k, (n, c) in enumerate(rows.items(), 1)]
+    (folder / "structures.csv").write_text("\n".join(lines) + "\n")
+    return folder / "street.sdf"
