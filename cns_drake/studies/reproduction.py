@@ -72,7 +72,7 @@ def reproduce_maps(
             failed.
     """
     methods = choose_methods(settings=settings)
-    folders = [_map_folder(name) for name in maps or _recordable_maps()]
+    folders = [recordable_map(name) for name in maps or _recordable_maps()]
     sequences, controls, pictures = [], [], []
     for folder in folders:
         of_map = _sequences(folder)
@@ -205,7 +205,7 @@ def _recordable_maps() -> list[str]:
     ]
 
 
-def _map_folder(name: str) -> Path:
+def recordable_map(name: str) -> Path:
     """Returns the folder of a map that can be recorded.
 
     Raises:

@@ -6,6 +6,7 @@ in three dimensions.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,7 @@ from evaluation.recognition.description import (
     DescribedDrive,
     describe_drive,
 )
+from evaluation.recognition.gate import gated
 from evaluation.recognition.overlap_truth import overlap_matrix
 from evaluation.recognition.pose_errors import (
     PoseErrors,
@@ -131,38 +133,89 @@ def compare(
     Raises:
         InputError: if the method returns what it must not.
     """
+    (found,) = _compare(
+        method,
+        database,
+        query,
+        protocol,
+        [protocol.gate_radius],
+        track,
+        overlaps,
+    )
+    return found
+
+
+def compare_both_ways(
+    method: Method,
+    database: DescribedDrive,
+    query: DescribedDrive,
+    protocol: RetrievalProtocol = PAPER_PROTOCOL,
+    track: Track = silent,
+) -> tuple[Retrieval, Retrieval]:
+    """Scores queries once; returns them without the gate, and with it.
+
+    Args:
+        method: see `compare`.
+        database: likewise.
+        query: likewise.
+        protocol: likewise; whether it has a gate does not matter.
+        track: reports progress.
+
+    Raises:
+        InputError: if the method returns what it must not.
+    """
+    radii = [None, protocol.radius]
+    without, with_gate = _compare(
+        method, database, query, protocol, radii, track
+    )
+    return without, with_gate
+
+
+def _compare(
+    method: Method,
+    database: DescribedDrive,
+    query: DescribedDrive,
+    protocol: RetrievalProtocol,
+    gate_radii: Collection[float | None],
+    track: Track,
+    overlaps: np.ndarray | None = None,
+) -> list[Retrieval]:
+    """Returns what is retrieved with each gate; None is no gate."""
     places, queries = database.places, query.queries
     is_known = _known_places(database, query, protocol)
     indexed = method.build_database(places.descriptors)
-    scores = np.empty(is_known.shape)
-    errors = PoseErrors.unknown(len(queries.frames))
+    scores = [np.empty(is_known.shape) for _ in gate_radii]
+    errors = [PoseErrors.unknown(len(queries.frames)) for _ in gate_radii]
     asking = track(
         range(len(queries.frames)),
         f"querying {query.name}",
         len(queries.frames),
     )
     for row in asking:
-        found = score_places(
+        asked = queries.descriptors[row]
+        ungated = score_places(
             method,
             queries.descriptors[: row + 1],
             queries.clouds[row] if queries.clouds else None,
             indexed,
             places.clouds,
             is_known[row],
-            gate_radius=protocol.gate_radius,
         )
-        scores[row] = found
-        if np.isnan(found).all():
-            continue
-        best = int(ranking(found)[0])
-        X_PQ = checked_pose(
-            method,
-            method.relative_pose(queries.descriptors[row], indexed, best),
-        )
-        if X_PQ is not None:
-            errors.translation[row], errors.rotation_deg[row] = pose_error(
-                X_PQ, places.X_WS[best], queries.X_WS[row]
+        for radius, kept, error in zip(gate_radii, scores, errors, strict=True):
+            found = ungated
+            if radius is not None:
+                found = gated(method, asked, indexed, ungated, radius)
+            kept[row] = found
+            if np.isnan(found).all():
+                continue
+            best = int(ranking(found)[0])
+            X_PQ = checked_pose(
+                method, method.relative_pose(asked, indexed, best)
             )
+            if X_PQ is not None:
+                error.translation[row], error.rotation_deg[row] = pose_error(
+                    X_PQ, places.X_WS[best], queries.X_WS[row]
+                )
     offsets = queries.p_WSs[:, None, :] - places.p_WSs[None, :, :]
     distances = np.linalg.norm(offsets, axis=2)
     if protocol.overlap is None:
@@ -170,16 +223,19 @@ def compare(
     else:
         assert overlaps is not None
         matches = overlaps >= protocol.overlap
-    return Retrieval(
-        query_frames=queries.frames,
-        database_frames=places.frames,
-        scores=scores,
-        distances=distances,
-        matches=matches & is_known,
-        pose_errors=errors,
-        is_known=is_known,
-        overlaps=overlaps,
-    )
+    return [
+        Retrieval(
+            query_frames=queries.frames,
+            database_frames=places.frames,
+            scores=kept,
+            distances=distances,
+            matches=matches & is_known,
+            pose_errors=error,
+            is_known=is_known,
+            overlaps=overlaps,
+        )
+        for kept, error in zip(scores, errors, strict=True)
+    ]
 
 
 def _known_places(

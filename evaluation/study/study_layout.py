@@ -96,6 +96,10 @@ class StudyFiles:
         name = f"{file_name(database)},{file_name(query)}.data"
         return self._parts / "trend" / name
 
+    def rung(self, name: str) -> Path:
+        """Of the `RungOutcome`s of a rung of a ladder."""
+        return self._parts / "rungs" / f"{file_name(name)}.data"
+
     def drawn(self, stem: str) -> Path:
         """Says what a figure was drawn of."""
         return self._parts / "figures" / f"{file_name(stem)}.data"

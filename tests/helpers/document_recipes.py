@@ -371,6 +371,22 @@ RECIPES = {
         after=("family trend",),
         prints=("simulated/trend.csv",),
     ),
+    "ladder": Recipe(
+        ".venv/bin/cns-drake ladder metropolis",
+        changes=(("metropolis", "town --cause construction"),),
+        after=("start a city",),
+        prints=("ladder/ladder.csv", "Town, "),
+        makes=("ladder/ladder.png", "ladder/queries.csv"),
+    ),
+    "table: ladder": Recipe(
+        "cns-drake ladder [MAP ...]",
+        changes=(
+            ("[MAP ...]", "town --quick --cause construction"),
+            ("DIR", "ladder"),
+        ),
+        after=("ladder",),
+        prints=("ladder/ladder.csv",),
+    ),
     "scattered losses": Recipe(
         ".venv/bin/cns-drake generate --vary worlds/downtown/hard_database",
         changes=(

@@ -187,6 +187,8 @@ def test_diagram_script(tmp_path):
             "--pose: not finite",
         ),
         (["reproduce", "atlantis"], "unknown map 'atlantis'"),
+        (["ladder", "--cause", "war"], "--cause: no cause 'war'"),
+        (["ladder", "atlantis"], "unknown map 'atlantis'"),
         (["reproduce", "--quick", "--pages"], "--quick and --pages: give one"),
         (["teleport"], "teleport"),
     ],

@@ -1,0 +1,103 @@
+"""The command `cns-drake ladder`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cns_drake.base.errors import InputError
+from cns_drake.base.interrupts import uninterrupted
+from cns_drake.base.terminal import note
+from cns_drake.command_line.options import Jobs, Output, Scheduler
+
+
+def ladder(
+    maps: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="MAP",
+            help="Which maps, by name or folder; all shipped ones by default.",
+        ),
+    ] = None,
+    *,
+    output: Output,
+    quick: Annotated[
+        bool,
+        typer.Option(
+            "--quick",
+            help="The strongest level of each cause, and every other query.",
+        ),
+    ] = False,
+    cause: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="A cause of change, such as traffic or all; may be repeated. "
+            "Every one by default.",
+        ),
+    ] = None,
+    seeds: Annotated[
+        int,
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Draw N times what is random, and give means.",
+        ),
+    ] = 1,
+    method: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Python file that registers a method, to run besides those "
+            "of cns-eval; may be repeated."
+        ),
+    ] = None,
+    jobs: Jobs = None,
+    scheduler: Scheduler = None,
+) -> None:
+    """What each cause of change costs each method.
+
+    One drive asks a database of its own route, with one cause of change
+    between the two at a time, and with all together. None is recorded. Writes
+    ladder.csv, queries.csv and a figure.
+    Interrupted, the same command goes on where it was.
+    """
+    with uninterrupted():
+        from dataclasses import replace
+
+        from cns_drake.base.jobs.cluster import choose_cluster
+        from cns_drake.studies.ladder import (
+            QUICK_EXTENT,
+            QUICK_PROTOCOL,
+            climb_ladder,
+        )
+        from cns_drake.studies.ladder_causes import CAUSES
+        from cns_drake.studies.ladder_rungs import Extent
+        from evaluation.recognition.protocol import PAPER_PROTOCOL
+        from evaluation.study.chosen_methods import choose_methods
+
+    cluster = choose_cluster(jobs, scheduler)
+    methods = choose_methods(method or ())
+    causes = tuple(cause or CAUSES)
+    for name in causes:
+        if name not in CAUSES:
+            known = ", ".join(CAUSES)
+            raise InputError(f"--cause: no cause {name!r} (known: {known})")
+    extent, protocol = Extent(), PAPER_PROTOCOL
+    if quick:
+        extent, protocol = QUICK_EXTENT, QUICK_PROTOCOL
+        note(
+            "--quick leaves out: levels 1 to 3 (but where a cause has no level "
+            "4), every other query, more than 1,000 places of other cities"
+        )
+    path, text = climb_ladder(
+        maps,
+        output,
+        cluster,
+        methods,
+        replace(extent, causes=causes, num_seeds=seeds),
+        protocol,
+        on_note=note,
+    )
+    typer.echo(path)
+    typer.echo(text)

@@ -1,0 +1,209 @@
+"""The ladder: what each cause of change costs each method.
+
+A drive asks a database that has the same route through the same city, with
+one cause of change between the two at a time. Nothing is recorded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from cns_drake.base.files import completing, make_folder
+from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.base.jobs.running import Job, run_jobs
+from cns_drake.base.map_folder import MapFolder
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import map_folder
+from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.shipped import shipped_maps
+from cns_drake.simulation.simulated_drive import SimulatedDrive
+from cns_drake.studies.distractors import distracting_drives
+from cns_drake.studies.ladder_causes import plain_drives
+from cns_drake.studies.ladder_rungs import Extent, Rung, plan_rungs
+from cns_drake.studies.reproduction import recordable_map
+from evaluation.recognition.description import Role
+from evaluation.recognition.protocol import (
+    PAPER_PROTOCOL,
+    RetrievalProtocol,
+)
+from evaluation.report.ladder_figure import draw_ladder
+from evaluation.report.ladder_rows import (
+    LadderRung,
+    MeasuredRung,
+    ladder_rows,
+)
+from evaluation.report.ladder_tables import ladder_query_table, ladder_table
+from evaluation.report.ladder_text import ladder_text
+from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.described_drives import DescribeDrive
+from evaluation.study.parts import read_part
+from evaluation.study.rungs import MeasureRung, RungDrive
+from evaluation.study.study_layout import StudyFiles, SurveyFiles
+
+# With --quick only the strongest level of each cause is climbed, on every
+# other query.
+QUICK_EXTENT = Extent(levels=(4,), most_places=1000)
+QUICK_PROTOCOL = replace(PAPER_PROTOCOL, query_spacing=20.0)
+
+# Expected seconds: to describe a drive, and for a rung.
+_DESCRIPTION_COST = 30.0
+_RUNG_COST = 60.0
+
+
+def climb_ladder(
+    maps: Sequence[str] | None,
+    output: Path,
+    cluster: Cluster,
+    methods: tuple[MethodChoice, ...],
+    extent: Extent,
+    protocol: RetrievalProtocol = PAPER_PROTOCOL,
+    on_note: Callable[[str], None] = lambda text: None,
+) -> tuple[Path, str]:
+    """Measures all rungs of maps; writes tables, figure and findings.
+
+    `<output>/ladder.csv` and `queries.csv` are the tables, `ladder.png` (and
+    PDF, SVG) the figure, `findings.txt` what they say. What is done already
+    is not done again.
+
+    Args:
+        maps: which maps, by name or folder; all shipped ones if empty.
+        output: the folder for everything.
+        cluster: where the work is done.
+        methods: that answer.
+        extent: how much of the ladder is climbed.
+        protocol: of place recognition; its gate does not matter.
+        on_note: is told of what a map lacks.
+
+    Returns:
+        The path of `ladder.csv`, and the findings.
+
+    Raises:
+        InputError: a map is not known, the folder cannot be made, or a step
+            failed.
+    """
+    folders = [recordable_map(name) for name in maps or shipped_maps()]
+    make_folder(output)
+    files = StudyFiles(output.absolute())
+    jobs: dict[str, Job] = {}
+    climbed: list[tuple[Scenario, Rung, Path]] = []
+    for folder in folders:
+        asking = load_scenario(MapFolder(folder).recordable_sequences()[-1])
+        rungs, notes = plan_rungs(asking, extent)
+        for text in notes:
+            on_note(f"{asking.source}: {text}")
+        plan = _Plan(asking, methods, protocol, files)
+        most = max(rung.drives.num_distractors for rung in rungs)
+        plan.add_distractors(
+            distracting_drives(
+                plain_drives(asking).database,
+                most,
+                protocol.place_spacing,
+                output / "cities",
+                cluster,
+            )
+        )
+        climbed += [(asking, rung, plan.add_rung(rung)) for rung in rungs]
+        jobs |= plan.jobs
+    run_jobs(jobs.values(), cluster)
+    measured = [
+        MeasuredRung(_labelled(asking, rung), rung.seed, read_part(part))
+        for asking, rung, part in climbed
+    ]
+    return _write(measured, output, protocol)
+
+
+class _Plan:
+    """The jobs of one map."""
+
+    def __init__(
+        self,
+        asking: Scenario,
+        methods: tuple[MethodChoice, ...],
+        protocol: RetrievalProtocol,
+        files: StudyFiles,
+    ):
+        self.jobs: dict[str, Job] = {}
+        self._asking = asking
+        self._plain = plain_drives(asking)
+        self._methods = methods
+        self._protocol = protocol
+        self._files = files
+        self._distractors: list[Scenario] = []
+
+    def add_distractors(self, drives: Sequence[Scenario]) -> None:
+        self._distractors = list(drives)
+
+    def add_rung(self, rung: Rung) -> Path:
+        """Adds the jobs of a rung; returns the part that they write."""
+        needs: list[str] = []
+        others = self._distractors if rung.drives.num_distractors else ()
+        name = f"{self._asking.name} {rung.cause} {rung.level} {rung.seed}"
+        part = self._files.rung(name)
+        step = MeasureRung(
+            database=self._drive(rung, "database", "places", needs),
+            query=self._drive(rung, "query", "queries", needs),
+            distractors=tuple(
+                self._describe(drive, "places", needs) for drive in others
+            ),
+            num_distractors=rung.drives.num_distractors,
+            methods=self._methods,
+            protocol=self._protocol,
+            part=part,
+        )
+        self.jobs[name] = Job(name, step, tuple(needs), _RUNG_COST)
+        return part
+
+    def _drive(
+        self, rung: Rung, side: str, role: Role, needs: list[str]
+    ) -> RungDrive:
+        drive = getattr(rung.drives, side)
+        # Only drives without a change serve several rungs.
+        is_shared = drive == getattr(self._plain, side)
+        files = self._describe(drive, role, needs) if is_shared else None
+        return RungDrive(SimulatedDrive(drive), files)
+
+    def _describe(
+        self, drive: Scenario, role: Role, needs: list[str]
+    ) -> SurveyFiles:
+        """Adds the job that describes a drive for several rungs."""
+        files = self._files.survey(f"{drive.name} {role}")
+        name = f"describe {drive.name}"
+        step = DescribeDrive(
+            SimulatedDrive(drive), role, self._methods, self._protocol, files
+        )
+        self.jobs[name] = Job(name, step, cost=_DESCRIPTION_COST)
+        needs.append(name)
+        return files
+
+
+def _labelled(asking: Scenario, rung: Rung) -> LadderRung:
+    # The database has the route of the query, whatever its stage.
+    route = str(asking.stage)
+    return LadderRung(
+        map_folder(asking).name,
+        route,
+        route,
+        rung.cause,
+        rung.level,
+        rung.strength,
+    )
+
+
+def _write(
+    measured: Sequence[MeasuredRung], output: Path, protocol: RetrievalProtocol
+) -> tuple[Path, str]:
+    rows = ladder_rows(measured)
+    text = ladder_text(rows)
+    _write_text(output / "queries.csv", ladder_query_table(measured).to_csv())
+    draw_ladder(rows, output / "ladder")
+    _write_text(output / "findings.txt", text + "\n")
+    table = output / "ladder.csv"
+    _write_text(table, ladder_table(rows, protocol).to_csv())
+    return table, text
+
+
+def _write_text(path: Path, text: str) -> None:
+    with completing(path) as part:
+        part.write_text(text, encoding="utf-8")

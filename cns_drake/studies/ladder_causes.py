@@ -1,0 +1,203 @@
+"""What changes between two drives, one cause at a time, and how strongly.
+
+Each cause changes one of the two drives. What a city is like when it is
+mapped, how it is mapped and from where, changes the drive of the database;
+what a later visitor meets, and measures with, changes the drive of the query,
+but never where it asks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from cns_drake.scenarios.ride_config import RideConfig
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.traffic_config import TrafficConfig
+from cns_drake.scenarios.weather_config import WeatherConfig
+
+# The unchanged world, and all causes together.
+NONE = "none"
+ALL = "all"
+# The strongest level; that of `none` is 0.
+STRONGEST = 4
+CAUSES = (
+    NONE,
+    "construction",
+    "traffic",
+    "weather",
+    "returns",
+    "ride",
+    "sensor",
+    "viewpoint",
+    "size",
+    ALL,
+)
+# Those that another seed draws anew.
+RANDOM_CAUSES = frozenset({"traffic", "weather", "returns", "ride", ALL})
+
+# No driver keeps to a line: the LiDAR of the database is so far ahead of that
+# of the query, and so far to its left [m].
+_AHEAD = 1.25
+_LEFT = 0.5
+
+# Cause -> level -> strength. The levels of construction are the map's stages.
+STRENGTHS: Mapping[str, Mapping[int, Any]] = {
+    # Number of vehicles, and of walkers.
+    "traffic": {1: 15, 2: 30, 3: 60, 4: 120},
+    # Visibility in fog [m].
+    "weather": {1: 200.0, 2: 100.0, 3: 50.0, 4: 25.0},
+    "returns": {1: "calibrated"},
+    # Class of the road of ISO 8608.
+    "ride": {1: "A", 2: "B", 3: "C", 4: "D"},
+    # Preset.
+    "sensor": {1: "os1-64", 2: "hdl-64e", 3: "vlp-16", 4: "avia"},
+    # Offset to the left [m], and heading [deg]. Beyond the radius of a match
+    # no place would be right.
+    "viewpoint": {1: (2.0, 0), 2: (4.0, 0), 3: (6.0, 0), 4: (6.0, 180)},
+    # Number of places of other cities.
+    "size": {1: 300, 2: 1000, 3: 3000, 4: 10000},
+}
+
+_WORDS = {
+    "construction": "mapped in stage {}",
+    "traffic": "{} vehicles and as many walkers",
+    "weather": "fog, {:g} m of visibility",
+    "returns": "{} returns",
+    "ride": "mapped on a road of class {}",
+    "sensor": "asked with a {}",
+    "viewpoint": "mapped {0[0]:g} m to the left, heading {0[1]} deg",
+    "size": "{} more places",
+}
+
+
+@dataclass(frozen=True)
+class RungDrives:
+    """What is simulated for a rung of a ladder.
+
+    Attributes:
+        database: drive whose places are known.
+        query: drive that asks.
+        num_distractors: places of other cities in the database.
+    """
+
+    database: Scenario
+    query: Scenario
+    num_distractors: int = 0
+
+
+def plain_drives(scenario: Scenario) -> RungDrives:
+    """Returns the drives without a change: one route, one city.
+
+    Args:
+        scenario: of the query.
+    """
+    database = scenario.model_copy(update={"name": f"{scenario.name}_database"})
+    return RungDrives(_mapped_from(database, _AHEAD, _LEFT, 0.0), scenario)
+
+
+def changed_drives(
+    plain: RungDrives, strengths: Mapping[str, Any], seed: int
+) -> RungDrives:
+    """Returns drives with causes of change between them.
+
+    Args:
+        plain: without.
+        strengths: cause -> its strength.
+        seed: of what is random.
+    """
+    drives = plain
+    # In one order, since returns are those of the sensor.
+    for cause, change in _CHANGES.items():
+        if cause in strengths:
+            drives = change(drives, strengths[cause], seed)
+    return drives
+
+
+def in_words(cause: str, strength: Any) -> str:
+    """Returns a strength as text."""
+    return _WORDS[cause].format(strength)
+
+
+def _construction(drives: RungDrives, stage: str, _: int) -> RungDrives:
+    return _mapped(drives, stage=stage)
+
+
+def _traffic(drives: RungDrives, number: int, seed: int) -> RungDrives:
+    traffic = TrafficConfig(vehicles=number, walkers=number, seed=seed)
+    return _asked(drives, traffic=traffic)
+
+
+def _weather(drives: RungDrives, visibility: float, seed: int) -> RungDrives:
+    weather = WeatherConfig(visibility=visibility)
+    query = drives.query.with_returns("calibrated", weather)
+    return _asked(replace(drives, query=query), seed=seed)
+
+
+def _returns(drives: RungDrives, _: str, seed: int) -> RungDrives:
+    query = drives.query.with_returns("calibrated")
+    return _asked(replace(drives, query=query), seed=seed)
+
+
+def _ride(drives: RungDrives, roughness: Any, seed: int) -> RungDrives:
+    return _mapped(drives, ride=RideConfig(roughness=roughness, seed=seed))
+
+
+def _sensor(drives: RungDrives, preset: str, _: int) -> RungDrives:
+    return replace(drives, query=drives.query.with_lidar_preset(preset))
+
+
+def _viewpoint(
+    drives: RungDrives, offset: tuple[float, float], _: int
+) -> RungDrives:
+    left, heading_deg = offset
+    moved = _mapped_from(drives.database, 0.0, left - _LEFT, heading_deg)
+    return replace(drives, database=moved)
+
+
+def _size(drives: RungDrives, number: int, _: int) -> RungDrives:
+    return replace(drives, num_distractors=number)
+
+
+_CHANGES: Mapping[str, Callable[[RungDrives, Any, int], RungDrives]] = {
+    "sensor": _sensor,
+    "returns": _returns,
+    "weather": _weather,
+    "traffic": _traffic,
+    "construction": _construction,
+    "ride": _ride,
+    "viewpoint": _viewpoint,
+    "size": _size,
+}
+
+
+def _mapped(drives: RungDrives, **update: Any) -> RungDrives:
+    return replace(drives, database=drives.database.model_copy(update=update))
+
+
+def _asked(drives: RungDrives, **update: Any) -> RungDrives:
+    return replace(drives, query=drives.query.model_copy(update=update))
+
+
+def _mapped_from(
+    scenario: Scenario, ahead: float, left: float, heading_deg: float
+) -> Scenario:
+    """Returns a scenario with its LiDARs elsewhere on the vehicle."""
+    lidars = {
+        name: config.model_copy(
+            update={
+                "xyz": (
+                    config.xyz[0] + ahead,
+                    config.xyz[1] + left,
+                    config.xyz[2],
+                ),
+                "rpy_deg": (
+                    *config.rpy_deg[:2],
+                    config.rpy_deg[2] + heading_deg,
+                ),
+            }
+        )
+        for name, config in scenario.lidars.items()
+    }
+    return scenario.model_copy(update={"lidars": lidars})

@@ -1,0 +1,178 @@
+"""The rungs of a ladder on a map: which causes, at which levels."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from cns_drake.roads.network import load_road_network
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import map_folder
+from cns_drake.studies.ladder_causes import (
+    ALL,
+    CAUSES,
+    NONE,
+    RANDOM_CAUSES,
+    STRENGTHS,
+    STRONGEST,
+    RungDrives,
+    changed_drives,
+    in_words,
+    plain_drives,
+)
+from cns_drake.traffic.road_lanes import make_lane_graph
+from cns_drake.traffic.starting_places import room_for_vehicles
+
+# Part of the room on the roads that traffic takes at most: the car needs some.
+_MOST_ROOM = 0.5
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One cause at one level.
+
+    Attributes:
+        cause: one of `CAUSES`.
+        level: from 1 to 4; 0 for `none`.
+        seed: of what is random.
+        strength: in words.
+        drives: what is simulated.
+    """
+
+    cause: str
+    level: int
+    seed: int
+    strength: str
+    drives: RungDrives
+
+
+@dataclass(frozen=True)
+class Extent:
+    """How much of the ladder is climbed.
+
+    Attributes:
+        causes: some of `CAUSES`, without `none`, which is always there.
+        levels: from 1 to 4. A cause that lacks one has its nearest lower
+            level in its place.
+        num_seeds: how often what is random is drawn.
+        most_places: most places of other cities.
+    """
+
+    causes: Collection[str] = CAUSES[1:]
+    levels: Sequence[int] = (1, 2, 3, 4)
+    num_seeds: int = 1
+    most_places: int = 10_000
+
+
+def plan_rungs(
+    scenario: Scenario, extent: Extent
+) -> tuple[list[Rung], list[str]]:
+    """Returns the rungs of a ladder, `none` first, and what a map lacks.
+
+    Args:
+        scenario: of the query, through a stage of a map.
+        extent: of the ladder.
+
+    Raises:
+        InputError: the map's roads cannot be used.
+    """
+    plain = plain_drives(scenario)
+    known, notes = _known_strengths(scenario, extent.most_places)
+    rungs = [Rung(NONE, 0, 1, "", plain)]
+    for cause in CAUSES[1:]:
+        if cause not in extent.causes or cause not in (*known, ALL):
+            continue
+        found = {
+            level: _strengths_at(
+                known if cause == ALL else {cause: known[cause]}, level
+            )
+            for level in _levels(known.get(cause), extent.levels)
+        }
+        draws = extent.num_seeds if cause in RANDOM_CAUSES else 1
+        for level, strengths in found.items():
+            text = "" if cause == ALL else in_words(cause, strengths[cause])
+            rungs += [
+                _rung(cause, level, seed, text, plain, strengths)
+                for seed in range(1, draws + 1)
+            ]
+    return rungs, notes
+
+
+def _rung(
+    cause: str,
+    level: int,
+    seed: int,
+    text: str,
+    plain: RungDrives,
+    strengths: Mapping[str, Any],
+) -> Rung:
+    drives = changed_drives(plain, strengths, seed)
+    # What differs from the plain drive has a name of its own.
+    ending = f"{cause}_{level}_{seed}"
+    for role in ("database", "query"):
+        drive = getattr(drives, role)
+        if drive != getattr(plain, role):
+            name = f"{drive.name}_{ending}"
+            renamed = drive.model_copy(update={"name": name})
+            drives = replace(drives, **{role: renamed})
+    return Rung(cause, level, seed, text, drives)
+
+
+def _known_strengths(
+    scenario: Scenario, most_places: int
+) -> tuple[dict[str, dict[int, Any]], list[str]]:
+    """Returns the strengths that a map has, and what it lacks."""
+    folder = map_folder(scenario)
+    known = {cause: dict(levels) for cause, levels in STRENGTHS.items()}
+    notes = []
+    before = [s for s in folder.stages() if s < str(scenario.stage)]
+    known["construction"] = _stage_levels(before)
+    if not before:
+        notes.append(f"no stage before {scenario.stage}: no construction")
+    if folder.roads.is_file():
+        graph = make_lane_graph(load_road_network(folder.roads))
+        room = int(_MOST_ROOM * room_for_vehicles(graph))
+        known["traffic"] = {
+            level: min(number, room)
+            for level, number in known["traffic"].items()
+        }
+    else:
+        del known["traffic"]
+        notes.append("no roads.yaml: no traffic")
+    known["size"] = {
+        level: number
+        for level, number in known["size"].items()
+        if number <= most_places
+    }
+    return {cause: levels for cause, levels in known.items() if levels}, notes
+
+
+def _stage_levels(stages: Sequence[str]) -> dict[int, Any]:
+    """Returns level -> stage, evenly chosen; the strongest is the first."""
+    number = min(STRONGEST, len(stages))
+    return {
+        STRONGEST - k: stages[k * (len(stages) - 1) // max(1, number - 1)]
+        for k in range(number)
+    }
+
+
+def _levels(
+    known: Mapping[int, Any] | None, wanted: Sequence[int]
+) -> list[int]:
+    """Returns levels in order; None has all."""
+    if known is None:
+        return sorted(wanted)
+    nearest = {max((k for k in known if k <= w), default=0) for w in wanted}
+    return sorted(nearest - {0})
+
+
+def _strengths_at(
+    known: Mapping[str, Mapping[int, Any]], level: int
+) -> dict[str, Any]:
+    """Returns cause -> its strength at a level, or the nearest lower one."""
+    return {
+        cause: levels[max(lower)]
+        for cause, levels in known.items()
+        if (lower := [k for k in levels if k <= level])
+    }

@@ -1,0 +1,84 @@
+"""What a method answered on a rung of a ladder, query by query."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from evaluation.recognition.description import DescribedDrive
+from evaluation.recognition.metrics import QueryOutcomes, judge
+from evaluation.recognition.pose_errors import PoseErrors
+from evaluation.recognition.retrieval import Retrieval
+
+
+@dataclass(frozen=True)
+class RungOutcome:
+    """What a method answered on a rung.
+
+    Attributes:
+        method: its name.
+        radius_told: whether it was gated by the radius.
+        outcomes: what became of each of Q queries.
+        query_frames: (Q,) of the query drive.
+        stamps_ns: (Q,) int64.
+        p_WQs: (Q, 3) where the sensor was [m].
+        match_drives: Q names of the drive of the best place; "" without a
+            candidate.
+        match_frames: (Q,) frame of the best place there; -1 without.
+        distances: (Q,) between query and best place [m]; NaN without, and
+            where the best place is of another city.
+        pose_errors: of the best place.
+    """
+
+    method: str
+    radius_told: bool
+    outcomes: QueryOutcomes
+    query_frames: np.ndarray
+    stamps_ns: np.ndarray
+    p_WQs: np.ndarray
+    match_drives: list[str]
+    match_frames: np.ndarray
+    distances: np.ndarray
+    pose_errors: PoseErrors
+
+    @classmethod
+    def of(
+        cls,
+        method: str,
+        radius_told: bool,
+        retrieval: Retrieval,
+        query: DescribedDrive,
+        drives: Sequence[str],
+    ) -> RungOutcome:
+        """Reduces the scores of all pairs to what became of each query.
+
+        Args:
+            method: that made the scores.
+            radius_told: whether they were gated.
+            retrieval: of Q queries and D places.
+            query: the drive that asks.
+            drives: D names of the drives of the places; that of the query's
+                own city comes first.
+        """
+        best = retrieval.best_places
+        rows = np.arange(len(best))
+        names = [drives[k] if k >= 0 else "" for k in best.tolist()]
+        at_home = np.array([name == drives[0] for name in names])
+        return cls(
+            method=method,
+            radius_told=radius_told,
+            outcomes=judge(retrieval.scores, retrieval.matches),
+            query_frames=retrieval.query_frames,
+            stamps_ns=query.queries.stamps_ns,
+            p_WQs=query.queries.p_WSs,
+            match_drives=names,
+            match_frames=np.where(
+                best >= 0, retrieval.database_frames[best], -1
+            ),
+            distances=np.where(
+                at_home, retrieval.distances[rows, best], np.nan
+            ),
+            pose_errors=retrieval.pose_errors,
+        )

@@ -1,0 +1,155 @@
+"""The numbers of a ladder: what each cause of change leaves of each method."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+import math
+
+import numpy as np
+
+from evaluation.recognition.metrics import (
+    Interval,
+    area,
+    percentile_interval,
+    resampled_metrics,
+    resampled_weights,
+)
+from evaluation.recognition.rung_outcome import RungOutcome
+from evaluation.recognition.survival import Kept
+
+
+@dataclass(frozen=True)
+class LadderRung:
+    """Which change there is between two drives.
+
+    Attributes:
+        map_name: of the city.
+        database: of the drive whose route is that of the database.
+        query: of the drive that asks.
+        cause: of the change; `none` without one.
+        level: its strength, from 1 to 4; 0 without a change.
+        strength: in words.
+    """
+
+    map_name: str
+    database: str
+    query: str
+    cause: str
+    level: int
+    strength: str
+
+
+@dataclass(frozen=True)
+class MeasuredRung:
+    """What all methods answered on a rung, with one draw of what is random.
+
+    Attributes:
+        rung: which.
+        seed: of the draw.
+        outcomes: of each method, without and with the gate.
+    """
+
+    rung: LadderRung
+    seed: int
+    outcomes: Sequence[RungOutcome]
+
+
+@dataclass(frozen=True)
+class LadderRow:
+    """A method on a rung: means over the draws.
+
+    Attributes:
+        rung: which.
+        method: its name.
+        radius_told: whether it was gated by the radius.
+        auc_interval: 95 %, of AUC: bootstrap over queries, in each sample the
+            same ones for each draw.
+        r1: R@1.
+        kept: of AUC, against the rung `none` of the same map.
+        queries: asked in each draw.
+        with_match: those that have a match.
+        places: of the database.
+        draws: of what is random.
+    """
+
+    rung: LadderRung
+    method: str
+    radius_told: bool
+    auc_interval: Interval
+    r1: float
+    kept: Kept
+    queries: int
+    with_match: int
+    places: int
+    draws: int
+
+    @property
+    def auc(self) -> float:
+        return self.kept.changed
+
+
+def ladder_rows(measured: Iterable[MeasuredRung]) -> list[LadderRow]:
+    """Returns a row for each rung, method and gate.
+
+    Args:
+        measured: of all maps; the rung `none` of a map comes first.
+    """
+    groups: dict[tuple[LadderRung, str, bool], list[RungOutcome]] = {}
+    for one in measured:
+        for outcome in one.outcomes:
+            key = one.rung, outcome.method, outcome.radius_told
+            groups.setdefault(key, []).append(outcome)
+    plain: dict[tuple[str, str, bool], list[RungOutcome]] = {}
+    rows = []
+    for (rung, method, told), draws in groups.items():
+        unchanged = plain.setdefault((rung.map_name, method, told), draws)
+        rows.append(_row(rung, unchanged, draws))
+    return rows
+
+
+def _row(
+    rung: LadderRung,
+    unchanged: Sequence[RungOutcome],
+    draws: Sequence[RungOutcome],
+) -> LadderRow:
+    first = draws[0]
+    num_queries = len(first.outcomes)
+    weights = resampled_weights(num_queries)
+    samples = _sampled_auc(draws, weights)
+    share = Interval(math.nan, math.nan)
+    if len(unchanged[0].outcomes) == num_queries:
+        before = _sampled_auc(unchanged, weights)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            share = percentile_interval(
+                np.where(before > 0.0, samples / before, math.nan)
+            )
+    return LadderRow(
+        rung=rung,
+        method=first.method,
+        radius_told=first.radius_told,
+        auc_interval=percentile_interval(samples),
+        r1=_mean([one.outcomes.recall_at(1) for one in draws]),
+        kept=Kept(_auc(unchanged), _auc(draws), share),
+        queries=num_queries,
+        with_match=int(first.outcomes.has_match.sum()),
+        places=first.outcomes.num_places,
+        draws=len(draws),
+    )
+
+
+def _auc(draws: Sequence[RungOutcome]) -> float:
+    return _mean([area(one.outcomes) for one in draws])
+
+
+def _sampled_auc(
+    draws: Sequence[RungOutcome], weights: np.ndarray
+) -> np.ndarray:
+    """Returns the mean AUC over draws, of samples of the queries."""
+    return np.mean(
+        [resampled_metrics(one.outcomes, weights)[0] for one in draws], axis=0
+    )
+
+
+def _mean(values: Sequence[float]) -> float:
+    return float(np.mean(values))

@@ -1,0 +1,108 @@
+"""What a ladder says, in words: which cause costs which method most."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import math
+
+from evaluation.report.ladder_rows import LadderRow
+from evaluation.report.method_titles import in_table_order, title
+
+# What is kept of AUC where little is lost.
+_MUCH = 0.95
+
+
+def ladder_text(rows: Sequence[LadderRow]) -> str:
+    """Returns a paragraph for each map.
+
+    Args:
+        rows: of all maps.
+    """
+    maps = dict.fromkeys(row.rung.map_name for row in rows)
+    return "\n\n".join(
+        _paragraph([row for row in rows if row.rung.map_name == name])
+        for name in maps
+    )
+
+
+def _paragraph(rows: Sequence[LadderRow]) -> str:
+    first = rows[0].rung
+    parts = [
+        f"{first.map_name.capitalize()}, {rows[0].queries} queries of drive"
+        f" {first.query}: what each cause of change, at its strongest level,"
+        " leaves of the AUC without a change (95 % intervals)."
+    ]
+    for told, words in (
+        (False, "With the radius untold"),
+        (True, "With the radius told"),
+    ):
+        strongest = _strongest([r for r in rows if r.radius_told == told])
+        single = [r for r in strongest if r.rung.cause not in ("none", "all")]
+        if not single:
+            continue
+        sentences = [
+            _sentence(method, single, strongest)
+            for method in in_table_order(row.method for row in single)
+        ]
+        parts.append(f"{words}: {'; '.join(filter(None, sentences))}.")
+        parts.append(_mildest(single))
+    return " ".join(filter(None, parts))
+
+
+def _sentence(
+    method: str, single: Sequence[LadderRow], strongest: Sequence[LadderRow]
+) -> str:
+    known = [
+        row
+        for row in single
+        if row.method == method and not math.isnan(row.kept.share)
+    ]
+    if not known:
+        return ""
+    worst = min(known, key=lambda row: row.kept.share)
+    text = (
+        f"{title(method)} keeps {_kept(worst)} whatever the cause"
+        if worst.kept.share >= _MUCH
+        else f"{title(method)} loses most by {_cause(worst)}"
+        f" ({worst.rung.strength}), which leaves {_kept(worst)}"
+    )
+    for row in strongest:
+        if row.method == method and row.rung.cause == "all":
+            text += f", and all causes together leave {_kept(row)}"
+    return text
+
+
+def _mildest(single: Sequence[LadderRow]) -> str:
+    """Returns which causes cost no method much."""
+    shares: dict[str, list[float]] = {}
+    for row in single:
+        if not math.isnan(row.kept.share):
+            shares.setdefault(_cause(row), []).append(row.kept.share)
+    least = {cause: min(values) for cause, values in shares.items()}
+    mild = [cause for cause, share in least.items() if share >= _MUCH]
+    much = f"{100.0 * _MUCH:.0f} % or more"
+    if not mild:
+        return f"No cause leaves {much} to every method."
+    return f"To every method {much} are left by {', '.join(mild)}."
+
+
+def _strongest(rows: Sequence[LadderRow]) -> list[LadderRow]:
+    """Returns the row of the strongest level of each cause and method."""
+    found: dict[tuple[str, str], LadderRow] = {}
+    for row in rows:
+        key = row.rung.cause, row.method
+        if key not in found or found[key].rung.level < row.rung.level:
+            found[key] = row
+    return list(found.values())
+
+
+def _cause(row: LadderRow) -> str:
+    return row.rung.cause.replace("_", " ")
+
+
+def _kept(row: LadderRow) -> str:
+    low, high = row.kept.interval.low, row.kept.interval.high
+    text = f"{100.0 * row.kept.share:.0f} %"
+    if math.isnan(low):
+        return text
+    return f"{text} ({100.0 * low:.0f} to {100.0 * high:.0f})"

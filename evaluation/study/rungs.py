@@ -1,0 +1,156 @@
+"""One rung of a ladder: a query drive asks a database, all methods answer.
+
+Each method answers twice, without the gate and with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from cns_drake.base.jobs.step import Tell
+from evaluation.recognition.description import (
+    DescribedDrive,
+    DescribedScans,
+    Role,
+)
+from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition.retrieval import compare_both_ways
+from evaluation.recognition.rung_outcome import RungOutcome
+from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.described_drives import describe
+from evaluation.study.drive_source import DriveSource
+from evaluation.study.parts import PartStep, part_digest, read_part
+from evaluation.study.study_layout import SurveyFiles
+
+# Between a city and the next one that distracts from it [m]. No scan reaches
+# so far.
+_APART = 1e5
+
+
+@dataclass(frozen=True)
+class RungDrive:
+    """A drive of a rung.
+
+    Attributes:
+        source: opens it.
+        files: where its descriptions lie that serve several rungs; None if
+            this rung alone needs them.
+    """
+
+    source: DriveSource
+    files: SurveyFiles | None = None
+
+
+@dataclass(frozen=True)
+class MeasureRung(PartStep):
+    """Writes the list of `RungOutcome`s of a rung, two for each method.
+
+    Attributes:
+        database: drive whose places are known.
+        query: drive that asks, in the same world frame.
+        distractors: descriptions of drives through other cities, whose places
+            stand among those of the database.
+        num_distractors: how many of their places do.
+        methods: that answer.
+        protocol: of place recognition.
+        part: to write.
+    """
+
+    database: RungDrive
+    query: RungDrive
+    distractors: tuple[SurveyFiles, ...]
+    num_distractors: int
+    methods: tuple[MethodChoice, ...]
+    protocol: RetrievalProtocol
+    part: Path
+
+    def inputs(self) -> dict[str, object]:
+        return {
+            "database": self._identity(self.database),
+            "query": self._identity(self.query),
+            "distractors": [self._digests(one) for one in self.distractors],
+            "number": self.num_distractors,
+            "protocol": self.protocol.to_json(),
+            "methods": [method.inputs() for method in self.methods],
+        }
+
+    def make(self, tell: Tell) -> list[RungOutcome]:
+        places = self._described(self.database, "places", tell)
+        queries = self._described(self.query, "queries", tell)
+        found = []
+        for choice in self.methods:
+            database = places.pop(choice.name, None) or read_part(
+                _file(self.database, choice)
+            )
+            query = queries.pop(choice.name, None) or read_part(
+                _file(self.query, choice)
+            )
+            others = [
+                read_part(one.described(choice)) for one in self.distractors
+            ]
+            known = [database, *others]
+            asked = replace(
+                database,
+                places=joined_places(
+                    [one.places for one in known], self.num_distractors
+                ),
+            )
+            drives = [one.name for one in known for _ in one.places.frames]
+            both = compare_both_ways(choice.make(), asked, query, self.protocol)
+            found += [
+                RungOutcome.of(choice.name, told, one, query, drives)
+                for told, one in zip((False, True), both, strict=True)
+            ]
+        return found
+
+    def _described(
+        self, drive: RungDrive, role: Role, tell: Tell
+    ) -> dict[str, DescribedDrive]:
+        """Returns descriptions that are not in files."""
+        if drive.files is not None:
+            return {}
+        return describe(drive.source, role, self.methods, self.protocol, tell)
+
+    def _identity(self, drive: RungDrive) -> object:
+        if drive.files is None:
+            return drive.source.identity()
+        return self._digests(drive.files)
+
+    def _digests(self, files: SurveyFiles) -> list[str]:
+        return [part_digest(files.described(one)) for one in self.methods]
+
+
+def joined_places(
+    drives: Sequence[DescribedScans], num_others: int
+) -> DescribedScans:
+    """Returns the places of a drive with places of others among them.
+
+    Args:
+        drives: the first is that of the query's world. The others are moved
+            so far away that no place of theirs is a match.
+        num_others: how many places of the others there are at most, from the
+            first one on.
+    """
+    first, *others = drives
+    poses = [first.X_WS]
+    for number, one in enumerate(others, start=1):
+        X_WS = one.X_WS.copy()
+        X_WS[:, 0, 3] += number * _APART
+        poses.append(X_WS)
+    end = len(first.frames) + num_others
+    return DescribedScans(
+        frames=np.concatenate([one.frames for one in drives])[:end],
+        stamps_ns=np.concatenate([one.stamps_ns for one in drives])[:end],
+        X_WS=np.concatenate(poses)[:end],
+        descriptors=[d for one in drives for d in one.descriptors][:end],
+        clouds=[cloud for one in drives for cloud in one.clouds][:end],
+    )
+
+
+def _file(drive: RungDrive, choice: MethodChoice) -> Path:
+    assert drive.files is not None
+    return drive.files.described(choice)

@@ -1,0 +1,183 @@
+"""`cns-drake ladder`: what its rungs change, and what it writes."""
+
+import csv
+
+from helpers import documents, studies
+from helpers.small_map import write_town
+import numpy as np
+import pytest
+
+from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.simulation.simulated_drive import SimulatedDrive
+from cns_drake.studies import ladder
+from cns_drake.studies.distractors import distracting_drives
+from cns_drake.studies.ladder import climb_ladder
+from cns_drake.studies.ladder_causes import CAUSES, STRENGTHS
+from cns_drake.studies.ladder_rungs import Extent, plan_rungs
+from evaluation.study.chosen_methods import MethodChoice
+
+METHODS = (MethodChoice("solid"), MethodChoice("layered-overlap"))
+# Where each cause may make a difference, apart from the drive's name.
+CHANGED = {
+    "construction": ("database", {"stage"}),
+    "traffic": ("query", {"traffic"}),
+    "weather": ("query", {"lidars", "weather", "seed"}),
+    "returns": ("query", {"lidars", "seed"}),
+    "ride": ("database", {"ride"}),
+    "sensor": ("query", {"lidars"}),
+    "viewpoint": ("database", {"lidars"}),
+}
+
+
+@pytest.fixture(scope="module")
+def town(tmp_path_factory):
+    """Folder of a map with three stages, and two drives of 60 frames."""
+    routes = {"01": "metropolis_01", "04": "metropolis_04"}
+    folder = write_town(tmp_path_factory.mktemp("maps") / "town", routes, 60)
+    (folder / "stage_02.sdf").write_bytes(
+        (folder / "stage_01.sdf").read_bytes()
+    )
+    return folder
+
+
+@pytest.fixture(scope="module")
+def asking(town):
+    return load_scenario(town / "sequence_04.yaml")
+
+
+def differences(one, other):
+    """The fields in which two scenarios differ."""
+    return {
+        name
+        for name in type(one).model_fields
+        if getattr(one, name) != getattr(other, name)
+    }
+
+
+def test_one_cause_changes_one_drive(asking):
+    (plain, *rungs), notes = plan_rungs(asking, Extent(levels=(1, 2, 3, 4)))
+    assert plain.cause == "none"
+    assert plain.drives.query == asking
+    assert differences(plain.drives.database, asking) == {"name", "lidars"}
+    assert not notes
+    for rung in rungs:
+        found = {
+            side: differences(
+                getattr(rung.drives, side), getattr(plain.drives, side)
+            )
+            for side in ("database", "query")
+        }
+        if rung.cause == "size":
+            assert found == {"database": set(), "query": set()}
+            assert rung.drives.num_distractors == STRENGTHS["size"][rung.level]
+        elif rung.cause != "all":
+            side, fields = CHANGED[rung.cause]
+            assert found.pop(side) - {"name"} <= fields
+            assert rung.drives.num_distractors == 0
+            assert list(found.values()) == [set()]
+
+
+def test_all_is_everything_at_its_level(asking):
+    rungs, _ = plan_rungs(asking, Extent(levels=(2, 4)))
+    strongest = {rung.cause: rung for rung in rungs if rung.cause != "none"}
+    assert set(strongest) == set(CAUSES) - {"none"}
+    both = strongest["all"].drives
+    assert both.num_distractors == 10_000
+    for cause, (side, fields) in CHANGED.items():
+        alone = getattr(strongest[cause].drives, side)
+        for field in fields - {"lidars", "seed"}:
+            assert getattr(getattr(both, side), field) == getattr(alone, field)
+    config = both.query.lidars["lidar"]
+    assert (config.preset, config.returns) == ("avia", "calibrated")
+    assert both.database.lidars["lidar"].rpy_deg[2] == 180.0
+
+
+def test_levels_and_seeds(asking):
+    rungs, _ = plan_rungs(asking, Extent(levels=(4,), num_seeds=3))
+    climbed = [(r.cause, r.level, r.seed) for r in rungs]
+    # The earlier of two stages is the stronger change; returns have one level.
+    assert ("construction", 4, 1) in climbed
+    assert ("returns", 1, 3) in climbed
+    assert ("ride", 4, 3) in climbed
+    assert ("sensor", 4, 2) not in climbed
+    rungs, _ = plan_rungs(asking, Extent(causes={"construction"}))
+    stages = {r.level: r.drives.database.stage for r in rungs}
+    assert stages == {0: "04", 3: "02", 4: "01"}
+    rungs, _ = plan_rungs(asking, Extent(causes={"size"}, most_places=500))
+    assert [r.drives.num_distractors for r in rungs] == [0, 300]
+
+
+def test_what_a_map_lacks(asking, town):
+    lonely = asking.model_copy(update={"stage": "01"})
+    rungs, notes = plan_rungs(lonely, Extent())
+    assert "construction" not in {rung.cause for rung in rungs}
+    assert notes == ["no stage before 01: no construction"]
+
+
+@pytest.mark.slow
+def test_queries_lie_at_the_same_places_on_every_rung(asking):
+    (plain, *rungs), _ = plan_rungs(asking, Extent(levels=(4,)))
+    expected = SimulatedDrive(plain.drives.query)().X_WS
+    for rung in rungs:
+        if rung.cause in ("weather", "returns", "sensor"):
+            np.testing.assert_array_equal(
+                SimulatedDrive(rung.drives.query)().X_WS, expected
+            )
+
+
+def test_the_other_carriageway(asking):
+    (plain, rung), _ = plan_rungs(
+        asking, Extent(causes={"viewpoint"}, levels=(4,))
+    )
+    query = SimulatedDrive(plain.drives.query)().X_WS
+    database = SimulatedDrive(rung.drives.database)().X_WS
+    X_QD = np.linalg.inv(query) @ database
+    np.testing.assert_allclose(X_QD[:, :3, 3] - [[1.25, 6, 0]], 0, atol=1e-9)
+    np.testing.assert_allclose(X_QD[:, 0, 0], -1.0, atol=1e-9)
+
+
+def test_distracting_drives_are_of_other_cities(tmp_path, monkeypatch):
+    asking = load_scenario("metropolis_04")
+    drives = distracting_drives(asking, 1000, 5.0, tmp_path, Cluster())
+    # Some 250 to 350 places each.
+    assert 3 <= len(drives) <= 5
+    assert all("metropolis" not in drive.name for drive in drives)
+    assert len({drive.name for drive in drives}) == len(drives)
+    assert distracting_drives(asking, 0, 5.0, tmp_path, Cluster()) == []
+
+
+@pytest.mark.slow
+def test_a_ladder_from_end_to_end(town, tmp_path, monkeypatch):
+    runs = []
+    monkeypatch.setattr(
+        ladder,
+        "run_jobs",
+        lambda jobs, cluster: runs.append(studies.do(jobs)),
+    )
+    extent = Extent(causes={"construction", "viewpoint"}, levels=(4,))
+    arguments = [[str(town)], tmp_path, Cluster(), METHODS, extent]
+    path, text = climb_ladder(*arguments)
+    assert path == tmp_path / "ladder.csv"
+    assert text.startswith("Town, ")
+    rows = list(csv.DictReader(path.open()))
+    assert [(r["cause"], r["level"]) for r in rows[::4]] == [
+        ("none", "0"),
+        ("construction", "4"),
+        ("viewpoint", "4"),
+    ]
+    assert {r["method"] for r in rows} == {"solid", "layered-overlap"}
+    assert {r["db"] for r in rows} == {r["query"] for r in rows} == {"04"}
+    queries = list(csv.DictReader((tmp_path / "queries.csv").open()))
+    assert len(queries) == sum(int(row["queries"]) for row in rows)
+    assert (tmp_path / "ladder.png").is_file()
+    # What is done is not done again.
+    assert climb_ladder(*arguments) == (path, text)
+    assert [len(run) for run in runs] == [5, 0]
+
+
+def test_the_page_has_every_cause():
+    table = documents.table(
+        documents.read("docs/ladder.md"), "## What is compared"
+    )
+    assert [row[0].strip("`") for row in table] == list(CAUSES[1:])

@@ -1,0 +1,179 @@
+"""The numbers, the table, the figure and the words of a ladder."""
+
+import csv
+import io
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from evaluation.recognition.metrics import QueryOutcomes
+from evaluation.recognition.pose_errors import PoseErrors
+from evaluation.recognition.protocol import PAPER_PROTOCOL
+from evaluation.recognition.rung_outcome import RungOutcome
+from evaluation.report.ladder_figure import draw_ladder
+from evaluation.report.ladder_rows import (
+    LadderRung,
+    MeasuredRung,
+    ladder_rows,
+)
+from evaluation.report.ladder_tables import ladder_query_table, ladder_table
+from evaluation.report.ladder_text import ladder_text
+
+
+def answered(method, told, is_right, scores=None):
+    """An outcome; all queries have a match."""
+    right = np.array(is_right, dtype=bool)
+    number = len(right)
+    return RungOutcome(
+        method,
+        told,
+        QueryOutcomes(
+            np.ones(number) if scores is None else scores,
+            right,
+            np.ones(number, bool),
+            np.where(right, 1.0, np.inf),
+            9,
+        ),
+        query_frames=np.arange(number),
+        stamps_ns=np.arange(number) * 50,
+        p_WQs=np.zeros((number, 3)),
+        match_drives=["town_01"] * number,
+        match_frames=np.arange(number),
+        distances=np.ones(number),
+        pose_errors=PoseErrors.unknown(number),
+    )
+
+
+def measured(cause, level, answers, seed=1):
+    """A rung of the ladder of a town."""
+    rung = LadderRung("town", "02", "02", cause, level, f"much {cause}")
+    return MeasuredRung(rung, seed, answers)
+
+
+def part(number, kept):
+    """Of so many queries the first are right."""
+    return np.arange(number) < kept
+
+
+@pytest.fixture(scope="module")
+def climbed():
+    """Of 60 queries, 45 survive snow and 30, then 15 survive works."""
+    return [
+        measured(
+            cause,
+            level,
+            [
+                answered("solid", told, part(60, kept + 6 * told))
+                for told in (False, True)
+            ],
+            seed,
+        )
+        for cause, level, seed, kept in (
+            ("none", 0, 1, 54),
+            ("snow", 4, 1, 45),
+            ("works", 2, 1, 30),
+            ("works", 4, 1, 20),
+            ("works", 4, 2, 10),
+            ("all", 4, 1, 0),
+        )
+    ]
+
+
+def test_the_share_of_auc_that_is_kept(climbed):
+    # All scores are equal: at the only threshold nothing is rejected, and AUC
+    # is the precision there.
+    found = {
+        (row.rung.cause, row.rung.level): row
+        for row in ladder_rows(climbed)
+        if not row.radius_told
+    }
+    assert found["none", 0].kept.share == 1.0
+    assert found["none", 0].kept.interval.low == 1.0
+    snow = found["snow", 4]
+    assert snow.r1 == 0.75
+    assert snow.auc == pytest.approx(0.75)
+    assert snow.kept.share == pytest.approx(45 / 54)
+    low, high = binom.ppf([0.025, 0.975], 54, 45 / 54) / 54
+    assert snow.kept.interval.low == pytest.approx(low, abs=0.05)
+    assert snow.kept.interval.high == pytest.approx(high, abs=0.05)
+
+
+def test_draws_are_averaged(climbed):
+    rows = [row for row in ladder_rows(climbed) if not row.radius_told]
+    (works,) = (
+        row for row in rows if (row.rung.cause, row.rung.level) == ("works", 4)
+    )
+    assert works.draws == 2
+    assert works.r1 == pytest.approx(15 / 60)
+    assert works.auc == pytest.approx(15 / 60)
+
+
+def test_every_number_follows_from_the_queries(climbed):
+    """AUC is counted by hand: the precision at the only threshold."""
+    rows = list(
+        csv.DictReader(
+            io.StringIO(
+                ladder_table(ladder_rows(climbed), PAPER_PROTOCOL).to_csv()
+            )
+        )
+    )
+    queries = list(
+        csv.DictReader(io.StringIO(ladder_query_table(climbed).to_csv()))
+    )
+    keys = ("map", "db", "query", "cause", "level", "method", "radius_told")
+    assert list(rows[0])[:12] == [
+        *keys,
+        "auc",
+        "r1",
+        "kept",
+        "kept_low",
+        "kept_high",
+    ]
+    assert len({tuple(row[key] for key in keys) for row in rows}) == len(rows)
+    auc = {}
+    for row in rows:
+        key = tuple(row[name] for name in keys)
+        mine = [q for q in queries if tuple(q[name] for name in keys) == key]
+        draws = []
+        for seed in {q["seed"] for q in mine}:
+            right = [int(q["correct"]) for q in mine if q["seed"] == seed]
+            draws.append(np.mean(right))
+        auc[key] = np.mean(draws)
+        assert float(row["auc"]) == pytest.approx(auc[key])
+        plain = auc[(*key[:3], "none", "0", *key[5:])]
+        assert float(row["kept"]) == pytest.approx(auc[key] / plain)
+
+
+def test_the_words_name_the_worst_cause(climbed):
+    text = ladder_text(ladder_rows(climbed))
+    assert "SOLiD loses most by works (much works), which leaves 28 %" in text
+    assert "all causes together leave 0 % (0 to 0)" in text
+    assert "No cause leaves 95 % or more to every method" in text
+    mild = [climbed[0], measured("ride", 4, climbed[0].outcomes)]
+    text = ladder_text(ladder_rows(mild))
+    assert "SOLiD keeps 100 % (100 to 100) whatever the cause" in text
+    assert "To every method 95 % or more are left by ride" in text
+
+
+def test_without_anything_to_keep(climbed):
+    nothing = [
+        measured(cause, 0, [answered("btc", False, part(9, 0))])
+        for cause in ("none", "snow")
+    ]
+    (_, row) = ladder_rows(nothing)
+    assert np.isnan(row.kept.share)
+    assert np.isnan(row.kept.interval.low)
+    assert "BTC" not in ladder_text([row])
+
+
+def test_the_figure_is_the_same_each_time(climbed, tmp_path):
+    for name in ("one", "other"):
+        draw_ladder(ladder_rows(climbed), tmp_path / name)
+    for ending in ("png", "pdf", "svg"):
+        one, other = (
+            (tmp_path / f"{name}.{ending}").read_bytes()
+            for name in ("one", "other")
+        )
+        assert one == other
+        assert len(one) > 1000

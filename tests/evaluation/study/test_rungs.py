@@ -1,0 +1,155 @@
+"""A rung of a ladder has the numbers of the single commands."""
+
+from dataclasses import dataclass
+
+from helpers.small_towns import drive
+import numpy as np
+import pytest
+
+from cns_drake.base.jobs.step import Tell
+from evaluation.methods import make_method
+from evaluation.recognition.place_recognition import run
+from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.sequences import open_sequence
+from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.described_drives import DescribeDrive
+from evaluation.study.drive_source import RecordedDrive
+from evaluation.study.parts import read_part
+from evaluation.study.rungs import MeasureRung, RungDrive
+from evaluation.study.study_layout import SurveyFiles
+
+METHODS = (MethodChoice("solid"), MethodChoice("layered-overlap"))
+PROTOCOL = RetrievalProtocol()
+
+
+@dataclass(frozen=True)
+class Once:
+    """Opens a recorded drive whose scans are read once each, in order."""
+
+    path: object
+
+    def __call__(self):
+        recorded = open_sequence(self.path)
+        read, scan = [], recorded.scan
+
+        def once(index):
+            assert index not in read
+            read.append(index)
+            return scan(index)
+
+        recorded.scan = once
+        return recorded
+
+    def identity(self):
+        return str(self.path)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("drives")
+    drive(folder / "metropolis_01", "01", "a")
+    drive(folder / "metropolis_04", "04", "b")
+    drive(folder / "suburbia_01", "04", "a", city="suburbia")
+    return folder
+
+
+def described(folder, name, role):
+    """The files of a drive, and the step that writes them."""
+    files = SurveyFiles(folder / "parts" / name)
+    step = DescribeDrive(
+        RecordedDrive(folder / name), role, METHODS, PROTOCOL, files
+    )
+    if not step.is_done():
+        step.run(Tell())
+    return files
+
+
+def rung(folder, part, **changes):
+    """A rung whose database is described beforehand."""
+    values = {
+        "database": RungDrive(
+            RecordedDrive(folder / "metropolis_01"),
+            described(folder, "metropolis_01", "places"),
+        ),
+        "query": RungDrive(Once(folder / "metropolis_04")),
+        "distractors": (),
+        "num_distractors": 0,
+        "methods": METHODS,
+        "protocol": PROTOCOL,
+        "part": part,
+    }
+    return MeasureRung(**values | changes)
+
+
+def test_the_numbers_are_those_of_the_single_command(folder, tmp_path):
+    step = rung(folder, tmp_path / "rung.data")
+    step.run(Tell())
+    assert step.is_done()
+    found = read_part(step.part)
+    assert [(one.method, one.radius_told) for one in found] == [
+        (choice.name, told) for choice in METHODS for told in (False, True)
+    ]
+    database, query = (
+        open_sequence(folder / name)
+        for name in ("metropolis_01", "metropolis_04")
+    )
+    for one in found:
+        alone = run(
+            database,
+            query,
+            make_method(one.method, {}),
+            protocol=RetrievalProtocol(gate=one.radius_told),
+        )
+        for name in ("best_scores", "is_right", "first_right_ranks"):
+            np.testing.assert_array_equal(
+                getattr(one.outcomes, name), getattr(alone.outcomes, name)
+            )
+        np.testing.assert_array_equal(
+            one.pose_errors.translation,
+            alone.retrieval.pose_errors.translation,
+        )
+        best = alone.retrieval.best_places
+        np.testing.assert_array_equal(
+            one.match_frames,
+            np.where(best < 0, -1, alone.retrieval.database_frames[best]),
+        )
+
+
+def test_places_of_other_cities_are_never_right(folder, tmp_path):
+    others = (described(folder, "suburbia_01", "places"),)
+    plain = read_part(_done(rung(folder, tmp_path / "plain.data")))
+    for number in (3, 100):
+        step = rung(
+            folder,
+            tmp_path / f"{number}.data",
+            distractors=others,
+            num_distractors=number,
+        )
+        for before, after in zip(plain, read_part(_done(step)), strict=True):
+            places = before.outcomes.num_places
+            assert after.outcomes.num_places == places + min(number, 9)
+            np.testing.assert_array_equal(
+                before.outcomes.has_match, after.outcomes.has_match
+            )
+            elsewhere = np.array(after.match_drives) == "suburbia_01"
+            assert not after.outcomes.is_right[elsewhere].any()
+            assert np.isnan(after.distances[elsewhere]).all()
+    # Stage 01 lacks what the query sees, and the other town has it.
+    assert elsewhere.any()
+
+
+def _done(step):
+    step.run(Tell())
+    return step.part
+
+
+def test_another_database_is_another_rung(folder, tmp_path):
+    step = rung(folder, tmp_path / "rung.data")
+    step.run(Tell())
+    other = rung(
+        folder,
+        step.part,
+        database=RungDrive(RecordedDrive(folder / "metropolis_04")),
+    )
+    assert step.is_done()
+    assert not other.is_done()
