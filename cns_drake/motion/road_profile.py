@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from scipy.ndimage import map_coordinates
 
 RoughnessClass = Literal["A", "B", "C", "D", "E"]
 
@@ -60,6 +59,9 @@ class RoadProfile:
 
     def heights(self, p_WQset: np.ndarray) -> np.ndarray:
         """Returns the (N,) heights [m] at (N, 2) places in the world [m]."""
+        # Slow to import, and not needed to describe a scenario.
+        from scipy.ndimage import map_coordinates
+
         heights = np.zeros(len(p_WQset))
         for layer, spacing in enumerate(_SPACINGS):
             rng = np.random.default_rng([self._seed, layer])

@@ -7,7 +7,6 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import PchipInterpolator
 
 from cns_drake.roads.centreline import Centreline, sample_stations
 from cns_drake.roads.road_schema import RoadEntry
@@ -84,6 +83,9 @@ class Road:
         z += [heights[1], heights[1]]
         if np.any(np.diff(stations) <= 0):
             raise ValueError("heights must lie between the junctions, in order")
+        # Slow to import, and not needed to describe or to list drives.
+        from scipy.interpolate import PchipInterpolator
+
         self._height = PchipInterpolator(stations, z)
 
     @property

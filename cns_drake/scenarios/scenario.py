@@ -155,7 +155,7 @@ class Scenario(Section):
     @model_validator(mode="after")
     def _check_weather(self) -> Scenario:
         ideal = [n for n, c in self.lidars.items() if c.returns == "ideal"]
-        if ideal and not self.weather.weather().is_clear:
+        if ideal and self.weather != WeatherConfig():
             raise ValueError(
                 "weather: ideal returns feel none; give lidars."
                 f"{ideal[0]}.returns: calibrated"

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from pydantic import Field
 
 from cns_drake.scenarios.section import Section
-from cns_drake.sensors.returns.weather import Weather
+
+if TYPE_CHECKING:
+    from cns_drake.sensors.returns.weather import Weather
 
 
 class WeatherConfig(Section):
@@ -23,4 +27,7 @@ class WeatherConfig(Section):
 
     def weather(self) -> Weather:
         """Returns what a LiDAR feels."""
+        # Slow to import, and not needed to describe a scenario.
+        from cns_drake.sensors.returns.weather import Weather
+
         return Weather(self.visibility, self.rain, self.snowfall)

@@ -50,17 +50,20 @@ def test_importing_a_package_loads_nothing_heavy(package):
 
 
 @pytest.mark.parametrize(
-    "module",
-    ["cns_drake.simulation.simulation", "evaluation.study.measurements"],
+    ("module", "slow"),
+    [
+        ("cns_drake.simulation.simulation", {"scipy.stats", "scipy.signal"}),
+        ("evaluation.study.measurements", {"scipy.stats", "matplotlib"}),
+        ("cns_drake.scenarios.sequence_table", {"scipy", "numba", "pydrake"}),
+    ],
 )
-def test_jobs_start_without_slow_statistics(module):
-    # Each job is a process of its own: what its modules load is paid often.
+def test_programs_load_no_slow_library_that_they_do_not_need(module, slow):
     code = f"import {module}, sys; print(*sys.modules)"
     loaded = subprocess.check_output(
         [sys.executable, "-c", code], cwd=ROOT, text=True
     ).split()
     assert module in loaded
-    assert {"scipy.stats", "scipy.signal", "matplotlib"}.isdisjoint(loaded)
+    assert slow.isdisjoint(loaded)
 
 
 @pytest.mark.parametrize("package", PACKAGES)
