@@ -22,9 +22,16 @@ NONE = "none"
 ALL = "all"
 # The strongest level; that of `none` is 0.
 STRONGEST = 4
+# Switches of the section `transient` of a scenario.
+_TRANSIENT = (
+    "parked_cars",
+    "leaves",
+    "furniture",
+)
 CAUSES = (
     NONE,
     "construction",
+    *_TRANSIENT,
     "traffic",
     "weather",
     "returns",
@@ -35,7 +42,9 @@ CAUSES = (
     ALL,
 )
 # Those that another seed draws anew.
-RANDOM_CAUSES = frozenset({"traffic", "weather", "returns", "ride", ALL})
+RANDOM_CAUSES = frozenset(
+    {*_TRANSIENT, "traffic", "weather", "returns", "ride", ALL}
+)
 
 # No driver keeps to a line: the LiDAR of the database is so far ahead of that
 # of the query, and so far to its left [m].
@@ -44,6 +53,10 @@ _LEFT = 0.5
 
 # Cause -> level -> strength. The levels of construction are the map's stages.
 STRENGTHS: Mapping[str, Mapping[int, Any]] = {
+    # Parts, or a depth [m]; see the scenario.
+    "parked_cars": {1: 0.25, 2: 0.5, 3: 0.75, 4: 1.0},
+    "leaves": {1: 0.75, 2: 0.5, 3: 0.25, 4: 0.0},
+    "furniture": {1: 0.25, 2: 0.5, 3: 0.75, 4: 1.0},
     # Number of vehicles, and of walkers.
     "traffic": {1: 15, 2: 30, 3: 60, 4: 120},
     # Visibility in fog [m].
@@ -62,6 +75,9 @@ STRENGTHS: Mapping[str, Mapping[int, Any]] = {
 
 _WORDS = {
     "construction": "mapped in stage {}",
+    "parked_cars": "{:.0%} of the parked cars are others",
+    "leaves": "{:.0%} of the leaves are left",
+    "furniture": "{:.0%} of the furniture replaced",
     "traffic": "{} vehicles and as many walkers",
     "weather": "fog, {:g} m of visibility",
     "returns": "{} returns",
@@ -124,6 +140,14 @@ def _construction(drives: RungDrives, stage: str, _: int) -> RungDrives:
     return _mapped(drives, stage=stage)
 
 
+def _transient(name: str) -> Callable[[RungDrives, float, int], RungDrives]:
+    def change(drives: RungDrives, value: float, seed: int) -> RungDrives:
+        query = drives.query.with_transient(**{name: value, "seed": seed})
+        return replace(drives, query=query)
+
+    return change
+
+
 def _traffic(drives: RungDrives, number: int, seed: int) -> RungDrives:
     traffic = TrafficConfig(vehicles=number, walkers=number, seed=seed)
     return _asked(drives, traffic=traffic)
@@ -164,6 +188,7 @@ _CHANGES: Mapping[str, Callable[[RungDrives, Any, int], RungDrives]] = {
     "sensor": _sensor,
     "returns": _returns,
     "weather": _weather,
+    **{name: _transient(name) for name in _TRANSIENT},
     "traffic": _traffic,
     "construction": _construction,
     "ride": _ride,
