@@ -88,7 +88,7 @@ def ladder(
         extent, protocol = QUICK_EXTENT, QUICK_PROTOCOL
         note(
             "--quick leaves out: levels 1 to 3 (but where a cause has no level "
-            "4), every other query, more than 1,000 places of other cities"
+            "4), every other query, more than 300 places of other cities"
         )
     path, text = climb_ladder(
         maps,

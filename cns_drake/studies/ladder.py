@@ -44,7 +44,7 @@ from evaluation.study.study_layout import StudyFiles, SurveyFiles
 
 # With --quick only the strongest level of each cause is climbed, on every
 # other query.
-QUICK_EXTENT = Extent(levels=(4,), most_places=1000)
+QUICK_EXTENT = Extent(levels=(4,), most_places=300)
 QUICK_PROTOCOL = replace(PAPER_PROTOCOL, query_spacing=20.0)
 
 # Expected seconds: to describe a drive, and for a rung.
@@ -194,9 +194,11 @@ def _labelled(asking: Scenario, rung: Rung) -> LadderRung:
 def _write(
     measured: Sequence[MeasuredRung], output: Path, protocol: RetrievalProtocol
 ) -> tuple[Path, str]:
-    rows = ladder_rows(measured)
+    rows = ladder_rows(measured, protocol.radius)
     text = ladder_text(rows)
-    _write_text(output / "queries.csv", ladder_query_table(measured).to_csv())
+    _write_text(
+        output / "queries.csv", ladder_query_table(measured, protocol).to_csv()
+    )
     draw_ladder(rows, output / "ladder")
     _write_text(output / "findings.txt", text + "\n")
     table = output / "ladder.csv"

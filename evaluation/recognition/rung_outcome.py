@@ -12,6 +12,11 @@ from evaluation.recognition.metrics import QueryOutcomes, judge
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.retrieval import Retrieval
 
+# How a best place can be wrong, in the order in which it is asked.
+FAULTS = ("no_place", "no_candidate", "other_city", "too_far", "elsewhere")
+# Up to so many radii a place is just too far away, and not another one.
+_NEARLY = 2.0
+
 
 @dataclass(frozen=True)
 class RungOutcome:
@@ -82,3 +87,26 @@ class RungOutcome:
             ),
             pose_errors=retrieval.pose_errors,
         )
+
+    def faults(self, radius: float) -> list[str]:
+        """Returns what is wrong with the best place of each query.
+
+        Args:
+            radius: of a match [m].
+
+        Returns:
+            Q of: "" if it is right; `no_place` if the query has no match;
+            `no_candidate` if the method has no place, or rejects all;
+            `other_city`; `too_far` if it is within two radii; `elsewhere`.
+        """
+        wrong = [
+            ~self.outcomes.has_match,
+            self.match_frames < 0,
+            np.isnan(self.distances),
+            self.distances <= _NEARLY * radius,
+        ]
+        return np.where(
+            self.outcomes.is_right,
+            "",
+            np.select(wrong, FAULTS[:-1], FAULTS[-1]),
+        ).tolist()

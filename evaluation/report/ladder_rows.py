@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 import math
 
@@ -15,7 +15,7 @@ from evaluation.recognition.metrics import (
     resampled_metrics,
     resampled_weights,
 )
-from evaluation.recognition.rung_outcome import RungOutcome
+from evaluation.recognition.rung_outcome import FAULTS, RungOutcome
 from evaluation.recognition.survival import Kept
 
 
@@ -71,6 +71,10 @@ class LadderRow:
         with_match: those that have a match.
         places: of the database.
         draws: of what is random.
+        lost: queries that are right on the rung `none`, and wrong here; mean.
+        found: the other way round.
+        faults: fault -> how many queries have it; mean. See
+            `RungOutcome.faults`.
     """
 
     rung: LadderRung
@@ -83,17 +87,23 @@ class LadderRow:
     with_match: int
     places: int
     draws: int
+    lost: float
+    found: float
+    faults: Mapping[str, float]
 
     @property
     def auc(self) -> float:
         return self.kept.changed
 
 
-def ladder_rows(measured: Iterable[MeasuredRung]) -> list[LadderRow]:
+def ladder_rows(
+    measured: Iterable[MeasuredRung], radius: float
+) -> list[LadderRow]:
     """Returns a row for each rung, method and gate.
 
     Args:
         measured: of all maps; the rung `none` of a map comes first.
+        radius: of a match [m].
     """
     groups: dict[tuple[LadderRung, str, bool], list[RungOutcome]] = {}
     for one in measured:
@@ -104,7 +114,7 @@ def ladder_rows(measured: Iterable[MeasuredRung]) -> list[LadderRow]:
     rows = []
     for (rung, method, told), draws in groups.items():
         unchanged = plain.setdefault((rung.map_name, method, told), draws)
-        rows.append(_row(rung, unchanged, draws))
+        rows.append(_row(rung, unchanged, draws, radius))
     return rows
 
 
@@ -112,18 +122,29 @@ def _row(
     rung: LadderRung,
     unchanged: Sequence[RungOutcome],
     draws: Sequence[RungOutcome],
+    radius: float,
 ) -> LadderRow:
     first = draws[0]
     num_queries = len(first.outcomes)
     weights = resampled_weights(num_queries)
     samples = _sampled_auc(draws, weights)
     share = Interval(math.nan, math.nan)
+    lost = found = math.nan
     if len(unchanged[0].outcomes) == num_queries:
         before = _sampled_auc(unchanged, weights)
         with np.errstate(invalid="ignore", divide="ignore"):
             share = percentile_interval(
                 np.where(before > 0.0, samples / before, math.nan)
             )
+        right = unchanged[0].outcomes.is_right
+        lost, found = (
+            _mean([float((a & ~b).sum()) for a, b in pairs])
+            for pairs in (
+                [(right, one.outcomes.is_right) for one in draws],
+                [(one.outcomes.is_right, right) for one in draws],
+            )
+        )
+    faults = [fault for one in draws for fault in one.faults(radius)]
     return LadderRow(
         rung=rung,
         method=first.method,
@@ -135,6 +156,9 @@ def _row(
         with_match=int(first.outcomes.has_match.sum()),
         places=first.outcomes.num_places,
         draws=len(draws),
+        lost=lost,
+        found=found,
+        faults={name: faults.count(name) / len(draws) for name in FAULTS},
     )
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition.rung_outcome import FAULTS
 from evaluation.report.ladder_rows import LadderRow, LadderRung, MeasuredRung
 from evaluation.report.tables import Table
 
@@ -34,6 +35,9 @@ def ladder_table(
             "with_match",
             "places",
             "draws",
+            "lost",
+            "found",
+            *FAULTS,
             "strength",
             *_OPTIONS,
         ),
@@ -52,6 +56,9 @@ def ladder_table(
                 one.with_match,
                 one.places,
                 one.draws,
+                one.lost,
+                one.found,
+                *(one.faults[name] for name in FAULTS),
                 one.rung.strength,
                 *_options(protocol),
             )
@@ -60,7 +67,9 @@ def ladder_table(
     )
 
 
-def ladder_query_table(measured: Iterable[MeasuredRung]) -> Table:
+def ladder_query_table(
+    measured: Iterable[MeasuredRung], protocol: RetrievalProtocol
+) -> Table:
     """Returns one row for each rung, draw, method, gate and query."""
     return Table(
         (
@@ -75,20 +84,26 @@ def ladder_query_table(measured: Iterable[MeasuredRung]) -> Table:
             "has_match",
             "score",
             "first_right_rank",
+            "why",
             "match_drive",
             "match_frame",
             "distance",
             "translation_error",
             "rotation_error_deg",
         ),
-        tuple(row for one in measured for row in _query_rows(one)),
+        tuple(
+            row for one in measured for row in _query_rows(one, protocol.radius)
+        ),
     )
 
 
-def _query_rows(measured: MeasuredRung) -> Iterator[tuple[object, ...]]:
+def _query_rows(
+    measured: MeasuredRung, radius: float
+) -> Iterator[tuple[object, ...]]:
     for one in measured.outcomes:
         keys = _keys(measured.rung, one.method, one.radius_told)
         judged = one.outcomes
+        faults = one.faults(radius)
         for k in range(len(judged)):
             rank = float(judged.first_right_ranks[k])
             frame = int(one.match_frames[k])
@@ -102,6 +117,7 @@ def _query_rows(measured: MeasuredRung) -> Iterator[tuple[object, ...]]:
                 int(judged.has_match[k]),
                 float(judged.best_scores[k]),
                 int(rank) if np.isfinite(rank) else None,
+                faults[k] or None,
                 one.match_drives[k] or None,
                 frame if frame >= 0 else None,
                 float(one.distances[k]),

@@ -85,7 +85,7 @@ def test_the_share_of_auc_that_is_kept(climbed):
     # is the precision there.
     found = {
         (row.rung.cause, row.rung.level): row
-        for row in ladder_rows(climbed)
+        for row in ladder_rows(climbed, 7.5)
         if not row.radius_told
     }
     assert found["none", 0].kept.share == 1.0
@@ -100,7 +100,7 @@ def test_the_share_of_auc_that_is_kept(climbed):
 
 
 def test_draws_are_averaged(climbed):
-    rows = [row for row in ladder_rows(climbed) if not row.radius_told]
+    rows = [row for row in ladder_rows(climbed, 7.5) if not row.radius_told]
     (works,) = (
         row for row in rows if (row.rung.cause, row.rung.level) == ("works", 4)
     )
@@ -114,12 +114,14 @@ def test_every_number_follows_from_the_queries(climbed):
     rows = list(
         csv.DictReader(
             io.StringIO(
-                ladder_table(ladder_rows(climbed), PAPER_PROTOCOL).to_csv()
+                ladder_table(ladder_rows(climbed, 7.5), PAPER_PROTOCOL).to_csv()
             )
         )
     )
     queries = list(
-        csv.DictReader(io.StringIO(ladder_query_table(climbed).to_csv()))
+        csv.DictReader(
+            io.StringIO(ladder_query_table(climbed, PAPER_PROTOCOL).to_csv())
+        )
     )
     keys = ("map", "db", "query", "cause", "level", "method", "radius_told")
     assert list(rows[0])[:12] == [
@@ -145,13 +147,35 @@ def test_every_number_follows_from_the_queries(climbed):
         assert float(row["kept"]) == pytest.approx(auc[key] / plain)
 
 
+def test_what_is_wrong_with_each_answer():
+    """Each kind of fault once, and two right answers."""
+    one = answered("btc", False, [1, 1, 0, 0, 0, 0, 0])
+    one.outcomes.has_match[2] = False
+    one.match_frames[3] = -1
+    one.distances[3:] = np.nan, np.nan, 15.0, 15.1
+    assert one.faults(7.5) == [
+        "",
+        "",
+        "no_place",
+        "no_candidate",
+        "other_city",
+        "too_far",
+        "elsewhere",
+    ]
+    before = answered("btc", False, [1, 0, 1, 1, 0, 0, 0])
+    rungs = [measured("none", 0, [before]), measured("snow", 1, [one])]
+    _, row = ladder_rows(rungs, 7.5)
+    assert (row.lost, row.found) == (2.0, 1.0)
+    assert set(row.faults.values()) == {1.0}
+
+
 def test_the_words_name_the_worst_cause(climbed):
-    text = ladder_text(ladder_rows(climbed))
+    text = ladder_text(ladder_rows(climbed, 7.5))
     assert "SOLiD loses most by works (much works), which leaves 28 %" in text
     assert "all causes together leave 0 % (0 to 0)" in text
     assert "No cause leaves 95 % or more to every method" in text
     mild = [climbed[0], measured("ride", 4, climbed[0].outcomes)]
-    text = ladder_text(ladder_rows(mild))
+    text = ladder_text(ladder_rows(mild, 7.5))
     assert "SOLiD keeps 100 % (100 to 100) whatever the cause" in text
     assert "To every method 95 % or more are left by ride" in text
 
@@ -161,7 +185,7 @@ def test_without_anything_to_keep(climbed):
         measured(cause, 0, [answered("btc", False, part(9, 0))])
         for cause in ("none", "snow")
     ]
-    (_, row) = ladder_rows(nothing)
+    (_, row) = ladder_rows(nothing, 7.5)
     assert np.isnan(row.kept.share)
     assert np.isnan(row.kept.interval.low)
     assert "BTC" not in ladder_text([row])
@@ -169,7 +193,7 @@ def test_without_anything_to_keep(climbed):
 
 def test_the_figure_is_the_same_each_time(climbed, tmp_path):
     for name in ("one", "other"):
-        draw_ladder(ladder_rows(climbed), tmp_path / name)
+        draw_ladder(ladder_rows(climbed, 7.5), tmp_path / name)
     for ending in ("png", "pdf", "svg"):
         one, other = (
             (tmp_path / f"{name}.{ending}").read_bytes()
