@@ -6,7 +6,9 @@ the two: few rays then have to be cast on the shapes themselves.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -50,96 +52,130 @@ def circumscribe(surface: CurvedSurface) -> TriangleSurface:
     return tessellate(CylinderSurface(radius, length), _SIDES)
 
 
-def ball_about(p_OSset: np.ndarray) -> tuple[np.ndarray, float] | None:
-    """Returns centre and radius of a ball about (K, 3) places, if any."""
-    if len(p_OSset) == 0:
-        return None
-    center = (p_OSset.min(axis=0) + p_OSset.max(axis=0)) / 2.0
-    return center, float(np.linalg.norm(p_OSset - center, axis=1).max())
-
-
 class NearCurvedShapes:
-    """Tells whether rays start near the curved shapes of a group."""
+    """Tells which rays start near curved shapes of groups."""
 
-    def __init__(self, group: RayGroup):
-        """Takes the shapes of a group."""
-        rows = []
-        for _, X_LG, surface in group.members:
-            if isinstance(surface, TriangleSurface | HalfSpaceSurface):
-                continue
-            if isinstance(surface, EllipsoidSurface):
-                half, radius = 0.0, max(surface.semi_axes)
-            else:
-                half, radius = surface.length / 2.0, surface.radius
-            axis = X_LG.rotation().matrix()[:, 2]
-            reach = 1.1 * radius + 2.0 * _GAP
-            rows.append([*X_LG.translation(), *axis, half, reach])
-        self._group = group
-        self._shapes = np.array(rows).reshape(-1, 8)
-        self._is_rigid = np.array_equal(group.X_FL[:3, :3], np.eye(3))
-        # A ball about L's origin with all of them.
-        shapes = self._shapes
-        self._radius = float(
-            np.max(
-                np.linalg.norm(shapes[:, :3], axis=1)
-                + shapes[:, 6]
-                + shapes[:, 7],
-                initial=0.0,
-            )
+    def __init__(self, groups: Sequence[RayGroup]):
+        """Takes the curved shapes of groups."""
+        self._groups = groups
+        rows, X_GLs, sizes = [], [], []
+        for row, group in enumerate(groups):
+            for _, X_LG, surface in group.members:
+                if isinstance(surface, TriangleSurface | HalfSpaceSurface):
+                    continue
+                if isinstance(surface, EllipsoidSurface):
+                    half, radius = 0.0, max(surface.semi_axes)
+                else:
+                    half, radius = surface.length / 2.0, surface.radius
+                rows.append(row)
+                X_GLs.append(X_LG.inverse().GetAsMatrix4())
+                sizes.append((half, 1.1 * radius + 2.0 * _GAP))
+        self._rows = np.array(rows, int)
+        self._X_GLs = np.reshape(X_GLs, (-1, 4, 4))
+        self._sizes = np.reshape(sizes, (-1, 2))
+        # How much longer an arrow of G can be in O.
+        self._stretches = np.array(
+            [np.linalg.norm(group.X_FL[:3, :3], 2) for group in groups]
         )
+        self._near: _Sorted | None = None
 
-    def contain(self, center: np.ndarray, spread: float) -> bool:
-        """Tells whether a ball meets a shape's polyhedron.
+    def forget_places(self) -> None:
+        """Has the shapes placed anew where their groups are now."""
+        self._near = None
 
-        Args:
-            center: (3,) of a ball about all origins of rays, in O.
-            spread: its radius.
+    def contain(self, p_OSset: np.ndarray) -> np.ndarray:
+        """Tells which of (K, 3) places lie near a shape, (K,) bool.
+
+        That is, within what a shape's polyhedron sweeps during the turn.
         """
-        X_OL = self._group.X_OL
-        if self._group.motion is None and self._is_rigid:
-            dx, dy, dz = (center - X_OL[:, 3]).tolist()
-            far = self._radius + spread
-            if dx * dx + dy * dy + dz * dz > far * far:
-                return False
-        spread += self._travel()
-        R_LO = np.linalg.inv(X_OL[:, :3])
-        p_LS = R_LO @ (center - X_OL[:, 3])
-        return _is_near(
-            self._shapes, p_LS, spread * float(np.linalg.norm(R_LO))
+        result = np.zeros(len(p_OSset), bool)
+        if len(self._rows):
+            if self._near is None:
+                self._near = self._place()
+            _find_near(self._near, p_OSset, result)
+        return result
+
+    def _place(self) -> _Sorted:
+        X_OLs = np.tile(np.eye(4), (len(self._groups), 1, 1))
+        X_OLs[:, :3] = [group.X_OL for group in self._groups]
+        X_GOs = self._X_GLs @ np.linalg.inv(X_OLs)[self._rows]
+        places = np.linalg.inv(X_GOs)[:, :3, 3]
+        stretches = self._stretches[self._rows]
+        reaches = stretches * self._sizes.sum(axis=1)
+        travels = self._travels(places, reaches)
+        # Bounds the largest of its singular values.
+        shrink = np.linalg.norm(X_GOs[:, :3, :3], axis=(1, 2))
+        reaches += travels
+        order = np.argsort(places[:, 0] - reaches)
+        return _Sorted(
+            places[order],
+            reaches[order],
+            X_GOs[order],
+            self._sizes[order, 0],
+            (self._sizes[:, 1] + shrink * travels)[order],
+            (places[:, 0] - reaches)[order],
+            2.0 * reaches.max(),
         )
 
-    def _travel(self) -> float:
-        """Returns how far a shape goes at most during a turn."""
-        motion = self._group.motion
-        if motion is None or len(self._shapes) == 0:
-            return 0.0
-        stretch = np.linalg.norm(self._group.X_OL[:, :3], 2)
-        p_FG = np.linalg.norm(self._shapes[:, :3], axis=1) + self._shapes[:, 7]
-        arm = np.linalg.norm(self._group.X_FL[:3, 3]) + stretch * p_FG.max()
-        angle = np.linalg.norm(motion.w) * motion.duration
-        way = np.linalg.norm(motion.v) * motion.duration
-        return float(way + min(angle, 2.0) * arm)
+    def _travels(self, places: np.ndarray, reaches: np.ndarray) -> np.ndarray:
+        """Returns how far each shape goes at most during a turn."""
+        ways, angles = np.zeros((2, len(self._groups)))
+        p_OFs = np.zeros((len(self._groups), 3))
+        for row, group in enumerate(self._groups):
+            if group.motion is None:
+                continue
+            angle = np.linalg.norm(group.motion.w) * group.motion.duration
+            angles[row] = min(float(angle), 2.0)
+            ways[row] = np.linalg.norm(group.motion.v) * group.motion.duration
+            p_OFs[row] = group.X_OL @ np.linalg.inv(group.X_FL)[:, 3]
+        arms = np.linalg.norm(places - p_OFs[self._rows], axis=1) + reaches
+        return ways[self._rows] + angles[self._rows] * arms
+
+
+class _Sorted(NamedTuple):
+    """M shapes where they are, by where their balls begin along x.
+
+    Attributes:
+        places: (M, 3) middles in O.
+        reaches: (M,) radii of balls about them [m].
+        X_GOs: (M, 4, 4) from O to their own frames; not rigid for an
+            ellipsoid, which is there a ball.
+        halves: (M,) half of the length along z.
+        radii: (M,) of what is about that line.
+        begins: (M,) where their balls begin along x [m].
+        width: of the widest ball [m].
+    """
+
+    places: np.ndarray
+    reaches: np.ndarray
+    X_GOs: np.ndarray
+    halves: np.ndarray
+    radii: np.ndarray
+    begins: np.ndarray
+    width: float
 
 
 @compiled
-def _is_near(shapes: np.ndarray, p_LS: np.ndarray, spread: float) -> bool:
-    """Tells whether a ball meets a segment that is widened by its reach.
-
-    Args:
-        shapes: (M, 8) middle of a segment, its unit direction, half its
-            length, and its reach.
-        p_LS: (3,) centre of the ball.
-        spread: its radius.
-    """
-    for k in range(len(shapes)):
-        along = 0.0
-        for axis in range(3):
-            along += (p_LS[axis] - shapes[k, axis]) * shapes[k, 3 + axis]
-        along = min(max(along, -shapes[k, 6]), shapes[k, 6])
-        square = 0.0
-        for axis in range(3):
-            nearest = shapes[k, axis] + along * shapes[k, 3 + axis]
-            square += (p_LS[axis] - nearest) ** 2
-        if square <= (shapes[k, 7] + spread) ** 2:
-            return True
-    return False
+def _find_near(near: _Sorted, p_OSset: np.ndarray, result: np.ndarray) -> None:
+    """Fills in which places lie near a shape; see `contain`."""
+    p_GS = np.empty(3)
+    for i in range(len(p_OSset)):
+        p = p_OSset[i]
+        k = np.searchsorted(near.begins, p[0], side="right")
+        while k > 0 and not result[i]:
+            k -= 1
+            if near.begins[k] + near.width < p[0]:
+                break
+            square = 0.0
+            for axis in range(3):
+                square += (p[axis] - near.places[k, axis]) ** 2
+            if square > near.reaches[k] ** 2:
+                continue
+            for axis in range(3):
+                p_GS[axis] = near.X_GOs[k, axis, 3]
+                for column in range(3):
+                    p_GS[axis] += near.X_GOs[k, axis, column] * p[column]
+            # To the nearest place on the line.
+            p_GS[2] -= min(max(p_GS[2], -near.halves[k]), near.halves[k])
+            square = p_GS[0] ** 2 + p_GS[1] ** 2 + p_GS[2] ** 2
+            result[i] = square <= near.radii[k] ** 2

@@ -14,7 +14,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from cns_drake.ray_casting.curved_proxies import NearCurvedShapes, ball_about
+from cns_drake.ray_casting.curved_proxies import NearCurvedShapes
 from cns_drake.ray_casting.embree_hierarchy import EmbreeHierarchy
 from cns_drake.ray_casting.embree_primitives import (
     PROXY_OWNER,
@@ -55,24 +55,32 @@ class EmbreeScene:
         self._curved: EmbreeHierarchy = EmbreeHierarchy(
             groups, merge_curved, 1, curved
         )
-        self._near = [
-            NearCurvedShapes(groups[row]) for row in self._curved.rows
-        ]
+        curved_groups = [groups[row] for row in self._curved.rows]
+        self._near_fixed = NearCurvedShapes(
+            [group for group in curved_groups if group.is_merged_world]
+        )
+        self._near_moving = NearCurvedShapes(
+            [group for group in curved_groups if not group.is_merged_world]
+        )
 
     def place(self, rows: Collection[int]) -> None:
         """Moves groups to where their `X_OL` says."""
         self._flat.place(rows)
         self._curved.place(rows)
+        self._near_moving.forget_places()
 
     def cast_rays(self, rays: Rays, with_normals: bool) -> Hits:
         """Casts rays."""
         hits = self._flat.cast(rays, with_normals=with_normals)
-        if not self._near:
+        if not self._curved.rows:
             return hits
-        again = np.flatnonzero(hits.owner == PROXY_OWNER)
-        ball = ball_about(rays.p_OSset)
-        if ball and any(shapes.contain(*ball) for shapes in self._near):
-            again = np.arange(len(rays.d_Sset))
+        is_near = self._near_fixed.contain(rays.p_OSset)
+        is_near |= self._near_moving.contain(rays.p_OSset)
+        is_unsure = hits.owner == PROXY_OWNER
+        if is_near.any():
+            turns = len(rays.d_Sset) // len(is_near)
+            is_unsure |= np.tile(is_near, turns)
+        again = np.flatnonzero(is_unsure)
         if len(again):
             rest = rays.select(again, rays.max_ranges_of(again))
             on_curved = self._curved.cast(rest, with_normals=with_normals)

@@ -23,16 +23,14 @@ from cns_drake.sensors.returns.echoes import (
 )
 from cns_drake.sensors.returns.footprint import (
     NUM_SUB_RAYS,
-    find_edges,
-    sub_directions,
+    find_jumps,
+    mark_edges,
 )
 from cns_drake.sensors.returns.light import Light
+from cns_drake.sensors.returns.link_budget import LinkBudget
 from cns_drake.sensors.returns.materials import Materials
-from cns_drake.sensors.returns.propagation import (
-    Ways,
-    follow,
-    leaf_depths,
-)
+from cns_drake.sensors.returns.propagation import Cast, Ways, follow
+from cns_drake.sensors.returns.starting_rays import start_ways
 from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS, UnitSheet
 from cns_drake.sensors.returns.weather import (
     Scattering,
@@ -107,33 +105,37 @@ class CalibratedReturns:
         return max_range + 8.0 * self.sheet.range_noise
 
     @cached_property
-    def _scatterings(self) -> dict[float, Scattering]:
+    def _budget(self) -> LinkBudget:
+        return self.sheet.budget
+
+    @cached_property
+    def _receivers(self) -> dict[tuple[float, float], Receiver]:
         return {}
 
     def _receiver(self, pattern: BeamPattern) -> Receiver:
-        sheet = self.sheet
-        scattering = self._scatterings.get(pattern.min_range)
-        if scattering is None:
+        """Returns the receiver of a pattern; those made before are kept."""
+        limits = pattern.min_range, pattern.max_range
+        if limits not in self._receivers:
+            sheet = self.sheet
             scattering = _no_scattering()
             if not self.weather.is_clear:
                 scattering = tabulate_scattering(
                     self.weather,
-                    sheet.budget,
+                    self._budget,
                     sheet.divergence,
                     sheet.resolution,
                     pattern.min_range,
                 )
-            self._scatterings[pattern.min_range] = scattering
-        return Receiver(
-            sheet.budget,
-            self.weather.extinction,
-            sheet.resolution,
-            pattern.min_range,
-            pattern.max_range,
-            sheet.retro_from,
-            choice_of(self.echoes),
-            scattering,
-        )
+            self._receivers[limits] = Receiver(
+                self._budget,
+                self.weather.extinction,
+                sheet.resolution,
+                *limits,
+                sheet.retro_from,
+                choice_of(self.echoes),
+                scattering,
+            )
+        return self._receivers[limits]
 
     def measure(
         self,
@@ -177,41 +179,34 @@ class CalibratedReturns:
                 p_Wset, d_Wset, reach, times=when, with_normals=True
             )
 
-        edges = self._find_edges(turn, R_WSset, hits)
-        rows = np.arange(len(turn.beam))
-        p_W = p_WSset[rows % len(p_WSset)]
-        d_W = np.einsum("nij,nj->ni", R_WSset[rows % len(R_WSset)], turn.d_Sset)
-        when = np.asarray(times, np.float32)[rows % len(times)]
-        whole = np.flatnonzero(~edges & (hits.geometry >= 0))
-        rows = np.concatenate(
-            [whole, np.repeat(np.flatnonzero(edges), NUM_SUB_RAYS)]
+        is_edge = self._find_edges(turn, p_WSset, R_WSset, times, hits, cast)
+        whole = np.flatnonzero(~is_edge & (hits.geometry >= 0))
+        edges = np.flatnonzero(is_edge)
+        ways = Ways.room_for(len(whole) + NUM_SUB_RAYS * len(edges))
+        start_ways(
+            key,
+            whole,
+            edges,
+            turn.beam,
+            turn.d_Sset,
+            p_WSset,
+            R_WSset,
+            np.asarray(times, np.float32),
+            self.sheet.divergence,
+            ways,
         )
-        sub = np.zeros(len(rows), np.int64)
-        sub[len(whole) :] = np.arange(len(rows) - len(whole)) % NUM_SUB_RAYS
-        energy = np.ones(len(rows))
-        energy[len(whole) :] /= NUM_SUB_RAYS
-        d_sub = self._sub_directions(key, turn, d_W, np.flatnonzero(edges))
-        depth = np.empty(len(rows))
-        leaf_depths(key, turn.beam[rows], sub, depth)
-        ways = Ways(
-            turn.beam[rows],
-            sub,
-            p_W[rows],
-            np.concatenate([d_W[whole], d_sub]),
-            when[rows],
-            np.zeros(len(rows)),
-            energy,
-            depth,
-            np.full(len(rows), -1),
+        p_W, d_W, when = (
+            values[len(whole) :]
+            for values in (ways.p_Wset, ways.d_Wset, ways.time)
         )
         # From one place, where they have one, which is faster.
-        p_sub = ways.p_Wset[len(whole) :] if len(p_WSset) > 1 else p_WSset
-        sub_hits = cast(p_sub, d_sub, ways.time[len(whole) :])
+        sub_hits = cast(p_W if len(p_WSset) > 1 else p_WSset, d_W, when)
         light = follow(
+            key,
             ways,
             join_hits(hits.take(whole), sub_hits),
             materials,
-            self.sheet.budget,
+            self._budget,
             self.sheet.divergence,
             cast,
         )
@@ -220,35 +215,25 @@ class CalibratedReturns:
         )
 
     def _find_edges(
-        self, turn: CalibratedTurn, R_WSset: np.ndarray, hits: RayHits
-    ) -> np.ndarray:
-        """Returns (N,) which beams lie next to an edge."""
-        is_edge = np.zeros(len(turn.beam), bool)
-        for order in turn.orders:
-            find_edges(
-                order,
-                turn.d_Sset,
-                R_WSset,
-                hits.ranges,
-                hits.normals_W,
-                self.sheet.divergence,
-                is_edge,
-            )
-        return is_edge
-
-    def _sub_directions(
         self,
-        key: np.uint64,
         turn: CalibratedTurn,
-        d_Wset: np.ndarray,
-        edges: np.ndarray,
+        p_WSset: np.ndarray,
+        R_WSset: np.ndarray,
+        times: np.ndarray,
+        hits: RayHits,
+        cast: Cast,
     ) -> np.ndarray:
-        """Returns (`NUM_SUB_RAYS` M, 3) directions for M beams."""
-        d_sub = np.empty((len(edges), NUM_SUB_RAYS, 3))
-        sub_directions(
-            key, turn.beam[edges], d_Wset[edges], self.sheet.divergence, d_sub
-        )
-        return d_sub.reshape(-1, 3)
+        """Returns (N,) which beams meet an edge."""
+        is_edge = np.zeros(len(turn.beam), bool)
+        seen = (turn.d_Sset, R_WSset, hits.ranges, hits.normals_W)
+        probes = find_jumps(turn.orders, *seen, self.sheet.divergence, is_edge)
+        origins = p_WSset
+        if len(p_WSset) > 1:
+            origins = p_WSset[probes.ray % len(p_WSset)]
+        when = np.asarray(times, np.float32)[probes.ray % len(times)]
+        met = cast(origins, probes.d_Wset, when)
+        mark_edges(*probes, met.ranges, met.normals_W, *seen, is_edge)
+        return is_edge
 
 
 class CalibratedTurn:

@@ -124,11 +124,39 @@ def _report(
     """Fills in what is reported; returns its number."""
     echo = np.zeros((_MOST_ECHOES + _MOST_DROPS + 1, 3))
     source = np.zeros(len(echo), np.int32)
+    budget, extinction = receiver.budget, receiver.extinction
+    is_clear = len(receiver.scattering.distances) == 0
     count, part = 0, 0
     for beam in range(num_beams):
-        size, first = 0, part
+        first = part
         while part < len(light.beam) and light.beam[part] == beam:
             part += 1
+        if is_clear and part - first <= 1:
+            # Most beams: a single echo at most.
+            if part == first:
+                continue
+            distance = light.distance[first]
+            snr = target_snr(budget, extinction, light.energy[first], distance)
+            if not _is_detected(key, beam, _FIRST_ECHO_DRAW, snr):
+                continue
+            if not receiver.min_range <= distance <= receiver.max_range:
+                continue
+            reported.beam[count] = beam
+            reported.distance[count] = _measured(
+                budget.range_noise,
+                receiver.min_range,
+                receiver.max_range,
+                key,
+                beam,
+                _FIRST_ECHO_DRAW,
+                distance,
+                snr,
+            )
+            energy = echo_energy(budget, snr, distance)
+            reported.intensity[count] = _intensity(receiver.retro_from, energy)
+            reported.geometry[count] = light.geometry[first]
+            count += 1
+            continue
         size = _merge(light, first, part, receiver, echo, source)
         size = _scatter(receiver, key, beam, echo, source, size)
         size = _detect(receiver, key, beam, echo, source, size)
@@ -303,16 +331,21 @@ def _detect(
         draw = _FIRST_ECHO_DRAW + _DRAWS_PER_ECHO * min(i, _MOST_ECHOES)
         is_sure = echo[i, 2] > 0.0
         echo[i, 2] = 0.0
-        if not is_sure and snr <= CERTAIN_SNR:
-            probability = detection_probability(snr)
-            if uniform(key, beam, draw) >= probability:
-                continue
-        deviation = receiver.budget.range_noise / np.sqrt(snr)
+        if not is_sure and not _is_detected(key, beam, draw, snr):
+            continue
         # Where a surface lies decides; an error of its range does not.
         if not receiver.min_range <= echo[i, 0] <= receiver.max_range:
             continue
-        distance = echo[i, 0] + deviation * normal(key, beam, draw + 1)
-        distance = min(max(distance, receiver.min_range), receiver.max_range)
+        distance = _measured(
+            receiver.budget.range_noise,
+            receiver.min_range,
+            receiver.max_range,
+            key,
+            beam,
+            draw,
+            echo[i, 0],
+            snr,
+        )
         # The unit corrects for the true distance; the error is too small.
         energy = echo_energy(receiver.budget, snr, echo[i, 0])
         echo[kept, 0], echo[kept, 1] = distance, snr
@@ -322,6 +355,30 @@ def _detect(
     for i in range(kept, size):
         echo[i, 2] = 0.0
     return kept
+
+
+@compiled
+def _is_detected(key: np.uint64, beam: int, draw: int, snr: float) -> bool:
+    if snr > CERTAIN_SNR:
+        return True
+    return uniform(key, beam, draw) < detection_probability(snr)
+
+
+@compiled
+def _measured(
+    range_noise: float,
+    min_range: float,
+    max_range: float,
+    key: np.uint64,
+    beam: int,
+    draw: int,
+    distance: float,
+    snr: float,
+) -> float:
+    """Returns the distance with its error."""
+    deviation = range_noise / np.sqrt(snr)
+    distance += deviation * normal(key, beam, draw + 1)
+    return min(max(distance, min_range), max_range)
 
 
 @compiled
@@ -335,19 +392,19 @@ def _write(
 ) -> int:
     reported.beam[count] = beam
     reported.distance[count] = echo[0]
-    reported.intensity[count] = np.rint(_intensity(receiver, echo[2]))
+    reported.intensity[count] = _intensity(receiver.retro_from, echo[2])
     reported.geometry[count] = source
     return count + 1
 
 
 @compiled
-def _intensity(receiver: Receiver, energy: float) -> float:
+def _intensity(retro_from: float, energy: float) -> float:
     """Returns the calibrated reflectivity in the scale of the unit.
 
-    Linear up to a reflectivity of 1, by the logarithm above.
+    A whole number: linear up to a reflectivity of 1, by the logarithm above.
     """
     if energy <= 1.0:
-        return receiver.retro_from * energy
-    rest = _FULL_INTENSITY - receiver.retro_from
+        return np.rint(retro_from * energy)
+    rest = _FULL_INTENSITY - retro_from
     part = np.log(energy) / np.log(_FULL_RETRO)
-    return min(receiver.retro_from + rest * part, _FULL_INTENSITY)
+    return np.rint(min(retro_from + rest * part, _FULL_INTENSITY))

@@ -27,21 +27,22 @@ class Light(NamedTuple):
     geometry: np.ndarray
 
     @classmethod
-    def sorted(
-        cls,
-        parts: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]],
-    ) -> Light:
-        """Returns the light of several parts, given as fields."""
-        beam, distance, energy, geometry = (
-            np.concatenate(values) for values in zip(*parts, strict=True)
+    def room_for(cls, count: int) -> Light:
+        """Returns parts to fill in."""
+        return cls(
+            np.empty(count, np.int32),
+            np.empty(count),
+            np.empty(count),
+            np.empty(count, np.int32),
         )
+
+    @classmethod
+    def sorted(cls, parts: Sequence[Light]) -> Light:
+        """Returns all parts in order."""
         unsorted = cls(
-            beam.astype(np.int32),
-            distance.astype(float),
-            energy.astype(float),
-            geometry.astype(np.int32),
+            *(np.concatenate(values) for values in zip(*parts, strict=True))
         )
-        order = np.zeros(len(beam), np.int64)
+        order = np.zeros(len(unsorted.beam), np.int64)
         _sort(unsorted.beam, unsorted.distance, order)
         return cls(*(values[order] for values in unsorted))
 

@@ -12,13 +12,14 @@ as does the mirrored light where the beam meets the pane at right angles.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from cns_drake.base.compiled import compiled
 from cns_drake.ray_casting.ray_casting_scene import RayHits
 from cns_drake.sensors.returns.counter_random import uniform
+from cns_drake.sensors.returns.light import Light
 from cns_drake.sensors.returns.link_budget import LinkBudget
 from cns_drake.sensors.returns.materials import (
     GLASS,
@@ -45,12 +46,9 @@ _RETRO_COSINE = np.cos(np.deg2rad(60.0))
 _FLATNESS = 2e-3
 _LEAF_DRAW = 2
 
+_Numbers = TypeVar("_Numbers", float, np.ndarray)
 # Casts rays of origins (N, 3), directions (N, 3) and times (N,).
 Cast = Callable[[np.ndarray, np.ndarray, np.ndarray], RayHits]
-
-
-# Fields of `Light`: beam, distance, energy, geometry.
-Part = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 class Ways(NamedTuple):
@@ -64,7 +62,8 @@ class Ways(NamedTuple):
         time: (N,) part of the turn at which it was sent.
         length: (N,) how far light has come before [m].
         energy: (N,) part of the beam that is sent, and that gets back.
-        depth: (N,) leaf area that is still in its way.
+        depth: (N,) leaf area that is still in its way; inf before the first
+            leaves.
         inside: (N,) geometry in which it begins, -1 for none.
     """
 
@@ -78,43 +77,32 @@ class Ways(NamedTuple):
     depth: np.ndarray
     inside: np.ndarray
 
-    def take(self, rows: np.ndarray) -> Ways:
-        """Returns the rays of some rows."""
-        return Ways(*(values[rows] for values in self))
-
-    def go_on(self, ranges: np.ndarray, d_Wset: np.ndarray) -> Ways:
-        """Returns the rays behind what they met, in new directions."""
-        p_Wset = self.p_Wset + ranges[:, None] * self.d_Wset + _SKIN * d_Wset
-        return self._replace(
-            p_Wset=p_Wset, d_Wset=d_Wset, length=self.length + ranges
+    @classmethod
+    def room_for(cls, count: int) -> Ways:
+        """Returns rays to fill in."""
+        return cls(
+            np.empty(count, np.int64),
+            np.empty(count, np.int64),
+            np.empty((count, 3)),
+            np.empty((count, 3)),
+            np.empty(count, np.float32),
+            np.empty(count),
+            np.empty(count),
+            np.empty(count),
+            np.empty(count, np.int32),
         )
 
 
 @compiled
-def leaf_depths(
-    key: np.uint64, beam: np.ndarray, sub: np.ndarray, depth: np.ndarray
-) -> None:
-    """Fills in leaf areas that rays pass before they meet a leaf.
-
-    Args:
-        key: of the frame; see `frame_key`.
-        beam, sub: (N,) which ray.
-        depth: (N,) to fill, exponential with a mean of 1.
-    """
-    for i in range(len(beam)):
-        draw = uniform(key, beam[i], _LEAF_DRAW + sub[i])
-        depth[i] = -np.log(1.0 - draw)
-
-
-def pane_shares(cosine: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def pane_shares(cosine: _Numbers) -> tuple[_Numbers, _Numbers]:
     """Returns what a pane reflects, and what it lets through.
 
     Args:
-        cosine: (N,) of the angle of incidence.
+        cosine: of the angle of incidence, one or many.
     """
-    sine = np.sqrt(np.maximum(1.0 - cosine**2, 0.0)) / _GLASS_INDEX
-    inner = np.sqrt(1.0 - sine**2)
     n = _GLASS_INDEX
+    sine = np.sqrt(np.maximum(1.0 - cosine**2, 0.0)) / n
+    inner = np.sqrt(1.0 - sine**2)
     across = ((cosine - n * inner) / (cosine + n * inner)) ** 2
     along = ((inner - n * cosine) / (inner + n * cosine)) ** 2
     # Light goes to and fro between the faces; both polarisations.
@@ -123,16 +111,18 @@ def pane_shares(cosine: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def follow(
+    key: np.uint64,
     ways: Ways,
     hits: RayHits,
     materials: Materials,
     budget: LinkBudget,
     divergence: float,
     cast: Cast,
-) -> list[Part]:
-    """Returns the light that comes back, as fields of `Light`.
+) -> list[Light]:
+    """Returns the light that comes back.
 
     Args:
+        key: of the frame; see `frame_key`.
         ways: the rays of the beams.
         hits: what they meet.
         materials: of all geometries.
@@ -140,120 +130,159 @@ def follow(
         divergence: half angle of a beam [rad].
         cast: casts the rays that go on.
     """
-    found: list[Part] = []
+    found: list[Light] = []
     for _ in range(_MOST_STEPS):
-        rows = np.flatnonzero(hits.geometry >= 0)
-        if len(rows) < len(hits.geometry):
-            ways, hits = ways.take(rows), hits.take(rows)
-        kind = materials.kind[hits.geometry]
-        is_stopped = np.zeros(len(kind), bool)
-        going_on = []
-        is_leaf = kind == LEAVES
-        if is_leaf.any() or (ways.inside >= 0).any():
-            depths, is_stopped = _pass_leaves(ways, hits, materials)
-            found.append(
-                _leaf_light(ways, materials, np.flatnonzero(is_stopped))
-            )
-            ways = ways._replace(depth=depths)
-            going_on.append(
-                _cross_leaves(ways, hits, np.flatnonzero(is_leaf & ~is_stopped))
-            )
-        solid = np.flatnonzero(~is_leaf & ~is_stopped)
-        cosine = np.abs(np.einsum("ij,ij->i", hits.normals_W, ways.d_Wset))
-        found.append(
-            _sent_back(ways, hits, materials, cosine, solid, divergence)
+        kinds = materials.kind[hits.geometry[hits.geometry >= 0]]
+        light = Light.room_for(len(kinds))
+        num_leaves = int(np.count_nonzero(kinds == LEAVES))
+        num_panes = int(np.count_nonzero(kinds == GLASS))
+        next_ways = Ways.room_for(num_leaves + 2 * num_panes)
+        num_parts, num_ways = _step(
+            key,
+            ways,
+            hits.ranges,
+            hits.geometry,
+            hits.normals_W,
+            hits.is_outside,
+            materials,
+            budget.scale,
+            divergence,
+            light,
+            next_ways,
         )
-        panes = np.flatnonzero((kind == GLASS) & ~is_stopped)
-        if len(panes):
-            going_on += _through_panes(ways, hits, cosine, panes, budget)
-        sent = [rays for rays in going_on if len(rays.beam)]
-        if not sent:
+        found.append(Light(*(values[:num_parts] for values in light)))
+        if num_ways == 0:
             break
-        ways = Ways(
-            *(np.concatenate(fields) for fields in zip(*sent, strict=True))
-        )
+        ways = Ways(*(values[:num_ways] for values in next_ways))
         hits = cast(ways.p_Wset, ways.d_Wset, ways.time)
     return found
 
 
-def _sent_back(
+@compiled
+def _step(
+    key: np.uint64,
     ways: Ways,
-    hits: RayHits,
+    ranges: np.ndarray,
+    geometries: np.ndarray,
+    normals_W: np.ndarray,
+    is_outside: np.ndarray,
     materials: Materials,
-    cosine: np.ndarray,
-    rows: np.ndarray,
+    scale: float,
     divergence: float,
-) -> Part:
-    """Returns the light that surfaces send straight back."""
-    geometry, cosine = hits.geometry[rows], cosine[rows]
-    kind = materials.kind[geometry]
-    rho = materials.reflectivity[geometry]
-    energy = rho * cosine
-    is_retro = kind == RETRO
-    energy[is_retro] = rho[is_retro] * (cosine[is_retro] > _RETRO_COSINE)
-    is_mirror = (kind == GLASS) & (cosine > np.cos(_FLATNESS + divergence))
-    if is_mirror.any():
-        reflected, _ = pane_shares(cosine[is_mirror])
-        # The mirrored light fills a cone of the beam's width; a Lambertian
-        # target spreads its own over pi.
-        energy[is_mirror] += reflected / (_FLATNESS + divergence) ** 2
-    distance = ways.length[rows] + hits.ranges[rows]
-    return ways.beam[rows], distance, energy * ways.energy[rows], geometry
+    light: Light,
+    next_ways: Ways,
+) -> tuple[int, int]:
+    """Takes each ray to what it meets.
 
+    Args:
+        key, ways, materials, divergence: see `follow`.
+        ranges, geometries, normals_W, is_outside: fields of `RayHits`.
+        scale: of the budget.
+        light: to fill with what comes back.
+        next_ways: to fill with the rays that go on.
 
-def _through_panes(
-    ways: Ways,
-    hits: RayHits,
-    cosine: np.ndarray,
-    rows: np.ndarray,
-    budget: LinkBudget,
-) -> list[Ways]:
-    """Returns the rays behind panes, and those that panes mirror."""
-    rays, cosine = ways.take(rows), cosine[rows]
-    ranges = hits.ranges[rows].astype(float)
-    normals = hits.normals_W[rows].astype(float)
-    reflected, through = pane_shares(cosine)
-    mirrored = rays.d_Wset + 2.0 * cosine[:, None] * normals
-    on = []
-    # Light passes the pane there and back.
-    for share, d_Wset in ((through**2, rays.d_Wset), (reflected**2, mirrored)):
-        next_rays = rays.go_on(ranges, d_Wset)
-        next_rays = next_rays._replace(energy=rays.energy * share)
-        snr = budget.scale * next_rays.energy / next_rays.length**2
-        on.append(next_rays.take(np.flatnonzero(snr > _FAINT_SNR)))
-    return on
-
-
-def _pass_leaves(
-    ways: Ways, hits: RayHits, materials: Materials
-) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the leaf area that is left, and which rays ended at leaves.
-
-    The area is negative for those.
+    Returns:
+        How many parts of light there are, and how many rays.
     """
-    density = np.where(
-        ways.inside >= 0, materials.leaf_area_density[ways.inside], 0.0
-    )
-    left = ways.depth - _LEAF_PROJECTION * density * hits.ranges
-    return left, left < 0.0
+    flat = _FLATNESS + divergence
+    num_parts, num_ways = 0, 0
+    mirrored = np.empty(3)
+    for i in range(len(geometries)):
+        geometry = geometries[i]
+        if geometry < 0:
+            continue
+        distance = ways.length[i] + ranges[i]
+        depth, inside = ways.depth[i], ways.inside[i]
+        if inside >= 0:
+            per_metre = _LEAF_PROJECTION * materials.leaf_area_density[inside]
+            left = depth - per_metre * ranges[i]
+            if left < 0.0:
+                light.beam[num_parts] = ways.beam[i]
+                light.distance[num_parts] = ways.length[i] + depth / per_metre
+                light.energy[num_parts] = (
+                    ways.energy[i] * materials.reflectivity[inside]
+                )
+                light.geometry[num_parts] = inside
+                num_parts += 1
+                continue
+            depth = left
+        kind = materials.kind[geometry]
+        d_W, normal_W = ways.d_Wset[i], normals_W[i]
+        if kind == LEAVES:
+            inside = -1
+            if is_outside[i]:
+                inside = geometry
+                if depth == np.inf:
+                    depth = leaf_depth(key, ways.beam[i], ways.sub[i])
+            _go_on(ways, i, ranges[i], d_W, 1.0, next_ways, num_ways)
+            next_ways.depth[num_ways] = depth
+            next_ways.inside[num_ways] = inside
+            num_ways += 1
+            continue
+        cosine = 0.0
+        for axis in range(3):
+            cosine -= normal_W[axis] * d_W[axis]
+        cosine = min(max(cosine, 0.0), 1.0)
+        energy = materials.reflectivity[geometry]
+        if kind == RETRO:
+            energy *= cosine > _RETRO_COSINE
+        else:
+            energy *= cosine
+        if kind == GLASS:
+            reflected, through = pane_shares(cosine)
+            if cosine > np.cos(flat):
+                # The mirrored light fills a cone of the beam's width; a
+                # Lambertian target spreads its own over pi.
+                energy += reflected / flat**2
+            for axis in range(3):
+                mirrored[axis] = d_W[axis] + 2.0 * cosine * normal_W[axis]
+            # Light passes the pane there and back.
+            for is_mirrored in (False, True):
+                share = (reflected if is_mirrored else through) ** 2
+                d_on = mirrored if is_mirrored else d_W
+                on = share * ways.energy[i]
+                if scale * on > _FAINT_SNR * distance**2:
+                    _go_on(ways, i, ranges[i], d_on, share, next_ways, num_ways)
+                    next_ways.depth[num_ways] = depth
+                    next_ways.inside[num_ways] = inside
+                    num_ways += 1
+        light.beam[num_parts] = ways.beam[i]
+        light.distance[num_parts] = distance
+        light.energy[num_parts] = energy * ways.energy[i]
+        light.geometry[num_parts] = geometry
+        num_parts += 1
+    return num_parts, num_ways
 
 
-def _leaf_light(ways: Ways, materials: Materials, rows: np.ndarray) -> Part:
-    """Returns the light of leaves inside of volumes."""
-    geometry = ways.inside[rows]
-    density = materials.leaf_area_density[geometry]
-    inner = ways.depth[rows] / (_LEAF_PROJECTION * density)
-    return (
-        ways.beam[rows],
-        ways.length[rows] + inner,
-        ways.energy[rows] * materials.reflectivity[geometry],
-        geometry,
-    )
+@compiled
+def _go_on(
+    ways: Ways,
+    i: int,
+    way: float,
+    d_Wset: np.ndarray,
+    share: float,
+    next_ways: Ways,
+    row: int,
+) -> None:
+    """Lets a ray begin anew behind what it met, in a new direction."""
+    next_ways.beam[row] = ways.beam[i]
+    next_ways.sub[row] = ways.sub[i]
+    next_ways.time[row] = ways.time[i]
+    next_ways.length[row] = ways.length[i] + way
+    next_ways.energy[row] = share * ways.energy[i]
+    for axis in range(3):
+        next_ways.d_Wset[row, axis] = d_Wset[axis]
+        next_ways.p_Wset[row, axis] = (
+            ways.p_Wset[i, axis]
+            + way * ways.d_Wset[i, axis]
+            + _SKIN * d_Wset[axis]
+        )
 
 
-def _cross_leaves(ways: Ways, hits: RayHits, rows: np.ndarray) -> Ways:
-    """Returns rays that enter or leave a volume of leaves."""
-    rays = ways.take(rows)
-    entered = np.where(hits.is_outside[rows], hits.geometry[rows], -1)
-    on = rays.go_on(hits.ranges[rows].astype(float), rays.d_Wset)
-    return on._replace(inside=entered)
+@compiled
+def leaf_depth(key: np.uint64, beam: int, sub: int) -> float:
+    """Returns the leaf area that a ray passes before it meets a leaf.
+
+    It is exponential with a mean of 1.
+    """
+    return -np.log(1.0 - uniform(key, beam, _LEAF_DRAW + sub))

@@ -8,9 +8,9 @@ import pytest
 
 from cns_drake.ray_casting.curved_proxies import (
     NearCurvedShapes,
-    ball_about,
     circumscribe,
 )
+from cns_drake.ray_casting.group_motion import Motion
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.ray_casting.ray_groups import RayGroup
 from cns_drake.scene.perception_geometry import PerceptionGeometry
@@ -66,14 +66,50 @@ def test_nearness_covers_the_polyhedron(surface):
     hull = circumscribe(surface)
     group = RayGroup(None, np.eye(4), [(0, X_WG, surface)], True)
     group.place(np.zeros(3), lambda frame: RigidTransform())
-    near = NearCurvedShapes(group)
-    for p_G in hull.p_GVset[:: max(1, len(hull.p_GVset) // 50)]:
-        assert near.contain(*ball_about((X_WG @ p_G)[None]))
-    # And a ball about several origins that only together reach it.
-    far = X_WG @ np.array([0.0, 0.0, 30.0])
-    assert not near.contain(*ball_about(far[None]))
-    other_side = X_WG @ np.array([0.0, 0.0, -30.0])
-    assert near.contain(*ball_about(np.stack([far, other_side])))
+    near = NearCurvedShapes([group])
+    corners = hull.p_GVset[:: max(1, len(hull.p_GVset) // 50)]
+    far = [X_WG @ np.array([0.0, 0.0, side]) for side in (30.0, -30.0)]
+    places = np.stack([*(X_WG @ p_G for p_G in corners), *far])
+    assert near.contain(places).tolist() == [True] * len(corners) + [False] * 2
+
+
+def test_nearness_of_many_shapes_is_that_of_each():
+    """Places among shapes of groups at all orientations, some stretched."""
+    rng = np.random.default_rng(5)
+    groups = []
+    for k in range(60):
+        X_WF = RigidTransform(
+            RollPitchYaw(*rng.uniform(-3.0, 3.0, 3)), rng.uniform(-9.0, 9.0, 3)
+        )
+        X_FL, surface = np.eye(4), SHAPES[k % len(SHAPES)]
+        if k % len(SHAPES) == 0:
+            X_FL = np.diag([0.5, 1.0, 2.0, 1.0])
+        member = (k, RigidTransform([0.1, 0.0, 0.2]), surface)
+        group = RayGroup(FrameId.get_new_id(), X_FL, [member])
+        group.place(np.array([1.0, 2.0, 3.0]), lambda frame, X=X_WF: X)
+        if k % 3 == 0:
+            group.motion = Motion(rng.normal(size=3), rng.normal(size=3), 0.3)
+        groups.append(group)
+    places = rng.uniform(-12.0, 12.0, (500, 3))
+    near = NearCurvedShapes(groups)
+    each = [NearCurvedShapes([group]).contain(places) for group in groups]
+    expected = np.any(each, axis=0)
+    assert 50 < expected.sum() < 450
+    np.testing.assert_array_equal(near.contain(places), expected)
+
+
+def test_nearness_holds_for_all_of_a_turn():
+    """Points of a hull stay within reach while its frame moves."""
+    surface = SHAPES[3]
+    member = (0, RigidTransform([0.4, 0.3, 0.0]), surface)
+    group = RayGroup(FrameId.get_new_id(), np.eye(4), [member])
+    group.place(np.zeros(3), lambda frame: X_WG)
+    w, v = np.array([0.5, 2.0, 1.0]), np.array([9.0, 0.0, 1.0])
+    group.motion = Motion(w, v, 0.1)
+    corners = member[1].multiply(circumscribe(surface).p_GVset.T).T
+    near = NearCurvedShapes([group])
+    for X_OL in group.X_OL_at(np.linspace(0.0, 1.0, 5)):
+        assert near.contain(corners @ X_OL[:, :3].T + X_OL[:, 3]).all()
 
 
 @pytest.mark.parametrize(("excess", "expected"), [(-1e-6, True), (1e-6, False)])
@@ -85,9 +121,7 @@ def test_nearness_ends_at_a_tenth_of_the_radius(excess, expected):
     distance = 1.1 * 0.8 + 2e-3 + excess
     for p_G in ([distance, 0.0, 0.7], [0.0, 0.0, -1.0 - distance]):
         p_O = X_WG @ np.array(p_G) - [5.0, 1.0, 0.0]
-        assert (
-            NearCurvedShapes(group).contain(*ball_about(p_O[None])) == expected
-        )
+        assert NearCurvedShapes([group]).contain(p_O[None]) == [expected]
 
 
 def geometry(surface, X_FG):
