@@ -21,7 +21,7 @@ from evaluation.methods.method import Method
 from evaluation.recognition.pose_errors import checked_pose
 from evaluation.recognition.ranking import ranking
 
-# Chosen on development worlds, see docs/fitting.md.
+# Chosen on development worlds, see docs/notes/fitting.md.
 NUM_GATED = 30
 SOFTNESS = 0.05
 

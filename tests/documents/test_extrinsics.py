@@ -10,8 +10,8 @@ from cns_drake.scenarios.sensor_making import sensor_pose
 
 
 def test_extrinsics_are_those_of_the_default_places():
-    page = documents.read("docs/recordings.md")
-    rows = documents.table(page, "### LIO-SAM and FAST-LIO2")
+    page = documents.read("docs/how-to/lidar_odometry.md")
+    rows = documents.table(page, "## LIO-SAM and FAST-LIO2")
     said = {
         row[0].strip("`"): yaml.safe_load(row[1])
         for row in rows

@@ -125,7 +125,7 @@ def test_topics(short_recording):
 
 
 def test_fields_of_points(short_recording):
-    page = documents.read("docs/recordings.md")
+    page = documents.read("docs/how-to/open_recordings.md")
     (example,) = (
         block.text
         for block in documents.fenced(page)
@@ -133,7 +133,8 @@ def test_fields_of_points(short_recording):
     )
     scan = open_sequence(short_recording).scan(0)
     assert f"# NumPy: {' '.join(scan.dtype.names)}\n" in example
-    assert f"{scan.dtype.itemsize} bytes a point" in page.text
+    topics = documents.read("docs/recordings.md").text
+    assert f"{scan.dtype.itemsize} bytes a point" in topics
 
 
 def test_dependencies():

@@ -32,7 +32,7 @@ def test_pages_are_reached_from_the_readme():
     while waiting:
         page = PAGES[waiting.pop()]
         reached.add(page.name)
-        linked = re.findall(r"\]\(([\w./]+\.md)", page.text)
+        linked = re.findall(r"\]\(([\w./-]+\.md)", page.text)
         waiting |= {follow(page, file) for file in linked} - reached
     assert reached == PAGES.keys()
 

@@ -52,7 +52,7 @@ def test_each_piece_has_one_recipe():
     ],
 )
 def test_what_is_new_is_noticed(text):
-    page = documents.read("docs/city.md")
+    page = documents.read("docs/how-to/own_city.md")
     before = documents.pieces(page)
     longer = replace(page, text=f"{page.text}\n{text}\n")
     (new,) = set(documents.pieces(longer)) - set(before)

@@ -97,7 +97,7 @@ RECIPES = {
         after=("start a city",),
     ),
     "own city": Recipe(
-        ".venv/bin/cns-drake list town",
+        ".venv/bin/cns-drake list town\n",
         changes=(("town_output", "output"),),
         after=("table: city",),
         prints=("town_01", "town_02", "output/town_01: 100 frames"),
@@ -314,8 +314,55 @@ RECIPES = {
         after=("scenario", "start a city"),
         prints=("recordings/drive: 2 frames",),
     ),
+    "first drive": Recipe(
+        ".venv/bin/cns-drake simulate riverside_01 --frames 200",
+        changes=(("--frames 200", "--frames 2"),),
+        prints=("first/riverside_01: 2 frames",),
+        makes=("drive.html",),
+    ),
+    "decay": Recipe(
+        "base: riverside_01\nmissing: [0, 0.3",
+        changes=(
+            ("riverside_01", "town/sequence_01.yaml"),
+            ("0, 0.3, 0.6", "0, 0.6"),
+        ),
+        file="decay.yaml",
+    ),
+    "first finding": Recipe(
+        ".venv/bin/cns-drake trend --vary decay.yaml",
+        changes=(("riverside_02", "town/sequence_02.yaml"),),
+        after=("decay", "start a city"),
+        makes=("decay/trend.csv", "decay/trend.png"),
+    ),
+    "tutorial's study": Recipe(
+        "cns-drake reproduce riverside --output output",
+        changes=(("reproduce riverside", "reproduce town"),),
+        after=("own city",),
+    ),
+    "another unit": Recipe(
+        ".venv/bin/cns-drake simulate riverside_01 --lidar os1-128",
+        changes=(("--frames 100", "--frames 2"),),
+        prints=("sensors/riverside_01: 2 frames",),
+    ),
+    "two units": Recipe(
+        "world: town/stage_02.sdf\nwaypoints: tour.csv\nspeeds: {cruise: 8}\n",
+        file="sensors.yaml",
+        command=".venv/bin/cns-drake simulate sensors.yaml --frames 2 "
+        "--output sensors",
+        after=("waypoints", "start a city"),
+        prints=("sensors/sensors: 2 frames",),
+    ),
+    "own beams": Recipe(
+        "import numpy as np\n\nfrom cns_drake import SpinningPattern",
+        file="beams.py",
+        command=".venv/bin/python beams.py",
+        prints=("8 rings, 5760 beams a turn",),
+    ),
     "noise of an IMU": Recipe("accelerometer_noise_density", file="imu.yaml"),
-    "scenario of a world": Recipe("world: town/", file="tour.yaml"),
+    "scenario of a world": Recipe(
+        "world: town/stage_02.sdf\nwaypoints: tour.csv\nspeeds: {cruise: 8, ",
+        file="tour.yaml",
+    ),
     "waypoints": Recipe("x,y", file="tour.csv"),
     "tour": Recipe(
         ".venv/bin/cns-drake simulate tour.yaml",
@@ -331,7 +378,7 @@ RECIPES = {
         makes=("before.pcd", "after.pcd"),
     ),
     "family": Recipe(
-        "base: riverside_01",
+        "base: riverside_01      # its route",
         changes=(
             ("riverside_01", "town/sequence_01.yaml"),
             ("count: 20", "count: 2"),
@@ -458,7 +505,7 @@ RECIPES = {
     "linter": Recipe(
         ".venv/bin/ruff check",
         # Of the examples in the documents, by the rules of this project.
-        after=("method", "Python", "own diagram"),
+        after=("method", "Python", "own diagram", "own beams"),
         prints=("All checks passed!", "already formatted"),
     ),
     "own method": Recipe(
@@ -490,6 +537,8 @@ RECIPES = {
 
 # What cannot run here: how it begins, and why.
 NOT_RUN = {
+    "python3 -m venv .venv\n": "installs from the network; test_wheel installs "
+    "the same",
     "python3 -m venv .venv && .venv/bin/pip install -e": "installs from the "
     "network and runs these tests; `.ci/run` takes this very line",
     "apt install": "changes the system; `.ci/run` installs the same packages",

@@ -12,7 +12,7 @@ ROOT = Path(__file__).resolve().parents[2]
 # What an inline piece of code begins with if it is meant to be run.
 PROGRAMS = (
     *("cns-drake", "cns-eval", "dask", "python", "python3", "pip", "pytest"),
-    *("ruff", "ros2", "npm", "apt", "git", "docker", "pre-commit", "pdoc"),
+    *("ruff", "ros2", "npm", "apt", "git", "docker", "pre-commit", "mkdocs"),
 )
 _FENCE = re.compile(r"^( *)```(\w*)\n(.*?)^\1```$", re.DOTALL | re.MULTILINE)
 _INLINE = re.compile(r"`([^`]+)`")
@@ -63,7 +63,7 @@ def read(name: str) -> Page:
 
 def pages() -> list[Page]:
     """Returns all documents, the README first."""
-    others = {*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")}
+    others = {*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")}
     names = sorted(str(path.relative_to(ROOT)) for path in others)
     names.remove("README.md")
     return [read(name) for name in ["README.md", *names]]

@@ -81,7 +81,10 @@ class CalibratedReturns:
 
         Args:
             preset: a key of `LIDAR_PRESETS`.
-            echoes, weather, seed, sensor_name: see the class.
+            echoes: see the class, like those that follow.
+            weather: fog, rain and snowfall.
+            seed: of the random draws.
+            sensor_name: the name of the LiDAR.
 
         Raises:
             KeyError: there is no such preset.

@@ -13,7 +13,7 @@ from evaluation.methods.own_file import load_method
 
 def shown_method(folder):
     """Saves the method that the documents show, as a file of a name."""
-    blocks = documents.fenced(documents.read("docs/methods.md"))
+    blocks = documents.fenced(documents.read("docs/how-to/own_method.md"))
     (example,) = (block.text for block in blocks if "@register" in block.text)
     path = folder / "shown_heights.py"
     path.write_text(example, encoding="utf-8")

@@ -1,0 +1,141 @@
+"""Draws the moving picture of the README: one drive, with traffic, twice.
+
+python docs/animation.py docs/pictures/drive.webp
+
+The same drive goes through two stages of a city. A photograph of each stage
+lies behind the points that the LiDAR sees there, coloured by height; orange
+points are on what moves.
+"""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+import sys
+import tempfile
+
+import matplotlib
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+from scipy.spatial import ConvexHull
+
+from cns_drake.base.terminal import track
+from cns_drake.pictures.stage_scene import StageScene, View
+from cns_drake.scenarios.planning import plan_drive
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import world_file
+from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.simulation.simulation import simulate
+from evaluation import sequences
+
+DRIVE = "metropolis_01"
+STAGES = ("01", "04")
+TRAFFIC = 60
+FIRST, LAST, STEP = 0, 160, 2  # frames of the recording
+SIZE = (800, 450)
+FRAME_MS = 100
+FADE = 6  # pictures
+_SMOOTHING = 2  # pixels of the photograph for one of the picture
+_ORANGE = (255, 140, 0)
+_HEIGHTS = (0.0, 12.0)  # of the colours [m]
+# Limits of the car's box in the LiDAR's frame [m].
+_CAR = ((-1.0, 3.6), (-0.95, 0.95), (-1.4, -0.2))
+
+
+def main(path: Path) -> None:
+    """Simulates both drives and writes the picture."""
+    drives = [
+        load_scenario(DRIVE)
+        .model_copy(update={"stage": stage, "name": f"stage_{stage}"})
+        .with_traffic(TRAFFIC)
+        .model_copy(update={"frames": LAST})
+        for stage in STAGES
+    ]
+    view = _view(drives[0])
+    films = []
+    with tempfile.TemporaryDirectory() as folder:
+        for drive in drives:
+            run = simulate(drive, Path(folder))
+            films.append(list(_film(drive, run.folder, view)))
+    pictures = []
+    for film, following in zip(films, films[1:] + films[:1], strict=True):
+        pictures += film
+        pictures += [
+            Image.blend(film[-1], following[0], (k + 1) / (FADE + 1))
+            for k in range(FADE)
+        ]
+    pictures[0].save(
+        path,
+        save_all=True,
+        append_images=pictures[1:],
+        duration=FRAME_MS,
+        loop=0,
+        quality=45,
+        method=6,
+    )
+
+
+def _view(drive: Scenario) -> View:
+    """Returns a view from above and behind, along what is shown."""
+    trajectory = plan_drive(drive)
+    start, end = (
+        trajectory.pose(t / 20.0).translation() for t in (FIRST, LAST)
+    )
+    ahead = (end - start) / np.linalg.norm(end - start)
+    left = np.array([-ahead[1], ahead[0], 0.0])
+    return View(
+        position=tuple(start - 28.0 * ahead - 12.0 * left + [0, 0, 24.0]),
+        target=tuple(start + 0.8 * (end - start)),
+        fov_y=50.0,
+    )
+
+
+def _film(drive: Scenario, folder: Path, view: View):
+    """Yields the pictures of one drive."""
+    width, height = (_SMOOTHING * pixels for pixels in SIZE)
+    photograph = StageScene(world_file(drive), drive.without).photograph(
+        view, width, height
+    )
+    still = Image.fromarray(photograph).resize(SIZE, Image.Resampling.LANCZOS)
+    font = ImageFont.load_default(size=22)
+    sequence = sequences.open(folder)
+    frames = range(FIRST, len(sequence), STEP)
+    for i in track(frames, f"stage {drive.stage}", len(frames)):
+        picture = still.copy()
+        pen = ImageDraw.Draw(picture)
+        _draw_scan(pen, sequence.scan(i), sequence.X_WS[i], view)
+        _draw_car(pen, sequence.X_WS[i], view)
+        pen.text((14, 10), f"Metropolis, stage {drive.stage}", "white", font)
+        yield picture
+
+
+def _draw_scan(pen: ImageDraw.ImageDraw, scan, X_WS: np.ndarray, view) -> None:
+    p_S = np.stack([scan["x"], scan["y"], scan["z"]], axis=1)
+    p_W = p_S @ X_WS[:3, :3].T + X_WS[:3, 3]
+    pixels, seen = view.project(p_W, *SIZE)
+    low, high = _HEIGHTS
+    shares = (p_W[seen, 2] - low) / (high - low)
+    colours = (
+        matplotlib.colormaps["viridis"](np.clip(shares, 0, 1))[:, :3] * 255
+    ).astype(int)
+    moving = scan["label"][seen] >= 252
+    for (x, y), colour, moves in zip(pixels, colours, moving, strict=True):
+        if moves:
+            pen.ellipse((x - 1.5, y - 1.5, x + 1.5, y + 1.5), _ORANGE)
+        else:
+            pen.point((x, y), tuple(colour))
+
+
+def _draw_car(pen: ImageDraw.ImageDraw, X_WS: np.ndarray, view: View) -> None:
+    p_S = np.array(list(itertools.product(*_CAR)))
+    pixels, _ = view.project(p_S @ X_WS[:3, :3].T + X_WS[:3, 3], *SIZE)
+    if len(pixels) == len(p_S):
+        corners = pixels[ConvexHull(pixels).vertices]
+        outline = [tuple(corner) for corner in corners]
+        pen.polygon(outline, fill=(235, 60, 60), outline="white")
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
+    main(Path(sys.argv[1]))

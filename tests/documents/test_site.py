@@ -1,0 +1,99 @@
+"""The site is built without a broken link, and has every page and name."""
+
+from html.parser import HTMLParser
+import json
+import os
+from pathlib import Path
+import subprocess
+import sys
+from urllib.parse import unquote, urlparse
+
+from helpers import documents
+import pytest
+
+import cns_drake
+import evaluation
+
+COMMAND = (sys.executable, "-m", "mkdocs", "build", "--strict")
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("site")
+    built = subprocess.run(
+        # With -q it would not count warnings.
+        [*COMMAND, "--site-dir", folder],
+        cwd=documents.ROOT,
+        env=os.environ | {"NO_MKDOCS_2_WARNING": "1"},
+        capture_output=True,
+        text=True,
+    )
+    assert built.returncode == 0, built.stderr
+    return folder
+
+
+class Links(HTMLParser):
+    """What a page links to, shows and has anchors for."""
+
+    def __init__(self, path):
+        super().__init__()
+        self.targets, self.anchors = set(), set()
+        self.feed(path.read_text())
+
+    def handle_starttag(self, tag, attrs):
+        values = dict(attrs)
+        self.anchors.add(values.get("id"))
+        if tag in ("a", "img", "script", "link"):
+            self.targets.add(values.get("href") or values.get("src"))
+
+
+def test_every_link_leads_somewhere(site):
+    pages = {path: Links(path) for path in site.rglob("*.html")}
+    shown = 0
+    for path, page in pages.items():
+        if path.name == "404.html":
+            continue  # Of whatever address was asked for.
+        for target in page.targets - {None}:
+            parts = urlparse(target)
+            if parts.scheme or parts.netloc:
+                continue
+            there = path
+            if parts.path:
+                there = Path(
+                    os.path.normpath(path.parent / unquote(parts.path))
+                )
+            assert there.exists(), (path, target)
+            if parts.fragment and there in pages:
+                anchor = unquote(parts.fragment)
+                assert anchor in pages[there].anchors, (path, target)
+            shown += there.suffix in (".jpg", ".png")
+    assert shown > 20
+
+
+def test_every_page_is_in_it(site):
+    for page in documents.pages():
+        name = page.name.removeprefix("docs/")
+        own = name if name != page.name else f"project/{name}"
+        html = Path(own.removesuffix(".md") + ".html")
+        if html.name == "README.html":
+            html = html.with_name("index.html")
+        assert (site / html).exists(), page.name
+
+
+def test_every_public_name_is_explained(site):
+    explained = set()
+    for package in (cns_drake, evaluation):
+        page = Links(site / f"api/{package.__name__}.html")
+        assert {name.lower() for name in package.__all__} - {
+            "__version__"
+        } <= page.anchors
+        explained |= {str(a).rpartition(".")[2] for a in page.anchors}
+    names = {*cns_drake.__all__, *evaluation.__all__} - {"__version__"}
+    assert names <= explained
+
+
+def test_search_finds_methods_and_names(site):
+    index = json.loads((site / "search/search_index.json").read_text())
+    titles = {entry["title"] for entry in index["docs"]}
+    assert {"add_lidar", "Layered overlap", "Tutorial"} <= titles
