@@ -23,6 +23,7 @@ from evaluation.command_line.protocol_options import (
     overlap_of,
     with_protocol,
 )
+from evaluation.command_line.ranking_agreement import ranking
 from evaluation.command_line.result_rows import change_rows, recognition_rows
 from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,
@@ -395,6 +396,11 @@ def trend(
         lidar,
     )
     print(write_trend(points, output))
+
+
+app.command(epilog=example("cns-eval ranking simulated/report real/report"))(
+    ranking
+)
 
 
 def main() -> None:

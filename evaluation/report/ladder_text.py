@@ -10,6 +10,8 @@ from evaluation.report.method_titles import in_table_order, title
 
 # What is kept of AUC where little is lost.
 _MUCH = 0.95
+# Rungs that are no single cause.
+_NONE, _ALL = "none", "all"
 
 
 def ladder_text(rows: Sequence[LadderRow]) -> str:
@@ -37,50 +39,49 @@ def _paragraph(rows: Sequence[LadderRow]) -> str:
         (True, "With the radius told"),
     ):
         strongest = _strongest([r for r in rows if r.radius_told == told])
-        single = [r for r in strongest if r.rung.cause not in ("none", "all")]
-        if not single:
-            continue
         sentences = [
-            _sentence(method, single, strongest)
-            for method in in_table_order(row.method for row in single)
+            _sentence([row for row in strongest if row.method == method])
+            for method in in_table_order(row.method for row in strongest)
         ]
-        parts.append(f"{words}: {'; '.join(filter(None, sentences))}.")
-        parts.append(_mildest(single))
+        if any(sentences):
+            parts.append(f"{words}: {'; '.join(filter(None, sentences))}.")
+            parts.append(_mildest(strongest))
     return " ".join(filter(None, parts))
 
 
-def _sentence(
-    method: str, single: Sequence[LadderRow], strongest: Sequence[LadderRow]
-) -> str:
-    known = [
-        row
-        for row in single
-        if row.method == method and not math.isnan(row.kept.share)
-    ]
-    if not known:
-        return ""
-    worst = min(known, key=lambda row: row.kept.share)
-    text = (
-        f"{title(method)} keeps {_kept(worst)} whatever the cause"
-        if worst.kept.share >= _MUCH
-        else f"{title(method)} loses most by {_cause(worst)}"
-        f" ({worst.rung.strength}), which leaves {_kept(worst)}"
-    )
-    for row in strongest:
-        if row.method == method and row.rung.cause == "all":
-            text += f", and all causes together leave {_kept(row)}"
-    return text
+def _sentence(rows: Sequence[LadderRow]) -> str:
+    """Returns what one method loses; "" where it had nothing to lose."""
+    known = {
+        row.rung.cause: row for row in rows if not math.isnan(row.kept.share)
+    }
+    together = known.pop(_ALL, None)
+    known.pop(_NONE, None)
+    parts = []
+    if known:
+        worst = min(known.values(), key=lambda row: row.kept.share)
+        parts.append(
+            f"keeps {_kept(worst)} whatever the cause"
+            if worst.kept.share >= _MUCH
+            else f"loses most by {_cause(worst)} ({worst.rung.strength}), which"
+            f" leaves {_kept(worst)}"
+        )
+    if together is not None:
+        parts.append(f"keeps {_kept(together)} under all causes together")
+    return f"{title(rows[0].method)} {', and '.join(parts)}" if parts else ""
 
 
-def _mildest(single: Sequence[LadderRow]) -> str:
+def _mildest(rows: Sequence[LadderRow]) -> str:
     """Returns which causes cost no method much."""
     shares: dict[str, list[float]] = {}
-    for row in single:
-        if not math.isnan(row.kept.share):
+    for row in rows:
+        is_single = row.rung.cause not in (_NONE, _ALL)
+        if is_single and not math.isnan(row.kept.share):
             shares.setdefault(_cause(row), []).append(row.kept.share)
     least = {cause: min(values) for cause, values in shares.items()}
     mild = [cause for cause, share in least.items() if share >= _MUCH]
     much = f"{100.0 * _MUCH:.0f} % or more"
+    if not shares:
+        return ""
     if not mild:
         return f"No cause leaves {much} to every method."
     return f"To every method {much} are left by {', '.join(mild)}."

@@ -261,6 +261,12 @@ RECIPES = {
         after=("exports",),
         prints=("report/report.",),
     ),
+    "table: ranking": Recipe(
+        "cns-eval ranking REPORT REPORT",
+        changes=(("REPORT REPORT", "output/report output/report"),),
+        after=("own city",),
+        prints=("Kendall's tau",),
+    ),
     "table: trend": Recipe(
         "cns-eval trend DATABASE ...",
         changes=(

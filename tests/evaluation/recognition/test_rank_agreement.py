@@ -1,0 +1,110 @@
+"""Kendall's tau between the methods of two reports, on made folders."""
+
+import csv
+import itertools
+
+import numpy as np
+import pytest
+
+from cns_drake.base.errors import InputError
+from evaluation.recognition.rank_agreement import rank_agreement
+
+METHODS = ("a", "b", "c", "d")
+HEADER = ("map", "db", "query", "method", "correct", "has_match", "score")
+
+
+def write_report(folder, pairs, number=200):
+    """Writes a report in which all scores of a method are equal.
+
+    Then its AUC is the part of its answers that is right.
+
+    Args:
+        folder: to write.
+        pairs: pair -> part that is right, of each method.
+        number: of queries of each pair.
+    """
+    folder.mkdir()
+    with (folder / "queries.csv").open("w", newline="") as stream:
+        table = csv.writer(stream)
+        table.writerow(HEADER)
+        for pair, parts in pairs.items():
+            for method, part in zip(METHODS, parts, strict=False):
+                for k in range(number):
+                    right = int(k < part * number)
+                    row = ("town", "01", pair, method, right, 1, 0.5)
+                    table.writerow(row)
+    return folder
+
+
+def counted_tau(first, second):
+    """Pairs in the same order, less those in the other, as a part of all."""
+    signs = [
+        np.sign((one - other) * (second[i] - second[k]))
+        for (i, one), (k, other) in itertools.combinations(enumerate(first), 2)
+    ]
+    return np.mean(signs)
+
+
+def test_tau_of_mean_areas(tmp_path):
+    simulated = write_report(
+        tmp_path / "simulated",
+        {"02": (0.9, 0.7, 0.5, 0.1), "03": (0.7, 0.9, 0.2, 0.3)},
+    )
+    real = write_report(tmp_path / "real", {"x": (0.6, 0.2, 0.4, 0.1)})
+    found = rank_agreement(simulated, real / "queries.csv")
+    assert found.methods == METHODS
+    np.testing.assert_allclose(found.first, [0.8, 0.8, 0.35, 0.2])
+    np.testing.assert_allclose(found.second, [0.6, 0.2, 0.4, 0.1])
+    # The first two are equal on one side: tau-b divides by the root of the
+    # 5 of 6 pairs that are not.
+    assert found.tau == pytest.approx(
+        counted_tau(found.first, found.second) / np.sqrt(5 / 6)
+    )
+
+
+def test_equal_and_opposite_rankings(tmp_path):
+    up = write_report(tmp_path / "up", {"02": (0.1, 0.4, 0.7, 0.95)})
+    down = write_report(tmp_path / "down", {"02": (0.9, 0.6, 0.4, 0.1)})
+    assert rank_agreement(up, up).tau == pytest.approx(1.0)
+    found = rank_agreement(up, down)
+    assert found.tau == pytest.approx(-1.0)
+    # Far apart, no sample turns two of them round.
+    assert found.interval.low == found.interval.high == pytest.approx(-1.0)
+
+
+def test_close_methods_leave_it_open(tmp_path):
+    wide = {"02": (0.5, 0.51, 0.52, 0.53)}
+    one = write_report(tmp_path / "one", wide, number=100)
+    other = write_report(tmp_path / "other", {"02": (0.9, 0.7, 0.4, 0.1)})
+    found = rank_agreement(one, other)
+    # Whatever one method answers rightly, so do the better ones: no sample
+    # turns two of them round, but some hold no query that tells them apart.
+    assert found.interval.low == found.tau == pytest.approx(-1.0)
+    assert -0.95 < found.interval.high < 0.0
+    assert found.to_json()["kendall_tau"] == found.tau
+
+
+def test_only_methods_of_both(tmp_path):
+    three = write_report(tmp_path / "three", {"02": (0.1, 0.2, 0.3)})
+    four = write_report(
+        tmp_path / "four", {"02": (0.1, 0.2, 0.3, 0.4), "03": (0.1, 0.2)}
+    )
+    assert rank_agreement(three, four).methods == ("a", "b")
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("map,db,query\n", "no column 'method'"),
+        (f"{','.join(HEADER)}\n", "no query"),
+        (f"{','.join(HEADER)}\nt,1,2,a,2,1,0.5\n", "line 2: correct"),
+        (f"{','.join(HEADER)}\nt,1,2,a,1,1,high\n", "line 2: correct"),
+        (f"{','.join(HEADER)}\nt,1,2,a,1,1,0.5\n", "fewer than two methods"),
+    ],
+)
+def test_bad_tables_are_named(tmp_path, text, fault):
+    good = write_report(tmp_path / "good", {"02": (0.1, 0.2)})
+    bad = tmp_path / "queries.csv"
+    bad.write_text(text)
+    with pytest.raises(InputError, match=fault):
+        rank_agreement(good, bad)
