@@ -28,7 +28,8 @@ class _Built(NamedTuple):
 
     Attributes:
         scene: the RTCScene, 0 if there is nothing in it.
-        owners: `Primitives.owners` of each of its geometries.
+        owners: `Primitives.owners` of each of its geometries; of a copy,
+            whose scene others have too, the one that all primitives have.
     """
 
     scene: int
@@ -74,15 +75,25 @@ class EmbreeHierarchy:
             self._lib.rtcRetainDevice(self._device)
         self._scenes: list[int] = []
         weakref.finalize(self, _release, self._lib, self._device, self._scenes)
-        known = {} if previous is None else previous._built_of()
+        known: dict[int, _Built] = {}
+        copied: dict[int, _Built] = {}
+        if previous is not None:
+            known, copied = previous._built_of(), previous._copied()
         self._built: dict[int, _Built] = {}
         for row, group in enumerate(groups):
             built = known.get(id(group))
+            if built is None and group.is_copy:
+                built = copied.get(id(group.members[0][2]))
             if built is None:
                 built = self._build(list(merge(group.members)))
+                if group.is_copy:
+                    copied[id(group.members[0][2])] = built
             elif built.scene:
                 self._lib.rtcRetainScene(built.scene)
                 self._scenes.append(built.scene)
+            if group.is_copy:
+                owner = np.array([group.members[0][0]], np.int32)
+                built = built._replace(owners=(owner,))
             self._built[row] = built
         fixed = [row for row in self.rows if groups[row].is_merged_world]
         moving = [row for row in self.rows if row not in fixed]
@@ -106,6 +117,7 @@ class EmbreeHierarchy:
             embree.COHERENT_RAYS, embree.INVALID_ID
         )
         nothing = _Built(0, ())
+        copies = {row for row, group in enumerate(groups) if group.is_copy}
         self._tree = Tree(
             embree.address_of(self._lib.rtcIntersect16),
             self._built[fixed[0]].scene if fixed else 0,
@@ -114,6 +126,7 @@ class EmbreeHierarchy:
             *_list_owners(
                 [self._built.get(row, nothing).owners for row in rows]
             ),
+            np.array([row not in copies for row in rows], np.int64),
         )
 
     @property
@@ -125,6 +138,14 @@ class EmbreeHierarchy:
         """Returns what was built of each group, by the group's `id`."""
         return {
             id(self._groups[row]): built for row, built in self._built.items()
+        }
+
+    def _copied(self) -> dict[int, _Built]:
+        """Returns what was built of copies, by the `id` of their surface."""
+        return {
+            id(self._groups[row].members[0][2]): built
+            for row, built in self._built.items()
+            if self._groups[row].is_copy
         }
 
     def place(self, rows: Collection[int]) -> None:

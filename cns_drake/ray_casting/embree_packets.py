@@ -33,6 +33,8 @@ class Tree(NamedTuple):
             primitives of geometry g in the fixed scene (first row) or in
             each instance begin.
         owner_of_primitive: (P,) int32.
+        steps: (1 + I,) int64, from one primitive to the next in
+            `owner_of_primitive`: 1, or 0 where all have the same owner.
     """
 
     intersect16: int
@@ -41,6 +43,7 @@ class Tree(NamedTuple):
     arguments: int
     first_primitive: np.ndarray
     owner_of_primitive: np.ndarray
+    steps: np.ndarray
 
 
 @intrinsic  # type: ignore[untyped-decorator]  # numba has no hints.
@@ -158,7 +161,8 @@ def _cast_block(
             hits.ranges[ray] = packet[8, lane]
             instance = packet_id[19, lane]
             row = 0 if instance == INVALID_ID else 1 + np.int64(instance)
-            primitive = tree.first_primitive[row, hit] + packet_id[17, lane]
+            primitive = np.int64(packet_id[17, lane]) * tree.steps[row]
+            primitive += tree.first_primitive[row, hit]
             hits.owner[ray] = tree.owner_of_primitive[primitive]
             hits.group[ray] = row
             for axis in range(hits.normals.shape[1]):

@@ -109,6 +109,7 @@ class RayCastingScene:
             zip(slots, self._geometries, strict=True),
             anchored_frames,
             calc_X_WF,
+            may_share=_has_embree(),
         )
         if previous is not None:
             take_over(self._groups, previous._groups)
@@ -206,17 +207,16 @@ class RayCastingScene:
             (N,) whether each ray has met the outside of a surface.
         """
         is_outside = np.zeros(len(hits.group), bool)
-        maps = [
-            np.eye(3)
-            if group.is_merged_world
-            # Normals transform by the inverse transpose.
-            else np.linalg.inv(group.X_OL[:, :3]).T
+        turns = [
+            np.eye(3) if group.is_merged_world else group.X_OL[:, :3]
             for group in self._groups
         ]
+        # Normals transform by the inverse transpose.
+        maps = np.linalg.inv(np.reshape(turns, (-1, 3, 3)))
         face_origins(
             hits.normals,
             hits.group,
-            np.reshape(maps, (-1, 3, 3)),
+            np.ascontiguousarray(maps.transpose(0, 2, 1)),
             rays.R_OSset,
             rays.d_Sset,
             is_outside,
@@ -253,12 +253,16 @@ def _assign_slots(
     return slots
 
 
+def _has_embree() -> bool:
+    return importlib.util.find_spec(_EMBREE_PACKAGE) is not None
+
+
 def _make_scene(
     groups: Sequence[RayGroup],
     num_threads: int,
     previous: EmbreeScene | Open3dScene | None,
 ) -> EmbreeScene | Open3dScene:
-    if importlib.util.find_spec(_EMBREE_PACKAGE) is not None:
+    if _has_embree():
         from cns_drake.ray_casting.embree_scene import EmbreeScene
 
         assert previous is None or isinstance(previous, EmbreeScene)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -18,6 +19,10 @@ from cns_drake.scene.surfaces import (
     TriangleSurface,
 )
 
+# A mesh whose copies have more triangles than this is held once. Its rays are
+# slower, since each copy has a hierarchy of its own: the many small objects of
+# a city stay merged.
+MOST_COPIED_TRIANGLES = 2**18
 NO_MOTIONS: Mapping[FrameId, Motion] = {}
 # What is built into one scene: index of a geometry, its pose, its surface.
 Member = tuple[int, RigidTransform, Surface]
@@ -34,6 +39,8 @@ class RayGroup:
         members: what the group holds, posed in L. A half space is alone in
             its group, and in L bounded by z = 0.
         is_merged_world: whether L is the world, moved to O.
+        is_copy: whether its only member is a surface, in its own frame, that
+            other groups have as well.
         X_OL: (3, 4) affine map from L to the scene's origin, at the start of
             a turn; there is none before `place`.
         motion: of F during the turn, None if it stays.
@@ -43,6 +50,7 @@ class RayGroup:
     X_FL: np.ndarray
     members: list[Member]
     is_merged_world: bool = False
+    is_copy: bool = False
     X_OL: np.ndarray = field(init=False)
     motion: Motion | None = None
 
@@ -82,6 +90,7 @@ class RayGroup:
         return (
             self.frame_id == other.frame_id
             and self.is_merged_world == other.is_merged_world
+            and self.is_copy == other.is_copy
             and len(self.members) == len(other.members)
             and np.array_equal(self.X_FL, other.X_FL)
             and all(
@@ -108,6 +117,8 @@ def group_geometries(
     geometries: Iterable[tuple[int, PerceptionGeometry]],
     anchored_frames: Collection[FrameId],
     calc_X_WF: Callable[[FrameId], RigidTransform],
+    *,
+    may_share: bool = True,
 ) -> tuple[np.ndarray, list[RayGroup]]:
     """Returns p_WO and the groups.
 
@@ -118,7 +129,11 @@ def group_geometries(
             gets.
         anchored_frames: the frames that never move.
         calc_X_WF: gives the pose of a frame in the world.
+        may_share: whether large surfaces that stand many times get groups of
+            their own, which refer to the same surface.
     """
+    geometries = list(geometries)
+    shared = _find_shared(geometries) if may_share else frozenset()
     by_frame: dict[FrameId | None, list[Member]] = {}
     half_spaces = []
     for index, geometry in geometries:
@@ -126,8 +141,8 @@ def group_geometries(
         if frame_id in anchored_frames:
             frame_id, X_FG = None, calc_X_WF(frame_id) @ X_FG
         if isinstance(geometry.surface, HalfSpaceSurface):
-            alone: Member = (index, RigidTransform(), geometry.surface)
-            half_spaces.append(RayGroup(frame_id, X_FG.GetAsMatrix4(), [alone]))
+            plane: Member = (index, RigidTransform(), geometry.surface)
+            half_spaces.append(RayGroup(frame_id, X_FG.GetAsMatrix4(), [plane]))
             continue
         by_frame.setdefault(frame_id, []).append(
             (index, X_FG, geometry.surface)
@@ -139,7 +154,7 @@ def group_geometries(
         places = np.array([X_WG.translation() for _, X_WG, _ in world])
         p_WO = np.round((places.min(axis=0) + places.max(axis=0)) / 2.0)
 
-    groups, ellipsoids = [], []
+    groups, alone = [], []
     for frame_id, members in [(None, world), *by_frame.items()]:
         # Coordinates are relative to O before they are rounded to float32,
         # and relative to F where F moves.
@@ -147,10 +162,21 @@ def group_geometries(
         X_FL, X_LF = RigidTransform(shift), RigidTransform(-shift)
         rest = []
         for index, X_FG, surface in members:
-            if isinstance(surface, EllipsoidSurface) and not surface.is_sphere:
+            if id(surface) in shared:
+                alone.append(
+                    RayGroup(
+                        frame_id,
+                        X_FG.GetAsMatrix4(),
+                        [(index, RigidTransform(), surface)],
+                        is_copy=True,
+                    )
+                )
+            elif (
+                isinstance(surface, EllipsoidSurface) and not surface.is_sphere
+            ):
                 stretch = np.diag([*surface.semi_axes, 1.0])
                 unit_sphere = EllipsoidSurface((1.0, 1.0, 1.0))
-                ellipsoids.append(
+                alone.append(
                     RayGroup(
                         frame_id,
                         X_FG.GetAsMatrix4() @ stretch,
@@ -163,7 +189,25 @@ def group_geometries(
             groups.append(
                 RayGroup(frame_id, X_FL.GetAsMatrix4(), rest, frame_id is None)
             )
-    return p_WO, groups + ellipsoids + half_spaces
+    return p_WO, groups + alone + half_spaces
+
+
+def _find_shared(
+    geometries: Iterable[tuple[int, PerceptionGeometry]],
+) -> frozenset[int]:
+    """Returns the `id` of each surface that is held once."""
+    num_triangles: Counter[int] = Counter()
+    copies: Counter[int] = Counter()
+    for _, geometry in geometries:
+        if isinstance(geometry.surface, TriangleSurface):
+            key = id(geometry.surface)
+            copies[key] += 1
+            num_triangles[key] += len(geometry.surface.triangles)
+    return frozenset(
+        key
+        for key, count in num_triangles.items()
+        if count > MOST_COPIED_TRIANGLES and copies[key] > 1
+    )
 
 
 def place_all(

@@ -26,11 +26,15 @@ _Y_UP = (".gltf", ".glb", ".dae")
 
 
 class MeshFiles:
-    """Reads meshes, each once however many geometries refer to it."""
+    """Reads meshes, each once however many geometries refer to it.
+
+    Of one mesh at one scale there is one surface.
+    """
 
     def __init__(self, foreign: ForeignMeshes):
         self._foreign = foreign
         self._unscaled: dict[object, TriangleSurface] = {}
+        self._surfaces: dict[tuple, TriangleSurface] = {}
 
     def read(self, name: str, shape: Mesh | Convex) -> TriangleSurface:
         """Returns the surface of a shape in G.
@@ -44,18 +48,25 @@ class MeshFiles:
                 the geometry is named.
         """
         where = _describe(name, shape.source())
+        key = mesh_shape_key(shape)
+        if key in self._surfaces:
+            return self._surfaces[key]
         try:
             with told_by_drake():  # Beside an error, no warning.
-                if isinstance(shape, Convex):
-                    return _check_size(_read_hull(shape))
-                return _check_size(self._read_mesh(shape))
+                surface = _check_size(
+                    _read_hull(shape)
+                    if isinstance(shape, Convex)
+                    else self._read_mesh(shape)
+                )
         except PARSER_ERRORS as error:
             fault = " ".join(str(error).split())
             raise InputError(f"{where}: {fault}") from error
+        self._surfaces[key] = surface
+        return surface
 
     def _read_mesh(self, shape: Mesh) -> TriangleSurface:
         source = shape.source()
-        key = mesh_key(source)
+        key = _source_key(source)
         surface = self._unscaled.get(key)
         if surface is None:
             surface = self._unscaled[key] = self._read_source(source)
@@ -103,7 +114,12 @@ class MeshFiles:
         return TriangleSurface(p_GVset, triangles)
 
 
-def mesh_key(source: MeshSource) -> object:
+def mesh_shape_key(shape: Mesh | Convex) -> tuple:
+    """Returns what only equal meshes and hulls have in common."""
+    return type(shape), _source_key(shape.source()), tuple(shape.scale3())
+
+
+def _source_key(source: MeshSource) -> object:
     """Returns what two sources have in common if they are the same mesh."""
     if source.is_path():
         return str(source.path())

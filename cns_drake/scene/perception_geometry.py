@@ -28,7 +28,7 @@ from pydrake.math import RigidTransform
 
 from cns_drake.base.errors import InputError
 from cns_drake.scene.foreign_meshes import ForeignMeshes
-from cns_drake.scene.mesh_files import MeshFiles, mesh_key
+from cns_drake.scene.mesh_files import MeshFiles, mesh_shape_key
 from cns_drake.scene.surfaces import (
     LARGEST_SIZE,
     CapsuleSurface,
@@ -246,8 +246,7 @@ def _diffuse_rgb(
 def _shape_key(shape: Shape) -> tuple:
     """Returns what only equal shapes have in common."""
     if isinstance(shape, Mesh | Convex):
-        scale = tuple(shape.scale3())
-        return type(shape), mesh_key(shape.source()), scale
+        return mesh_shape_key(shape)
     if isinstance(shape, HalfSpace):
         return (HalfSpace,)
     return type(shape), *_dimensions(shape)
