@@ -64,7 +64,7 @@ def test_survival_comes_first(text):
 
 def test_text_is_escaped(text):
     assert "A &lt; B &amp; C." in text
-    assert "curves &quot;P&quot; &lt; R" in text
+    assert "curves &#34;P&#34; &lt; R" in text
     assert "gone &lt; new" in text
     assert 'class="verdict does-not-hold"' in text
 

@@ -1,13 +1,14 @@
 import math
 from types import SimpleNamespace
 
+from helpers.small_page import make_content
 import pytest
 
 from evaluation.recognition.metrics import Interval
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.survival import Kept
 from evaluation.report import survival_figure
-from evaluation.report.page_survival import survival_section
+from evaluation.report.page import write_page
 from evaluation.report.survival_figure import draw_survival
 from evaluation.report.survival_tables import (
     survival_numbers,
@@ -86,10 +87,13 @@ def test_summary():
     assert survival_summary([]) == ""
 
 
-def test_section_of_the_page():
-    assert survival_section([], "") == ""
-    text = survival_section([make("a<b", "01", 0.8, 0.4)], "<svg/>")
-    assert "<svg/>" in text
+def test_section_of_the_page(tmp_path):
+    page = tmp_path / "report.html"
+    write_page(page, make_content(tmp_path, survivals=[]))
+    assert "survives the change" not in page.read_text()
+    survivals = [make("a<b", "01", 0.8, 0.4)]
+    write_page(page, make_content(tmp_path, survivals=survivals))
+    text = page.read_text()
     assert "a&lt;b" in text
     assert "<td>0.800</td><td>0.400</td><td><b>50 %</b>" in text
     assert "<td>0.125</td></tr>" in text
