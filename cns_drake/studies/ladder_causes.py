@@ -82,7 +82,7 @@ _WORDS = {
     "weather": "fog, {:g} m of visibility",
     "returns": "{} returns",
     "ride": "mapped on a road of class {}",
-    "sensor": "asked with a {}",
+    "sensor": "the query measures with {}",
     "viewpoint": "mapped {0[0]:g} m to the left, heading {0[1]} deg",
     "size": "{} more places",
 }

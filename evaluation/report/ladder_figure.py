@@ -17,7 +17,10 @@ from evaluation.report.drawing import plain, save
 from evaluation.report.ladder_rows import LadderRow
 from evaluation.report.method_titles import in_table_order, title
 
-_COLOURS = colormaps["RdYlGn"]
+# Told apart by all kinds of colour vision.
+_COLOURS = colormaps["RdYlBu"]
+# Letters on these shares are black.
+_LIGHT = (0.15, 0.85)
 _SHARES = Normalize(0.0, 1.0)
 _CELL_WIDTH, _CELL_HEIGHT = 0.95, 0.3
 _EDGES = (2.4, 1.6)
@@ -29,7 +32,7 @@ def draw_ladder(rows: Sequence[LadderRow], stem: Path) -> None:
     """Draws how much of AUC without a change each cause leaves.
 
     A cell has a strip for each level, the weakest at its left; the number is
-    that of the strongest level [%].
+    that of the strongest level [%]. Without a change it is AUC itself.
 
     Args:
         rows: of all maps.
@@ -83,13 +86,16 @@ def _draw_panel(
             axes.add_patch(
                 Rectangle((x + k * width, y), width, 1.0, color=colour, lw=0)
             )
-        share = levels[-1].kept.share
+        strongest = levels[-1]
+        share = strongest.kept.share
+        is_light = math.isnan(share) or _LIGHT[0] < share < _LIGHT[1]
         axes.text(
             x + 0.5,
             y + 0.5,
-            "–" if math.isnan(share) else f"{100.0 * share:.0f}",
+            _label(strongest),
             ha="center",
             va="center",
+            color="black" if is_light else "white",
             fontsize=_FONT_SIZE,
         )
     axes.set(xlim=(0, len(methods)), ylim=(len(causes), 0))
@@ -109,3 +115,10 @@ def _draw_panel(
     for k in range(1, len(causes)):
         axes.axhline(k, color="white", linewidth=2)
     axes.spines[:].set_visible(False)
+
+
+def _label(row: LadderRow) -> str:
+    if row.rung.level == 0:
+        return f"AUC {row.auc:.2f}"
+    share = row.kept.share
+    return "–" if math.isnan(share) else f"{100.0 * share:.0f}"

@@ -10,6 +10,8 @@ from evaluation.report.method_titles import in_table_order, title
 
 # What is kept of AUC where little is lost.
 _MUCH = 0.95
+# Between what is kept with and without the gate.
+_DIFFERENT = 0.1
 # Rungs that are no single cause.
 _NONE, _ALL = "none", "all"
 
@@ -34,18 +36,20 @@ def _paragraph(rows: Sequence[LadderRow]) -> str:
         f" {first.query}: what each cause of change, at its strongest level,"
         " leaves of the AUC without a change (95 % intervals)."
     ]
-    for told, words in (
-        (False, "With the radius untold"),
-        (True, "With the radius told"),
-    ):
-        strongest = _strongest([r for r in rows if r.radius_told == told])
-        sentences = [
-            _sentence([row for row in strongest if row.method == method])
-            for method in in_table_order(row.method for row in strongest)
-        ]
-        if any(sentences):
-            parts.append(f"{words}: {'; '.join(filter(None, sentences))}.")
-            parts.append(_mildest(strongest))
+    untold, told = (
+        _strongest([row for row in rows if row.radius_told == is_told])
+        for is_told in (False, True)
+    )
+    sentences = [
+        _sentence([row for row in untold if row.method == method])
+        for method in in_table_order(row.method for row in untold)
+    ]
+    if any(sentences):
+        parts.append(
+            f"No method knows the radius: {'; '.join(filter(None, sentences))}."
+        )
+        parts.append(_mildest(untold))
+        parts.append(_difference(untold, told))
     return " ".join(filter(None, parts))
 
 
@@ -87,6 +91,25 @@ def _mildest(rows: Sequence[LadderRow]) -> str:
     return f"To every method {much} are left by {', '.join(mild)}."
 
 
+def _difference(untold: Sequence[LadderRow], told: Sequence[LadderRow]) -> str:
+    """Returns what depends on the gate."""
+    before = {(row.rung.cause, row.method): row for row in untold}
+    changed = [
+        f"{title(row.method)} under {_cause(row)} keeps"
+        f" {_percent(row.kept.share)} instead of {_percent(other.kept.share)}"
+        for row in told
+        if (other := before.get((row.rung.cause, row.method))) is not None
+        and abs(row.kept.share - other.kept.share) >= _DIFFERENT
+    ]
+    much = f"{100.0 * _DIFFERENT:.0f} points"
+    if not changed:
+        return f"The gate changes nothing by {much} or more."
+    return (
+        f"With the gate, {'; '.join(changed)}; all else changes by less than"
+        f" {much}."
+    )
+
+
 def _strongest(rows: Sequence[LadderRow]) -> list[LadderRow]:
     """Returns the row of the strongest level of each cause and method."""
     found: dict[tuple[str, str], LadderRow] = {}
@@ -103,7 +126,11 @@ def _cause(row: LadderRow) -> str:
 
 def _kept(row: LadderRow) -> str:
     low, high = row.kept.interval.low, row.kept.interval.high
-    text = f"{100.0 * row.kept.share:.0f} %"
+    text = _percent(row.kept.share)
     if math.isnan(low):
         return text
     return f"{text} ({100.0 * low:.0f} to {100.0 * high:.0f})"
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.0f} %"

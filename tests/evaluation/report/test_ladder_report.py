@@ -174,6 +174,8 @@ def test_the_words_name_the_worst_cause(climbed):
     assert "SOLiD loses most by works (much works), which leaves 28 %" in text
     assert "and keeps 0 % (0 to 0) under all causes together" in text
     assert "No cause leaves 95 % or more to every method" in text
+    # With the gate 6 more of 60 are right: 6 of 60 instead of none.
+    assert "With the gate, SOLiD under all keeps 10 % instead of 0 %;" in text
     text = ladder_text(ladder_rows([climbed[0], climbed[-1]], 7.5))
     assert "SOLiD keeps 0 % (0 to 0) under all causes together" in text
     mild = [climbed[0], measured("ride", 4, climbed[0].outcomes)]
