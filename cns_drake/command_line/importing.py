@@ -137,6 +137,7 @@ def import_city(
         within,
         drive_on,
         grow,
+        dressed=not plain,
     )
     report = import_map.import_city(
         path,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from shapely.geometry import MultiPoint
@@ -37,6 +37,10 @@ class Imported:
         triangles: (M, 3, 3) of what a car could hit or drive over, in the
             world [m].
         until: year in which it was demolished, if it was.
+        tags: or attributes, that the file gives it.
+        lod: level of detail; 0 if it is not known.
+        original: name of the structure that it is a variant of; its own if
+            empty.
     """
 
     structure: Structure
@@ -44,6 +48,14 @@ class Imported:
     year: int | None
     triangles: np.ndarray
     until: int | None = None
+    tags: Mapping[str, str] = field(default_factory=dict)
+    lod: float = 0.0
+    original: str = ""
+
+    @property
+    def lot_name(self) -> str:
+        """The name by which lots are drawn."""
+        return self.original or self.structure.name
 
     @property
     def is_ground(self) -> bool:
@@ -89,6 +101,8 @@ def make_imported(
     colours: Mapping[str, Rgb | None],
     year: int | None = None,
     until: int | None = None,
+    tags: Mapping[str, str] | None = None,
+    lod: float = 0.0,
 ) -> Imported:
     """Returns a structure of triangles in the world.
 
@@ -101,6 +115,8 @@ def make_imported(
         colours: part -> diffuse colour; that of the class where it has none.
         year: in which it was built, if it is told.
         until: in which it was demolished, if it was.
+        tags: or attributes, that the file gives it.
+        lod: level of detail; 0 if it is not known.
     """
     filled = {part: some for part, some in surfaces.items() if len(some)}
     triangles = np.concatenate(list(filled.values()))
@@ -113,7 +129,7 @@ def make_imported(
         MultiPoint(triangles.reshape(-1, 3)[:, :2]).convex_hull,
     )
     structure = Structure(name, semantic_class, model, (0.0, 0.0, 0.0))
-    return Imported(structure, kind, year, triangles, until)
+    return Imported(structure, kind, year, triangles, until, tags or {}, lod)
 
 
 def _to_mesh(triangles: np.ndarray) -> Mesh:

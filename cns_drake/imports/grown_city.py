@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-import hashlib
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -13,6 +12,7 @@ from shapely import STRtree
 
 from cns_drake.city.geometry.structures import MeshShape
 from cns_drake.imports.foreign_city import Imported
+from cns_drake.imports.lots import lot
 from cns_drake.imports.staged_city import StagedCity
 
 # Buildings so near each other are of one block [m].
@@ -60,9 +60,9 @@ def grow(city: StagedCity, part: float, seed: int) -> tuple[StagedCity, Growth]:
     for one in chosen:
         name = one.structure.name
         z = one.triangles[:, :, 2]
-        if np.ptp(z) >= _LEAST_HEIGHT and _lot(seed, "lower", name) < _LOWER:
+        if np.ptp(z) >= _LEAST_HEIGHT and lot(seed, "lower", name) < _LOWER:
             low, high = _HEIGHTS
-            share = low + (high - low) * _lot(seed, "height", name)
+            share = low + (high - low) * lot(seed, "height", name)
             lower[name] = round(share, 2)
             variants[one] = _lowered(one, lower[name], taken)
         else:
@@ -88,7 +88,7 @@ def _drawn(
 
     def lot_of_block(members: list[Imported]) -> float:
         name = min(one.structure.name for one in members)
-        return _lot(seed, "block", name)
+        return lot(seed, "block", name)
 
     chosen: list[Imported] = []
     for members in sorted(blocks.values(), key=lot_of_block):
@@ -98,7 +98,7 @@ def _drawn(
             chosen += members
     left = set(buildings) - set(chosen)
     singles = sorted(
-        left, key=lambda one: _lot(seed, "single", one.structure.name)
+        left, key=lambda one: lot(seed, "single", one.structure.name)
     )
     return chosen + singles[: number - len(chosen)]
 
@@ -143,16 +143,10 @@ def _lowered(one: Imported, share: float, taken: set[str]) -> Imported:
         name=f"{one.structure.name}{suffix}",
         model=replace(model, parts=parts, meshes=meshes),
     )
-    return Imported(
-        structure,
-        f"{one.kind}, lower at first",
-        one.year,
-        one.triangles * scale + move,
+    return replace(
+        one,
+        structure=structure,
+        kind=f"{one.kind}, lower at first",
+        triangles=one.triangles * scale + move,
+        original=one.structure.name,
     )
-
-
-def _lot(seed: int, purpose: str, name: str) -> float:
-    """Returns a number from 0 to 1 that depends on these alone."""
-    text = f"{seed}/{purpose}/{name}".encode()
-    digest = hashlib.blake2b(text, digest_size=8).digest()
-    return int.from_bytes(digest, "big") / 2.0**64

@@ -12,9 +12,11 @@ import re
 import numpy as np
 
 from cns_drake.base.errors import InputError
+from cns_drake.city.geometry.structures import MeshShape
+from cns_drake.imports.dressing.dressed_city import dress_buildings
 from cns_drake.imports.drive_files import write_drives
 from cns_drake.imports.drive_search import find_drives
-from cns_drake.imports.foreign_city import ForeignCity
+from cns_drake.imports.foreign_city import ForeignCity, Imported
 from cns_drake.imports.free_drives import CellGraph
 from cns_drake.imports.free_space import FreeSpace, find_free_space
 from cns_drake.imports.grown_city import grow
@@ -75,16 +77,32 @@ def import_city(
         staged = staged.near(drives, options.within, city.faults)
         ground = ground_of(staged.kept)
     drives = _lifted(drives, ground, city.faults)
+    bare, dressing = staged.kept, None
+    if options.dressed:
+        progress("dressing buildings")
+        dressing = dress_buildings(
+            staged.kept, drives, city.streets, ground, options.seed
+        )
+        staged = staged.replaced(dressing.buildings)
     progress(f"writing {output}")
     with map_draft(output) as draft:
-        write_world(draft, source, staged, bottom_of(staged.kept, ground))
-        write_facts(draft, source, city, options, list(staged.standing), growth)
+        bottom = bottom_of(staged.kept, ground)
+        write_world(draft, source, staged, bottom, dressing)
+        write_facts(
+            draft,
+            source,
+            city,
+            options,
+            list(staged.standing),
+            growth,
+            dressing,
+        )
         write_drives(
             draft,
             _titles(staged, options),
             [drive.waypoints for drive in drives],
         )
-        draw_overview(draft / "from_above.png", staged.kept, space, drives)
+        draw_overview(draft / "from_above.png", bare, space, drives)
         finish(draft)
     return _report(staged, drives, city.faults)
 
@@ -185,10 +203,22 @@ def _report(
 ) -> ImportReport:
     return ImportReport(
         kinds=dict(Counter(one.kind for one in city.kept)),
-        triangles=sum(len(one.triangles) for one in city.kept),
+        triangles=sum(map(_triangles_of, city.kept)),
         stages={stage: len(some) for stage, some in city.standing.items()},
         undated=city.undated,
         dated=city.dated,
         drives=tuple(drive.length for drive in drives),
         faults=faults.rows(),
+    )
+
+
+def _triangles_of(one: Imported) -> int:
+    """Returns how many triangles a structure has, if these are its own."""
+    shapes = [part.shape for part in one.structure.model.parts]
+    if not one.kind.startswith("Building"):
+        return len(one.triangles)
+    return sum(
+        one.structure.model.meshes[shape.mesh].num_triangles
+        for shape in shapes
+        if isinstance(shape, MeshShape)
     )

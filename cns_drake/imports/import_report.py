@@ -35,6 +35,8 @@ class ImportOptions:
             right, if None.
         within: how far from the drives a structure may lie; anywhere if None
             [m].
+        dressed: whether what the file does not say of the looks of buildings
+            is drawn by lot.
     """
 
     years: tuple[int, ...] = ()
@@ -46,6 +48,7 @@ class ImportOptions:
     within: float | None = None
     drive_on: DriveOn | None = None
     grow: float | None = None
+    dressed: bool = False
 
 
 @dataclass(frozen=True)

@@ -178,6 +178,13 @@ def _make(
         whole,
         {"body": rgb, "roof": RED_ROOF},
         known[0] if known else None,
+        tags={
+            key: str(value)
+            for one in reversed(members)
+            for key, value in one.attributes.items()
+            if isinstance(value, str | int | float)
+        },
+        lod=max(geometry.lod for geometry in chosen),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -68,6 +68,17 @@ class StagedCity:
             for stage, some in self.standing.items()
         }
         return replace(self, standing=standing, kept=kept)
+
+    def replaced(self, changed: Mapping[Imported, Imported]) -> StagedCity:
+        """Returns the city with some structures in place of others."""
+        return replace(
+            self,
+            standing={
+                stage: [changed.get(one, one) for one in some]
+                for stage, some in self.standing.items()
+            },
+            kept=[changed.get(one, one) for one in self.kept],
+        )
 
 
 def stage_city(

@@ -1,0 +1,1 @@
+"""What is added to the bare shapes of an imported city, by tags and by lot."""

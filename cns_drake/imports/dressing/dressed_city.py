@@ -1,0 +1,378 @@
+"""All buildings of an imported city, dressed."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import KDTree
+import shapely
+from shapely.geometry import MultiLineString
+from shapely.geometry.base import BaseGeometry
+
+from cns_drake.city.geometry.structures import (
+    MeshShape,
+    Model,
+    Part,
+)
+from cns_drake.imports.dressing.facade_pieces import Faces, add_facade
+from cns_drake.imports.dressing.facade_plan import (
+    FacadePlan,
+    plan_facade,
+    with_doors,
+    with_shops,
+)
+from cns_drake.imports.dressing.roof_pieces import is_flat_roof, roof_pieces
+from cns_drake.imports.dressing.styles import Style, make_style
+from cns_drake.imports.dressing.upper_sides import UpperSides, looks_up
+from cns_drake.imports.dressing.wall_panels import (
+    Panel,
+    find_panels,
+    is_upright,
+)
+from cns_drake.imports.foreign_city import Imported
+from cns_drake.imports.import_ground import Ground
+from cns_drake.imports.lots import lot_generator
+from cns_drake.imports.street_lanes import Street
+from cns_drake.imports.waypoint_drives import Drive
+
+# Walls that are farther from all drives have no windows, and roofs no
+# equipment [m].
+_WALLS_WITHIN, _ROOFS_WITHIN = 60.0, 100.0
+# Of drives, for what they see of a wall [m].
+_SPACING = 4.0
+# So many triangles are given to openings, about, the nearest walls first.
+_MOST_TRIANGLES = 1_100_000
+_OF_OPENING, _OF_WALL = 30, 40
+# Shops are on walls so near a street [m].
+_SHOPS_WITHIN = 16.0
+# From this level of detail on a model has its own roof, and windows.
+_OWN_ROOF, _OWN_WINDOWS = 2.2, 3.0
+# A building whose feet lie farther from the ground has been let into it [m].
+_LET_IN = 2.0
+
+
+@dataclass(frozen=True)
+class DressedBuildings:
+    """What became of buildings.
+
+    Attributes:
+        buildings: before -> after.
+        by_lot: what was added -> how many.
+        by_file: what the file says of their looks -> of how many.
+    """
+
+    buildings: Mapping[Imported, Imported]
+    by_lot: Mapping[str, int]
+    by_file: Mapping[str, int]
+
+
+@dataclass(frozen=True)
+class _Bare:
+    """A building by its surfaces, (M, 3, 3) each [m]."""
+
+    one: Imported
+    walls: np.ndarray
+    roof: np.ndarray
+    rest: np.ndarray
+    base: float
+    style: Style
+    is_flat: bool
+    rng: np.random.Generator
+
+
+def dress_buildings(
+    structures: Sequence[Imported],
+    drives: Sequence[Drive],
+    streets: Sequence[Street],
+    ground: Ground,
+    seed: int,
+) -> DressedBuildings:
+    """Dresses the buildings of a city.
+
+    A building looks the same in each stage and each import, since its lot is
+    drawn by its own name; only whether a wall is near enough to a drive for
+    its windows depends on the drives.
+
+    Args:
+        structures: all that ever stand.
+        drives: through the city; without any no wall has windows.
+        streets: of the file, which doors and shops look to.
+        ground: below the city.
+        seed: of the lot.
+    """
+    buildings = [one for one in structures if one.kind.startswith("Building")]
+    bare = _all_laid_bare(buildings, ground, seed)
+    by_lot: Counter[str] = Counter()
+    by_file: Counter[str] = Counter()
+    for some in bare:
+        by_file.update(some.style.by_tag)
+    solids = [some.one.triangles for some in bare]
+    upper = UpperSides(np.concatenate([np.zeros((0, 3, 3)), *solids]))
+    plans, distances = _plans(bare, drives, streets, ground, upper)
+    paths = MultiLineString([drive.path for drive in drives])
+    dressed = {}
+    for number, some in enumerate(bare):
+        faces = Faces()
+        if number in plans:
+            walls = _undressed_walls(some, plans[number])
+            for material, triangles in (
+                ("body", walls),
+                ("body", some.rest),
+                ("roof", some.roof),
+            ):
+                faces.add(material, triangles)
+            for plan, distance in zip(
+                plans[number], distances[number], strict=True
+            ):
+                rng = lot_generator(
+                    seed, _wall_name(plan.panel), some.one.lot_name
+                )
+                add_facade(faces, plan, distance, rng)
+        else:
+            for material, triangles in (
+                ("body", some.walls),
+                ("body", some.rest),
+                ("roof", some.roof),
+            ):
+                faces.add(material, triangles)
+        roof = _roof(some, paths)
+        faces.counts["roof equipment and chimneys"] += len(roof.parts)
+        by_lot += faces.counts
+        dressed[some.one] = _assembled(some, faces, roof)
+    return DressedBuildings(
+        dressed, dict(sorted(by_lot.items())), dict(sorted(by_file.items()))
+    )
+
+
+def _all_laid_bare(
+    buildings: Sequence[Imported], ground: Ground, seed: int
+) -> list[_Bare]:
+    """Returns all buildings, lower variants in the style of the original."""
+    whole = [
+        _laid_bare(one, ground, seed) for one in buildings if not one.original
+    ]
+    styles = {some.one.lot_name: some.style for some in whole}
+    lower = [
+        _laid_bare(one, ground, seed, styles.get(one.original))
+        for one in buildings
+        if one.original
+    ]
+    return whole + lower
+
+
+def _laid_bare(
+    one: Imported, ground: Ground, seed: int, known: Style | None = None
+) -> _Bare:
+    surfaces = {"body": np.zeros((0, 3, 3)), "roof": np.zeros((0, 3, 3))}
+    for part in one.structure.model.parts:
+        if isinstance(part.shape, MeshShape):
+            mesh = one.structure.model.meshes[part.shape.mesh]
+            surfaces[part.name] = mesh.vertices[mesh.triangles()]
+    body = surfaces["body"]
+    upright, up = is_upright(body), looks_up(body)
+    roof = np.concatenate([surfaces["roof"], body[up]])
+    walls, rest = body[upright], body[~upright & ~up]
+    corners = one.triangles.reshape(-1, 3)
+    foot = float(corners[:, 2].min())
+    below = float(ground.height(corners[:, :2]).min())
+    base = foot if abs(foot - below) < _LET_IN else below
+    width, depth = np.ptp(corners[:, :2], axis=0)
+    top = walls if len(walls) else one.triangles
+    height = max(1.0, float(top[:, :, 2].max()) - base)
+    is_flat = bool(len(roof)) and is_flat_roof(roof)
+    rng = lot_generator(seed, "dressing", one.lot_name)
+    area = 0.8 * float(width * depth)
+    style = make_style(one.tags, one.year, area, height, is_flat, rng)
+    if known is not None:
+        storeys = max(1, round(height / known.storey))
+        style = replace(known, storey=height / storeys)
+    return _Bare(one, walls, roof, rest, base, style, is_flat, rng)
+
+
+def _plans(
+    bare: Sequence[_Bare],
+    drives: Sequence[Drive],
+    streets: Sequence[Street],
+    ground: Ground,
+    upper: UpperSides,
+) -> tuple[dict[int, list[FacadePlan]], dict[int, list[float]]]:
+    """Returns of buildings the walls to dress, and how far drives are."""
+    panels = [
+        panel
+        for panel in find_panels(
+            [
+                some.walls
+                if some.one.lod < _OWN_WINDOWS
+                else np.zeros((0, 3, 3))
+                for some in bare
+            ]
+        )
+        if panel.is_plane
+    ]
+    panels, to_drive = _seen(panels, drives)
+    if not panels:
+        return {}, {}
+    before = np.array(
+        [
+            panel.place(np.array(panel.length / 2), np.array(0.0), 1.0)
+            for panel in panels
+        ]
+    )
+    heights = ground.height(before[:, :2])
+    plans = [
+        plan_facade(
+            panel,
+            bare[panel.building].style,
+            bare[panel.building].base,
+            float(height),
+        )
+        for panel, height in zip(panels, heights, strict=True)
+    ]
+    probes = [plan.probes() for plan in plans]
+    hidden = upper.hides(np.concatenate(probes))
+    ends = np.cumsum([len(some) for some in probes])[:-1]
+    plans = [
+        plan.without(some)
+        for plan, some in zip(plans, np.split(hidden, ends), strict=True)
+    ]
+    ways = MultiLineString(
+        [
+            *(street.line for street in streets),
+            *(drive.path for drive in drives),
+        ]
+    )
+    to_way = np.asarray(shapely.distance(shapely.points(before[:, :2]), ways))
+    found: dict[int, list[FacadePlan]] = {}
+    distances: dict[int, list[float]] = {}
+    for number, members in _grouped(plans).items():
+        front = _front(members, plans, to_way)
+        for k in members:
+            plan = plans[k]
+            if plan.style.shops and to_way[k] < _SHOPS_WITHIN:
+                plan = with_shops(plan)
+            if k == front:
+                plan = with_doors(plan)
+            found.setdefault(number, []).append(plan)
+            distances.setdefault(number, []).append(float(to_drive[k]))
+    return found, distances
+
+
+def _seen(
+    panels: Sequence[Panel], drives: Sequence[Drive]
+) -> tuple[list[Panel], np.ndarray]:
+    """Returns the panels that drives see from near, and how near [m].
+
+    The nearest come first, as many as there are triangles for.
+    """
+    if not panels or not drives:
+        return [], np.zeros(0)
+    points = np.concatenate(
+        [
+            np.asarray(
+                shapely.get_coordinates(
+                    shapely.segmentize(
+                        shapely.linestrings(drive.path), _SPACING
+                    )
+                )
+            )
+            for drive in drives
+        ]
+    )
+    middles = np.array(
+        [panel.origin[:2] + panel.along * panel.length / 2 for panel in panels]
+    )
+    reach = np.array([panel.length / 2 for panel in panels])
+    near = KDTree(points).query_ball_point(middles, _WALLS_WITHIN + reach)
+    distances = np.full(len(panels), np.inf)
+    for k, some in enumerate(near):
+        if len(some):
+            from_start = points[some] - panels[k].origin[:2]
+            out = from_start @ panels[k].outward
+            x = from_start @ panels[k].along
+            aside = np.maximum(np.maximum(-x, x - panels[k].length), 0.0)
+            if (out > 0.0).any():
+                distances[k] = np.hypot(out, aside)[out > 0.0].min()
+    order = np.argsort(distances, kind="stable")
+    order = order[distances[order] <= _WALLS_WITHIN]
+    cost = [
+        _OF_WALL + _OF_OPENING * panel.length * panel.height / 9.0
+        for panel in (panels[k] for k in order)
+    ]
+    order = order[np.cumsum(cost) <= _MOST_TRIANGLES]
+    return [panels[k] for k in order], distances[order]
+
+
+def _grouped(plans: Sequence[FacadePlan]) -> dict[int, list[int]]:
+    """Returns the building's number -> numbers of its walls."""
+    groups: dict[int, list[int]] = {}
+    for k, plan in enumerate(plans):
+        groups.setdefault(plan.panel.building, []).append(k)
+    return groups
+
+
+def _front(
+    members: Sequence[int], plans: Sequence[FacadePlan], to_way: np.ndarray
+) -> int | None:
+    """Returns the number of the wall that the door of a building is in."""
+    possible = [k for k in members if plans[k].street_openings.any()]
+    return min(possible, key=lambda k: (to_way[k], k)) if possible else None
+
+
+def _undressed_walls(some: _Bare, plans: Sequence[FacadePlan]) -> np.ndarray:
+    """Returns the walls (M, 3, 3) of a building without those planned."""
+    taken = {one.tobytes() for plan in plans for one in plan.panel.triangles}
+    kept = [one for one in some.walls if one.tobytes() not in taken]
+    return np.array(kept).reshape(-1, 3, 3)
+
+
+def _roof(some: _Bare, paths: BaseGeometry) -> Model:
+    near = False
+    if len(some.roof) and some.one.lod < _OWN_ROOF and not paths.is_empty:
+        outline = some.one.structure.model.footprint
+        near = bool(shapely.dwithin(outline, paths, _ROOFS_WITHIN))
+    roof = some.roof if near else np.zeros((0, 3, 3))
+    if not near:
+        return Model((), {}, some.one.structure.model.footprint)
+    return roof_pieces(
+        roof, some.style, some.is_flat, some.rng, some.one.structure.name
+    )
+
+
+def _wall_name(panel: Panel) -> str:
+    """Returns a name of a wall that does not depend on the map's origin."""
+    heading = np.degrees(np.arctan2(panel.along[1], panel.along[0]))
+    return f"wall {panel.length:.1f} {heading:.0f}"
+
+
+def _assembled(some: _Bare, faces: Faces, roof: Model) -> Imported:
+    style, structure = some.style, some.one.structure
+    colours = {
+        "body": style.wall,
+        "roof": style.roof,
+        "glass": style.glass,
+        "frames": style.frame,
+        "trim": style.trim,
+        "doors": style.door,
+        "sign": style.sign,
+    }
+    meshes = {
+        f"{structure.name}_{material}": mesh
+        for material, mesh in faces.meshes().items()
+    }
+    parts = tuple(
+        Part(
+            material := name.removeprefix(f"{structure.name}_"),
+            MeshShape(name),
+            rgb=colours[material],
+        )
+        for name in meshes
+    )
+    model = Model(
+        parts + roof.parts,
+        {**meshes, **roof.meshes},
+        structure.model.footprint,
+    )
+    return replace(some.one, structure=replace(structure, model=model))

@@ -1,0 +1,160 @@
+"""Walls of buildings as plane panels, found in their triangles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+import shapely
+from shapely.geometry import Polygon, box
+from shapely.geometry.base import BaseGeometry
+
+# A face whose unit normal rises or falls by less is upright.
+_UPRIGHT = 0.02
+# Triangles of one wall have normals whose product is at least this (1 deg).
+_SAME_PLANE = float(np.cos(np.radians(1.0)))
+_MM = 1000.0
+# Of a wall's area, as much may be missing from a rectangle [m^2].
+_NO_AREA = 0.01
+# A wall that bends by more is left as it is [m].
+_BENT = 0.05
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A plane, upright wall or a piece of one, seen from outside.
+
+    Attributes:
+        building: number of its building.
+        origin: (3,) where x = z = 0 [m].
+        along: (2,) unit vector to the right, seen from outside.
+        length, height: of its bounding rectangle [m].
+        outline: polygon in x and z [m]; None if it fills the rectangle.
+        triangles: (M, 3, 3) that it was found in [m].
+        is_plane: whether these lie in one plane.
+    """
+
+    building: int
+    origin: np.ndarray
+    along: np.ndarray
+    length: float
+    height: float
+    outline: BaseGeometry | None
+    triangles: np.ndarray
+    is_plane: bool
+
+    @property
+    def outward(self) -> np.ndarray:
+        """The (2,) unit normal."""
+        return np.array([self.along[1], -self.along[0]])
+
+    def place(
+        self, x: np.ndarray, z: np.ndarray, out: np.ndarray | float = 0.0
+    ) -> np.ndarray:
+        """Returns places (..., 3) of the panel's coordinates [m].
+
+        Args:
+            x, z: along the panel and up, from its origin [m].
+            out: distance outwards [m].
+        """
+        out = np.broadcast_to(out, np.shape(x))
+        xy = (
+            self.origin[:2]
+            + x[..., None] * self.along
+            + out[..., None] * self.outward
+        )
+        return np.concatenate([xy, (self.origin[2] + z)[..., None]], axis=-1)
+
+    def whole(self) -> BaseGeometry:
+        """Returns the panel's outline in x and z [m]."""
+        if self.outline is not None:
+            return self.outline
+        return box(0.0, 0.0, self.length, self.height)
+
+
+def unit_normals(triangles: np.ndarray) -> np.ndarray:
+    """Returns the unit normals (M, 3) of triangles (M, 3, 3), or zeros."""
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    normal = np.cross(b - a, c - a)
+    size = np.linalg.norm(normal, axis=1, keepdims=True)
+    return normal / np.where(size > 1e-9, size, np.inf)
+
+
+def is_upright(triangles: np.ndarray) -> np.ndarray:
+    """Tells which of the triangles (M, 3, 3) are walls."""
+    normals = unit_normals(triangles)
+    return normals.any(axis=1) & (np.abs(normals[:, 2]) < _UPRIGHT)
+
+
+def find_panels(walls: Sequence[np.ndarray]) -> list[Panel]:
+    """Returns the panels of the walls of buildings.
+
+    Args:
+        walls: of each building, upright triangles (M, 3, 3) that look
+            outwards [m].
+    """
+    triangles = np.concatenate([np.zeros((0, 3, 3)), *walls])
+    building = np.repeat(np.arange(len(walls)), [len(w) for w in walls])
+    if not len(triangles):
+        return []
+    normals = unit_normals(triangles)
+    component = _connected(triangles, normals, building)
+    order = np.argsort(component, kind="stable")
+    ends = np.flatnonzero(np.diff(component[order])) + 1
+    return [
+        _panel(int(building[some[0]]), triangles[some], normals[some])
+        for some in np.split(order, ends)
+    ]
+
+
+def _connected(
+    triangles: np.ndarray, normals: np.ndarray, building: np.ndarray
+) -> np.ndarray:
+    """Returns the number of the panel (M,) that each triangle belongs to."""
+    corners = np.rint(triangles * _MM).astype(np.int64).reshape(-1, 3)
+    keyed = np.column_stack([np.repeat(building, 3), corners])
+    _, vertex = np.unique(keyed, axis=0, return_inverse=True)
+    vertex = vertex.reshape(-1, 3)
+    edges = np.stack([vertex, np.roll(vertex, -1, axis=1)], axis=2)
+    edges = np.sort(edges.reshape(-1, 2), axis=1)
+    _, edge = np.unique(edges, axis=0, return_inverse=True)
+    order = np.argsort(edge.reshape(-1), kind="stable")
+    one, other = order[:-1] // 3, order[1:] // 3
+    shared = edge.reshape(-1)[order[:-1]] == edge.reshape(-1)[order[1:]]
+    same = np.einsum("ij,ij->i", normals[one], normals[other]) >= _SAME_PLANE
+    one, other = one[shared & same], other[shared & same]
+    count = len(triangles)
+    links = coo_array((np.ones(len(one)), (one, other)), (count, count))
+    _, component = connected_components(links, directed=False)
+    return np.asarray(component)
+
+
+def _panel(building: int, triangles: np.ndarray, normals: np.ndarray) -> Panel:
+    corners = triangles.reshape(-1, 3)
+    # The mean over areas: small triangles have imprecise normals.
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2.0
+    outward = (normals * areas[:, None]).sum(axis=0)[:2]
+    outward /= np.hypot(*outward)
+    along = np.array([-outward[1], outward[0]])
+    x = (corners[:, :2] - corners[0, :2]) @ along
+    start = corners[0, :2] + x.min() * along
+    # In the middle of what is not quite plane.
+    aside = (corners[:, :2] - start) @ outward
+    start = start + outward * float(aside.mean())
+    origin = np.array([*start, corners[:, 2].min()])
+    length, height = float(np.ptp(x)), float(np.ptp(corners[:, 2]))
+    outline: BaseGeometry | None = None
+    if length * height - areas.sum() > _NO_AREA:
+        flat = np.column_stack([x - x.min(), corners[:, 2] - origin[2]])
+        outline = shapely.union_all(
+            [Polygon(one) for one in np.round(flat, 3).reshape(-1, 3, 2)],
+            grid_size=1.0 / _MM,
+        )
+    is_plane = bool(np.ptp(aside) <= _BENT)
+    return Panel(
+        building, origin, along, length, height, outline, triangles, is_plane
+    )

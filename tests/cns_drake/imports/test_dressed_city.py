@@ -1,0 +1,359 @@
+"""Buildings are dressed on the walls of the file, by tags and by lot."""
+
+import csv
+import hashlib
+import re
+
+from helpers.small_cityjson import CityWriter
+from helpers.small_osm import OsmWriter
+import numpy as np
+import pytest
+from shapely.geometry import LineString
+from typer.testing import CliRunner
+import yaml
+
+from cns_drake.city.geometry.object_parts import part_triangles
+from cns_drake.command_line.cli import app
+from cns_drake.imports.dressing.dressed_city import dress_buildings
+from cns_drake.imports.dressing.reliefs import Openings, framed, open_wall
+from cns_drake.imports.dressing.styles import Use, building_use, told_colour
+from cns_drake.imports.dressing.wall_panels import find_panels, is_upright
+from cns_drake.imports.extrusions import extruded
+from cns_drake.imports.grown_city import grow
+from cns_drake.imports.import_faults import ImportFaults
+from cns_drake.imports.import_ground import ground_of
+from cns_drake.imports.import_report import ImportOptions
+from cns_drake.imports.import_structures import import_cityjson
+from cns_drake.imports.openstreetmap import import_openstreetmap
+from cns_drake.imports.staged_city import stage_city
+from cns_drake.imports.waypoint_drives import Drive
+
+# Of an import before there was dressing.
+PLAIN = "100f7a75c0f44113"
+STREET = np.column_stack([np.linspace(-80, 80, 41), np.full(41, -12.0)])
+
+
+def volume(triangles):
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    return np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6
+
+
+def area(triangles):
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+
+
+def surfaces(one):
+    """Returns part -> its triangles in the world."""
+    model = one.structure.model
+    found = {}
+    for part in model.parts:
+        vertices, triangles = part_triangles(part, model.meshes)
+        found[part.name] = vertices[triangles]
+    return found
+
+
+def dressed(city, path=STREET, seed=0):
+    drives = [Drive(path, path)]
+    ground = ground_of(city.structures)
+    result = dress_buildings(city.structures, drives, (), ground, seed)
+    names = {one.structure.name: one for one in result.buildings}
+    return {k: result.buildings[v] for k, v in names.items()}, result
+
+
+def read(osm, folder):
+    return import_openstreetmap(osm.write(folder / "city.osm"), None)
+
+
+@pytest.fixture(scope="module")
+def row(tmp_path_factory):
+    """Houses of a street: a wall in common, an odd outline, a gable."""
+    osm = OsmWriter()
+    common = {"building": "apartments", "building__levels": "5"}
+    osm.box(-60, -4, 20, 14, **common)
+    osm.box(-40, -4, 20, 14, **common)
+    odd = [(-10, -4), (14, 1), (14, 12), (4, 9), (2, 16), (-10, 16)]
+    osm.way(odd, closed=True, building="yes", height="17")
+    osm.box(
+        20, -4, 24, 10, building="house", height="11",
+        roof__shape="gabled", roof__height="5",
+    )  # fmt: skip
+    osm.box(55, -4, 9, 9, building="house", height="6", building__colour="#f00")
+    return read(osm, tmp_path_factory.mktemp("row"))
+
+
+def test_recesses_take_their_volume_and_nothing_else(row):
+    after, _ = dressed(row)
+    for one in row.structures:
+        parts = surfaces(after[one.structure.name])
+        closed = [
+            parts[name]
+            for name in ("body", "roof", "glass", "frames", "doors")
+            if name in parts
+        ]
+        triangles = np.concatenate(closed)
+        panes = {"glass", "frames", "doors"} & set(parts)
+        backs = np.concatenate([parts[name] for name in sorted(panes)])
+        panels = find_panels([one.triangles[is_upright(one.triangles)]])
+        taken = 0.0
+        for triangle in backs:
+            depths = [
+                -(triangle.mean(axis=0) - p.origin)[:2] @ p.outward
+                for p in panels
+                if np.abs((triangle - triangle[0])[:, :2] @ p.outward).max()
+                < 1e-6
+            ]
+            depth = min(d for d in depths if d > 0.05)
+            assert depth < 0.5
+            taken += area(triangle[None]) * depth
+        assert taken > 1.0, one.structure.name
+        expected = volume(one.triangles) - taken
+        assert volume(triangles) == pytest.approx(expected, abs=2e-3)
+
+
+def test_walls_stay_where_the_file_has_them(row):
+    after, _ = dressed(row)
+    for one in row.structures:
+        body = surfaces(after[one.structure.name])["body"]
+        panels = find_panels([one.triangles[is_upright(one.triangles)]])
+        before = sum(area(p.triangles) for p in panels)
+        on_wall = np.zeros(len(body), dtype=bool)
+        for p in panels:
+            off = (body - p.origin)[:, :, :2] @ p.outward
+            on_wall |= (np.abs(off) < 1e-3).all(axis=1)
+        parts = surfaces(after[one.structure.name])
+        backs = sum(
+            area(parts[k]) for k in ("glass", "frames", "doors") if k in parts
+        )
+        assert area(body[on_wall]) + backs == pytest.approx(before, abs=1e-2)
+        # Reliefs reach out of a wall by a balcony at most.
+        low, high = (f(one.triangles[:, :, :2].reshape(-1, 2), axis=0)
+                     for f in (np.min, np.max))  # fmt: skip
+        corners = np.concatenate(list(parts.values())).reshape(-1, 3)[:, :2]
+        assert (corners > low - 1.2).all()
+        assert (corners < high + 1.2).all()
+
+
+def test_a_wall_against_a_neighbour_has_no_windows(row):
+    after, _ = dressed(row)
+    left, right = (row.structures[k].structure.name for k in (0, 1))
+    for name, side in ((left, 1), (right, -1)):
+        parts = surfaces(after[name])
+        x = np.concatenate([parts["glass"], parts["doors"]])[:, :, 0]
+        wall = row.structures[0].triangles[:, :, 0].max()
+        assert (np.abs(x - wall) > 0.4).all()
+        # On the far side of the same house there are windows.
+        assert (np.abs(x - (wall - 20.0 * side)).max(axis=1) < 0.5).any()
+
+
+def test_tags_win(row):
+    after, result = dressed(row)
+    model = after[row.structures[4].structure.name].structure.model
+    colours = {part.name: part.rgb for part in model.parts}
+    assert colours["body"] == (1.0, 0.0, 0.0)
+    assert result.by_file == {"levels": 2, "use": 4, "wall": 1}
+    parts = surfaces(after[row.structures[0].structure.name])
+    lowest = np.sort(parts["glass"][:, :, 2].min(axis=1).round(2))
+    # Five storeys of three metres, as the file says.
+    assert len(np.unique(np.floor(lowest / 3.0))) == 5
+
+
+@pytest.mark.parametrize(
+    ("tags", "use"),
+    [({"building": "yes", "shop": "bakery"}, Use.RETAIL),
+     ({"building": "church"}, Use.CHURCH),
+     ({"building": "garages"}, Use.SHED),
+     ({"function": "Woonfunctie"}, Use.FLATS),
+     ({}, Use.HOUSE)],
+)  # fmt: skip
+def test_uses(tags, use):
+    assert building_use(tags, 100.0, 6.0) == (use, bool(tags))
+
+
+@pytest.mark.parametrize(
+    ("value", "rgb"),
+    [("#ff8000", (1.0, 128 / 255, 0.0)), ("light_grey", (211 / 255,) * 3),
+     ("nonsense", None)],
+)  # fmt: skip
+def test_colours(value, rgb):
+    told = told_colour({"roof:colour": value}, "roof")
+    assert told == (rgb if rgb is None else pytest.approx(rgb))
+    assert told_colour({"building:material": "wood"}, "building") is not None
+
+
+def test_a_house_is_the_same_whatever_else_the_file_holds(row, tmp_path):
+    after, _ = dressed(row)
+    again, _ = dressed(row)
+    other, _ = dressed(row, seed=1)
+    name = row.structures[2].structure.name
+
+    def look(found):
+        return surfaces(found[name]), [
+            part.rgb for part in found[name].structure.model.parts
+        ]
+
+    first, second = look(after), look(again)
+    assert first[1] == second[1] != look(other)[1]
+    for part, triangles in first[0].items():
+        np.testing.assert_array_equal(triangles, second[0][part])
+    alone = dressed(
+        type(row)([row.structures[2]], row.origin, "", ImportFaults())
+    )[0]
+    assert look(alone)[1] == first[1]
+
+
+def test_a_lower_house_has_the_colours_of_the_whole_one(row):
+    city = type(row)(row.structures, row.origin, "", ImportFaults())
+    staged, growth = grow(stage_city("f", city, ImportOptions()), 0.9, 4)
+    assert growth.lower
+    drives = [Drive(STREET, STREET)]
+    found = dress_buildings(staged.kept, drives, (), ground_of(staged.kept), 0)
+    new = {o.structure.name: o for o in found.buildings.values()}
+    for name in growth.lower:
+        whole, low = new[name], new[f"{name}_lower"]
+        rgb = [
+            {p.name: p.rgb for p in one.structure.model.parts}
+            for one in (whole, low)
+        ]
+        assert rgb[0]["body"] == rgb[1]["body"]
+        assert rgb[0]["roof"] == rgb[1]["roof"]
+
+
+def test_only_what_drives_see_from_near_has_windows(tmp_path):
+    osm = OsmWriter()
+    near = osm.box(-10, 0, 20, 10, building="yes", height="12")
+    far = osm.box(-10, 60, 20, 10, building="yes", height="12")
+    city = read(osm, tmp_path)
+    path = np.column_stack([np.linspace(-80, 80, 41), np.full(41, -40.0)])
+    after, _ = dressed(city, path)
+    glass = surfaces(after[f"building_w{near}"])["glass"]
+    y = city.structures[0].triangles[:, :, 1]
+    # The rear cannot be seen.
+    assert glass[:, :, 1].max() < y.min() + 11.0
+    assert (glass[:, :, 1] < y.min() + 0.5).any()
+    assert set(surfaces(after[f"building_w{far}"])) >= {"body", "roof"}
+    assert "glass" not in surfaces(after[f"building_w{far}"])
+
+
+def test_nothing_hangs_in_the_way_of_a_drive(tmp_path):
+    osm = OsmWriter()
+    for k in range(12):
+        osm.box(20 * k, 0, 20, 10, building="apartments", building__levels="4")
+    osm.box(0, 30, 20, 10, building="retail", height="9")
+    city = read(osm, tmp_path)
+    low = np.min(
+        [o.triangles.min(axis=(0, 1)) for o in city.structures], axis=0
+    )
+    x = np.linspace(low[0], low[0] + 240, 60)
+    path = np.column_stack([x, np.full(60, low[1] - 2.0)])
+    after, result = dressed(city, path)
+    assert result.by_lot["balconies"] > 0
+    way = LineString(path).buffer(1.5)
+    for one in after.values():
+        for triangles in surfaces(one).values():
+            some = triangles[triangles[:, :, 2].min(axis=1) < 4.0]
+            # A balcony would reach 0.35 m into it.
+            assert some[:, :, 1].min(initial=np.inf) > way.bounds[3] + 0.1
+
+
+def test_models_with_windows_of_their_own_keep_them(tmp_path):
+    city = CityWriter()
+    city.box("plain", 0, 0, (12, 12, 9))
+    city.box("own", 30, 0, (12, 12, 9))
+    city.objects["own"]["geometry"][0]["lod"] = "3"
+    found = import_cityjson(city.write(tmp_path / "c.json"), None, None)
+    low = np.min([o.triangles.min(axis=(0, 1)) for o in found.structures], 0)
+    path = STREET + low[:2] + [0.0, 4.0]
+    after, _ = dressed(found, path)
+    assert "glass" in surfaces(after["plain"])
+    assert set(surfaces(after["own"])) == {"body", "roof"}
+    np.testing.assert_allclose(
+        volume(np.concatenate(list(surfaces(after["own"]).values()))),
+        12 * 12 * 9,
+        atol=1e-6,
+    )
+
+
+def test_a_gable_keeps_its_slopes():
+    walls, _ = extruded(
+        LineString([(0, 0), (12, 0)]).buffer(4, cap_style="flat"),
+        0.0, 9.0, "a", ImportFaults(), "gabled", 3.0,
+    )  # fmt: skip
+    gable = min(find_panels([walls[is_upright(walls)]]), key=lambda p: p.length)
+    assert gable.outline is not None
+    ones = np.ones(2)
+    openings = Openings(
+        np.arange(2), 2.0 * ones, 3.0 * ones, np.array([1.0, 6.9]),
+        np.array([2.0, 8.0]), 0.2 * ones, np.zeros(2, dtype=bool),
+    )  # fmt: skip
+    wall = open_wall(gable, openings)
+    # The upper one leaves the gable.
+    assert wall is not None
+    assert len(wall.backs) == 1
+    fronts = np.concatenate(
+        [wall.quads[:, [0, 1, 2]], wall.quads[:, [0, 2, 3]], wall.triangles]
+    )
+    flat = np.abs((fronts - gable.origin)[:, :, :2] @ gable.outward) < 1e-9
+    assert area(fronts[flat.all(axis=1)]) == pytest.approx(8 * 6 + 12 - 1.0)
+    frames, panes = framed(gable, wall.openings)
+    assert len(frames) == 4
+    assert len(panes) == 1
+
+
+def write_quarter(folder):
+    osm = OsmWriter()
+    for k in range(4):
+        for y in (8, -20):
+            osm.box(40 * k, y, 30, 12, building="yes", height=str(9 + k))
+    ends = [osm.node(-20, 0), osm.node(180, 0)]
+    osm.way_of(ends, highway="residential", width="8", sidewalk="both")
+    osm.node(30, 5.5, natural="tree")
+    return osm.write(folder / "quarter.osm")
+
+
+def run_import(folder, *options):
+    source, output = write_quarter(folder), folder / "quarter"
+    result = CliRunner().invoke(
+        app, ["import", str(source), "--output", str(output), *options]
+    )
+    assert result.exit_code == 0, result.output
+    return output
+
+
+def digest(folder):
+    names = ("stage_*.sdf", "structures.csv", "meshes/*", "import.yaml",
+             "*.csv", "sequence_*.yaml")  # fmt: skip
+    paths = sorted({path for name in names for path in folder.glob(name)})
+    whole = hashlib.sha256()
+    for path in paths:
+        whole.update(str(path.relative_to(folder)).encode())
+        whole.update(path.read_bytes())
+    return whole.hexdigest()[:16]
+
+
+@pytest.mark.slow
+def test_plain_is_what_an_import_gave_before_there_was_dressing(tmp_path):
+    assert digest(run_import(tmp_path, "--plain")) == PLAIN
+
+
+@pytest.mark.slow
+def test_what_is_from_the_file_and_what_by_lot_is_told(tmp_path):
+    folder = run_import(tmp_path, "--grow", "0.5")
+    facts = yaml.safe_load((folder / "import.yaml").read_text())["dressing"]
+    assert facts["seed"] == 0
+    assert facts["buildings"] >= 8
+    assert facts["by_lot"]["windows"] > 50
+    with (folder / "structures.csv").open() as stream:
+        origins = {r["name"]: r["origin"] for r in csv.DictReader(stream)}
+    assert origins["ground"] == "guess"
+    for name, origin in origins.items():
+        if name.startswith("building"):
+            assert origin == "dressed"
+        elif name.startswith(("road", "walk", "tree")):
+            assert origin == "file"
+    # Each stage parses, and both have the house that changes nothing.
+    for stage in ("01", "02"):
+        text = (folder / f"stage_{stage}.sdf").read_text()
+        assert "/glass" in text
+        for mesh in set(re.findall("meshes/[^<]+", text)):
+            assert (folder / mesh).is_file()
