@@ -145,7 +145,8 @@ class _Plan:
             database=self._drive(rung, "database", "places", needs),
             query=self._drive(rung, "query", "queries", needs),
             distractors=tuple(
-                self._describe(drive, "places", needs) for drive in others
+                self._describe(drive, "places", needs, with_scans=False)
+                for drive in others
             ),
             num_distractors=rung.drives.num_distractors,
             methods=self._methods,
@@ -165,13 +166,23 @@ class _Plan:
         return RungDrive(SimulatedDrive(drive), files)
 
     def _describe(
-        self, drive: Scenario, role: Role, needs: list[str]
+        self,
+        drive: Scenario,
+        role: Role,
+        needs: list[str],
+        *,
+        with_scans: bool = True,
     ) -> SurveyFiles:
         """Adds the job that describes a drive for several rungs."""
         files = self._files.survey(f"{drive.name} {role}")
         name = f"describe {drive.name}"
         step = DescribeDrive(
-            SimulatedDrive(drive), role, self._methods, self._protocol, files
+            SimulatedDrive(drive),
+            role,
+            self._methods,
+            self._protocol,
+            files,
+            with_scans,
         )
         self.jobs[name] = Job(name, step, cost=_DESCRIPTION_COST)
         needs.append(name)

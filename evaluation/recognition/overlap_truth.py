@@ -125,6 +125,40 @@ def overlap_matrix(
     return result
 
 
+def best_overlaps(
+    place_scans: list[np.ndarray],
+    X_WPs: np.ndarray,
+    query_scans: list[np.ndarray],
+    X_WQs: np.ndarray,
+    matches: np.ndarray,
+) -> np.ndarray:
+    """Returns how much of each query the best of its matches shows, (Q,).
+
+    Args:
+        place_scans: D scans (N, 3), each in the frame of its sensor.
+        X_WPs: (D, 4, 4) poses of these sensors.
+        query_scans: Q scans.
+        X_WQs: (Q, 4, 4) poses of theirs.
+        matches: (Q, D) bool, the truth.
+
+    Returns:
+        NaN for a query without a point or without a match.
+    """
+    asked = np.flatnonzero(matches.any(axis=0)).tolist()
+    seen = {k: SeenRanges.of(place_scans[k].astype(float)) for k in asked}
+    result = np.full(len(query_scans), math.nan)
+    for row, scan in enumerate(query_scans):
+        X_WQ = X_WQs[row]
+        p_W = scan.astype(float) @ X_WQ[:3, :3].T + X_WQ[:3, 3]
+        shares = [
+            seen[k].share_of((p_W - X_WPs[k, :3, 3]) @ X_WPs[k, :3, :3])
+            for k in np.flatnonzero(matches[row]).tolist()
+        ]
+        if shares:
+            result[row] = max(shares)
+    return result
+
+
 def _with_neighbours(cells: np.ndarray, border: float) -> list[np.ndarray]:
     """Returns the cells, and those above and below each."""
     padded = np.pad(cells, ((1, 1), (0, 0)), constant_values=border)

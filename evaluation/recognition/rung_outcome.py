@@ -16,6 +16,7 @@ from evaluation.recognition.retrieval import Retrieval
 FAULTS = ("no_place", "no_candidate", "other_city", "too_far", "elsewhere")
 # Up to so many radii a place is just too far away, and not another one.
 _NEARLY = 2.0
+_HALF = 0.5
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,8 @@ class RungOutcome:
         distances: (Q,) between query and best place [m]; NaN without, and
             where the best place is of another city.
         pose_errors: of the best place.
+        overlaps: (Q,) how much of the query's scan the best of its matches
+            shows, see `overlap_truth`; NaN without a match.
     """
 
     method: str
@@ -47,6 +50,7 @@ class RungOutcome:
     match_frames: np.ndarray
     distances: np.ndarray
     pose_errors: PoseErrors
+    overlaps: np.ndarray
 
     @classmethod
     def of(
@@ -56,6 +60,7 @@ class RungOutcome:
         retrieval: Retrieval,
         query: DescribedDrive,
         drives: Sequence[str],
+        overlaps: np.ndarray,
     ) -> RungOutcome:
         """Reduces the scores of all pairs to what became of each query.
 
@@ -66,6 +71,7 @@ class RungOutcome:
             query: the drive that asks.
             drives: D names of the drives of the places; that of the query's
                 own city comes first.
+            overlaps: (Q,) of the best match of each query.
         """
         best = retrieval.best_places
         rows = np.arange(len(best))
@@ -86,7 +92,17 @@ class RungOutcome:
                 at_home, retrieval.distances[rows, best], np.nan
             ),
             pose_errors=retrieval.pose_errors,
+            overlaps=overlaps,
         )
+
+    @property
+    def num_hidden(self) -> int:
+        """How many wrong answers are to queries of which little is seen.
+
+        Their best match shows less than half of them.
+        """
+        is_hidden = self.overlaps < _HALF
+        return int((is_hidden & ~self.outcomes.is_right).sum())
 
     def faults(self, radius: float) -> list[str]:
         """Returns what is wrong with the best place of each query.

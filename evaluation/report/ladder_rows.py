@@ -73,6 +73,8 @@ class LadderRow:
         draws: of what is random.
         lost: queries that are right on the rung `none`, and wrong here; mean.
         found: the other way round.
+        hidden: see `RungOutcome.num_hidden`; mean.
+        overlap: mean over queries, see `RungOutcome.overlaps`.
         faults: fault -> how many queries have it; mean. See
             `RungOutcome.faults`.
     """
@@ -89,6 +91,8 @@ class LadderRow:
     draws: int
     lost: float
     found: float
+    hidden: float
+    overlap: float
     faults: Mapping[str, float]
 
     @property
@@ -158,6 +162,8 @@ def _row(
         draws=len(draws),
         lost=lost,
         found=found,
+        hidden=_mean([one.num_hidden for one in draws]),
+        overlap=_mean_known(np.concatenate([one.overlaps for one in draws])),
         faults={name: faults.count(name) / len(draws) for name in FAULTS},
     )
 
@@ -177,3 +183,8 @@ def _sampled_auc(
 
 def _mean(values: Sequence[float]) -> float:
     return float(np.mean(values))
+
+
+def _mean_known(values: np.ndarray) -> float:
+    known = values[~np.isnan(values)]
+    return float(known.mean()) if len(known) else math.nan

@@ -37,6 +37,8 @@ def ladder_table(
             "draws",
             "lost",
             "found",
+            "hidden",
+            "overlap",
             *FAULTS,
             "strength",
             *_OPTIONS,
@@ -58,6 +60,8 @@ def ladder_table(
                 one.draws,
                 one.lost,
                 one.found,
+                one.hidden,
+                one.overlap,
                 *(one.faults[name] for name in FAULTS),
                 one.rung.strength,
                 *_options(protocol),
@@ -90,6 +94,7 @@ def ladder_query_table(
             "distance",
             "translation_error",
             "rotation_error_deg",
+            "overlap",
         ),
         tuple(
             row for one in measured for row in _query_rows(one, protocol.radius)
@@ -123,6 +128,7 @@ def _query_rows(
                 float(one.distances[k]),
                 float(one.pose_errors.translation[k]),
                 float(one.pose_errors.rotation_deg[k]),
+                float(one.overlaps[k]),
             )
 
 

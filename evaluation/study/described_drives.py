@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from cns_drake.base.jobs.step import Step, Tell
 from evaluation.recognition.description import (
     DescribedDrive,
@@ -31,7 +33,8 @@ class DescribeDrive(Step):
         role: what the drive serves as.
         methods: that describe it.
         protocol: where it has places and queries.
-        files: to write; only those of the descriptions.
+        files: to write; only those of the descriptions, and of the scans.
+        with_scans: keep the single scans that are described, too.
     """
 
     source: DriveSource
@@ -39,6 +42,7 @@ class DescribeDrive(Step):
     methods: tuple[MethodChoice, ...]
     protocol: RetrievalProtocol
     files: SurveyFiles
+    with_scans: bool = False
 
     @property
     def output(self) -> Path:
@@ -49,14 +53,23 @@ class DescribeDrive(Step):
 
     def run(self, tell: Tell) -> None:
         missing = self._missing()
-        found = describe(self.source, self.role, missing, self.protocol, tell)
-        for choice, inputs in missing.items():
+        methods = [one for one in self.methods if self._file(one) in missing]
+        scans: list[np.ndarray] | None = [] if self.with_scans else None
+        found = describe(
+            self.source, self.role, methods, self.protocol, tell, scans
+        )
+        for choice in methods:
             # Each is let go when it is written.
-            value = found.pop(choice.name)
-            write_part(self.files.described(choice), inputs, value)
+            file = self._file(choice)
+            write_part(file, missing[file], found.pop(choice.name))
+        if self.files.scans in missing:
+            write_part(self.files.scans, missing[self.files.scans], scans)
 
-    def _missing(self) -> dict[MethodChoice, dict]:
-        """Returns methods without a description, and what it is made of."""
+    def _file(self, method: MethodChoice) -> Path:
+        return self.files.described(method)
+
+    def _missing(self) -> dict[Path, dict]:
+        """Returns the parts that are missing, and what they are made of."""
         inputs = self.made_of(
             {
                 "drive": self.source.identity(),
@@ -64,11 +77,16 @@ class DescribeDrive(Step):
                 "protocol": self.protocol.described(),
             }
         )
-        made_of = {m: {**inputs, "method": m.inputs()} for m in self.methods}
+        parts = {
+            self._file(method): {**inputs, "method": method.inputs()}
+            for method in self.methods
+        }
+        if self.with_scans:
+            parts[self.files.scans] = inputs
         return {
-            method: one
-            for method, one in made_of.items()
-            if not is_current(self.files.described(method), one)
+            file: made_of
+            for file, made_of in parts.items()
+            if not is_current(file, made_of)
         }
 
 
@@ -78,6 +96,7 @@ def describe(
     methods: Iterable[MethodChoice],
     protocol: RetrievalProtocol,
     tell: Tell,
+    scans: list[np.ndarray] | None = None,
 ) -> dict[str, DescribedDrive]:
     """Returns name of method -> what it keeps of a drive.
 
@@ -87,6 +106,8 @@ def describe(
         methods: that describe it.
         protocol: where it has places and queries.
         tell: takes the progress.
+        scans: gets the single scan (N, 3) float32 of each described frame, in
+            the frame of the sensor.
 
     Raises:
         InputError: see `describe_drive`.
@@ -94,7 +115,19 @@ def describe(
     running = [choice.make() for choice in methods]
     kept = max(map(protocol.scans, running), default=1)
     drive = RecentScans(source(), kept)
-    found = describe_drive(drive, running, {role}, protocol, tell.track)
+
+    def keep(_: int, scan: np.ndarray) -> None:
+        assert scans is not None
+        scans.append(scan.astype(np.float32))
+
+    found = describe_drive(
+        drive,
+        running,
+        {role},
+        protocol,
+        tell.track,
+        visit=None if scans is None else keep,
+    )
     return {
         method.name: one for method, one in zip(running, found, strict=True)
     }

@@ -17,6 +17,7 @@ from evaluation.recognition.description import (
     DescribedScans,
     Role,
 )
+from evaluation.recognition.overlap_truth import best_overlaps
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.retrieval import compare_both_ways
 from evaluation.recognition.rung_outcome import RungOutcome
@@ -37,8 +38,8 @@ class RungDrive:
 
     Attributes:
         source: opens it.
-        files: where its descriptions lie that serve several rungs; None if
-            this rung alone needs them.
+        files: where its descriptions and scans lie that serve several rungs;
+            None if this rung alone needs them.
     """
 
     source: DriveSource
@@ -79,8 +80,11 @@ class MeasureRung(PartStep):
         }
 
     def make(self, tell: Tell) -> list[RungOutcome]:
-        places = self._described(self.database, "places", tell)
-        queries = self._described(self.query, "queries", tell)
+        place_scans: list[np.ndarray] = []
+        query_scans: list[np.ndarray] = []
+        places = self._described(self.database, "places", tell, place_scans)
+        queries = self._described(self.query, "queries", tell, query_scans)
+        overlaps = None
         found = []
         for choice in self.methods:
             database = places.pop(choice.name, None) or read_part(
@@ -101,24 +105,39 @@ class MeasureRung(PartStep):
             )
             drives = [one.name for one in known for _ in one.places.frames]
             both = compare_both_ways(choice.make(), asked, query, self.protocol)
+            if overlaps is None:
+                overlaps = best_overlaps(
+                    place_scans,
+                    database.places.X_WS,
+                    query_scans,
+                    query.queries.X_WS,
+                    both[0].matches[:, : len(place_scans)],
+                )
             found += [
-                RungOutcome.of(choice.name, told, one, query, drives)
+                RungOutcome.of(choice.name, told, one, query, drives, overlaps)
                 for told, one in zip((False, True), both, strict=True)
             ]
         return found
 
     def _described(
-        self, drive: RungDrive, role: Role, tell: Tell
+        self,
+        drive: RungDrive,
+        role: Role,
+        tell: Tell,
+        scans: list[np.ndarray],
     ) -> dict[str, DescribedDrive]:
-        """Returns descriptions that are not in files."""
+        """Returns descriptions that are not in files; adds all scans."""
         if drive.files is not None:
+            scans += read_part(drive.files.scans)
             return {}
-        return describe(drive.source, role, self.methods, self.protocol, tell)
+        return describe(
+            drive.source, role, self.methods, self.protocol, tell, scans
+        )
 
     def _identity(self, drive: RungDrive) -> object:
         if drive.files is None:
             return drive.source.identity()
-        return self._digests(drive.files)
+        return [*self._digests(drive.files), part_digest(drive.files.scans)]
 
     def _digests(self, files: SurveyFiles) -> list[str]:
         return [part_digest(files.described(one)) for one in self.methods]

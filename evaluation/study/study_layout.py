@@ -31,6 +31,11 @@ class SurveyFiles:
         """Of the cloud for pictures."""
         return self.folder / "fine.data"
 
+    @property
+    def scans(self) -> Path:
+        """Of the scans of places or queries."""
+        return self.folder / "scans.data"
+
     def described(self, method: MethodChoice) -> Path:
         """Of (`PlacedDrive`, `DescribedDrive`)."""
         return self.folder / f"described_{file_name(method.name)}.data"

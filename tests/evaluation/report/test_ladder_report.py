@@ -42,6 +42,7 @@ def answered(method, told, is_right, scores=None):
         match_frames=np.arange(number),
         distances=np.ones(number),
         pose_errors=PoseErrors.unknown(number),
+        overlaps=np.linspace(0.2, 0.8, number),
     )
 
 
@@ -166,6 +167,9 @@ def test_what_is_wrong_with_each_answer():
     rungs = [measured("none", 0, [before]), measured("snow", 1, [one])]
     _, row = ladder_rows(rungs, 7.5)
     assert (row.lost, row.found) == (2.0, 1.0)
+    # Of the seven shares of 0.2 to 0.8 the first three are below a half, and
+    # of these the third is wrong.
+    assert (row.hidden, row.overlap) == (1.0, pytest.approx(0.5))
     assert set(row.faults.values()) == {1.0}
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from cns_drake.base.jobs.step import Tell
 from evaluation.methods import make_method
+from evaluation.recognition.overlap_truth import overlap_matrix
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.sequences import open_sequence
@@ -57,7 +58,7 @@ def described(folder, name, role):
     """The files of a drive, and the step that writes them."""
     files = SurveyFiles(folder / "parts" / name)
     step = DescribeDrive(
-        RecordedDrive(folder / name), role, METHODS, PROTOCOL, files
+        RecordedDrive(folder / name), role, METHODS, PROTOCOL, files, True
     )
     if not step.is_done():
         step.run(Tell())
@@ -113,6 +114,24 @@ def test_the_numbers_are_those_of_the_single_command(folder, tmp_path):
             one.match_frames,
             np.where(best < 0, -1, alone.retrieval.database_frames[best]),
         )
+
+
+def test_the_best_match_shows_what_the_matrix_of_overlaps_says(
+    folder, tmp_path
+):
+    database, query = (
+        open_sequence(folder / name)
+        for name in ("metropolis_01", "metropolis_04")
+    )
+    matrix = overlap_matrix(database, query, PROTOCOL)
+    apart = np.linalg.norm(
+        query.X_WS[:, None, :3, 3] - database.X_WS[None, :, :3, 3], axis=2
+    )
+    # Places and queries are all frames of both drives.
+    assert matrix.shape == apart.shape
+    expected = np.where(apart <= PROTOCOL.radius, matrix, 0.0).max(axis=1)
+    for one in read_part(_done(rung(folder, tmp_path / "rung.data"))):
+        np.testing.assert_allclose(one.overlaps, expected, atol=1e-4)
 
 
 def test_places_of_other_cities_are_never_right(folder, tmp_path):
