@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -10,7 +9,12 @@ import typer
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.terminal import note
-from cns_drake.command_line.options import Jobs, Output, Scheduler
+from cns_drake.command_line.options import (
+    Jobs,
+    MethodFiles,
+    Results,
+    Scheduler,
+)
 
 
 def ladder(
@@ -22,7 +26,7 @@ def ladder(
         ),
     ] = None,
     *,
-    output: Output,
+    output: Results,
     quick: Annotated[
         bool,
         typer.Option(
@@ -45,17 +49,11 @@ def ladder(
             help="Draw N times what is random, and give means.",
         ),
     ] = 1,
-    method: Annotated[
-        list[Path] | None,
-        typer.Option(
-            help="Python file that registers a method, to run besides those "
-            "of cns-eval; may be repeated."
-        ),
-    ] = None,
+    method: MethodFiles = None,
     jobs: Jobs = None,
     scheduler: Scheduler = None,
 ) -> None:
-    """What each cause of change costs each method.
+    """What each change costs each method.
 
     One drive asks a database of its own route, with one cause of change
     between the two at a time, and with all together. None is recorded. Writes

@@ -10,12 +10,15 @@ import typer
 Output = Annotated[
     Path, typer.Option(help="Folder for recordings; created if need be.")
 ]
+Results = Annotated[
+    Path, typer.Option(help="Folder for the results; created if need be.")
+]
 Frames = Annotated[
     int | None,
     typer.Option(
         min=1,
         metavar="N",
-        help="Record only the first N frames (20 a second).",
+        help="Record only the first N frames (20 a second by default).",
     ),
 ]
 LIDAR_OPTION = typer.Option(
@@ -49,5 +52,12 @@ Scheduler = Annotated[
         metavar="ADDRESS",
         help="Work on the cluster of this Dask scheduler; by default that of "
         "DASK_SCHEDULER_ADDRESS, if that is set.",
+    ),
+]
+MethodFiles = Annotated[
+    list[Path] | None,
+    typer.Option(
+        help="Python file that registers a method, to run besides those of "
+        "cns-eval; may be repeated."
     ),
 ]

@@ -10,7 +10,12 @@ import typer
 
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.command_line.families import family_members
-from cns_drake.command_line.options import Jobs, Output, Scheduler
+from cns_drake.command_line.options import (
+    Jobs,
+    MethodFiles,
+    Results,
+    Scheduler,
+)
 from evaluation.command_line.protocol_options import with_protocol
 from evaluation.recognition.protocol import RetrievalProtocol
 
@@ -35,14 +40,8 @@ def trend(
             help="The drive that asks: a shipped sequence or a scenario file.",
         ),
     ],
-    output: Output,
-    method: Annotated[
-        list[Path] | None,
-        typer.Option(
-            help="Python file that registers a method, to run besides those "
-            "of cns-eval; may be repeated."
-        ),
-    ] = None,
+    output: Results,
+    method: MethodFiles = None,
     jobs: Jobs = None,
     scheduler: Scheduler = None,
     protocol: RetrievalProtocol,

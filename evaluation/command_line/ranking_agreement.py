@@ -17,9 +17,10 @@ def ranking(
         bool, typer.Option("--json", help="Print one JSON object.")
     ] = False,
 ) -> None:
-    """Whether two reports rank the methods alike, such as simulated and real.
+    """Whether two reports rank methods alike.
 
-    Prints the mean AUC of each method in both, and Kendall's tau with its 95 %
+    The reports may be of simulated and of real drives. Prints the mean AUC of
+    each method in both, and Kendall's tau with its 95 %
     interval. A report is a folder with a queries.csv, or that file.
     """
     from evaluation.recognition.rank_agreement import rank_agreement
