@@ -16,6 +16,7 @@ from cns_drake.sensors.returns.link_budget import (
     LinkBudget,
     detection_probability,
     echo_energy,
+    range_deviation,
     target_snr,
 )
 from cns_drake.sensors.returns.weather import Scattering
@@ -93,8 +94,8 @@ def report_echoes(
     """Returns what a unit reports of the light.
 
     Light less than a pulse apart is one echo, whose distance is the mean by
-    energy. An echo is detected by the probability of its SNR. Its distance
-    has a standard deviation of range_noise / sqrt(SNR).
+    energy. An echo is detected by the probability of its SNR, and its distance
+    has the standard deviation that belongs to that.
 
     Args:
         light: sorted.
@@ -143,7 +144,7 @@ def _report(
                 continue
             reported.beam[count] = beam
             reported.distance[count] = _measured(
-                budget.range_noise,
+                budget,
                 receiver.min_range,
                 receiver.max_range,
                 key,
@@ -337,7 +338,7 @@ def _detect(
         if not receiver.min_range <= echo[i, 0] <= receiver.max_range:
             continue
         distance = _measured(
-            receiver.budget.range_noise,
+            receiver.budget,
             receiver.min_range,
             receiver.max_range,
             key,
@@ -366,7 +367,7 @@ def _is_detected(key: np.uint64, beam: int, draw: int, snr: float) -> bool:
 
 @compiled
 def _measured(
-    range_noise: float,
+    budget: LinkBudget,
     min_range: float,
     max_range: float,
     key: np.uint64,
@@ -376,8 +377,7 @@ def _measured(
     snr: float,
 ) -> float:
     """Returns the distance with its error."""
-    deviation = range_noise / np.sqrt(snr)
-    distance += deviation * normal(key, beam, draw + 1)
+    distance += range_deviation(budget, snr) * normal(key, beam, draw + 1)
     return min(max(distance, min_range), max_range)
 
 

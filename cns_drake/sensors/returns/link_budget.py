@@ -59,21 +59,23 @@ class LinkBudget(NamedTuple):
         scale: S of the equation above [m^2].
         own_extinction: alpha_0 [1/m].
         range_noise: standard deviation of a range at an SNR of 1 [m].
+        range_floor: standard deviation that no SNR falls below [m].
     """
 
     scale: float
     own_extinction: float
     range_noise: float
+    range_floor: float
 
 
 def fit_link_budget(
-    rows: tuple[SheetRow, ...], range_noise: float
+    rows: tuple[SheetRow, ...], range_noise: float, range_floor: float
 ) -> LinkBudget:
     """Returns the budget that gives one or two rows of a sheet exactly.
 
     Args:
         rows: one row, or two of different ranges.
-        range_noise: see `LinkBudget`.
+        range_noise, range_floor: see `LinkBudget`.
     """
     # log(snr r^2 / e) = log(S) - 2 alpha_0 r at each row.
     logs = [math.log(row.snr * row.range**2 / row.reflectivity) for row in rows]
@@ -82,7 +84,7 @@ def fit_link_budget(
         way = 2.0 * (rows[1].range - rows[0].range)
         extinction = (logs[0] - logs[1]) / way
     scale = math.exp(logs[0] + 2.0 * extinction * rows[0].range)
-    return LinkBudget(scale, extinction, range_noise)
+    return LinkBudget(scale, extinction, range_noise, range_floor)
 
 
 @compiled
@@ -114,6 +116,16 @@ def detection_probability(snr: float) -> float:
         return 1.0
     deviation = (snr - THRESHOLD_SNR) / np.sqrt(snr)
     return 0.5 * (1.0 + math.erf(deviation / np.sqrt(2.0)))
+
+
+@compiled
+def range_deviation(budget: LinkBudget, snr: float) -> float:
+    """Returns the standard deviation of a range [m].
+
+    It falls with the root of the SNR (Wagner et al., 2006), down to what the
+    clock of the unit and the shape of its pulses allow.
+    """
+    return max(budget.range_noise / np.sqrt(snr), budget.range_floor)
 
 
 @compiled

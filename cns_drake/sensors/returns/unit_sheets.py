@@ -26,6 +26,8 @@ class UnitSheet:
     Attributes:
         rows: ranges at stated reflectivities, at most two.
         range_noise: standard deviation of a range at an SNR of 1 [m].
+        range_floor: the best accuracy or precision that is stated, as the
+            standard deviation of a range at any SNR [m].
         divergence_deg: full angle of the beam at 1 / e^2 of its peak [deg].
         pulse_ns: width of its pulse at half of the peak [ns].
         retro_from: the intensity at which retro-reflectors begin; diffuse
@@ -36,6 +38,7 @@ class UnitSheet:
 
     rows: tuple[SheetRow, ...]
     range_noise: float
+    range_floor: float
     divergence_deg: float
     pulse_ns: float
     retro_from: float
@@ -44,7 +47,7 @@ class UnitSheet:
 
     @property
     def budget(self) -> LinkBudget:
-        return fit_link_budget(self.rows, self.range_noise)
+        return fit_link_budget(self.rows, self.range_noise, self.range_floor)
 
     @property
     def divergence(self) -> float:
@@ -73,10 +76,11 @@ def _ouster(
     source: str,
 ) -> UnitSheet:
     # Ranges of the first OS1 scatter by 10, 3 and 1.5 cm at an SNR of 12, 100
-    # and 250: 0.30 m / sqrt(SNR) in the middle.
+    # and 250: 0.30 m / sqrt(SNR) in the middle, and nowhere below 1.5 cm.
     return UnitSheet(
         _rows(far, near),
         0.30,
+        0.015,
         divergence_deg,
         4.0,
         100.0,
@@ -108,6 +112,7 @@ UNIT_SHEETS: dict[str, UnitSheet] = {
     "vlp-16": UnitSheet(
         _rows((0.8, 100.0, 0.9), None),
         0.10,
+        0.03,
         0.18,
         6.0,
         100.0,
@@ -118,6 +123,7 @@ UNIT_SHEETS: dict[str, UnitSheet] = {
     "hdl-64e": UnitSheet(
         _rows((0.8, 120.0, 0.9), (0.1, 50.0, 0.9)),
         0.15,
+        0.02,
         0.11,
         5.0,
         100.0,
@@ -128,6 +134,7 @@ UNIT_SHEETS: dict[str, UnitSheet] = {
     "hesai-pandar-xt32": UnitSheet(
         _rows((0.8, 120.0, 0.9), (0.1, 80.0, 0.9)),
         0.03,
+        0.005,
         0.09,
         3.0,
         100.0,
@@ -138,6 +145,7 @@ UNIT_SHEETS: dict[str, UnitSheet] = {
     "hokuyo-ust-20lx": UnitSheet(
         _rows((0.9, 20.0, 0.9), (0.1, 8.0, 0.9)),
         0.10,
+        0.03,
         0.3,
         4.0,
         100.0,
@@ -148,6 +156,7 @@ UNIT_SHEETS: dict[str, UnitSheet] = {
     "mid-70": UnitSheet(
         _rows((0.8, 260.0, 0.9), (0.1, 90.0, 0.9)),
         0.06,
+        0.02,
         0.28,
         6.0,
         150.0,
@@ -158,6 +167,7 @@ UNIT_SHEETS: dict[str, UnitSheet] = {
     "avia": UnitSheet(
         _rows((0.8, 320.0, 0.9), (0.1, 190.0, 0.9)),
         0.06,
+        0.02,
         0.28,
         6.0,
         150.0,
@@ -168,6 +178,7 @@ UNIT_SHEETS: dict[str, UnitSheet] = {
     "mid-360": UnitSheet(
         _rows((0.8, 70.0, 0.9), (0.1, 40.0, 0.9)),
         0.06,
+        0.02,
         0.9,
         6.0,
         150.0,

@@ -1,14 +1,16 @@
 """Fog, rain and snowfall: what they take from a beam and send back.
 
 Rain and snow are drops of random size and place. Their number in a volume
-follows Marshall and Palmer (1948) and Gunn and Marshall (1958),
+follows Marshall and Palmer (1948) and Sekhon and Srivastava (1970),
 
     N(D) = N_0 exp(-L D) [1/(m3 mm)]
 
-with N_0 = 8000 and L = 4.1 R^-0.21 for rain, N_0 = 7600 R^-0.87 and
-L = 2.55 R^-0.48 for snow; D in mm, the rate R in mm/h of water. Extinction is
-that of geometric optics, with twice the area of each drop. What a drop sends
-back is that of LISA (Kilic et al., 2021).
+with N_0 = 8000 and L = 4.1 R^-0.21 for rain, N_0 = 2500 R^-0.94 and
+L = 2.29 R^-0.45 for snow; D in mm, of a flake once it has melted; the rate R in
+mm/h of water. Extinction is that of geometric optics, with twice the area of
+each drop. What a drop of rain sends back is that of LISA (Kilic et al., 2021);
+a flake sends back what the lidar ratio of ice crystals has it, 25 sr (Young
+and Vaughan, 2009).
 
 Fog is a medium: alpha = ln 20 / V by the meteorological visibility V, and a
 back-scatter coefficient of 0.046 / V [1/(m sr)] (Rasshofer et al., 2011).
@@ -33,7 +35,9 @@ from cns_drake.sensors.returns.link_budget import (
 # could detect [mm].
 _DIAMETERS_MM = np.geomspace(0.05, 12.0, 120)
 _WATER_INDEX = 1.328
-_FLAKE_REFLECTIVITY = 0.9
+# A flake has twice its area as extinction, and a Lambertian target rho / pi of
+# its area as back-scatter: rho = 2 pi / 25 sr.
+_FLAKE_REFLECTIVITY = 2.0 * np.pi / 25.0
 # Distances at which scattering is tabulated [m].
 _DISTANCES = np.geomspace(0.3, 60.0, 96)
 # The aperture of a unit: the radius of a beam where it begins [m].
@@ -86,22 +90,26 @@ class Weather:
         if self.visibility is not None:
             fog = math.log(20.0) / self.visibility
         return fog + sum(
-            _extinction(number) for number, _ in self._drops() if number.any()
+            _extinction(number) for number, _ in self.drops(_DIAMETERS_MM)
         )
 
-    def _drops(self) -> list[tuple[np.ndarray, float]]:
-        """Returns N(D) of each kind of drops, and its reflectivity."""
+    def drops(self, diameters_mm: np.ndarray) -> list[tuple[np.ndarray, float]]:
+        """Returns each kind of drops: N(D) [1/(m3 mm)], and reflectivity.
+
+        Args:
+            diameters_mm: D.
+        """
         kinds = []
         if self.rain > 0.0:
             slope = 4.1 * self.rain**-0.21
             fresnel = ((_WATER_INDEX - 1.0) / (_WATER_INDEX + 1.0)) ** 2
-            kinds.append((8000.0 * np.exp(-slope * _DIAMETERS_MM), fresnel))
+            kinds.append((8000.0 * np.exp(-slope * diameters_mm), fresnel))
         if self.snowfall > 0.0:
-            slope = 2.55 * self.snowfall**-0.48
-            number = 7600.0 * self.snowfall**-0.87
+            slope = 2.29 * self.snowfall**-0.45
+            number = 2500.0 * self.snowfall**-0.94
             kinds.append(
                 (
-                    number * np.exp(-slope * _DIAMETERS_MM),
+                    number * np.exp(-slope * diameters_mm),
                     _FLAKE_REFLECTIVITY,
                 )
             )
@@ -166,7 +174,7 @@ def tabulate_scattering(
     energies = np.zeros((len(distances), 0))
     alpha = weather.extinction
     steps = np.gradient(_DIAMETERS_MM)
-    for number, reflectivity in weather._drops():
+    for number, reflectivity in weather.drops(_DIAMETERS_MM):
         part = np.minimum(
             (_DIAMETERS_MM * 1e-3 / (2.0 * radius[:, None])) ** 2, 1.0
         )

@@ -2,16 +2,19 @@
 
 from helpers.plates import ahead, beside, facing, plate, scan, unit
 import numpy as np
-from pydrake.geometry import Box, Sphere
+from pydrake.geometry import Box, FrameId, GeometryId, Sphere
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 from scipy import stats
 from scipy.special import erf
 
+from cns_drake.scene.perception_geometry import PerceptionGeometry
+from cns_drake.scene.semantics import CLASS_IDS
 from cns_drake.scene.structure_table import StructureEntry, StructureTable
-from cns_drake.scene.surfaces import TriangleSurface
+from cns_drake.scene.surfaces import EllipsoidSurface, TriangleSurface
 from cns_drake.sensors.returns.closed_surfaces import is_closed
 from cns_drake.sensors.returns.echo_choice import Echoes
+from cns_drake.sensors.returns.materials import find_materials
 from cns_drake.sensors.returns.propagation import pane_shares
 from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS
 
@@ -156,6 +159,28 @@ def test_retro_reflectors_shine_at_any_angle():
         points = scan([plate_], ahead(100), unit(), structures=signs)
         bright.append(np.median(points["intensity"]))
     assert bright[0] == bright[1] > 100.0
+
+
+def test_every_class_is_made_of_something():
+    """Also those of traffic: a bright coat sends back more than a dark one."""
+    for name in CLASS_IDS:
+        table = StructureTable([StructureEntry(1, "thing", name)])
+        things = [
+            PerceptionGeometry(
+                GeometryId.get_new_id(),
+                "thing",
+                FrameId.get_new_id(),
+                RigidTransform(),
+                EllipsoidSurface((1.0, 1.0, 1.0)),
+                (value, value, value),
+            )
+            for value in (0.0, 1.0)
+        ]
+        materials = find_materials(things, table, is_wet=False)
+        dark, bright = materials.reflectivity
+        assert 0.05 <= dark <= bright <= 0.9
+        if "cycl" in name:
+            assert bright - dark > 0.2
 
 
 @pytest.mark.parametrize("echoes", list(Echoes))

@@ -13,6 +13,7 @@ from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS
 from cns_drake.sensors.returns.weather import Weather, tabulate_scattering
 
 OUTLIER = CLASS_IDS["outlier"]
+DIAMETERS_MM = np.linspace(0.01, 25.0, 4_000)
 
 
 def test_extinction_of_rain_is_that_of_geometric_optics():
@@ -25,6 +26,47 @@ def test_extinction_of_rain_is_that_of_geometric_optics():
     assert expected == pytest.approx(0.0016, abs=1e-4)
     assert Weather(100.0).extinction == pytest.approx(np.log(20.0) / 100.0)
     assert Weather().extinction == 0.0
+
+
+@pytest.mark.parametrize(
+    ("weather", "slowest", "fastest"),
+    [
+        (Weather(snowfall=0.3), 0.7, 1.2),
+        (Weather(snowfall=3.0), 0.7, 1.2),
+        (Weather(rain=1.0), 2.5, 5.0),
+        (Weather(rain=30.0), 4.0, 8.0),
+    ],
+)
+def test_the_water_in_the_air_falls_as_fast_as_measured(
+    weather, slowest, fastest
+):
+    """The rate over the water content of the air is the speed of falling.
+
+    Flakes fall by 0.7 to 1.2 m/s, rain of the mean size by 3 to 8 m/s (Gunn
+    and Kinzer, 1949).
+    """
+    rate = weather.rain + weather.snowfall
+    ((number, _),) = weather.drops(DIAMETERS_MM)
+    grams = integrate.trapezoid(
+        number * np.pi / 6.0 * 1e-3 * DIAMETERS_MM**3, DIAMETERS_MM
+    )
+    assert slowest < rate * 1e3 / 3600.0 / grams < fastest
+
+
+def test_flakes_send_back_what_their_lidar_ratio_says():
+    weather = Weather(snowfall=1.0)
+    ((number, rho),) = weather.drops(DIAMETERS_MM)
+    area = np.pi / 4.0 * (DIAMETERS_MM * 1e-3) ** 2
+    backscatter = integrate.trapezoid(number * area * rho / np.pi, DIAMETERS_MM)
+    assert weather.extinction / backscatter == pytest.approx(25.0, rel=0.01)
+
+
+def test_a_sky_of_moderate_snow_is_mostly_empty():
+    """1 mm/h, a moderate snowfall, shows in fewer than one beam in five."""
+    far = plate("far", 0.5, RigidTransform([0.0, 0.0, -300.0]), (1, 1, 1))
+    returns = unit(weather=Weather(snowfall=1.0))
+    share = len(scan([far], ahead(4_000), returns)) / 4_000
+    assert 0.02 < share < 0.2
 
 
 def test_the_table_of_drops_is_an_integral():
