@@ -10,7 +10,7 @@ from cns_drake.base import terminal
 from cns_drake.base.terminal import example
 from cns_drake.command_line.city import city
 from cns_drake.command_line.importing import import_city
-from cns_drake.command_line.laddering import ladder
+from cns_drake.command_line.laddering import ladder, levels
 from cns_drake.command_line.listing import list_sequences
 from cns_drake.command_line.recorded import export, repair
 from cns_drake.command_line.reproducing import reproduce
@@ -63,6 +63,7 @@ app.command(
 app.command(
     epilog=example("cns-drake ladder metropolis --output ladder --quick")
 )(ladder)
+app.command(epilog=example("cns-drake levels ours.csv theirs.csv"))(levels)
 app.command(
     "import",
     epilog=example(

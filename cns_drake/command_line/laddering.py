@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -32,6 +33,13 @@ def ladder(
         typer.Option(
             "--quick",
             help="The strongest level of each cause, and every other query.",
+        ),
+    ] = False,
+    levels: Annotated[
+        bool,
+        typer.Option(
+            "--levels",
+            help="The frozen levels alone: all causes together, three draws.",
         ),
     ] = False,
     cause: Annotated[
@@ -71,9 +79,14 @@ def ladder(
         )
         from cns_drake.studies.ladder_causes import CAUSES
         from cns_drake.studies.ladder_rungs import Extent
+        from cns_drake.studies.levels import LEVELS_EXTENT
         from evaluation.recognition.protocol import PAPER_PROTOCOL
         from evaluation.study.chosen_methods import choose_methods
 
+    if levels and (quick or cause or seeds > 1):
+        raise InputError(
+            "--levels: they are frozen; leave out --quick, --cause and --seeds"
+        )
     cluster = choose_cluster(jobs, scheduler)
     methods = choose_methods(method or ())
     causes = tuple(cause or CAUSES)
@@ -88,14 +101,38 @@ def ladder(
             "--quick leaves out: levels 1 to 3 (but where a cause has no level "
             "4), every other query, more than 300 places of other cities"
         )
+    extent = replace(extent, causes=causes, seeds=range(1, seeds + 1))
     path, text = climb_ladder(
         maps,
         output,
         cluster,
         methods,
-        replace(extent, causes=causes, num_seeds=seeds),
+        LEVELS_EXTENT if levels else extent,
         protocol,
         on_note=note,
     )
     typer.echo(path)
     typer.echo(text)
+
+
+def levels(
+    results: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="RESULTS.csv", help="Tables that ladder --levels wrote."
+        ),
+    ],
+) -> None:
+    """Check results on the frozen levels.
+
+    Prints one table of all of them, as Markdown.
+    """
+    with uninterrupted():
+        from cns_drake.studies.levels import (
+            frozen_levels,
+            level_table,
+            read_results,
+        )
+
+    table = level_table(read_results(results, frozen_levels()))
+    typer.echo(table.to_markdown())

@@ -27,7 +27,7 @@ _HEADINGS = (
     "structures",
     "triangles",
 )
-# Columns that find no room go in this order.
+# Of columns that find no room the first of these goes first.
 _GIVE_WAY = (
     "map",
     "structures",

@@ -1,4 +1,4 @@
-"""The source of the motion of a plant's bodies."""
+"""Who tells how a plant's bodies move."""
 
 from __future__ import annotations
 

@@ -6,10 +6,11 @@ one cause of change between the two at a time. Nothing is recorded.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from cns_drake.base.errors import InputError
 from cns_drake.base.files import completing, make_folder
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.running import Job, run_jobs
@@ -83,35 +84,58 @@ def climb_ladder(
         InputError: a map is not known, the folder cannot be made, or a step
             failed.
     """
-    folders = [recordable_map(name) for name in maps or shipped_maps()]
+    asking = _asking_drives(maps or shipped_maps())
     make_folder(output)
     files = StudyFiles(output.absolute())
     jobs: dict[str, Job] = {}
     climbed: list[tuple[Scenario, Rung, Path]] = []
-    for folder in folders:
-        asking = load_scenario(MapFolder(folder).recordable_sequences()[-1])
-        rungs, notes = plan_rungs(asking, extent)
+    for drive in asking:
+        rungs, notes = plan_rungs(drive, extent)
         for text in notes:
-            on_note(f"{asking.source}: {text}")
-        plan = _Plan(asking, methods, protocol, files)
+            on_note(f"{drive.source}: {text}")
+        plan = _Plan(drive, methods, protocol, files)
         most = max(rung.drives.num_distractors for rung in rungs)
+        if most:
+            on_note(f"{drive.name}: looking for {most} places elsewhere")
         plan.add_distractors(
             distracting_drives(
-                plain_drives(asking).database,
+                plain_drives(drive).database,
                 most,
                 protocol.place_spacing,
                 output / "cities",
                 cluster,
             )
         )
-        climbed += [(asking, rung, plan.add_rung(rung)) for rung in rungs]
+        climbed += [(drive, rung, plan.add_rung(rung)) for rung in rungs]
         jobs |= plan.jobs
     run_jobs(jobs.values(), cluster)
     measured = [
-        MeasuredRung(_labelled(asking, rung), rung.seed, read_part(part))
-        for asking, rung, part in climbed
+        MeasuredRung(
+            _labelled(drive, rung),
+            rung.seed,
+            rung.fingerprint(),
+            read_part(part),
+        )
+        for drive, rung, part in climbed
     ]
     return _write(measured, output, protocol)
+
+
+def _asking_drives(maps: Iterable[str]) -> list[Scenario]:
+    """Returns the last drive of each map.
+
+    Raises:
+        InputError: a map is not known, or two have drives of one name.
+    """
+    drives: dict[str, Scenario] = {}
+    for folder in dict.fromkeys(recordable_map(name) for name in maps):
+        drive = load_scenario(MapFolder(folder).recordable_sequences()[-1])
+        if drive.name in drives:
+            raise InputError(
+                f"{folder}: another map has a drive {drive.name}, too"
+            )
+        drives[drive.name] = drive
+    return list(drives.values())
 
 
 class _Plan:

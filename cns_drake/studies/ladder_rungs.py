@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.roads.network import load_road_network
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder
@@ -46,6 +47,16 @@ class Rung:
     strength: str
     drives: RungDrives
 
+    def fingerprint(self) -> str:
+        """Returns what tells the drives from all others."""
+        return fingerprint(
+            {
+                "database": self.drives.database.model_dump(mode="json"),
+                "query": self.drives.query.model_dump(mode="json"),
+                "distractors": self.drives.num_distractors,
+            }
+        )
+
 
 @dataclass(frozen=True)
 class Extent:
@@ -55,13 +66,13 @@ class Extent:
         causes: some of `CAUSES`, without `none`, which is always there.
         levels: from 1 to 4. A cause that lacks one has its nearest lower
             level in its place.
-        num_seeds: how often what is random is drawn.
+        seeds: of the draws of what is random.
         most_places: most places of other cities.
     """
 
     causes: Collection[str] = CAUSES[1:]
     levels: Sequence[int] = (1, 2, 3, 4)
-    num_seeds: int = 1
+    seeds: Sequence[int] = (1,)
     most_places: int = 10_000
 
 
@@ -79,7 +90,7 @@ def plan_rungs(
     """
     plain = plain_drives(scenario)
     known, notes = _known_strengths(scenario, extent.most_places)
-    rungs = [Rung(NONE, 0, 1, "", plain)]
+    rungs = [Rung(NONE, 0, extent.seeds[0], "", plain)]
     for cause in CAUSES[1:]:
         if cause not in extent.causes or cause not in (*known, ALL):
             continue
@@ -89,12 +100,12 @@ def plan_rungs(
             )
             for level in _levels(known.get(cause), extent.levels)
         }
-        draws = extent.num_seeds if cause in RANDOM_CAUSES else 1
+        seeds = extent.seeds if cause in RANDOM_CAUSES else extent.seeds[:1]
         for level, strengths in found.items():
             text = "" if cause == ALL else in_words(cause, strengths[cause])
             rungs += [
                 _rung(cause, level, seed, text, plain, strengths)
-                for seed in range(1, draws + 1)
+                for seed in seeds
             ]
     return rungs, notes
 

@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 
+from cns_drake.base.jobs.fingerprint import fingerprint
 from evaluation.recognition.metrics import (
     Interval,
     area,
@@ -47,11 +48,13 @@ class MeasuredRung:
     Attributes:
         rung: which.
         seed: of the draw.
+        drives: what tells the drives from all others.
         outcomes: of each method, without and with the gate.
     """
 
     rung: LadderRung
     seed: int
+    drives: str
     outcomes: Sequence[RungOutcome]
 
 
@@ -71,6 +74,7 @@ class LadderRow:
         with_match: those that have a match.
         places: of the database.
         draws: of what is random.
+        drives: what tells the drives of all draws from all others.
         lost: queries that are right on the rung `none`, and wrong here; mean.
         found: the other way round.
         hidden: see `RungOutcome.num_hidden`; mean.
@@ -89,6 +93,7 @@ class LadderRow:
     with_match: int
     places: int
     draws: int
+    drives: str
     lost: float
     found: float
     hidden: float
@@ -110,7 +115,9 @@ def ladder_rows(
         radius: of a match [m].
     """
     groups: dict[tuple[LadderRung, str, bool], list[RungOutcome]] = {}
+    drives: dict[LadderRung, list[str]] = {}
     for one in measured:
+        drives.setdefault(one.rung, []).append(one.drives)
         for outcome in one.outcomes:
             key = one.rung, outcome.method, outcome.radius_told
             groups.setdefault(key, []).append(outcome)
@@ -118,12 +125,14 @@ def ladder_rows(
     rows = []
     for (rung, method, told), draws in groups.items():
         unchanged = plain.setdefault((rung.map_name, method, told), draws)
-        rows.append(_row(rung, unchanged, draws, radius))
+        drawn = fingerprint({"drives": drives[rung]})
+        rows.append(_row(rung, drawn, unchanged, draws, radius))
     return rows
 
 
 def _row(
     rung: LadderRung,
+    drives: str,
     unchanged: Sequence[RungOutcome],
     draws: Sequence[RungOutcome],
     radius: float,
@@ -160,6 +169,7 @@ def _row(
         with_match=int(first.outcomes.has_match.sum()),
         places=first.outcomes.num_places,
         draws=len(draws),
+        drives=drives,
         lost=lost,
         found=found,
         hidden=_mean([one.num_hidden for one in draws]),

@@ -561,5 +561,9 @@ NOT_RUN = {
     "recordings with rosbags' reader of rosbag2 folders",
     "rko_lio output": "a program that is no part of this project; test_rko_lio "
     "runs it on a short drive",
+    "cns-drake ladder --levels": "hours of work; the recipe ladder climbs some "
+    "of it",
+    "cns-drake levels mine": "needs these hours; test_levels has such tables",
+    "cns-drake levels RESULTS": "likewise",
     "@misc{song2025city": "a citation",
 }

@@ -188,6 +188,7 @@ def test_diagram_script(tmp_path):
         ),
         (["reproduce", "atlantis"], "unknown map 'atlantis'"),
         (["ladder", "--cause", "war"], "--cause: no cause 'war'"),
+        (["ladder", "--levels", "--quick"], "--levels: they are frozen"),
         (["ladder", "atlantis"], "unknown map 'atlantis'"),
         (["reproduce", "--quick", "--pages"], "--quick and --pages: give one"),
         (["teleport"], "teleport"),

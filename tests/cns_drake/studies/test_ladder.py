@@ -1,12 +1,14 @@
 """`cns-drake ladder`: what its rungs change, and what it writes."""
 
 import csv
+import shutil
 
 from helpers import documents, studies
 from helpers.small_map import write_town
 import numpy as np
 import pytest
 
+from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.scenarios.scenario_loading import load_scenario
 from cns_drake.simulation.simulated_drive import SimulatedDrive
@@ -104,7 +106,7 @@ def test_all_is_everything_at_its_level(asking):
 
 
 def test_levels_and_seeds(asking):
-    rungs, _ = plan_rungs(asking, Extent(levels=(4,), num_seeds=3))
+    rungs, _ = plan_rungs(asking, Extent(levels=(4,), seeds=(1, 2, 3)))
     climbed = [(r.cause, r.level, r.seed) for r in rungs]
     # The earlier of two stages is the stronger change; returns have one level.
     assert ("construction", 4, 1) in climbed
@@ -184,6 +186,14 @@ def test_a_ladder_from_end_to_end(town, tmp_path, monkeypatch):
     # What is done is not done again.
     assert climb_ladder(*arguments) == (path, text)
     assert [len(run) for run in runs] == [5, 0]
+
+
+def test_two_maps_of_one_name(town, tmp_path):
+    shutil.copytree(town, tmp_path / "town")
+    maps = [str(town), str(tmp_path / "town")]
+    with pytest.raises(InputError, match="another map has a drive town_04"):
+        climb_ladder(maps, tmp_path / "out", Cluster(), METHODS, Extent())
+    assert not (tmp_path / "out").exists()
 
 
 def test_the_page_has_every_cause():

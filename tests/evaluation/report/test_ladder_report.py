@@ -49,7 +49,7 @@ def answered(method, told, is_right, scores=None):
 def measured(cause, level, answers, seed=1):
     """A rung of the ladder of a town."""
     rung = LadderRung("town", "02", "02", cause, level, f"much {cause}")
-    return MeasuredRung(rung, seed, answers)
+    return MeasuredRung(rung, seed, f"{cause} {seed}", answers)
 
 
 def part(number, kept):

@@ -1,0 +1,187 @@
+"""Levels: frozen rungs of the ladder, and the results of methods on them.
+
+Level 0 is the world without a change; levels 1 to 4 have all causes together,
+each at that level of the ladder. Their drives are frozen: `worlds/levels.csv`
+holds what tells them from all others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+import math
+from pathlib import Path
+import statistics
+
+from cns_drake.base.csv_files import read_records
+from cns_drake.base.errors import InputError
+from cns_drake.base.jobs.fingerprint import fingerprint
+from cns_drake.base.map_folder import MapFolder
+from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.shipped import shipped_maps, worlds_folder
+from cns_drake.studies.ladder_causes import ALL, NONE
+from cns_drake.studies.ladder_rungs import Extent, plan_rungs
+from evaluation.report.method_titles import in_table_order, title
+from evaluation.report.tables import Table
+
+# The seeds were drawn before any method was run on them.
+LEVELS_EXTENT = Extent(causes=(ALL,), seeds=(6151, 3847, 9209))
+# A level is solved when the interval of the best method ends above this.
+_SOLVED = 0.98
+# Machines differ in the last digits of scores, and ties fall either way.
+_EQUAL = 1e-3
+_NUMBERS = ("auc", "auc_low", "auc_high")
+
+# (Map, level) -> what tells its drives from all others.
+Levels = Mapping[tuple[str, int], str]
+
+
+@dataclass(frozen=True)
+class LevelResult:
+    """A method on a level of a map.
+
+    Attributes:
+        map_name: of the city.
+        level: from 0 to 4.
+        method: its name.
+        radius_told: whether it was gated by the radius.
+        auc, low, high: with its 95 % interval.
+    """
+
+    map_name: str
+    level: int
+    method: str
+    radius_told: bool
+    auc: float
+    low: float
+    high: float
+
+
+def planned_levels() -> dict[tuple[str, int], str]:
+    """Returns the levels as this version of the program drives them."""
+    found = {}
+    for name, folder in shipped_maps().items():
+        asking = load_scenario(MapFolder(folder).recordable_sequences()[-1])
+        drives: dict[int, list[str]] = {}
+        for rung in plan_rungs(asking, LEVELS_EXTENT)[0]:
+            drives.setdefault(rung.level, []).append(rung.fingerprint())
+        for level, prints in drives.items():
+            found[name, level] = fingerprint({"drives": prints})
+    return found
+
+
+def frozen_levels() -> dict[tuple[str, int], str]:
+    """Returns the levels as they were frozen."""
+    columns = ("map", "level", "drives")
+    rows = read_records(worlds_folder() / "levels.csv", columns)
+    return {(row["map"], int(row["level"])): row["drives"] for _, row in rows}
+
+
+def read_results(files: Iterable[Path], levels: Levels) -> list[LevelResult]:
+    """Returns the results of several tables, checked.
+
+    Args:
+        files: tables like `ladder.csv`, of one method or of several each.
+            Rungs that are no level do not matter.
+        levels: which there are.
+
+    Raises:
+        InputError: a table cannot be read; a method lacks a level, was asked
+            by other drives, or has numbers that cannot be or that differ
+            between two tables.
+    """
+    kept: dict[str, tuple[Path, list[LevelResult]]] = {}
+    for file in files:
+        found = list(_read_file(file, levels))
+        for method in dict.fromkeys(one.method for one in found):
+            mine = [one for one in found if one.method == method]
+            _check_complete(file, method, mine, levels)
+            before, others = kept.setdefault(method, (file, mine))
+            if not _are_equal(mine, others):
+                raise InputError(f"{file}: {method}: differs from {before}")
+    return [one for _, results in kept.values() for one in results]
+
+
+def _are_equal(some: list[LevelResult], others: list[LevelResult]) -> bool:
+    numbers = {
+        (one.map_name, one.level, one.radius_told): one.auc for one in others
+    }
+    return all(
+        math.isclose(
+            one.auc,
+            numbers[one.map_name, one.level, one.radius_told],
+            abs_tol=_EQUAL,
+        )
+        for one in some
+    )
+
+
+def _read_file(file: Path, levels: Levels) -> Iterable[LevelResult]:
+    columns = ("map", "cause", "level", "method", "radius_told", "drives")
+    for line, row in read_records(file, (*columns, *_NUMBERS)):
+        if row["cause"] not in (NONE, ALL):
+            continue
+        where = f"{file}: line {line}"
+        try:
+            level, told = int(row["level"]), int(row["radius_told"])
+            auc, low, high = (float(row[name]) for name in _NUMBERS)
+        except ValueError:
+            raise InputError(f"{where}: not a number") from None
+        if levels.get((row["map"], level)) != row["drives"]:
+            raise InputError(
+                f"{where}: drives: not those of level {level} of {row['map']}"
+            )
+        # Means of samples may miss the value itself by rounding.
+        is_ordered = low - 1e-9 <= high and low >= -1e-9 and high <= 1 + 1e-9
+        if not (is_ordered and 0.0 <= auc <= 1.0):
+            raise InputError(f"{where}: auc, auc_low, auc_high: cannot be")
+        yield LevelResult(
+            row["map"], level, row["method"], bool(told), auc, low, high
+        )
+
+
+def _check_complete(
+    file: Path, method: str, found: Iterable[LevelResult], levels: Levels
+) -> None:
+    there = [(one.map_name, one.level, one.radius_told) for one in found]
+    for name, level in levels:
+        for told in (False, True):
+            number = there.count((name, level, told))
+            if number != 1:
+                raise InputError(
+                    f"{file}: {method}: level {level} of {name}, radius_told "
+                    f"{int(told)}: {number} rows instead of 1"
+                )
+
+
+def level_table(results: Iterable[LevelResult]) -> Table:
+    """Returns the table of all methods: AUC, the mean over the maps.
+
+    The last row says which levels are solved: for the best method, the
+    interval ends above 0.98 on every map.
+    """
+    results = list(results)
+    numbers = sorted({one.level for one in results})
+    rows: list[tuple[object, ...]] = []
+    solved = dict.fromkeys(numbers, False)
+    for method in in_table_order(one.method for one in results):
+        for told in (False, True):
+            mine = [
+                [
+                    one
+                    for one in results
+                    if (one.method, one.radius_told, one.level)
+                    == (method, told, number)
+                ]
+                for number in numbers
+            ]
+            means = [statistics.fmean(one.auc for one in m) for m in mine]
+            rows.append((title(method), "yes" if told else "no", *means))
+            for number, same in zip(numbers, mine, strict=True):
+                least = min((one.low for one in same), default=math.nan)
+                solved[number] |= not told and least > _SOLVED
+    rows.append(
+        ("solved", "no", *("yes" if solved[n] else "no" for n in numbers))
+    )
+    header = ("method", "radius told", *(f"level {n}" for n in numbers))
+    return Table(header, tuple(rows))
