@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -32,6 +33,7 @@ def run_sequence(
     returns: Literal["ideal", "calibrated"] | None = None,
     weather: WeatherConfig | None = None,
     traffic: int | None = None,
+    transient: Mapping[str, float | str] | None = None,
     recording: Path | None = None,
     graphviz: Path | None = None,
     overwrite: bool = False,
@@ -47,6 +49,7 @@ def run_sequence(
         weather: in place of the scenario's.
         traffic: how many vehicles, and how many walkers, in place of the
             scenario's.
+        transient: switches of the section `transient`, and their values.
         recording: where to save a web page of the drive.
         graphviz: where to save the Diagram as Graphviz text.
         overwrite: replace an existing recording.
@@ -74,6 +77,8 @@ def run_sequence(
         scenario = scenario.with_returns(returns, weather)
     if traffic is not None:
         scenario = scenario.with_traffic(traffic)
+    if transient:
+        scenario = scenario.with_transient(**transient)
     if frames is not None:
         scenario = scenario.model_copy(update={"frames": frames})
     with show_progress() as progress:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
@@ -56,6 +57,14 @@ def simulate(
             "scenario's.",
         ),
     ] = None,
+    transient: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="SWITCH=VALUE,...",
+            help="What came and went: parked_cars, leaves, snow, scaffolds, "
+            "works, furniture, seed; may be given many times.",
+        ),
+    ] = None,
     recording: Recording = None,
     graphviz: Graphviz = None,
     overwrite: Overwrite = False,
@@ -76,10 +85,30 @@ def simulate(
         returns=chosen,
         weather=weather,
         traffic=traffic,
+        transient=_switches(transient or ()),
         recording=recording,
         graphviz=graphviz,
         overwrite=overwrite,
     )
+
+
+def _switches(texts: Iterable[str]) -> dict[str, str]:
+    """Returns the switches of `--transient` by name.
+
+    Raises:
+        InputError: one has no value, or has two.
+    """
+    found: dict[str, str] = {}
+    for text in texts:
+        for item in text.split(","):
+            name, equals, value = (part.strip() for part in item.partition("="))
+            if not (name and equals and value) or name in found:
+                raise InputError(
+                    f"--transient: '{item}' is not one value of a switch, "
+                    "such as snow=0.2"
+                )
+            found[name] = value
+    return found
 
 
 def scan(

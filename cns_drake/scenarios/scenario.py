@@ -210,7 +210,7 @@ class Scenario(Section):
         )
         return self.model_copy(update={"traffic": traffic})
 
-    def with_transient(self, **changes: float) -> Scenario:
+    def with_transient(self, **changes: float | str) -> Scenario:
         """Returns the scenario with some switches of `transient` set.
 
         Raises:

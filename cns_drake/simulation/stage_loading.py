@@ -45,7 +45,9 @@ def load_stage(
     trajectory = trajectory or plan_drive(scenario)
     times = np.arange(0.0, trajectory.duration, 0.1)
     drive = shapely.LineString(trajectory.poses(times)[1][:, :2])
-    return change_world(world, scenario.transient, _driven(scenario, drive))
+    return change_world(
+        world, scenario.transient, drive, _driven(scenario, drive)
+    )
 
 
 def _driven(scenario: Scenario, drive: shapely.LineString) -> BaseGeometry:

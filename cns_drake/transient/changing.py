@@ -8,19 +8,30 @@ from cns_drake.scenarios.transient_config import TransientConfig
 from cns_drake.scene.world import World
 from cns_drake.transient.bays_refilled import change_parked_cars, make_bays
 from cns_drake.transient.furniture import move_furniture
+from cns_drake.transient.ground_surface import GroundSurface
 from cns_drake.transient.leaves import thin_leaves
+from cns_drake.transient.roadworks import put_up_works
+from cns_drake.transient.scaffolds import put_up_scaffolds
 from cns_drake.transient.scene_editing import SceneEditing
+from cns_drake.transient.snow_cover import lay_snow
 from cns_drake.transient.standing import read_standing
+
+# Farther from the drive, no LiDAR sees much of snow [m].
+_NEAR = 120.0
 
 
 def change_world(
-    world: World, config: TransientConfig, kept_free: BaseGeometry
+    world: World,
+    config: TransientConfig,
+    drive: BaseGeometry,
+    kept_free: BaseGeometry,
 ) -> World:
     """Returns a world in which time has passed.
 
     Args:
         world: not yet a part of a diagram; its SceneGraph is changed.
         config: what came and went.
+        drive: the way of the vehicle, seen from above [m].
         kept_free: where vehicles drive, seen from above [m]; nothing new
             stands there.
 
@@ -40,4 +51,20 @@ def change_world(
         thin_leaves(editing, things, config.leaves, seed)
     if config.furniture > 0.0:
         move_furniture(editing, things, kept_free, config.furniture, seed)
+    if not (config.scaffolds or config.works or config.snow):
+        return editing.finish()
+    ground = GroundSurface(things, drive.buffer(_NEAR))
+    for put_up, part in (
+        (put_up_scaffolds, config.scaffolds),
+        (put_up_works, config.works),
+    ):
+        if part > 0.0:
+            put_up(editing, things, drive, kept_free, ground, part, seed)
+    if config.snow > 0.0:
+        # It lies on what is new as well.
+        world = editing.finish()
+        editing = SceneEditing(world)
+        lay_snow(
+            editing, read_standing(world), drive, ground, config.snow, seed
+        )
     return editing.finish()

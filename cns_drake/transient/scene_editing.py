@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from pydrake.common import MemoryFile
@@ -42,6 +42,18 @@ from cns_drake.scene.structure_table import (
 from cns_drake.scene.surfaces import TriangleSurface
 from cns_drake.scene.world import World
 from cns_drake.transient.standing import Standing, StandingPart
+
+
+class Look(NamedTuple):
+    """What new surfaces look like.
+
+    Attributes:
+        rgb: diffuse colour.
+        reflectivity: near 900 nm, 0 to 1; None where class and colour say it.
+    """
+
+    rgb: tuple[float, float, float]
+    reflectivity: float | None = None
 
 
 class SceneEditing:
@@ -99,16 +111,23 @@ class SceneEditing:
         self._added[name] = (old.semantic_class, old.reflectivity)
         self.blame(name, cause)
 
-    def shift_part(self, part: StandingPart, p_W: np.ndarray) -> None:
-        """Moves a part of a structure that keeps its name.
+    def cover_part(
+        self, part: StandingPart, p_W: np.ndarray, look: Look
+    ) -> None:
+        """Moves a part of a structure and paints it.
 
         Args:
             part: which.
             p_W: (3,) by how much, in the world [m].
+            look: of it from now on.
         """
-        X_new = RigidTransform(np.asarray(p_W, float)) @ part.X_WG
-        name = f"{part.geometry.structure}/{part.name}"
-        self._copy_part(part, X_new, name)
+        inspector = self._world.scene_graph.model_inspector()
+        self._register(
+            f"{part.geometry.structure}/{part.name}_covered",
+            RigidTransform(np.asarray(p_W, float)) @ part.X_WG,
+            inspector.GetShape(part.geometry.geometry_id),
+            *_properties(look),
+        )
         self.remove_part(part)
 
     def add(
@@ -133,7 +152,7 @@ class SceneEditing:
                 f"{name}/{part.name}",
                 X_WS @ RigidTransform(RollPitchYaw(*part.rpy), part.xyz),
                 _shape(part, model),
-                *_colours(part.rgb or (0.5, 0.5, 0.5)),
+                *_properties(Look(part.rgb or (0.5, 0.5, 0.5))),
             )
         self._added[name] = (semantic_class, None)
         self.blame(name, cause)
@@ -161,6 +180,54 @@ class SceneEditing:
             )
         self.remove_part(part)
 
+    def add_triangles(
+        self,
+        part: StandingPart,
+        name: str,
+        vertices: np.ndarray,
+        triangles: np.ndarray,
+        look: Look,
+    ) -> None:
+        """Adds a surface to the structure of a part.
+
+        Args:
+            part: whose structure it joins, in the frame of its geometry.
+            name: of the new part.
+            vertices: (N, 3) in the world [m].
+            triangles: (M, 3) vertex indices.
+            look: of it.
+        """
+        R, p = part.X_WG.rotation().matrix(), part.X_WG.translation()
+        mesh = memory_mesh((vertices - p) @ R, triangles)
+        name = f"{part.geometry.structure}/{name}"
+        self._register(name, part.X_WG, mesh, *_properties(look))
+
+    def add_mesh(
+        self,
+        name: str,
+        semantic_class: str,
+        vertices: np.ndarray,
+        triangles: np.ndarray,
+        look: Look,
+        cause: str,
+    ) -> None:
+        """Adds a structure of triangles.
+
+        Args:
+            name: of the structure.
+            semantic_class: a key of `CLASS_IDS`.
+            vertices: (N, 3) in the world [m].
+            triangles: (M, 3) vertex indices.
+            look: of it.
+            cause: the switch.
+        """
+        middle = np.round(vertices.mean(axis=0))
+        mesh = memory_mesh(vertices - middle, triangles)
+        X_WG = RigidTransform(middle)
+        self._register(f"{name}/surface", X_WG, mesh, *_properties(look))
+        self._added[name] = (semantic_class, None)
+        self.blame(name, cause)
+
     def finish(self) -> World:
         """Returns the world with its table and notes brought up to date.
 
@@ -184,14 +251,17 @@ class SceneEditing:
         ]
         return replace(
             self._world,
-            structures=StructureTable(
-                replace(entry, causes=tuple(self._causes[entry.name]))
-                if entry.name in self._causes
-                else entry
-                for entry in entries
-            ),
+            structures=StructureTable(map(self._with_causes, entries)),
             notes=(*self._world.notes, *self._notes),
         )
+
+    def _with_causes(self, entry: StructureEntry) -> StructureEntry:
+        new = [
+            cause
+            for cause in self._causes.get(entry.name, ())
+            if cause not in entry.causes
+        ]
+        return replace(entry, causes=(*entry.causes, *new)) if new else entry
 
     def _properties(
         self, part: StandingPart
@@ -238,14 +308,16 @@ class SceneEditing:
 
 
 def memory_mesh(
-    vertices: np.ndarray, triangles: np.ndarray, scale: np.ndarray
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    scale: np.ndarray | None = None,
 ) -> Mesh:
     """Returns a mesh that lies in no file; equal ones are one to readers.
 
     Args:
         vertices: (N, 3) before they are scaled [m].
         triangles: (M, 3) vertex indices.
-        scale: (3,) along the axes.
+        scale: (3,) along the axes; none by default.
     """
     used, corners = np.unique(triangles, return_inverse=True)
     lines = [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in vertices[used]]
@@ -254,15 +326,19 @@ def memory_mesh(
     ]
     text = "\n".join(lines) + "\n"
     file = MemoryFile(text.encode(), ".obj", "mesh")
-    return Mesh(InMemoryMesh(mesh_file=file), scale)
+    return Mesh(
+        InMemoryMesh(mesh_file=file), np.ones(3) if scale is None else scale
+    )
 
 
-def _colours(
-    rgb: Iterable[float],
+def _properties(
+    look: Look,
 ) -> tuple[PerceptionProperties, IllustrationProperties]:
     seen, shown = PerceptionProperties(), IllustrationProperties()
     for properties in (seen, shown):
-        properties.AddProperty("phong", "diffuse", Rgba(*rgb, 1.0))
+        properties.AddProperty("phong", "diffuse", Rgba(*look.rgb, 1.0))
+    if look.reflectivity is not None:
+        seen.AddProperty("lidar", "reflectivity", look.reflectivity)
     return seen, shown
 
 

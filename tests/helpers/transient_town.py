@@ -64,7 +64,7 @@ def write_transient_town(folder):
     edge = pole_shape(0.1, 1)
     visuals = [
         visual("west/edge", edge, -200, -200),
-        visual("east/edge", edge, 200, 200),
+        visual("east/edge", edge, 200, 200, 40),
         visual("road/plate", box_shape(200, 6, 1), 0, 0, -0.5),
         visual("lawn/plate", box_shape(200, 40, 1), 0, 23, -0.45),
     ]

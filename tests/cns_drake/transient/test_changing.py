@@ -21,6 +21,7 @@ X_WT = RigidTransform(RollPitchYaw(*ORIGIN[3:]), ORIGIN[:3])
 _CORNERS = [
     X_WT @ [x, y, 0] for x, y in ((-90, -3), (90, -3), (90, 2), (-90, 2))
 ]
+DRIVE = shapely.LineString([(X_WT @ [x, -1, 0])[:2] for x in (-60, 60)])
 LANES = shapely.Polygon([(x, y) for x, y, _ in _CORNERS])
 
 
@@ -36,7 +37,7 @@ def changed(sdf):
     @functools.cache
     def make(**switches):
         config = TransientConfig(**switches)
-        world = change_world(load_world(sdf), config, LANES)
+        world = change_world(load_world(sdf), config, DRIVE, LANES)
         return world, read_standing(world)
 
     return make
@@ -63,7 +64,7 @@ def same(first, second, but=()):
 def test_nothing_changes_by_default(sdf):
     world = load_world(sdf)
     ids = world.scene_graph.model_inspector().GetAllGeometryIds()
-    assert change_world(world, TransientConfig(seed=9), LANES) is world
+    assert change_world(world, TransientConfig(seed=9), DRIVE, LANES) is world
     assert world.scene_graph.model_inspector().GetAllGeometryIds() == ids
 
 
@@ -164,7 +165,9 @@ def test_each_switch_is_independent_of_the_others(changed):
 def test_the_same_twice(sdf, changed):
     switches = {"parked_cars": 0.6, "leaves": 0.4, "furniture": 0.7}
     world, things = changed(**switches)
-    again = change_world(load_world(sdf), TransientConfig(**switches), LANES)
+    again = change_world(
+        load_world(sdf), TransientConfig(**switches), DRIVE, LANES
+    )
     assert list(again.structures) == list(world.structures)
     assert same(places(things), places(read_standing(again)))
 
@@ -235,7 +238,7 @@ def test_points_that_no_changed_thing_could_hide_are_identical(sdf):
     X_WS = X_WT @ RigidTransform(RollPitchYaw(0, 0, 1.0), [20.0, 0.0, 1.6])
     config = TransientConfig(parked_cars=0.5, leaves=0.5, furniture=0.5)
     old_world = load_world(sdf)
-    new_world = change_world(load_world(sdf), config, LANES)
+    new_world = change_world(load_world(sdf), config, DRIVE, LANES)
     causes = {e.instance for e in new_world.structures if e.causes}
     scans = [
         scan_world(world, X_WS, pattern) for world in (old_world, new_world)
@@ -265,7 +268,9 @@ def test_what_a_world_lacks_is_said(tmp_path):
         "</box></geometry></visual></link></model></sdf>"
     )
     config = TransientConfig(parked_cars=0.1, leaves=0.9, furniture=0.1)
-    world = change_world(load_world(tmp_path / "plain.sdf"), config, LANES)
+    world = change_world(
+        load_world(tmp_path / "plain.sdf"), config, DRIVE, LANES
+    )
     told = [note.split(":")[:2] for note in world.notes]
     assert told == [
         ["transient", f" {name}"]

@@ -1,0 +1,238 @@
+"""Snow on what faces the sky, and banks of it along kerbs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from cns_drake.transient.draws import draws
+from cns_drake.transient.ground_surface import (
+    GroundSurface,
+    from_above,
+    triangle_corners,
+    upwardness,
+)
+from cns_drake.transient.scene_editing import Look, SceneEditing
+from cns_drake.transient.standing import GROUND_CLASSES, Standing, StandingPart
+
+CAUSE = "snow"
+# Snow near 900 nm: Warren, "Optical properties of snow", 1982.
+_LOOK = Look((0.93, 0.95, 0.97), 0.9)
+# Snow slides from what is steeper: cosine of 45 degrees.
+_LEAST_UP = 0.707
+# What is smaller bears none [m^2].
+_LEAST_AREA = 0.3
+_BARE = frozenset(
+    {"vegetation", "trunk", "pole", "traffic-sign", "fence", "bicycle", "road"}
+)
+# Of triangles at the edge of a cleared road, the longest side [m].
+_FINE = 0.7
+# A bank along a kerb: how far it reaches to both sides, by its height where
+# it is highest, in depths of snow, and at most [m].
+_INSIDE, _CREST, _OUTSIDE = 0.3, 0.3, 1.1
+_HIGHEST, _MOST_HEIGHT = 2.5, 0.9
+_SPACING = 1.5
+# Wave lengths of its height along the street [m].
+_WAVES = (9.0, 3.7)
+
+
+def lay_snow(
+    editing: SceneEditing,
+    things: Mapping[str, Standing],
+    drive: BaseGeometry,
+    ground: GroundSurface,
+    depth: float,
+    seed: int,
+) -> None:
+    """Lays snow on all near a drive but roads, plants and thin things.
+
+    Ground is raised. Roads are cleared, with banks along their kerbs.
+
+    Args:
+        editing: of the world.
+        things: all that stands, with what was changed.
+        drive: the way of the vehicle, seen from above [m].
+        ground: near the drive.
+        depth: of the snow [m].
+        seed: of the banks' heights.
+    """
+    for thing in things.values():
+        if thing.semantic_class in _BARE:
+            continue
+        is_ground = thing.semantic_class in GROUND_CLASSES
+        if not is_ground and not thing.outline.intersects(ground.near):
+            continue
+        changed = False
+        for part in thing.parts:
+            if is_ground and not _lies_below_road(part, ground):
+                editing.cover_part(part, np.array([0.0, 0.0, depth]), _LOOK)
+                changed = True
+            else:
+                changed |= _cover(editing, part, ground, depth, is_ground)
+        if changed:
+            editing.blame(thing.name, CAUSE)
+    if ground.carriageway.is_empty:
+        editing.note(
+            "snow: no structure of class road along the drive: no road is "
+            "cleared, and no bank lies along a kerb"
+        )
+    else:
+        _lay_banks(editing, drive, ground, depth, seed)
+
+
+def _lies_below_road(part: StandingPart, ground: GroundSurface) -> bool:
+    """Tells whether ground goes on below a carriageway."""
+    corners = triangle_corners(part)
+    corners = corners[upwardness(corners) > 0.0]
+    inner = ground.carriageway.buffer(-0.5)
+    if inner.is_empty or len(corners) == 0:
+        return False
+    shapely.prepare(inner)
+    return bool(shapely.intersects(from_above(corners), inner).any())
+
+
+def _cover(
+    editing: SceneEditing,
+    part: StandingPart,
+    ground: GroundSurface,
+    depth: float,
+    is_ground: bool,
+) -> bool:
+    """Puts a slab on what of a part faces the sky; tells whether anything."""
+    corners = triangle_corners(part)
+    corners = corners[upwardness(corners) > _LEAST_UP]
+    if is_ground:
+        corners = _beside(corners, ground)
+    if len(corners) == 0:
+        return False
+    vertices, triangles = _merged(corners)
+    triangles = triangles[_is_large(vertices, triangles)]
+    if len(triangles) == 0:
+        return False
+    edges = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    keys = np.sort(edges, axis=1)
+    _, first, count = np.unique(
+        keys, axis=0, return_index=True, return_counts=True
+    )
+    rim = edges[first[count == 1]]
+    up = len(vertices)
+    slab = np.concatenate(
+        [
+            triangles + up,
+            np.column_stack([rim[:, 0], rim[:, 1], rim[:, 1] + up]),
+            np.column_stack([rim[:, 0], rim[:, 1] + up, rim[:, 0] + up]),
+        ]
+    )
+    risen = vertices + np.array([0.0, 0.0, depth])
+    raised = np.concatenate([vertices, risen])
+    editing.add_triangles(part, f"{part.name}_snow", raised, slab, _LOOK)
+    return True
+
+
+def _beside(corners: np.ndarray, ground: GroundSurface) -> np.ndarray:
+    """Returns triangles beside the carriageway, finer along its edge."""
+    corners = corners[shapely.intersects(from_above(corners), ground.near)]
+    road = ground.carriageway
+    shapely.prepare(road)
+    done = [np.zeros((0, 3, 3))]
+    while len(corners):
+        areas = from_above(corners)
+        meets = shapely.intersects(areas, road)
+        done.append(corners[~meets])
+        corners = corners[meets]
+        corners = corners[~shapely.covers(road, areas[meets])]
+        sides = np.linalg.norm(
+            corners - np.roll(corners, -1, axis=1), axis=2
+        ).max(axis=1)
+        fine = sides <= _FINE
+        last = corners[fine]
+        middles = last[:, :, :2].mean(axis=1)
+        done.append(last[~shapely.contains_xy(road, middles)])
+        corners = _halved(corners[~fine])
+    return np.concatenate(done)
+
+
+def _halved(corners: np.ndarray) -> np.ndarray:
+    """Returns the four triangles of each between the middles of its sides."""
+    a, b, c = np.moveaxis(corners, 1, 0)
+    ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+    parts = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
+    return np.concatenate([np.stack(part, axis=1) for part in parts])
+
+
+def _merged(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns vertices and triangles, equal corners as one vertex."""
+    rounded = np.round(corners.reshape(-1, 3), 4)
+    _, first, inverse = np.unique(
+        rounded, axis=0, return_index=True, return_inverse=True
+    )
+    return corners.reshape(-1, 3)[first], inverse.reshape(-1, 3)
+
+
+def _is_large(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Tells which triangles belong to a connected area that bears snow."""
+    edges = triangles[:, [0, 1, 1, 2]].reshape(-1, 2)
+    graph = coo_matrix(
+        (np.ones(len(edges)), (edges[:, 0], edges[:, 1])),
+        (len(vertices),) * 2,
+    )
+    piece = connected_components(graph, directed=False)[1][triangles[:, 0]]
+    a, b, c = np.moveaxis(vertices[triangles], 1, 0)
+    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    return np.bincount(piece, areas)[piece] >= _LEAST_AREA
+
+
+def _lay_banks(
+    editing: SceneEditing,
+    drive: BaseGeometry,
+    ground: GroundSurface,
+    depth: float,
+    seed: int,
+) -> None:
+    phases = draws(seed, CAUSE, "banks").uniform(0, 2 * np.pi, 4)
+    way = drive.buffer(1.4 + _INSIDE)
+    shapely.prepare(way)
+    meshes = []
+    for kerb in ground.kerbs(_SPACING):
+        xy, out = kerb.points, kerb.outwards
+        road = ground.heights(xy - 0.1 * out, of_road=True)
+        beside = ground.heights(xy + _OUTSIDE * out, of_road=False)
+        beside = np.where(np.isfinite(beside), beside, road)
+        waves = (
+            np.sin(2 * np.pi * (xy / _WAVES[0]) + phases[:2]).sum(axis=1)
+            + np.sin(2 * np.pi * (xy / _WAVES[1]) + phases[2:]).sum(axis=1)
+        ) / 4
+        most = min(_HIGHEST * depth, _MOST_HEIGHT + depth)
+        crest = beside + depth + (most - depth) * (0.6 + 0.4 * waves)
+        # A profile: on the road, on the crest, on the snow beside it.
+        profile = np.stack(
+            [
+                np.column_stack([xy - _INSIDE * out, road]),
+                np.column_stack([xy, (road + crest) / 2]),
+                np.column_stack([xy + _CREST * out, crest]),
+                np.column_stack([xy + _OUTSIDE * out, beside + depth - 0.01]),
+            ],
+            axis=1,
+        )
+        free = np.isfinite(road) & ~shapely.contains_xy(way, xy)
+        use = np.flatnonzero(free[:-1] & free[1:])
+        here, there = profile[use], profile[use + 1]
+        for k in range(3):
+            a, b = here[:, k], there[:, k]
+            c, d = there[:, k + 1], here[:, k + 1]
+            meshes += [np.stack([a, d, c], 1), np.stack([a, c, b], 1)]
+    if meshes:
+        corners = np.concatenate(meshes)
+        corners = corners[:, ::-1] if _faces_down(corners) else corners
+        vertices, triangles = _merged(corners)
+        editing.add_mesh("snow_banks", "terrain", vertices, triangles, _LOOK,
+                         CAUSE)  # fmt: skip
+
+
+def _faces_down(corners: np.ndarray) -> bool:
+    return float(np.median(upwardness(corners))) < 0.0
