@@ -3,8 +3,8 @@
 python docs/animation.py docs/pictures/drive.webp
 
 The same drive goes through two stages of a city. A photograph of each stage
-lies behind the points that the LiDAR sees there, coloured by height; orange
-points are on what moves.
+lies behind the points that the LiDAR sees there, coloured by height;
+orange points are on what moves.
 """
 
 from __future__ import annotations
@@ -31,12 +31,13 @@ from evaluation import sequences
 DRIVE = "metropolis_01"
 STAGES = ("01", "04")
 TRAFFIC = 60
-FIRST, LAST, STEP = 0, 160, 2  # frames of the recording
-SIZE = (800, 450)
-FRAME_MS = 100
-FADE = 6  # pictures
+FIRST, LAST, STEP = 0, 160, 3  # frames of the recording
+SIZE = (720, 405)
+FRAME_MS = 120
+FADE = 4  # pictures
 _SMOOTHING = 2  # pixels of the photograph for one of the picture
-_ORANGE = (255, 140, 0)
+_MOVING_COLOUR = (255, 140, 0)
+_FIRST_MOVING_CLASS = 252  # of SemanticKITTI
 _HEIGHTS = (0.0, 12.0)  # of the colours [m]
 # Limits of the car's box in the LiDAR's frame [m].
 _CAR = ((-1.0, 3.6), (-0.95, 0.95), (-1.4, -0.2))
@@ -70,8 +71,8 @@ def main(path: Path) -> None:
         append_images=pictures[1:],
         duration=FRAME_MS,
         loop=0,
-        quality=45,
-        method=6,
+        quality=50,
+        method=2,
     )
 
 
@@ -96,34 +97,46 @@ def _film(drive: Scenario, folder: Path, view: View):
     photograph = StageScene(world_file(drive), drive.without).photograph(
         view, width, height
     )
-    still = Image.fromarray(photograph).resize(SIZE, Image.Resampling.LANCZOS)
+    still = np.asarray(
+        Image.fromarray(photograph).resize(SIZE, Image.Resampling.LANCZOS)
+    )
     font = ImageFont.load_default(size=22)
     sequence = sequences.open(folder)
     frames = range(FIRST, len(sequence), STEP)
     for i in track(frames, f"stage {drive.stage}", len(frames)):
-        picture = still.copy()
+        pixels = still.copy()
+        _draw_scan(pixels, sequence.scan(i), sequence.X_WS[i], view)
+        picture = Image.fromarray(pixels)
         pen = ImageDraw.Draw(picture)
-        _draw_scan(pen, sequence.scan(i), sequence.X_WS[i], view)
         _draw_car(pen, sequence.X_WS[i], view)
-        pen.text((14, 10), f"Metropolis, stage {drive.stage}", "white", font)
+        title = f"Metropolis, stage {drive.stage}"
+        pen.text(
+            (14, 10),
+            title,
+            "white",
+            font,
+            stroke_width=2,
+            stroke_fill="#303030",
+        )
         yield picture
 
 
-def _draw_scan(pen: ImageDraw.ImageDraw, scan, X_WS: np.ndarray, view) -> None:
+def _draw_scan(
+    picture: np.ndarray, scan: np.ndarray, X_WS: np.ndarray, view: View
+) -> None:
     p_S = np.stack([scan["x"], scan["y"], scan["z"]], axis=1)
     p_W = p_S @ X_WS[:3, :3].T + X_WS[:3, 3]
     pixels, seen = view.project(p_W, *SIZE)
+    column, row = pixels.astype(int).T
     low, high = _HEIGHTS
-    shares = (p_W[seen, 2] - low) / (high - low)
-    colours = (
-        matplotlib.colormaps["viridis"](np.clip(shares, 0, 1))[:, :3] * 255
-    ).astype(int)
-    moving = scan["label"][seen] >= 252
-    for (x, y), colour, moves in zip(pixels, colours, moving, strict=True):
-        if moves:
-            pen.ellipse((x - 1.5, y - 1.5, x + 1.5, y + 1.5), _ORANGE)
-        else:
-            pen.point((x, y), tuple(colour))
+    shares = np.clip((p_W[seen, 2] - low) / (high - low), 0.0, 1.0)
+    colours = matplotlib.colormaps["viridis"](shares)[:, :3]
+    picture[row, column] = 255 * colours
+    moving = scan["label"][seen] >= _FIRST_MOVING_CLASS
+    for down, right in itertools.product((-1, 0, 1), repeat=2):
+        rows = np.clip(row[moving] + down, 0, SIZE[1] - 1)
+        columns = np.clip(column[moving] + right, 0, SIZE[0] - 1)
+        picture[rows, columns] = _MOVING_COLOUR
 
 
 def _draw_car(pen: ImageDraw.ImageDraw, X_WS: np.ndarray, view: View) -> None:

@@ -47,7 +47,7 @@ def _inside(kind: object, part: str | int) -> Iterator[object]:
         for name, field in kind.model_fields.items():
             if part in (name, field.alias):
                 yield field.annotation
-        # Of a choice of models, the place has the name of one.
+        # The place has the name of one of the models to choose from.
         if part == kind.__name__:
             yield kind
         return

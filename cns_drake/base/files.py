@@ -123,7 +123,7 @@ def write_part(path: Path, text: str) -> None:
         InputError: if that fails, e.g. on a full disk.
     """
     part = part_path(path)
-    # Of several files, all are to be whole before the first gets its name.
+    # Several files must all be whole before the first gets its name.
     with user_errors(part), open(part, "w", encoding="utf-8") as stream:
         stream.write(text)
         stream.flush()

@@ -45,7 +45,7 @@ def import_city(
         str | None,
         typer.Option(
             metavar="NAME",
-            help="Attribute that tells the year; one of the usual ones if "
+            help="Attribute that holds the year; one of the usual ones if "
             "left out.",
         ),
     ] = None,

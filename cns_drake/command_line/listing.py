@@ -27,7 +27,7 @@ _HEADINGS = (
     "structures",
     "triangles",
 )
-# Of columns that find no room the first of these goes first.
+# Columns that find no room go in this order.
 _GIVE_WAY = (
     "map",
     "structures",

@@ -25,7 +25,7 @@ from cns_drake.imports.waypoint_drives import (
 # What the second drive has to itself at either end, at least and at most [m].
 _SHORTEST_ARM = 40.0
 _LONGEST_ARM = LONGEST / 3
-# Of the first drive: where the second joins it, from and to, and until where
+# On the first drive: where the second joins it, from and to, and until where
 # it has left; then the same if no way of that kind is found; and how much
 # they share at least.
 _SHARED = ((0.25, 0.5, 0.75), (0.0, 0.7, 1.0))

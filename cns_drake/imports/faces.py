@@ -37,7 +37,7 @@ def face_triangles(
         return np.zeros((0, 3, 3))
     normal = _newell(rings[0])
     if 0.5 * np.linalg.norm(normal) < _LEAST_AREA:
-        # Of a ring that crosses itself both halves may be equally large.
+        # Both halves of a ring that crosses itself may be equally large.
         _, spread, axes = np.linalg.svd(rings[0] - rings[0].mean(axis=0))
         normal = axes[2] if spread[1] ** 2 >= _LEAST_AREA else np.zeros(3)
     if not normal.any():

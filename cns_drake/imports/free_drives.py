@@ -27,7 +27,7 @@ _OBSTRUCTED = 3.0
 _WAYPOINT_SPACING = 15.0
 # By how much waypoints may leave the path that was found, as tried [m].
 _SIMPLIFICATIONS = (1.5, 1.0, 0.7, 2.0, 3.0)
-# Of a running mean over so many cells, as tried.
+# Cells in a running mean, chosen by trial.
 _STRAIGHTENED = (5, 11, 17)
 
 

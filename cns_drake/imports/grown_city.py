@@ -17,7 +17,7 @@ from cns_drake.imports.staged_city import StagedCity
 
 # Buildings so near each other are of one block [m].
 _SAME_BLOCK = 4.0
-# Of the buildings that change, the part that is drawn block by block, and the
+# The part of the changing buildings that is drawn block by block, and the
 # part that is lower at first, the others are not there.
 _BY_BLOCK = 0.5
 _LOWER = 1.0 / 3.0

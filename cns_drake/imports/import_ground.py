@@ -18,7 +18,7 @@ from cns_drake.city.geometry.structures import (
 )
 from cns_drake.imports.foreign_city import Imported
 
-# Of the grid of a guessed ground, and how far it reaches beyond the city [m].
+# Cells of a guessed ground, and how far it reaches beyond the city [m].
 CELL = 4.0
 MARGIN = 40.0
 # A larger city has larger cells.
@@ -27,10 +27,10 @@ _MOST_CELLS = 500
 # so that pavements are seen and not it [m].
 _SMOOTHING = 1.5
 _DEPTH = 0.1
-# Of an edge that is not parted before, and points at once.
+# Length of an edge that is not parted before, and points at once.
 _MOST_STEPS = 256
 _AT_ONCE = 1_000_000
-# Of flat things on the ground every such corner helps to find its height.
+# Each such corner of a flat thing on the ground helps to find its height.
 _EVERY_CORNER = 7
 
 

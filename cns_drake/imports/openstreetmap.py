@@ -43,7 +43,7 @@ from cns_drake.imports.osm_streets import (
 )
 from cns_drake.imports.osm_tags import area_kind, told
 
-# Of barriers and trees [m].
+# Sizes of barriers and trees [m].
 _TALLEST = 150.0
 _HEDGE = (0.8, 1.2)
 _WALL = (0.2, 1.6)

@@ -13,7 +13,7 @@ from shapely.validation import make_valid
 
 from cns_drake.imports.import_faults import ImportFaults
 
-# Of the Earth, WGS 84 [m].
+# The Earth's axes, WGS 84 [m].
 _SEMI_MAJOR = 6378137.0
 _FLATTENING = 1.0 / 298.257223563
 _LEAST_AREA = 0.01  # [m^2]

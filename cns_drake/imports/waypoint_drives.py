@@ -19,7 +19,7 @@ _DEGREE = 5
 # A proposed drive is driven on a slope and with rounded numbers: it keeps so
 # much away from what the car can just steer.
 _MARGIN = 1.01
-# Of the places where bends and room are looked at [m].
+# Distance of the places where bends and room are checked [m].
 _STEP = 0.25
 # No proposed drive is longer, and none shorter [m].
 LONGEST = 1500.0

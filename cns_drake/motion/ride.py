@@ -39,7 +39,7 @@ def ride_on_springs(
     _, speeds, _ = trajectory.path_parameter(np.arange(0.0, end, _STEP))
     step = min(_STEP, _STRIDE / speeds.max())
     frame = trajectory.path_motion(np.arange(0.0, end, step))
-    # Of every wheel at every time.
+    # For every wheel at every time.
     p_FQ_Wset = frame.R[:, :2, :2] @ masses.p_BWset.T
     p_WQset = frame.p[:, :2, None] + p_FQ_Wset
     heights = profile.heights(p_WQset.transpose(0, 2, 1).reshape(-1, 2))

@@ -11,7 +11,7 @@ from typing import Any
 
 from llvmlite import ir
 
-# Of an argument's kind: a pointer, or an unsigned number of 32 bits.
+# Kinds of arguments: a pointer, or an unsigned number of 32 bits.
 POINTER, NUMBER = ir.IntType(8).as_pointer(), ir.IntType(32)
 
 

@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.roads.centreline import Centreline, sample_stations
 
-# Of the car in worlds/vehicle.sdf: its axles' distance, from the middle to a
+# From the car in worlds/vehicle.sdf: its axles' distance, from the middle to a
 # front wheel [m], and how far the inner one can be steered [rad].
 _WHEELBASE = 2.8
 _HALF_TRACK = 0.79
@@ -24,11 +24,11 @@ _REAR, _FRONT, _HALF_WIDTH = 1.0, 3.72, 1.03
 
 # What the middle of the rear axle can go round [m].
 TIGHTEST_RADIUS = float(_WHEELBASE / np.tan(_STEERING_LIMIT) + _HALF_TRACK)
-# Of planned loops, whose curve is smoothed to the inside of its points [m].
+# For planned loops, whose curve is smoothed to the inside of its points [m].
 LOOP_RADIUS = 4.4
 # Distance of the places at which the car's outline is drawn [m].
 _STEP = 0.25
-# Of a dead end in which every street's loop has room [m].
+# Radius of a dead end in which every street's loop has room [m].
 _DEAD_END_RADIUS = 8.0
 
 

@@ -37,9 +37,8 @@ _PACKAGES = (
 INPUTS_KEY = "inputs_sha256"
 
 # What a folder that is included as a model consists of, besides meshes.
-_OF_A_MODEL = (".sdf", ".urdf", ".config", ".xml")
-# Of mesh files by their ending, where these name others: materials, textures,
-# buffers.
+_MODEL_ENDINGS = (".sdf", ".urdf", ".config", ".xml")
+# How mesh files name others, by ending: materials, textures, buffers.
 _NAMING = {
     ".obj": re.compile(rb"^mtllib\s+(.+)$", re.MULTILINE),
     ".mtl": re.compile(rb"^\s*map_\w+.*?(\S+)\s*$", re.MULTILINE),
@@ -192,7 +191,7 @@ def _files_at(place: str) -> list[str]:
         return [
             path
             for name in sorted(os.listdir(place))
-            if name.endswith(_OF_A_MODEL)
+            if name.endswith(_MODEL_ENDINGS)
             and os.path.isfile(path := os.path.join(place, name))
         ]
     # Only what is really a file: no device.
@@ -202,7 +201,7 @@ def _files_at(place: str) -> list[str]:
 def _references(file: str) -> list[str]:
     """Returns what a model or a mesh says of other files."""
     ending = os.path.splitext(file)[1].lower()
-    if ending in (*_OF_A_MODEL, ".dae"):
+    if ending in (*_MODEL_ENDINGS, ".dae"):
         return _xml_references(_read(Path(file)))
     if ending not in _NAMING:
         return []

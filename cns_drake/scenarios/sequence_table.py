@@ -75,8 +75,8 @@ def sequence_rows(
     """
     its = MapFolder(folder)
     known = {row.checksum: row for row in _read(its.sequence_table)}
-    # Of the meshes, names and sizes have to do: reading them all would take
-    # longer than a listing may.
+    # Names and sizes stand for the meshes: to read them all would take longer
+    # than a listing may.
     meshes = "".join(
         f"{mesh.name} {mesh.stat().st_size}"
         for mesh in sorted(its.meshes.glob("*"))

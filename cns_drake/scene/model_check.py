@@ -1,7 +1,7 @@
 """Models, checked before Drake's parser gets them.
 
-Of numbers that are none, or not sizes, libsdformat reads what it can or puts
-1 in their place, and Drake ends the program; long names end the process.
+Where a number is none, or no size, libsdformat reads what it can or puts 1 in
+its place, and Drake ends the program. Long names end the process.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from cns_drake.base.files import read_bytes
 _LIMIT_BYTES = 1 << 28
 _VERTEX = re.compile(rb"^[ \t]*v[ \t]", re.MULTILINE)
 _FACE = re.compile(rb"^[ \t]*f[ \t]([^\n#]*)", re.MULTILINE)
-# Of texture and normals a ray caster knows nothing; Drake checks them.
+# A ray caster needs neither texture nor normals; Drake checks them.
 _OTHER_INDICES = re.compile(rb"/[^\s]*")
 _NO_INDICES = re.compile(rb"[^-\d\s]|\d-|\d{10}")
 

@@ -1,4 +1,4 @@
-"""Who tells how a plant's bodies move."""
+"""The source of the motion of a plant's bodies."""
 
 from __future__ import annotations
 

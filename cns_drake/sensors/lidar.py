@@ -389,7 +389,7 @@ class Lidar(LeafSystem):
     ) -> None:
         scan = self._scan.Eval(context)
         p_WSset, R_WSset = self._calc_poses(context)
-        # Of the columns, or one for all.
+        # One for each column, or one for all.
         column = np.searchsorted(self._first.beams.column_t_ns, scan["t"])
         p_SRset = np.stack([scan["x"], scan["y"], scan["z"]], axis=1)
         p_WRset = p_WSset[column % len(p_WSset)] + np.einsum(

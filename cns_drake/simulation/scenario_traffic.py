@@ -23,7 +23,7 @@ from cns_drake.traffic.traffic_adding import traffic_structures
 from cns_drake.traffic.traffic_plan import TrafficPlan, plan_traffic
 from cns_drake.traffic.walkways import make_walkways
 
-# Of the car in worlds/vehicle.sdf, mirrors and wheels included [m].
+# Size of the car in worlds/vehicle.sdf, with mirrors and wheels [m].
 EGO_BOX = EgoBox(rear=-1.05, front=3.75, half_width=1.05)
 
 
@@ -77,7 +77,7 @@ def plan_scenario_traffic(
         vehicles=wanted.vehicles,
         walkers=wanted.walkers,
         seed=wanted.seed,
-        # Of the whole drive, of which the frames are a part.
+        # For the whole drive; the frames are a part of it.
         duration=trajectory.duration + FRAME_PERIOD,
         ego=ego,
         ego_box=EGO_BOX,

@@ -175,7 +175,7 @@ def _make_schedule(
         if topic.latched:
             continue
         sensor = topic.name.split("/")[1]
-        # Of all frames that move, as often as any of them is recorded.
+        # All frames that move, as often as any of them is recorded.
         moving = [one for name, one in periods.items() if name != "imu"]
         by_topic[topic.name] = periods.get(sensor, min(moving))
     return make_schedule(by_topic)

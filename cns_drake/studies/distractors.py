@@ -17,7 +17,7 @@ from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.studies.redrawing import redraw_cities
 from evaluation.sequences.sampling import sample_frames
 
-# Of the only stage of a city that is drawn anew.
+# Name of the only stage of a city that is drawn anew.
 _STAGE = "01"
 
 

@@ -1,4 +1,4 @@
-"""Who may enter a junction: one after the other, as they came.
+"""The right to enter a junction: one after the other, by arrival.
 
 A vehicle is let into its way as a whole, once nothing that crosses the way is
 let in or comes, once there is room for it behind the way, and while its
@@ -17,9 +17,9 @@ from cns_drake.traffic.lane_arrays import LaneArrays
 from cns_drake.traffic.presence import Presence
 from cns_drake.traffic.vehicle_state import CURRENT, Occupants, Vehicles
 
-# Of signals: how long a phase is green, and all are red after it [s].
+# Signals: how long a phase is green, and all are red after it [s].
 _GREEN, _RED = 14.0, 4.0
-# Who stands where the ego car comes this soon goes first, and need not wait
+# Traffic where the ego car comes this soon goes first, without a wait
 # for signals [s].
 _EGO_IS_NEAR = 45.0
 _GOES_FIRST = 1e6
@@ -43,7 +43,7 @@ _REST = 12.0
 
 
 class Permits(NamedTuple):
-    """Who uses what of the P pieces and C crossings.
+    """The users of the P pieces and C crossings.
 
     Attributes:
         small, large: (P + C,) how many small and large vehicles were let into
@@ -241,7 +241,7 @@ def _open_crossing(
     if presence.until[k, place] < needed or blocked[place]:
         return
     if is_taken(lanes, permits, place, False):
-        # Who came later must not go first all the time.
+        # Those that came later must not always go first.
         for other in range(len(blocked)):
             blocked[other] |= lanes.small[place, other]
         return

@@ -25,7 +25,7 @@ from cns_drake.traffic.walkways import Walkway
 _SPACE = 9.0
 # Vehicles begin with this part of what may be driven.
 _PART_OF_SPEED = 0.5
-# So much of a sidewalk holds one walker [m].
+# Length of sidewalk for one walker [m].
 _WALKER_SPACE = 3.0
 # As many places are drawn before a vehicle is given up.
 _TRIES = 200

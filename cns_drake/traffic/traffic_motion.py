@@ -17,7 +17,7 @@ from cns_drake.traffic.body_shapes import Limb
 from cns_drake.traffic.body_states import LimbTable, bodies_at
 from cns_drake.traffic.traffic_plan import WALKER_SIZE, TrafficPlan
 
-# Who is faster moves; who is slower is labelled as what stands [m/s].
+# What is faster is labelled as moving, what is slower as standing [m/s].
 MOVING_SPEED = 0.5
 
 

@@ -31,7 +31,7 @@ STEP = 0.1
 WALKER_SIZE = (WALKER_LENGTH, WALKER_WIDTH, 1.8)
 # Boxes are kept apart by this much, for they are looked at now and then [m].
 _APART = 0.1
-# So many more vehicles and walkers are planned than asked for, as part, for
+# How many more vehicles and walkers are planned than asked for, as part, for
 # some are left out; and so many times it is tried.
 _SPARE, _TRIES = 0.06, 4
 
@@ -41,7 +41,7 @@ EgoPath = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 @dataclass(frozen=True)
 class TrafficPlan:
-    """Who moves, and how.
+    """What moves, and how.
 
     Attributes:
         kinds: of the N vehicles.

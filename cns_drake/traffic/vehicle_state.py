@@ -64,7 +64,7 @@ class Vehicles(NamedTuple):
 
 
 class Occupants(NamedTuple):
-    """Who covers which part of which piece: a linked list for each.
+    """The vehicles on each piece, as a linked list with their parts.
 
     Attributes:
         head: (P,) the first entry of a piece, -1 for none.

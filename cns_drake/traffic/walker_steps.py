@@ -17,7 +17,7 @@ from cns_drake.traffic.lane_graph import SPACING
 from cns_drake.traffic.overlaps import boxes_overlap
 from cns_drake.traffic.right_of_way import WALK_GROUP, Permits
 
-# Of the model: speed that is wanted, and its spread [m/s]; relaxation [s];
+# The model's speed that is wanted, and its spread [m/s]; relaxation [s];
 # strength [m/s^2] and reach [m] of what keeps walkers, and edges, away.
 SPEED, SPREAD = 1.34, 0.26
 _RELAXATION = 0.5
@@ -40,7 +40,7 @@ _AHEAD = 2.0
 _TURN_RATE, _GOING = 2.5, 0.2
 # One stands so near to the crossing that one waits for [m].
 _AT_NODE = 1.0
-# Who may cross or go on does so this often, for each that goes on.
+# Walkers that may cross or go on cross this often, for each that goes on.
 _CROSSES = 0.25
 # Whoever has left a walkway goes back to it no faster [m/s].
 _BACK = 0.6

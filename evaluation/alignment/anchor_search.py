@@ -30,7 +30,7 @@ _TURN = np.radians(12.0)
 _BASELINE = 20.0
 _MOST_TRIALS = 3000
 _NUM_GUESSES = 5
-# Of the points of a scan, along each axis [m].
+# Extent of the points of a scan along each axis [m].
 _MAX_RANGE = 100.0
 _SEED = 11
 

@@ -20,7 +20,7 @@ AGREEMENT = (1.0, np.radians(2.0))
 # By how much a drive may have bent on a metre of its path: grows with the
 # square root of the distance, 0.15 degrees and 0.05 m.
 _BEND = np.diag([np.radians(0.15) ** 2] * 3 + [0.05**2] * 3)
-# Of keyframes at one place, so that the ties stay regular [m].
+# Deviation of keyframes at one place; it keeps the ties regular [m].
 _LEAST_STEP = 0.1
 _TIGHT = 1e-8 * np.eye(6)
 

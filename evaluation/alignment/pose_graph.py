@@ -23,8 +23,8 @@ FIXED = -1
 # Factors on the width of the kernel, and steps at each.
 _WIDTHS = (100.0, 30.0, 10.0, 3.0, 1.0)
 _STEPS = 8
-# Of the squared, normalised error: 95 % of the chi-squared distribution with
-# six degrees of freedom.
+# Limit of the squared, normalised error: 95 % of the chi-squared distribution
+# with six degrees of freedom.
 _KERNEL = 12.6
 _STILL = 1e-6
 

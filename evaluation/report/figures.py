@@ -28,7 +28,7 @@ from evaluation.report.point_rendering import (
 _UNCHANGED = (214, 214, 214)
 _CHANGED = (196, 18, 24)
 _ABSENT_OUTSIDE = (240, 170, 160)
-# Of sets O and H: blue and vermilion are told apart by all.
+# Sets O and H: everybody can tell blue from vermilion.
 _IN_O = (120, 170, 215)
 _ONLY_IN_H = (213, 94, 0)
 _OUTSIDE_H = (228, 228, 228)
@@ -177,7 +177,7 @@ def voxel_of_each(points: np.ndarray, coarse: VoxelMap) -> np.ndarray:
     """Returns in which voxel of their map some points lie.
 
     A point on a border may have been counted on its other side, with a
-    rounding error. So the occupied voxel with the nearest centre is meant.
+    rounding error. The occupied voxel with the nearest centre is meant.
 
     Args:
         points: (N, 3) of those that were mapped [m].

@@ -150,7 +150,7 @@ def colour_by_height(
 
 def _height_parts(heights: np.ndarray) -> np.ndarray:
     """Returns 0 for low points to 1 for high ones; stray ones do not count."""
-    # Of a riverside, the bed is up to 5 % and to be no brighter than streets.
+    # A river's bed is up to 5 %, and must be no brighter than streets.
     low, high = np.quantile(heights, [0.05, 0.99])
     part = np.clip((heights - low) / max(high - low, 1e-9), 0.0, 1.0)
     # Root, because most of a city is near the ground.

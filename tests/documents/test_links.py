@@ -44,4 +44,9 @@ def test_pictures_are_shown():
 
 
 def test_readme_is_short():
-    assert len(PAGES["README.md"].text.split()) <= 1200
+    assert len(PAGES["README.md"].text.split()) <= 900
+
+
+def test_moving_picture_is_small():
+    picture = documents.ROOT / "docs/pictures/drive.webp"
+    assert picture.stat().st_size < 5e6

@@ -88,7 +88,7 @@ def run_process(
         stdout=_STDERR,
         start_new_session=True,
     )
-    theirs.close()  # So that the pipe ends with the process.
+    theirs.close()  # The pipe then ends with the process.
     with ours:
         try:
             told, text = _listen(ours, job, on_message, is_wanted)

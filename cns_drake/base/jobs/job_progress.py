@@ -155,7 +155,7 @@ class JobProgress:
         self.refresh()
 
     def progress(self, name: str, done: int, total: int) -> None:
-        """So much of so much of a job is done."""
+        """Reports which part of a job is done."""
         if name not in self._tasks:
             return
         share = done / max(total, 1)

@@ -23,7 +23,7 @@ class Tell:
     """How a step reports on itself; without an argument nobody listens."""
 
     def __init__(self, send: Callable[..., None] = lambda *message: None):
-        """Takes what takes the messages: a kind and its values."""
+        """Reports a message to its receiver: a kind and its values."""
         self._send = send
         self._told: float | None = None
 

@@ -36,9 +36,9 @@ from cns_drake.base.recordings.mcap_records import (
     read_chunk,
 )
 
-# Of a message, after its record header: channel id, sequence, two times.
+# A message, after its record header: channel id, sequence, two times.
 _MESSAGE_HEADER = struct.Struct("<HIQQ")
-# Of a message index, after its record header: channel id, length of the rest.
+# A message index, after its record header: channel id, length of the rest.
 _INDEX_HEADER = struct.Struct("<HI")
 _INDEX_ENTRY = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
 # The frame that is being read, and its neighbour when two of them interleave.

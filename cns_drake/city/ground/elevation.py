@@ -145,7 +145,7 @@ class SlopingGround:
             )
             areas: np.ndarray = self._pad_tree.geometries[pad]
             gain = _gain(shapely.distance(points[near], areas))
-            # Of pads that touch a point only the first counts.
+            # Only the first of the pads that touch a point counts.
             order = np.lexsort((pad, near))
             near, pad, gain = near[order], pad[order], gain[order]
             touching = gain > _gain(np.array([2 * _TOUCHING]))[0]

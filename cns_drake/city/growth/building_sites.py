@@ -17,7 +17,7 @@ _CRANE_ROOM = 7.0
 # The jib clears the frame by this [m].
 _CRANE_RISE = 14.0
 _CRANE_REACH = 30.0
-# Of each direction, that a rectangle on a lot is chosen from.
+# In each direction; a rectangle on a lot is chosen from them.
 _MOST_SIDES = 12
 
 

@@ -18,7 +18,7 @@ from pydantic import (
 from cns_drake.base.errors import InputError, describe_validation_error
 from cns_drake.base.yaml_files import read_yaml
 
-# Of a city [m]: what is generated grows with its area.
+# A city's extent [m]: what is generated grows with its area.
 _LARGEST_SIDE = 10_000.0
 Point = tuple[float, float]
 Line = Annotated[list[Point], Field(min_length=2)]

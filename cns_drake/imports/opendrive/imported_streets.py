@@ -138,7 +138,7 @@ def _gaps(lanes: BaseGeometry) -> list[Polygon]:
 
 def _closed(parts: Iterable[BaseGeometry]) -> BaseGeometry:
     """Returns a union without slits between neighbours."""
-    # Of edges that fold back GEOS divides by nothing, to no harm.
+    # GEOS divides by zero where edges fold back, which does no harm.
     with np.errstate(divide="ignore", invalid="ignore"):
         grown = shapely.union_all(
             [part.buffer(_SEAM, join_style="mitre") for part in parts]

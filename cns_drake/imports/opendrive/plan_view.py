@@ -16,7 +16,7 @@ import numpy as np
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 # By which the heading of a spiral turns on a panel, at most [rad].
 _TURN = 0.5
-# Who turns more has a number wrong [rad].
+# A road that turns more has a wrong number [rad].
 _MOST_TURN = 10_000.0
 _PANELS = 64
 _NEWTON_STEPS = 8

@@ -16,7 +16,7 @@ _NEIGHBOURS = 8
 _SPACING = 0.5
 # Nearer ones count more, but for this distance [m].
 _CORE = 0.05
-# Of places at a time.
+# Places at a time.
 _BLOCK = 200_000
 _LEVEL = 1e-9
 

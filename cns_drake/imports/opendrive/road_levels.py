@@ -12,7 +12,7 @@ from cns_drake.imports.opendrive.lane_bands import LaneBand
 
 # A road that is so much higher than another below it is a bridge [m].
 _HEADROOM = 3.0
-# Of places that lie above one another, and how far a bridge reaches beyond
+# For places that lie above one another, and how far a bridge reaches beyond
 # what it crosses [m].
 _NEAR, _BEYOND = 2.5, 8.0
 _LEAST_WIDTH = 0.1

@@ -89,7 +89,7 @@ _ROUNDING = 0.01
 _WIDEST = 100.0
 _SHARPEST = 100.0
 _SHORTEST = 1e-5
-# Of a name that is made part of others.
+# Longest part of a name that becomes part of others.
 _LONGEST_NAME = 60
 
 

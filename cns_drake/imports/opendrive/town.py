@@ -38,13 +38,13 @@ from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.thing_structures import thing_structures
 from cns_drake.imports.waypoint_drives import Drive
 
-# Of sidewalks, where the file does not tell [m].
+# Sidewalks, where the file does not say [m].
 _KERB = 0.1
 _KERBS = (0.03, 0.3)
 # The generator fills no larger ground [m^2, m].
 _LARGEST_AREA = 8e6
 _LONGEST_SIDE = 9000.0
-# Of cars in parking lanes: length of a bay, part that is taken, and the
+# Cars in parking lanes: length of a bay, part that is taken, and the
 # least width of a lane [m].
 _BAY = (5.8, 7.4)
 _FILL = 0.6

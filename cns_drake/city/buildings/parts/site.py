@@ -133,13 +133,13 @@ class Dice:
 
     @property
     def width(self) -> float:
-        """Of a rectangular site, along its front [m]."""
+        """Length of a rectangular site along its front [m]."""
         x0, _, x1, _ = self.site.bounds
         return x1 - x0
 
     @property
     def depth(self) -> float:
-        """Of a rectangular site, from its front to its back [m]."""
+        """Length of a rectangular site from front to back [m]."""
         _, y0, _, y1 = self.site.bounds
         return y1 - y0
 
