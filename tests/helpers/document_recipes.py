@@ -322,8 +322,12 @@ RECIPES = {
     ),
     "first drive": Recipe(
         ".venv/bin/cns-drake simulate riverside_01 --frames 200",
-        changes=(("--frames 200", "--frames 2"),),
-        prints=("first/riverside_01: 2 frames",),
+        changes=(
+            ("--frames 200", "--frames 2"),
+            ("riverside_01", "town/sequence_01.yaml"),
+        ),
+        after=("start a city",),
+        prints=("first/town_01: 2 frames",),
         makes=("drive.html",),
     ),
     "decay": Recipe(
@@ -347,8 +351,12 @@ RECIPES = {
     ),
     "another unit": Recipe(
         ".venv/bin/cns-drake simulate riverside_01 --lidar os1-128",
-        changes=(("--frames 100", "--frames 2"),),
-        prints=("sensors/riverside_01: 2 frames",),
+        changes=(
+            ("--frames 100", "--frames 2"),
+            ("riverside_01", "town/sequence_01.yaml"),
+        ),
+        after=("start a city",),
+        prints=("sensors/town_01: 2 frames",),
     ),
     "two units": Recipe(
         "world: town/stage_02.sdf\nwaypoints: tour.csv\nspeeds: {cruise: 8}\n",
