@@ -17,6 +17,12 @@ def looks_up(triangles: np.ndarray) -> np.ndarray:
     return np.asarray(unit_normals(triangles)[:, 2] > _UPWARDS)
 
 
+def turned_up(triangles: np.ndarray) -> np.ndarray:
+    """Returns triangles (M, 3, 3), those that look downwards turned round."""
+    is_down = unit_normals(triangles)[:, 2] < 0.0
+    return np.where(is_down[:, None, None], triangles[:, ::-1], triangles)
+
+
 class UpperSides:
     """The upper sides of solids, and how high they are at a place."""
 
