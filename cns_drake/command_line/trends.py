@@ -16,7 +16,7 @@ from cns_drake.command_line.options import (
     Results,
     Scheduler,
 )
-from evaluation.command_line.protocol_options import with_protocol
+from evaluation.command_line.protocol_options import Settings, with_protocol
 from evaluation.recognition.protocol import RetrievalProtocol
 
 if TYPE_CHECKING:
@@ -44,6 +44,7 @@ def trend(
     method: MethodFiles = None,
     jobs: Jobs = None,
     scheduler: Scheduler = None,
+    parameter: Settings = None,
     protocol: RetrievalProtocol,
 ) -> None:
     """AUC over TCR_sym, of a family of drives.
@@ -62,7 +63,7 @@ def trend(
         from evaluation.study.trend_databases import Asked, measure_drives
 
     cluster = choose_cluster(jobs, scheduler)
-    methods = choose_methods(method or ())
+    methods = choose_methods(method or (), parameter or ())
     asking = load_scenario(query)
     members = family_members(vary, output, cluster)
     controls = family_controls(members, asking)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
+import warnings
 
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform, RotationMatrix
@@ -104,7 +105,8 @@ class McapRecorder(LeafSystem):
 
     Tick i is at i * period of its schedule. What is
     due then is written as the inputs show it, by a periodic publish event
-    from time zero on, or by a forced publish at such a time. The inputs must
+    from time zero on, or by a forced publish at such a time; a simulation that
+    starts earlier warns of it. The inputs must
     be wired straight to continuous outputs: a publish sees the state before
     any update at the same time, so a hold in front would make every message
     one period old.
@@ -211,6 +213,7 @@ class McapRecorder(LeafSystem):
                 for kind, image in _IMAGES.items()
             }
             self._poses[name] = (self._declare_pose(name), camera.X_BC)
+        self.DeclareInitializationPublishEvent(publish=_warn_of_early_start)
         self.DeclarePeriodicPublishEvent(
             period_sec=self._schedule.period,
             offset_sec=0.0,
@@ -349,7 +352,20 @@ class McapRecorder(LeafSystem):
                 f"time {time} s is no multiple of the period "
                 f"{self._schedule.period} s"
             )
+        if round(ticks) < 0:
+            raise ValueError(f"time {time} s: a recording starts at time zero")
         return round(ticks)
+
+
+def _warn_of_early_start(context: Context) -> EventStatus:
+    time = context.get_time()
+    if time < 0.0:
+        warnings.warn(
+            f"the simulation starts at {time:g} s: nothing is recorded before "
+            "time zero",
+            stacklevel=2,
+        )
+    return EventStatus.Succeeded()
 
 
 def _eval(port: InputPort, context: Context) -> Any:

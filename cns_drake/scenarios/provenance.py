@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import importlib.metadata
 import json
 import os
 from pathlib import Path
@@ -13,6 +12,7 @@ import re
 from xml.parsers import expat
 
 from cns_drake.base.files import user_errors
+from cns_drake.base.installed_versions import installed_versions
 from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
 from cns_drake.base.version import __version__
 from cns_drake.scenarios.imu_making import KALIBR_FILE, describe_kalibr
@@ -51,14 +51,11 @@ def dependency_versions() -> dict[str, str]:
 
     What is not installed is left out: not all platforms have Embree's wheel.
     """
-    versions = {
+    return {
         "cns-drake": __version__,
         "python": platform.python_version(),
+        **installed_versions(_PACKAGES),
     }
-    for name in _PACKAGES:
-        with contextlib.suppress(importlib.metadata.PackageNotFoundError):
-            versions[name] = importlib.metadata.version(name)
-    return versions
 
 
 def digest_inputs(scenario: Scenario) -> dict[str, str]:

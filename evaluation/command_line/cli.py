@@ -372,6 +372,7 @@ def trend(
     lidar: _LidarName = None,
     jobs: _Jobs = None,
     scheduler: _Scheduler = None,
+    parameter: Settings = None,
     *,
     protocol: RetrievalProtocol,
 ) -> None:
@@ -394,6 +395,7 @@ def trend(
         protocol,
         control or (),
         lidar,
+        parameter or (),
     )
     print(write_trend(points, output))
 

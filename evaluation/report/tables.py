@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 import csv
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import html
 import io
 import math
@@ -68,6 +68,21 @@ class Table:
     rows: tuple[tuple[object, ...], ...]
     groups: tuple[tuple[str, int], ...] = ()
     caption: str = ""
+
+    def without_empty(self, name: str) -> Table:
+        """Returns the table without a column that has no value in any row.
+
+        Args:
+            name: of the column; the table has no groups.
+        """
+        column = self.header.index(name)
+        if not all(_is_missing(row[column]) for row in self.rows):
+            return self
+        return replace(
+            self,
+            header=self.header[:column] + self.header[column + 1 :],
+            rows=tuple(r[:column] + r[column + 1 :] for r in self.rows),
+        )
 
     def to_csv(self) -> str:
         """Returns the table with all digits; a missing value is empty.

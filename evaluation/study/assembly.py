@@ -212,7 +212,8 @@ def _write_all(
 ) -> Path:
     changes, recognitions = collected.changes, collected.recognitions
     judgements = reference.judge(recognitions, changes)
-    change = change_table(changes, reference)
+    change_numbers = change_table(changes, reference)
+    change = change_numbers.without_empty("paper")
     recognition = recognition_tables(recognitions, changes, reference)
     audit = audit_table(recognitions, reference)
     survival = survival_table(collected.survivals)
@@ -221,7 +222,7 @@ def _write_all(
     _write(output / "metrics.csv", metric_numbers(recognitions).to_csv())
     written = [
         ("survival", [survival], survival_numbers(collected.survivals)),
-        ("tcr", [change], change),
+        ("tcr", [change], change_numbers),
         ("place_recognition", recognition, audit),
         ("poses", [poses], pose_numbers(recognitions)),
     ]

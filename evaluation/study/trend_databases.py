@@ -55,6 +55,7 @@ def measure_trend(
     protocol: RetrievalProtocol = PAPER_PROTOCOL,
     controls: Sequence[Path] = (),
     lidar: str | None = None,
+    settings: Iterable[str] = (),
 ) -> list[TrendPoint]:
     """Returns the points of all databases and methods.
 
@@ -73,13 +74,14 @@ def measure_trend(
         controls: drives on the routes of databases through the stage of the
             query; each serves the databases whose route it has.
         lidar: whose scans to read, of recordings with several.
+        settings: `METHOD.NAME=VALUE` of parameters of methods.
 
     Raises:
         InputError: a recording cannot be read, two have one name, a control
             serves no database, or a database is of another world or shares
             no place with the query.
     """
-    methods = choose_methods(own_methods)
+    methods = choose_methods(own_methods, settings)
     asking = open_sequence(query, lidar)
     names = {asking.name}
     if protocol.exclude_recent is not None:

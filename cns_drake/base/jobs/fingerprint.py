@@ -2,7 +2,8 @@
 
 Two results of equal fingerprints are the same. Code counts by the modules
 that are imported, directly or not, found in their sources: a change of any
-other module leaves a result as it is.
+other module leaves a result as it is. The libraries that compute count by
+their versions.
 """
 
 from __future__ import annotations
@@ -16,10 +17,15 @@ from pathlib import Path
 from typing import NamedTuple
 
 from cns_drake.base.files import user_errors
+from cns_drake.base.installed_versions import installed_versions
 
 # Where the packages lie, and which these are.
 _ROOT = Path(__file__).parents[3]
 _PACKAGES = ("cns_drake", "evaluation")
+# Others' packages that have a say in numbers.
+_LIBRARIES = (
+    "drake", "embreex", "numba", "numpy", "open3d", "open3d-cpu", "scipy",
+)  # fmt: skip
 
 
 def fingerprint(inputs: Mapping[str, object]) -> str:
@@ -33,7 +39,7 @@ def code_digest(*modules: str, without: tuple[str, ...] = ()) -> str:
     """Returns a digest of modules and of all that they import of ours.
 
     Data files count with the modules of their folder that name them, or the
-    folder beside the module that they are in.
+    folder beside the module that they are in. Versions of libraries count.
 
     Args:
         modules: full names; `<package>.*` stands for all modules in it.
@@ -54,8 +60,8 @@ def code_digest(*modules: str, without: tuple[str, ...] = ()) -> str:
 def script_digest(path: Path) -> str:
     """Returns a digest of a Python file and of all that it imports.
 
-    That is what lies beside it, and modules of ours; other libraries do not
-    count.
+    That is what lies beside it, and modules of ours, besides the versions of
+    libraries; see `code_digest`.
 
     Raises:
         InputError: if a file cannot be read.
@@ -145,7 +151,7 @@ def _modules_in(package: str) -> Iterator[_Module]:
 
 
 def _digest(modules: Iterable[_Module], without: tuple[str, ...]) -> str:
-    total = hashlib.sha256()
+    total = hashlib.sha256(repr(installed_versions(_LIBRARIES)).encode())
     for name, path in sorted(_files(modules, without).items()):
         total.update(f"{name}\n".encode())
         with user_errors(path):

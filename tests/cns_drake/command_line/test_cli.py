@@ -190,6 +190,10 @@ def test_diagram_script(tmp_path):
         (["ladder", "--cause", "war"], "--cause: no cause 'war'"),
         (["ladder", "--levels", "--quick"], "--levels: they are frozen"),
         (["ladder", "atlantis"], "unknown map 'atlantis'"),
+        (
+            ["trend", "--vary", "f", "--query", "q", "--set", "solid.x=1"],
+            "solid: no parameter 'x'",
+        ),
         (["reproduce", "--quick", "--pages"], "--quick and --pages: give one"),
         (["teleport"], "teleport"),
     ],

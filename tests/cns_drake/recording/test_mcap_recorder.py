@@ -349,3 +349,24 @@ def test_time_between_frames_is_refused():
     context.SetTime(1.26)
     with pytest.raises(ValueError, match=r"1\.26 s is no multiple"):
         diagram.ForcedPublish(context)
+
+
+def test_a_start_before_time_zero_is_told():
+    bag = _BagStub()
+    simulator = Simulator(make_diagram(bag))
+    simulator.get_mutable_context().SetTime(-2 * PERIOD)
+    with pytest.warns(UserWarning, match=r"starts at -0\.1 s: nothing is rec"):
+        simulator.Initialize()
+    simulator.AdvanceTo(-PERIOD)
+    assert bag.written == []
+    simulator.AdvanceTo(PERIOD)
+    frames = [number for topic, _, number in bag.written if topic == "/tf"]
+    assert frames == [0, 1]
+
+
+def test_time_before_zero_is_refused():
+    diagram = make_diagram(_BagStub())
+    context = diagram.CreateDefaultContext()
+    context.SetTime(-PERIOD)
+    with pytest.raises(ValueError, match=r"-0\.05 s: a recording starts at"):
+        diagram.ForcedPublish(context)

@@ -27,8 +27,12 @@ def test_bad_usage(capsys, towns):
         )
 
 
-def test_bad_settings_of_a_report(capsys, towns, tmp_path):
-    report = ["report", towns, "--output", tmp_path / "out", "--set"]
+def test_bad_settings(capsys, towns, tmp_path):
+    output = ["--output", tmp_path / "out", "--set"]
+    report = ["report", towns, *output]
+    town = towns / "town_01"
+    trend = ["trend", town, "--query", town, *output]
+    assert_refused(capsys, [*trend, "solid.x=1"], "solid: no parameter 'x'")
     for text, fault in (
         ("rings=3", "'rings=3' is not METHOD.NAME=VALUE"),
         ("solid.rings", "'solid.rings' is not METHOD.NAME=VALUE"),

@@ -28,6 +28,12 @@ def test_plain():
     )
 
 
+def test_a_column_without_values_can_go():
+    table = Table(("map", "paper"), (("a", None), ("b", float("nan"))))
+    assert table.without_empty("paper") == Table(("map",), (("a",), ("b",)))
+    assert PLAIN.without_empty("value") is PLAIN
+
+
 def test_cells_become_two_columns_of_csv():
     rows = list(csv.reader(io.StringIO(GROUPED.to_csv())))
     assert rows == [

@@ -1,5 +1,6 @@
 """Fingerprints: which code counts for a result."""
 
+import importlib.metadata
 import shutil
 import subprocess
 import sys
@@ -118,6 +119,23 @@ def test_line_ends_do_not_count(packages):
     path.write_bytes(b"one\r\ntwo\r\n")
     code_digest.cache_clear()
     assert code_digest("evaluation.top") == before
+
+
+def test_versions_of_libraries_count(packages, monkeypatch):
+    (packages / "evaluation").mkdir()
+    (packages / "evaluation" / "top.py").write_text("import numpy\n")
+    before = code_digest("evaluation.top")
+    version = importlib.metadata.version
+    for library in ("numpy", "scipy", "drake"):
+        monkeypatch.setattr(
+            importlib.metadata,
+            "version",
+            lambda name, library=library: (
+                "9.9.9" if name == library else version(name)
+            ),
+        )
+        code_digest.cache_clear()
+        assert code_digest("evaluation.top") != before
 
 
 @pytest.mark.slow

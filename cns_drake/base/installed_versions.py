@@ -1,0 +1,16 @@
+"""Which versions of other packages are installed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+import contextlib
+import importlib.metadata
+
+
+def installed_versions(packages: Iterable[str]) -> dict[str, str]:
+    """Returns package -> version, of the packages that are installed."""
+    versions = {}
+    for name in packages:
+        with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+            versions[name] = importlib.metadata.version(name)
+    return versions
