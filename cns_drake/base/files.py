@@ -200,7 +200,7 @@ def exclusive(path: Path, on_wait: Callable[[], None]) -> Iterator[None]:
 def _lock(
     lock: Path, stack: contextlib.ExitStack, on_wait: Callable[[], None]
 ) -> bool:
-    """Locks a file; tells whether it still has its name then."""
+    """Locks a file; returns whether it still has its name then."""
     stream = stack.enter_context(lock.open("w"))
     try:
         fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)

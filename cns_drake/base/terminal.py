@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 import contextlib
-from importlib import metadata
 import json
 import math
 import os
@@ -23,6 +22,7 @@ from cns_drake.base.interrupts import (
 )
 from cns_drake.base.libraries import missing_library
 from cns_drake.base.progress import LINE_INTERVAL
+from cns_drake.base.version import __version__
 
 # All errors of usage are click's UsageError, which new versions of Typer
 # bring along under a private name; public is only this class derived from it.
@@ -64,7 +64,7 @@ def make_program(name: str, summary: str, epilog: str) -> typer.Typer:
         ] = False,
     ) -> None:
         if version:
-            print(name, metadata.version("cns-drake"))
+            print(name, __version__)
             raise typer.Exit
         if context.invoked_subcommand is None:
             print(context.get_help())

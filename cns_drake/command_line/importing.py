@@ -80,15 +80,15 @@ def import_city(
         typer.Option(
             min=1.0,
             metavar="METRES",
-            help="Leave out what lies farther from the drives than that, "
-            "where memory is short.",
+            help="Leave out structures farther from the drives, to save "
+            "memory.",
         ),
     ] = None,
     drive_on: Annotated[
         DriveOn | None,
         typer.Option(
             help="Side of the streets on which cars drive; the right if "
-            "neither this nor OpenStreetMap tells.",
+            "neither this nor the file says so.",
         ),
     ] = None,
     grow: Annotated[

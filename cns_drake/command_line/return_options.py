@@ -34,8 +34,7 @@ Fog = Annotated[
     float | None,
     typer.Option(
         metavar="METRES",
-        help="Visibility in fog. Weather needs calibrated returns, and asks "
-        "for them.",
+        help="Visibility in fog. Weather switches calibrated returns on.",
     ),
 ]
 Rain = Annotated[float, typer.Option(metavar="MM_H", help="Rate of rain.")]

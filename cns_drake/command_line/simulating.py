@@ -53,8 +53,7 @@ def simulate(
             min=0,
             max=2000,
             metavar="N",
-            help="So many vehicles, and as many walkers, in place of the "
-            "scenario's.",
+            help="N vehicles and N walkers, in place of the scenario's.",
         ),
     ] = None,
     transient: Annotated[

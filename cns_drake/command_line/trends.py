@@ -37,7 +37,7 @@ def trend(
         str,
         typer.Option(
             metavar="NAME|SCENARIO.yaml",
-            help="The drive that asks: a shipped sequence or a scenario file.",
+            help="The query drive: a shipped sequence or a scenario file.",
         ),
     ],
     output: Results,

@@ -47,7 +47,7 @@ def construction_year(
     name: str = "",
     faults: ImportFaults | None = None,
 ) -> int | None:
-    """Returns the year in which something was built, if it is told.
+    """Returns the year in which something was built, if the file has it.
 
     Args:
         attributes: of the object.

@@ -1,4 +1,4 @@
-"""Footprints raised to solids, with the roofs that OpenStreetMap knows."""
+"""Footprints raised to solids, with the roofs that OpenStreetMap describes."""
 
 from __future__ import annotations
 

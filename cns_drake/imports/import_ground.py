@@ -1,4 +1,4 @@
-"""The height of an imported city's ground, told or guessed."""
+"""The height of an imported city's ground, from the file or guessed."""
 
 from __future__ import annotations
 

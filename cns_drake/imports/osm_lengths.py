@@ -39,7 +39,7 @@ _QUOTES = str.maketrans({"’": "'", "′": "'", "”": '"', "″": '"'})
 
 
 def length(text: str | None) -> float | None:
-    """Returns a length in metres; None if it is not told or is no length.
+    """Returns a length in metres; None if it is missing or no length.
 
     The greatest, where there is a list or a range.
     """
@@ -48,7 +48,7 @@ def length(text: str | None) -> float | None:
 
 
 def count(text: str | None) -> float | None:
-    """Returns a number, such as of levels; None if it is not told or is none.
+    """Returns a number, such as of levels; None if it is missing or none.
 
     The greatest, where there is a list or a range.
     """

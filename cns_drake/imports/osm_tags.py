@@ -79,7 +79,7 @@ def told(
     where: tuple[str, ImportFaults] | None,
     least: float = 0.0,
 ) -> float | None:
-    """Returns what a tag tells, None if it does not.
+    """Returns the meaning of a tag, None if it has none.
 
     Args:
         tags: of a thing.

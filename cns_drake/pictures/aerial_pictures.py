@@ -39,7 +39,7 @@ def draw_drives(scenarios: Mapping[str, Scenario], path: Path) -> None:
 
     Args:
         scenarios: title -> drive.
-        path: the picture to write; its ending tells the format.
+        path: the picture to write; its ending chooses the format.
 
     Raises:
         InputError: a drive cannot be planned, a world not be loaded or the

@@ -49,7 +49,7 @@ def draw_stages(stages: dict[str, Path], view: View, path: Path) -> None:
     Args:
         stages: title -> SDF world, from left to right.
         view: the camera.
-        path: the picture to write; its ending tells the format.
+        path: the picture to write; its ending chooses the format.
 
     Raises:
         InputError: a world cannot be loaded or the picture not be written.

@@ -7,7 +7,7 @@ from cns_drake.scenarios.section import field_off_by_default
 
 
 class ImuConfig(Mount):
-    """An IMU, ideal and with one sample a scan unless told otherwise.
+    """An IMU, ideal and with one sample a scan unless a field says otherwise.
 
     Attributes:
         rate: samples per second.

@@ -1,4 +1,4 @@
-"""What Drake tells of a file that it cannot read."""
+"""Drake's messages about a file that it cannot read."""
 
 from __future__ import annotations
 

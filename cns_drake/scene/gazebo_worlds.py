@@ -103,7 +103,7 @@ class _Simplifier:
                 some += ", ..." if len(uris) > 3 else ""
                 notes.append(
                     f"{self._path}: {len(uris)} {what} not found, and left "
-                    f"out: {some}; --model-path tells where they are"
+                    f"out: {some}; name their folder with --model-path"
                 )
         return tuple(notes)
 

@@ -95,7 +95,7 @@ def structure_name(geometry_name: str) -> str:
 
 
 def check_shape(name: str, shape: Shape) -> None:
-    """Checks that the size of a shape is sane; of a mesh its file tells.
+    """Checks the size of a shape; that of a mesh is in its file.
 
     Args:
         name: of the geometry.
@@ -134,7 +134,7 @@ def read_perception_geometry(
 
 
 class _Record(NamedTuple):
-    """What a SceneGraph tells of a geometry, for comparison."""
+    """The properties of a geometry in a SceneGraph, for comparison."""
 
     name: str
     frame_id: FrameId

@@ -236,7 +236,7 @@ def _check_file(path: Path) -> None:
 
 
 def _parse_fault(path: Path, *texts: str) -> InputError:
-    """Returns the error that tells the first two of what Drake told."""
+    """Returns the error with the first two of Drake's messages."""
     # Drake and libsdformat begin with the path, which Drake makes absolute, a
     # severity and a code.
     names = "|".join(re.escape(str(p)) for p in (path.absolute(), path))

@@ -27,7 +27,7 @@ def connect_motion(
     body: RigidBody,
     inputs: dict[str, InputPort],
 ) -> None:
-    """Connects inputs to what tells how bodies move.
+    """Connects inputs to the source of the bodies' motion.
 
     Args:
         builder: of the diagram.

@@ -20,7 +20,7 @@ _MOST_BLOCKS = 1 << 32
 
 @dataclass(frozen=True)
 class ImuNoise:
-    """How an IMU errs; ideal unless told otherwise.
+    """How an IMU errs; ideal unless a field says otherwise.
 
     The model is Kalibr's: a measurement is w + b + n with white noise n and
     a bias b that walks at random. For samples dt apart, n has the standard

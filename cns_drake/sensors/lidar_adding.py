@@ -110,7 +110,7 @@ def add_lidar(
         frame_id = body
         if motion_distortion:
             raise ValueError(
-                "motion distortion needs a body of a plant, which knows its "
+                "motion distortion needs a body of a plant, which has its "
                 "velocity; a frame of another source does not"
             )
     if unseen is not None:

@@ -89,7 +89,7 @@ class RosettePattern(_TimedPattern):
         num_lines: int = 1,
         height_deg: float = 0.0,
     ):
-        """Takes what a data sheet tells.
+        """Makes the pattern from the figures of a data sheet.
 
         Args:
             fov_deg: full angle of a disc.
@@ -155,7 +155,7 @@ class NoddingPattern(_TimedPattern):
         max_range: float,
         period: float,
     ):
-        """Takes what a data sheet tells.
+        """Makes the pattern from the figures of a data sheet.
 
         Args:
             elevations_deg: lowest and highest.

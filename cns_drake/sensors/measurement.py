@@ -41,7 +41,7 @@ class Returns(NamedTuple):
 
 @dataclass(frozen=True)
 class MeasurementModel:
-    """How a LiDAR measures; ideal unless told otherwise.
+    """How a LiDAR measures; ideal unless a field says otherwise.
 
     Random numbers depend on `seed`, `sensor_name` and the number of the
     frame alone, and are drawn for every beam, whatever it meets: neither

@@ -1,4 +1,4 @@
-"""What a run tells while it goes on, and what it has done."""
+"""The progress of a run, and its result."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 # Reports that so many frames of so many are done.
 ProgressCallback = Callable[[int, int], None]
-# Takes what a user should know, in words.
+# Receives a message for the user.
 NoteCallback = Callable[[str], None]
 
 

@@ -56,7 +56,7 @@ def scan_world(
 
 
 def check_ending(path: Path) -> None:
-    """Checks that `save_scan` knows the format of a file.
+    """Checks that `save_scan` can write the format of a file.
 
     Raises:
         InputError: it does not.
@@ -69,7 +69,7 @@ def check_ending(path: Path) -> None:
 
 
 def save_scan(scan: np.ndarray, path: Path) -> None:
-    """Saves a scan's x, y, z and intensity; the ending tells the format.
+    """Saves a scan's x, y, z and intensity; the ending chooses the format.
 
     `.bin` is KITTI's float32 x y z intensity, `.npy` the same numbers as an
     N x 4 array, `.pcd` a binary PCD file.

@@ -179,7 +179,7 @@ def control_drives(sequences: Sequence[Scenario]) -> list[Scenario]:
 def recording_info(
     scenario: Scenario, output: Path, is_waiting: bool
 ) -> RecordingInfo:
-    """Returns what the evaluation knows of a recording before it is made.
+    """Returns the description of a recording before it is made.
 
     Args:
         scenario: of a map.

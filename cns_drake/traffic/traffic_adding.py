@@ -158,7 +158,7 @@ def connect_traffic(
     lidar: System,
     goes_on: bool = False,
 ) -> None:
-    """Connects what a LiDAR has to be told of traffic.
+    """Connects traffic with a LiDAR.
 
     Args:
         builder: of the diagram.

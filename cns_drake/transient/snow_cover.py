@@ -103,7 +103,11 @@ def _cover(
     depth: float,
     is_ground: bool,
 ) -> bool:
-    """Puts a slab on what of a part faces the sky; tells whether anything."""
+    """Puts a slab on the faces of a part below the sky, if it has any.
+
+    Returns:
+        Whether there were any.
+    """
     corners = triangle_corners(part)
     corners = corners[upwardness(corners) > _LEAST_UP]
     if is_ground:

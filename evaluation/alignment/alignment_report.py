@@ -1,4 +1,4 @@
-"""What is told about an alignment."""
+"""The report on an alignment."""
 
 from __future__ import annotations
 

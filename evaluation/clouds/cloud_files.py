@@ -28,7 +28,7 @@ SCAN_LIMIT_BYTES = 1 << 27
 
 
 def read_cloud(path: Path) -> np.ndarray:
-    """Reads one point cloud into memory; its name's ending tells the format.
+    """Reads one point cloud into memory; the ending of its name is its format.
 
     `.pcd` and `.ply` in all their encodings; `.npy` holds N x 3 or N x 4
     numbers or a structured array; `.bin` is KITTI's sequence of float32

@@ -359,7 +359,7 @@ def report(
 @with_protocol
 def trend(
     databases: Annotated[list[Path], typer.Argument(metavar="DATABASE")],
-    query: Annotated[Path, typer.Option(help="The drive that asks.")],
+    query: Annotated[Path, typer.Option(help="The query drive.")],
     output: Annotated[Path, typer.Option(help="Folder to write.")],
     control: Annotated[
         list[Path] | None,

@@ -69,8 +69,8 @@ _OPTIONS: dict[str, tuple[object, object]] = {
             float | None,
             typer.Option(
                 metavar="S",
-                help="Loop closure: a drive is also asked about itself, of"
-                " places passed at least S seconds before.",
+                help="Loop closure: a drive is also its own database, with"
+                " the places that it passed at least S seconds before.",
             ),
         ],
         None,

@@ -76,7 +76,7 @@ def load_method(path: Path) -> type[Method]:
 
 
 def _telling(function: Callable, path: Path) -> Callable:
-    """Returns a function that tells what is raised in it in one line."""
+    """Returns a function whose exceptions become one line."""
 
     @functools.wraps(function)
     def call(*arguments: Any, **options: Any) -> Any:

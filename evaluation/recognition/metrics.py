@@ -84,7 +84,7 @@ class QueryOutcomes:
 
     @property
     def match_auroc(self) -> float:
-        """How well the best score tells queries with a match from others.
+        """How well the best score separates queries with a match from others.
 
         The area under the receiver operating characteristic: the chance that
         a query with a match has a higher best score than one without; equal

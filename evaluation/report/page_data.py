@@ -1,4 +1,4 @@
-"""What the page knows of drives and pairs, in the form its script reads."""
+"""Drives and pairs, in the form that the page's script reads."""
 
 from __future__ import annotations
 

@@ -47,7 +47,9 @@ def deskew(sequence: Sequence, index: int) -> np.ndarray:
     around = slice(first, index + _REACH + 2)
     X_WS = sequence.X_WS[around]
     if len(X_WS) < 2:
-        raise InputError(f"{sequence.name}: one pose tells no motion")
+        raise InputError(
+            f"{sequence.name}: one pose is not enough for a motion"
+        )
     # Differences of int64 are exact; stamps as doubles would not be.
     stamps_ns = sequence.stamps_ns[around] - sequence.stamps_ns[index]
     # Most points share their firing time with a whole column.

@@ -14,7 +14,7 @@ from evaluation.sequences import open_sequence
 from evaluation.study.drive_source import DriveSource, RecordedDrive
 
 _NAME = re.compile(r"(?P<map>.+)_(?P<stage>[^_]+)")
-_UNPLACED = "neither a scenario nor a name <map>_<stage> tells map and stage"
+_UNPLACED = "map and stage are unknown: no scenario, and no name <map>_<stage>"
 
 
 @dataclass(frozen=True)
@@ -224,7 +224,7 @@ def _is_exported_drive(path: Path) -> bool:
 
 
 def _place(path: Path, lidar: str | None) -> RecordingInfo | None:
-    """Returns a recording; None if nothing tells its map and stage."""
+    """Returns a recording; None without its map and stage."""
     sequence = open_sequence(path, lidar)
     scenario = sequence.scenario or {}
     way = driven_way(scenario)

@@ -1,4 +1,4 @@
-"""The process in which one job runs, and what it tells its parent.
+"""The process in which one job runs, and its messages to its parent.
 
 A process each, with an interpreter of its own: what a job leaves in memory
 goes with it (Python systems in a Drake diagram are not freed otherwise), and
@@ -106,7 +106,7 @@ def _listen(
     on_message: Callable[..., None],
     is_wanted: Callable[[], bool],
 ) -> tuple[str, str]:
-    """Returns the last that a job told, "" if it just ended."""
+    """Returns the last message of a job, "" if it just ended."""
     with contextlib.suppress(EOFError, ConnectionError):
         connection.send_bytes(job)
         while is_wanted():

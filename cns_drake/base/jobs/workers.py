@@ -16,7 +16,7 @@ Listener = Callable[..., None]
 
 
 class Workers(Protocol):
-    """Runs jobs side by side, and tells a `Listener` of them."""
+    """Runs jobs side by side, and reports them to a `Listener`."""
 
     def submit(self, name: str, job: bytes, priority: float) -> None:
         """Lets a job run, when there is room.
@@ -32,7 +32,7 @@ class Workers(Protocol):
 
 
 class LocalWorkers:
-    """Starts every job at once: whoever submits them knows the room.
+    """Starts every job at once: the caller sees to it that there is room.
 
     Nothing listens on any port, since whoever reached that could run
     programs here.

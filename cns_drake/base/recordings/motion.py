@@ -1,4 +1,4 @@
-"""What a vehicle's motion sensors told, as structured arrays."""
+"""Measurements of a vehicle's motion, as structured arrays."""
 
 from __future__ import annotations
 

@@ -61,7 +61,7 @@ class Draft:
         self._lanes.add(areas.lane_area())
 
     def rng(self, *words: str | int) -> np.random.Generator:
-        """Returns the generator of one task, told apart by words.
+        """Returns the random generator of one task, by its name.
 
         Every task has its own, so that a change in one district leaves the
         draws of all others alone.

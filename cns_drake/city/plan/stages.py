@@ -35,7 +35,7 @@ class Growth(_Model):
 
 
 class Stage(_Model):
-    """One stage, told in words and by what sets it apart from the next.
+    """One stage, in words and by what sets it apart from the next.
 
     Attributes:
         story: what a visitor of this stage would notice.

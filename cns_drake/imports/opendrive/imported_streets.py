@@ -104,7 +104,7 @@ class ImportedStreets:
         return self._sidewalks
 
     def medians(self) -> MultiPolygon:
-        """Returns medians that the file tells to have a kerb."""
+        """Returns the medians that have a kerb in the file."""
         return self._medians
 
 

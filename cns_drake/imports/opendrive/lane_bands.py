@@ -133,7 +133,7 @@ def _kind(road: ImportedRoad, section: LaneSection, lane: Lane) -> str:
 def _stations(
     road: ImportedRoad, section: LaneSection
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns places along a section, and where their pieces are told.
+    """Returns places along a section, and where their pieces begin in the file.
 
     Both sides of each joint are there.
     """

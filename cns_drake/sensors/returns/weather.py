@@ -49,7 +49,7 @@ _OVERLAP = (1.0, 3.0)
 
 @dataclass(frozen=True)
 class Weather:
-    """The weather of a drive; the air is clear unless told otherwise.
+    """The weather of a drive; the air is clear unless a field says otherwise.
 
     Attributes:
         visibility: meteorological visibility in fog, None without fog [m].

@@ -99,7 +99,7 @@ def test_what_cannot_be_placed_is_left_out(tmp_path):
     (found,) = find_recordings(tmp_path, told.append)
     assert found.name == "town_1"
     (note,) = told
-    assert note.startswith(f"{tmp_path / 'unnamed'}: left out: neither a")
+    assert note.startswith(f"{tmp_path / 'unnamed'}: left out: map and")
 
 
 def test_no_recordings_or_too_many(tmp_path):
