@@ -92,7 +92,7 @@ def test_names_serve_without_scenarios(tmp_path):
 
 def test_what_cannot_be_placed_is_left_out(tmp_path):
     drive(tmp_path / "unnamed", "01", "a", scenario=False)
-    with pytest.raises(InputError, match="unnamed: neither a scenario nor"):
+    with pytest.raises(InputError, match="unnamed: map and stage are unknown"):
         find_cities(tmp_path)
     drive(tmp_path / "town_1", "01", "a", scenario=False)
     told = []
