@@ -100,8 +100,13 @@ class Centreline:
         index = np.searchsorted(self._ends, s, side="left")
         index = np.minimum(index, len(self._pieces) - 1)
         result = np.empty((len(s), 3))
-        for k, piece in enumerate(self._pieces):
-            chosen = index == k
+        # Sorted once: a look at all of s for each piece takes minutes where
+        # there are many of both.
+        order = np.argsort(index, kind="stable")
+        found, first = np.unique(index[order], return_index=True)
+        groups = np.split(order, first[1:])
+        for k, chosen in zip(found.tolist(), groups, strict=False):
+            piece = self._pieces[k]
             local = s[chosen] - (self._ends[k] - piece.length)
             result[chosen] = piece.evaluate(local)
         return result

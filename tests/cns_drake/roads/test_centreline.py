@@ -5,6 +5,7 @@ import pytest
 
 from cns_drake.roads.centreline import (
     Centreline,
+    _Piece,
     blend,
     sample_stations,
 )
@@ -74,3 +75,21 @@ def test_blend_of_offset_lanes_keeps_the_headings():
     for edge in (points[1] - points[0], points[-1] - points[-2]):
         assert np.arctan2(edge[1], edge[0]) == pytest.approx(0.1, abs=1e-3)
     np.testing.assert_allclose(points[[0, -1]], [(0, 0), (40, 7)], atol=1e-9)
+
+
+def test_only_the_pieces_that_are_asked_for_are_looked_at(monkeypatch):
+    """Otherwise 100,000 waypoints take minutes."""
+    corners = [(10.0 * k, float(k % 2)) for k in range(40)]
+    curve = Centreline(corners, np.ones(38))
+    asked = []
+    evaluate = _Piece.evaluate
+
+    def counted(piece, s):
+        asked.append(len(s))
+        return evaluate(piece, s)
+
+    monkeypatch.setattr(_Piece, "evaluate", counted)
+    s = np.array([curve.length, 3.0, 0.0, 2.0, -1.0])
+    unsorted = curve.evaluate(s)
+    assert sorted(asked) == [1, 4]
+    np.testing.assert_array_equal(unsorted, [curve.evaluate([x])[0] for x in s])
