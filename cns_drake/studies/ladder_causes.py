@@ -26,6 +26,9 @@ STRONGEST = 4
 _TRANSIENT = (
     "parked_cars",
     "leaves",
+    "snow",
+    "scaffolds",
+    "works",
     "furniture",
 )
 CAUSES = (
@@ -56,6 +59,9 @@ STRENGTHS: Mapping[str, Mapping[int, Any]] = {
     # Parts, or a depth [m]; see the scenario.
     "parked_cars": {1: 0.25, 2: 0.5, 3: 0.75, 4: 1.0},
     "leaves": {1: 0.75, 2: 0.5, 3: 0.25, 4: 0.0},
+    "snow": {1: 0.05, 2: 0.1, 3: 0.2, 4: 0.4},
+    "scaffolds": {1: 0.1, 2: 0.2, 3: 0.4, 4: 0.8},
+    "works": {1: 0.05, 2: 0.1, 3: 0.2, 4: 0.4},
     "furniture": {1: 0.25, 2: 0.5, 3: 0.75, 4: 1.0},
     # Number of vehicles, and of walkers.
     "traffic": {1: 15, 2: 30, 3: 60, 4: 120},
@@ -77,6 +83,9 @@ _WORDS = {
     "construction": "mapped in stage {}",
     "parked_cars": "{:.0%} of the parked cars are others",
     "leaves": "{:.0%} of the leaves are left",
+    "snow": "{:g} m of snow",
+    "scaffolds": "{:.0%} of the fronts behind scaffolds",
+    "works": "works beside {:.0%} of the kerbs",
     "furniture": "{:.0%} of the furniture replaced",
     "traffic": "{} vehicles and as many walkers",
     "weather": "fog, {:g} m of visibility",

@@ -24,6 +24,9 @@ METHODS = (MethodChoice("solid"), MethodChoice("layered-overlap"))
 CHANGED = {
     "parked_cars": ("query", {"transient"}),
     "leaves": ("query", {"transient"}),
+    "snow": ("query", {"transient"}),
+    "scaffolds": ("query", {"transient"}),
+    "works": ("query", {"transient"}),
     "furniture": ("query", {"transient"}),
     "construction": ("database", {"stage"}),
     "traffic": ("query", {"traffic"}),
