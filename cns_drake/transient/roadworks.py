@@ -227,7 +227,10 @@ class _Site:
         turn: float,
         length: float,
     ) -> None:
-        """Adds a thing that lies on the ground at both of its ends."""
+        """Adds a thing that lies on the ground at both of its ends.
+
+        Where there is no ground, the thing is left out.
+        """
         yaw = self._stretch.yaw + turn
         middle = self._stretch.place(x, y)
         along = np.array([np.cos(yaw), np.sin(yaw)]) * length / 2
@@ -237,6 +240,8 @@ class _Site:
         if not np.isfinite(at):  # Beside the road is nothing.
             edge = self._stretch.place(x, -0.1)[None]
             at = float(self._ground.heights(edge, of_road=True)[0])
+        if not np.isfinite(at):  # Both places are slits of the ground.
+            return
         pitch = 0.0
         if length > 0.0 and np.isfinite(z).all():
             pitch = -float(np.arctan2(z[2] - z[1], length))

@@ -124,6 +124,19 @@ def test_a_part_of_the_works(changed):
         assert np.array_equal(thing.p_WPs, whole[name].p_WPs)
 
 
+def test_over_slits_of_the_ground_there_are_no_works(sdf, monkeypatch):
+    """A thing at a height of NaN would hide the whole world from rays."""
+
+    def heights(ground, xy, *, of_road):
+        return np.full(len(xy), np.nan)
+
+    monkeypatch.setattr(GroundSurface, "heights", heights)
+    config = TransientConfig(works=1.0)
+    before = load_world(sdf)
+    after = change_world(before, config, DRIVE, LANES)
+    assert read_standing(after).keys() == read_standing(before).keys()
+
+
 def test_kerbs_and_heights_of_a_plane_road(changed):
     """The oracle is where the road lies: between y = -3 and 3 of the town."""
     _, before = changed()
