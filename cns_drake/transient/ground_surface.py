@@ -64,7 +64,7 @@ class GroundSurface:
         self._tree = shapely.STRtree(from_above(self._corners))
 
     def _upward(self, part: StandingPart) -> np.ndarray:
-        corners = triangle_corners(part)
+        corners = faced_up(triangle_corners(part))
         middles = corners[:, :, :2].mean(axis=1)
         return corners[
             (upwardness(corners) > _LEAST_UP)
@@ -140,6 +140,12 @@ def triangle_corners(part: StandingPart) -> np.ndarray:
     if not isinstance(surface, TriangleSurface):
         return np.zeros((0, 3, 3))
     return part.p_WPs[surface.triangles]
+
+
+def faced_up(corners: np.ndarray) -> np.ndarray:
+    """Returns triangles of ground, whichever way round they are in a file."""
+    down = upwardness(corners) < 0.0
+    return np.where(down[:, None, None], corners[:, ::-1], corners)
 
 
 def from_above(corners: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.transient.draws import draws
 from cns_drake.transient.ground_surface import (
     GroundSurface,
+    faced_up,
     from_above,
     triangle_corners,
     upwardness,
@@ -87,7 +88,7 @@ def lay_snow(
 
 def _lies_below_road(part: StandingPart, ground: GroundSurface) -> bool:
     """Tells whether ground goes on below a carriageway."""
-    corners = triangle_corners(part)
+    corners = faced_up(triangle_corners(part))
     corners = corners[upwardness(corners) > 0.0]
     inner = ground.carriageway.buffer(-0.5)
     if inner.is_empty or len(corners) == 0:
@@ -109,6 +110,8 @@ def _cover(
         Whether there were any.
     """
     corners = triangle_corners(part)
+    if is_ground:
+        corners = faced_up(corners)
     corners = corners[upwardness(corners) > _LEAST_UP]
     if is_ground:
         corners = _beside(corners, ground)

@@ -13,7 +13,11 @@ from cns_drake.scene.world import load_world
 from cns_drake.sensors.lidar_presets import make_beam_pattern
 from cns_drake.simulation.scanning import scan_world
 from cns_drake.transient.changing import change_world
-from cns_drake.transient.ground_surface import GroundSurface
+from cns_drake.transient.ground_surface import (
+    GroundSurface,
+    faced_up,
+    upwardness,
+)
 from cns_drake.transient.standing import read_standing
 
 X_WT = RigidTransform(RollPitchYaw(*ORIGIN[3:]), ORIGIN[:3])
@@ -160,6 +164,15 @@ def test_kerbs_and_heights_of_a_plane_road(changed):
     lawn = ground.heights(places, of_road=False)
     assert lawn[1] == pytest.approx(0.45)
     assert np.isnan(lawn[[0, 2]]).all()
+
+
+def test_ground_is_ground_whichever_way_round_it_is():
+    rng = np.random.default_rng(2)
+    corners = rng.uniform(-1, 1, (50, 3, 3))
+    faced = faced_up(corners)
+    assert (upwardness(corners) < 0).sum() > 10
+    assert np.allclose(upwardness(faced), abs(upwardness(corners)))
+    assert np.array_equal(np.sort(faced, axis=1), np.sort(corners, axis=1))
 
 
 @pytest.mark.parametrize("depth", [0.1, 0.4])
