@@ -86,15 +86,12 @@ def _reference(package: str) -> str:
     lines = [f"# {package}", "", ast.get_docstring(tree) or ""]
     for name in sorted({*names} - {"__version__"}, key=str.lower):
         home = homes.get(name, "")
-        lines += ["", f"## {name}", ""]
         if home.startswith("cns_drake") and package != "cns_drake":
             # A name has one place in the site.
-            lines += [
-                f"The same as [that of cns_drake](cns_drake.md#{name.lower()})."
-            ]
+            link = f"[{name} of cns_drake](cns_drake.md#{home}.{name})"
+            lines += ["", f"## {name}", "", f"See {link}."]
         else:
-            lines += [f"::: {home}.{name}"]
-            lines += ["    options:", "      show_root_heading: false"]
+            lines += ["", f"::: {home}.{name}"]
     return "\n".join([*lines, ""])
 
 
