@@ -69,6 +69,25 @@ class Imported:
 
 
 @dataclass(frozen=True)
+class Thing:
+    """A small thing of a file, such as a bench.
+
+    Attributes:
+        source: name of what it was read from.
+        told: what that is, as the file has it.
+        kind: a key of `cns_drake.city.placement.objects.OBJECTS`.
+        xy: where it stands [m].
+        yaw: where it faces, if that is told [rad].
+    """
+
+    source: str
+    told: str
+    kind: str
+    xy: tuple[float, float]
+    yaw: float | None
+
+
+@dataclass(frozen=True)
 class ForeignCity:
     """What a file holds.
 
@@ -80,6 +99,8 @@ class ForeignCity:
         faults: what was repaired or left out.
         streets: whose lanes are known; drives are looked for in them.
         keeps_left: whether the file says that traffic does.
+        things: small ones, which only a dressed city has; they are counted as
+            left out.
         axes: what the file's coordinates are, unless they are metres, east,
             north and up.
     """
@@ -91,6 +112,7 @@ class ForeignCity:
     streets: Sequence[Street] = ()
     keeps_left: bool = False
     axes: tuple[str, ...] = ()
+    things: Sequence[Thing] = ()
 
 
 def make_imported(

@@ -26,6 +26,13 @@ class ImportFaults:
         self._counts[kind] += number
         self._examples.setdefault(kind, _printable(example))
 
+    def take_back(self, kind: str) -> None:
+        """Counts one fault less of a kind that has some."""
+        kind = _printable(kind)
+        self._counts[kind] -= 1
+        if not self._counts[kind]:
+            del self._counts[kind], self._examples[kind]
+
     def rows(self) -> list[tuple[str, int, str]]:
         """Returns kind, how many, and an example, most frequent first."""
         return [

@@ -13,7 +13,7 @@ import numpy as np
 
 from cns_drake.base.errors import InputError
 from cns_drake.city.geometry.structures import MeshShape
-from cns_drake.imports.dressing.dressed_city import dress_buildings
+from cns_drake.imports.dressing.whole_city import dress_city
 from cns_drake.imports.drive_files import write_drives
 from cns_drake.imports.drive_search import find_drives
 from cns_drake.imports.foreign_city import ForeignCity, Imported
@@ -79,14 +79,14 @@ def import_city(
     drives = _lifted(drives, ground, city.faults)
     bare, dressing = staged.kept, None
     if options.dressed:
-        progress("dressing buildings")
-        dressing = dress_buildings(
-            staged.kept, drives, city.streets, ground, options.seed
-        )
-        staged = staged.replaced(dressing.buildings)
+        progress("dressing buildings and streets")
+        dressing = dress_city(staged, city, drives, ground, options.seed)
+        staged = dressing.city
     progress(f"writing {output}")
     with map_draft(output) as draft:
-        bottom = bottom_of(staged.kept, ground)
+        bottom = bottom_of(bare, ground)
+        if dressing is not None:
+            bottom = dressing.ground(bottom)
         write_world(draft, source, staged, bottom, dressing)
         write_facts(
             draft,

@@ -15,7 +15,7 @@ from cns_drake.base.map_folder import MESH_FOLDER, STRUCTURES_NAME, stage_name
 from cns_drake.city.generation.generate import structure_table
 from cns_drake.city.generation.sdf import stage_sdf
 from cns_drake.city.geometry.structures import Structure
-from cns_drake.imports.dressing.dressed_city import DressedBuildings
+from cns_drake.imports.dressing.whole_city import Dressing
 from cns_drake.imports.foreign_city import ForeignCity
 from cns_drake.imports.grown_city import Growth
 from cns_drake.imports.import_report import ImportOptions
@@ -46,7 +46,7 @@ def write_world(
     source: Path,
     city: StagedCity,
     bottom: Sequence[Structure],
-    dressing: DressedBuildings | None = None,
+    dressing: Dressing | None = None,
 ) -> None:
     """Writes the stages, their meshes and the table of structures.
 
@@ -55,18 +55,14 @@ def write_world(
         source: the file that the city was read from.
         city: all structures.
         bottom: the ground below them, at all stages.
-        dressing: what was added to buildings, if they were dressed.
+        dressing: what was added, if the city was dressed.
     """
     structures = [*bottom, *(one.structure for one in city.kept)]
     table = structure_table(structures)
     if dressing is not None:
-        dressed = set(dressing.buildings.values())
-        table = with_column(
-            table,
-            "origin",
-            ["guess"] * len(bottom)
-            + ["dressed" if one in dressed else "file" for one in city.kept],
-        )
+        names = [one.structure.name for one in city.kept]
+        origins = [dressing.origins.get(name, "file") for name in names]
+        table = with_column(table, "origin", ["guess"] * len(bottom) + origins)
     (draft / STRUCTURES_NAME).write_text(table, "utf-8")
     for stage, some in city.standing.items():
         text = stage_sdf(
@@ -93,7 +89,7 @@ def write_facts(
     options: ImportOptions,
     stages: Sequence[str],
     growth: Growth | None,
-    dressing: DressedBuildings | None = None,
+    dressing: Dressing | None = None,
 ) -> None:
     """Writes where the map comes from, where it lies, and what was drawn."""
     facts = {
@@ -104,7 +100,7 @@ def write_facts(
         "lod": options.lod if options.lod is not None else "highest",
         "years": dict(zip(stages, options.years, strict=False)),
         **_drawn(options, growth),
-        **_dressed(options, dressing),
+        **({"dressing": dict(dressing.facts)} if dressing else {}),
         "left_out_or_repaired": {
             kind: number for kind, number, _ in city.faults.rows()
         },
@@ -132,20 +128,6 @@ def _drawn(options: ImportOptions, growth: Growth | None) -> dict:
             "seed": options.seed,
             "missing": list(growth.missing),
             "part_of_height": growth.lower,
-        }
-    }
-
-
-def _dressed(options: ImportOptions, dressing: DressedBuildings | None) -> dict:
-    """Returns what of the looks of buildings the file says, and what not."""
-    if dressing is None:
-        return {}
-    return {
-        "dressing": {
-            "seed": options.seed,
-            "buildings": len(dressing.buildings),
-            "by_file": dict(dressing.by_file),
-            "by_lot": dict(dressing.by_lot),
         }
     }
 

@@ -42,6 +42,7 @@ from cns_drake.imports.osm_streets import (
     street_surfaces,
 )
 from cns_drake.imports.osm_tags import area_kind, told
+from cns_drake.imports.osm_things import make_things
 
 # Sizes of barriers and trees [m].
 _TALLEST = 150.0
@@ -92,6 +93,9 @@ def import_openstreetmap(path: Path, year_attribute: str | None) -> ForeignCity:
         any(
             tags.get("driving_side") == "left"
             for _, tags, _, _ in features.ways
+        ),
+        things=list(
+            make_things(features.nodes, features.ways, features.kinds, local)
         ),
     )
 

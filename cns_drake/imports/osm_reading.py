@@ -100,6 +100,7 @@ class OsmFeatures:
         ways: with all of their places that are in the file.
         trees: id, tags and place.
         crossings: number of the node, and tags.
+        nodes: id, tags and place of all other nodes that have tags.
         kinds: id of each thing that has tags -> what it is; nodes have `n`
             before their number, ways `w` and relations `r`.
         faults: what could not be read.
@@ -111,6 +112,9 @@ class OsmFeatures:
         default_factory=list
     )
     crossings: list[tuple[int, Tags]] = field(default_factory=list)
+    nodes: list[tuple[str, Tags, tuple[float, float]]] = field(
+        default_factory=list
+    )
     kinds: dict[str, str] = field(default_factory=dict)
     faults: ImportFaults = field(default_factory=ImportFaults)
 
@@ -164,6 +168,9 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
                     features.trees.append((f"n{one.id}", tags, place))
                 elif tags.get("highway") == "crossing":
                     features.crossings.append((one.id, tags))
+                elif tags:
+                    place = (one.lon, one.lat)
+                    features.nodes.append((f"n{one.id}", tags, place))
     except (
         RuntimeError,
         ValueError,

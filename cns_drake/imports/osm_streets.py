@@ -83,7 +83,7 @@ def street_surfaces(
 def drivable_streets(ways: Iterable[OsmWay], local: Local) -> list[Street]:
     """Returns the streets that a car may drive, and where they meet."""
     streets = []
-    for _, tags, line, nodes in ways:
+    for name, tags, line, nodes in ways:
         width = street_width(tags)
         if width is None or is_told(tags, "tunnel") or is_told(tags, "area"):
             continue
@@ -91,7 +91,16 @@ def drivable_streets(ways: Iterable[OsmWay], local: Local) -> list[Street]:
         if forward or backward:
             beside = lanes_beside(tags, width)
             streets.append(
-                Street(local(line), nodes, forward, backward, beside)
+                Street(
+                    local(line),
+                    nodes,
+                    forward,
+                    backward,
+                    beside,
+                    width,
+                    name,
+                    tags,
+                )
             )
     return streets
 

@@ -80,6 +80,16 @@ class StagedCity:
             kept=[changed.get(one, one) for one in self.kept],
         )
 
+    def joined(self, added: Sequence[Imported]) -> StagedCity:
+        """Returns the city with more structures, at all stages."""
+        return replace(
+            self,
+            standing={
+                stage: [*some, *added] for stage, some in self.standing.items()
+            },
+            kept=[*self.kept, *added],
+        )
+
 
 def stage_city(
     source: object, city: ForeignCity, options: ImportOptions

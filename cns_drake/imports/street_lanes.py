@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -23,6 +23,9 @@ class Street:
             there.
         forward, backward: whether it is driven along its line, and against.
         aside: from its middle to that of the outermost lane [m].
+        width: of its carriageway; 0 if it is not known [m].
+        name: of what it was read from.
+        tags: that the file gives it.
     """
 
     line: np.ndarray
@@ -30,6 +33,9 @@ class Street:
     forward: bool
     backward: bool
     aside: float
+    width: float = 0.0
+    name: str = ""
+    tags: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

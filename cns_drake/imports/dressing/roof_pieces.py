@@ -26,7 +26,7 @@ _LEAST_ROOF = 40.0  # [m^2]
 # For each piece of equipment so much roof [m^2], and at most so many.
 _ROOF_EACH, _MOST = 90.0, 6
 _ITEMS = {
-    Use.FLATS: "stair_house vents skylight tank vents mast",
+    Use.FLATS: "stair_house vents skylight tank vents dish",
     Use.OFFICE: "lift_house air_handler ac_unit ac_unit vents cooling_tower",
     Use.RETAIL: "air_handler ac_unit skylight vents ac_unit dish",
     Use.PUBLIC: "stair_house air_handler skylight vents ac_unit mast",

@@ -1,0 +1,102 @@
+"""An imported city, dressed, and what of it is from the file."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from cns_drake.city.geometry.structures import Structure
+from cns_drake.imports.dressing.dressed_city import dress_buildings
+from cns_drake.imports.dressing.grounds import (
+    is_dense,
+    missing_sidewalks,
+    near_drives,
+    paved,
+    with_kerb,
+)
+from cns_drake.imports.dressing.street_dressing import dress_streets
+from cns_drake.imports.foreign_city import ForeignCity, Imported
+from cns_drake.imports.import_ground import Ground
+from cns_drake.imports.staged_city import StagedCity
+from cns_drake.imports.waypoint_drives import Drive
+
+
+@dataclass(frozen=True)
+class Dressing:
+    """What became of a city.
+
+    Attributes:
+        city: dressed.
+        origins: name of a structure -> `dressed` or `lot`; all others are as
+            the file has them.
+        facts: what came from the file and what by lot, to be written.
+        is_paved: whether the ground is, where the file does not say what it
+            is.
+    """
+
+    city: StagedCity
+    origins: Mapping[str, str]
+    facts: Mapping[str, Any]
+    is_paved: bool
+
+    def ground(self, bottom: Sequence[Structure]) -> list[Structure]:
+        """Returns the guessed ground as it looks."""
+        return [paved(one) if self.is_paved else one for one in bottom]
+
+
+def dress_city(
+    staged: StagedCity,
+    city: ForeignCity,
+    drives: Sequence[Drive],
+    ground: Ground,
+    seed: int,
+) -> Dressing:
+    """Dresses buildings and streets.
+
+    Args:
+        staged: what stands when.
+        city: what the file holds; its faults no longer count what has a
+            place.
+        drives: through it.
+        ground: below it.
+        seed: of what is drawn by lot.
+    """
+    buildings = dress_buildings(staged.kept, drives, city.streets, ground, seed)
+    changed = dict(buildings.buildings)
+    by_lot = Counter(buildings.by_lot)
+    is_paved = is_dense(staged.kept)
+    added: list[Imported] = []
+    if drives:
+        walks = [one for one in staged.kept if one.kind == "Sidewalk"]
+        changed |= {one: with_kerb(one) for one in near_drives(walks, drives)}
+        missing = missing_sidewalks(staged.kept, city.streets, drives)
+        added = [with_kerb(one) for one in missing]
+        by_lot["Sidewalk"] += len(added)
+    things = dress_streets(
+        [*staged.kept, *added], city.things, city.streets, drives, ground, seed
+    )
+    added += things.structures
+    for thing in city.things:
+        if thing.source in things.sources:
+            things.sources.remove(thing.source)
+            city.faults.take_back(f"{thing.told}, left out")
+    origins = {one.structure.name: "dressed" for one in changed.values()}
+    from_file = things.from_file
+    origins |= {
+        one.structure.name: "lot"
+        for one in added
+        if one.structure.name not in from_file
+    }
+    facts = {
+        "seed": seed,
+        "buildings": len(buildings.buildings),
+        "by_file": dict(
+            sorted((Counter(buildings.by_file) + things.by_file).items())
+        ),
+        "by_lot": dict(sorted((+by_lot + things.by_lot).items())),
+        "without_room": things.no_room,
+    }
+    dressed = staged.replaced(changed).joined(added)
+    return Dressing(dressed, origins, facts, is_paved)

@@ -1,0 +1,249 @@
+"""Streets are furnished by the file first, then by lot, off the drives."""
+
+from itertools import combinations
+
+from helpers.small_osm import OsmWriter
+import numpy as np
+import pytest
+from shapely.geometry import LineString, Point
+
+from cns_drake.city.geometry.object_parts import HEADROOM, part_triangles
+from cns_drake.imports.dressing.grounds import (
+    missing_sidewalks,
+    paved,
+    with_kerb,
+)
+from cns_drake.imports.dressing.street_dressing import dress_streets
+from cns_drake.imports.dressing.whole_city import dress_city
+from cns_drake.imports.import_ground import bottom_of, ground_of
+from cns_drake.imports.import_report import ImportOptions
+from cns_drake.imports.openstreetmap import import_openstreetmap
+from cns_drake.imports.osm_things import object_of
+from cns_drake.imports.staged_city import stage_city
+from cns_drake.imports.waypoint_drives import Drive
+
+WIDTH = 9.0
+
+
+def write_street(osm, **tags):
+    """Writes a street of 200 m along y = 0, and houses on both sides."""
+    ends = [osm.node(-100, 0), osm.node(100, 0)]
+    osm.way_of(ends, highway="residential", width=f"{WIDTH:g}", **tags)
+    for x in (-90, 40):
+        osm.box(x, 12, 50, 10, building="yes", height="12")
+        osm.box(x, -22, 50, 10, building="yes", height="12")
+
+
+def read(osm, folder):
+    return import_openstreetmap(osm.write(folder / "city.osm"), None)
+
+
+def origin(city):
+    """Returns where the writer's origin lies in the map."""
+    return city.streets[0].line.mean(axis=0)
+
+
+def drive_of(city, y=2.25):
+    x = np.linspace(-95, 95, 96)
+    path = np.column_stack([x, np.full(96, y)]) + origin(city)
+    return Drive(path, path)
+
+
+def dressed(city, seed=0):
+    ground = ground_of(city.structures)
+    drives = [drive_of(city)]
+    return dress_streets(
+        city.structures, city.things, city.streets, drives, ground, seed
+    )
+
+
+def corners(structure):
+    """Returns the corners of a structure below headroom, in the world."""
+    c, s = np.cos(structure.yaw), np.sin(structure.yaw)
+    found = []
+    for part in structure.model.parts:
+        p, _ = part_triangles(part, structure.model.meshes)
+        found.append(p[p[:, 2] < HEADROOM])
+    p = np.concatenate(found)
+    xy = p[:, :2] @ np.array([[c, s], [-s, c]])
+    return xy + structure.xyz[:2]
+
+
+@pytest.mark.parametrize(
+    ("tags", "name"),
+    [({"highway": "street_lamp"}, "lamp_post"),
+     ({"highway": "street_lamp", "lamp_mount": "wall_mounted"}, None),
+     ({"emergency": "fire_hydrant"}, "hydrant"),
+     ({"emergency": "fire_hydrant", "fire_hydrant:type": "underground"}, None),
+     ({"traffic_sign": "DE:283"}, "sign_round"),
+     ({"highway": "bus_stop", "shelter": "yes"}, "bus_shelter"),
+     ({"highway": "bus_stop"}, "sign_rectangular"),
+     ({"amenity": "cafe"}, None), ({"amenity": "no"}, None), ({}, None)],
+)  # fmt: skip
+def test_objects_of_tags(tags, name):
+    assert object_of(tags) == name
+
+
+def test_things_of_the_file_stand_at_their_place(tmp_path):
+    osm = OsmWriter()
+    write_street(osm)
+    lamp = osm.node(10, -6, highway="street_lamp")
+    bench = osm.node(-30, -7, amenity="bench", direction="180")
+    inside = osm.node(-70, -17, amenity="bench")
+    sign = osm.node(30, 0, traffic_sign="DE:283")
+    osm.way([(-60, -8.5), (60, -8.5)], natural="tree_row")
+    city = read(osm, tmp_path)
+    found = dressed(city)
+    placed = {one.structure.name: one.structure for one in found.structures}
+    at = placed[f"lamp_post_n{lamp}"]
+    np.testing.assert_allclose(
+        at.xyz[:2], origin(city) + np.array([10, -6]), atol=0.01
+    )
+    assert at.semantic_class == "pole"
+    # Its arm, along its x, reaches over the street.
+    assert at.yaw == pytest.approx(np.pi / 2, abs=1e-3)
+    facing = placed[f"bench_n{bench}"].yaw
+    assert facing == pytest.approx(-np.pi / 2, abs=1e-3)
+    assert f"bench_n{inside}" not in placed
+    # A sign on the middle of a street stands beside it, on the right.
+    moved = placed[f"sign_round_n{sign}"]
+    expected = origin(city) + np.array([30, -(WIDTH / 2 + 0.6)])
+    np.testing.assert_allclose(moved.xyz[:2], expected, atol=0.01)
+    trees = sorted(
+        one.xyz[0] for name, one in placed.items() if name.startswith("lime")
+    )
+    assert len(trees) == 15
+    np.testing.assert_allclose(np.diff(trees), 8.0, atol=0.01)
+    assert found.by_file["Lamp post"] == 1
+    assert found.no_room == 1
+
+
+def test_nothing_stands_in_the_way_or_in_each_other(tmp_path):
+    osm = OsmWriter()
+    write_street(osm)
+    for x in range(-90, 90, 6):
+        osm.node(x, 2.0 + 0.02 * x, amenity="bench")
+    city = read(osm, tmp_path)
+    found = dressed(city)
+    path = LineString(drive_of(city).path)
+    assert found.by_lot["Parked vehicles"] > 5
+    for one in found.structures:
+        xy = corners(one.structure)
+        assert min(path.distance(Point(p)) for p in xy) > 1.5
+    outlines = [one.structure.footprint_W for one in found.structures]
+    for a, b in combinations(outlines, 2):
+        assert not a.intersects(b)
+
+
+@pytest.mark.parametrize(
+    ("tags", "parks"),
+    [({}, True), ({"parking__both": "no"}, False),
+     ({"parking__both": "lane"}, True),
+     ({"parking__lane__right": "no_stopping"}, False)],
+)  # fmt: skip
+def test_cars_park_where_they_may(tmp_path, tags, parks):
+    osm = OsmWriter()
+    write_street(osm, **tags)
+    found = dressed(read(osm, tmp_path))
+    classes = {one.structure.semantic_class for one in found.structures}
+    assert ("car" in classes) == parks == (found.by_lot["Parked vehicles"] > 0)
+
+
+def test_a_car_park_has_cars_within_it(tmp_path):
+    osm = OsmWriter()
+    write_street(osm, parking__both="no")
+    osm.box(-30, -12, 60, 5.5, amenity="parking")
+    city = read(osm, tmp_path)
+    cars = [
+        one.structure
+        for one in dressed(city).structures
+        if one.structure.semantic_class == "car"
+    ]
+    assert len(cars) > 5
+    low = origin(city) + np.array([-30, -12])
+    for car in cars:
+        xy = np.array(car.footprint_W.exterior.coords)
+        assert (xy > low - 0.3).all()
+        assert (xy < low + np.array([60.3, 5.8])).all()
+
+
+def test_lots_do_not_depend_on_each_other(tmp_path):
+    osm = OsmWriter()
+    write_street(osm)
+    city = read(osm, tmp_path)
+    names = [
+        [
+            (o.structure.name, o.structure.xyz)
+            for o in dressed(city, seed).structures
+        ]
+        for seed in (0, 0, 1)
+    ]
+    assert names[0] == names[1] != names[2]
+
+
+def test_sidewalks_are_added_where_nothing_is_told_of_them(tmp_path):
+    osm = OsmWriter()
+    ends = [osm.node(-100, 0), osm.node(100, 0)]
+    osm.way_of(ends, highway="residential", width="9")
+    osm.way([(-100, 60), (100, 60)], highway="residential", sidewalk="no")
+    osm.box(-5, 200, 9, 9, building="yes")
+    city = read(osm, tmp_path)
+    drives = [drive_of(city)]
+    (walk,) = missing_sidewalks(city.structures, city.streets, drives)
+    a, b, c = np.moveaxis(walk.triangles, 1, 0)
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+    # Two strips, and around both ends half a ring of 16 corners.
+    ring = 8 * np.sin(np.pi / 8) * (6.5**2 - 4.5**2)
+    assert area == pytest.approx(2 * 2 * 200 + ring, rel=1e-3)
+    kerb = with_kerb(walk).structure.model.meshes[f"{walk.structure.name}_kerb"]
+    faces = kerb.vertices[np.array(kerb.faces)]
+    edges = np.linalg.norm(faces[:, 1, :2] - faces[:, 0, :2], axis=1)
+    around = 16 * 2 * np.sin(np.pi / 16)
+    expected = 4 * 200 + around * (6.5 + 4.5)
+    assert edges.sum() == pytest.approx(expected, rel=1e-3)
+    assert {*faces[:, :, 2].ravel().round(3)} == {0.12, -0.13}
+    # Each looks away from the sidewalk.
+    normal = np.cross(faces[:, 1] - faces[:, 0], faces[:, 3] - faces[:, 0])
+    middle = faces.mean(axis=1) + 0.01 * normal / np.linalg.norm(
+        normal, axis=1, keepdims=True
+    )
+    line = LineString(city.streets[0].line)
+    gaps = np.array([line.distance(Point(p[:2])) for p in middle])
+    assert ((gaps < 4.5) | (gaps > 6.33)).all()
+
+
+def test_a_city_counts_what_is_from_the_file_and_what_by_lot(tmp_path):
+    osm = OsmWriter()
+    write_street(osm, sidewalk="both")
+    osm.node(10, -6, highway="street_lamp")
+    osm.node(-70, -17, amenity="bench")
+    city = read(osm, tmp_path)
+    staged = stage_city("f", city, ImportOptions())
+    ground = ground_of(staged.kept)
+    before = {kind: number for kind, number, _ in city.faults.rows()}
+    assert before["highway=street_lamp, left out"] == 1
+    result = dress_city(staged, city, [drive_of(city)], ground, 0)
+    after = {kind: number for kind, number, _ in city.faults.rows()}
+    assert "highway=street_lamp, left out" not in after
+    assert after["amenity=bench, left out"] == 1
+    assert result.facts["by_file"]["Lamp post"] == 1
+    assert result.facts["without_room"] == 1
+    origins = result.origins
+    kinds = {
+        one.structure.name: origins.get(one.structure.name, "file")
+        for one in result.city.kept
+    }
+    by_start = {
+        start: {o for name, o in kinds.items() if name.startswith(start)}
+        for start in ("building", "walk", "road", "lamp_post_n", "car")
+    }
+    assert by_start == {
+        "building": {"dressed"}, "walk": {"dressed"}, "road": {"file"},
+        "lamp_post_n": {"file"}, "car": {"lot"},
+    }  # fmt: skip
+    (bottom,) = bottom_of(staged.kept, ground)
+    (seen,) = result.ground([bottom])
+    # Four houses of 500 m^2 in 180 m by 44 m.
+    assert result.is_paved
+    assert seen.model.parts[0].rgb == paved(bottom).model.parts[0].rgb
+    assert seen.model.parts[0].rgb != bottom.model.parts[0].rgb
