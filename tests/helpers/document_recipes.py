@@ -551,6 +551,7 @@ RECIPES = {
 
 # What cannot run here: how it begins, and why.
 NOT_RUN = {
+    "mkdocs serve": "a server, which does not end; test_site builds the site",
     "python3 -m venv .venv\n": "installs from the network; test_wheel installs "
     "the same",
     "python3 -m venv .venv && .venv/bin/pip install -e": "installs from the "
