@@ -89,6 +89,8 @@ _ROUNDING = 0.01
 _WIDEST = 100.0
 _SHARPEST = 100.0
 _SHORTEST = 1e-5
+# Banked test tracks have up to 49 deg [rad].
+_MOST_BANKED = math.radians(50.0)
 # Longest part of a name that becomes part of others.
 _LONGEST_NAME = 60
 
@@ -186,7 +188,11 @@ def _road(
     if element.first("lateralProfile", "shape"):
         faults.add("lateral shape of a road, not read", name)
     junction = element.text("junction", "-1")
-    lateral = element.all("lateralProfile", "superelevation")
+    banking = _cubics(element.all("lateralProfile", "superelevation"), "s")
+    along = np.linspace(0.0, length, math.ceil(length) + 1)
+    if banking and np.abs(banking.at(along, along)).max() > _MOST_BANKED:
+        faults.add("superelevation beyond 50 deg, taken as level", name)
+        banking = Cubics()
     offsets = element.all("lanes", "laneOffset")
     return ImportedRoad(
         name=name,
@@ -194,7 +200,7 @@ def _road(
         length=length,
         pieces=tuple(pieces),
         elevation=_cubics(element.all("elevationProfile", "elevation"), "s"),
-        superelevation=_cubics(lateral, "s"),
+        superelevation=banking,
         lane_offset=_cubics(offsets, "s"),
         sections=tuple(sections),
         keeps_left=element.text("rule", "RHT").upper() == "LHT",

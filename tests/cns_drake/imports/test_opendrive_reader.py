@@ -1,5 +1,7 @@
 """Files of OpenDRIVE that are wrong, or hostile: one line, and no harm."""
 
+import math
+
 from helpers.small_opendrive import (
     TWO_LANES,
     cubic,
@@ -269,3 +271,30 @@ def test_links_to_nothing_are_counted(tmp_path):
         ("road of a junction that is not in the file", 1, "3"),
         ("link to a junction that is not in the file", 1, "3"),
     }
+
+
+@pytest.mark.parametrize(("end_deg", "count"), [(49.9, 0), (50.1, 1), (-97, 1)])
+def test_superelevation_has_a_limit(tmp_path, end_deg, count):
+    """Reached at the end of the road, 50 m on."""
+    growth = math.radians(end_deg) / 50.0
+    banked = cubic("superelevation", 0, 0.0, growth, 0, 0, "s")
+    path = write_roads(
+        tmp_path / "a.xodr", straight("1", 0, 0, 50, 0, lateral=banked)
+    )
+    roads, faults = faults_of(path)
+    kind = "superelevation beyond 50 deg, taken as level"
+    assert faults.get(kind, 0) == count
+    (one,) = roads.roads
+    assert bool(one.superelevation) == (count == 0)
+
+
+def test_a_piece_without_length_is_left_out(tmp_path):
+    pieces = [
+        geometry(0.0, 0.0, 0.0, 0.0, 25.0, "<line/>"),
+        geometry(25.0, 25.0, 0.0, 0.3, 0.0, "<line/>"),
+        geometry(25.0, 25.0, 0.0, 0.0, 25.0, "<line/>"),
+    ]
+    path = write_roads(tmp_path / "a.xodr", road("1", 50.0, pieces, [LANES]))
+    roads, faults = faults_of(path)
+    assert faults == {"geometry without length, left out": 1}
+    assert [piece.s for piece in roads.roads[0].pieces] == [0.0, 25.0]
