@@ -22,6 +22,7 @@ from cns_drake.scenarios.scenario_files import (
 from cns_drake.scenarios.sensor_making import (
     make_measurement,
     make_pattern,
+    make_returns,
 )
 from cns_drake.sensors.lidar import Lidar
 from cns_drake.simulation.planned_sequence import PlannedSequence
@@ -78,7 +79,8 @@ class SimulatedSequence(PlannedSequence):
         if config.motion_distortion:
             self._column_t = pattern.column_t_ns * 1e-9
         measurement = make_measurement(config, name, scenario.seed)
-        self._is_random = measurement.is_random
+        returns = make_returns(config, scenario.weather, name, scenario.seed)
+        self._is_random = measurement.is_random or returns is not None
         # No LiDAR sees the vehicle that carries it.
         world = load_stage(scenario, with_vehicle=False, trajectory=trajectory)
         traffic = None
@@ -99,6 +101,7 @@ class SimulatedSequence(PlannedSequence):
             RigidTransform(),
             pattern,
             measurement=measurement,
+            returns=returns,
             with_sweep=True,
             moving_bodies=(
                 traffic.moving_frames if traffic and distorts else None

@@ -55,6 +55,26 @@ def test_noise_and_motion_distortion_too(tmp_path):
     check_same(simulated, recorded, [40, 0, 41, FRAMES - 1, 40])
 
 
+def test_calibrated_returns_in_fog_too(tmp_path):
+    scenario = tiny_scenario(
+        tmp_path,
+        frames=4,
+        weather={"visibility": 30.0},
+        lidars={
+            "lidar": {
+                "preset": "vlp-16",
+                "columns": 64,
+                "returns": "calibrated",
+            }
+        },
+    )
+    recorded = open_sequence(simulate(scenario, tmp_path / "out").folder)
+    simulated = SimulatedDrive(scenario)()
+    check_same(simulated, recorded, [2, 0, 3])
+    clear = scenario.with_returns("ideal")
+    assert len(SimulatedDrive(clear)().scan(0)) != len(simulated.scan(0))
+
+
 def test_identity_tells_scenarios_and_worlds_apart(tmp_path):
     scenario = tiny_scenario(tmp_path)
     source = SimulatedDrive(scenario)
