@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import contextlib
 import hashlib
 import json
@@ -33,6 +34,7 @@ _PACKAGES = (
     "rosbags",
     "zstandard",
 )
+_BLOCK_BYTES = 1 << 20
 # Where a recording's metadata keep the combined digest of its inputs.
 INPUTS_KEY = "inputs_sha256"
 
@@ -139,12 +141,20 @@ def digest_file(path: Path) -> str:
     """
     digest = hashlib.sha256()
     for name, file in sorted(_referenced_files(path).items()):
-        content = _read(file)
-        digest.update(f"{name} {len(content)}\n".encode())
-        digest.update(content)
+        with user_errors(file):
+            size = file.stat().st_size
+        digest.update(f"{name} {size}\n".encode())
+        _take(file, digest.update)
     # The file itself comes last, without its name.
-    digest.update(_read(path))
+    _take(path, digest.update)
     return digest.hexdigest()
+
+
+def _take(path: Path, update: Callable[[bytes], None]) -> None:
+    """Shows a file in blocks: textures and meshes may be of any size."""
+    with user_errors(path), open(path, "rb") as stream:
+        while block := stream.read(_BLOCK_BYTES):
+            update(block)
 
 
 def _referenced_files(model: Path) -> dict[str, Path]:

@@ -1,7 +1,9 @@
 """What a recording was made from and with."""
 
+import hashlib
 import importlib.metadata
 import shutil
+import tracemalloc
 
 from helpers.tiny_drive import tiny_scenario
 import pytest
@@ -10,6 +12,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.scenarios.provenance import (
     combined_digest,
     dependency_versions,
+    digest_file,
     digest_inputs,
 )
 
@@ -137,3 +140,24 @@ def test_packages_that_a_platform_lacks_have_no_version(monkeypatch):
     monkeypatch.setattr(importlib.metadata, "version", without_embree)
     del versions["embreex"]
     assert dependency_versions() == versions
+
+
+def test_a_digest_holds_little_of_a_large_file(tmp_path):
+    (tmp_path / "a.obj").write_text("mtllib a.mtl\n")
+    (tmp_path / "a.mtl").write_text("map_Kd a.png\n")
+    with open(tmp_path / "a.png", "wb") as stream:
+        stream.truncate(1 << 26)
+    tracemalloc.start()
+    try:
+        found = digest_file(tmp_path / "a.obj")
+        assert tracemalloc.get_traced_memory()[1] < 1 << 23
+    finally:
+        tracemalloc.stop()
+    expected = hashlib.sha256()
+    for name, content in (
+        ("a.mtl", b"map_Kd a.png\n"),
+        ("a.png", bytes(1 << 26)),
+    ):
+        expected.update(f"{name} {len(content)}\n".encode() + content)
+    expected.update(b"mtllib a.mtl\n")
+    assert found == expected.hexdigest()
