@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 
 from helpers.tiny_drive import tiny_scenario
 from helpers.transient_town import write_transient_town
@@ -11,11 +12,14 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.recordings.mcap_sequence import McapSequence
+from cns_drake.export.marked_sequence import MarkedSequence
 from cns_drake.scenarios.provenance import digest_inputs
 from cns_drake.scenarios.scenario_files import describe_scenario
 from cns_drake.scenarios.scenario_loading import make_scenario
 from cns_drake.simulation.simulated_drive import SimulatedSequence
 from cns_drake.simulation.simulation import simulate
+from cns_drake.simulation.stage_loading import load_stage
+from evaluation.change.tcr import temporal_change
 
 
 @pytest.fixture(scope="module")
@@ -73,6 +77,72 @@ def test_recordings_and_surveys_see_the_same_changes(scenario, tmp_path):
     assert causes["car_003"] == ["parked_cars"]
     assert causes["lamp_003"] is None
     assert any(name.startswith("parked_car_") for name in causes)
+
+
+def test_the_change_of_a_cause_is_that_of_its_instances_alone(scenario):
+    """TCR of a cause is that of replacing what met its instances alone."""
+    changed = SimulatedSequence(scenario.with_transient(parked_cars=1.0))
+    plain = SimulatedSequence(scenario)
+    causes = np.array(
+        [
+            entry.instance
+            for entry in load_stage(
+                scenario.with_transient(parked_cars=1.0)
+            ).structures
+            if entry.causes
+        ]
+    )
+    before, after, rebuilt = [], [], []
+    for index in range(3):
+        old, new = plain.scan(index), changed.scan(index)
+        met = {
+            key
+            for scan in (old, new)
+            for key in keys_of(scan[np.isin(scan["instance"], causes)])
+        }
+        kept = [key not in met for key in keys_of(old)]
+        fresh = [key in met for key in keys_of(new)]
+        assert 0 < sum(fresh) < len(new)
+        for clouds, scan in (
+            (before, old),
+            (after, new),
+            (rebuilt, np.concatenate([old[kept], new[fresh]])),
+        ):
+            scan = np.sort(scan, order=("ring", "t"))
+            p_S = np.column_stack([scan[axis] for axis in "xyz"])
+            X_WS = plain.X_WS[index]
+            clouds.append(p_S @ X_WS[:3, :3].T + X_WS[:3, 3])
+    before, after, rebuilt = map(np.concatenate, (before, after, rebuilt))
+    change = temporal_change(before, after, tau=0.3)
+    assert 0.0 < change.symmetric < 1.0
+    alone = temporal_change(before, rebuilt, tau=0.3)
+    assert change.symmetric == alone.symmetric
+
+
+def keys_of(scan):
+    """Which beam each point is of."""
+    return list(zip(scan["ring"].tolist(), scan["t"].tolist(), strict=True))
+
+
+def test_what_came_is_absent_in_another_stage(tmp_path):
+    """`--absent-in` marks new cars, and not what stands in both."""
+    town = tmp_path / "town"
+    town.mkdir()
+    world = write_transient_town(town)
+    shutil.copy(world, town / "stage_02.sdf")
+    world.rename(town / "stage_01.sdf")
+    place = {"world": None, "map": str(town), "stage": "01"}
+    scenario = tiny_scenario(tmp_path, frames=2, **place)
+    simulate(scenario.with_transient(parked_cars=1.0), tmp_path / "out")
+    folder = next((tmp_path / "out").iterdir())
+    marked = MarkedSequence(folder, None, "02")
+    scan = marked.scan(0)
+    names = {k: entry["name"] for k, entry in marked.instances.items()}
+    parked = [k for k, name in names.items() if name.startswith("parked_")]
+    came = np.isin(scan["instance"], parked)
+    assert 0 < came.sum() < len(scan)
+    assert (scan["label"][came] == 252).all()
+    assert (scan["label"][~came] < 252).all()
 
 
 @pytest.mark.parametrize(
