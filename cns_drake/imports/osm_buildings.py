@@ -120,7 +120,7 @@ def make_buildings(
             {"roof": RED_ROOF},
             construction_year(whole.tags, year_attribute, whole.name, faults),
             told_year(whole.tags.get("end_date", "")),
-            # Of parts that look different, the first one's looks are taken.
+            # Where parts look different, the looks of the first one count.
             tags={**blocks[0].tags, **whole.tags},
             lod=1.0,
         )

@@ -1,6 +1,6 @@
 """Temporal change ratio (TCR) of two maps, directed and symmetric.
 
-Of the paper "The City that Never Settles": equations 1 to 3. What it leaves
+Source: "The City that Never Settles", equations 1 to 3. What the paper leaves
 open is fixed as follows.
 
 - X is the map of a whole sequence in world coordinates, as the centroids of

@@ -18,7 +18,7 @@ from evaluation.clouds.pcd import read_pcd
 from evaluation.clouds.ply import read_ply
 from evaluation.clouds.record_blocks import check_size, read_binary
 
-# Of a file and how many points to yield at once.
+# Takes a file and how many points to yield at once.
 _Reader = Callable[[Path, int], Iterator[np.ndarray]]
 _BIN = np.dtype([(name, "<f4") for name in ("x", "y", "z", "intensity")])
 # Points of a map that are read at once.

@@ -16,7 +16,7 @@ from cns_drake.base.compiled import compiled
 
 # A group has so many points or more, but less than twice as many.
 _GROUP_SIZE = 16
-# So many points that came before bound the neighbourhood of the next one.
+# How many earlier points bound the neighbourhood of the next one.
 _MEMORY = 32
 # Bounds are widened by this factor, against rounding.
 _MARGIN = 1.0 + 1e-9

@@ -15,15 +15,15 @@ from evaluation.maps.voxel_maps import (
     VoxelMap,
 )
 
-# Of a voxel's side, for pictures: they show a point in each cube of 0.5 m.
+# Parts of a voxel's side in pictures, which show a point in each 0.5 m.
 PICTURE_DIVISIONS = 10
 
 
 class MappedSequence(Sequence):
     """A sequence whose scans enter a map as they are read for the first time.
 
-    Reading and unpacking scans takes longer than mapping them. Who asks for
-    scans in increasing order, give or take a few, has each read once.
+    Reading and unpacking scans takes longer than mapping them. In
+    increasing order, give or take a few, each scan is read once.
     """
 
     def __init__(self, sequence: Sequence, kept: int):

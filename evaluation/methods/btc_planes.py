@@ -145,7 +145,7 @@ def group_alike(
     """Returns the group (P,) of each patch; -1 for one that is like no other.
 
     From the last patch to the first, each is compared with all before it, in
-    their order. Of two that are alike, one without a group joins that of the
+    their order. If two are alike, one without a group joins that of the
     other, or both found a new one; two groups never become one.
 
     Args:

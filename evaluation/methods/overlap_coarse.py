@@ -139,7 +139,7 @@ def search_coarse(
     fine = _search_nearby(
         bits, database, coarse * [1, _SECOND_STEP, 1, 1], _THIRD_REACH
     )
-    # Of each place the best pose, in the order of these.
+    # The best pose of each place, in the order of the places.
     _, first = np.unique(fine[:, 0], return_index=True)
     return fine[np.sort(first)]
 
@@ -161,7 +161,7 @@ def _search_first(
         _FIRST_SHIFTS,
     )
     counts = counts[: len(database.places)]
-    # Of floats that hold whole numbers, products are exact and fast.
+    # Products of floats that hold whole numbers are exact and fast.
     of_query = _count_halves(bits).reshape(len(bits), -1).T.astype(float)
     of_places = database.first_counts.reshape(len(counts), -1).astype(float)
     weights = np.repeat(_FIRST_WEIGHTS, 2)[:, None]

@@ -18,7 +18,7 @@ from numba.core import cgutils, types
 from numba.extending import intrinsic
 
 LANES = 8
-# Of the first search: rows of a map, a word a row, and the weights of the
+# The first search: rows of a map, a word a row, and the weights of the
 # common bits of its maps, as powers of two; then those of the second.
 FIRST_ROWS, FIRST_POWERS = 32, (0, 1)
 SECOND_ROWS, SECOND_POWERS = 64, (0, 0, 2, 1)

@@ -18,7 +18,7 @@ from evaluation.recognition.scoring import score_places
 
 @dataclass(frozen=True)
 class Cost:
-    """Of one method, on one core.
+    """The cost of one method, on one core.
 
     Times are of the processor, medians over some scans.
 

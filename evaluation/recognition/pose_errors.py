@@ -22,7 +22,7 @@ SUCCESS_ROTATION_DEG = 5.0
 
 @dataclass(frozen=True)
 class PoseErrors:
-    """Of the pose of each of Q queries relative to its best place.
+    """Errors of the pose of each of Q queries relative to its best place.
 
     Attributes:
         translation: (Q,) distance to the true position [m]; NaN without a
@@ -123,7 +123,7 @@ def pose_metrics(
         accepted = outcomes.is_right & (outcomes.best_scores >= least)
     known = ~np.isnan(errors.translation)
     success = math.nan
-    # Who finds no place at all localises nothing, poses or not.
+    # A method that finds no place at all localises nothing.
     estimates = known.any() or np.isnan(outcomes.best_scores).all()
     if estimates and outcomes.has_match.any():
         is_near = (errors.translation <= SUCCESS_TRANSLATION) & (

@@ -168,7 +168,7 @@ def _areas(
 
 def _tau(first: np.ndarray, second: np.ndarray) -> float:
     with warnings.catch_warnings():
-        # Of equal values; the result is NaN then.
+        # SciPy warns of equal values; the result is NaN then.
         warnings.simplefilter("ignore")
         return float(kendalltau(first, second).statistic)
 

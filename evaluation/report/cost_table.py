@@ -11,8 +11,8 @@ from evaluation.report.tables import Table
 
 COST_CAPTION = (
     "What each method costs on one core of the machine that made this report:"
-    " time of the processor, medians over some scans. Of all tables only this"
-    " one differs from run to run (--no-costs leaves it out)."
+    " time of the processor, medians over some scans. This table alone"
+    " differs from run to run (--no-costs leaves it out)."
 )
 
 

@@ -1,8 +1,8 @@
 """What a report may stand beside: published numbers, and claims to judge.
 
 A study of somebody's own city has none. `Reference` itself is that: nothing
-published, nothing judged. Who has numbers to compare with hands a study an
-object of a class of their own.
+published, nothing judged. A study with numbers to compare with gets an object
+of another class.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ _ROW = 0.17
 _EDGES = 0.75
 _FONT_SIZE = 8.5
 _LEGEND_COLOUR = "#444444"
-# Of a pair's title and the gap above it, in rows.
+# Height of a pair's title and the gap above it, in rows.
 _TITLE_ROWS = 1.5
 
 

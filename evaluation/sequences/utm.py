@@ -2,7 +2,7 @@
 
 MulRan and HeLiPR give positions as easting, northing and height in zone 52N.
 Here W has its axes east, north and up, and its origin at a fixed point of
-that grid near the drives. So all sequences have the same W, and coordinates
+that grid near the drives. All sequences have the same W, and coordinates
 are a few kilometres instead of thousands: a float32 resolves them to under
 a millimetre where easting and northing would move in steps of 0.25 m.
 """

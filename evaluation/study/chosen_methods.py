@@ -16,7 +16,7 @@ from evaluation.methods import (
 )
 from evaluation.methods.own_file import load_method
 
-# Of a parameter, as text.
+# The value of a parameter, as text.
 Setting = str | tuple[str, ...]
 
 _FORM = "METHOD.NAME=VALUE"

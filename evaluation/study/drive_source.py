@@ -1,8 +1,8 @@
 """Where a drive comes from: opened, and identified, by whoever needs it.
 
 A job that works on a drive may run in another process, or on another
-machine, before or after the drive is recorded. So it is handed not the drive
-but what opens it.
+machine, before or after the drive is recorded. It is therefore given what opens
+the drive.
 """
 
 from __future__ import annotations

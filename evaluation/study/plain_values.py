@@ -74,7 +74,7 @@ class _Encoder:
 
     def __init__(self) -> None:
         self.arrays = io.BytesIO()
-        # Of an array's identity; it stays alive meanwhile.
+        # By an array's identity; it stays alive meanwhile.
         self._numbers: dict[int, tuple[int, np.ndarray]] = {}
 
     def encode(self, value: Any) -> Any:

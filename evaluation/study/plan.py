@@ -32,7 +32,7 @@ from evaluation.study.views import DrawChange, DrawCity
 _START_COST = 2.0
 _MAP_COST = 10.0
 _ROLE_COST = {"places": 12.0, "queries": 8.0}
-# Of the other jobs, beyond their start.
+# Costs of the other jobs, beyond their start.
 _CHANGE_COST = 6.0
 _CITY_COST = 4.0
 _COSTS_COST = 8.0

@@ -23,17 +23,17 @@ class SurveyFiles:
 
     @property
     def drive(self) -> Path:
-        """Of the `SurveyedDrive`."""
+        """Returns the file of the `SurveyedDrive`."""
         return self.folder / "drive.data"
 
     @property
     def fine(self) -> Path:
-        """Of the cloud for pictures."""
+        """Returns the file of the cloud for pictures."""
         return self.folder / "fine.data"
 
     @property
     def scans(self) -> Path:
-        """Of the scans of places or queries."""
+        """Returns the file of the scans of places or queries."""
         return self.folder / "scans.data"
 
     def described(self, method: MethodChoice) -> Path:
@@ -52,7 +52,7 @@ class RecognitionFiles:
     folder: Path
 
     def result(self, method: MethodChoice) -> Path:
-        """Of the `RecognitionResult` of a method."""
+        """Returns the file of the `RecognitionResult` of a method."""
         return self.folder / f"{file_name(method.name)}.data"
 
 
@@ -79,7 +79,7 @@ class StudyFiles:
         return SurveyFiles(self._parts / "surveys" / file_name(recording))
 
     def change(self, earlier: str, later: str) -> Path:
-        """Of the `ChangeResult` of two recordings."""
+        """Returns the file of the `ChangeResult` of two recordings."""
         name = f"{file_name(earlier)},{file_name(later)}.data"
         return self._parts / "changes" / name
 
@@ -89,20 +89,20 @@ class StudyFiles:
 
     @property
     def costs(self) -> Path:
-        """Of the list of `Cost`."""
+        """Returns the file of the list of `Cost`."""
         return self._parts / "costs" / "costs.data"
 
     def page_drives(self, city: str) -> Path:
-        """Of the `PageDrive`s of a city's stages, by name."""
+        """Returns the file of the `PageDrive`s of a city's stages, by name."""
         return self._parts / "pages" / f"{file_name(city)}.data"
 
     def trend_points(self, database: str, query: str) -> Path:
-        """Of the `TrendPoint`s of two recordings."""
+        """Returns the file of the `TrendPoint`s of two recordings."""
         name = f"{file_name(database)},{file_name(query)}.data"
         return self._parts / "trend" / name
 
     def rung(self, name: str) -> Path:
-        """Of the `RungOutcome`s of a rung of a ladder."""
+        """Returns the file of the `RungOutcome`s of a rung of a ladder."""
         return self._parts / "rungs" / f"{file_name(name)}.data"
 
     def drawn(self, stem: str) -> Path:

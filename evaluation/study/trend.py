@@ -25,7 +25,7 @@ from evaluation.report.drawing import method_entry, method_style, save
 from evaluation.report.method_titles import in_table_order
 from evaluation.study.trend_points import TrendPoint
 
-# Of the kernel that smooths over TCR_sym, as part of its range; and how the
+# Width of the kernel that smooths over TCR_sym, as part of its range; the
 # band is found: by drawing databases with replacement.
 _BANDWIDTH = 0.15
 _RESAMPLES = 1000

@@ -60,8 +60,8 @@ def measure_trend(
     """Returns the points of all databases and methods.
 
     What an earlier run left, finished or not, is used as far as it belongs
-    to the same recordings and methods. Of a database only its points are
-    left, since the surveys of many would fill a disk.
+    to the same recordings and methods. A database leaves only its points,
+    since the surveys of many would fill a disk.
 
     Args:
         query: the drive that asks.

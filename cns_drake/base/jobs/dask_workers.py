@@ -74,8 +74,8 @@ class DaskWorkers:
         if future.status == "finished":
             return None
         if future.status == "lost":
-            # Done, but its worker went before that was noticed here. Who does
-            # it again finds it done.
+            # Done, but its worker went before that was noticed here. A second
+            # run finds it done.
             return ProcessDiedError("its worker died")
         if future.status != "error":
             return LostSchedulerError(
