@@ -58,7 +58,7 @@ class NearCurvedShapes:
     def __init__(self, groups: Sequence[RayGroup]):
         """Takes the curved shapes of groups."""
         self._groups = groups
-        rows, X_GLs, sizes = [], [], []
+        rows, X_LGs, sizes = [], [], []
         for row, group in enumerate(groups):
             for _, X_LG, surface in group.members:
                 if isinstance(surface, TriangleSurface | HalfSpaceSurface):
@@ -68,10 +68,11 @@ class NearCurvedShapes:
                 else:
                     half, radius = surface.length / 2.0, surface.radius
                 rows.append(row)
-                X_GLs.append(X_LG.inverse().GetAsMatrix4())
+                X_LGs.append(X_LG.GetAsMatrix4())
                 sizes.append((half, 1.1 * radius + 2.0 * _GAP))
         self._rows = np.array(rows, int)
-        self._X_GLs = np.reshape(X_GLs, (-1, 4, 4))
+        X_LGset = np.reshape(X_LGs, (-1, 4, 4))
+        self._p_LGs, self._X_GLs = X_LGset[:, :, 3:], np.linalg.inv(X_LGset)
         self._sizes = np.reshape(sizes, (-1, 2))
         # How much longer an arrow of G can be in O.
         self._stretches = np.array(
@@ -99,7 +100,7 @@ class NearCurvedShapes:
         X_OLs = np.tile(np.eye(4), (len(self._groups), 1, 1))
         X_OLs[:, :3] = [group.X_OL for group in self._groups]
         X_GOs = self._X_GLs @ np.linalg.inv(X_OLs)[self._rows]
-        places = np.linalg.inv(X_GOs)[:, :3, 3]
+        places = (X_OLs[self._rows] @ self._p_LGs)[:, :3, 0]
         stretches = self._stretches[self._rows]
         reaches = stretches * self._sizes.sum(axis=1)
         travels = self._travels(places, reaches)

@@ -85,10 +85,20 @@ def read_scenario_file(path: Path) -> Scenario:
                 values[field] = str((path.parent / place).resolve())
             except ValueError as error:
                 raise InputError(f"{path}: {field}: {error}") from error
+    find_kalibr(values, path)
+    scenario = make_scenario(values, path)
+    scenario._file = path
+    return scenario
+
+
+def find_kalibr(values: dict, path: Path) -> None:
+    """Makes the path of the IMU's noise one that holds everywhere.
+
+    Args:
+        values: fields of a scenario or a family, to change.
+        path: the file that they are from; the path is relative to it.
+    """
     imu = values.get("imu")
     if isinstance(imu, dict) and isinstance(imu.get("kalibr"), str):
         kalibr = str((path.parent / imu["kalibr"]).resolve())
         values["imu"] = {**imu, "kalibr": kalibr}
-    scenario = make_scenario(values, path)
-    scenario._file = path
-    return scenario

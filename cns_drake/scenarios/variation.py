@@ -51,7 +51,7 @@ from cns_drake.scenarios.scenario_files import (
     map_folder,
     world_file,
 )
-from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.scenario_loading import find_kalibr, load_scenario
 from cns_drake.scenarios.shipped import shipped_sequences
 from cns_drake.scene.world import load_world, structures_in
 
@@ -162,6 +162,8 @@ def load_family(path: Path, redraw: Redraw | None = None) -> list[Scenario]:
         InputError: the file or what it refers to cannot be used.
     """
     values = read_yaml(path)
+    if isinstance(values, dict):
+        find_kalibr(values, path)
     try:
         family = Family.model_validate(values)
     except ValidationError as error:
@@ -197,6 +199,7 @@ def vary(
     base = base.model_copy(
         update={name: value for name, value in sections.items() if value}
     )
+    check_files(base, source)
     last = max(map_folder(base).stages())
     stage = family.stage or last
     if family.city_seeds:

@@ -5,7 +5,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from pydrake.common.value import AbstractValue, Value
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    LeafSystem,
+    ValueProducer,
+)
 
 from cns_drake.sensors.imu_noise import ImuErrors, ImuNoise
 
@@ -43,6 +49,15 @@ class NoisyImu(LeafSystem):
         self._rate = rate
         names = ("specific_force", "angular_velocity")
         self._inputs = [self.DeclareVectorInputPort(name, 3) for name in names]
+        # Both ports share a sample.
+        measured = self.DeclareCacheEntry(
+            "measured",
+            ValueProducer(
+                allocate=lambda: Value(object()), calc=self._calc_measured
+            ),
+            {*(port.ticket() for port in self._inputs), self.time_ticket()},
+        )
+        self._measured = measured
         for place, name in enumerate(names):
             self.DeclareVectorOutputPort(
                 name,
@@ -50,12 +65,17 @@ class NoisyImu(LeafSystem):
                 lambda context, output, place=place: self._calc(
                     place, context, output
                 ),
-                {self._inputs[place].ticket(), self.time_ticket()},
+                {self.cache_entry_ticket(measured.cache_index())},
             )
 
-    def _calc(self, place: int, context: Context, output: BasicVector) -> None:
+    def _calc_measured(self, context: Context, value: AbstractValue) -> None:
         sample = math.floor(context.get_time() * self._rate + _SAMPLE_TOLERANCE)
-        exact = np.zeros(6)
-        rows = slice(3 * place, 3 * place + 3)
-        exact[rows] = self._inputs[place].Eval(context)
-        output.SetFromVector(self._errors.measure(sample, exact)[rows])
+        exact = [
+            port.Eval(context) if port.HasValue(context) else np.zeros(3)
+            for port in self._inputs
+        ]
+        value.set_value(self._errors.measure(sample, np.concatenate(exact)))
+
+    def _calc(self, place: int, context: Context, output: BasicVector) -> None:
+        measured = self._measured.Eval(context)
+        output.SetFromVector(measured[3 * place : 3 * place + 3])

@@ -10,6 +10,7 @@ import yaml
 
 from cns_drake.base.errors import InputError
 from cns_drake.command_line.trends import family_controls
+from cns_drake.scenarios.kalibr import KalibrImu
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_files import map_folder, world_file
 from cns_drake.scenarios.scenario_loading import load_scenario
@@ -129,6 +130,17 @@ def test_all_members_ride_and_measure_alike(tmp_path):
     assert controls[rough[0].name].ride == rough[0].ride
     (path, _) = write_scenarios(rough, tmp_path / "written")
     assert load_scenario(path) == rough[0]
+
+
+def test_noise_of_an_imu_lies_beside_the_family(tmp_path):
+    imu = {"rate": 200, "kalibr": "noise.yaml"}
+    with pytest.raises(InputError, match=r"noise\.yaml: no such file"):
+        family(tmp_path, missing=[0.1], imu=imu)
+    noise = dict.fromkeys(KalibrImu.model_fields, 0.01)
+    noise |= {"update_rate": 200.0, "rostopic": "/imu"}
+    (tmp_path / "noise.yaml").write_text(yaml.safe_dump(noise))
+    (member,) = family(tmp_path, missing=[0.1], imu=imu)
+    assert member.imu.kalibr == str(tmp_path / "noise.yaml")
 
 
 def test_a_member_is_a_scenario_file_of_its_own(tmp_path):
