@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from cns_drake.base.errors import InputError
+from cns_drake.city.generation.generate import MAX_STRUCTURES
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.imports.dressing.dressed_city import dress_buildings
 from cns_drake.imports.dressing.grounds import (
@@ -62,6 +64,9 @@ def dress_city(
         drives: through it.
         ground: below it.
         seed: of what is drawn by lot.
+
+    Raises:
+        InputError: if there are more structures than a map may have.
     """
     buildings = dress_buildings(staged.kept, drives, city.streets, ground, seed)
     changed = dict(buildings.buildings)
@@ -99,4 +104,10 @@ def dress_city(
         "without_room": things.no_room,
     }
     dressed = staged.replaced(changed).joined(added)
+    if len(dressed.kept) >= MAX_STRUCTURES:
+        raise InputError(
+            f"--plain: without it the city has {len(dressed.kept)} structures,"
+            f" more than instance ids can count ({MAX_STRUCTURES}); or give"
+            " --within"
+        )
     return Dressing(dressed, origins, facts, is_paved)

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from shapely.geometry import LineString, Point
 
+from cns_drake.base.errors import InputError
 from cns_drake.city.geometry.object_parts import HEADROOM, part_triangles
+from cns_drake.imports.dressing import whole_city
 from cns_drake.imports.dressing.grounds import (
     missing_sidewalks,
     paved,
@@ -212,12 +214,15 @@ def test_sidewalks_are_added_where_nothing_is_told_of_them(tmp_path):
     assert ((gaps < 4.5) | (gaps > 6.33)).all()
 
 
-def test_a_city_counts_what_is_from_the_file_and_what_by_lot(tmp_path):
+def test_a_city_counts_what_is_from_the_file_and_what_by_lot(
+    tmp_path, monkeypatch
+):
     osm = OsmWriter()
     write_street(osm, sidewalk="both")
     osm.node(10, -6, highway="street_lamp")
     osm.node(-70, -17, amenity="bench")
     city = read(osm, tmp_path)
+    again = read(osm, tmp_path)
     staged = stage_city("f", city, ImportOptions())
     ground = ground_of(staged.kept)
     before = {kind: number for kind, number, _ in city.faults.rows()}
@@ -241,6 +246,9 @@ def test_a_city_counts_what_is_from_the_file_and_what_by_lot(tmp_path):
         "building": {"dressed"}, "walk": {"dressed"}, "road": {"file"},
         "lamp_post_n": {"file"}, "car": {"lot"},
     }  # fmt: skip
+    monkeypatch.setattr(whole_city, "MAX_STRUCTURES", len(result.city.kept))
+    with pytest.raises(InputError, match="more than instance ids"):
+        dress_city(staged, again, [drive_of(again)], ground, 0)
     (bottom,) = bottom_of(staged.kept, ground)
     (seen,) = result.ground([bottom])
     # Four houses of 500 m^2 in 180 m by 44 m.
