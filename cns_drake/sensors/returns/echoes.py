@@ -126,13 +126,20 @@ def _report(
     echo = np.zeros((_MOST_ECHOES + _MOST_DROPS + 1, 3))
     source = np.zeros(len(echo), np.int32)
     budget, extinction = receiver.budget, receiver.extinction
-    is_clear = len(receiver.scattering.distances) == 0
+    table = receiver.scattering
+    is_clear = len(table.distances) == 0
+    is_fog = not is_clear and table.fog_energies[-1] > 0.0
     count, part = 0, 0
     for beam in range(num_beams):
         first = part
         while part < len(light.beam) and light.beam[part] == beam:
             part += 1
-        if is_clear and part - first <= 1:
+        is_alone = is_clear
+        if not is_clear and not is_fog:
+            # Not even on the longest way does the first drop arrive.
+            arrived = -np.log(1.0 - uniform(key, beam, _FIRST_DROP_DRAW))
+            is_alone = arrived >= table.counts[-1]
+        if is_alone and part - first <= 1:
             # Most beams: a single echo at most.
             if part == first:
                 continue
