@@ -129,10 +129,10 @@ def test_nothing_is_recorded_in_silence_to_nowhere(drive):
         drive.simulator.AdvanceTo(3 * PERIOD)
 
 
-def test_stamps_are_not_before_the_epoch(drive):
+def test_nothing_is_published_before_time_zero(drive):
     context = drive.fresh_context()
     context.SetTime(-PERIOD)
-    with pytest.raises(InputError, match="before the epoch"), drive.bag:
+    with pytest.raises(ValueError, match="starts at time zero"), drive.bag:
         drive.diagram.ForcedPublish(context)
 
 
