@@ -12,6 +12,7 @@ from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.terminal import note
 from cns_drake.command_line.options import (
     Jobs,
+    Maps,
     MethodFiles,
     Results,
     Scheduler,
@@ -19,13 +20,7 @@ from cns_drake.command_line.options import (
 
 
 def ladder(
-    maps: Annotated[
-        list[str] | None,
-        typer.Argument(
-            metavar="MAP",
-            help="Which maps, by name or folder; all shipped ones by default.",
-        ),
-    ] = None,
+    maps: Maps = None,
     *,
     output: Results,
     quick: Annotated[

@@ -54,6 +54,13 @@ Scheduler = Annotated[
         "DASK_SCHEDULER_ADDRESS, if that is set.",
     ),
 ]
+Maps = Annotated[
+    list[str] | None,
+    typer.Argument(
+        metavar="MAP",
+        help="Which maps, by name or folder; all shipped ones by default.",
+    ),
+]
 MethodFiles = Annotated[
     list[Path] | None,
     typer.Option(

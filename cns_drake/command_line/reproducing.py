@@ -9,7 +9,7 @@ import typer
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.terminal import note
-from cns_drake.command_line.options import Jobs, Output, Scheduler
+from cns_drake.command_line.options import Jobs, Maps, Output, Scheduler
 from evaluation.command_line.protocol_options import (
     Costs,
     Settings,
@@ -20,13 +20,7 @@ from evaluation.recognition.protocol import RetrievalProtocol
 
 @with_protocol
 def reproduce(
-    maps: Annotated[
-        list[str] | None,
-        typer.Argument(
-            metavar="MAP",
-            help="Which maps, by name or folder; all shipped ones by default.",
-        ),
-    ] = None,
+    maps: Maps = None,
     *,
     output: Output,
     jobs: Jobs = None,

@@ -156,15 +156,10 @@ def make_bays(
     if not bays:
         return {}
     standing = Obstacles((n, bay.box()) for n, bay in bays.items())
-    others = Obstacles(
-        [
-            ("", kept_free),
-            *(
-                (name, thing.footprint)
-                for name, thing in things.items()
-                if thing.semantic_class not in CLASSES | GROUND_CLASSES
-            ),
-        ]
+    passed = CLASSES | GROUND_CLASSES
+    others = Obstacles.of_things(
+        kept_free,
+        (t for t in things.values() if t.semantic_class not in passed),
     )
     grown = {}
     for name, car in cars.items():

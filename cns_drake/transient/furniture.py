@@ -42,15 +42,9 @@ def move_furniture(
     wanted = [t for t in things.values() if t.semantic_class in CLASSES]
     if not wanted:
         editing.note("furniture: the world has no pole and no traffic sign")
-    obstacles = Obstacles(
-        [
-            ("", kept_free),
-            *(
-                (thing.name, thing.footprint)
-                for thing in things.values()
-                if thing.semantic_class not in GROUND_CLASSES
-            ),
-        ]
+    obstacles = Obstacles.of_things(
+        kept_free,
+        (t for t in things.values() if t.semantic_class not in GROUND_CLASSES),
     )
     for thing in wanted:
         rng = draws(seed, CAUSE, thing.name)

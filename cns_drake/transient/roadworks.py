@@ -102,15 +102,9 @@ def put_up_works(
     if not stretches:
         editing.note("works: no structure of class road along the drive")
     solid, every = (
-        Obstacles(
-            [
-                ("", kept_free),
-                *(
-                    (thing.name, thing.footprint)
-                    for thing in things.values()
-                    if thing.semantic_class not in ignored
-                ),
-            ]
+        Obstacles.of_things(
+            kept_free,
+            [t for t in things.values() if t.semantic_class not in ignored],
         )
         for ignored in (_OPEN, GROUND_CLASSES)
     )

@@ -66,15 +66,9 @@ def put_up_scaffolds(
         editing.note(
             f"scaffolds: no building within {_FARTHEST:g} m of the drive"
         )
-    obstacles = Obstacles(
-        [
-            ("", kept_free),
-            *(
-                (thing.name, thing.footprint)
-                for thing in things.values()
-                if thing.semantic_class in _NOT_THROUGH
-            ),
-        ]
+    obstacles = Obstacles.of_things(
+        kept_free,
+        (t for t in things.values() if t.semantic_class in _NOT_THROUGH),
     )
     for building in fronts:
         rng = draws(seed, CAUSE, building.name)

@@ -169,6 +169,19 @@ class Obstacles:
         self._areas = [area for _, area in pairs]
         self._tree = shapely.STRtree(self._areas)
 
+    @classmethod
+    def of_things(
+        cls, kept_free: BaseGeometry, things: Iterable[Standing]
+    ) -> Obstacles:
+        """Collects footprints, and an area without a name.
+
+        Args:
+            kept_free: where nothing may stand, seen from above [m].
+            things: whose footprints are in the way.
+        """
+        feet = ((thing.name, thing.footprint) for thing in things)
+        return cls([("", kept_free), *feet])
+
     def is_free(
         self, area: BaseGeometry, ignored: Collection[str] = ()
     ) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Mapping
 
 import numpy as np
 
@@ -14,12 +13,13 @@ from evaluation.maps.voxel_maps import (
     VoxelAccumulator,
     VoxelMap,
 )
+from evaluation.sequences.sequence_view import SequenceView
 
 # Parts of a voxel's side in pictures, which show a point in each 0.5 m.
 PICTURE_DIVISIONS = 10
 
 
-class MappedSequence(Sequence):
+class MappedSequence(SequenceView):
     """A sequence whose scans enter a map as they are read for the first time.
 
     Reading and unpacking scans takes longer than mapping them. In
@@ -34,31 +34,15 @@ class MappedSequence(Sequence):
             kept: how many of the last scans stay in memory; older ones are
                 read again.
         """
-        self.name = sequence.name
-        self._sequence = sequence
+        super().__init__(sequence)
         self._accumulator = VoxelAccumulator(VOXEL_SIZE, PICTURE_DIVISIONS)
         self._kept = kept
         self._recent: OrderedDict[int, np.ndarray] = OrderedDict()
         self._num_mapped = 0
 
-    def __len__(self) -> int:
-        return len(self._sequence)
-
     @property
     def world_frame(self) -> str:  # type: ignore[override]  # Read late.
         return self._sequence.world_frame
-
-    @property
-    def stamps_ns(self) -> np.ndarray:
-        return self._sequence.stamps_ns
-
-    @property
-    def X_WS(self) -> np.ndarray:
-        return self._sequence.X_WS
-
-    @property
-    def scenario(self) -> Mapping | None:
-        return self._sequence.scenario
 
     def scan(self, index: int) -> np.ndarray:
         while self._num_mapped <= index:

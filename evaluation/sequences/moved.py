@@ -7,9 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from cns_drake.base.recordings.sequence import Sequence
+from evaluation.sequences.sequence_view import SequenceView
 
 
-class MovedSequence(Sequence):
+class MovedSequence(SequenceView):
     """Another sequence's scans, at other poses."""
 
     def __init__(
@@ -27,18 +28,10 @@ class MovedSequence(Sequence):
             world_frame: name of W.
             datum: see `Sequence.datum`.
         """
-        self.name = sequence.name
+        super().__init__(sequence)
         self.world_frame = world_frame
-        self._sequence = sequence
         self._X_WS = X_WS
         self._datum = datum
-
-    def __len__(self) -> int:
-        return len(self._sequence)
-
-    @property
-    def stamps_ns(self) -> np.ndarray:
-        return self._sequence.stamps_ns
 
     @property
     def X_WS(self) -> np.ndarray:
@@ -54,10 +47,6 @@ class MovedSequence(Sequence):
     @property
     def notes(self) -> tuple[str, ...]:
         return self._sequence.notes
-
-    @property
-    def scenario(self) -> Mapping | None:
-        return self._sequence.scenario
 
     @property
     def instances(self) -> Mapping[int, Mapping] | None:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Mapping
 
 import numpy as np
 
 from cns_drake.base.recordings.sequence import Sequence
+from evaluation.sequences.sequence_view import SequenceView
 
 
-class RecentScans(Sequence):
+class RecentScans(SequenceView):
     """A sequence that reads each scan once.
 
     That holds for a reader who asks in increasing order, give or take as many
@@ -24,26 +24,10 @@ class RecentScans(Sequence):
             sequence: the drive.
             kept: how many of the last scans stay in memory.
         """
-        self.name = sequence.name
+        super().__init__(sequence)
         self.world_frame = sequence.world_frame
-        self._sequence = sequence
         self._kept = kept
         self._recent: OrderedDict[int, np.ndarray] = OrderedDict()
-
-    def __len__(self) -> int:
-        return len(self._sequence)
-
-    @property
-    def stamps_ns(self) -> np.ndarray:
-        return self._sequence.stamps_ns
-
-    @property
-    def X_WS(self) -> np.ndarray:
-        return self._sequence.X_WS
-
-    @property
-    def scenario(self) -> Mapping | None:
-        return self._sequence.scenario
 
     def scan(self, index: int) -> np.ndarray:
         if index not in self._recent:

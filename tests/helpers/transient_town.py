@@ -1,8 +1,14 @@
 """A street with parked cars, trees, poles and walls, for tests of change."""
 
+import functools
+
 import numpy as np
 
 from cns_drake.city.geometry.object_meshes import FOLDER
+from cns_drake.scenarios.transient_config import TransientConfig
+from cns_drake.scene.world import load_world
+from cns_drake.transient.changing import change_world
+from cns_drake.transient.standing import read_standing
 
 _WORLD = """<?xml version="1.0"?>
 <sdf version="1.9">
@@ -123,3 +129,18 @@ def write_transient_town(folder):
     lines += [f"{k},{n},{c}" for k, (n, c) in enumerate(rows.items(), 1)]
     (folder / "structures.csv").write_text("\n".join(lines) + "\n")
     return folder / "street.sdf"
+
+
+def change_maker(sdf, drive, lanes):
+    """Returns a function of switches that changes the town, once for each.
+
+    It returns the world and what stands in it.
+    """
+
+    @functools.cache
+    def make(**switches):
+        config = TransientConfig(**switches)
+        world = change_world(load_world(sdf), config, drive, lanes)
+        return world, read_standing(world)
+
+    return make

@@ -1,8 +1,6 @@
 """What came and went: parked cars, leaves, poles."""
 
-import functools
-
-from helpers.transient_town import ORIGIN, write_transient_town
+from helpers.transient_town import ORIGIN, change_maker, write_transient_town
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
@@ -33,14 +31,7 @@ def sdf(tmp_path_factory):
 @pytest.fixture(scope="module")
 def changed(sdf):
     """Returns the world after changes, and what stands in it; once for each."""
-
-    @functools.cache
-    def make(**switches):
-        config = TransientConfig(**switches)
-        world = change_world(load_world(sdf), config, DRIVE, LANES)
-        return world, read_standing(world)
-
-    return make
+    return change_maker(sdf, DRIVE, LANES)
 
 
 def places(things):

@@ -1,0 +1,37 @@
+"""A drive seen through another one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from cns_drake.base.recordings.sequence import Sequence
+
+
+class SequenceView(Sequence):
+    """Shows length, times, poses and scenario of another sequence."""
+
+    def __init__(self, sequence: Sequence):
+        """Begins with what it shows.
+
+        Args:
+            sequence: the drive.
+        """
+        self.name = sequence.name
+        self._sequence = sequence
+
+    def __len__(self) -> int:
+        return len(self._sequence)
+
+    @property
+    def stamps_ns(self) -> np.ndarray:
+        return self._sequence.stamps_ns
+
+    @property
+    def X_WS(self) -> np.ndarray:
+        return self._sequence.X_WS
+
+    @property
+    def scenario(self) -> Mapping | None:
+        return self._sequence.scenario
