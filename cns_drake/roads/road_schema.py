@@ -32,14 +32,14 @@ class RoadStyle(_Model):
     """What roads of a town share; every road may override it.
 
     Attributes:
-        lanes: lanes along the centreline and against it; a zero makes the
-            road one-way. Traffic keeps right.
-        lane_width: [m].
+        lanes: lanes along the centreline and against it, up to 4 each; a zero
+            makes the road one-way.
+        lane_width: width of a lane [m].
         median: width of the kerbed strip between the directions [m].
         parking: width of the bays cut into both sidewalks, 0 for none [m].
         sidewalk: width of the sidewalk on each side [m].
         kerb_height: height of sidewalks and medians above the lanes [m].
-        speed_limit: [m/s].
+        speed_limit: speed limit [m/s].
     """
 
     lanes: tuple[LaneCount, LaneCount] = Field(default=(1, 1), strict=False)
@@ -55,14 +55,15 @@ class RoadEntry(RoadStyle):
     """One road between two junctions.
 
     Attributes:
-        start, end: names of its junctions; the centreline runs from the
-            position of `start` to that of `end`.
-        via: corners on the way, each x, y and the radius of its arc [m].
-        heights: distance along the centreline and height, for points
-            between the junctions [m]; in between the height follows a
-            monotone cubic, and it is level where the road meets a junction.
-        start_setback, end_setback: how far from the junction's position the
-            road ends; derived from the kerb radius where absent [m].
+        start: name of the junction where the centreline begins.
+        end: name of the junction where it ends.
+        via: corners on the way, each `[x, y, radius of its bend]` [m].
+        heights: points between the junctions, each `[distance along the
+            centreline, height]` [m]; in between the height follows a monotone
+            cubic, and it is level where the road meets a junction.
+        start_setback: how far from the junction's position the road begins [m];
+            by default it follows from the kerb radius.
+        end_setback: likewise at its end [m].
     """
 
     start: str
@@ -77,10 +78,10 @@ class JunctionEntry(_Model):
     """Where roads meet; also the joint of two different roads.
 
     Attributes:
-        position: x, y of the point where the centrelines meet [m].
+        position: `[x, y]` where the centrelines meet [m].
         height: the junction's area is level at this z [m].
-        kerb_radius: radius of the kerb round each corner [m]; of a dead end
-            radius of the disc in which its road ends.
+        kerb_radius: radius of the kerb round each corner; of a dead end, radius
+            of the disc in which its road ends [m].
         dead_end: only one road comes here, and traffic cannot go on.
     """
 
@@ -91,7 +92,13 @@ class JunctionEntry(_Model):
 
 
 class RoadsFile(_Model):
-    """The whole file: styles, junctions by name and roads by name."""
+    """The whole file: styles, junctions by name and roads by name.
+
+    Attributes:
+        defaults: style of roads without their own.
+        junctions: name -> junction, at least one.
+        roads: name -> road, at least one.
+    """
 
     defaults: RoadStyle = RoadStyle()
     junctions: dict[str, JunctionEntry] = Field(min_length=1)

@@ -38,13 +38,13 @@ class RouteLeg(BaseModel):
 
     Attributes:
         road: name of the road.
-        direction: along its centreline or against it.
-        lane: lane number, 1 next to the middle of the road; two numbers for
-            a change from the first to the second on this road.
-        start: only in the first leg: where the drive begins, measured from
-            the entry of the road [m].
-        end: in the last leg: where it ends, measured likewise; in a leg
-            whose next one leads back: where the car turns round [m].
+        direction: `forward` along its centreline, or `backward`.
+        lane: 1 is next to the middle of the road; two numbers change from the
+            first to the second.
+        start: only in the first leg: where the drive begins, from the entry of
+            the road [m].
+        end: in the last leg: where it ends, measured likewise; in a leg whose
+            next one leads back: where the car turns round [m].
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)

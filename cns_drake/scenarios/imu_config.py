@@ -10,13 +10,17 @@ class ImuConfig(Mount):
     """An IMU, ideal and with one sample a scan unless a field says otherwise.
 
     Attributes:
-        rate: samples per second.
-        kalibr: a file of Kalibr with its noise; see `read_kalibr`.
-        accelerometer_turn_on_bias: standard deviation of its bias at the
-            start [m/s^2].
-        gyroscope_turn_on_bias: likewise [rad/s].
-        accelerometer_range: the most that an axis measures [m/s^2].
-        gyroscope_range: likewise [rad/s].
+        xyz: position in `base_link` [m].
+        rpy_deg: roll, pitch, yaw in `base_link` [deg].
+        rate: samples per second, from the rate of the scans to 1000; it divides
+            1,000,000,000 ns, as 100, 200, 250, 400 and 500 do.
+        kalibr: a file with the four noise densities, as Kalibr has it.
+        accelerometer_turn_on_bias: standard deviation of the accelerometer's
+            bias at the start, drawn for each axis [m/s^2].
+        gyroscope_turn_on_bias: likewise of the gyroscope [rad/s].
+        accelerometer_range: the most that an axis of the accelerometer
+            measures, either way [m/s^2].
+        gyroscope_range: likewise of the gyroscope [rad/s].
     """
 
     xyz: Triple = (-1.0, 0.0, 1.6)

@@ -24,23 +24,28 @@ class LidarConfig(Mount):
     """A LiDAR.
 
     Attributes:
-        preset: which unit, a key of `LIDAR_PRESETS`.
+        preset: name of the unit, from the table of presets.
+        xyz: position in `base_link` [m].
+        rpy_deg: roll, pitch, yaw in `base_link` [deg].
         columns: columns in a turn, in place of the preset's.
         min_range: nearest range, in place of the preset's [m].
         max_range: farthest range, in place of the preset's [m].
-        resolution: step of the coordinates [m]; 0 records what was cast.
-        range_noise: standard deviation of the ranges [m].
-        dropout: probability that a return is lost.
-        faint_dropout: probability that a return of no intensity is lost,
-            falling linearly with intensity to none for full intensity.
-        motion_distortion: whether each column is cast from the sensor's pose
-            at its own firing time, instead of all from that at the stamp.
-        returns: `ideal`, or `calibrated` by the data sheet of the unit: what
-            returns, how far off, and how bright.
-        echoes: which echoes of a beam calibrated returns report.
+        resolution: step of the coordinates, 2^-10 m; 0 records what was cast
+            [m].
+        range_noise: standard deviation of a Gaussian error along the beam; the
+            range limits hold for what is measured [m].
+        dropout: each return is lost with this probability.
+        faint_dropout: on top, a return of intensity I is lost with this
+            probability times (1 - I).
+        motion_distortion: each column is cast from the sensor's pose at
+            `stamp + t` and expressed in its frame at that time, as real units
+            report it.
+        returns: `calibrated` ones have the losses, errors and brightness of the
+            unit's data sheet.
+        echoes: which echoes of a beam calibrated returns report; `dual` is the
+            strongest and the last.
         rate: turns per second.
-        layout: of the points in a recording; see
-            `cns_drake.base.recordings.point_layouts`.
+        layout: which fields a point has in the recording.
     """
 
     xyz: Triple = (0.0, 0.0, 1.6)

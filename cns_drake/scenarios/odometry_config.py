@@ -9,7 +9,9 @@ class OdometryConfig(Section):
     """How often the exact motion of the vehicle is recorded.
 
     Attributes:
-        rate: messages per second; by default one a scan.
+        rate: messages per second, at most 1000: a multiple of the fastest
+            LiDAR's rate that divides 1,000,000,000 ns, such as 100; by
+            default one message a scan.
     """
 
     rate: int | None = None

@@ -14,9 +14,9 @@ class RideConfig(Section):
     """How the body of the vehicle moves against its path.
 
     Attributes:
-        roughness: the road's class of ISO 8608; without one the vehicle is
-            rigid and follows its path exactly.
-        seed: of the road's profile.
+        roughness: class of the road after ISO 8608, from `A`, as new, to `E`,
+            very poor.
+        seed: seed of the road's profile.
     """
 
     roughness: Literal["none", RoughnessClass] = "none"

@@ -44,30 +44,33 @@ class Scenario(Section):
     follows either lanes of the map's roads or waypoints.
 
     Attributes:
-        name: of the sequence; file and folder names derive from it.
-        map: name of a shipped map, or the path of a folder laid out like
-            one (see `MapFolder`).
+        name: name of the sequence and its files; letters, digits and
+            underscores.
+        map: a shipped map, or a folder laid out like one.
         stage: which stage of the map.
-        world: an SDF file instead, with visuals for the LiDAR.
-        without: names of structures that are left out of it.
-        title: what the sequence shows, in words.
-        route: the lanes to follow.
-        aside: how far to the right of its lanes' middle the vehicle keeps
-            between junctions, where the road has room; negative to the left
-            [m].
-        waypoints: a CSV file of places to pass instead; see
-            `cns_drake.roads.waypoints.load_waypoint_path`.
-        u_turns: whether the vehicle turns round where waypoints double back.
+        world: any SDF file, in place of `map` and `stage`.
+        without: names of structures to leave out, as `structures.csv` lists
+            them.
+        title: what the drive shows, in words.
+        route: the lanes to follow, leg by leg; give this or `waypoints`.
+        waypoints: a CSV file of places to pass; a world has no roads, and needs
+            them.
+        u_turns: whether the car turns round where waypoints double back.
+        aside: how far to the right of its lanes' middle the car keeps between
+            junctions, as far as the road has room; to the left if negative, at
+            most 3 [m].
         speeds: how fast.
-        ride: how springs and the road move the body.
+        ride: how springs and the road move the car.
         traffic: who else moves.
         transient: what came and went since the stage was built.
-        lidars: the LiDARs by name; the name gives frame and topic.
+        lidars: name -> LiDAR; the name gives frame and topic; by default one
+            named `lidar`.
         imu: the IMU.
-        weather: fog, rain and snowfall, for LiDARs with calibrated returns.
-        odometry: the exact motion of the vehicle.
-        frames: how many frames to record; all of the route by default.
-        seed: of everything random: the noise of LiDARs that have any.
+        weather: fog, rain and snowfall for calibrated returns.
+        odometry: the odometry.
+        frames: how many frames to record, which are the scans of the first
+            LiDAR; by default the whole drive.
+        seed: seed of the noise of LiDARs and the IMU.
 
     Example:
         from cns_drake import load_scenario

@@ -14,9 +14,10 @@ class TrafficConfig(Section):
     """Vehicles and walkers that move while a drive is recorded.
 
     Attributes:
-        vehicles: how many vehicles drive along the map's roads.
+        vehicles: how many cars, vans, trucks, buses, motorcycles and bicycles
+            drive along the map's roads.
         walkers: how many people walk on its sidewalks and crossings.
-        seed: of what they are, where they begin and where they go.
+        seed: seed of their kinds, starts and ways.
     """
 
     vehicles: int = Field(default=0, ge=0, le=_MOST)

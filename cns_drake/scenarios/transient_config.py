@@ -14,17 +14,20 @@ class TransientConfig(Section):
     of its structures, whatever the other switches are.
 
     Attributes:
-        seed: of all that is drawn.
-        parked_cars: part of the parked cars that have left, stand elsewhere
-            in their bay, or have another car in their place.
-        leaves: part of the leaves that crowns and shrubs still have.
-        snow: depth of the snow on what faces the sky [m].
-        scaffolds: part of the fronts along the drive that stand behind a
-            scaffold.
-        works: part of the stretches of kerb along the drive with roadworks
-            beside them.
-        furniture: part of poles, lamps and signs that were replaced within
-            2 m.
+        seed: seed of all draws.
+        parked_cars: part of the parked cars that have left (three in ten of
+            them), stand elsewhere in their bay (two), or have another in their
+            place.
+        leaves: part of the leaves that is left on crowns, needles included;
+            wood stays; a shrub without wood keeps a tenth, as twigs.
+        snow: depth of the snow on what faces the sky within 120 m of the drive;
+            roads are cleared, and banks lie along their kerbs [m].
+        scaffolds: part of the fronts within 30 m of the drive that stand behind
+            a scaffold, four in ten of them with a net.
+        works: part of the stretches of kerb within 30 m of the drive with
+            fences, skips or diggers beside the road, and a new kerb stone 0.3 m
+            into it.
+        furniture: part of poles, lamps and signs that were replaced within 2 m.
     """
 
     seed: int = Field(default=1, ge=0)

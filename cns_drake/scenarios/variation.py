@@ -97,9 +97,9 @@ class DrawnRoutes(_Model):
     """Routes by lot.
 
     Attributes:
-        count: how many.
+        count: number of routes.
         length: least length of each [m].
-        seed: of the draws.
+        seed: seed of the draws.
     """
 
     count: int = Field(ge=1, le=10_000)
@@ -113,21 +113,21 @@ class Family(_Model):
     Attributes:
         base: sequence or scenario file that gives map, route, speeds and
             sensors.
-        stage: of which something is missing; the map's last one by default.
-        towards: another stage; only what it lacks can be missing.
-        missing: parts of the buildings and plants, or of what `towards`
-            lacks, that are missing, each from 0 to 1; or {from, to, count}
-            for evenly spread ones.
-        scattered: class -> part of its structures that is missing besides, by
+        stage: stage that something is missing from; by default the map's last
+            one.
+        towards: another stage: only what it lacks can be missing; what is lower
+            there stays high.
+        missing: parts that are missing, each from 0 to 1; or `{from: 0, to:
+            0.6, count: 20}` for evenly spread ones.
+        scattered: class of structures, such as `pole` -> part of them that is
+            missing besides, by lot.
+        seeds: for each, another place from which the city decays, and another
             lot.
-        seeds: for each of these, another place from which the city decays,
-            and another lot.
-        city_seeds: for each of these, another draw of the city along the
-            same streets, in place of the map as it is.
-        routes: routes by lot in place of the base's.
-        lidars: presets in place of the base's LiDARs.
-        ride: of all members, in place of the base's.
-        imu: of all members, in place of the base's.
+        city_seeds: for each, another draw of the city along the same streets.
+        routes: routes by lot, in place of the base's.
+        lidars: presets in place of the base's LiDARs, such as `[cns, os1-64]`.
+        ride: the ride of all members, in place of the base's.
+        imu: the IMU of all members, in place of the base's.
     """
 
     base: str

@@ -80,35 +80,36 @@ class BtcConfig(MethodConfig):
     the cloud.
 
     Attributes:
-        voxel_size: of the planes [m]; [O] 2.
-        max_sparse_points: a voxel with more may be a plane; [O] 10.
-        flatness: variance along the normal below which it is [m^2];
+        voxel_size: side of the voxels of the planes [m]; [O] 2.
+        max_sparse_points: a voxel with more points may be a plane; [O] 10.
+        flatness: variance along the normal below which it is one [m^2];
             [O] 0.01.
         merge_normal_limit: difference of two normals below which two planes
             may be one; [O] 0.1.
-        merge_distance_limit: likewise, of the centers from the other plane
+        merge_distance_limit: likewise, of the centres from the other plane
             [m]; [O] 0.3.
         image_axes: whether keypoints are placed as by the public program,
             whose second axis leaves the plane by a wrong term (see
             `btc_keypoints.image_axes`), or by orthogonal axes. [P] public.
         resolution: length of a cell of the image [m]; [O] 0.5.
-        height_range: of the points in it, above the ground [m]; [O] -1, 4.
-        height_step: of the layers that bits stand for [m]; [O] 0.1.
-        num_layers: how many; [P] 49. The public program divides the range by
-            the step in single precision, which gives one less than meant,
-            and writes what is higher beyond the end of its array; here that
-            has no bit.
-        min_heights: that a keypoint needs; [O] 10.
-        suppression_radius: within which only the keypoint with most heights
-            stays [m]; [O] 2.
-        max_keypoints: [O] 500.
+        height_range: heights above the ground of the points in it [m];
+            [O] -1, 4.
+        height_step: height of the layers that bits stand for [m]; [O] 0.1.
+        num_layers: number of layers; [P] 49. The public program divides the
+            range by the step in single precision, which gives one less than
+            meant, and writes higher points beyond the end of its array; here
+            these have no bit.
+        min_heights: heights that a keypoint needs; [O] 10.
+        suppression_radius: distance within which only the keypoint with most
+            heights stays [m]; [O] 2.
+        max_keypoints: most keypoints of a place; [O] 500.
         num_neighbours: keypoints that triangles are made with, the keypoint
             itself included; [O] 10.
-        side_range: of the triangles [m]; [O] 2, 50.
-        side_resolution: of the table of triangles [m]; [O] 0.2.
+        side_range: lengths of the triangles' sides [m]; [O] 2, 50.
+        side_resolution: step of the table of triangles [m]; [O] 0.2.
         side_tolerance: relative difference of the sides of triangles that
             match; [O] 0.01.
-        min_similarity: of their descriptors; [O] 0.7.
+        min_similarity: least similarity of their descriptors; [O] 0.7.
         min_votes: matches that a candidate needs; [P] 5.
         candidates: places with most votes that are verified; [O] 50.
         normal_limit: difference of the normals of planes that fit; [O] 0.2.
@@ -162,7 +163,7 @@ class BtcDatabase:
 
     Attributes:
         places: their descriptions.
-        trees: of the centers of the planes of each place.
+        trees: of the centres of the planes of each place.
         table: the triangles of all.
     """
 
@@ -221,7 +222,7 @@ class Btc(Method[BtcDescription, BtcDatabase]):
     def build_database(self, places: Sequence[BtcDescription]) -> BtcDatabase:
         return BtcDatabase(
             places=places,
-            trees=[cKDTree(place.planes.centers) for place in places],
+            trees=[cKDTree(place.planes.centres) for place in places],
             table=make_table(
                 [place.triangles for place in places],
                 self.config.side_resolution,

@@ -44,18 +44,18 @@ _TO_LAST = np.array([1, 2, 8, 8])
 class LayeredOverlapConfig(MethodConfig):
     """Parameters of layered overlap.
 
-    Source of all: trials on development worlds, which the documentation
-    tells apart from those that results are reported of.
+    Source of all: trials on development worlds, which are not the worlds of
+    the reported results.
 
     Attributes:
         cell: length of a cell of the finest maps, of 256 x 256 [m].
-        min_points: that fill a cell.
-        poses: of places with a heading that the second search looks at.
-        refined: of these, that the third one looks at.
+        min_points: points that fill a cell.
+        poses: pairs of a place and a heading that the second search compares.
+        refined: those of them that the third search compares.
         candidates: places that are compared cell by cell.
-        weights: of common cells: low, middle, high, poles and kerbs.
-        least_cells: weighted cells that are added to those of either scan,
-            lest two be alike that hardly show anything.
+        weights: weights of common cells: low, middle, high, poles, kerbs.
+        least_cells: weighted cells added to those of either scan, so that two
+            nearly empty scans are not alike.
     """
 
     cell: PositiveFloat = 0.5

@@ -47,14 +47,15 @@ class RingPlusPlusConfig(MethodConfig):
     Source of all: the authors' program, with what it has for KITTI.
 
     Attributes:
-        half_width: of the square map from above [m]; 70. The protocol's
-            limit of 100 m is wider.
-        min_height: above the ground, at which what counts begins [m]; 0.73
+        half_width: half the side of the square map from above [m]; 70. The
+            protocol's limit of 100 m is wider.
+        min_height: height above the ground from which points count [m]; 0.73
             (z > -1.0 m from a LiDAR at 1.73 m).
-        max_height: likewise where it ends [m]; 11.73 (z < 10 m).
+        max_height: height up to which they count [m]; 11.73 (z < 10 m).
         height_unit: what a height is divided by when shape is described,
             horizontal coordinates being divided by `half_width` [m]; 10.
-        neighbours: of a point, with itself, whose shape is described; 30.
+        neighbours: points, itself included, that describe the shape at a
+            point; 30.
         cells: rows and columns of the map from above, and angles and rays of
             its Radon transform; 120.
     """

@@ -55,19 +55,19 @@ class ScanContextConfig(MethodConfig):
         variant: which context; augmented forms add copies to the database.
             Default: what [T] calls A-PC.
         voxel_size: cell of the thinning before [m]; [T] 0.5.
-        rings: of the polar context; [T], [C] 20.
-        sectors: of the polar context; [T], [C] 60.
-        max_range: of the polar context [m]; [T], [C] 80.
+        rings: rings of the polar context; [T], [C] 20.
+        sectors: sectors of the polar context; [T], [C] 60.
+        max_range: farthest range of the polar context [m]; [T], [C] 80.
         far_points: what becomes of points farther away: they count in the
             last ring, as in [T] (default), or are dropped, as in [C].
-        min_points: that a cell of the polar context needs; [T] 5,
+        min_points: points that a cell of the polar context needs; [T] 5,
             [C] 1.
         cart_cell: length and width of a cell of the cart context [m];
             [T] 5 and 2.
         cart_range: half length and half width of the cart context [m];
             [T] 100 and 40.
         lateral_shift: offset of the augmenting copies [m]; [T] 2.
-        candidates: places that the KD-tree is asked for; [E] 50. With
+        candidates: places that the KD-tree returns; [E] 50. With
             augmented places, as many times more contexts.
         search_ratio: part of all shifts that are tried around the best by
             the aligning key; [C] 0.1.

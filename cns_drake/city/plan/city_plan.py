@@ -49,13 +49,14 @@ class BuildingPlan(_Model):
     """One building at a given place.
 
     Attributes:
-        archetype: a key of the registry of buildings.
-        at: position of the middle of the footprint in W [m].
-        size: width along the front and depth [m]; or
+        archetype: name of an archetype.
+        at: `[x, y]` of the middle of the footprint [m].
+        size: `[width along the front, depth]` [m]; give this or
+            `outline`.
         outline: corners of the footprint about `at`, before turning [m].
-        yaw_deg: heading of the front's direction; at 0 the front faces -y.
-        height: of the walls [m].
-        kind: stem of the structure's name; default: the archetype.
+        yaw_deg: heading; at 0 the front faces -y [deg].
+        height: height of the walls [m].
+        kind: stem of its name; by default the archetype.
     """
 
     archetype: str
@@ -79,10 +80,12 @@ class RowPlan(_Model):
     Attributes:
         setback: from the inner edge of the sidewalk to the fronts [m].
         archetypes: archetype -> weight.
-        width, depth, height: ranges of the lots and of the walls [m].
+        width: range of the lots [m].
+        depth: range of the lots [m].
+        height: range of the walls [m].
         gap: range of the distance between neighbours [m].
         fill: part of the lots that are built on.
-        kind: stem of the structures' names; default: the archetype.
+        kind: stem of their names; by default the archetype.
         within: corners of an area that the row is limited to [m].
     """
 
@@ -102,11 +105,11 @@ class PatchPlan(_Model):
 
     Attributes:
         ground: kind of ground.
-        area: corners of the patch in W [m]; or
-        line: points of a path's middle line in W [m] and its
-        width: [m].
-        level: height at which the patch is held level; default: it follows
-            the ground around it [m].
+        area: corners [m]; give this or `line`.
+        line: points of a path's middle line [m].
+        width: width of the path [m].
+        level: height at which the patch is held level [m]; by default it
+            follows the ground around it.
     """
 
     ground: Ground
@@ -126,8 +129,8 @@ class ParkingPlan(_Model):
     """Rows of bays with parked cars.
 
     Attributes:
-        start, end: ends of the line along the open side of the bays [m];
-            the bays lie on its left, seen from start.
+        start: one end of the line along the open side of the bays [m].
+        end: the other; the bays lie on its left, seen from `start` [m].
         bay: width and depth of a bay [m].
         fill: part of the bays that are taken.
     """
@@ -143,12 +146,12 @@ class ScatterPlan(_Model):
 
     Attributes:
         objects: object -> weight.
-        spacing: least distance between two of them [m].
+        spacing: least distance between two of them, more than 0.2 [m].
         fill: part of the places that are used.
         within: corners of an area that they are limited to [m].
-        clearance: to buildings and streets [m].
-        ground: kinds of ground they may stand on.
-        kind: stem of the structures' names; default: the object.
+        clearance: least distance to buildings and streets [m].
+        ground: kinds of ground that they may stand on.
+        kind: stem of their names; by default the object.
     """
 
     objects: Weights = Field(min_length=1)
@@ -165,12 +168,12 @@ class LinePlan(_Model):
 
     Attributes:
         objects: object -> weight.
-        points: the line in W [m]; its right is the objects' front.
-        spacing: range of the distance between two objects [m]; None: each
-            piece is as long as the line is straight (fences, hedges).
-        yaw_deg: turn of each object against the line.
-        kind: stem of the structures' names; default: the object.
-        parameters: passed on to the object's builder.
+        points: the line [m]; its right is the objects' front.
+        spacing: range of the distance between two objects [m]; by default each
+            piece is as long as the line is straight, as fences and hedges are.
+        yaw_deg: turn of each object against the line [deg].
+        kind: stem of their names; by default the object.
+        parameters: passed on to what builds the objects.
     """
 
     objects: Weights = Field(min_length=1)
@@ -185,11 +188,12 @@ class ObjectPlan(_Model):
     """One object at a given place.
 
     Attributes:
-        object: a key of the registry of objects.
-        at: position in W [m].
-        yaw_deg: heading.
-        kind: stem of the structure's name; default: the object.
-        parameters: passed on to the object's builder.
+        object: name of an object.
+        at: `[x, y]` [m].
+        yaw_deg: heading [deg].
+        kind: stem of its name; by default the object.
+        parameters: passed on to what builds the object, such as `{height: 1.1}`
+            of a `garden_wall`.
     """
 
     object: str
@@ -203,11 +207,11 @@ class StreetPlan(_Model):
     """What stands on the sidewalks in front of a district.
 
     Attributes:
-        trees: species -> weight; none: a street without trees.
+        trees: species -> weight; a street without trees by default.
         tree_spacing: range of the distance between trees [m].
         tree_gaps: part of the trees left out.
         lamp: object used as street lamp.
-        lamp_spacing: distance between lamps [m].
+        lamp_spacing: distance between lamps, more than 2 [m].
         furniture: object -> weight.
         furniture_spacing: range of the distance between objects [m].
     """
@@ -225,12 +229,23 @@ class DistrictPlan(_Model):
     """One block, or an area of the surroundings.
 
     Attributes:
-        name: unique; also seeds the district's own random draws.
-        block: a point in the block that the streets leave [m]; or
-        area: corners [m]; without both, all that no other district takes.
+        name: unique; small letters, digits and underscores; also seeds the
+            district's own draws.
+        block: `[x, y]` of a point in the block that the streets leave [m];
+            give this, `area` or neither.
+        area: corners [m]; without both, the district is all that no other one
+            takes.
         ground: kind of ground.
         relief: height of the swells of its lawns [m].
         relief_margin: width of their slope at paths and buildings [m].
+        patches: list of patches.
+        buildings: list of buildings.
+        rows: list of rows of buildings.
+        parking: list of parking lots.
+        objects: list of objects.
+        lines: list of lines of objects.
+        scatter: list of scattered objects.
+        street: what stands on its sidewalks.
     """
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_]*$")
@@ -259,13 +274,14 @@ class CityPlan(_Model):
     """A whole city, from `city.yaml`.
 
     Attributes:
-        seed: of all random draws.
-        bounds: x0, y0, x1, y1 of the generated world [m].
+        seed: seed of all random draws.
+        bounds: `[x0, y0, x1, y1]` of the generated world [m].
         water_level: height of the water's surface [m].
-        street: what stands on sidewalks unless the district says otherwise.
-        cars: object -> weight of parked cars.
-        medians: what is planted between the directions; default: `street`.
-        districts: in the order in which they take ground.
+        cars: object -> weight, of parked cars.
+        street: what stands on sidewalks, unless the district says otherwise.
+        medians: what is planted between the directions, with the same fields;
+            by default as `street`.
+        districts: list of districts, in the order in which they take ground.
     """
 
     seed: int = Field(ge=0)

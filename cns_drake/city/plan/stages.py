@@ -24,9 +24,11 @@ class Growth(_Model):
     """Structures that stand, but have not grown to their full height yet.
 
     Attributes:
-        height: how high they are, above their own ground [m].
-        structures: their names, or patterns such as `office_*`.
-        but: names or patterns of those that are not meant.
+        height: how high the structures are until then, above their own ground,
+            more than 2 [m].
+        structures: their names in `structures.csv`; `*` and `?` stand for any
+            text and letter.
+        but: names of exceptions.
     """
 
     height: float = Field(gt=2.0, allow_inf_nan=False)
@@ -38,13 +40,14 @@ class Stage(_Model):
     """One stage, in words and by what sets it apart from the next.
 
     Attributes:
-        story: what a visitor of this stage would notice.
-        absent: story item -> names of the structures that the next stage
-            adds, or patterns. What later stages add is absent as well.
-        lower: story item -> structures that the next stage raises. What
-            later stages raise is low as well.
-        sites: story item -> structures that are under construction at this
-            stage only.
+        story: what a visitor would notice.
+        absent: group, in words -> names of the structures that the next stage
+            adds; none in the last stage.
+        lower: group, in words -> what the next stage raises; none in the last
+            stage.
+        sites: group, in words -> what is under construction at this stage only:
+            a frame of that height, scaffolds and a crane; its lot must take
+            16 m by 16 m.
     """
 
     story: str
@@ -61,9 +64,10 @@ class Stages(_Model):
     the last stage is the whole city.
 
     Attributes:
-        stages: stage name -> stage, earliest first.
-        lots: use -> buildings, or patterns, on whose lots it is found until
-            they are built; by default a lot's use goes by its size.
+        stages: stage, two digits in quotes, rising -> stage.
+        lots: use -> buildings on whose lots it is found until they are built:
+            `car_park`, `market`, `garden`, `yard` or `empty`; by default a
+            lot's use goes by its size.
     """
 
     stages: dict[StageName, Stage]

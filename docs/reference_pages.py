@@ -1,0 +1,337 @@
+"""Writes the pages in `docs/reference` from the code that they explain.
+
+    python docs/reference_pages.py
+
+Tables of fields come from the docstrings and types of the models that read
+the input files, tables of options from the programs themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import inspect
+from pathlib import Path
+import typing
+from typing import Any
+
+import griffe
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+import typer
+
+from cns_drake.city.plan import city_plan, stages
+from cns_drake.command_line import cli
+from cns_drake.motion.speeds import Speeds
+from cns_drake.roads import road_schema
+from cns_drake.roads.route import Route, RouteLeg
+from cns_drake.scenarios import variation
+from cns_drake.scenarios.imu_config import ImuConfig
+from cns_drake.scenarios.lidar_config import LidarConfig
+from cns_drake.scenarios.odometry_config import OdometryConfig
+from cns_drake.scenarios.ride_config import RideConfig
+from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.traffic_config import TrafficConfig
+from cns_drake.scenarios.transient_config import TransientConfig
+from cns_drake.scenarios.weather_config import WeatherConfig
+from evaluation.command_line import cli as evaluation_cli
+from evaluation.methods import MethodConfig, make_method, shipped_methods
+
+FOLDER = Path(__file__).resolve().parent / "reference"
+Sections = dict[str, type[BaseModel]]
+
+SCENARIO: Sections = {
+    "Scenario": Scenario,
+    "Route": RouteLeg,
+    "Speeds": Speeds,
+    "Ride": RideConfig,
+    "Traffic": TrafficConfig,
+    "Transient": TransientConfig,
+    "LiDARs": LidarConfig,
+    "IMU": ImuConfig,
+    "Weather": WeatherConfig,
+    "Odometry": OdometryConfig,
+}
+FAMILY: Sections = {
+    "Family": variation.Family,
+    "Routes by lot": variation.DrawnRoutes,
+}
+CITY: Sections = {
+    "roads.yaml": road_schema.RoadsFile,
+    "A road's style": road_schema.RoadStyle,
+    "A road": road_schema.RoadEntry,
+    "A junction": road_schema.JunctionEntry,
+    "city.yaml": city_plan.CityPlan,
+    "A district": city_plan.DistrictPlan,
+    "A patch": city_plan.PatchPlan,
+    "A building": city_plan.BuildingPlan,
+    "A row": city_plan.RowPlan,
+    "A parking lot": city_plan.ParkingPlan,
+    "An object": city_plan.ObjectPlan,
+    "A line": city_plan.LinePlan,
+    "A scatter": city_plan.ScatterPlan,
+    "A street": city_plan.StreetPlan,
+    "stages.yaml": stages.Stages,
+    "A stage": stages.Stage,
+    "A growth": stages.Growth,
+}
+METHODS: Sections = {
+    "All methods": MethodConfig,
+    **{name: make_method(name, {}).Config for name in shipped_methods()},
+}
+# Fields without a default that whoever reads the file fills in.
+_FILLED_IN = {(Scenario, "name"): "the file's name"}
+
+
+def pages() -> dict[str, str]:
+    """Returns the text of every page by its file name."""
+    return {
+        "scenario.md": _fields_page(
+            "Fields of a drive",
+            "[Drives](../scenarios.md) explains them with examples. Paths are "
+            "relative to the file.",
+            SCENARIO,
+        ),
+        "family.md": _fields_page(
+            "Fields of a family of drives",
+            "[Families](../scenarios.md#families) shows one. All fields but "
+            "`ride` and `imu` multiply: every part, seed, city, route and "
+            "LiDAR with every other.",
+            FAMILY | {"Ride": RideConfig, "IMU": ImuConfig},
+        ),
+        "city.md": _fields_page(
+            "Fields of a city",
+            "[Files of a city](../city.md) says which file is for what, and "
+            "lists archetypes and objects.",
+            CITY,
+        ),
+        "methods.md": _fields_page(
+            "Settings of the methods",
+            "[Methods](../methods.md) shows how to set them.",
+            METHODS,
+        ),
+        "commands.md": _commands_page(),
+    }
+
+
+def _fields_page(title: str, introduction: str, sections: Sections) -> str:
+    links = {model: heading for heading, model in sections.items()}
+    parts = [_heading(title), introduction]
+    for heading, model in sections.items():
+        description, meanings = explain_fields(model)
+        rows = [
+            (
+                f"`{name}`",
+                describe_default(model, name),
+                _values(model, name),
+                meanings[name] + _links(field.annotation, links),
+            )
+            for name, field in own_fields(model).items()
+        ]
+        parts += [
+            f"## {heading}",
+            description,
+            _table(("field", "default", "values", "meaning"), rows),
+        ]
+    return "\n\n".join(parts) + "\n"
+
+
+def own_fields(model: type[BaseModel]) -> dict[str, FieldInfo]:
+    """Returns the fields that have a row in the model's table.
+
+    What a road shares with the style of all roads, and a method with all
+    methods, is in the tables of those.
+    """
+    shared: dict[str, FieldInfo] = {}
+    for base in (road_schema.RoadStyle, MethodConfig):
+        if issubclass(model, base) and model is not base:
+            shared |= base.model_fields
+    fields = model.model_fields
+    return {name: fields[name] for name in fields if name not in shared}
+
+
+def explain_fields(model: type[BaseModel]) -> tuple[str, dict[str, str]]:
+    """Returns what the docstring says of a model, and of each field."""
+    docstring = griffe.Docstring(inspect.getdoc(model) or "")
+    description, meanings = "", {}
+    for section in docstring.parse("google"):
+        if section.kind is griffe.DocstringSectionKind.text:
+            description = description or section.value
+        if section.kind is griffe.DocstringSectionKind.attributes:
+            meanings = {
+                attribute.name: " ".join(attribute.description.split())
+                for attribute in section.value
+            }
+    return _prose(description), meanings
+
+
+def describe_default(model: type[BaseModel], name: str) -> str:
+    """Returns the default of a field as YAML writes it."""
+    field = model.model_fields[name]
+    if (model, name) in _FILLED_IN:
+        return _FILLED_IN[model, name]
+    if field.is_required():
+        return "required"
+    default = field.get_default(call_default_factory=True)
+    if default in (None, (), [], {}, "") or _holds_models(default):
+        return "none"
+    return f"`{_plain(default)}`"
+
+
+def _holds_models(value: Any) -> bool:
+    values = value.values() if isinstance(value, dict) else [value]
+    return any(isinstance(each, BaseModel) for each in values)
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, tuple | list):
+        return f"[{', '.join(_plain(each) for each in value)}]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, float):
+        return f"{value:.10g}"
+    return str(getattr(value, "value", value))
+
+
+def _values(model: type[BaseModel], name: str) -> str:
+    """Returns which values a field takes, after the model's JSON schema."""
+    schema = model.model_json_schema()
+    alias = model.model_fields[name].alias or name
+    return _kind(schema["properties"][alias], schema.get("$defs", {}))
+
+
+def _kind(schema: dict[str, Any], models: dict[str, Any]) -> str:
+    """Returns in words what a JSON schema allows; empty for a model."""
+    if "$ref" in schema:
+        model = models[schema["$ref"].rpartition("/")[2]]
+        return "" if model["type"] == "object" else _kind(model, models)
+    if "anyOf" in schema:
+        kinds = [_kind(each, models) for each in schema["anyOf"]]
+        return " or ".join(kind for kind in kinds if kind)
+    if "enum" in schema:
+        return ", ".join(f"`{value}`" for value in schema["enum"])
+    if schema["type"] == "array":
+        return _list_kind(schema, models)
+    if schema["type"] == "object":
+        # What a name stands for, whatever the name.
+        inner = schema.get("additionalProperties", {})
+        kind = _kind(inner, models) if isinstance(inner, dict) and inner else ""
+        return f"name: {kind}" if kind else "names and values"
+    words = {"string": "text", "boolean": "`true` or `false`", "null": ""}
+    kind = words.get(schema["type"], schema["type"])
+    return " ".join(part for part in (kind, _limits(schema)) if part)
+
+
+def _list_kind(schema: dict[str, Any], models: dict[str, Any]) -> str:
+    if "prefixItems" not in schema:
+        inner = _kind(schema["items"], models)
+        return f"list: {inner}" if inner else "list"
+    kinds = [_kind(each, models) for each in schema["prefixItems"]]
+    if len(set(kinds)) > 1:
+        return f"{len(kinds)} numbers"
+    noun, _, limits = kinds[0].partition(" ")
+    return f"{len(kinds)} {noun}s {limits}".strip()
+
+
+def _limits(schema: dict[str, Any]) -> str:
+    least, most = schema.get("minimum"), schema.get("maximum")
+    above = schema.get("exclusiveMinimum")
+    begin = "" if least is None else f"from {least:g}"
+    if above is not None:
+        begin = f"above {above:g}"
+    end = "" if most is None else f"to {most:g}"
+    return f"{begin} {end}".strip()
+
+
+def _links(annotation: Any, headings: dict[type[BaseModel], str]) -> str:
+    """Returns links to the tables of the models that a field holds."""
+    found = [headings[model] for model in models_in(annotation)]
+    if not found:
+        return ""
+    links = (f"[{each}](#{_anchor(each)})" for each in dict.fromkeys(found))
+    return f" See {', '.join(links)}."
+
+
+def models_in(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Yields the models that an annotation names; a route's are its legs."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield RouteLeg if annotation is Route else annotation
+    for argument in typing.get_args(annotation):
+        yield from models_in(argument)
+
+
+def _commands_page() -> str:
+    parts = [
+        _heading("Commands"),
+        "Results go to stdout, progress and messages to stderr. The exit "
+        "status is 0 on success; 2, with one line, for bad input; 1 if some "
+        "of many jobs could not be done.",
+    ]
+    for program, app in (
+        ("cns-drake", cli.app),
+        ("cns-eval", evaluation_cli.app),
+    ):
+        group = typer.main.get_command(app)
+        for name, command in group.commands.items():
+            rows = [
+                (_option(each), _option_default(each), each.help or "")
+                for each in command.params
+                if each.name != "help"
+            ]
+            parts += [
+                f"## {program} {name}",
+                _prose(command.help or ""),
+                _table(("argument or option", "default", "meaning"), rows),
+            ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _option(parameter: Any) -> str:
+    """Returns the names of a parameter and what stands for its value."""
+    metavar = parameter.metavar or parameter.type.name.upper()
+    if parameter.param_type_name == "argument":
+        return f"`{metavar}`"
+    names = " / ".join([*parameter.opts, *parameter.secondary_opts])
+    return f"`{names}`" if parameter.is_flag else f"`{names} {metavar}`"
+
+
+def _option_default(parameter: Any) -> str:
+    if parameter.required:
+        return "required"
+    default = parameter.default
+    if default in (None, False, (), [], "") or callable(default):
+        return "none"
+    return f"`{_plain(default)}`"
+
+
+def _heading(title: str) -> str:
+    return (
+        f"# {title}\n\n"
+        "<!-- Written by docs/reference_pages.py; change the code instead. -->"
+    )
+
+
+def _prose(text: str) -> str:
+    paragraphs = text.replace("\b", "").split("\n\n")
+    return "\n\n".join(" ".join(each.split()) for each in paragraphs)
+
+
+def _table(heading: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+    lines = [heading, ("---",) * len(heading), *rows]
+    cells = [[each.replace("|", "\\|") for each in line] for line in lines]
+    return "\n".join(f"| {' | '.join(line)} |" for line in cells)
+
+
+def _anchor(heading: str) -> str:
+    kept = "".join(c for c in heading.lower() if c.isalnum() or c in " -_")
+    return kept.replace(" ", "-")
+
+
+def main() -> None:
+    """Writes all pages."""
+    FOLDER.mkdir(exist_ok=True)
+    for name, text in pages().items():
+        (FOLDER / name).write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
