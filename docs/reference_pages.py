@@ -280,6 +280,7 @@ def _commands_page() -> str:
             parts += [
                 f"## {program} {name}",
                 _prose(command.help or ""),
+                _example(command.epilog),
                 _table(("argument or option", "default", "meaning"), rows),
             ]
     return "\n\n".join(parts) + "\n"
@@ -301,6 +302,14 @@ def _option_default(parameter: Any) -> str:
     if default in (None, False, (), [], "") or callable(default):
         return "none"
     return f"`{_plain(default)}`"
+
+
+def _example(epilog: str) -> str:
+    """Returns the example at the end of a command's help as a block."""
+    lines = epilog.replace("\\\n", " ").splitlines()[2:]
+    return "\n".join(
+        ["```", *(" ".join(each.split()) for each in lines), "```"]
+    )
 
 
 def _heading(title: str) -> str:

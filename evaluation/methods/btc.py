@@ -163,7 +163,7 @@ class BtcDatabase:
 
     Attributes:
         places: their descriptions.
-        trees: of the centres of the planes of each place.
+        trees: of the centers of the planes of each place.
         table: the triangles of all.
     """
 
@@ -222,7 +222,7 @@ class Btc(Method[BtcDescription, BtcDatabase]):
     def build_database(self, places: Sequence[BtcDescription]) -> BtcDatabase:
         return BtcDatabase(
             places=places,
-            trees=[cKDTree(place.planes.centres) for place in places],
+            trees=[cKDTree(place.planes.centers) for place in places],
             table=make_table(
                 [place.triangles for place in places],
                 self.config.side_resolution,

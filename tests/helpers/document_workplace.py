@@ -83,7 +83,7 @@ class Workplace:
         return "".join(printed)
 
     def _run(self, place: str, command: str) -> str:
-        # The table of commands names them without their folder.
+        # The help of commands names them without their folder.
         command = f".venv/bin/{command.removeprefix('.venv/bin/')}"
         if command not in self._printed:
             done = subprocess.run(
