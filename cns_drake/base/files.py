@@ -24,7 +24,7 @@ def part_path(path: Path) -> Path:
 
 
 @contextlib.contextmanager
-def user_errors(path: Path) -> Iterator[None]:
+def user_errors(path: Path | str) -> Iterator[None]:
     """Turns errors of the file system into one line that names the file.
 
     Raises:

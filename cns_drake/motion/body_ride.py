@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import PPoly
 
 from cns_drake.motion.frame_motion import FrameMotion, cross
 
@@ -57,6 +56,8 @@ class BodyRide:
             pivot: x in F of the point about which the body turns [m].
         """
         self._pivot = pivot
+        from scipy.interpolate import PPoly
+
         times = step * np.arange(len(q))
         self._end = times[-1]
         v, a = dq * step, ddq * step**2 / 2

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import PchipInterpolator
 
 from cns_drake.base.angles import wrapped
 from cns_drake.base.csv_files import read_rows
@@ -154,6 +153,8 @@ def _rounded(
     count = int(np.ceil(curve.length / _DENSE_SPACING)) + 1
     along = np.linspace(0.0, curve.length, count)
     # Where the curve passes each corner: the middle of its arc.
+    from scipy.interpolate import PchipInterpolator
+
     saved = 2 * radii * np.tan(turns / 2) - radii * turns
     shortened = np.concatenate([[0.0], np.cumsum(saved)])
     lengths = np.hypot(edges[:, 0], edges[:, 1])

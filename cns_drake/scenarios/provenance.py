@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-import contextlib
 import hashlib
 import json
-import os
 from pathlib import Path
 import platform
-import re
-from xml.parsers import expat
 
 from cns_drake.base.files import user_errors
 from cns_drake.base.installed_versions import installed_versions
 from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
 from cns_drake.base.version import __version__
 from cns_drake.scenarios.imu_making import KALIBR_FILE, describe_kalibr
+from cns_drake.scenarios.referenced_files import FileWatch, referenced_files
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder, world_file
 from cns_drake.scenarios.shipped import suspension_file, vehicle_file
-from cns_drake.scene.gazebo_models import ModelFinder
 
 # Whatever can have a say in a message's bytes.
 _PACKAGES = (
@@ -38,15 +34,6 @@ _BLOCK_BYTES = 1 << 20
 # Where a recording's metadata keep the combined digest of its inputs.
 INPUTS_KEY = "inputs_sha256"
 
-# What a folder that is included as a model consists of, besides meshes.
-_MODEL_ENDINGS = (".sdf", ".urdf", ".config", ".xml")
-# How mesh files name others, by ending: materials, textures, buffers.
-_NAMING = {
-    ".obj": re.compile(rb"^mtllib\s+(.+)$", re.MULTILINE),
-    ".mtl": re.compile(rb"^\s*map_\w+.*?(\S+)\s*$", re.MULTILINE),
-    ".gltf": re.compile(rb'"uri"\s*:\s*"([^":]+)"'),
-}
-
 
 def dependency_versions() -> dict[str, str]:
     """Returns package -> version, of cns-drake and what it computes with.
@@ -60,11 +47,17 @@ def dependency_versions() -> dict[str, str]:
     }
 
 
-def digest_inputs(scenario: Scenario) -> dict[str, str]:
+def digest_inputs(
+    scenario: Scenario, watch: FileWatch | None = None
+) -> dict[str, str]:
     """Returns SHA-256 digests of the files that a scenario reads.
 
     A world counts with the meshes and models that it names, and these with
     what they name.
+
+    Args:
+        scenario: what is recorded.
+        watch: also takes down each file, before it is read.
 
     Returns:
         `world`, `vehicle`, and `structures`, `suspension`, `roads`,
@@ -90,7 +83,10 @@ def digest_inputs(scenario: Scenario) -> dict[str, str]:
         or (not scenario.transient.is_off and roads.is_file())
     ):
         inputs["roads"] = roads
-    digests = {name: digest_file(path) for name, path in inputs.items()}
+    watch = watch or FileWatch()
+    digests = {name: digest_file(path, watch) for name, path in inputs.items()}
+    if scenario.imu.kalibr is not None:
+        watch.take_down(str(scenario.imu.kalibr))
     kalibr = describe_kalibr(scenario)
     if kalibr is not None:
         text = json.dumps(kalibr).encode()
@@ -133,16 +129,19 @@ def recording_fingerprint(scenario: Scenario, inputs: dict[str, str]) -> str:
     )
 
 
-def digest_file(path: Path) -> str:
+def digest_file(path: Path, watch: FileWatch | None = None) -> str:
     """Returns the SHA-256 digest of a model and of the files that it names.
+
+    Args:
+        path: of the model.
+        watch: also takes down each file, before it is read.
 
     Raises:
         InputError: a file cannot be read.
     """
     digest = hashlib.sha256()
-    for name, file in sorted(_referenced_files(path).items()):
-        with user_errors(file):
-            size = file.stat().st_size
+    found = referenced_files(path, watch or FileWatch())
+    for name, (file, size) in sorted(found.items()):
         digest.update(f"{name} {size}\n".encode())
         _take(file, digest.update)
     # The file itself comes last, without its name.
@@ -150,96 +149,8 @@ def digest_file(path: Path) -> str:
     return digest.hexdigest()
 
 
-def _take(path: Path, update: Callable[[bytes], None]) -> None:
+def _take(path: Path | str, update: Callable[[bytes], None]) -> None:
     """Shows a file in blocks: textures and meshes may be of any size."""
     with user_errors(path), open(path, "rb") as stream:
         while block := stream.read(_BLOCK_BYTES):
             update(block)
-
-
-def _referenced_files(model: Path) -> dict[str, Path]:
-    """Returns the files that a model and the files that it names refer to.
-
-    Returns:
-        The path relative to the model's folder, or the URI of what is found
-        elsewhere -> file.
-    """
-    finder = ModelFinder(model)
-    found: dict[str, Path] = {}
-    waiting = [str(model)]
-    while waiting:
-        file = waiting.pop()
-        folder = os.path.dirname(file)
-        for uri in _references(file):
-            place = os.path.join(folder, uri)
-            name = os.path.relpath(place, model.parent)
-            if not os.path.exists(place):
-                place, name = _find(finder, uri, folder), uri
-            for one in _files_at(place):
-                key = name
-                if one != place:  # It lies in the folder of a model.
-                    key = os.path.join(name, os.path.basename(one))
-                if key not in found:
-                    found[key] = Path(one)
-                    waiting.append(one)
-    return found
-
-
-def _find(finder: ModelFinder, uri: str, folder: str) -> str:
-    """Returns where a URI leads; "" if that is nowhere."""
-    with contextlib.suppress(OSError, ValueError):  # It may be no name.
-        return str(finder.find(uri, Path(folder)) or "")
-    return ""
-
-
-def _files_at(place: str) -> list[str]:
-    """Returns a file, or those of a model's folder that say what it is."""
-    if os.path.isdir(place):
-        return [
-            path
-            for name in sorted(os.listdir(place))
-            if name.endswith(_MODEL_ENDINGS)
-            and os.path.isfile(path := os.path.join(place, name))
-        ]
-    # Only what is really a file: no device.
-    return [place] if os.path.isfile(place) else []
-
-
-def _references(file: str) -> list[str]:
-    """Returns what a model or a mesh says of other files."""
-    ending = os.path.splitext(file)[1].lower()
-    if ending in (*_MODEL_ENDINGS, ".dae"):
-        return _xml_references(_read(Path(file)))
-    if ending not in _NAMING:
-        return []
-    names = _NAMING[ending].findall(_read(Path(file)))
-    return [name.decode(errors="replace").strip() for name in names]
-
-
-def _xml_references(content: bytes) -> list[str]:
-    found: list[str] = []
-    texts: list[str] = []
-
-    def start(tag: str, attributes: dict[str, str]) -> None:
-        texts.clear()
-        if "filename" in attributes:  # Of URDF.
-            found.append(attributes["filename"])
-
-    def end(tag: str) -> None:
-        if tag in ("uri", "init_from") or tag.endswith("_map"):
-            found.append("".join(texts).strip())
-        texts.clear()
-
-    parser = expat.ParserCreate("utf-8")
-    parser.StartElementHandler = start
-    parser.CharacterDataHandler = texts.append
-    parser.EndElementHandler = end
-    # What is no XML is refused by whoever loads it.
-    with contextlib.suppress(expat.ExpatError):
-        parser.Parse(content, True)
-    return found
-
-
-def _read(path: Path) -> bytes:
-    with user_errors(path):
-        return path.read_bytes()

@@ -15,10 +15,10 @@ from cns_drake.scenarios.provenance import (
     recording_fingerprint,
 )
 from cns_drake.scenarios.rates import frame_period
+from cns_drake.scenarios.referenced_files import FileWatch
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import (
     check_files,
-    world_file,
 )
 from cns_drake.scenarios.sensor_making import sensor_pose
 from cns_drake.scene.world import World
@@ -67,7 +67,8 @@ def load_drive(scenario: Scenario) -> LoadedDrive:
             they were being read.
     """
     check_files(scenario)
-    inputs = digest_inputs(scenario)
+    watch = FileWatch()
+    inputs = digest_inputs(scenario, watch)
     trajectory = plan_drive(scenario)
     num_frames = count_frames(scenario, trajectory)
     scenario = scenario.model_copy(update={"frames": num_frames})
@@ -76,10 +77,9 @@ def load_drive(scenario: Scenario) -> LoadedDrive:
     if not scenario.traffic.is_off:
         traffic = plan_scenario_traffic(scenario, trajectory)
         world = with_traffic(world, traffic)
-    if digest_inputs(scenario) != inputs:
-        raise InputError(
-            f"{world_file(scenario)}: changed while it was being read"
-        )
+    changed = watch.changed()
+    if changed is not None:
+        raise InputError(f"{changed}: changed while it was being read")
     # The whole drive is the same by whichever name it is asked for.
     whole = num_frames == frames_within(
         trajectory.duration, frame_period(scenario.lidars)

@@ -15,10 +15,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 import math
+from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import ndtri
 
 from cns_drake.base.compiled import compiled
 
@@ -47,7 +47,7 @@ class SheetRow:
     def snr(self) -> float:
         """The SNR that has the stated probability."""
         # `detection_probability`, solved for the root of the SNR.
-        z = float(ndtri(self.probability))
+        z = NormalDist().inv_cdf(self.probability)
         root = (z + math.sqrt(z * z + 4.0 * THRESHOLD_SNR)) / 2.0
         return root * root
 

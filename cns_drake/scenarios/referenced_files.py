@@ -1,0 +1,173 @@
+"""The files that a model refers to, and whether one of them changes."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from pathlib import Path
+import re
+import stat
+from xml.parsers import expat
+
+from cns_drake.base.files import user_errors
+from cns_drake.scene.gazebo_models import ModelFinder
+
+# What a folder that is included as a model consists of, besides meshes.
+_MODEL_ENDINGS = (".sdf", ".urdf", ".config", ".xml")
+# How mesh files name others, by ending: materials, textures, buffers.
+_NAMING = {
+    ".obj": re.compile(rb"^mtllib\s+(.+)$", re.MULTILINE),
+    ".mtl": re.compile(rb"^\s*map_\w+.*?(\S+)\s*$", re.MULTILINE),
+    ".gltf": re.compile(rb'"uri"\s*:\s*"([^":]+)"'),
+}
+
+
+class FileWatch:
+    """Notices that one of many files changes after it was taken down.
+
+    Contents are not compared: a file counts as changed once its size, its
+    times or the file behind its name have changed.
+    """
+
+    def __init__(self) -> None:
+        self._states: dict[str, tuple[int, ...]] = {}
+
+    def take_down(self, path: str) -> os.stat_result | None:
+        """Returns the present status of a file; None if there is none.
+
+        The first status of each file is the one that counts.
+        """
+        status = _status(path)
+        self._states.setdefault(path, _state(status))
+        return status
+
+    def changed(self) -> str | None:
+        """Returns the first file that has changed since, if one has."""
+        for path, state in self._states.items():
+            if _state(_status(path)) != state:
+                return path
+        return None
+
+
+def _status(path: str) -> os.stat_result | None:
+    try:
+        return os.stat(path)
+    except (OSError, ValueError):  # It may be no name.
+        return None
+
+
+def _state(status: os.stat_result | None) -> tuple[int, ...]:
+    if status is None:
+        return ()
+    return status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns
+
+
+def referenced_files(
+    model: Path, watch: FileWatch
+) -> dict[str, tuple[str, int]]:
+    """Returns the files that a model and the files that it names refer to.
+
+    Args:
+        model: a file of any kind.
+        watch: takes down the model and each of these files.
+
+    Returns:
+        The path relative to the model's folder, or the URI of what is found
+        elsewhere -> file, and its size.
+
+    Raises:
+        InputError: a file cannot be read.
+    """
+    finder = ModelFinder(model)
+    found: dict[str, tuple[str, int]] = {}
+    waiting = [str(model)]
+    watch.take_down(str(model))
+    while waiting:
+        file = waiting.pop()
+        folder = os.path.dirname(file)
+        for uri in _references(file):
+            place = os.path.join(folder, uri)
+            name = os.path.relpath(place, model.parent)
+            status = watch.take_down(place)
+            if status is None:
+                place, name = _find(finder, uri, folder), uri
+                status = watch.take_down(place)
+            for one, size in _files_at(place, status, watch):
+                key = name
+                if one != place:  # It lies in the folder of a model.
+                    key = os.path.join(name, os.path.basename(one))
+                if key not in found:
+                    found[key] = one, size
+                    waiting.append(one)
+    return found
+
+
+def _find(finder: ModelFinder, uri: str, folder: str) -> str:
+    """Returns where a URI leads; "" if that is nowhere."""
+    with contextlib.suppress(OSError, ValueError):  # It may be no name.
+        return str(finder.find(uri, Path(folder)) or "")
+    return ""
+
+
+def _files_at(
+    place: str, status: os.stat_result | None, watch: FileWatch
+) -> list[tuple[str, int]]:
+    """Returns a file, or those of a model's folder that say what it is.
+
+    Each comes with its size.
+    """
+    if status is not None and stat.S_ISDIR(status.st_mode):
+        inside = [
+            os.path.join(place, name)
+            for name in sorted(os.listdir(place))
+            if name.endswith(_MODEL_ENDINGS)
+        ]
+    else:
+        inside = [place]
+    found = []
+    for path in inside:
+        inner = status if path == place else watch.take_down(path)
+        # Only what is really a file: no device.
+        if inner is not None and stat.S_ISREG(inner.st_mode):
+            found.append((path, inner.st_size))
+    return found
+
+
+def _references(file: str) -> list[str]:
+    """Returns what a model or a mesh says of other files."""
+    ending = os.path.splitext(file)[1].lower()
+    if ending in (*_MODEL_ENDINGS, ".dae"):
+        return _xml_references(_read(file))
+    if ending not in _NAMING:
+        return []
+    names = _NAMING[ending].findall(_read(file))
+    return [name.decode(errors="replace").strip() for name in names]
+
+
+def _xml_references(content: bytes) -> list[str]:
+    found: list[str] = []
+    texts: list[str] = []
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        texts.clear()
+        if "filename" in attributes:  # Of URDF.
+            found.append(attributes["filename"])
+
+    def end(tag: str) -> None:
+        if tag in ("uri", "init_from") or tag.endswith("_map"):
+            found.append("".join(texts).strip())
+        texts.clear()
+
+    parser = expat.ParserCreate("utf-8")
+    parser.StartElementHandler = start
+    parser.CharacterDataHandler = texts.append
+    parser.EndElementHandler = end
+    # What is no XML is refused by whoever loads it.
+    with contextlib.suppress(expat.ExpatError):
+        parser.Parse(content, True)
+    return found
+
+
+def _read(path: str) -> bytes:
+    with user_errors(path), open(path, "rb") as stream:
+        return stream.read()
