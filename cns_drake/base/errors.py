@@ -33,7 +33,7 @@ class InputError(Exception):
     exit_status = 2
 
     def __init__(self, message: object):
-        """Takes what to tell; see `one_line`."""
+        """Takes the message; see `one_line`."""
         super().__init__(one_line(message))
 
 
@@ -67,7 +67,7 @@ def describe_validation_error(
     Args:
         source: the file or object that was validated.
         error: a `pydantic.ValidationError`.
-        model: what it was to be, which tells how a misspelt field is written.
+        model: its model, which has the right names for misspelt fields.
     """
     fault = error.errors()[0]
     field = ".".join(str(part) for part in fault["loc"]) or "(top level)"

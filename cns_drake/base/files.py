@@ -177,7 +177,7 @@ def exclusive(path: Path, on_wait: Callable[[], None]) -> Iterator[None]:
     """Keeps other processes that ask for the same out, while the block runs.
 
     The file `<path>.lock` is locked meanwhile, also for other machines if
-    the file system knows locks. It is unlocked however the process ends.
+    the file system has locks. It is unlocked however the process ends.
 
     Args:
         path: what the block works on, a file or a folder.
@@ -208,7 +208,7 @@ def _lock(
         on_wait()
         fcntl.flock(stream, fcntl.LOCK_EX)
     except OSError:
-        pass  # Some network file systems know no locks; then there is none.
+        pass  # Some network file systems have no locks; then there is none.
     # Whoever had it before has removed it; others may have made it anew.
     try:
         if not os.path.samestat(os.stat(lock), os.fstat(stream.fileno())):

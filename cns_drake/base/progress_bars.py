@@ -100,7 +100,7 @@ def count_progress(
 ) -> Callable[[int, int], None]:
     """Returns a callback that shows how many frames of how many are done.
 
-    On a terminal the bar moves; elsewhere a line tells the same every few
+    On a terminal the bar moves; elsewhere a line says the same every few
     seconds.
 
     Args:
@@ -113,7 +113,7 @@ def count_progress(
     console = progress.console
     interval = 0.5 if console.is_terminal else LINE_INTERVAL
     shown = 0.0
-    # Neither loading nor what an earlier run had done tells the speed.
+    # Neither loading nor what an earlier run had done shows the speed.
     first: tuple[float, int] | None = None
 
     def on_frame(done: int, total: int) -> None:

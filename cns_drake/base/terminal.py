@@ -149,7 +149,7 @@ def _open_standard_streams() -> None:
             os.fstat(number)
         except OSError:
             # For reading, so that a result that is lost is an error; what is
-            # told to people beside it may be lost.
+            # said to people beside it may be lost.
             writes = os.O_WRONLY if name == "stderr" else os.O_RDONLY
             opened = os.open(os.devnull, writes)
             if opened != number:

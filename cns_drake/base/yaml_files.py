@@ -37,7 +37,7 @@ def parse_yaml(text: str | bytes, loader: type = yaml.CSafeLoader) -> Any:
     is there twice is a slip of which YAML's libraries take the last.
 
     Args:
-        text: the document, as bytes in an encoding that YAML knows.
+        text: the document, as bytes in an encoding of YAML.
         loader: the class that makes values of nodes.
 
     Returns:

@@ -50,7 +50,7 @@ def export_sequence(
         lidar: whose scans, if the recording has several LiDARs.
         absent_in: another stage of the recording's map; points of what is
             absent there get the labels of `MarkedSequence`.
-        on_frame: is told how many frames of how many are done.
+        on_frame: takes how many frames of how many are done.
 
     Returns:
         The folder of the drive.

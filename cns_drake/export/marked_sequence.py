@@ -1,4 +1,4 @@
-"""A recording whose points tell which of them another stage lacks."""
+"""A recording with marks on points that another stage lacks."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ class VehicleSweep(LeafSystem):
     """Tells where a vehicle is at times shortly after the present one.
 
     A LiDAR turns on while a frame is made: its output at a time needs poses
-    that the SceneGraph, which knows that time only, does not have.
+    that the SceneGraph, which has that time only, does not have.
 
     .. pydrake_system::
 

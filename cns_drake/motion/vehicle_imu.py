@@ -19,7 +19,7 @@ class VehicleImu(LeafSystem):
     """Measures what an accelerometer and a gyroscope on a vehicle would.
 
     It gives what Drake's sensors on a `VehicleMotion` give, to rounding, at
-    a fifteenth of their cost: it knows the motion of one frame only, and
+    a fifteenth of their cost: it has the motion of one frame only, and
     computes many samples at once.
 
     .. pydrake_system::

@@ -99,7 +99,7 @@ def _draw_route(axes: Axes, view: View, positions: np.ndarray) -> None:
     segments = list(np.stack([pixels[:-1], pixels[1:]], axis=1))
     # It gets thinner, so that a street that is driven again shows both.
     widths = np.linspace(5.0, 2.0, len(segments))
-    # A rim tells the line from roofs of its colour.
+    # A rim sets the line apart from roofs of its colour.
     axes.add_collection(
         LineCollection(segments, colors="white", linewidths=widths + 1.5)
     )

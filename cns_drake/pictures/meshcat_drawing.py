@@ -141,7 +141,7 @@ def height_rgb(z: np.ndarray) -> np.ndarray:
     lowest, highest = POINT_HEIGHTS
     level = np.clip((z - lowest) / (highest - lowest), 0.0, 1.0)
     level = np.round(level * (_NUM_COLORS - 1)) / (_NUM_COLORS - 1)
-    # The dark ends of the colour map are hard to tell from asphalt and brick.
+    # The dark ends of the colour map look much like asphalt and brick.
     return colormaps["turbo"](0.15 + 0.75 * level)[:, :3]
 
 

@@ -192,7 +192,7 @@ class EmbreeHierarchy:
         Args:
             rays: N of them.
             mask: which geometries they hit.
-            with_normals: whether to tell normals.
+            with_normals: whether to return normals.
         """
         num_rays = len(rays.d_Sset)
         hits = Hits.misses(num_rays, with_normals)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class Tree(NamedTuple):
-    """Scenes of Embree's, with what tells whose their primitives are.
+    """Scenes of Embree's, with the owners of their primitives.
 
     Attributes:
         intersect16: address of the C function.

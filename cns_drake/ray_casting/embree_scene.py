@@ -5,7 +5,7 @@ and rounded segments exactly (in float32), and an ellipsoid is an instance of
 the unit sphere. Any of them in a scene would slow down all its rays by a
 third, though (measured), also those that meet triangles only. They have a
 hierarchy of their own, therefore, and polyhedra about them in that of the
-triangles tell which few rays have to be cast on it.
+triangles show which few rays have to be cast on it.
 """
 
 from __future__ import annotations

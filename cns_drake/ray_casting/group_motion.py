@@ -28,7 +28,7 @@ class Motion(NamedTuple):
 
     @property
     def num_steps(self) -> int:
-        """How many poses Embree needs to know, at even times.
+        """How many poses Embree needs, at even times.
 
         Raises:
             ValueError: F turns too fast.

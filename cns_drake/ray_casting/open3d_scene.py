@@ -1,7 +1,7 @@
 """Groups of geometry as Open3D scenes, where Embree's own wheel is missing.
 
 About a third as fast as `embree_scene`, and curved shapes are polyhedra:
-Open3D knows triangles only.
+Open3D has triangles only.
 """
 
 from __future__ import annotations

@@ -107,7 +107,7 @@ class BagWriter:
                 the attachments [ns].
             attachments: file name -> value, put before all messages; as YAML
                 if the name ends with `.yaml`, and else as JSON.
-                They tell whether an interrupted recording is of the same
+                They show whether an interrupted recording is of the same
                 kind, so that its messages can be taken over.
             scenario: what `scenario.yaml` beside the MCAP shall hold.
             beside: name of a further file beside the MCAP -> what it shall

@@ -56,12 +56,12 @@ _IMAGES = {
 
 
 class RecordedCamera(NamedTuple):
-    """A camera as a recording wants to know it.
+    """A camera as a recording needs it.
 
     Attributes:
         info: its intrinsics.
         X_BC: pose of its optical frame C (z ahead, y down) in the sensor's
-            frame B, of which the port `<camera>_pose` tells.
+            frame B, whose pose is on the port `<camera>_pose`.
     """
 
     info: CameraInfo
@@ -198,7 +198,7 @@ class McapRecorder(LeafSystem):
             name: self.DeclareAbstractInputPort(f"{name}_scan", Value(object()))
             for name in X_BSs
         }
-        # Frame on the map -> the port that tells its pose, and from there.
+        # Frame on the map -> the port that has its pose, and from there.
         self._poses = {
             name: (self._declare_pose(name), RigidTransform())
             for name, X_BS in X_BSs.items()
@@ -259,7 +259,7 @@ class McapRecorder(LeafSystem):
         return EventStatus.Succeeded()
 
     def _locate(self, context: Context, stamp_ns: int) -> dict[Topic, Any]:
-        """Returns the messages that tell where all is."""
+        """Returns the messages that say where all is."""
         outgoing = {}
         odometry = _eval(self._odometry, context)
         X_WCs = {

@@ -18,7 +18,7 @@ from cns_drake.recording.messages import (
 
 
 class RecordedObject(Protocol):
-    """What a recording wants to know of a vehicle or a walker."""
+    """What a recording needs of a vehicle or a walker."""
 
     @property
     def instance(self) -> int:

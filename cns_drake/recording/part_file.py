@@ -91,7 +91,7 @@ class PartFile:
         self._stream.close()
 
     def _lock(self, path: Path) -> None:
-        # Some network file systems know no locks; then there is none.
+        # Some network file systems have no locks; then there is none.
         with contextlib.suppress(OSError):
             try:
                 fcntl.flock(self._stream, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -18,7 +18,7 @@ class RecordingFolder:
         scenario: what was recorded.
         fingerprint: of all that it was made of; see
             `cns_drake.scenarios.provenance`.
-        metadata: what rosbag2 wants to know. It gets its name last: where it
+        metadata: what rosbag2 needs. It gets its name last: where it
             is, the recording is finished.
     """
 

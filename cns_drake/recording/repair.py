@@ -79,7 +79,7 @@ def repair_mcap(
     Args:
         path: any MCAP file, or what is left of one; it is only read.
         output: the new file; by default `<name>_repaired.mcap` beside it.
-        on_bytes: is told about progress.
+        on_bytes: takes the progress.
 
     Raises:
         InputError: nothing can be read, or the new file exists already or

@@ -1,4 +1,4 @@
-"""What rosbag2 wants to know of a recording, as text in its own form.
+"""What rosbag2 needs of a recording, as text in its own form.
 
 Metadata version 8 is the newest that ROS 2 Humble reads. Conventions are
 those of rosbag2's own MCAP files.
@@ -35,7 +35,7 @@ class Topic:
 
 @dataclass(frozen=True)
 class TopicMetadata:
-    """What rosbag2 wants to know of a topic.
+    """What rosbag2 needs of a topic.
 
     Attributes:
         name: e.g. `/lidar/points`.

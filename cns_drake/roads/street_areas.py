@@ -1,4 +1,4 @@
-"""What a city needs to know of its streets, whoever drew them."""
+"""What a city needs of its streets, whoever drew them."""
 
 from __future__ import annotations
 

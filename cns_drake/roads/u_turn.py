@@ -119,7 +119,7 @@ def find_loop(
         area: on which all of the car has to stay.
 
     Raises:
-        ValueError: there is no room, which tells how much it takes.
+        ValueError: there is no room; it says how much is needed.
     """
     shapely.prepare(area)
     needed, widest = np.inf, 0.0

@@ -84,7 +84,7 @@ def _serve() -> None:
         except EOFError:
             return
         if path.lower().endswith(".dae"):
-            # Only its reader of models knows the format.
+            # Only its reader of models has the format.
             parts = open3d.io.read_triangle_model(path).meshes
             mesh = open3d.geometry.TriangleMesh()
             for part in parts:

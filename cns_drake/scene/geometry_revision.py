@@ -19,7 +19,7 @@ _revisions = itertools.count(1)
 def geometry_revision_port(scene_graph: SceneGraph) -> OutputPort:
     """Returns a port whose value changes when geometry does, and only then.
 
-    SceneGraph's own `geometry_version` tells of perception geometry only what
+    SceneGraph's own `geometry_version` shows of perception geometry only what
     a render engine accepted, and to compare all geometries takes longer than
     a scan. But a Context keeps the geometry as a parameter, which Drake's
     cache tracks: a port that depends on nothing else is computed anew when

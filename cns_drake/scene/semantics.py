@@ -29,7 +29,7 @@ CLASS_IDS = {
     "other-object": 99,
 }
 
-# SemanticKITTI's ids of what moves, by our class; all that it knows no moving
+# SemanticKITTI's ids of what moves, by our class; all that it has no moving
 # kind of goes with its "moving-other-vehicle".
 MOVING_IDS = {
     "car": 252,

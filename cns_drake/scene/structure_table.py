@@ -44,7 +44,7 @@ class StructureTable:
 
     Names that the table does not list get the ids that are still free, in
     alphabetical order, and the class `unlabeled`; so a world without a table
-    still has its structures told apart.
+    still has its structures kept apart.
     """
 
     def __init__(self, entries: Iterable[StructureEntry]):

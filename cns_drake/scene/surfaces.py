@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# Rays are cast in single precision: beyond this they tell no metre from the
+# Rays are cast in single precision: beyond this they part no metre from the
 # next [m].
 LARGEST_SIZE = 1e7
 

@@ -71,7 +71,7 @@ def load_world(
     """Parses a world and, in it, a vehicle.
 
     Of a world for Gazebo, what is seen of it stays, where it is at the start;
-    the notes tell what was left out.
+    the notes say what was left out.
 
     Args:
         sdf: the world or model file.
@@ -94,7 +94,7 @@ def load_world(
         world = load_world(Path("my_world.sdf"))
     """
     scene_graph = SceneGraph()
-    # The plant parses models and knows their frames. It stays out of the
+    # The plant parses models and has their frames. It stays out of the
     # Diagram: motion is prescribed, for which a plant has no port, and a
     # plant of many models makes Build() slow.
     plant = MultibodyPlant(time_step=0.0)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.jobs.running import Job
-from cns_drake.base.jobs.step import Tell
+from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.scenarios.provenance import digest_file, digest_inputs
 from cns_drake.scenarios.scenario import Scenario
@@ -76,7 +76,7 @@ class DrawDrives(_Picture):
             for one in self._scenarios()
         }
 
-    def make(self, tell: Tell) -> None:
+    def make(self, reporter: Reporter) -> None:
         with uninterrupted():
             from cns_drake.pictures.aerial_pictures import draw_drives
 
@@ -99,7 +99,7 @@ class DrawStages(_Picture):
         files = [*self._two_stages(), MapFolder(self.folder).views]
         return {file.name: digest_file(file) for file in files}
 
-    def make(self, tell: Tell) -> None:
+    def make(self, reporter: Reporter) -> None:
         with uninterrupted():
             from cns_drake.pictures.stage_pictures import (
                 draw_stages,

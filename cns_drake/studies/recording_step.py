@@ -11,7 +11,7 @@ import shutil
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import user_errors
 from cns_drake.base.interrupts import uninterrupted
-from cns_drake.base.jobs.step import Step, Tell
+from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.recordings.sequence import Sequence
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.recording.recording_folder import RecordingFolder
@@ -54,7 +54,7 @@ class Record(Step):
     def is_done(self) -> bool:
         return is_recorded(self.scenario, self.folder) and self._is_shown()
 
-    def run(self, tell: Tell) -> None:
+    def run(self, reporter: Reporter) -> None:
         with uninterrupted():
             from cns_drake.simulation.simulation import simulate
 
@@ -68,7 +68,7 @@ class Record(Step):
             methods = survey.methods if survey.roles else ()
             # What is wrong comes up again in the survey's own job.
             with contextlib.suppress(Exception):
-                found.append(survey.find(drive, methods, Tell()))
+                found.append(survey.find(drive, methods, Reporter()))
 
         with self._place(is_new) as (folder, overwrite):
             simulate(
@@ -77,8 +77,8 @@ class Record(Step):
                 page_file=self.page,
                 overwrite=overwrite,
                 reader=None if survey is None else read,
-                on_frame=tell.progress,
-                on_note=tell.note,
+                on_frame=reporter.progress,
+                on_note=reporter.note,
             )
         for one in found:
             assert survey is not None

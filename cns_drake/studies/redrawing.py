@@ -20,7 +20,7 @@ from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.jobs.running import Job, run_jobs
-from cns_drake.base.jobs.step import Step, Tell
+from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.map_folder import STAGES_NAME, MapFolder
 from cns_drake.base.version import __version__
 from cns_drake.base.yaml_files import read_yaml
@@ -105,7 +105,7 @@ class RedrawCity(Step):
         # A folder that has its final name is complete.
         return is_current(self.folder / _PART, self._made_of())
 
-    def run(self, tell: Tell) -> None:
+    def run(self, reporter: Reporter) -> None:
         with uninterrupted():
             from cns_drake.city.generation.generate import generate_city
 
@@ -130,7 +130,7 @@ class RedrawCity(Step):
                 ) from error
             write_part(draft / _PART, made_of, None)
             if _is_replaced(folder):
-                tell.note(f"{folder}: replaced, as it was of other inputs")
+                reporter.note(f"{folder}: replaced, as it was of other inputs")
             with user_errors(folder):
                 if os.path.lexists(folder):
                     os.replace(folder, part / "replaced")

@@ -201,7 +201,7 @@ def _start(
     """Finds first loops.
 
     Returns:
-        A search with some loops; what told where to look; the number of
+        A search with some loops; what said where to look; the number of
         candidates if places had to be recognised.
 
     Raises:
@@ -304,7 +304,7 @@ def _lowered(
 
 
 def _motion(X_WS: np.ndarray, X_TS: np.ndarray) -> dict:
-    """Returns the fields of the report that tell how a drive was moved."""
+    """Returns the fields of the report that say how a drive was moved."""
     moves = X_TS @ poses.inverse(X_WS)
     middle = moves[len(moves) // 2]
     rigid = middle @ X_WS

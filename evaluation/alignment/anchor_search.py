@@ -1,6 +1,6 @@
 """Guesses of how the worlds of two drives lie to each other.
 
-Without common coordinates, places that look alike tell it: Scan Context
+Without common coordinates, places that look alike show it: Scan Context
 proposes pairs of keyframes with the turn between them, and a consensus of
 two pairs (RANSAC) fixes the four numbers that two upright worlds can differ
 by: a turn about the vertical and a move.
@@ -26,7 +26,7 @@ _CANDIDATES = 5
 # keyframes, drift; sectors of six degrees [m, rad].
 _NEAR = 8.0
 _TURN = np.radians(12.0)
-# Two pairs tell a turn if they are this far apart [m].
+# Two pairs determine a turn if they are this far apart [m].
 _BASELINE = 20.0
 _MOST_TRIALS = 3000
 _NUM_GUESSES = 5

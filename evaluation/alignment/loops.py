@@ -19,7 +19,7 @@ _LEAST_FITNESS = 0.55
 _LEAST_STRUCTURE = 0.55
 # Registration does not find back from farther off [m].
 _BASIN = 12.0
-# What ICP does not know of its errors: 0.2 degrees, 0.1 m.
+# Errors that ICP does not estimate: 0.2 degrees, 0.1 m.
 _FLOOR = np.diag([np.radians(0.2) ** 2] * 3 + [0.1**2] * 3)
 
 

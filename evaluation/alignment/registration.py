@@ -34,7 +34,7 @@ _SCALE = 0.25
 # Normals of a pair that differ by more than this cosine are of two surfaces.
 _PARALLEL = 0.7
 _FEWEST_PAIRS = 20
-# Powers of up to 2^6 tell spreads apart that differ by a tenth.
+# Powers of up to 2^6 part spreads that differ by a tenth.
 _SQUARINGS = 6
 _SEED = 7
 # How well a point is known to lie on its plane [m]; of so many neighbouring

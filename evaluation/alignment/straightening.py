@@ -1,7 +1,7 @@
 """Drives that have drifted, made to agree with themselves.
 
 Positions of one drive that are off show where it passes a place again: the
-scans tell where it is, and the poses say something else.
+scans show where it is, and the poses say something else.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def make_consistent(sequence: Sequence, track: Track) -> Straightened:
     """
     drive = Submaps(sequence)
     worst = 0.0
-    # Near places first: what they tell brings others within reach.
+    # Near places first: what they show brings others within reach.
     for _ in range(_ROUNDS):
         loops = find_self_loops(drive, _NUM_LOOPS, track)
         if len(loops) < _FEWEST_LOOPS:

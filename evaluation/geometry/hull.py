@@ -40,7 +40,7 @@ def in_convex_hull(points: np.ndarray, vertices: np.ndarray) -> np.ndarray:
         try:
             facets = ConvexHull(hull @ axes[:rank].T).equations
         except QhullError:
-            # Flatter than Qhull can tell from rounding.
+            # As flat as rounding, for Qhull.
             rank -= 1
             continue
         return _in_half_spaces(inside @ axes[:rank].T, facets, tolerance) & (

@@ -4,7 +4,7 @@ Faster than to ask a tree for each point anew, because points that lie
 together share the search. The cloud is cut into groups of nearby points, and
 a group finds once which others can hold neighbours of its points. And if the
 k nearest of a point lie within r, then the k nearest of another one at
-distance d lie within r + d: points taken in order of their place know the
+distance d lie within r + d: points taken in order of their place have the
 size of their neighbourhood before they look.
 """
 

@@ -36,7 +36,7 @@ def cell_order(indices: np.ndarray) -> np.ndarray:
         low, high = int(column.min()), int(column.max())
         largest = largest * (high - low + 1) + high - low
         if largest > _LARGEST_NUMBER:
-            # Cells that no number can tell apart.
+            # Too many cells to number.
             return np.lexsort(indices.T[::-1])
         numbers *= high - low + 1
         numbers += column

@@ -1,7 +1,7 @@
 """Keypoints of a cloud: places that stand out from a plane, and how.
 
 Part of BTC (see `evaluation.methods.btc`). Seen along the normal of the
-plane, the cloud is an image; each of its cells tells by bits at which
+plane, the cloud is an image; each of its cells has bits that say at which
 heights above the plane there are points. Cells with many heights (walls,
 trunks, posts) are the keypoints, if they are not part of a line of such.
 """

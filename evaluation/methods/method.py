@@ -38,7 +38,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     """Describes scans and compares a query with a database of places.
 
     Attributes:
-        name: as the command line knows it.
+        name: as on the command line.
         Config: type of its parameters.
         scans_per_place: how many consecutive scans are merged, in the frame
             of the first, into the cloud that is described.

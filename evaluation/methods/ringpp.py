@@ -4,7 +4,7 @@ A scan becomes a map from above with six channels that describe the shape of
 the cloud. Its Radon transform turns a rotation into a shift of its rows; the
 magnitude of each row's spectrum does not change if the scan is moved. Two
 scans are alike if these spectra correlate well for some shift, which is also
-their difference in heading. With the heading known, the maps from above tell
+their difference in heading. With the heading known, the maps from above give
 the translation.
 """
 

@@ -2,8 +2,8 @@
 
 Points are counted over range and elevation, and over azimuth and elevation.
 Elevations weigh the more the more points they have: the weighted counts over
-range tell places apart whichever way the sensor is turned, those over azimuth
-tell how it is turned.
+range part places whichever way the sensor is turned, those over azimuth
+show how it is turned.
 """
 
 from __future__ import annotations

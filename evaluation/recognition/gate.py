@@ -2,7 +2,7 @@
 
 A method that estimates how the query lies to a place thereby says how far
 apart the two are. With the gate, that distance is compared with the radius of
-a match. The same rule serves every method, and no method knows the radius.
+a match. The same rule serves every method; no method uses the radius.
 
 The gate looks at the `NUM_GATED` places with the best scores. A score counts
 in full up to a distance of `1 - SOFTNESS` radii, falls linearly, and the place

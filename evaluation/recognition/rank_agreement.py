@@ -27,7 +27,7 @@ from evaluation.recognition.metrics import (
 )
 
 _NEEDED = ("map", "db", "query", "method", "correct", "has_match", "score")
-# Those of a table of queries that tell apart what a method is run on.
+# Those of a table of queries that name what a method is run on.
 _KEYS = ("map", "db", "query", "cause", "level", "radius_told", "seed", "gate")
 
 # Pair of drives -> method -> what became of its queries.

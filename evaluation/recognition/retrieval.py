@@ -45,7 +45,7 @@ class Retrieval:
         distances: (Q, D) float64 between the sensor positions [m].
         matches: (Q, D) bool, which place is a true match of which query.
         pose_errors: of the best place of each query.
-        is_known: (Q, D) bool, which places a query can know.
+        is_known: (Q, D) bool, which places a query may find.
         overlaps: (Q, D) float64, see `overlap_truth`; None where they are not
             the truth.
 
@@ -243,9 +243,9 @@ def _known_places(
     query: DescribedDrive,
     protocol: RetrievalProtocol,
 ) -> np.ndarray:
-    """Returns which places each query can know, (Q, D) bool."""
-    asked, told = query.queries.stamps_ns, database.places.stamps_ns
+    """Returns which places each query may find, (Q, D) bool."""
+    query_ns, place_ns = query.queries.stamps_ns, database.places.stamps_ns
     if protocol.exclude_recent is None or database.name != query.name:
-        return np.ones((len(asked), len(told)), dtype=bool)
-    age_ns = asked[:, None] - told[None, :]
+        return np.ones((len(query_ns), len(place_ns)), dtype=bool)
+    age_ns = query_ns[:, None] - place_ns[None, :]
     return age_ns >= protocol.exclude_recent * 1e9

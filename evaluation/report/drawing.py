@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from cns_drake.base.files import completing
 from evaluation.report.method_titles import title
 
-# Okabe and Ito's colours, told apart by all kinds of colour vision; line
+# Okabe and Ito's colours, distinct for all kinds of colour vision; line
 # styles and markers for prints without colour.
 METHOD_STYLES = {
     "ring++": ("#0072B2", "-", "o"),

@@ -28,7 +28,7 @@ from evaluation.report.point_rendering import (
 _UNCHANGED = (214, 214, 214)
 _CHANGED = (196, 18, 24)
 _ABSENT_OUTSIDE = (240, 170, 160)
-# Sets O and H: everybody can tell blue from vermilion.
+# Sets O and H: blue and vermilion differ for everybody.
 _IN_O = (120, 170, 215)
 _ONLY_IN_H = (213, 94, 0)
 _OUTSIDE_H = (228, 228, 228)

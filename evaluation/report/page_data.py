@@ -42,7 +42,7 @@ class Illustration:
         page_kind: "svg" or "webp", the form in which the page holds it.
         section: of the page that shows it; "print" for none.
         num_panels: that lie side by side; a phone shows one at a time.
-        legend: red, green, blue and meaning of colours, told again below
+        legend: red, green, blue and meaning of colours, named again below
             the figure, where a phone shows it legibly.
     """
 

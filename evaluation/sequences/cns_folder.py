@@ -129,7 +129,7 @@ def _read_mount(path: Path | None) -> np.ndarray:
         return poses.make_pose(np.eye(3), np.array([0.0, 0.0, _LIDAR_HEIGHT]))
     try:
         text = read_bytes(path).decode("utf-8")
-        # OpenCV begins its files with a directive that YAML does not know.
+        # OpenCV begins its files with a directive that is not YAML's.
         lines = [x for x in text.splitlines() if not x.startswith("%")]
         X_BS = _find_pose(parse_yaml("\n".join(lines), _Loader), path)
     except ValueError as error:

@@ -10,7 +10,7 @@ from cns_drake.base import poses
 from cns_drake.base.errors import InputError
 from cns_drake.base.recordings.sequence import Sequence
 
-# Poses on either side of a scan that tell how the LiDAR moved. The ends of
+# Poses on either side of a scan that show how the LiDAR moved. The ends of
 # the splines through them are free, so that an error there fades by about a
 # quarter from pose to pose.
 _REACH = 4
@@ -35,7 +35,7 @@ def deskew(sequence: Sequence, index: int) -> np.ndarray:
         A copy of the scan with other `x`, `y`, `z`.
 
     Raises:
-        InputError: if the scan cannot be read or does not tell when its
+        InputError: if the scan cannot be read or does not say when its
             points were measured, or there are too few poses.
     """
     points = sequence.scan(index).copy()

@@ -56,7 +56,7 @@ class MulranSequence(FileSequence):
     The pose of a scan is interpolated at its stamp. Points without a return,
     which are stored as (0, 0, 0), are left out. A whole scan has the fields
     `ring` and `t` [ns since the stamp] beside the stored ones; a file that
-    is short of points does not tell which are missing, so its scan has not.
+    is short of points does not say which are missing, so its scan has not.
     """
 
     def __init__(self, path: Path):

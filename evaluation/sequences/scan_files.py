@@ -167,7 +167,7 @@ def read_packed(path: Path, dtype: np.dtype) -> np.ndarray:
 def check_below(points: np.ndarray, name: str, limit: int) -> None:
     """Refuses points with a number that their sensor does not have.
 
-    It tells files of one sensor from those of another.
+    It differs between files of two sensors.
 
     Raises:
         ValueError: if `points[name]` reaches `limit`.

@@ -104,7 +104,7 @@ def assemble(
         protocol: likewise.
         with_costs: likewise.
         reference: likewise.
-        on_note: is told of which cities there is nothing to compare; the
+        on_note: takes which cities have nothing to compare; the
             report says so too.
 
     Returns:

@@ -45,7 +45,7 @@ def write_report(
         own_methods: Python files with one method each, to run besides those
             of this package.
         protocol: of place recognition.
-        on_note: is told which recordings are left out, and of which cities
+        on_note: takes which recordings are left out, and for which cities
             there is nothing to compare.
         settings: see `choose_methods`.
         with_costs: measure what the methods cost, too.

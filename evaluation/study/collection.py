@@ -131,12 +131,12 @@ def find_recordings(
     Drives in the layout of CNS, and in that of KITTI if a `scenario.yaml`
     lies in them, are found up to three levels down, where exports put them.
     A recording states its map and stage in its scenario; without one they
-    are taken from its name, `<map>_<stage>`. Where neither tells them, it is
+    are taken from its name, `<map>_<stage>`. Where neither has them, it is
     left out.
 
     Args:
         folder: that holds them.
-        on_note: is told what is left out.
+        on_note: takes what is left out.
         lidar: whose scans to read, of recordings with several.
 
     Raises:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base.jobs.step import Step, Tell
+from cns_drake.base.jobs.step import Reporter, Step
 from evaluation.recognition.description import (
     DescribedDrive,
     Role,
@@ -51,12 +51,12 @@ class DescribeDrive(Step):
     def is_done(self) -> bool:
         return not self._missing()
 
-    def run(self, tell: Tell) -> None:
+    def run(self, reporter: Reporter) -> None:
         missing = self._missing()
         methods = [one for one in self.methods if self._file(one) in missing]
         scans: list[np.ndarray] | None = [] if self.with_scans else None
         found = describe(
-            self.source, self.role, methods, self.protocol, tell, scans
+            self.source, self.role, methods, self.protocol, reporter, scans
         )
         for choice in methods:
             # Each is let go when it is written.
@@ -95,7 +95,7 @@ def describe(
     role: Role,
     methods: Iterable[MethodChoice],
     protocol: RetrievalProtocol,
-    tell: Tell,
+    reporter: Reporter,
     scans: list[np.ndarray] | None = None,
 ) -> dict[str, DescribedDrive]:
     """Returns name of method -> what it keeps of a drive.
@@ -105,7 +105,7 @@ def describe(
         role: what the drive serves as.
         methods: that describe it.
         protocol: where it has places and queries.
-        tell: takes the progress.
+        reporter: takes the progress.
         scans: gets the single scan (N, 3) float32 of each described frame, in
             the frame of the sensor.
 
@@ -125,7 +125,7 @@ def describe(
         running,
         {role},
         protocol,
-        tell.track,
+        reporter.track,
         visit=None if scans is None else keep,
     )
     return {

@@ -30,7 +30,7 @@ class DriveSource(Protocol):
         """
 
     def identity(self) -> object:
-        """Returns what tells the drive from all others, ready for JSON.
+        """Returns what identifies the drive, ready for JSON.
 
         Results that were found from a drive with an equal identity are not
         found again.

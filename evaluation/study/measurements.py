@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from cns_drake.base.jobs.step import Tell
+from cns_drake.base.jobs.step import Reporter
 from evaluation.change.change_result import ChangeResult
 from evaluation.change.drive_change import Surveyed
 from evaluation.change.drive_change import compare as compare_maps
@@ -44,7 +44,7 @@ class MeasureChange(PartStep):
             "drives": [part_digest(survey.drive) for survey in self.surveys],
         }
 
-    def make(self, tell: Tell) -> ChangeResult:
+    def make(self, reporter: Reporter) -> ChangeResult:
         earlier, later, *controls = (
             _to_surveyed(read_part(survey.drive)) for survey in self.surveys
         )
@@ -88,17 +88,19 @@ class RecognisePlaces(PartStep):
             "drives": [part_digest(part) for part in self._described],
         }
 
-    def make(self, tell: Tell) -> RecognitionResult | None:
+    def make(self, reporter: Reporter) -> RecognitionResult | None:
         # The method comes first: what it kept may be of a type of its own.
         method = self.method.make()
         (placed, database), (placed_query, query) = map(
             read_part, self._described
         )
         check_same_world(placed, placed_query)
-        retrieval = score(method, database, query, self.protocol, tell.track)
+        retrieval = score(
+            method, database, query, self.protocol, reporter.track
+        )
         if database.name == query.name and not retrieval.matches.any():
             # A route need not close a loop.
-            tell.note(f"{query.name}: it never comes back to where it was")
+            reporter.note(f"{query.name}: it never comes back to where it was")
             return None
         outcome = judge_retrieval(
             method, database.name, query.name, retrieval, self.protocol

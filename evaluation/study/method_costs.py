@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from cns_drake.base.jobs.step import Tell
+from cns_drake.base.jobs.step import Reporter
 from evaluation.recognition.costs import Cost, measure_cost
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.sequences.sampling import gather
@@ -51,11 +51,11 @@ class MeasureCosts(PartStep):
             "protocol": self.protocol.to_json(),
         }
 
-    def make(self, tell: Tell) -> list[Cost]:
+    def make(self, reporter: Reporter) -> list[Cost]:
         sequence, protocol = self.source(), self.protocol
         costs = []
         with threadpool_limits(limits=1):
-            for choice in tell.track(self.methods, "", len(self.methods)):
+            for choice in reporter.track(self.methods, "", len(self.methods)):
                 method = choice.make()
                 number = protocol.scans(method)
                 last = max(len(sequence) - number, 0)

@@ -18,7 +18,7 @@ import zstandard
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import completing, make_folder
 from cns_drake.base.jobs.fingerprint import fingerprint
-from cns_drake.base.jobs.step import Step, Tell
+from cns_drake.base.jobs.step import Reporter, Step
 from evaluation.study.plain_values import decode, encode
 
 _MAGIC = b"cns-eval part 2\n"
@@ -52,7 +52,7 @@ class PartStep(Step):
         """
 
     @abc.abstractmethod
-    def make(self, tell: Tell) -> object:
+    def make(self, reporter: Reporter) -> object:
         """Returns the value of the part; see `Step.run`."""
 
     def is_done(self) -> bool:
@@ -61,10 +61,10 @@ class PartStep(Step):
             file.is_file() for file in self.figures
         )
 
-    def run(self, tell: Tell) -> None:
+    def run(self, reporter: Reporter) -> None:
         # What changes while it is made shall not count as its input.
         inputs = self.made_of(self.inputs())
-        write_part(self.part, inputs, self.make(tell))
+        write_part(self.part, inputs, self.make(reporter))
 
 
 def write_part(path: Path, inputs: Mapping, value: object) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cns_drake.base.jobs.step import Tell
+from cns_drake.base.jobs.step import Reporter
 from evaluation.recognition.description import (
     DescribedDrive,
     DescribedScans,
@@ -79,11 +79,11 @@ class MeasureRung(PartStep):
             "methods": [method.inputs() for method in self.methods],
         }
 
-    def make(self, tell: Tell) -> list[RungOutcome]:
+    def make(self, reporter: Reporter) -> list[RungOutcome]:
         place_scans: list[np.ndarray] = []
         query_scans: list[np.ndarray] = []
-        places = self._described(self.database, "places", tell, place_scans)
-        queries = self._described(self.query, "queries", tell, query_scans)
+        places = self._described(self.database, "places", reporter, place_scans)
+        queries = self._described(self.query, "queries", reporter, query_scans)
         overlaps = None
         found = []
         for choice in self.methods:
@@ -123,7 +123,7 @@ class MeasureRung(PartStep):
         self,
         drive: RungDrive,
         role: Role,
-        tell: Tell,
+        reporter: Reporter,
         scans: list[np.ndarray],
     ) -> dict[str, DescribedDrive]:
         """Returns descriptions that are not in files; adds all scans."""
@@ -131,7 +131,7 @@ class MeasureRung(PartStep):
             scans += read_part(drive.files.scans)
             return {}
         return describe(
-            drive.source, role, self.methods, self.protocol, tell, scans
+            drive.source, role, self.methods, self.protocol, reporter, scans
         )
 
     def _identity(self, drive: RungDrive) -> object:

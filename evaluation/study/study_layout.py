@@ -37,7 +37,7 @@ class SurveyFiles:
         return self.folder / "scans.data"
 
     def described(self, method: MethodChoice) -> Path:
-        """Of (`PlacedDrive`, `DescribedDrive`)."""
+        """Returns the layout of (`PlacedDrive`, `DescribedDrive`)."""
         return self.folder / f"described_{file_name(method.name)}.data"
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from cns_drake.base.jobs.step import Step, Tell
+from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.recordings.sequence import Sequence
 from evaluation.recognition.description import Role
 from evaluation.recognition.protocol import RetrievalProtocol
@@ -42,22 +42,22 @@ class Survey(Step):
     def is_done(self) -> bool:
         return not any(self._missing())
 
-    def run(self, tell: Tell) -> None:
+    def run(self, reporter: Reporter) -> None:
         missing = self._missing()
-        self._write(self.find(self.source(), missing[0], tell), *missing)
+        self._write(self.find(self.source(), missing[0], reporter), *missing)
 
     def find(
         self,
         drive: Sequence,
         methods: Iterable[MethodChoice],
-        tell: Tell,
+        reporter: Reporter,
     ) -> RecordingSurvey:
         """Returns the survey of a drive, described by some of the methods.
 
         Args:
             drive: that of the source, or the same while it is made.
             methods: to describe it; none if it has no role.
-            tell: what takes the progress.
+            reporter: takes the progress.
 
         Raises:
             InputError: see `survey_recording`.
@@ -67,7 +67,7 @@ class Survey(Step):
             self.roles,
             [method.make() for method in methods],
             self.protocol,
-            tell.track,
+            reporter.track,
         )
 
     def write(self, found: RecordingSurvey) -> None:

@@ -34,7 +34,7 @@ _COST = 30.0
 
 @dataclass(frozen=True)
 class Asked:
-    """A drive that is asked, and what tells the change from the route.
+    """A database drive, and what separates the change from the route.
 
     Attributes:
         source: opens it.

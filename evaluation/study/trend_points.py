@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import math
 from pathlib import Path
 
-from cns_drake.base.jobs.step import Tell
+from cns_drake.base.jobs.step import Reporter
 from evaluation.change.tcr import temporal_change
 from evaluation.recognition.place_recognition import judge_retrieval
 from evaluation.recognition.protocol import RetrievalProtocol
@@ -83,10 +83,10 @@ class MeasureDatabase(PartStep):
             "methods": [method.inputs() for method in self.methods],
         }
 
-    def make(self, tell: Tell) -> list[TrendPoint]:
+    def make(self, reporter: Reporter) -> list[TrendPoint]:
         running = [method.make() for method in self.methods]
         database = survey_recording(
-            self.source(), {"places"}, running, self.protocol, tell.track
+            self.source(), {"places"}, running, self.protocol, reporter.track
         )
         asking = read_part(self.query.drive)
         check_same_world(database.drive.placed, asking.placed)

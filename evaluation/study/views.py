@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cns_drake.base.files import make_folder
-from cns_drake.base.jobs.step import Tell
+from cns_drake.base.jobs.step import Reporter
 from evaluation.report.drawing import PRINTED
 from evaluation.report.figures import (
     SeenRoute,
@@ -53,17 +53,17 @@ class DrawCity(PartStep):
             "surveys": _digests(surveys),
         }
 
-    def make(self, tell: Tell) -> dict[str, PageDrive]:
+    def make(self, reporter: Reporter) -> dict[str, PageDrive]:
         routes, drives = [], {}
         for done, (name, survey) in enumerate(self.stages):
-            tell.progress(done, len(self.stages) + 1)
+            reporter.progress(done, len(self.stages) + 1)
             drive = read_part(survey.drive)
             view = top_view(read_part(survey.fine), drive.positions)
             routes.append(SeenRoute(name, view, drive.positions))
             drives[drive.name] = make_drive(
                 drive.name, view, drive.X_WS, drive.frames, drive.thumbnails
             )
-        tell.progress(len(self.stages), len(self.stages) + 1)
+        reporter.progress(len(self.stages), len(self.stages) + 1)
         make_folder(self.stem.parent)
         draw_routes(self.map_name, routes, self.stem)
         return drives
@@ -95,7 +95,7 @@ class DrawChange(PartStep):
             "surveys": _digests(self.surveys),
         }
 
-    def make(self, tell: Tell) -> None:
+    def make(self, reporter: Reporter) -> None:
         result = read_part(self.change)
         earlier, later = (
             _stage(name, survey)

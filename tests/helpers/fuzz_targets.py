@@ -39,9 +39,9 @@ from evaluation import sequences
 from evaluation.clouds.cloud_files import read_cloud
 from helpers import (
     bent_drive,
+    contradictions,
     dataset_folders,
     helipr_drive,
-    lies,
     mulran_drive,
 )
 from helpers.bag_recordings import contents, record
@@ -411,24 +411,24 @@ TARGETS = (
     Target("opendrive", 8, write_opendrive, ("town.xodr",), read_opendrive),
     # Well-formed parts that contradict each other.
     Target(
-        "recording lies", 8, _write_recording, ("town_07/*.mcap",),
+        "false recording", 8, _write_recording, ("town_07/*.mcap",),
         lambda folder: _read_sequence(folder / "town_07"),
-        exact=True, mutate=lies.lie_about,
+        exact=True, mutate=contradictions.contradict,
     ),
     Target(
-        "cloud lies", 8, _write_clouds, ("*.*",), _read_clouds, exact=True,
-        mutate=lies.lie_about_cloud,
+        "false cloud", 8, _write_clouds, ("*.*",), _read_clouds, exact=True,
+        mutate=contradictions.contradict_cloud,
     ),
     Target(
-        "world lies", 2, _write_town, ("stage_01.sdf",), _scan, exact=True,
-        mutate=lies.lie_about_size,
+        "false world", 2, _write_town, ("stage_01.sdf",), _scan, exact=True,
+        mutate=contradictions.contradict_size,
     ),
     Target(
-        "kitti lies", 4, _export("kitti"),
+        "false kitti", 4, _export("kitti"),
         ("kitti/**/*.label", "kitti/**/*.bin", "kitti/**/poses.txt",
          "kitti/poses/*.txt", "kitti/**/times.txt"),
         lambda folder: _read_sequence(folder / "kitti" / "sequences" / "07"),
-        exact=True, mutate=lies.lie_about_rows,
+        exact=True, mutate=contradictions.contradict_rows,
     ),
     Target("mulran", 6, _write_mulran, ("drive/**/*",), _read_drive),
     Target("helipr", 6, _write_helipr, ("drive/**/*",), _read_drive),

@@ -28,14 +28,14 @@ class Call(Step):
     def is_done(self):
         return self.done is not None and self.done(*self.arguments)
 
-    def run(self, tell):
-        self.function(*self.arguments, tell)
+    def run(self, reporter):
+        self.function(*self.arguments, reporter)
 
 
-def join(inputs, path, tell):
+def join(inputs, path, reporter):
     """Writes the contents of files, one after the other."""
     for done, file in enumerate(inputs):
-        tell.progress(done, len(inputs))
+        reporter.progress(done, len(inputs))
         assert file.is_file()
     path.write_text("+".join(file.read_text() for file in inputs) or path.name)
 
@@ -52,27 +52,27 @@ def cannot_tell(*arguments):
     raise InputError("FILE: cannot be read")
 
 
-def note_process(path, tell):
-    tell.note("here I am")
+def note_process(path, reporter):
+    reporter.note("here I am")
     path.write_text(f"{os.getpid()} {os.getppid()} {os.getsid(0)}")
 
 
-def refuse(tell):
+def refuse(reporter):
     raise InputError("FILE: field: cannot be used")
 
 
-def stumble(tell):
+def stumble(reporter):
     raise ZeroDivisionError("over nothing")
 
 
-def die(tries, tell):
+def die(tries, reporter):
     """Dies each time, and leaves a mark."""
     with tries.open("a") as stream:
         stream.write("x")
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def die_first(tries, path, tell):
+def die_first(tries, path, reporter):
     """Dies twice, of two causes, then succeeds."""
     with tries.open("a") as stream:
         stream.write("x")
@@ -84,7 +84,7 @@ def die_first(tries, path, tell):
     path.write_text("at last")
 
 
-def hold(pipe: Path, tell):
+def hold(pipe: Path, reporter):
     """Says its process through a named pipe, then works for ever."""
     with pipe.open("w") as stream:
         stream.write(str(os.getpid()))
@@ -106,7 +106,7 @@ def read_holder(pipe: Path) -> int:
         os.close(reader)
 
 
-def kill_worker(tries, tell):
+def kill_worker(tries, reporter):
     """Takes the worker along, and leaves a mark."""
     with tries.open("a") as stream:
         stream.write("x")
@@ -114,11 +114,11 @@ def kill_worker(tries, tell):
     threading.Event().wait()
 
 
-def note_variable(name, output, tell):
+def note_variable(name, output, reporter):
     output.write_text(repr(os.environ.get(name)))
 
 
-def note_ports(path, tell):
+def note_ports(path, reporter):
     """Writes on how many processes there are, and who listens where."""
     import psutil
 

@@ -5,7 +5,7 @@ tests; processes would only make these slow.
 """
 
 from cns_drake.base.jobs.job_process import nothing_left
-from cns_drake.base.jobs.step import Tell
+from cns_drake.base.jobs.step import Reporter
 from evaluation.paper import reference_for
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.study.assembly import assemble
@@ -22,7 +22,7 @@ def do(jobs):
     done = []
     for job in jobs:
         if not nothing_left(job.step):
-            job.step.run(Tell())
+            job.step.run(Reporter())
             done.append(job.name)
     return done
 

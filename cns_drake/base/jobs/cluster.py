@@ -32,7 +32,7 @@ class Cluster:
     def slots(self) -> int | None:
         """How many jobs it runs at a time, if that is known beforehand.
 
-        A foreign scheduler is told of all jobs at once, since others may use
+        A foreign scheduler gets all jobs at once, since others may use
         it, and it may start workers for them.
         """
         return self.num_workers if self.scheduler is None else None
@@ -41,7 +41,7 @@ class Cluster:
         """Returns workers, which live as long as the context.
 
         Args:
-            listener: is told of their jobs.
+            listener: takes the messages of their jobs.
 
         Raises:
             InputError: if the scheduler does not answer.

@@ -46,7 +46,7 @@ class DaskWorkers:
             name,
             job,
             self._id,
-            # Up to the first "-", what Dask knows the duration of: only then
+            # Up to the first "-", a kind whose duration Dask learns: only then
             # it moves jobs from a worker to an idle one. A new key each time:
             # an old one would stand for the old result.
             key=f"{_KIND}-{name} {self._count}-{self._id}",
@@ -104,7 +104,7 @@ def dask_workers(address: str, listener: Listener) -> Iterator[DaskWorkers]:
     # Slow to import, and needed by nobody who asks for help.
     from distributed import Client
 
-    # What happens to jobs is told by whoever runs them, in other words.
+    # Whoever runs the jobs reports what happens to them, in other words.
     for name in ("distributed", "distributed.client"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
     _check_answer(address)
@@ -157,7 +157,7 @@ def work(name: str, job: bytes, topic: str) -> None:
     worker = get_worker()
     key = worker.get_current_task()
 
-    def tell(kind: str, *values: object) -> None:
+    def report(kind: str, *values: object) -> None:
         worker.log_event(topic, (kind, name, *values))
 
     def is_wanted() -> bool:
@@ -169,8 +169,8 @@ def work(name: str, job: bytes, topic: str) -> None:
             and task.state != "cancelled"
         )
 
-    tell("started")
+    report("started")
     try:
-        run_process(job, tell, is_wanted)
+        run_process(job, report, is_wanted)
     finally:
-        tell("ended")
+        report("ended")

@@ -27,7 +27,7 @@ from cns_drake.base.interrupts import (
     interrupt_on_termination,
     uninterrupted,
 )
-from cns_drake.base.jobs.step import Step, Tell
+from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.libraries import missing_library
 
 # How long a process may take to close its files once it is asked to end [s].
@@ -69,7 +69,7 @@ def run_process(
 
     Args:
         job: a pickled `Step`.
-        on_message: takes what the job tells; see `Tell`.
+        on_message: takes the job's messages; see `Reporter`.
         is_wanted: asked often; where it says no, the process is ended.
 
     Raises:
@@ -91,12 +91,12 @@ def run_process(
     theirs.close()  # The pipe then ends with the process.
     with ours:
         try:
-            told, text = _listen(ours, job, on_message, is_wanted)
+            kind, text = _listen(ours, job, on_message, is_wanted)
         finally:
             status = _end(process)
-    if told == "fault":
+    if kind == "fault":
         raise JobError(text)
-    if told != "done":
+    if kind != "done":
         raise ProcessDiedError(text or _describe(status))
 
 
@@ -150,7 +150,7 @@ def main(number: int) -> None:
     interrupt_on_termination(once=True)
 
     def send(*message: object) -> None:
-        # Where the parent has gone, there is nobody to tell.
+        # Where the parent has gone, nobody takes the message.
         with contextlib.suppress(ConnectionError):
             connection.send(message)
 
@@ -159,15 +159,15 @@ def main(number: int) -> None:
         threading.Thread(
             target=_end_with_parent, args=(connection,), daemon=True
         ).start()
-        last = _run(job, Tell(send))
+        last = _run(job, Reporter(send))
     except KeyboardInterrupt:
         end_interrupted()
     ignore_interrupts()
     send(*last)
 
 
-def _run(job: bytes, tell: Tell) -> tuple[str, str]:
-    """Runs a job; returns what is left to tell."""
+def _run(job: bytes, reporter: Reporter) -> tuple[str, str]:
+    """Runs a job; returns its last message."""
     try:
         with uninterrupted():
             step: Step = pickle.loads(job)
@@ -177,14 +177,14 @@ def _run(job: bytes, tell: Tell) -> tuple[str, str]:
                 stack.enter_context(
                     exclusive(
                         output,
-                        lambda: tell.note(
+                        lambda: reporter.note(
                             f"{output}: waiting for another process that "
                             "works on it"
                         ),
                     )
                 )
             if not nothing_left(step):
-                step.run(tell)
+                step.run(reporter)
     except MemoryError:
         # Another time, or elsewhere, there may be enough.
         return "died", "not enough memory"
@@ -194,7 +194,7 @@ def _run(job: bytes, tell: Tell) -> tuple[str, str]:
         lacking = isinstance(error, ImportError) and missing_library(error)
         if lacking:
             return "fault", lacking
-        tell.note(traceback.format_exc())
+        reporter.note(traceback.format_exc())
         return "fault", one_line(f"{type(error).__name__}: {error}")
     return "done", ""
 

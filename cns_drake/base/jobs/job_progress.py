@@ -19,7 +19,7 @@ from cns_drake.base.progress_bars import print_note, show_bars
 # outweighs them [s].
 _PRIOR = 10.0
 # A job that takes less than this share of its cost was done already, and
-# tells nothing about the pace.
+# says nothing about the pace.
 _REAL_SHARE = 0.05
 
 
@@ -50,7 +50,7 @@ class TimeLeft:
         """Takes name -> expected time on one core [s]."""
         self._works = {name: _Work(cost) for name, cost in costs.items()}
         # Name -> time and share when the job was first heard of; the share
-        # is unknown until it tells. An earlier run may have left some.
+        # is unknown until it reports. An earlier run may have left some.
         self._running: dict[str, tuple[float, float | None]] = {}
         self._most_running = 1
 
@@ -167,7 +167,7 @@ class JobProgress:
             total=total,
             note=self._notes[name],
         )
-        if self._silent:  # Something has begun: that is soon told.
+        if self._silent:  # Something has begun: a line soon says so.
             self._due = 0.0
         self.refresh()
 

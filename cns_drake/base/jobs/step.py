@@ -19,23 +19,23 @@ from cns_drake.base.jobs.fingerprint import code_digest
 _REPORT_INTERVAL = 0.5
 
 
-class Tell:
+class Reporter:
     """How a step reports on itself; without an argument nobody listens."""
 
     def __init__(self, send: Callable[..., None] = lambda *message: None):
         """Reports a message to its receiver: a kind and its values."""
         self._send = send
-        self._told: float | None = None
+        self._reported: float | None = None
 
     def progress(self, done: int, total: int) -> None:
         """Reports that so much of so much is done, in any unit."""
         now = time.monotonic()
         if (
             done >= total
-            or self._told is None
-            or now - self._told >= _REPORT_INTERVAL
+            or self._reported is None
+            or now - self._reported >= _REPORT_INTERVAL
         ):
-            self._told = now
+            self._reported = now
             self._send("progress", int(done), int(total))
 
     def note(self, text: str) -> None:
@@ -77,11 +77,11 @@ class Step(abc.ABC):
         """
 
     @abc.abstractmethod
-    def run(self, tell: Tell) -> None:
+    def run(self, reporter: Reporter) -> None:
         """Does the work; leaves no file under a final name half written.
 
         Args:
-            tell: what takes its progress.
+            reporter: takes its progress.
 
         Raises:
             InputError: it cannot be done.
@@ -111,7 +111,7 @@ class Steps(Step):
     def is_done(self) -> bool:
         return all(step.is_done() for step in self.steps)
 
-    def run(self, tell: Tell) -> None:
+    def run(self, reporter: Reporter) -> None:
         for step in self.steps:
             if not step.is_done():
-                step.run(tell)
+                step.run(reporter)

@@ -9,8 +9,8 @@ from typing import Protocol
 
 from cns_drake.base.jobs.job_process import run_process
 
-# Takes what is told of a job: the kind, its name, and values. Besides what
-# the job tells itself these are "started", "ended", and at last "result" with
+# Takes a message of a job: the kind, the job's name, and values. Besides what
+# the job reports itself these are "started", "ended", and at last "result" with
 # the exception that it ended by, or None. It is called from any thread.
 Listener = Callable[..., None]
 
@@ -28,7 +28,7 @@ class Workers(Protocol):
         """
 
     def stop(self) -> None:
-        """Ends all jobs; "ended" tells when the files of each are closed."""
+        """Ends all jobs; "ended" says that the files of one are closed."""
 
 
 class LocalWorkers:
@@ -68,7 +68,7 @@ class LocalWorkers:
                 lambda kind, *values: self._listener(kind, name, *values),
                 lambda: not self._stopped.is_set(),
             )
-        except Exception as caught:  # Whatever it is, it is told.
+        except Exception as caught:  # Whatever it is, it is reported.
             error = caught
         self._listener("ended", name)
         self._listener("result", name, error)

@@ -267,7 +267,7 @@ class McapFile:
             if len(body) != length:
                 raise EOFError("a message ends behind its chunk")
             channel_id, _, log_time_ns, _ = _MESSAGE_HEADER.unpack_from(body)
-            # Nothing else would tell that a message index is damaged.
+            # Nothing else would show that a message index is damaged.
             if (channel_id, log_time_ns) != (
                 expected_channel_id,
                 expected_time_ns,
@@ -279,7 +279,7 @@ class McapFile:
         """Refuses messages of a channel that the summary does not name.
 
         Raises:
-            InputError: that tells its number.
+            InputError: with its number.
         """
         used = {
             number
@@ -300,7 +300,7 @@ class McapFile:
         """Refuses an index that lists not all messages of a channel.
 
         Raises:
-            ValueError: that tells the numbers.
+            ValueError: with the numbers.
         """
         if self._summary.statistics is None:
             return

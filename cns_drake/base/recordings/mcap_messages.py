@@ -19,7 +19,7 @@ from cns_drake.base.recordings.ros_types import (
 _LONGEST = {ODOMETRY: 1 << 12, IMU: 1 << 12, TF: 1 << 20}
 _MOST_FIELDS = 256
 _LONGEST_NAME = 1 << 10
-# Of CDR: what tells the order of bytes.
+# The header of CDR that gives the order of bytes.
 _ENCAPSULATION_BYTES = 4
 
 

@@ -20,7 +20,7 @@ _LABEL_FIELDS = ("label", "instance")
 _NS_PER_S = 1e9
 _MM_PER_M = 1e3
 _LONGEST_NS = 2.0**32
-# Of Autoware: the only, and strongest, return of a beam.
+# Autoware's type of the only, and strongest, return of a beam.
 _SINGLE_STRONGEST = 1
 
 

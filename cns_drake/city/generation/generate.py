@@ -199,7 +199,7 @@ def _stages_text(
         try:
             found = find_renaming(stages, table, city.structures)
         except InputError:
-            # A faulty table is written anew; of faulty stages is told later.
+            # A faulty table is written anew; faulty stages are reported later.
             return None
         for old, new in found.renamed.items():
             raise InputError(

@@ -85,7 +85,7 @@ def find_renaming(
             if _has_changed(name, before, names, successor):
                 unclear.append(name)
         elif name not in before:
-            # A name of today, or a slip, of which generating tells.
+            # A name of today, or a slip, which generating reports.
             continue
         elif name not in successor:
             lost.append(name)
@@ -125,7 +125,7 @@ def _text(path: Path) -> str:
 def _name_nodes(path: Path) -> list[yaml.ScalarNode]:
     """Returns the scalars of a file of stages that name structures."""
     read_yaml(path)  # Within bounds, or an error in one line.
-    # Only the slower loader tells where in the text a node is.
+    # Only the slower loader says where in the text a node is.
     root = yaml.compose(_text(path), yaml.SafeLoader)
     lists = [
         node
@@ -232,7 +232,7 @@ def _successors(
         for k in tree.query_ball_point(row.xy, _SAME_PLACE):
             other = today[k]
             # What is of one kind is one thing; two things of a kind, such
-            # as the grounds of two districts, are told apart by names.
+            # as the grounds of two districts, differ by their names.
             if (
                 row.stem == other.stem
                 and row.semantic_class == other.semantic_class

@@ -34,7 +34,7 @@ class Draft:
     Attributes:
         areas: of the streets.
         streets: all ground that belongs to them, sidewalks included, in W.
-        frontage: that buildings stand along; the streets if not told.
+        frontage: line along which buildings stand; the streets by default.
         base: height of sidewalks and of the ground between them in W,
             without what buildings and relief change about it.
         structures: what has been placed, in the order of placement.

@@ -1,6 +1,6 @@
 "use strict";
 
-// What the page knows of pairs and drives, and what it shows just now.
+// What the page has of pairs and drives, and what it shows just now.
 
 const data = JSON.parse(document.getElementById("data").textContent);
 

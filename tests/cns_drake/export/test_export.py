@@ -7,7 +7,7 @@ import subprocess
 import sys
 
 from helpers.bent_drive import NUM_SCANS, P_BS, QUAT_BS, write_drive
-from helpers.lies import read_told, write_told
+from helpers.contradictions import read_messages, write_messages
 from mcap.reader import make_reader
 from mcap.writer import Writer
 import numpy as np
@@ -455,14 +455,14 @@ def test_quaternions_are_of_unit_length(tmp_path, format_name):
     """Also where the source's are not: our own reader wants them so."""
     recording = write_drive(tmp_path / "town_07")
     path = recording / "town_07_0.mcap"
-    told, attachments = read_told(path.read_bytes())
+    messages, attachments = read_messages(path.read_bytes())
     whole = sequences.open(path).X_WS
-    for one in told:
+    for one in messages:
         if one.topic == "/odometry":
             for name in "xyzw":
                 quat = one.body.pose.pose.orientation
                 setattr(quat, name, 3.0 * getattr(quat, name))
-    path.write_bytes(write_told(told, attachments))
+    path.write_bytes(write_messages(messages, attachments))
     folder = export_sequence(path, format_name, tmp_path / "out")
     if format_name == "cns":
         exported = sequences.open(folder)
@@ -471,8 +471,8 @@ def test_quaternions_are_of_unit_length(tmp_path, format_name):
         rows = np.loadtxt(folder / "base_link.tum")
         np.testing.assert_allclose(np.linalg.norm(rows[:, 4:], axis=1), 1.0)
     for name in "xyzw":
-        setattr(told[-2].body.pose.pose.orientation, name, 0.0)
-    path.write_bytes(write_told(told, attachments))
+        setattr(messages[-2].body.pose.pose.orientation, name, 0.0)
+    path.write_bytes(write_messages(messages, attachments))
     with pytest.raises(InputError, match="quaternion"):
         export_sequence(path, format_name, tmp_path / "new")
     assert not list((tmp_path / "new").glob("*/*"))

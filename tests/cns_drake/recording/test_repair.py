@@ -249,8 +249,8 @@ HARMFUL = {
         Opcode.CHUNK, chunk_of(b"", size=0, length=HUGE)
     ),
     "bomb": record_of(Opcode.CHUNK, chunk_of(BOMB, size=2 * CHUNK_LIMIT_BYTES)),
-    "bomb that lies": record_of(Opcode.CHUNK, chunk_of(BOMB, size=1000)),
-    "lz4 bomb that lies": record_of(
+    "bomb of a wrong size": record_of(Opcode.CHUNK, chunk_of(BOMB, size=1000)),
+    "lz4 bomb of a wrong size": record_of(
         Opcode.CHUNK, chunk_of(LZ4_BOMB, size=1000, compression=b"lz4")
     ),
     "huge window": record_of(

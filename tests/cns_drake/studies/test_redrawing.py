@@ -10,7 +10,7 @@ import yaml
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.base.jobs.step import Tell
+from cns_drake.base.jobs.step import Reporter
 from cns_drake.city.generation import generate
 from cns_drake.city.generation.city_structures import make_city
 from cns_drake.city.generation.generate import (
@@ -198,7 +198,7 @@ def test_what_was_drawn_of_something_else_is_replaced(
     step = RedrawCity(town, "02", 4, folder)
     assert not step.is_done()
     notes = []
-    step.run(Tell(lambda kind, text: notes.append(text)))
+    step.run(Reporter(lambda kind, text: notes.append(text)))
     assert notes == [f"{folder}: replaced, as it was of other inputs"]
     assert step.is_done()
     fresh = redraw_here(town, [4], tmp_path / "fresh")[4]
@@ -222,7 +222,7 @@ def test_anything_else_of_that_name_is_left_alone(town, tmp_path, other):
         redraw_here(town, [5, 4], folder.parent)
     # Nor does the job take it, if it comes up meanwhile.
     with pytest.raises(InputError, match=r"town_c4: is there already, and no"):
-        RedrawCity(town, "02", 4, folder).run(Tell())
+        RedrawCity(town, "02", 4, folder).run(Reporter())
     assert contents(tmp_path) == before
     assert [p.name for p in folder.parent.iterdir()] == ["town_c4"]
 

@@ -8,7 +8,7 @@ import yaml
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
-from cns_drake.base.jobs.step import Tell
+from cns_drake.base.jobs.step import Reporter
 from cns_drake.scenarios.scenario_loading import load_scenario
 from cns_drake.simulation.simulated_drive import SimulatedDrive
 from cns_drake.simulation.simulation import simulate
@@ -108,7 +108,7 @@ def test_everything_is_planned_before_anything_runs(
     for scenario in (*sequences, *control_drives(sequences)):
         simulate(scenario, tmp_path)
     page = tmp_path / "pages" / "town_01.html"
-    Record(sequences[0], tmp_path, page=page).run(Tell())
+    Record(sequences[0], tmp_path, page=page).run(Reporter())
     reproduction.reproduce_maps(*arguments)
     assert names & planned[1].keys() == {"town_04"}
     assert planned[1]["pages"] == {"town_01": "../pages/town_01.html"}

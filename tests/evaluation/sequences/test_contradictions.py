@@ -4,7 +4,7 @@ import subprocess
 import sys
 
 from helpers import bent_drive
-from helpers.lies import LIES, read_told, write_told
+from helpers.contradictions import CONTRADICTIONS, read_messages, write_messages
 import numpy as np
 import pytest
 
@@ -17,7 +17,7 @@ def recording(tmp_path):
     """Path of a recording; what it holds."""
     bent_drive.write_drive(tmp_path / "town_07")
     path = tmp_path / "town_07" / "town_07_0.mcap"
-    return path, *read_told(path.read_bytes())
+    return path, *read_messages(path.read_bytes())
 
 
 def read_all(path):
@@ -29,38 +29,38 @@ def read_all(path):
     )
 
 
-@pytest.mark.parametrize("name", LIES)
+@pytest.mark.parametrize("name", CONTRADICTIONS)
 def test_a_lie_is_refused_by_what_it_says(recording, name):
-    path, told, attachments = recording
-    lie, fault = LIES[name]
-    # Scan 3 has no point that a lie could be told of.
+    path, messages, attachments = recording
+    change, fault = CONTRADICTIONS[name]
+    # Scan 3 has no point that a change could be made to.
     rng = np.random.default_rng(1)
-    lie(told, rng)
-    path.write_bytes(write_told(told, attachments))
+    change(messages, rng)
+    path.write_bytes(write_messages(messages, attachments))
     with pytest.raises(InputError, match=fault) as refusal:
         read_all(path)
     assert str(refusal.value).startswith(f"{path}: /")
 
 
 def test_all_channels_of_a_topic_are_one_stream(recording):
-    path, told, attachments = recording
+    path, messages, attachments = recording
     whole = read_all(path)
-    for number, one in enumerate(told):
-        told[number] = one.copy(channel=number % 3)
-    path.write_bytes(write_told(told, attachments))
+    for number, one in enumerate(messages):
+        messages[number] = one.copy(channel=number % 3)
+    path.write_bytes(write_messages(messages, attachments))
     assert read_all(path) == whole
 
 
 def test_what_is_said_again_says_nothing_new(recording):
-    path, told, attachments = recording
+    path, messages, attachments = recording
     whole = open_sequence(path)
     X_WS, mount = whole.X_WS, whole.X_BS
     again = [
         one.copy(channel=1)
-        for one in told
+        for one in messages
         if one.topic in ("/odometry", "/tf_static")
     ]
-    path.write_bytes(write_told(told + again, attachments))
+    path.write_bytes(write_messages(messages + again, attachments))
     sequence = open_sequence(path)
     np.testing.assert_array_equal(sequence.X_WS, X_WS)
     np.testing.assert_array_equal(sequence.X_BS, mount)
@@ -68,20 +68,20 @@ def test_what_is_said_again_says_nothing_new(recording):
 
 
 def test_two_attachments_of_a_name_that_differ(recording):
-    path, told, attachments = recording
+    path, messages, attachments = recording
     one = attachments[0]
     assert one.name == "scenario.json"
-    path.write_bytes(write_told(told, [*attachments, one]))
+    path.write_bytes(write_messages(messages, [*attachments, one]))
     assert open_sequence(path).scenario["map"] == "town"
     other = type(one)(**{**vars(one), "data": b'{"map": "village"}'})
-    path.write_bytes(write_told(told, [*attachments, other]))
+    path.write_bytes(write_messages(messages, [*attachments, other]))
     with pytest.raises(InputError, match=r"scenario\.json: there are two"):
         _ = open_sequence(path).scenario
 
 
 def test_messages_of_a_channel_that_nobody_names(recording, monkeypatch):
-    path, told, attachments = recording
-    data = write_told(told, attachments)
+    path, messages, attachments = recording
+    data = write_messages(messages, attachments)
     path.write_bytes(data)
     from mcap.reader import SeekingReader
 
@@ -117,14 +117,14 @@ print(peak.split()[1])
 @pytest.mark.parametrize("topic", ["/odometry", "/lidar/points", "/tf_static"])
 def test_a_small_file_takes_little_memory(recording, topic):
     """Messages that are nearly all padding, of which zstd leaves nothing."""
-    path, told, attachments = recording
-    place = next(k for k, one in enumerate(told) if one.topic == topic)
-    padded = told[place].copy()
+    path, messages, attachments = recording
+    place = next(k for k, one in enumerate(messages) if one.topic == topic)
+    padded = messages[place].copy()
     (getattr(padded.body, "transforms", None) or [padded.body])[
         0
     ].header.frame_id += " " * (30 << 20)
     more = [padded.copy(log_time=padded.log_time + k) for k in range(20)]
-    path.write_bytes(write_told(told + more, attachments))
+    path.write_bytes(write_messages(messages + more, attachments))
     assert path.stat().st_size < 1_000_000
     output = subprocess.run(
         [sys.executable, "-c", _READ, str(path)],

@@ -6,7 +6,7 @@ from helpers.small_towns import drive
 import numpy as np
 import pytest
 
-from cns_drake.base.jobs.step import Tell
+from cns_drake.base.jobs.step import Reporter
 from evaluation.methods import make_method
 from evaluation.recognition.overlap_truth import overlap_matrix
 from evaluation.recognition.place_recognition import run
@@ -61,7 +61,7 @@ def described(folder, name, role):
         RecordedDrive(folder / name), role, METHODS, PROTOCOL, files, True
     )
     if not step.is_done():
-        step.run(Tell())
+        step.run(Reporter())
     return files
 
 
@@ -84,7 +84,7 @@ def rung(folder, part, **changes):
 
 def test_the_numbers_are_those_of_the_single_command(folder, tmp_path):
     step = rung(folder, tmp_path / "rung.data")
-    step.run(Tell())
+    step.run(Reporter())
     assert step.is_done()
     found = read_part(step.part)
     assert [(one.method, one.radius_told) for one in found] == [
@@ -158,13 +158,13 @@ def test_places_of_other_cities_are_never_right(folder, tmp_path):
 
 
 def _done(step):
-    step.run(Tell())
+    step.run(Reporter())
     return step.part
 
 
 def test_another_database_is_another_rung(folder, tmp_path):
     step = rung(folder, tmp_path / "rung.data")
-    step.run(Tell())
+    step.run(Reporter())
     other = rung(
         folder,
         step.part,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.jobs.step import Tell
+from cns_drake.base.jobs.step import Reporter
 from evaluation.change import drive_change
 from evaluation.recognition.description import describe_drive
 from evaluation.recognition.protocol import PAPER_PROTOCOL
@@ -75,7 +75,7 @@ def survey(source, methods, files, roles=BOTH):
     """Does a survey, unless there is nothing to do."""
     step = Survey(source, roles, tuple(methods), PAPER_PROTOCOL, files)
     if not step.is_done():
-        step.run(Tell())
+        step.run(Reporter())
     assert step.is_done()
 
 
@@ -191,5 +191,5 @@ def test_drives_of_two_worlds_are_not_compared(tmp_path, recorded):
         "metropolis", ("01", "04"), surveys, solid, PAPER_PROTOCOL, part
     )
     with pytest.raises(InputError, match="poses in frame 'utm'"):
-        step.run(Tell())
+        step.run(Reporter())
     assert not part.parent.exists()

@@ -23,7 +23,7 @@ from cns_drake.base.jobs.job_process import (
     run_process,
 )
 from cns_drake.base.jobs.running import Job, run_jobs
-from cns_drake.base.jobs.step import Tell
+from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.processors import num_cores
 
 pytestmark = pytest.mark.slow
@@ -373,15 +373,15 @@ def test_progress_is_told_now_and_then(monkeypatch):
     now = [100.0]
     monkeypatch.setattr("time.monotonic", lambda: now[0])
     told = []
-    tell = Tell(lambda *message: told.append(message))
+    reporter = Reporter(lambda *message: told.append(message))
     for done in range(11):
-        tell.progress(done, 10)
+        reporter.progress(done, 10)
         now[0] += 0.2
     # The first, the last, and one in half a second.
     assert [done for _, done, _ in told] == [0, 3, 6, 9, 10]
-    tell.note(3)
+    reporter.note(3)
     assert told[-1] == ("note", "3")
-    Tell().progress(1, 2)
+    Reporter().progress(1, 2)
 
 
 def test_where_jobs_run(monkeypatch):

@@ -25,7 +25,7 @@ _LIDAR, _ODOMETRY, _IMU, _MOUNTS = (
 
 
 @dataclass(frozen=True)
-class Told:
+class RecordedMessage:
     """A message, and how it is recorded.
 
     Attributes:
@@ -44,15 +44,15 @@ class Told:
     channel: int = 0
     encoding: str = "cdr"
 
-    def copy(self, **changes) -> Told:
+    def copy(self, **changes) -> RecordedMessage:
         return replace(self, body=copy.deepcopy(self.body), **changes)
 
 
-def read_told(data: bytes) -> tuple[list[Told], list]:
+def read_messages(data: bytes) -> tuple[list[RecordedMessage], list]:
     """Returns the messages of a recording, and its attachments."""
     reader = make_reader(io.BytesIO(data))
-    told = [
-        Told(
+    messages = [
+        RecordedMessage(
             channel.topic,
             schema.name,
             TYPES.deserialize_cdr(message.data, schema.name),
@@ -60,10 +60,10 @@ def read_told(data: bytes) -> tuple[list[Told], list]:
         )
         for schema, channel, message in reader.iter_messages()
     ]
-    return told, list(reader.iter_attachments())
+    return messages, list(reader.iter_attachments())
 
 
-def write_told(told: list[Told], attachments: list) -> bytes:
+def write_messages(messages: list[RecordedMessage], attachments: list) -> bytes:
     """Returns a recording."""
     stream = io.BytesIO()
     writer = Writer(stream, chunk_size=4000)
@@ -73,7 +73,7 @@ def write_told(told: list[Told], attachments: list) -> bytes:
             one.create_time, one.log_time, one.name, one.media_type, one.data
         )
     channels: dict[tuple, int] = {}
-    for number, one in enumerate(told):
+    for number, one in enumerate(messages):
         key = (one.topic, one.kind, one.channel, one.encoding)
         if key not in channels:
             text, _ = TYPES.generate_msgdef(one.kind, ros_version=2)
@@ -89,37 +89,39 @@ def write_told(told: list[Told], attachments: list) -> bytes:
     return stream.getvalue()
 
 
-def _some(told: list[Told], topic: str, rng, later: bool = False) -> int:
+def _some(
+    messages: list[RecordedMessage], topic: str, rng, later: bool = False
+) -> int:
     """Returns the place of a message of a topic, not the first if `later`."""
-    places = [k for k, one in enumerate(told) if one.topic == topic]
+    places = [k for k, one in enumerate(messages) if one.topic == topic]
     if not places:
-        return _some(told, _ODOMETRY, rng, later)
+        return _some(messages, _ODOMETRY, rng, later)
     places = places[1:] if later and len(places) > 1 else places
     return places[int(rng.integers(len(places)))]
 
 
 def _changed(change: Callable[[Any, Any], None], topic: str, later=True):
-    """Returns the lie that is a change of a topic's message."""
+    """Returns an edit that changes a topic's message."""
 
-    def lie(told: list[Told], rng) -> None:
-        place = _some(told, topic, rng, later)
-        new = told[place].copy()
+    def edit(messages: list[RecordedMessage], rng) -> None:
+        place = _some(messages, topic, rng, later)
+        new = messages[place].copy()
         change(new.body, rng)
-        told[place] = new
+        messages[place] = new
 
-    return lie
+    return edit
 
 
 def _said_twice(change: Callable[[Any, Any], None], topic: str):
-    """Returns the lie that is a message and, later, a changed copy."""
+    """Returns an edit that adds a changed copy of a message."""
 
-    def lie(told: list[Told], rng) -> None:
-        place = _some(told, topic, rng)
-        new = told[place].copy(channel=int(rng.integers(2)))
+    def edit(messages: list[RecordedMessage], rng) -> None:
+        place = _some(messages, topic, rng)
+        new = messages[place].copy(channel=int(rng.integers(2)))
         change(new.body, rng)
-        told.insert(int(rng.integers(place + 1, len(told) + 1)), new)
+        messages.insert(int(rng.integers(place + 1, len(messages) + 1)), new)
 
-    return lie
+    return edit
 
 
 def _move(message, rng) -> None:
@@ -189,34 +191,38 @@ def _more_rows(message, rng) -> None:
 
 
 def _add_channel(**changes):
-    """Returns the lie that is a channel that does not belong to its topic."""
+    """Returns an edit that adds a channel that does not belong to its topic."""
 
-    def lie(told: list[Told], rng) -> None:
+    def edit(messages: list[RecordedMessage], rng) -> None:
         topic = (_LIDAR, _ODOMETRY, _MOUNTS)[int(rng.integers(3))]
-        place = _some(told, topic, rng)
-        told.insert(place, told[place].copy(channel=1, **changes))
+        place = _some(messages, topic, rng)
+        messages.insert(place, messages[place].copy(channel=1, **changes))
 
-    return lie
+    return edit
 
 
-def _another_type(told: list[Told], rng) -> None:
+def _another_type(messages: list[RecordedMessage], rng) -> None:
     topics = [_LIDAR, _ODOMETRY, _MOUNTS]
     one, other = rng.choice(3, 2, replace=False)
-    stranger = told[_some(told, topics[other], rng)]
-    told.insert(int(rng.integers(len(told))), stranger.copy(topic=topics[one]))
+    stranger = messages[_some(messages, topics[other], rng)]
+    messages.insert(
+        int(rng.integers(len(messages))), stranger.copy(topic=topics[one])
+    )
 
 
-def _drop_pose(told: list[Told], rng) -> None:
-    del told[_some(told, _ODOMETRY, rng)]
+def _drop_pose(messages: list[RecordedMessage], rng) -> None:
+    del messages[_some(messages, _ODOMETRY, rng)]
 
 
-def _scan_again(told: list[Told], rng) -> None:
-    place = _some(told, _LIDAR, rng)
-    told.insert(place, told[place].copy(channel=int(rng.integers(2))))
+def _scan_again(messages: list[RecordedMessage], rng) -> None:
+    place = _some(messages, _LIDAR, rng)
+    messages.insert(place, messages[place].copy(channel=int(rng.integers(2))))
 
 
-# Name -> lie, and what the refusal says of it.
-LIES: dict[str, tuple[Callable[[list[Told], Any], None], str]] = {
+# Name -> edit, and what the refusal says of it.
+CONTRADICTIONS: dict[
+    str, tuple[Callable[[list[RecordedMessage], Any], None], str]
+] = {
     "two poses": (_said_twice(_move, _ODOMETRY), r"position at \d+ ns: \["),
     "two attitudes": (_said_twice(_turn, _ODOMETRY), "quat_xyzw at"),
     "two mounts": (_said_twice(_move_mount, _MOUNTS), "lidar: at .* before"),
@@ -238,15 +244,15 @@ LIES: dict[str, tuple[Callable[[list[Told], Any], None], str]] = {
 }
 
 
-def lie_about(path: Path, data: bytes, rng) -> bytes:
-    """Returns a recording with a lie in it."""
-    told, attachments = read_told(data)
-    names = sorted(LIES)
-    LIES[names[int(rng.integers(len(names)))]][0](told, rng)
-    return write_told(told, attachments)
+def contradict(path: Path, data: bytes, rng) -> bytes:
+    """Returns a recording with a contradiction in it."""
+    messages, attachments = read_messages(data)
+    names = sorted(CONTRADICTIONS)
+    CONTRADICTIONS[names[int(rng.integers(len(names)))]][0](messages, rng)
+    return write_messages(messages, attachments)
 
 
-def lie_about_cloud(path: Path, data: bytes, rng) -> bytes:
+def contradict_cloud(path: Path, data: bytes, rng) -> bytes:
     """Returns a point cloud whose header and rows tell different numbers."""
     more = int(rng.choice([1, 2, 7, 1000]))
     is_text = path.stem in ("text", "ascii")
@@ -260,7 +266,7 @@ def lie_about_cloud(path: Path, data: bytes, rng) -> bytes:
     return data[: place.start(1)] + b"%d" % number + data[place.end(1) :]
 
 
-def lie_about_size(path: Path, data: bytes, rng) -> bytes:
+def contradict_size(path: Path, data: bytes, rng) -> bytes:
     """Returns a world with a number that is none, or no size."""
     text = data.decode()
     places = list(re.finditer(r"<(radius|length|size|scale)>([^<]+)", text))
@@ -282,7 +288,7 @@ def lie_about_size(path: Path, data: bytes, rng) -> bytes:
     ).encode()
 
 
-def lie_about_rows(path: Path, data: bytes, rng) -> bytes:
+def contradict_rows(path: Path, data: bytes, rng) -> bytes:
     """Returns a file of an exported drive with more or less in it."""
     if path.suffix in (".label", ".bin"):
         size = 4 if path.suffix == ".label" else 16
