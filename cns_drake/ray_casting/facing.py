@@ -29,6 +29,7 @@ def face_origins(
         is_outside: (N,) bool to fill: whether the ray has met the side that
             the winding of the surface calls its outside.
     """
+    n = np.empty(3)
     for ray in range(len(normals)):
         row = group[ray]
         if row < 0:
@@ -37,7 +38,6 @@ def face_origins(
         R = R_OSset[ray % len(R_OSset)]
         length = 0.0
         along = 0.0
-        n = np.empty(3)
         for i in range(3):
             n[i] = (
                 M[i, 0] * normals[ray, 0]

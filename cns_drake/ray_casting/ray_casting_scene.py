@@ -57,15 +57,6 @@ class RayHits:
     normals_W: np.ndarray
     is_outside: np.ndarray
 
-    def take(self, rows: np.ndarray) -> RayHits:
-        """Returns what the rays of some rows met; they have normals."""
-        return RayHits(
-            self.ranges[rows],
-            self.geometry[rows],
-            self.normals_W[rows],
-            self.is_outside[rows],
-        )
-
 
 class RayCastingScene:
     """A bounding volume hierarchy over geometry.
@@ -148,7 +139,7 @@ class RayCastingScene:
         self,
         p_WSset: np.ndarray,
         d_Sset: np.ndarray,
-        max_range: float,
+        max_range: float | np.ndarray,
         *,
         R_WSset: np.ndarray = _IDENTITY,
         times: np.ndarray = _AT_ONCE,
@@ -160,7 +151,8 @@ class RayCastingScene:
             p_WSset: (3,) or (K, 3) origins in the world [m]; ray i starts at
                 origin i mod K.
             d_Sset: (N, 3) unit directions, expressed in S.
-            max_range: how far to look [m].
+            max_range: how far to look [m], for all rays or (M,) taken in turn
+                likewise.
             R_WSset: (3, 3) or (L, 3, 3) orientations of S in the world, taken
                 in turn likewise.
             times: (T,) when rays are cast, as parts of the turn from 0 to 1,
@@ -169,12 +161,14 @@ class RayCastingScene:
                 are at the start of the turn.
 
         Raises:
-            ValueError: N is not a multiple of K, L or T.
+            ValueError: N is not a multiple of K, L, M or T.
         """
         p_OSset = np.atleast_2d(p_WSset) - self._p_WO
         R_WSset = np.reshape(R_WSset, (-1, 3, 3))
+        max_ranges = np.atleast_1d(np.asarray(max_range, np.float32))
         for count, what in (
             (len(p_OSset), "origins"),
+            (len(max_ranges), "ranges"),
             (len(R_WSset), "frames"),
             (len(times), "times"),
         ):
@@ -183,7 +177,7 @@ class RayCastingScene:
         rays = Rays(
             p_OSset.astype(np.float32),
             np.ascontiguousarray(R_WSset, dtype=float),
-            np.array([max_range], np.float32),
+            max_ranges,
             np.ascontiguousarray(d_Sset, dtype=float),
             np.ascontiguousarray(times, dtype=np.float32),
         )
@@ -222,16 +216,6 @@ class RayCastingScene:
             is_outside,
         )
         return is_outside
-
-
-def join_hits(first: RayHits, second: RayHits) -> RayHits:
-    """Returns the hits of two casts with normals, one after the other."""
-    return RayHits(
-        np.concatenate([first.ranges, second.ranges]),
-        np.concatenate([first.geometry, second.geometry]),
-        np.concatenate([first.normals_W, second.normals_W]),
-        np.concatenate([first.is_outside, second.is_outside]),
-    )
 
 
 def _assign_slots(

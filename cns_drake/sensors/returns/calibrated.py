@@ -10,7 +10,6 @@ import numpy as np
 from cns_drake.ray_casting.ray_casting_scene import (
     RayCastingScene,
     RayHits,
-    join_hits,
 )
 from cns_drake.sensors.beam_pattern import BeamPattern, Beams
 from cns_drake.sensors.returns.counter_random import frame_key
@@ -21,15 +20,12 @@ from cns_drake.sensors.returns.echoes import (
     choice_of,
     report_echoes,
 )
-from cns_drake.sensors.returns.footprint import (
-    NUM_SUB_RAYS,
-    find_jumps,
-    mark_edges,
-)
+from cns_drake.sensors.returns.footprint import find_sides, meet_sides
 from cns_drake.sensors.returns.light import Light
 from cns_drake.sensors.returns.link_budget import LinkBudget
 from cns_drake.sensors.returns.materials import Materials
-from cns_drake.sensors.returns.propagation import Cast, Ways, follow
+from cns_drake.sensors.returns.met import Met, rotate
+from cns_drake.sensors.returns.propagation import follow
 from cns_drake.sensors.returns.starting_rays import start_ways
 from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS, UnitSheet
 from cns_drake.sensors.returns.weather import (
@@ -175,68 +171,49 @@ class CalibratedReturns:
             with_normals=True,
         )
 
+        met = Met.of(rotate(R_WSset, turn.d_Sset), hits)
+
         def cast(
-            p_Wset: np.ndarray, d_Wset: np.ndarray, when: np.ndarray
+            p_Wset: np.ndarray,
+            d_Wset: np.ndarray,
+            when: np.ndarray,
+            reaches: np.ndarray,
         ) -> RayHits:
             return scene.cast_rays(
-                p_Wset, d_Wset, reach, times=when, with_normals=True
+                p_Wset, d_Wset, reaches, times=when, with_normals=True
             )
 
-        is_edge = self._find_edges(turn, p_WSset, R_WSset, times, hits, cast)
-        whole = np.flatnonzero(~is_edge & (hits.geometry >= 0))
-        edges = np.flatnonzero(is_edge)
-        ways = Ways.room_for(len(whole) + NUM_SUB_RAYS * len(edges))
-        start_ways(
-            key,
-            whole,
-            edges,
-            turn.beam,
-            turn.d_Sset,
-            p_WSset,
-            R_WSset,
-            np.asarray(times, np.float32),
-            self.sheet.divergence,
-            ways,
-        )
-        p_W, d_W, when = (
-            values[len(whole) :]
-            for values in (ways.p_Wset, ways.d_Wset, ways.time)
-        )
+        divergence = self.sheet.divergence
+        sides = find_sides(key, turn.beam, turn.orders, met, divergence, reach)
         # From one place, where they have one, which is faster.
-        sub_hits = cast(p_W if len(p_WSset) > 1 else p_WSset, d_W, when)
-        light = follow(
+        rows = sides.ray
+        origins = p_WSset[rows % len(p_WSset)] if len(p_WSset) > 1 else p_WSset
+        times = np.asarray(times, np.float32)
+        when = times[rows % len(times)]
+        side_met = Met.of(
+            sides.d_Wset, cast(origins, sides.d_Wset, when, sides.reach)
+        )
+        rest = np.ones(len(turn.beam))
+        meet_sides(sides, side_met, met, rest)
+        light, ways, ways_met = start_ways(
+            turn.beam, p_WSset, times, rest, met, sides, side_met, materials
+        )
+        followed = follow(
             key,
             ways,
-            join_hits(hits.take(whole), sub_hits),
+            ways_met,
             materials,
             self._budget,
-            self.sheet.divergence,
+            divergence,
+            reach,
             cast,
         )
         return report_echoes(
-            Light.sorted(light), self._receiver(pattern), key, len(turn.beam)
+            Light.sorted([light, *followed]),
+            self._receiver(pattern),
+            key,
+            len(turn.beam),
         )
-
-    def _find_edges(
-        self,
-        turn: CalibratedTurn,
-        p_WSset: np.ndarray,
-        R_WSset: np.ndarray,
-        times: np.ndarray,
-        hits: RayHits,
-        cast: Cast,
-    ) -> np.ndarray:
-        """Returns (N,) which beams meet an edge."""
-        is_edge = np.zeros(len(turn.beam), bool)
-        seen = (turn.d_Sset, R_WSset, hits.ranges, hits.normals_W)
-        probes = find_jumps(turn.orders, *seen, self.sheet.divergence, is_edge)
-        origins = p_WSset
-        if len(p_WSset) > 1:
-            origins = p_WSset[probes.ray % len(p_WSset)]
-        when = np.asarray(times, np.float32)[probes.ray % len(times)]
-        met = cast(origins, probes.d_Wset, when)
-        mark_edges(*probes, met.ranges, met.normals_W, *seen, is_edge)
-        return is_edge
 
 
 class CalibratedTurn:
@@ -245,14 +222,16 @@ class CalibratedTurn:
     Attributes:
         d_Sset: (N, 3) directions in the order of casting.
         beam: (N,) number of each beam, in firing order.
-        orders: orders of the rays in which neighbours follow each other: that
-            of casting, and that of firing.
+        orders: (2, N) orders of the rays in which neighbours follow each
+            other: that of casting, and that of firing.
     """
 
     def __init__(self, beams: Beams):
         self.beam = np.asarray(beams.packet_order, np.int64)
         self.d_Sset = np.ascontiguousarray(beams.d_Sset[self.beam])
-        self.orders = (np.arange(len(self.beam)), np.argsort(self.beam))
+        self.orders = np.stack(
+            [np.arange(len(self.beam)), np.argsort(self.beam)]
+        )
 
 
 def _no_scattering() -> Scattering:

@@ -144,11 +144,14 @@ def _report(
             if part == first:
                 continue
             distance = light.distance[first]
-            snr = target_snr(budget, extinction, light.energy[first], distance)
-            if not _is_detected(key, beam, _FIRST_ECHO_DRAW, snr):
-                continue
             if not receiver.min_range <= distance <= receiver.max_range:
                 continue
+            energy = light.energy[first]
+            snr = target_snr(budget, extinction, energy, distance)
+            if not _is_detected(key, beam, _FIRST_ECHO_DRAW, snr):
+                continue
+            if extinction > 0.0:
+                energy *= np.exp(-2.0 * extinction * distance)
             reported.beam[count] = beam
             reported.distance[count] = _measured(
                 budget,
@@ -160,7 +163,6 @@ def _report(
                 distance,
                 snr,
             )
-            energy = echo_energy(budget, snr, distance)
             reported.intensity[count] = _intensity(receiver.retro_from, energy)
             reported.geometry[count] = light.geometry[first]
             count += 1

@@ -1,274 +1,281 @@
 """The width of a beam: where it matters, and the rays that stand for it.
 
 A beam's irradiance falls as exp(-2 r^2 / w^2) with the distance r from its
-axis; w is its radius at 1 / e^2. Several rays stand for a beam that meets
-more than one surface, each for the same part of its light.
+axis; w is its radius at 1 / e^2. Where the neighbour of a beam meets another
+surface, a ray at a random place of the beam's half on that side stands for
+the half. What it meets has that part of the light, so that the mean over
+beams is that of the whole profile.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from cns_drake.base.compiled import compiled
 from cns_drake.sensors.returns.counter_random import uniform
+from cns_drake.sensors.returns.met import Met
 
-# Rays that stand for a beam.
-NUM_SUB_RAYS = 3
-# Draws of a beam that they take.
-_RADIUS_DRAW, _ANGLE_DRAW = 0, 1
-_GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
+# Draws of a beam that the rays at its sides take, two each.
+_SIDE_DRAW = 0
 # Surfaces are apart where ranges differ from those on one's own plane by this
 # much [m], and by this part of the range.
 _JUMP, _JUMP_PART = 0.1, 0.01
 # Beams are neighbours if they are this many times the divergence apart at
 # most. Between beams that are farther apart, hardly any edge lies in either.
 _NEIGHBOURS = 10.0
-# Where a probe lies between neighbours, in radii of the beam at 1 / e^2. An
-# edge that is farther away takes less than 2.3 % of the light.
-_PROBE = 1.0
 
 
-class Probes(NamedTuple):
-    """Rays that tell whether an edge between neighbours lies in a beam.
+class Sides(NamedTuple):
+    """P rays in those parts of beams that are next to an edge.
 
     Attributes:
-        ray: (P,) row of the ray at whose side each lies.
+        ray: (P,) row of the beam.
+        neighbour: (P,) row of the beam beyond the edge.
+        number: (P,) which side of the beam it is: 0 and 1 in the first order
+            of beams, 2 and 3 in the second one.
+        share: (P,) part of the beam's light.
         d_Wset: (P, 3) directions.
+        reach: (P,) float32: beyond the nearer of both surfaces [m].
     """
 
     ray: np.ndarray
+    neighbour: np.ndarray
+    number: np.ndarray
+    share: np.ndarray
     d_Wset: np.ndarray
+    reach: np.ndarray
 
 
-def find_jumps(
-    orders: Sequence[np.ndarray],
-    d_Sset: np.ndarray,
-    R_WSset: np.ndarray,
-    ranges: np.ndarray,
-    normals_W: np.ndarray,
+def find_sides(
+    key: np.uint64,
+    beam: np.ndarray,
+    orders: np.ndarray,
+    met: Met,
     divergence: float,
-    is_edge: np.ndarray,
-) -> Probes:
+    max_range: float,
+) -> Sides:
     """Returns rays to cast where neighbours meet different surfaces.
 
     Two neighbours meet one surface, or two that touch, where one lies on the
     plane of the other, or both planes meet in between. Otherwise an edge
-    lies between them: within one of their beams, or in the gap, which a probe
-    at the side of each decides.
+    lies between them: within one of their beams, or in the gap.
 
     Args:
-        orders: of the rays in which neighbours follow, (N,) each.
-        d_Sset: (N, 3) directions of the rays.
-        R_WSset: (L, 3, 3) orientations of S, taken in turn.
-        ranges: (N,) inf for a miss.
-        normals_W: (N, 3) of the surfaces.
+        key: of the frame; see `frame_key`.
+        beam: (N,) number of each beam.
+        orders: (2, N) orders of the rays in which neighbours follow.
+        met: by the axes of the beams.
         divergence: half angle of a beam [rad].
-        is_edge: (N,) bool; rays are marked whose neighbour is as near as a
-            probe would be.
+        max_range: how far to look [m].
     """
-    ray = np.empty(2 * len(orders) * len(d_Sset), np.int64)
-    d_Wset = np.empty((len(ray), 3))
-    count = 0
-    for order in orders:
-        count = _find_jumps(
-            order,
-            d_Sset,
-            R_WSset,
-            ranges,
-            normals_W,
-            divergence,
-            is_edge,
-            ray,
-            d_Wset,
-            count,
-        )
-    return Probes(ray[:count], d_Wset[:count])
+    ray = np.empty(2 * orders.size, np.int64)
+    neighbour, number = np.empty_like(ray), np.empty_like(ray)
+    side_of = np.full((len(beam), 2 * len(orders)), -1, np.int32)
+    count = _find_jumps(
+        orders, met, divergence, side_of, ray, neighbour, number
+    )
+    sides = Sides(
+        ray[:count],
+        neighbour[:count],
+        number[:count],
+        np.empty(count),
+        np.empty((count, 3)),
+        np.empty(count, np.float32),
+    )
+    _face_neighbours(met, sides)
+    _share(side_of, sides)
+    is_twin = sides.share == 0.0
+    if is_twin.any():
+        sides = Sides(*(values[~is_twin] for values in sides))
+    _aim(key, beam, met, divergence, max_range, sides)
+    return sides
 
 
 @compiled
 def _find_jumps(
-    order: np.ndarray,
-    d_Sset: np.ndarray,
-    R_WSset: np.ndarray,
-    ranges: np.ndarray,
-    normals_W: np.ndarray,
+    orders: np.ndarray,
+    met: Met,
     divergence: float,
-    is_edge: np.ndarray,
+    side_of: np.ndarray,
     ray: np.ndarray,
-    d_Wset: np.ndarray,
-    count: int,
+    neighbour: np.ndarray,
+    number: np.ndarray,
 ) -> int:
-    """Adds the probes of one order; returns how many there are then."""
+    """Fills in the first fields of `Sides`; returns how many there are."""
     # Chord and angle are the same at this size.
     farthest = (_NEIGHBOURS * divergence) ** 2
-    step = _PROBE * divergence
-    d_i, d_j = np.empty(3), np.empty(3)
-    for k in range(len(order) - 1):
-        i, j = order[k], order[k + 1]
-        hit_i, hit_j = np.isfinite(ranges[i]), np.isfinite(ranges[j])
-        if not hit_i and not hit_j:
-            continue
-        apart = 0.0
-        for axis in range(3):
-            apart += (d_Sset[i, axis] - d_Sset[j, axis]) ** 2
-        if apart > farthest:
-            continue
-        R = R_WSset[i % len(R_WSset)]
-        for row in range(3):
-            d_i[row] = d_j[row] = 0.0
+    count = 0
+    for way in range(len(orders)):
+        for k in range(orders.shape[1] - 1):
+            i, j = orders[way, k], orders[way, k + 1]
+            if met.geometry[i] < 0 and met.geometry[j] < 0:
+                continue
+            apart = 0.0
             for axis in range(3):
-                d_i[row] += R[row, axis] * d_Sset[i, axis]
-                d_j[row] += R[row, axis] * d_Sset[j, axis]
-        if (
-            hit_i
-            and hit_j
-            and _touch(
-                d_i, ranges[i], normals_W, i, d_j, ranges[j], normals_W, j
-            )
-        ):
-            continue
-        if apart <= step * step:
-            is_edge[i] = is_edge[j] = True
-            continue
-        part = step / np.sqrt(apart)
-        for axis in range(3):
-            way = part * (d_j[axis] - d_i[axis])
-            d_Wset[count, axis] = d_i[axis] + way
-            d_Wset[count + 1, axis] = d_j[axis] - way
-        for probe in range(count, count + 2):
-            square = 0.0
-            for axis in range(3):
-                square += d_Wset[probe, axis] ** 2
-            for axis in range(3):
-                d_Wset[probe, axis] /= np.sqrt(square)
-        ray[count], ray[count + 1] = i, j
-        count += 2
+                apart += (met.d_Wset[i, axis] - met.d_Wset[j, axis]) ** 2
+            if apart > farthest or apart == 0.0 or _touch(met, i, met, j):
+                continue
+            side_of[i, 2 * way], side_of[j, 2 * way + 1] = count, count + 1
+            ray[count], neighbour[count], number[count] = i, j, 2 * way
+            count += 1
+            ray[count], neighbour[count], number[count] = j, i, 2 * way + 1
+            count += 1
     return count
 
 
 @compiled
-def mark_edges(
-    probe_rays: np.ndarray,
-    probe_d_Wset: np.ndarray,
-    probe_ranges: np.ndarray,
-    probe_normals_W: np.ndarray,
-    d_Sset: np.ndarray,
-    R_WSset: np.ndarray,
-    ranges: np.ndarray,
-    normals_W: np.ndarray,
-    is_edge: np.ndarray,
-) -> None:
-    """Marks the rays whose probes meet another surface than they do.
-
-    Args:
-        probe_rays, probe_d_Wset: see `Probes`.
-        probe_ranges: (P,) what they met.
-        probe_normals_W: (P, 3)
-        d_Sset, R_WSset, ranges, normals_W: see `find_jumps`.
-        is_edge: (N,) bool to mark.
-    """
-    d_i = np.empty(3)
-    for probe in range(len(probe_rays)):
-        i = probe_rays[probe]
-        if is_edge[i]:
-            continue
-        is_hit = np.isfinite(ranges[i])
-        if is_hit != np.isfinite(probe_ranges[probe]):
-            is_edge[i] = True
-        elif is_hit:
-            R = R_WSset[i % len(R_WSset)]
-            for row in range(3):
-                d_i[row] = 0.0
-                for axis in range(3):
-                    d_i[row] += R[row, axis] * d_Sset[i, axis]
-            is_edge[i] = not _touch(
-                d_i,
-                ranges[i],
-                normals_W,
-                i,
-                probe_d_Wset[probe],
-                probe_ranges[probe],
-                probe_normals_W,
-                probe,
-            )
+def _face_neighbours(met: Met, sides: Sides) -> None:
+    """Has directions be unit vectors across the beams, to the neighbours."""
+    for side in range(len(sides.ray)):
+        d = met.d_Wset[sides.ray[side]]
+        d_j = met.d_Wset[sides.neighbour[side]]
+        along = d[0] * d_j[0] + d[1] * d_j[1] + d[2] * d_j[2]
+        square = 0.0
+        for axis in range(3):
+            sides.d_Wset[side, axis] = d_j[axis] - along * d[axis]
+            square += sides.d_Wset[side, axis] ** 2
+        length = np.sqrt(square)
+        for axis in range(3):
+            sides.d_Wset[side, axis] /= length
 
 
 @compiled
-def _touch(
-    d_i: np.ndarray,
-    range_i: float,
-    normals_i: np.ndarray,
-    i: int,
-    d_j: np.ndarray,
-    range_j: float,
-    normals_j: np.ndarray,
-    j: int,
-) -> bool:
+def _share(side_of: np.ndarray, sides: Sides) -> None:
+    """Fills in the parts of the light, by what `_face_neighbours` has made.
+
+    A half of the beam, or a quarter if there are edges at its other sides,
+    too. A second neighbour on the same side has no part.
+    """
+    for side in range(len(sides.ray)):
+        share = 0.5
+        for other in side_of[sides.ray[side]]:
+            if other < 0 or other == side:
+                continue
+            along = 0.0
+            for axis in range(3):
+                along += sides.d_Wset[side, axis] * sides.d_Wset[other, axis]
+            if abs(along) < 0.5:
+                share = min(share, 0.25)
+            elif along > 0.0 and other < side:
+                share = 0.0
+        sides.share[side] = share
+
+
+@compiled
+def _aim(
+    key: np.uint64,
+    beam: np.ndarray,
+    met: Met,
+    divergence: float,
+    max_range: float,
+    sides: Sides,
+) -> None:
+    """Turns directions to random places of the sides; fills in the reach."""
+    u = np.empty(3)
+    for side in range(len(sides.ray)):
+        i, j = sides.ray[side], sides.neighbour[side]
+        d, d_W = met.d_Wset[i], sides.d_Wset[side]
+        for axis in range(3):
+            u[axis] = d_W[axis]
+        draw = _SIDE_DRAW + 2 * sides.number[side]
+        rest = 1.0 - uniform(key, beam[i], draw)
+        radius = divergence * np.sqrt(-0.5 * np.log(rest))
+        turn = uniform(key, beam[i], draw + 1) - 0.5
+        angle = 2.0 * np.pi * sides.share[side] * turn
+        toward, across = radius * np.cos(angle), radius * np.sin(angle)
+        d_W[0] = d[0] + toward * u[0] + across * (d[1] * u[2] - d[2] * u[1])
+        d_W[1] = d[1] + toward * u[1] + across * (d[2] * u[0] - d[0] * u[2])
+        d_W[2] = d[2] + toward * u[2] + across * (d[0] * u[1] - d[1] * u[0])
+        length = np.sqrt(d_W[0] ** 2 + d_W[1] ** 2 + d_W[2] ** 2)
+        for axis in range(3):
+            d_W[axis] /= length
+        near, far = (i, j) if met.ranges[i] <= met.ranges[j] else (j, i)
+        reach = _range_on(met, near, d_W)
+        reach = min(max(reach, met.ranges[near]), met.ranges[far])
+        sides.reach[side] = min(reach + _limit(met.ranges[near]), max_range)
+
+
+@compiled
+def meet_sides(sides: Sides, side_met: Met, met: Met, rest: np.ndarray) -> None:
+    """Takes from beams what other surfaces at their sides have of the light.
+
+    A ray that goes beyond the nearer of two surfaces has met the farther one,
+    where its plane is.
+
+    Args:
+        sides: see `find_sides`.
+        side_met: by their rays within their reach. Those that meet what their
+            beam meets are made misses, those that go beyond the nearer
+            surface hits.
+        met: by the axes of the beams.
+        rest: (N,) part of each beam's light, to lessen.
+    """
+    for side in range(len(sides.ray)):
+        i, j = sides.ray[side], sides.neighbour[side]
+        if side_met.geometry[side] < 0:
+            if met.ranges[i] > met.ranges[j]:
+                continue
+            rest[i] -= sides.share[side]
+            if met.geometry[j] < 0:
+                continue
+            distance = _range_on(met, j, sides.d_Wset[side])
+            if not sides.reach[side] < distance < 2.0 * met.ranges[j]:
+                distance = met.ranges[j]
+            side_met.ranges[side] = distance
+            side_met.geometry[side] = met.geometry[j]
+            side_met.is_outside[side] = met.is_outside[j]
+            side_met.cosine[side] = met.cosine[j]
+            for axis in range(3):
+                side_met.normals_W[side, axis] = met.normals_W[j, axis]
+        elif met.geometry[i] >= 0 and _touch(met, i, side_met, side):
+            side_met.geometry[side] = -1
+        else:
+            rest[i] -= sides.share[side]
+
+
+@compiled
+def _limit(distance: float) -> float:
+    """Returns by how much ranges on one surface differ at most [m]."""
+    return _JUMP + _JUMP_PART * distance
+
+
+@compiled
+def _range_on(met: Met, i: int, d_W: np.ndarray) -> float:
+    """Returns where a ray meets the plane that the i-th one has met [m].
+
+    It is inf where it meets the plane nowhere, or the i-th ray met none.
+    """
+    along = 0.0
+    for axis in range(3):
+        along -= met.normals_W[i, axis] * d_W[axis]
+    if met.geometry[i] < 0 or along <= 0.0:
+        return np.inf
+    return met.cosine[i] * met.ranges[i] / along
+
+
+@compiled
+def _touch(a: Met, i: int, b: Met, j: int) -> bool:
     """Tells whether the planes of two places are one, or meet in between.
 
     Args:
-        d_i, range_i: direction and distance of a place.
-        normals_i, i: the i-th of these is the normal of its plane.
-        d_j, range_j, normals_j, j: of the other place.
+        a, i: a place: what the i-th of these rays has met.
+        b, j: another place.
     """
-    # n . d for the plane of each and the direction of each.
-    ii = ij = ji = jj = 0.0
-    for axis in range(3):
-        ii += normals_i[i, axis] * d_i[axis]
-        ij += normals_i[i, axis] * d_j[axis]
-        ji += normals_j[j, axis] * d_i[axis]
-        jj += normals_j[j, axis] * d_j[axis]
-    limit = _JUMP + _JUMP_PART * min(range_i, range_j)
-    off_i = abs(ij * range_j - ii * range_i)
-    off_j = abs(ji * range_i - jj * range_j)
-    if min(off_i, off_j) <= limit:
-        return True
-    # The inverse of the distance to a plane is linear from d_i to d_j. Which
-    # plane is nearer changes in between if there is a corner.
-    before = jj * range_j - ji * range_i
-    after = ij * range_j - ii * range_i
-    if jj * ii == 0.0:
+    if a.geometry[i] < 0 or b.geometry[j] < 0:
         return False
-    return before / jj * (after / ii) <= 0.0
-
-
-@compiled
-def sub_directions(
-    key: np.uint64,
-    beam: int,
-    d_W: np.ndarray,
-    divergence: float,
-    result: np.ndarray,
-) -> None:
-    """Fills in the directions of the rays that stand for a beam.
-
-    The distances from the axis are stratified: one ray in each of the parts
-    into which circles cut the beam's light evenly. A beam has a turn and a
-    place within the parts of its own, so that the mean over beams is that of
-    the whole profile.
-
-    Args:
-        key: of the frame; see `frame_key`.
-        beam: number of the beam.
-        d_W: (3,) its axis.
-        divergence: half angle at 1 / e^2 [rad].
-        result: (`NUM_SUB_RAYS`, 3) to fill with unit vectors.
-    """
-    # Two unit vectors across the axis.
-    a = np.zeros(3)
-    a[0 if abs(d_W[0]) < 0.6 else 1] = 1.0
-    u = np.cross(d_W, a)
-    u /= np.sqrt(np.sum(u * u))
-    v = np.cross(d_W, u)
-    place = uniform(key, beam, _RADIUS_DRAW)
-    turn = 2.0 * np.pi * uniform(key, beam, _ANGLE_DRAW)
-    for k in range(NUM_SUB_RAYS):
-        share = (k + place) / NUM_SUB_RAYS
-        radius = divergence * np.sqrt(-0.5 * np.log(1.0 - share))
-        angle = turn + k * _GOLDEN_ANGLE
-        along_u, along_v = radius * np.cos(angle), radius * np.sin(angle)
-        result[k] = d_W + along_u * u + along_v * v
-        result[k] /= np.sqrt(np.sum(result[k] ** 2))
+    # -n . d for the plane of each and the direction of the other.
+    ij = ji = 0.0
+    for axis in range(3):
+        ij -= a.normals_W[i, axis] * b.d_Wset[j, axis]
+        ji -= b.normals_W[j, axis] * a.d_Wset[i, axis]
+    ii, jj = a.cosine[i], b.cosine[j]
+    range_i, range_j = a.ranges[i], b.ranges[j]
+    after = ij * range_j - ii * range_i
+    before = jj * range_j - ji * range_i
+    if min(abs(after), abs(before)) <= _limit(min(range_i, range_j)):
+        return True
+    # The inverse of the distance to a plane is linear from i to j. Which
+    # plane is nearer changes in between if there is a corner.
+    return ii * jj > 0.0 and before * after <= 0.0

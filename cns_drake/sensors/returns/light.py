@@ -36,6 +36,10 @@ class Light(NamedTuple):
             np.empty(count, np.int32),
         )
 
+    def first(self, count: int) -> Light:
+        """Returns the first parts."""
+        return Light(*(values[:count] for values in self))
+
     @classmethod
     def sorted(cls, parts: Sequence[Light]) -> Light:
         """Returns all parts in order."""

@@ -27,6 +27,7 @@ from cns_drake.sensors.returns.materials import (
     RETRO,
     Materials,
 )
+from cns_drake.sensors.returns.met import Met
 
 # Refractive index of window glass near 900 nm.
 _GLASS_INDEX = 1.52
@@ -44,11 +45,13 @@ _RETRO_COSINE = np.cos(np.deg2rad(60.0))
 # Panes are flat to this angle: within it and the beam's own they send the
 # mirrored light back to the unit [rad].
 _FLATNESS = 2e-3
-_LEAF_DRAW = 2
+# Draws of a beam that leaves take, one for each of its rays.
+_LEAF_DRAW = 8
 
 _Numbers = TypeVar("_Numbers", float, np.ndarray)
-# Casts rays of origins (N, 3), directions (N, 3) and times (N,).
-Cast = Callable[[np.ndarray, np.ndarray, np.ndarray], RayHits]
+# Casts rays of origins (N, 3), directions (N, 3) and times (N,), each no
+# farther than its own reach (N,).
+Cast = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], RayHits]
 
 
 class Ways(NamedTuple):
@@ -56,7 +59,7 @@ class Ways(NamedTuple):
 
     Attributes:
         beam: (N,) number of the beam of each.
-        sub: (N,) number of the ray among those of its beam.
+        sub: (N,) number of the ray among those of its beam; 0 for its axis.
         p_Wset: (N, 3) where each begins now.
         d_Wset: (N, 3) where it goes.
         time: (N,) part of the turn at which it was sent.
@@ -65,6 +68,7 @@ class Ways(NamedTuple):
         depth: (N,) leaf area that is still in its way; inf before the first
             leaves.
         inside: (N,) geometry in which it begins, -1 for none.
+        reach: (N,) float32: how far it matters what the ray meets [m].
     """
 
     beam: np.ndarray
@@ -76,6 +80,7 @@ class Ways(NamedTuple):
     energy: np.ndarray
     depth: np.ndarray
     inside: np.ndarray
+    reach: np.ndarray
 
     @classmethod
     def room_for(cls, count: int) -> Ways:
@@ -90,7 +95,12 @@ class Ways(NamedTuple):
             np.empty(count),
             np.empty(count),
             np.empty(count, np.int32),
+            np.empty(count, np.float32),
         )
+
+    def first(self, count: int) -> Ways:
+        """Returns the first rays."""
+        return Ways(*(values[:count] for values in self))
 
 
 @compiled
@@ -113,10 +123,11 @@ def pane_shares(cosine: _Numbers) -> tuple[_Numbers, _Numbers]:
 def follow(
     key: np.uint64,
     ways: Ways,
-    hits: RayHits,
+    met: Met,
     materials: Materials,
     budget: LinkBudget,
     divergence: float,
+    max_range: float,
     cast: Cast,
 ) -> list[Light]:
     """Returns the light that comes back.
@@ -124,37 +135,34 @@ def follow(
     Args:
         key: of the frame; see `frame_key`.
         ways: the rays of the beams.
-        hits: what they meet.
+        met: what they meet.
         materials: of all geometries.
         budget: of the unit.
         divergence: half angle of a beam [rad].
+        max_range: how far light is followed [m].
         cast: casts the rays that go on.
     """
     found: list[Light] = []
-    for _ in range(_MOST_STEPS):
-        kinds = materials.kind[hits.geometry[hits.geometry >= 0]]
-        light = Light.room_for(len(kinds))
-        num_leaves = int(np.count_nonzero(kinds == LEAVES))
-        num_panes = int(np.count_nonzero(kinds == GLASS))
-        next_ways = Ways.room_for(num_leaves + 2 * num_panes)
+    for step in range(_MOST_STEPS):
+        count = len(met.geometry)
+        light, next_ways = Light.room_for(count), Ways.room_for(2 * count)
         num_parts, num_ways = _step(
             key,
             ways,
-            hits.ranges,
-            hits.geometry,
-            hits.normals_W,
-            hits.is_outside,
+            met,
             materials,
             budget.scale,
             divergence,
+            max_range,
             light,
             next_ways,
         )
-        found.append(Light(*(values[:num_parts] for values in light)))
-        if num_ways == 0:
+        found.append(light.first(num_parts))
+        if num_ways == 0 or step + 1 == _MOST_STEPS:
             break
-        ways = Ways(*(values[:num_ways] for values in next_ways))
-        hits = cast(ways.p_Wset, ways.d_Wset, ways.time)
+        ways = next_ways.first(num_ways)
+        hits = cast(ways.p_Wset, ways.d_Wset, ways.time, ways.reach)
+        met = Met.of(ways.d_Wset, hits)
     return found
 
 
@@ -162,21 +170,18 @@ def follow(
 def _step(
     key: np.uint64,
     ways: Ways,
-    ranges: np.ndarray,
-    geometries: np.ndarray,
-    normals_W: np.ndarray,
-    is_outside: np.ndarray,
+    met: Met,
     materials: Materials,
     scale: float,
     divergence: float,
+    max_range: float,
     light: Light,
     next_ways: Ways,
 ) -> tuple[int, int]:
     """Takes each ray to what it meets.
 
     Args:
-        key, ways, materials, divergence: see `follow`.
-        ranges, geometries, normals_W, is_outside: fields of `RayHits`.
+        key, ways, met, materials, divergence, max_range: see `follow`.
         scale: of the budget.
         light: to fill with what comes back.
         next_ways: to fill with the rays that go on.
@@ -187,15 +192,13 @@ def _step(
     flat = _FLATNESS + divergence
     num_parts, num_ways = 0, 0
     mirrored = np.empty(3)
-    for i in range(len(geometries)):
-        geometry = geometries[i]
-        if geometry < 0:
-            continue
-        distance = ways.length[i] + ranges[i]
+    for i in range(len(met.geometry)):
+        geometry, way = met.geometry[i], met.ranges[i]
         depth, inside = ways.depth[i], ways.inside[i]
         if inside >= 0:
+            # Beyond the reach of the ray there is a leaf in any case.
             per_metre = _LEAF_PROJECTION * materials.leaf_area_density[inside]
-            left = depth - per_metre * ranges[i]
+            left = depth - per_metre * way
             if left < 0.0:
                 light.beam[num_parts] = ways.beam[i]
                 light.distance[num_parts] = ways.length[i] + depth / per_metre
@@ -206,52 +209,86 @@ def _step(
                 num_parts += 1
                 continue
             depth = left
+        if geometry < 0:
+            continue
+        length = ways.length[i] + way
         kind = materials.kind[geometry]
-        d_W, normal_W = ways.d_Wset[i], normals_W[i]
+        d_W, normal_W = met.d_Wset[i], met.normals_W[i]
         if kind == LEAVES:
             inside = -1
-            if is_outside[i]:
+            if met.is_outside[i]:
                 inside = geometry
                 if depth == np.inf:
                     depth = leaf_depth(key, ways.beam[i], ways.sub[i])
-            _go_on(ways, i, ranges[i], d_W, 1.0, next_ways, num_ways)
+            _go_on(ways, i, way, d_W, 1.0, next_ways, num_ways)
             next_ways.depth[num_ways] = depth
             next_ways.inside[num_ways] = inside
+            next_ways.reach[num_ways] = max_range - length
+            if inside >= 0:
+                per_metre = (
+                    _LEAF_PROJECTION * materials.leaf_area_density[inside]
+                )
+                next_ways.reach[num_ways] = min(
+                    depth / per_metre, max_range - length
+                )
             num_ways += 1
             continue
-        cosine = 0.0
-        for axis in range(3):
-            cosine -= normal_W[axis] * d_W[axis]
-        cosine = min(max(cosine, 0.0), 1.0)
-        energy = materials.reflectivity[geometry]
-        if kind == RETRO:
-            energy *= cosine > _RETRO_COSINE
-        else:
-            energy *= cosine
+        cosine = met.cosine[i]
+        add_light(
+            light,
+            num_parts,
+            ways.beam[i],
+            length,
+            materials,
+            geometry,
+            cosine,
+            ways.energy[i],
+        )
         if kind == GLASS:
             reflected, through = pane_shares(cosine)
             if cosine > np.cos(flat):
                 # The mirrored light fills a cone of the beam's width; a
                 # Lambertian target spreads its own over pi.
-                energy += reflected / flat**2
+                light.energy[num_parts] += ways.energy[i] * reflected / flat**2
             for axis in range(3):
                 mirrored[axis] = d_W[axis] + 2.0 * cosine * normal_W[axis]
             # Light passes the pane there and back.
             for is_mirrored in (False, True):
                 share = (reflected if is_mirrored else through) ** 2
                 d_on = mirrored if is_mirrored else d_W
-                on = share * ways.energy[i]
-                if scale * on > _FAINT_SNR * distance**2:
-                    _go_on(ways, i, ranges[i], d_on, share, next_ways, num_ways)
+                seen = np.sqrt(scale * share * ways.energy[i] / _FAINT_SNR)
+                reach = min(seen, max_range) - length
+                if reach > 0.0:
+                    _go_on(ways, i, way, d_on, share, next_ways, num_ways)
                     next_ways.depth[num_ways] = depth
                     next_ways.inside[num_ways] = inside
+                    next_ways.reach[num_ways] = reach
                     num_ways += 1
-        light.beam[num_parts] = ways.beam[i]
-        light.distance[num_parts] = distance
-        light.energy[num_parts] = energy * ways.energy[i]
-        light.geometry[num_parts] = geometry
         num_parts += 1
     return num_parts, num_ways
+
+
+@compiled
+def add_light(
+    light: Light,
+    part: int,
+    beam: int,
+    distance: float,
+    materials: Materials,
+    geometry: int,
+    cosine: float,
+    share: float,
+) -> None:
+    """Fills in what a surface sends back of a part of a beam's light."""
+    light.beam[part] = beam
+    light.distance[part] = distance
+    energy = share * materials.reflectivity[geometry]
+    if materials.kind[geometry] != RETRO:
+        energy *= cosine
+    elif cosine <= _RETRO_COSINE:
+        energy = 0.0
+    light.energy[part] = energy
+    light.geometry[part] = geometry
 
 
 @compiled

@@ -1,66 +1,158 @@
-"""The rays that stand for beams: one each, or several at an edge."""
+"""What beams meet first: light that comes back, and rays that go on."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from cns_drake.base.compiled import compiled
-from cns_drake.sensors.returns.footprint import NUM_SUB_RAYS, sub_directions
-from cns_drake.sensors.returns.propagation import Ways
+from cns_drake.sensors.returns.footprint import Sides
+from cns_drake.sensors.returns.light import Light
+from cns_drake.sensors.returns.materials import GLASS, LEAVES, Materials
+from cns_drake.sensors.returns.met import Met, copy_hit
+from cns_drake.sensors.returns.propagation import Ways, add_light
+
+
+def start_ways(
+    beam: np.ndarray,
+    p_WSset: np.ndarray,
+    times: np.ndarray,
+    rest: np.ndarray,
+    met: Met,
+    sides: Sides,
+    side_met: Met,
+    materials: Materials,
+) -> tuple[Light, Ways, Met]:
+    """Returns what opaque surfaces send back, and the rays that meet others.
+
+    Args:
+        beam: (N,) number of each beam.
+        p_WSset: (K, 3) positions of S, taken in turn.
+        times: (T,) parts of the turn, taken in turn.
+        rest: (N,) part of the light that its axis stands for.
+        met: by the axes of the beams.
+        sides: rays at the sides of beams.
+        side_met: by those; misses do not count.
+        materials: of all geometries.
+
+    Returns:
+        The light, the rays that meet panes or leaves, and what they meet.
+    """
+    is_open = np.isin(materials.kind, (GLASS, LEAVES))
+    light = Light.room_for(len(beam) + len(sides.ray))
+    count = _count(is_open, met.geometry) + _count(is_open, side_met.geometry)
+    ways_met = Met.room_for(count)
+    ways = Ways.room_for(count)._replace(d_Wset=ways_met.d_Wset)
+    num_parts, num_ways = _start_ways(
+        beam,
+        p_WSset,
+        times,
+        rest,
+        met,
+        sides,
+        side_met,
+        materials,
+        is_open,
+        light,
+        ways,
+        ways_met,
+    )
+    return (
+        light.first(num_parts),
+        ways.first(num_ways),
+        ways_met.first(num_ways),
+    )
 
 
 @compiled
-def start_ways(
-    key: np.uint64,
-    whole: np.ndarray,
-    edges: np.ndarray,
-    beam: np.ndarray,
-    d_Sset: np.ndarray,
-    p_WSset: np.ndarray,
-    R_WSset: np.ndarray,
-    times: np.ndarray,
-    divergence: float,
-    ways: Ways,
-) -> None:
-    """Fills in the rays of beams.
+def _count(is_open: np.ndarray, geometry: np.ndarray) -> int:
+    count = 0
+    for one in geometry:
+        if one >= 0 and is_open[one]:
+            count += 1
+    return count
 
-    Args:
-        key: of the frame; see `frame_key`.
-        whole: (M,) rows of the beams that one ray stands for.
-        edges: (E,) rows of those that `NUM_SUB_RAYS` rays stand for.
-        beam: (N,) number of each beam.
-        d_Sset: (N, 3) its direction.
-        p_WSset: (K, 3) positions of S, taken in turn.
-        R_WSset: (L, 3, 3) its orientations, taken in turn.
-        times: (T,) parts of the turn, taken in turn.
-        divergence: half angle of a beam [rad].
-        ways: (M + `NUM_SUB_RAYS` E,) to fill: whole beams first.
-    """
-    d_W = np.empty(3)
-    d_sub = np.empty((NUM_SUB_RAYS, 3))
-    way = 0
-    for k in range(len(whole) + len(edges)):
-        row = whole[k] if k < len(whole) else edges[k - len(whole)]
-        R = R_WSset[row % len(R_WSset)]
-        for i in range(3):
-            d_W[i] = 0.0
-            for j in range(3):
-                d_W[i] += R[i, j] * d_Sset[row, j]
-        count = 1
-        if k >= len(whole):
-            count = NUM_SUB_RAYS
-            sub_directions(key, beam[row], d_W, divergence, d_sub)
-        for sub in range(count):
-            ways.beam[way] = beam[row]
-            ways.sub[way] = sub
-            for axis in range(3):
-                ways.p_Wset[way, axis] = p_WSset[row % len(p_WSset), axis]
-                ways.d_Wset[way, axis] = (
-                    d_W[axis] if count == 1 else d_sub[sub, axis]
-                )
-            ways.time[way] = times[row % len(times)]
-            ways.length[way] = 0.0
-            ways.energy[way] = 1.0 / count
-            ways.depth[way] = np.inf
-            ways.inside[way] = -1
-            way += 1
+
+@compiled
+def _start_ways(
+    beam: np.ndarray,
+    p_WSset: np.ndarray,
+    times: np.ndarray,
+    rest: np.ndarray,
+    met: Met,
+    sides: Sides,
+    side_met: Met,
+    materials: Materials,
+    is_open: np.ndarray,
+    light: Light,
+    ways: Ways,
+    ways_met: Met,
+) -> tuple[int, int]:
+    """Fills in what comes back and what goes on; returns how many."""
+    num_parts, num_ways = 0, 0
+    for row in range(len(beam)):
+        geometry = met.geometry[row]
+        if geometry < 0 or rest[row] <= 0.0:
+            continue
+        if is_open[geometry]:
+            copy_hit(met, row, ways_met, num_ways)
+            _start(ways, num_ways, beam, row, 0, p_WSset, times, rest[row])
+            num_ways += 1
+        else:
+            add_light(
+                light,
+                num_parts,
+                beam[row],
+                met.ranges[row],
+                materials,
+                geometry,
+                met.cosine[row],
+                rest[row],
+            )
+            num_parts += 1
+    for side in range(len(sides.ray)):
+        geometry, row = side_met.geometry[side], sides.ray[side]
+        if geometry < 0:
+            continue
+        share = sides.share[side]
+        if is_open[geometry]:
+            copy_hit(side_met, side, ways_met, num_ways)
+            number = 1 + sides.number[side]
+            _start(ways, num_ways, beam, row, number, p_WSset, times, share)
+            num_ways += 1
+        else:
+            add_light(
+                light,
+                num_parts,
+                beam[row],
+                side_met.ranges[side],
+                materials,
+                geometry,
+                side_met.cosine[side],
+                share,
+            )
+            num_parts += 1
+    return num_parts, num_ways
+
+
+@compiled
+def _start(
+    ways: Ways,
+    way: int,
+    beam: np.ndarray,
+    row: int,
+    sub: int,
+    p_WSset: np.ndarray,
+    times: np.ndarray,
+    share: float,
+) -> None:
+    """Fills in a ray that begins at the unit, but for its direction."""
+    ways.beam[way] = beam[row]
+    ways.sub[way] = sub
+    ways.time[way] = times[row % len(times)]
+    for axis in range(3):
+        ways.p_Wset[way, axis] = p_WSset[row % len(p_WSset), axis]
+    ways.length[way] = 0.0
+    ways.energy[way] = share
+    ways.depth[way] = np.inf
+    ways.inside[way] = -1
+    ways.reach[way] = np.inf
