@@ -144,7 +144,7 @@ def import_city(
         output,
         options,
         note,
-        finish=lambda folder: write_table(folder, note),
+        finish=lambda folder, sizes: write_table(folder, note, sizes),
     )
     print_rows(_rows(report, options.years))
     for line in _shortcomings(report, output, options):

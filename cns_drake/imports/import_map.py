@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 import os
 from pathlib import Path
@@ -35,6 +35,8 @@ from cns_drake.imports.street_drives import StreetGraph
 from cns_drake.imports.waypoint_drives import Drive, steerable_drive
 
 Progress = Callable[[str], None]
+# Takes the folder, and structures and triangles of stages that are counted.
+Finish = Callable[[Path, Mapping[str, tuple[int, int]]], None]
 
 
 def import_city(
@@ -42,7 +44,7 @@ def import_city(
     output: Path,
     options: ImportOptions,
     progress: Progress = lambda line: None,
-    finish: Callable[[Path], None] = lambda folder: None,
+    finish: Finish = lambda folder, sizes: None,
 ) -> ImportReport:
     """Writes a map folder of a file.
 
@@ -87,7 +89,7 @@ def import_city(
         bottom = bottom_of(bare, ground)
         if dressing is not None:
             bottom = dressing.ground(bottom)
-        write_world(draft, source, staged, bottom, dressing)
+        sizes = write_world(draft, source, staged, bottom, dressing)
         write_facts(
             draft,
             source,
@@ -103,7 +105,7 @@ def import_city(
             [drive.waypoints for drive in drives],
         )
         draw_overview(draft / "from_above.png", bare, space, drives)
-        finish(draft)
+        finish(draft, sizes)
     return _report(staged, drives, city.faults)
 
 
@@ -139,12 +141,12 @@ def _import_roads(
     output: Path,
     options: ImportOptions,
     progress: Progress,
-    finish: Callable[[Path], None],
+    finish: Finish,
 ) -> ImportReport:
     town = build_town(source, options.seed, progress)
     with map_draft(output) as draft:
         report = write_town(draft, source, town, progress)
-        finish(draft)
+        finish(draft, {})
     return report
 
 
@@ -158,7 +160,7 @@ def _read(source: Path, options: ImportOptions) -> ForeignCity:
         )
     if options.lod is not None:
         raise InputError(f"--lod: {source} has no levels of detail")
-    return import_openstreetmap(source, options.year_attribute)
+    return import_openstreetmap(source, options.year_attribute, options.dressed)
 
 
 def _find_drives(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 import os
 from pathlib import Path
@@ -14,12 +14,18 @@ from cns_drake.base.files import part_path, user_errors
 from cns_drake.base.map_folder import MESH_FOLDER, STRUCTURES_NAME, stage_name
 from cns_drake.city.generation.generate import structure_table
 from cns_drake.city.generation.sdf import stage_sdf
-from cns_drake.city.geometry.structures import Structure
+from cns_drake.city.geometry.structures import (
+    BoxShape,
+    MeshShape,
+    Structure,
+)
 from cns_drake.imports.dressing.whole_city import Dressing
 from cns_drake.imports.foreign_city import ForeignCity
 from cns_drake.imports.grown_city import Growth
 from cns_drake.imports.import_report import ImportOptions
 from cns_drake.imports.staged_city import StagedCity
+
+_OF_BOX = 12  # triangles
 
 
 @contextmanager
@@ -47,7 +53,7 @@ def write_world(
     city: StagedCity,
     bottom: Sequence[Structure],
     dressing: Dressing | None = None,
-) -> None:
+) -> dict[str, tuple[int, int]]:
     """Writes the stages, their meshes and the table of structures.
 
     Args:
@@ -56,6 +62,9 @@ def write_world(
         city: all structures.
         bottom: the ground below them, at all stages.
         dressing: what was added, if the city was dressed.
+
+    Returns:
+        Stage -> how many structures and triangles it has.
     """
     structures = [*bottom, *(one.structure for one in city.kept)]
     table = structure_table(structures)
@@ -77,9 +86,33 @@ def write_world(
         for structure in structures
         for name, mesh in structure.model.meshes.items()
     }
+    triangles = {}
     for name, mesh in meshes.items():
-        path = draft / MESH_FOLDER / f"{name}.obj"
-        path.write_text(mesh.to_obj(), "utf-8")
+        text = mesh.to_obj()
+        (draft / MESH_FOLDER / f"{name}.obj").write_text(text, "utf-8")
+        triangles[name] = _triangles_in(text)
+    return {
+        stage: _size([*bottom, *(one.structure for one in some)], triangles)
+        for stage, some in city.standing.items()
+    }
+
+
+def _triangles_in(obj: str) -> int:
+    """Returns how many triangles the faces of a mesh have."""
+    faces = obj[obj.find("\nf ") :].split()
+    return len(faces) - 3 * faces.count("f")
+
+
+def _size(
+    structures: Sequence[Structure], triangles: Mapping[str, int]
+) -> tuple[int, int]:
+    """Returns how many structures have a surface, and their triangles."""
+    shapes = [p.shape for one in structures for p in one.model.parts]
+    return sum(bool(one.model.parts) for one in structures), sum(
+        triangles[shape.mesh] if isinstance(shape, MeshShape) else _OF_BOX
+        for shape in shapes
+        if isinstance(shape, MeshShape | BoxShape)
+    )
 
 
 def write_facts(

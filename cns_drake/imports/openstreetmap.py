@@ -6,6 +6,7 @@ Heights above the sea are not in it: the ground is level.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from collections.abc import Set as AbstractSet
 from pathlib import Path
 import re
 
@@ -15,25 +16,23 @@ from shapely.geometry import LineString, Point
 from cns_drake.base.errors import InputError
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.plants.vegetation import tree
-from cns_drake.imports.extrusions import extruded, flat_surface
+from cns_drake.imports.extrusions import extruded
 from cns_drake.imports.foreign_city import (
-    LAWN,
-    WATER,
     ForeignCity,
     Imported,
     make_imported,
 )
 from cns_drake.imports.import_faults import ImportFaults
+from cns_drake.imports.osm_bridges import Bridges, bridges_of, parapets
 from cns_drake.imports.osm_buildings import make_buildings, standing_buildings
+from cns_drake.imports.osm_grounds import coasts_of, ground_areas, sea
 from cns_drake.imports.osm_lengths import length
 from cns_drake.imports.osm_places import Local, parts_of, sound_parts
 from cns_drake.imports.osm_reading import (
-    OsmArea,
     OsmFeatures,
     OsmWay,
     Tags,
     is_building,
-    is_told,
     read_openstreetmap,
 )
 from cns_drake.imports.osm_streets import (
@@ -41,19 +40,29 @@ from cns_drake.imports.osm_streets import (
     drivable_streets,
     street_surfaces,
 )
-from cns_drake.imports.osm_tags import area_kind, told
+from cns_drake.imports.osm_tags import told
 from cns_drake.imports.osm_things import make_things
 
 # Sizes of barriers and trees [m].
 _TALLEST = 150.0
 _HEDGE = (0.8, 1.2)
 _WALL = (0.2, 1.6)
+# The sea reaches so far beyond the buildings [m].
+_SEA = 60.0
 # A file of a whole country would not end.
 _LARGEST = 20_000.0  # [m]
 
 
-def import_openstreetmap(path: Path, year_attribute: str | None) -> ForeignCity:
+def import_openstreetmap(
+    path: Path, year_attribute: str | None, dressed: bool = False
+) -> ForeignCity:
     """Reads a file; its origin is the middle of its buildings.
+
+    Args:
+        path: of the file.
+        year_attribute: see `construction_year`.
+        dressed: whether the sea, and grounds by what they are made of, are
+            made, and bridges have parapets or are left out.
 
     Raises:
         InputError: if it cannot be read, has no building, or is larger than
@@ -75,21 +84,27 @@ def import_openstreetmap(path: Path, year_attribute: str | None) -> ForeignCity:
             f"{path}: {size.max() / 1000:.0f} km across; cut out a piece of at"
             f" most {_LARGEST / 1000:.0f} km"
         )
+    bridges = bridges_of(features.ways, local) if dressed else Bridges()
+    coasts = coasts_of(features.ways) if dressed else []
+    limits = local(np.array([low, high])) + _SEA * np.array([[-1.0], [1.0]])
     found = [
         *make_buildings(buildings, local, year_attribute, faults),
-        *street_surfaces(features.ways, local, faults),
+        *street_surfaces(features.ways, local, faults, bridges),
         *crossing_stripes(features.crossings, features.ways, local, faults),
-        *_lands(features.areas, local, faults),
+        *ground_areas(features.areas, local, faults, dressed),
+        *sea(coasts, local, limits, faults),
+        *parapets(features.ways, bridges, local),
         *_barriers(features.ways, local, faults),
         *_trees(features.trees, local, faults),
     ]
-    _count_unused(features, found)
+    also = bridges.left_out | {way.name for way in coasts}
+    _count_unused(features, found, also)
     return ForeignCity(
         found,
         (latitude, longitude),
         "WGS 84",
         faults,
-        drivable_streets(features.ways, local),
+        drivable_streets(features.ways, local, bridges),
         any(
             tags.get("driving_side") == "left"
             for _, tags, _, _ in features.ways
@@ -100,10 +115,17 @@ def import_openstreetmap(path: Path, year_attribute: str | None) -> ForeignCity:
     )
 
 
-def _count_unused(features: OsmFeatures, found: Iterable[Imported]) -> None:
+def _count_unused(
+    features: OsmFeatures, found: Iterable[Imported], also: AbstractSet[str]
+) -> None:
     """Counts what is in the file and has no place in the city, by kind.
 
     Buildings that are left out are counted where that is decided.
+
+    Args:
+        features: all of the file.
+        found: the city.
+        also: ids of what else has a place, or is counted elsewhere.
     """
     used = {
         name
@@ -111,38 +133,13 @@ def _count_unused(features: OsmFeatures, found: Iterable[Imported]) -> None:
         for name in re.findall(r"_([nwr]-?\d+)", one.structure.name)
     }
     used |= {one.name for one in features.areas if is_building(one.tags)}
+    used |= also
     for name, kind in features.kinds.items():
         is_relation_of_parts = kind == "relation of type building"
         if name not in used and not is_relation_of_parts:
             if kind.startswith(("building=", "building:part=")):
                 continue
             features.faults.add(f"{kind}, left out", name)
-
-
-def _lands(
-    areas: Iterable[OsmArea],
-    local: Local,
-    faults: ImportFaults,
-) -> Iterator[Imported]:
-    for name, tags, polygons in areas:
-        found = area_kind(tags)
-        if found is None or is_told(tags, "building"):
-            continue
-        kind, semantic_class = found
-        surface = [
-            flat_surface(one, -0.05, name, faults)
-            for polygon in polygons
-            for one in sound_parts(local.polygon(polygon), name, faults)
-        ]
-        if surface:
-            colours = {"WaterBody": WATER, "LandUse": LAWN}
-            yield make_imported(
-                f"land_{name}",
-                semantic_class,
-                kind,
-                {"surface": np.concatenate(surface)},
-                {"surface": colours.get(kind)},
-            )
 
 
 def _barriers(

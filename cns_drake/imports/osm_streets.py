@@ -12,6 +12,7 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.imports.extrusions import flat_surface
 from cns_drake.imports.foreign_city import Imported, make_imported
 from cns_drake.imports.import_faults import ImportFaults
+from cns_drake.imports.osm_bridges import Bridges
 from cns_drake.imports.osm_places import Local, parts_of, sound_parts
 from cns_drake.imports.osm_reading import OsmWay, Tags, is_told
 from cns_drake.imports.osm_tags import (
@@ -32,13 +33,24 @@ _STRIPE, _STRIPE_LENGTH, _STRIPE_HEIGHT = 0.5, 3.0, 0.01
 
 
 def street_surfaces(
-    ways: Iterable[OsmWay], local: Local, faults: ImportFaults
+    ways: Iterable[OsmWay],
+    local: Local,
+    faults: ImportFaults,
+    bridges: Bridges,
 ) -> Iterator[Imported]:
     """Yields carriageways, and the sidewalks and paths beside them."""
+    for kind, ids in (
+        ("bridge over a street or railway, left out", bridges.over_streets),
+        ("tunnel, left out", bridges.tunnels),
+    ):
+        for name in sorted(ids):
+            faults.add(kind, name)
     roads: list[tuple[str, BaseGeometry]] = []
     walks: list[tuple[str, BaseGeometry]] = []
     for name, tags, line, _ in ways:
         if is_told(tags, "tunnel") or is_told(tags, "area"):
+            continue
+        if name in bridges.over_streets:
             continue
         width = street_width(tags, (name, faults))
         narrow = path_width(tags)
@@ -48,7 +60,7 @@ def street_surfaces(
         if width is None:
             walks.append((name, course.buffer((narrow or 0.0) / 2.0, 4)))
             continue
-        if is_told(tags, "bridge"):
+        if is_told(tags, "bridge") and name not in bridges.level:
             faults.add("bridge, laid on the ground", name)
         roads.append((name, course.buffer(width / 2.0, 4)))
         for side, has in zip((1.0, -1.0), sidewalk_sides(tags), strict=True):
@@ -80,12 +92,16 @@ def street_surfaces(
                 )
 
 
-def drivable_streets(ways: Iterable[OsmWay], local: Local) -> list[Street]:
+def drivable_streets(
+    ways: Iterable[OsmWay], local: Local, bridges: Bridges
+) -> list[Street]:
     """Returns the streets that a car may drive, and where they meet."""
     streets = []
     for name, tags, line, nodes in ways:
         width = street_width(tags)
         if width is None or is_told(tags, "tunnel") or is_told(tags, "area"):
+            continue
+        if name in bridges.over_streets:
             continue
         forward, backward = driven_ways(tags)
         if forward or backward:

@@ -7,7 +7,7 @@ measured from, and is measured anew when they have changed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 import csv
 from dataclasses import astuple, dataclass, fields
 import io
@@ -61,13 +61,17 @@ class SequenceRow:
 
 
 def sequence_rows(
-    folder: Path, progress: Callable[[str], None] = lambda line: None
+    folder: Path,
+    progress: Callable[[str], None] = lambda line: None,
+    sizes: Mapping[str, tuple[int, int]] | None = None,
 ) -> list[SequenceRow]:
     """Returns the rows of a map's sequences whose stage is there.
 
     Args:
         folder: of the map, with `sequence_NN.yaml` and `stage_NN.sdf`.
         progress: takes a line for each row that has to be measured.
+        sizes: stage -> its structures and triangles; those that are not told
+            are counted in the world, which takes long to load.
 
     Raises:
         InputError: if a sequence cannot be read or planned, or its stage not
@@ -93,22 +97,25 @@ def sequence_rows(
         row = known.get(checksum)
         if row is None:
             progress(f"measuring {sequence_name(path)}")
-            row = _measure(scenario, checksum)
+            size = (sizes or {}).get(str(scenario.stage))
+            row = _measure(scenario, checksum, size)
         rows.append(row)
     return rows
 
 
 def write_table(
-    folder: Path, progress: Callable[[str], None] = lambda line: None
+    folder: Path,
+    progress: Callable[[str], None] = lambda line: None,
+    sizes: Mapping[str, tuple[int, int]] | None = None,
 ) -> None:
     """Brings the table of a folder up to date.
 
-    A folder without sequences gets none.
+    A folder without sequences gets none. Arguments as of `sequence_rows`.
 
     Raises:
         InputError: as `sequence_rows`, or if the table cannot be written.
     """
-    rows = sequence_rows(folder, progress)
+    rows = sequence_rows(folder, progress, sizes)
     if not rows:
         return
     out = io.StringIO()
@@ -155,17 +162,15 @@ def _read(path: Path) -> list[SequenceRow]:
         return []
 
 
-def _measure(scenario: Scenario, checksum: str) -> SequenceRow:
+def _measure(
+    scenario: Scenario, checksum: str, size: tuple[int, int] | None
+) -> SequenceRow:
     # Slow to import, and rarely needed.
     from cns_drake.scenarios.sequence_facts import sequence_facts
-    from cns_drake.scene.perception_geometry import read_perception_geometry
-    from cns_drake.scene.surfaces import TriangleSurface
-    from cns_drake.scene.world import load_world
 
     check_files(scenario)
     facts = sequence_facts(scenario)
-    world = load_world(world_file(scenario), without=scenario.without)
-    geometries = read_perception_geometry(world.scene_graph.model_inspector())
+    structures, triangles = size or _size(scenario)
     return SequenceRow(
         sequence=scenario.name,
         map=map_folder(scenario).path.resolve().name,
@@ -175,10 +180,21 @@ def _measure(scenario: Scenario, checksum: str) -> SequenceRow:
         length=round(facts.length, 1),
         duration=round(facts.duration, 2),
         frames=facts.frames,
-        structures=len({geometry.structure for geometry in geometries}),
-        triangles=sum(
-            len(geometry.surface.triangles)
-            for geometry in geometries
-            if isinstance(geometry.surface, TriangleSurface)
-        ),
+        structures=structures,
+        triangles=triangles,
+    )
+
+
+def _size(scenario: Scenario) -> tuple[int, int]:
+    """Returns how many structures and triangles a stage has."""
+    from cns_drake.scene.perception_geometry import read_perception_geometry
+    from cns_drake.scene.surfaces import TriangleSurface
+    from cns_drake.scene.world import load_world
+
+    world = load_world(world_file(scenario), without=scenario.without)
+    geometries = read_perception_geometry(world.scene_graph.model_inspector())
+    return len({geometry.structure for geometry in geometries}), sum(
+        len(geometry.surface.triangles)
+        for geometry in geometries
+        if isinstance(geometry.surface, TriangleSurface)
     )

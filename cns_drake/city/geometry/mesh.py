@@ -29,18 +29,23 @@ class Mesh:
 
     @property
     def num_triangles(self) -> int:
-        return sum(len(face) - 2 for face in self.faces)
+        return sum(map(len, self.faces)) - 2 * len(self.faces)
 
     def triangles(self) -> np.ndarray:
         """Returns the (M, 3) int32 vertex indices after fan triangulation."""
-        return np.array(
-            [
-                (face[0], face[k], face[k + 1])
-                for face in self.faces
-                for k in range(1, len(face) - 1)
-            ],
-            dtype=np.int32,
-        ).reshape(-1, 3)
+        corners = self._corners()
+        is_there = np.ones((len(corners), 2), dtype=bool)
+        is_there[:, 1] = corners[:, 2] != corners[:, 3]
+        halves = corners[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 2, 3)
+        return halves[is_there].astype(np.int32)
+
+    def _corners(self) -> np.ndarray:
+        """Returns the faces as (F, 4) vertex indices.
+
+        Triangles have their last one twice.
+        """
+        padded = [f if len(f) == 4 else (*f, f[-1]) for f in self.faces]
+        return np.array(padded, dtype=np.int64).reshape(-1, 4)
 
     def moved(
         self, translation: ArrayLike = (0.0, 0.0, 0.0), yaw: float = 0.0
@@ -56,20 +61,42 @@ class Mesh:
         Vertices that coincide after rounding are merged, faces that
         collapse are dropped; the same mesh always gives the same text.
         """
-        rounded = np.round(self.vertices, _DECIMALS) + 0.0  # No minus zero.
-        unique, inverse = np.unique(rounded, axis=0, return_inverse=True)
-        inverse = inverse.reshape(-1)
-        lines = ["v " + " ".join(map(_number, v)) for v in unique]
-        for face in self.faces:
-            corners = [int(inverse[i]) + 1 for i in face]
-            corners = [c for k, c in enumerate(corners) if c != corners[k - 1]]
-            if len(corners) >= 3:
-                lines.append("f " + " ".join(map(str, corners)))
-        return "\n".join(lines) + "\n"
+        thousandths = np.rint(self.vertices * 10**_DECIMALS).astype(np.int64)
+        unique, inverse = _unique_rows(thousandths)
+        values, index = np.unique(unique, return_inverse=True)
+        texts = [_number(value) for value in values.tolist()]
+        vertices = tuple(texts[k] for k in index.reshape(-1).tolist())
+        corners = inverse[self._corners()] + 1
+        is_kept = corners != np.roll(corners, 1, axis=1)
+        numbers = is_kept.sum(axis=1)
+        is_kept[numbers < 3] = False
+        faces = "".join(_FACES[number] for number in numbers.tolist())
+        return "v %s %s %s\n" * len(unique) % vertices + faces % tuple(
+            corners[is_kept].tolist()
+        )
 
 
-def _number(value: float) -> str:
-    return f"{value:.{_DECIMALS}f}".rstrip("0").rstrip(".")
+# The line of a face by how many corners it has; fewer than three are none.
+_FACES = ("", "", "", "f %d %d %d\n", "f %d %d %d %d\n")
+
+
+def _unique_rows(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the rows (N, 3) without those told twice, sorted; their numbers.
+
+    As `np.unique` along an axis, which takes several times as long.
+    """
+    order = np.lexsort(rows.T[::-1])
+    ordered = rows[order]
+    is_first = np.ones(len(rows), dtype=bool)
+    is_first[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    inverse = np.empty(len(rows), dtype=np.int64)
+    inverse[order] = np.cumsum(is_first) - 1
+    return ordered[is_first], inverse
+
+
+def _number(thousandths: int) -> str:
+    text = f"{thousandths / 10**_DECIMALS:.{_DECIMALS}f}"
+    return text.rstrip("0").rstrip(".")
 
 
 def merge_meshes(*meshes: Mesh) -> Mesh:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial import KDTree
 import shapely
 from shapely.geometry import MultiLineString
 from shapely.geometry.base import BaseGeometry
@@ -27,6 +26,7 @@ from cns_drake.imports.dressing.facade_plan import (
 from cns_drake.imports.dressing.roof_pieces import is_flat_roof, roof_pieces
 from cns_drake.imports.dressing.styles import Style, make_style
 from cns_drake.imports.dressing.upper_sides import UpperSides, looks_up
+from cns_drake.imports.dressing.visible_walls import DriveViews
 from cns_drake.imports.dressing.wall_panels import (
     Panel,
     find_panels,
@@ -41,8 +41,6 @@ from cns_drake.imports.waypoint_drives import Drive
 # Walls that are farther from all drives have no windows, and roofs no
 # equipment [m].
 _WALLS_WITHIN, _ROOFS_WITHIN = 60.0, 100.0
-# Of drives, for what they see of a wall [m].
-_SPACING = 4.0
 # So many triangles are given to openings, about, the nearest walls first.
 _MOST_TRIANGLES = 1_100_000
 _OF_OPENING, _OF_WALL = 30, 40
@@ -89,6 +87,7 @@ def dress_buildings(
     streets: Sequence[Street],
     ground: Ground,
     seed: int,
+    always: Collection[Imported] | None = None,
 ) -> DressedBuildings:
     """Dresses the buildings of a city.
 
@@ -102,6 +101,8 @@ def dress_buildings(
         streets: of the file, which doors and shops look to.
         ground: below the city.
         seed: of the lot.
+        always: what stands at all stages, and so hides what is behind it; all
+            structures if None.
     """
     buildings = [one for one in structures if one.kind.startswith("Building")]
     bare = _all_laid_bare(buildings, ground, seed)
@@ -109,9 +110,14 @@ def dress_buildings(
     by_file: Counter[str] = Counter()
     for some in bare:
         by_file.update(some.style.by_tag)
-    solids = [some.one.triangles for some in bare]
-    upper = UpperSides(np.concatenate([np.zeros((0, 3, 3)), *solids]))
-    plans, distances = _plans(bare, drives, streets, ground, upper)
+    plans: Mapping[int, list[FacadePlan]] = {}
+    distances: Mapping[int, list[float]] = {}
+    if drives and bare:
+        lasting = set(buildings if always is None else always)
+        hiding = [b.triangles for b in buildings if b in lasting]
+        solids = np.concatenate([np.zeros((0, 3, 3)), *hiding])
+        views = DriveViews(drives, ground, solids)
+        plans, distances = _plans(bare, drives, streets, ground, views)
     paths = MultiLineString([drive.path for drive in drives])
     dressed = {}
     for number, some in enumerate(bare):
@@ -197,22 +203,14 @@ def _plans(
     drives: Sequence[Drive],
     streets: Sequence[Street],
     ground: Ground,
-    upper: UpperSides,
+    views: DriveViews,
 ) -> tuple[dict[int, list[FacadePlan]], dict[int, list[float]]]:
     """Returns of buildings the walls to dress, and how far drives are."""
-    panels = [
-        panel
-        for panel in find_panels(
-            [
-                some.walls
-                if some.one.lod < _OWN_WINDOWS
-                else np.zeros((0, 3, 3))
-                for some in bare
-            ]
-        )
-        if panel.is_plane
+    walls = [
+        some.walls if some.one.lod < _OWN_WINDOWS else np.zeros((0, 3, 3))
+        for some in bare
     ]
-    panels, to_drive = _seen(panels, drives)
+    panels, to_drive = _seen(walls, views)
     if not panels:
         return {}, {}
     before = np.array(
@@ -231,6 +229,8 @@ def _plans(
         )
         for panel, height in zip(panels, heights, strict=True)
     ]
+    solids = [some.one.triangles for some in bare]
+    upper = UpperSides(np.concatenate(solids))
     probes = [plan.probes() for plan in plans]
     hidden = upper.hides(np.concatenate(probes))
     ends = np.cumsum([len(some) for some in probes])[:-1]
@@ -261,40 +261,24 @@ def _plans(
 
 
 def _seen(
-    panels: Sequence[Panel], drives: Sequence[Drive]
+    walls: Sequence[np.ndarray], views: DriveViews
 ) -> tuple[list[Panel], np.ndarray]:
-    """Returns the panels that drives see from near, and how near [m].
+    """Returns the plane walls that drives see from near, and how near [m].
 
     The nearest come first, as many as there are triangles for.
+
+    Args:
+        walls: of each building, upright triangles (M, 3, 3) [m].
+        views: from the drives.
     """
-    if not panels or not drives:
-        return [], np.zeros(0)
-    points = np.concatenate(
-        [
-            np.asarray(
-                shapely.get_coordinates(
-                    shapely.segmentize(
-                        shapely.linestrings(drive.path), _SPACING
-                    )
-                )
-            )
-            for drive in drives
-        ]
-    )
-    middles = np.array(
-        [panel.origin[:2] + panel.along * panel.length / 2 for panel in panels]
-    )
-    reach = np.array([panel.length / 2 for panel in panels])
-    near = KDTree(points).query_ball_point(middles, _WALLS_WITHIN + reach)
-    distances = np.full(len(panels), np.inf)
-    for k, some in enumerate(near):
-        if len(some):
-            from_start = points[some] - panels[k].origin[:2]
-            out = from_start @ panels[k].outward
-            x = from_start @ panels[k].along
-            aside = np.maximum(np.maximum(-x, x - panels[k].length), 0.0)
-            if (out > 0.0).any():
-                distances[k] = np.hypot(out, aside)[out > 0.0].min()
+    panels = [
+        panel
+        for panel in find_panels(
+            walls, lambda limits: views.are_near(limits, _WALLS_WITHIN)
+        )
+        if panel.is_plane
+    ]
+    distances = views.distances(panels, _WALLS_WITHIN)
     order = np.argsort(distances, kind="stable")
     order = order[distances[order] <= _WALLS_WITHIN]
     cost = [

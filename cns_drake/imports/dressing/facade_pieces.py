@@ -24,8 +24,9 @@ _SIGN_REACH, _SIGN_HEIGHT = 0.15, 0.5
 _BALCONY_REACH, _BALCONY_WIDTH = 1.15, 3.0
 _AWNING_REACH, _AWNING_HEIGHT = 1.1, 0.55
 _SILL_HEIGHT, _SILL_BESIDE, _SILL_REACH = 0.08, 0.08, 0.07
-# Windows farther from drives have neither frames nor sills [m].
-_FRAMES_WITHIN = 35.0
+# Windows farther from drives have no sills, or no frames, or lie in the plane
+# of their wall, and walls have no plinths [m].
+_SILLS_WITHIN, _FRAMES_WITHIN, _RECESSES_WITHIN = 15.0, 30.0, 45.0
 # Nothing that is lower may hang over the way of a car, with so much room
 # beside the middle of it [m].
 _TALLEST_CAR, _BESIDE = 4.0, 2.5
@@ -88,6 +89,9 @@ def add_facade(
     has_balconies = style.balconies and bool(rng.random() < 0.6)
     if has_balconies:
         plan = opened_to_floor(plan, balcony_windows(plan))
+    if to_drive > _RECESSES_WITHIN:
+        flush = np.zeros_like(plan.openings.depth)
+        plan = replace(plan, openings=plan.openings._replace(depth=flush))
     wall = open_wall(panel, plan.openings)
     if wall is None:
         faces.add("body", panel.triangles)
@@ -101,16 +105,19 @@ def add_facade(
             frames, panes = framed(panel, plan.openings.chosen(is_glass))
             faces.add("frames", frames)
             faces.add("glass", panes)
-            _add_sills(faces, plan)
         else:
             faces.add("glass", wall.backs[is_glass])
+        if to_drive < _SILLS_WITHIN:
+            _add_sills(faces, plan)
         faces.counts["windows"] += int((~plan.openings.is_door).sum())
         faces.counts["doors"] += int(plan.openings.is_door.sum())
         if has_balconies:
             _add_balconies(faces, plan, to_drive)
         if plan.shop:
             _add_signs(faces, plan, to_drive, rng)
-    _add_bands(faces, plan)
+    if to_drive < _RECESSES_WITHIN:
+        _add_plinth(faces, plan)
+    _add_cornice(faces, plan)
 
 
 def _add_sills(faces: Faces, plan: FacadePlan) -> None:
@@ -124,23 +131,30 @@ def _add_sills(faces: Faces, plan: FacadePlan) -> None:
     faces.add("trim", sills)
 
 
-def _add_bands(faces: Faces, plan: FacadePlan) -> None:
-    """Adds the plinth and the cornice."""
+def _add_plinth(faces: Faces, plan: FacadePlan) -> None:
     panel, style = plan.panel, plan.style
-    if style.plinth and plan.stands_on_ground and plan.top_is_free:
-        top = plan.ground + style.plinth
-        if 0.1 < top < panel.height and panel.outline is None:
-            start, end = _between(plan, top)
-            reach = _PLINTH_REACH
-            start[start == 0.0] -= reach
-            end[end == panel.length] += reach
-            faces.add("trim", boxes_on(panel, start, end, 0.0, top, reach))
-            faces.counts["plinths"] += 1
-    tall_enough = panel.height > _LEAST_WALL
+    top = plan.ground + style.plinth
+    if (
+        style.plinth
+        and plan.stands_on_ground
+        and plan.top_is_free
+        and 0.1 < top < panel.height
+        and panel.outline is None
+    ):
+        start, end = _between(plan, top)
+        reach = _PLINTH_REACH
+        start[start == 0.0] -= reach
+        end[end == panel.length] += reach
+        faces.add("trim", boxes_on(panel, start, end, 0.0, top, reach))
+        faces.counts["plinths"] += 1
+
+
+def _add_cornice(faces: Faces, plan: FacadePlan) -> None:
+    panel, style = plan.panel, plan.style
     if (
         style.cornice
         and plan.top_is_free
-        and tall_enough
+        and panel.height > _LEAST_WALL
         and panel.outline is None
     ):
         is_gutter = style.cornice < _GUTTER

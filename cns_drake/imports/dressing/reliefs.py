@@ -17,6 +17,18 @@ _BESIDE = 0.1
 _FRAME = 0.09
 _EXACT = 1e-3
 _LEAST_AREA = 1e-4
+# The faces of a box on a panel: the limits (left, right, bottom, top, out and
+# the panel's plane) of x, z and out (3, F, 4) of their corners.
+_FACES = (
+    ("lbo", "rbo", "rto", "lto"),
+    ("lbp", "lbo", "lto", "ltp"),
+    ("rbo", "rbp", "rtp", "rto"),
+    ("lbp", "rbp", "rbo", "lbo"),
+    ("lto", "rto", "rtp", "ltp"),
+)
+_BOX = np.moveaxis(
+    np.array([[list(map("lrbtop".index, c)) for c in f] for f in _FACES]), 2, 0
+)
 
 
 class Openings(NamedTuple):
@@ -74,9 +86,7 @@ def fronts(
         x0, x1, z0, z1: (N,) limits in its coordinates [m].
         out: (N,) distance from it outwards [m].
     """
-    x = np.stack([x0, x1, x1, x0], axis=-1)
-    z = np.stack([z0, z0, z1, z1], axis=-1)
-    return panel.place(x, z, np.asarray(out)[..., None])
+    return _quads(panel, _BOX[:, :1], x0, x1, z0, z1, out)
 
 
 def sides(
@@ -91,24 +101,7 @@ def sides(
 
     They are seen from within a recess (out < 0) or from beside a box.
     """
-    zero = np.zeros_like(out)
-    rings = (
-        ((x0, z0, zero), (x0, z0, out), (x0, z1, out), (x0, z1, zero)),
-        ((x1, z0, out), (x1, z0, zero), (x1, z1, zero), (x1, z1, out)),
-        ((x0, z0, zero), (x1, z0, zero), (x1, z0, out), (x0, z0, out)),
-        ((x0, z1, out), (x1, z1, out), (x1, z1, zero), (x0, z1, zero)),
-    )
-    return np.concatenate(
-        [
-            panel.place(
-                *(
-                    np.stack(values, axis=-1)
-                    for values in zip(*ring, strict=True)
-                )
-            )
-            for ring in rings
-        ]
-    )
+    return _quads(panel, _BOX[:, 1:], x0, x1, z0, z1, out)
 
 
 def boxes_on(
@@ -120,16 +113,24 @@ def boxes_on(
     reach: np.ndarray | float,
 ) -> np.ndarray:
     """Returns boxes without backs on a panel, (5 N, 4, 3) [m]."""
-    left, right, low, high, out = (
-        np.atleast_1d(limit).astype(float)
-        for limit in np.broadcast_arrays(x0, x1, z0, z1, reach)
-    )
-    return np.concatenate(
-        [
-            fronts(panel, left, right, low, high, out),
-            sides(panel, left, right, low, high, out),
-        ]
-    )
+    return _quads(panel, _BOX, x0, x1, z0, z1, reach)
+
+
+def _quads(
+    panel: Panel, faces: np.ndarray, *limits: np.ndarray | float
+) -> np.ndarray:
+    """Returns the faces (F N, 4, 3) of N boxes, face by face [m].
+
+    Args:
+        panel: the wall.
+        faces: (3, F, 4) which of the limits their corners have.
+        limits: x0, x1, z0, z1 and the distance outwards, (N,) or one [m].
+    """
+    values = np.stack(
+        [some.reshape(-1) for some in np.broadcast_arrays(*limits, 0.0)]
+    ).astype(float)
+    x, z, out = values[faces].transpose(0, 1, 3, 2).reshape(3, -1, 4)
+    return panel.place(x, z, out)
 
 
 def open_wall(panel: Panel, openings: Openings) -> OpenedWall | None:
@@ -152,12 +153,10 @@ def open_wall(panel: Panel, openings: Openings) -> OpenedWall | None:
         return None
     openings = openings.chosen(np.lexsort([openings.x0, openings.row]))
     _, x0, x1, z0, z1, depth, _ = openings
-    quads = np.concatenate(
-        [
-            fronts(panel, *_wall_between(openings, area)),
-            sides(panel, x0, x1, z0, z1, -depth),
-        ]
-    )
+    quads = fronts(panel, *_wall_between(openings, area))
+    if depth.any():
+        reveals = sides(panel, x0, x1, z0, z1, -depth)
+        quads = np.concatenate([quads, reveals])
     return OpenedWall(
         quads, rest, fronts(panel, x0, x1, z0, z1, -depth), openings
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,13 +60,13 @@ class Panel:
             x, z: along the panel and up, from its origin [m].
             out: distance outwards [m].
         """
-        out = np.broadcast_to(out, np.shape(x))
-        xy = (
-            self.origin[:2]
-            + x[..., None] * self.along
-            + out[..., None] * self.outward
-        )
-        return np.concatenate([xy, (self.origin[2] + z)[..., None]], axis=-1)
+        places = np.empty((*np.shape(x), 3))
+        for k in range(2):
+            places[..., k] = (
+                self.origin[k] + x * self.along[k] + out * self.outward[k]
+            )
+        places[..., 2] = self.origin[2] + z
+        return places
 
     def whole(self) -> BaseGeometry:
         """Returns the panel's outline in x and z [m]."""
@@ -89,12 +89,17 @@ def is_upright(triangles: np.ndarray) -> np.ndarray:
     return normals.any(axis=1) & (np.abs(normals[:, 2]) < _UPRIGHT)
 
 
-def find_panels(walls: Sequence[np.ndarray]) -> list[Panel]:
+def find_panels(
+    walls: Sequence[np.ndarray],
+    is_wanted: Callable[[np.ndarray], np.ndarray] | None = None,
+) -> list[Panel]:
     """Returns the panels of the walls of buildings.
 
     Args:
         walls: of each building, upright triangles (M, 3, 3) that look
             outwards [m].
+        is_wanted: tells which (N,) panels are, of the least and the greatest
+            x and y of each, (N, 2, 2) [m]; all if None.
     """
     triangles = np.concatenate([np.zeros((0, 3, 3)), *walls])
     building = np.repeat(np.arange(len(walls)), [len(w) for w in walls])
@@ -103,10 +108,22 @@ def find_panels(walls: Sequence[np.ndarray]) -> list[Panel]:
     normals = unit_normals(triangles)
     component = _connected(triangles, normals, building)
     order = np.argsort(component, kind="stable")
-    ends = np.flatnonzero(np.diff(component[order])) + 1
+    begins = np.flatnonzero(np.diff(component[order], prepend=-1))
+    groups = np.split(order, begins[1:])
+    if is_wanted is not None:
+        xy = triangles[order, :, :2]
+        limits = np.stack(
+            [
+                np.minimum.reduceat(xy.min(axis=1), begins),
+                np.maximum.reduceat(xy.max(axis=1), begins),
+            ],
+            axis=1,
+        )
+        wanted = is_wanted(limits)
+        groups = [some for k, some in enumerate(groups) if wanted[k]]
     return [
         _panel(int(building[some[0]]), triangles[some], normals[some])
-        for some in np.split(order, ends)
+        for some in groups
     ]
 
 

@@ -18,6 +18,7 @@ from cns_drake.imports.dressing.grounds import (
     paved,
     with_kerb,
 )
+from cns_drake.imports.dressing.lane_marks import lane_marks
 from cns_drake.imports.dressing.street_dressing import dress_streets
 from cns_drake.imports.foreign_city import ForeignCity, Imported
 from cns_drake.imports.import_ground import Ground
@@ -68,7 +69,10 @@ def dress_city(
     Raises:
         InputError: if there are more structures than a map may have.
     """
-    buildings = dress_buildings(staged.kept, drives, city.streets, ground, seed)
+    always = set.intersection(*map(set, staged.standing.values()))
+    buildings = dress_buildings(
+        staged.kept, drives, city.streets, ground, seed, always
+    )
     changed = dict(buildings.buildings)
     by_lot = Counter(buildings.by_lot)
     is_paved = is_dense(staged.kept)
@@ -79,6 +83,9 @@ def dress_city(
         missing = missing_sidewalks(staged.kept, city.streets, drives)
         added = [with_kerb(one) for one in missing]
         by_lot["Sidewalk"] += len(added)
+        marks = list(lane_marks(city.streets, drives))
+        by_lot["Lane mark"] += len(marks)
+        added += marks
     things = dress_streets(
         [*staged.kept, *added], city.things, city.streets, drives, ground, seed
     )

@@ -27,6 +27,7 @@ from cns_drake.imports.import_structures import import_cityjson
 from cns_drake.imports.openstreetmap import import_openstreetmap
 from cns_drake.imports.staged_city import stage_city
 from cns_drake.imports.waypoint_drives import Drive
+from cns_drake.scenarios.sequence_table import write_table
 
 # Of an import before there was dressing.
 PLAIN = "100f7a75c0f44113"
@@ -235,6 +236,26 @@ def test_only_what_drives_see_from_near_has_windows(tmp_path):
     assert "glass" not in surfaces(after[f"building_w{far}"])
 
 
+@pytest.mark.parametrize("is_lasting", [True, False])
+def test_a_house_behind_one_that_always_stands_has_no_windows(
+    tmp_path, is_lasting
+):
+    osm = OsmWriter()
+    osm.box(-40, 0, 80, 8, building="yes", height="30")
+    behind = osm.box(-8, 20, 16, 10, building="yes", height="9")
+    city = read(osm, tmp_path)
+    low = city.structures[0].triangles.min(axis=(0, 1))
+    path = STREET * [0.2, 1.0] + low[:2] + [40.0, 6.0]
+    always = city.structures if is_lasting else city.structures[1:]
+    result = dress_buildings(
+        city.structures, [Drive(path, path)], (), ground_of(city.structures),
+        0, always,
+    )  # fmt: skip
+    after = {o.structure.name: o for o in result.buildings.values()}
+    has_glass = "glass" in surfaces(after[f"building_w{behind}"])
+    assert has_glass is not is_lasting
+
+
 def test_nothing_hangs_in_the_way_of_a_drive(tmp_path):
     osm = OsmWriter()
     for k in range(12):
@@ -355,6 +376,12 @@ def test_what_is_from_the_file_and_what_by_lot_is_told(tmp_path):
         else:
             # Sidewalks have kerbs; lamps and cars are not in the file.
             assert origin == ("dressed" if name.startswith("walk") else "lot")
+    # The table has what the worlds have, though no world was loaded for it.
+    table = folder / "sequences.csv"
+    told = table.read_text()
+    table.unlink()
+    write_table(folder)
+    assert table.read_text() == told
     # Each stage parses, and both have the house that changes nothing.
     for stage in ("01", "02"):
         text = (folder / f"stage_{stage}.sdf").read_text()

@@ -336,7 +336,7 @@ def test_no_import_refuses_its_own_drives(tmp_path, columns):
 def test_an_import_that_fails_leaves_no_folder(tmp_path):
     write_grid(tmp_path / "city.osm")
 
-    def fail(folder):
+    def fail(folder, sizes):
         assert (folder / "stage_01.sdf").exists()
         assert folder.name == "town"
         raise InputError("no")
@@ -348,5 +348,5 @@ def test_an_import_that_fails_leaves_no_folder(tmp_path):
     with pytest.raises(InputError, match="no"):
         run(fail)
     assert {path.name for path in tmp_path.iterdir()} == {"city.osm"}
-    run(lambda folder: None)
+    run(lambda folder, sizes: None)
     assert (tmp_path / "town" / "stage_01.sdf").exists()
