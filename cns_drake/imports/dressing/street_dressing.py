@@ -62,7 +62,22 @@ _SMALL = {
 }
 # Half of a street whose width is not known: cars pass what stands there [m].
 _HALF_STREET = 3.9
-_NO_PARKING = ("no", "no_parking", "no_stopping", "separate", "street_side")
+_NO_PARKING = (
+    "no",
+    "no_parking",
+    "no_stopping",
+    "separate",
+    "drawn_separately",
+    "street_side",
+    "lay_by",
+)
+_PARKING_KEYS = (
+    "parking:{}",
+    "parking:{}:restriction",
+    "parking:lane:{}",
+    "parking:condition:{}",
+)
+_WITHOUT_CARS = ("service", "track", "motorway", "trunk", "living_street")
 
 
 @dataclass
@@ -121,8 +136,7 @@ def dress_streets(
     for name, line, half, may_park in rows:
         if placing.is_near(np.array(line.coords), _ROWS_WITHIN):
             rng = lot_generator(seed, "row", name)
-            if may_park:
-                _park(placing, name, line, half, lines, rng)
+            _park(placing, name, line, half, may_park, lines, rng)
             _light(placing, name, line, half, rng)
             if not things:
                 _furnish(placing, name, line, half, rng)
@@ -131,23 +145,34 @@ def dress_streets(
 
 def _rows(
     streets: Sequence[Street], drives: Sequence[Drive]
-) -> Iterator[tuple[str, LineString, float, bool]]:
-    """Yields name, middle, half width, whether cars park, of streets."""
+) -> Iterator[tuple[str, LineString, float, tuple[bool, bool]]]:
+    """Yields name, middle, half width, and whether cars park, of streets.
+
+    On the right, and on the left.
+    """
     for street in streets:
-        told = {
-            value
-            for key, value in street.tags.items()
-            if key.startswith("parking")
-        }
-        may_park = not told & set(_NO_PARKING)
-        kind = street.tags.get("highway", "")
-        may_park &= kind not in ("service", "track", "motorway", "trunk")
+        may_park = (may_park_on("right", street), may_park_on("left", street))
         half = street.width / 2.0
         yield street.name, LineString(street.line), half, may_park
     if not streets:
         for number, drive in enumerate(drives):
             line = LineString(drive.path)
-            yield f"drive_{number}", line, _HALF_STREET, True
+            yield f"drive_{number}", line, _HALF_STREET, (True, True)
+
+
+def may_park_on(side: str, street: Street) -> bool:
+    """Tells whether cars may park on the `left` or `right` of a street.
+
+    https://wiki.openstreetmap.org/wiki/Street_parking
+    """
+    if street.tags.get("highway", "") in _WITHOUT_CARS:
+        return False
+    told = {
+        street.tags.get(key.format(which))
+        for which in (side, "both")
+        for key in _PARKING_KEYS
+    }
+    return not told & set(_NO_PARKING)
 
 
 class _Placing:
@@ -311,12 +336,15 @@ def _park(
     name: str,
     line: LineString,
     half: float,
+    may_park: tuple[bool, bool],
     lines: BaseGeometry,
     rng: np.random.Generator,
 ) -> None:
-    """Parks cars along both sides of a street."""
+    """Parks cars along the right and the left of a street."""
     others = lines.difference(line.buffer(0.5)) if not lines.is_empty else lines
-    for side in (1.0, -1.0):
+    for side, is_allowed in zip((1.0, -1.0), may_park, strict=True):
+        if not is_allowed:
+            continue
         s = float(rng.uniform(4.0, 9.0))
         while s < line.length - 4.0:
             xy, yaw = _along(line, s, side, half - _FROM_KERB)

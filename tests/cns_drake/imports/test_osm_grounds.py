@@ -1,0 +1,144 @@
+"""Grounds, the sea, bridges and tunnels of OpenStreetMap."""
+
+from helpers.small_osm import OsmWriter
+import numpy as np
+import pytest
+
+from cns_drake.imports.dressing.lane_marks import lane_marks
+from cns_drake.imports.dressing.street_dressing import may_park_on
+from cns_drake.imports.openstreetmap import import_openstreetmap
+from cns_drake.imports.street_lanes import Street
+from cns_drake.imports.waypoint_drives import Drive
+
+
+def read(osm, folder, dressed=True):
+    path = osm.write(folder / "city.osm")
+    return import_openstreetmap(path, None, dressed)
+
+
+def area(one):
+    a, b, c = np.moveaxis(one.triangles, 1, 0)
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+
+
+def kinds(city):
+    return {one.structure.name: one.kind for one in city.structures}
+
+
+@pytest.mark.parametrize(
+    ("tags", "kind", "plain"),
+    [({"natural": "sand"}, "Sand", None),
+     ({"leisure": "pitch"}, "Pitch", "LandUse"),
+     ({"leisure": "playground"}, "Playground", "LandUse"),
+     ({"landuse": "basin"}, "WaterBody", None),
+     ({"highway": "footway", "area": "yes"}, "Square", None),
+     ({"amenity": "parking"}, "Parking", "Parking"),
+     ({"amenity": "parking", "parking": "underground"}, None, "Parking"),
+     ({"natural": "water", "layer": "-1"}, None, "WaterBody"),
+     ({"landuse": "grass"}, "LandUse", "LandUse")],
+)  # fmt: skip
+def test_grounds_by_what_they_are_made_of(tmp_path, tags, kind, plain):
+    osm = OsmWriter()
+    osm.box(0, 0, 10, 10, building="yes")
+    name = f"land_w{osm.box(20, 0, 30, 20, **tags)}"
+    dressed, bare = read(osm, tmp_path), read(osm, tmp_path, dressed=False)
+    assert kinds(dressed).get(name) == kind
+    assert kinds(bare).get(name) == plain
+    for one in dressed.structures:
+        if one.structure.name == name:
+            assert area(one) == pytest.approx(600.0, abs=1.0)
+            assert (one.triangles[:, :, 2] < 0.0).all()
+
+
+def test_a_pitch_has_the_colour_of_its_surface(tmp_path):
+    osm = OsmWriter()
+    osm.box(0, 0, 10, 10, building="yes")
+    lawn = osm.box(20, 0, 9, 9, leisure="pitch", sport="soccer")
+    hard = osm.box(40, 0, 9, 9, leisure="pitch", sport="basketball")
+    found = {o.structure.name: o for o in read(osm, tmp_path).structures}
+    assert found[f"land_w{lawn}"].structure.semantic_class == "terrain"
+    assert found[f"land_w{hard}"].structure.semantic_class == "other-ground"
+
+
+@pytest.mark.parametrize("is_eastward", [True, False])
+def test_the_sea_lies_right_of_the_coast(tmp_path, is_eastward):
+    osm = OsmWriter()
+    osm.box(-50, -50, 10, 10, building="yes")
+    osm.box(40, 40, 10, 10, building="yes")
+    # It ends within the city, where the file was cut.
+    line = [(-30, 0), (0, 0), (70, 0)]
+    osm.way(line if is_eastward else line[::-1], natural="coastline")
+    # Around an island the land is inside.
+    island = [(0, -60), (20, -60), (20, -40), (0, -40)]
+    osm.way(island, closed=True, natural="coastline")
+    city = read(osm, tmp_path)
+    (sea,) = (o for o in city.structures if o.structure.name[:4] == "sea_")
+    half = 220.0 * 110.0
+    expected = half - 400.0 if is_eastward else half
+    assert area(sea) == pytest.approx(expected, rel=0.01)
+    y = sea.triangles[:, :, 1].mean()
+    assert bool(y < 0.0) is is_eastward
+    assert not any("coastline" in kind for kind, _, _ in city.faults.rows())
+
+
+def test_bridges_are_level_or_left_out(tmp_path):
+    osm = OsmWriter()
+    osm.box(-60, 20, 10, 10, building="yes")
+    below = [osm.node(0, -80), osm.node(0, 80)]
+    osm.way_of(below, highway="residential", width="8")
+    over = [osm.node(-40, 0), osm.node(40, 0)]
+    over = osm.way_of(over, highway="primary", width="10", bridge="yes")
+    level = [osm.node(60, -30), osm.node(60, 30)]
+    level = osm.way_of(level, highway="primary", width="10", bridge="yes")
+    under = [osm.node(-90, -50), osm.node(-60, -50)]
+    under = osm.way_of(under, highway="primary", tunnel="yes", layer="-1")
+    city = read(osm, tmp_path)
+    names = set(kinds(city))
+    assert f"road_w{over}" not in names
+    assert f"w{over}" not in {street.name for street in city.streets}
+    assert {f"road_w{level}", f"parapet_w{level}"} <= names
+    faults = {kind: number for kind, number, _ in city.faults.rows()}
+    assert faults["bridge over a street or railway, left out"] == 1
+    assert faults["tunnel, left out"] == 1
+    assert not any(kind.startswith("highway=") for kind in faults)
+    (wall,) = (o for o in city.structures if o.kind == "Parapet")
+    x = wall.triangles[:, :, 0] - city.streets[-1].line[0, 0]
+    # 0.2 m beside a carriageway of 10 m, 0.25 m thick.
+    assert np.abs(x).min() == pytest.approx(5.075, abs=0.02)
+    assert wall.triangles[:, :, 2].max() == pytest.approx(1.0)
+    plain = read(osm, tmp_path, dressed=False)
+    assert f"road_w{over}" in kinds(plain)
+
+
+@pytest.mark.parametrize(
+    ("tags", "right", "left"),
+    [({}, True, True),
+     ({"parking:both": "no"}, False, False),
+     ({"parking:left": "no", "parking:right": "lane"}, True, False),
+     ({"parking:lane:right": "no_stopping"}, False, True),
+     ({"parking:right:restriction": "no_parking"}, False, True),
+     ({"highway": "service"}, False, False)],
+)  # fmt: skip
+def test_cars_park_on_the_side_that_tags_allow(tags, right, left):
+    street = Street(np.zeros((2, 2)), (1, 2), True, True, 1.5, 7.0, "a", tags)
+    assert may_park_on("right", street) is right
+    assert may_park_on("left", street) is left
+
+
+def test_marks_lie_on_the_middle_and_end_before_junctions():
+    main = {"highway": "secondary"}
+    line = np.array([[0.0, 0.0], [50.0, 0.0], [100.0, 0.0]])
+    side = np.array([[50.0, 0.0], [50.0, 60.0]])
+    streets = [
+        Street(line, (1, 2, 3), True, True, 2.0, 8.0, "main", main),
+        Street(side, (2, 4), True, True, 2.0, 8.0, "side", {}),
+    ]
+    path = np.column_stack([np.linspace(0, 100, 30), np.full(30, -2.0)])
+    (marks,) = lane_marks(streets, [Drive(path, path)])
+    x, y = marks.triangles[:, :, 0], marks.triangles[:, :, 1]
+    assert np.abs(y).max() == pytest.approx(0.06)
+    # Half of the street, 4 m before the junction, and half a dash.
+    assert np.abs(x - 50.0).min() > 4.0 + 4.0 - 1.5 - 1e-9
+    assert area(marks) == pytest.approx(len(x) / 2 * 3.0 * 0.12)
+    far = path + np.array([0.0, 500.0])
+    assert not list(lane_marks(streets, [Drive(far, far)]))
