@@ -143,7 +143,7 @@ def _import_roads(
     progress: Progress,
     finish: Finish,
 ) -> ImportReport:
-    town = build_town(source, options.seed, progress)
+    town = build_town(source, options.seed, progress, options.dressed)
     with map_draft(output) as draft:
         report = write_town(draft, source, town, progress)
         finish(draft, {})

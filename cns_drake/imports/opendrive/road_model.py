@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -72,6 +72,27 @@ class Cubics:
 
 
 @dataclass(frozen=True)
+class RoadMark:
+    """A line painted on the border of a lane.
+
+    Attributes:
+        start: along the road [m].
+        kind: its type, such as `solid broken`.
+        colour: as the file names it.
+        width: of one line [m].
+    """
+
+    start: float
+    kind: str
+    colour: str
+    width: float
+
+    def colour_of(self, known: Container[str]) -> str:
+        """Returns its colour, or the standard one if it is not known."""
+        return self.colour if self.colour in known else "standard"
+
+
+@dataclass(frozen=True)
 class Lane:
     """A lane of a section.
 
@@ -81,6 +102,7 @@ class Lane:
         width: over the distance along the road; or
         border: how far its outer edge is from the middle.
         height: how high its inner edge stands above the road [m].
+        marks: on its outer border, one after the other.
     """
 
     number: int
@@ -88,6 +110,7 @@ class Lane:
     width: Cubics
     border: Cubics
     height: float
+    marks: tuple[RoadMark, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -97,11 +120,13 @@ class LaneSection:
     Attributes:
         start, end: along the road [m].
         lanes: without the middle one, by their number.
+        middle_marks: on the middle, one after the other.
     """
 
     start: float
     end: float
     lanes: dict[int, Lane]
+    middle_marks: tuple[RoadMark, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ from cns_drake.imports.opendrive.road_model import (
     Lane,
     LaneSection,
     RoadMap,
+    RoadMark,
 )
 from cns_drake.imports.opendrive.road_things import read_things
 from cns_drake.imports.opendrive.xml_elements import Element, read_elements
@@ -65,6 +66,7 @@ _KNOWN = frozenset(
         "repeat",
         "right",
         "road",
+        "roadMark",
         "shape",
         "signal",
         "signals",
@@ -85,6 +87,8 @@ _LONGEST_TOGETHER = 2_000_000.0
 _FAR = 10_000.0
 # Lengths that differ by less agree [m].
 _ROUNDING = 0.01
+# A painted line where its width is not told, or beyond reason [m].
+_MARK_WIDTH, _WIDEST_MARK = 0.12, 1.0
 # No lane is wider, no curve sharper [m, 1/m].
 _WIDEST = 100.0
 _SHARPEST = 100.0
@@ -306,7 +310,12 @@ def _sections(
                 if lane.number in lanes:
                     faults.add("lane told twice, left out", name)
                 lanes.setdefault(lane.number, lane)
-        found.append(LaneSection(start, end, lanes))
+        middle = [
+            mark
+            for element in one.all("center", "lane")
+            for mark in _marks(element, start)
+        ]
+        found.append(LaneSection(start, end, lanes, tuple(middle)))
     return found
 
 
@@ -321,6 +330,7 @@ def _lane(element: Element, start: float) -> Lane:
         width=_cubics(element.all("width"), "sOffset", start),
         border=_cubics(element.all("border"), "sOffset", start),
         height=heights.number("inner", 0.0) if heights else 0.0,
+        marks=tuple(_marks(element, start)),
     )
     for one in (*element.all("width"), *element.all("border")):
         if abs(one.number("a", 0.0)) > _WIDEST:
@@ -329,6 +339,25 @@ def _lane(element: Element, start: float) -> Lane:
                 f" {one.number('a'):g} m is beyond {_WIDEST:g} m"
             )
     return lane
+
+
+def _marks(lane: Element, start: float) -> list[RoadMark]:
+    """Returns the marks of a lane, in their order along the road."""
+    marks = []
+    for one in lane.all("roadMark"):
+        told = one.number("width", 0.0)
+        width = told if 0.0 < told <= _WIDEST_MARK else _MARK_WIDTH
+        if one.text("weight", "standard") == "bold" and not told:
+            width *= 2.0
+        marks.append(
+            RoadMark(
+                start + one.number("sOffset", 0.0),
+                one.text("type", "none"),
+                one.text("color", "standard"),
+                width,
+            )
+        )
+    return sorted(marks, key=lambda mark: mark.start)
 
 
 def _limits(road: Element) -> Iterator[tuple[float, float]]:

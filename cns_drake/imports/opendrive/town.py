@@ -33,6 +33,7 @@ from cns_drake.imports.opendrive.lane_bands import LaneBand, lane_bands
 from cns_drake.imports.opendrive.lane_drives import find_lane_drives
 from cns_drake.imports.opendrive.road_heights import RoadHeights
 from cns_drake.imports.opendrive.road_levels import split_levels
+from cns_drake.imports.opendrive.road_marks import road_marks
 from cns_drake.imports.opendrive.road_model import RoadMap
 from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.thing_structures import thing_structures
@@ -80,6 +81,7 @@ def build_town(
     source: Path,
     seed: int,
     progress: Callable[[str], None] = lambda line: None,
+    dressed: bool = False,
 ) -> Town:
     """Reads a road network and builds a town along it.
 
@@ -87,6 +89,7 @@ def build_town(
         source: OpenDRIVE.
         seed: of what the generator draws.
         progress: takes one line at a time.
+        dressed: whether the file's road marks are painted.
 
     Raises:
         InputError: if the file cannot be used.
@@ -94,7 +97,7 @@ def build_town(
     faults = ImportFaults()
     roads = read_roads(source, faults)
     try:
-        return _build(source, roads, seed, faults, progress)
+        return _build(source, roads, seed, faults, progress, dressed)
     except GEOSException as error:
         raise InputError(
             f"{source}: an area cannot be used: {error}"
@@ -107,6 +110,7 @@ def _build(
     seed: int,
     faults: ImportFaults,
     progress: Callable[[str], None],
+    dressed: bool,
 ) -> Town:
     try:
         bands = [band for road in roads.roads for band in lane_bands(road)]
@@ -134,6 +138,10 @@ def _build(
     decks = list(bridge_decks(raised))
     kerb = _kerb(ground)
     surface = RoadHeights(ground)
+    marks: list[Structure] = []
+    if dressed:
+        marks += road_marks("marks", ground, surface.heights)
+        marks += road_marks("bridge_marks", raised)
     progress(
         f"{len(roads.roads)} roads, {len(things)} signals and objects;"
         " building along them"
@@ -161,6 +169,7 @@ def _build(
                 ),
                 *decks,
                 *things,
+                *marks,
             ),
             furnish=lambda draft: None,
             park=lambda draft: _park(draft, ground, plan.cars),
@@ -168,7 +177,7 @@ def _build(
         plan,
         str(source),
     )
-    told = {one.name for one in (*decks, *things)}
+    told = {one.name for one in (*decks, *things, *marks)}
     generated = [one for one in city.structures if one.name not in told]
     stages = starter_stages(City(tuple(generated), city.cars))
     return Town(
@@ -178,7 +187,7 @@ def _build(
         Stages.model_validate(stages),
         streets,
         find_lane_drives(bands),
-        _kinds(roads, things, decks, generated),
+        _kinds(roads, things, decks, marks, generated),
         faults,
     )
 
@@ -222,6 +231,7 @@ def _kinds(
     roads: RoadMap,
     things: Sequence[Structure],
     decks: Sequence[Structure],
+    marks: Sequence[Structure],
     generated: Sequence[Structure],
 ) -> dict[str, int]:
     junctions = {road.junction for road in roads.roads} - {None}
@@ -234,6 +244,7 @@ def _kinds(
         "signals": sum("signal" in one.tags for one in things),
         "objects": sum("object" in one.tags for one in things),
         "bridges": sum(one.semantic_class == "road" for one in decks),
+        "roads with marks": len(marks),
         "buildings, drawn by lot": sum(
             one.semantic_class == "building" for one in generated
         ),

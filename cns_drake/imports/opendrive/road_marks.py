@@ -1,0 +1,148 @@
+"""Lines painted on imported roads, between lanes and at their edges.
+
+ASAM OpenDRIVE 1.7, 11.9: a mark lies on the outer border of its lane, that of
+lane 0 on the middle; double lines are told from the inside out, those of the
+middle from left to right.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from cns_drake.city.geometry.structures import Structure
+from cns_drake.imports.foreign_city import Rgb, make_imported
+from cns_drake.imports.opendrive.lane_bands import LaneBand
+from cns_drake.imports.opendrive.road_model import RoadMark
+
+# A dash and its gap, where the file does not tell them; from the middle of a
+# double line to each of its lines; above the road [m].
+_DASH, _GAP = 3.0, 6.0
+_ASIDE = 0.12
+_ABOVE = 0.015
+_SHORTEST = 0.05
+_COLOURS: dict[str, Rgb] = {
+    "standard": (0.86, 0.86, 0.84),
+    "white": (0.86, 0.86, 0.84),
+    "yellow": (0.86, 0.70, 0.22),
+    "red": (0.70, 0.20, 0.18),
+    "blue": (0.20, 0.32, 0.62),
+    "green": (0.22, 0.48, 0.28),
+    "orange": (0.85, 0.50, 0.15),
+}
+_STYLES = ("solid", "broken")
+
+
+def road_marks(
+    prefix: str,
+    bands: Sequence[LaneBand],
+    heights: Callable[[np.ndarray], np.ndarray] | None = None,
+) -> Iterator[Structure]:
+    """Yields the marks of each road.
+
+    Args:
+        prefix: of the names.
+        bands: lanes of the roads.
+        heights: of the ground at (N, 2) places [m]; the marks lie on the
+            borders of lanes if None.
+    """
+    painted: dict[str, dict[str, list[np.ndarray]]] = defaultdict(
+        lambda: defaultdict(list)
+    )
+    for band in bands:
+        section = band.road.sections[band.section]
+        lines = [(band.outer, band.lane.marks, float(band.lane.number))]
+        if band.lane.number == (-1 if -1 in section.lanes else 1):
+            # Of the middle, the second line is on the right.
+            lines.append((band.inner, section.middle_marks, -1.0))
+        for border, marks, side in lines:
+            for colour, quads in _painted(
+                border, band.s, band.heading, marks, side, section.end
+            ):
+                painted[band.road.name][colour].append(quads)
+    for road, colours in painted.items():
+        surfaces = {}
+        for colour, quads in colours.items():
+            corners = np.concatenate(quads)
+            z = corners[..., 2]
+            if heights is not None:
+                ground = heights(corners[..., :2].reshape(-1, 2))
+                z = np.maximum(z, ground.reshape(z.shape))
+            corners[..., 2] = z + _ABOVE
+            surfaces[colour] = corners[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3, 3)
+        yield make_imported(
+            f"{prefix}_{road}",
+            "road",
+            "Road mark",
+            surfaces,
+            {colour: _COLOURS[colour] for colour in surfaces},
+        ).structure
+
+
+def _painted(
+    border: np.ndarray,
+    s: np.ndarray,
+    heading: np.ndarray,
+    marks: Sequence[RoadMark],
+    side: float,
+    end: float,
+) -> Iterator[tuple[str, np.ndarray]]:
+    """Yields colours, and the quads (K, 4, 3) on a border [m].
+
+    Args:
+        border: (N, 3) places [m].
+        s, heading: (N,) of the road there [m, rad].
+        marks: along it.
+        side: above zero, if outwards is to the left.
+        end: of the last mark along the road [m].
+    """
+    left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
+    ends = [*(mark.start for mark in marks[1:]), end][: len(marks)]
+    for mark, last in zip(marks, ends, strict=True):
+        styles = [word for word in mark.kind.split() if word in _STYLES]
+        for k, style in enumerate(styles):
+            out = (2 * k - 1) * _ASIDE if len(styles) > 1 else 0.0
+            aside = left * out * np.sign(side)
+            for a, b in _stretches(style, mark.start, last):
+                quads = _stripe(border, s, left, aside, (a, b), mark.width)
+                if len(quads):
+                    yield mark.colour_of(_COLOURS), quads
+
+
+def _stretches(
+    style: str, start: float, end: float
+) -> Iterator[tuple[float, float]]:
+    """Yields from where to where a line is painted [m]."""
+    if style == "solid":
+        yield start, end
+        return
+    for s in np.arange(start, end, _DASH + _GAP).tolist():
+        yield s, min(s + _DASH, end)
+
+
+def _stripe(
+    border: np.ndarray,
+    s: np.ndarray,
+    left: np.ndarray,
+    aside: np.ndarray,
+    limits: tuple[float, float],
+    width: float,
+) -> np.ndarray:
+    """Returns a stretch of a line as (K, 4, 3), seen from above [m]."""
+    a, b = max(limits[0], s[0]), min(limits[1], s[-1])
+    if b - a < _SHORTEST:
+        return np.zeros((0, 4, 3))
+    inside = s[(s > a + _SHORTEST) & (s < b - _SHORTEST)]
+    at = np.concatenate([[a], np.unique(inside), [b]])
+    values = np.column_stack([border, left, aside])
+    rows = np.stack([np.interp(at, s, some) for some in values.T], axis=1)
+    middle = rows[:, :3].copy()
+    middle[:, :2] += rows[:, 5:7]
+    half = np.zeros_like(middle)
+    half[:, :2] = rows[:, 3:5] * width / 2.0
+    right_edge, left_edge = middle - half, middle + half
+    return np.stack(
+        [right_edge[:-1], right_edge[1:], left_edge[1:], left_edge[:-1]], axis=1
+    )

@@ -1,0 +1,83 @@
+"""Painted lines of OpenDRIVE lie on the borders of their lanes."""
+
+import numpy as np
+import pytest
+
+from cns_drake.imports.import_faults import ImportFaults
+from cns_drake.imports.opendrive.lane_bands import lane_bands
+from cns_drake.imports.opendrive.road_marks import road_marks
+from cns_drake.imports.opendrive.road_reader import read_roads
+
+RADIUS = 50.0
+# A bend to the left, from its middle; two lanes of 3.5 m, one line in the
+# middle that changes, and a double line at the right edge.
+ROAD = f"""<OpenDRIVE><header revMajor="1" revMinor="6"/>
+<road name="" length="90" id="1" junction="-1">
+<planView><geometry s="0" x="0" y="0" hdg="0" length="90">
+<arc curvature="{1 / RADIUS}"/></geometry></planView>
+<lanes><laneSection s="0">
+<left><lane id="1" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/>
+</lane></left>
+<center><lane id="0" type="none">
+<roadMark sOffset="30" type="solid" color="yellow" width="0.2"/>
+<roadMark sOffset="0" type="broken" color="white" width="0.1"/>
+</lane></center>
+<right><lane id="-1" type="driving">
+<width sOffset="0" a="3.5" b="0" c="0" d="0"/>
+<roadMark sOffset="0" type="solid broken" color="no colour"/></lane></right>
+</laneSection></lanes></road></OpenDRIVE>"""
+
+
+@pytest.fixture(scope="module")
+def paint(tmp_path_factory):
+    """Returns colour -> triangles in the world, about the bend's middle."""
+    path = tmp_path_factory.mktemp("road") / "road.xodr"
+    path.write_text(ROAD)
+    roads = read_roads(path, ImportFaults())
+    bands = [band for road in roads.roads for band in lane_bands(road)]
+    (one,) = road_marks("marks", bands, lambda xy: np.full(len(xy), 0.5))
+    assert one.name == "marks_1"
+    middle = np.array([-roads.origin[0], RADIUS - roads.origin[1], 0.0])
+    found = {}
+    for part in one.model.parts:
+        mesh = one.model.meshes[part.shape.mesh]
+        found[part.name] = mesh.vertices[mesh.triangles()] - middle
+    return found
+
+
+def radii(triangles):
+    return np.linalg.norm(triangles[..., :2], axis=-1)
+
+
+def area(triangles):
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+
+
+def test_lines_lie_on_their_borders(paint):
+    assert set(paint) == {"yellow", "white", "standard"}
+    for colour, radius, half in (("white", 50.0, 0.05), ("yellow", 50.0, 0.1)):
+        off = radii(paint[colour]) - radius
+        assert np.abs(np.abs(off) - half).max() < 0.005
+    # Inside first, and the middle of the bend is on the left.
+    outer = RADIUS + 3.5
+    r = radii(paint["standard"]).reshape(-1)
+    expected = [outer + a + b for a in (-0.12, 0.12) for b in (-0.06, 0.06)]
+    nearest = np.abs(r[:, None] - expected).min(axis=1)
+    assert nearest.max() < 0.005
+
+
+def test_lines_are_as_long_as_the_file_says(paint):
+    # From 0 to 30 m, 3 m of each 9 m; from 30 m to 90 m.
+    assert area(paint["white"]) == pytest.approx(4 * 3.0 * 0.1, rel=0.01)
+    assert area(paint["yellow"]) == pytest.approx(60.0 * 0.2, rel=0.01)
+    stretch = (RADIUS + 3.5) / RADIUS
+    expected = (90.0 + 10 * 3.0) * 0.12 * stretch
+    assert area(paint["standard"]) == pytest.approx(expected, rel=0.01)
+
+
+def test_lines_are_seen_from_above_the_ground(paint):
+    for triangles in paint.values():
+        a, b, c = np.moveaxis(triangles, 1, 0)
+        assert (np.cross(b - a, c - a)[:, 2] > 0.0).all()
+        np.testing.assert_allclose(triangles[..., 2], 0.515, atol=1e-9)
