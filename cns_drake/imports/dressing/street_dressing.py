@@ -125,10 +125,11 @@ def dress_streets(
         return found
     placing = _Placing(structures, drives, ground, found)
     near = [s for s in streets if placing.is_near(s.line, _THINGS_WITHIN)]
-    lines = MultiLineString([street.line for street in near])
+    courses = [LineString(street.line) for street in near]
+    lines = MultiLineString(courses)
     for number, thing in enumerate(things):
         if placing.is_near(np.array([thing.xy] * 2), _THINGS_WITHIN):
-            _place_thing(placing, thing, number, near, lines, seed)
+            _place_thing(placing, thing, number, near, courses, seed)
     for one in structures:
         if one.kind == "Parking":
             _fill_car_park(placing, one, seed)
@@ -277,7 +278,7 @@ def _place_thing(
     thing: Thing,
     number: int,
     streets: Sequence[Street],
-    lines: BaseGeometry,
+    courses: Sequence[LineString],
     seed: int,
 ) -> None:
     name = f"{thing.kind}_{thing.source}"
@@ -285,7 +286,7 @@ def _place_thing(
         name += f"_{number}"
     xy, yaw = np.array(thing.xy), thing.yaw
     if streets:
-        xy, towards = _beside(xy, streets)
+        xy, towards = _beside(xy, streets, courses)
         yaw = towards if yaw is None else yaw
     rng = lot_generator(seed, "thing", name)
     at = (float(xy[0]), float(xy[1]))
@@ -299,14 +300,13 @@ def _place_thing(
 
 
 def _beside(
-    xy: np.ndarray, streets: Sequence[Street]
+    xy: np.ndarray, streets: Sequence[Street], courses: Sequence[LineString]
 ) -> tuple[np.ndarray, float]:
     """Returns a place off the carriageway, and the heading to the street."""
     point = Point(xy)
-    lines = [LineString(street.line) for street in streets]
-    distances = shapely.distance(lines, point)
+    distances = shapely.distance(courses, point)
     nearest = int(np.argmin(distances))
-    line, half = lines[nearest], streets[nearest].width / 2.0
+    line, half = courses[nearest], streets[nearest].width / 2.0
     station = station_at(line, line.project(point))
     foot = np.array([station.x, station.y])
     offset = xy - foot

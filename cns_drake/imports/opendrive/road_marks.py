@@ -64,8 +64,8 @@ def road_marks(
                 painted[band.road.name][colour].append(quads)
     for road, colours in painted.items():
         surfaces = {}
-        for colour, quads in colours.items():
-            corners = np.concatenate(quads)
+        for colour, pieces in colours.items():
+            corners = np.concatenate(pieces)
             z = corners[..., 2]
             if heights is not None:
                 ground = heights(corners[..., :2].reshape(-1, 2))
