@@ -21,6 +21,7 @@ from pydrake.math import RigidTransform
 from cns_drake.pictures.city_parts import Part, compare_parts, read_parts
 from cns_drake.pictures.daylight import set_view
 from cns_drake.pictures.drive_panel import CHANGE_RGB, make_panel, template
+from cns_drake.pictures.drive_plots import make_plots, motion_curves
 from cns_drake.pictures.meshcat_drawing import (
     draw_body,
     draw_marker,
@@ -42,9 +43,6 @@ _UNREAL = {
     "material.polygonOffsetUnits": 4.0,
 }
 
-# How far above the vehicle's origin the arrow's tip is [m].
-_MARKER_ALTITUDE = 3.0
-
 
 @dataclass(frozen=True)
 class Drive:
@@ -56,12 +54,19 @@ class Drive:
         X_WFs: for each moving geometry frame F, its pose at each frame.
         scans: frame index and (N, 3) positions in the world [m] of the
             scans to show.
+        speeds: forward speed of the vehicle at each frame [m/s].
+        specific_forces_I: what the IMU measures at each frame in its frame I
+            [m/s^2].
+        angular_velocities_I: likewise w_WI_I [rad/s].
     """
 
     period: float
     X_WBs: list[RigidTransform] = field(default_factory=list)
     X_WFs: dict[FrameId, list[RigidTransform]] = field(default_factory=dict)
     scans: list[tuple[int, np.ndarray]] = field(default_factory=list)
+    speeds: list[float] = field(default_factory=list)
+    specific_forces_I: list[np.ndarray] = field(default_factory=list)
+    angular_velocities_I: list[np.ndarray] = field(default_factory=list)
 
 
 def make_drive_page(
@@ -70,11 +75,14 @@ def make_drive_page(
     *,
     other_stage: World | None = None,
     other_name: str = "the other stage",
+    stage: str | None = None,
+    stages: Sequence[str] = (),
     title: str = "cns-drake",
 ) -> str:
     """Returns a page with the city, the drive and its scans.
 
-    The layers of the page, each to be switched in its Scene panel:
+    The layers of the page, each to be switched in Meshcat's controls, which
+    the button "Layers" shows:
 
     - `/city/<class>`: the structures of the stage in their own colours,
     - `/vehicle/<body>`, `/moving/<body>`: what moves, as it moved,
@@ -89,14 +97,17 @@ def make_drive_page(
 
     A panel has the title and a legend; buttons play the drive, let the camera
     follow the car, switch points off, and switch on what changed: then the
-    additional is violet.
+    additional is violet. Below the time line are plots of speed, IMU and
+    stage.
 
     Args:
         drive: what happened.
         world: the stage, with the vehicle.
         other_stage: the stage to show the difference to.
         other_name: what the page calls it.
-        title: of the page.
+        stage: name of the stage, if the world is one of a map.
+        stages: names of all stages of that map, the earliest first.
+        title: title of the page.
     """
     with _quiet():
         meshcat = Meshcat(MeshcatParams(host="127.0.0.1", port=0))
@@ -106,10 +117,16 @@ def make_drive_page(
     _animate(meshcat, drive, world)
     p_WBset = np.array([X_WB.translation() for X_WB in drive.X_WBs])
     set_view(meshcat, p_WBset.min(axis=0), p_WBset.max(axis=0))
+    curves = motion_curves(
+        drive.speeds, drive.specific_forces_I, drive.angular_velocities_I
+    )
+    plots = make_plots(curves, stage, stages)
     return make_static_page(
         meshcat,
         title,
-        body=make_panel(title, drive.X_WBs, drive.period, changes, other_name),
+        body=make_panel(
+            title, drive.X_WBs, drive.period, changes, other_name, plots
+        ),
         script=template("drive.js"),
     )
 
@@ -162,10 +179,8 @@ def _animate(meshcat: Meshcat, drive: Drive, world: World) -> None:
             read_perception_geometry(inspector, frame_id.__eq__),
         )
         _move(meshcat, animation, path, drive.X_WFs[frame_id])
+    # The page's script places it.
     draw_marker(meshcat, "/vehicle/marker")
-    X_BM = RigidTransform([0.0, 0.0, _MARKER_ALTITUDE])
-    X_WMs = [X_WB @ X_BM for X_WB in drive.X_WBs]
-    _move(meshcat, animation, "/vehicle/marker", X_WMs)
     for k, (frame, p_WRset) in enumerate(drive.scans):
         path = f"/scans/{k:03d}"
         draw_points(meshcat, path, p_WRset)

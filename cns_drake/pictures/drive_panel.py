@@ -39,6 +39,7 @@ def make_panel(
     period: float,
     changes: Set[str],
     other_name: str,
+    plots: str,
 ) -> str:
     """Returns the HTML of title, legend and buttons.
 
@@ -48,6 +49,7 @@ def make_panel(
         period: time between frames [s].
         changes: which of `CHANGE_RGB` the page has.
         other_name: what the stage that it is compared with is called.
+        plots: HTML below the time line.
     """
     p_WBset = np.array([X_WB.translation() for X_WB in X_WBs])
     length = np.linalg.norm(np.diff(p_WBset, axis=0), axis=1).sum()
@@ -68,6 +70,7 @@ def make_panel(
             if name in changes
         ),
         "change_button": "",
+        "plots": plots,
     }
     if changes:
         slots["change_button"] = (

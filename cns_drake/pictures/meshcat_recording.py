@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -36,11 +36,14 @@ class MeshcatRecorder(LeafSystem):
         input_ports:
         - geometry_query
         - odometry
+        - specific_force
+        - angular_velocity
         - <lidar>_scan (one for each LiDAR)
 
-    Frames: world W, vehicle B (`base_link`), LiDAR S. `odometry` is an
-    object with `X_WB`; `<lidar>_scan` a structured array of points expressed
-    in S.
+    Frames: world W, vehicle B (`base_link`), LiDAR S, IMU I. `odometry` is
+    an `Odometry`; `specific_force` [m/s^2] and `angular_velocity` w_WI_I
+    [rad/s] are expressed in I; `<lidar>_scan` is a structured array of points
+    expressed in S.
 
     At every frame the poses of all moving frames are taken down, and the
     scans wherever the vehicle has gone another `scan_spacing` meters; on a
@@ -56,6 +59,8 @@ class MeshcatRecorder(LeafSystem):
         num_frames: int | None = None,
         other_stage: World | None = None,
         other_name: str = "the other stage",
+        stage: str | None = None,
+        stages: Sequence[str] = (),
         scan_spacing: float = 15.0,
     ):
         """Declares the ports and the schedule.
@@ -67,12 +72,16 @@ class MeshcatRecorder(LeafSystem):
             num_frames: how many frames to take down, if not all.
             other_stage: the stage to show the difference to.
             other_name: what the page calls it.
+            stage: name of the stage, if the world is one of a map.
+            stages: names of all stages of that map, the earliest first.
             scan_spacing: way between two scans that are shown [m].
         """
         super().__init__()
         self._world = world
         self._other_stage = other_stage
         self._other_name = other_name
+        self._stage = stage
+        self._stages = tuple(stages)
         self._X_BSs = dict(X_BSs)
         self._scan_spacing = scan_spacing
         self._way_to_scan = 0.0
@@ -86,6 +95,10 @@ class MeshcatRecorder(LeafSystem):
         )
         self._odometry = self.DeclareAbstractInputPort(
             "odometry", Value(object())
+        )
+        self._specific_force = self.DeclareVectorInputPort("specific_force", 3)
+        self._angular_velocity = self.DeclareVectorInputPort(
+            "angular_velocity", 3
         )
         self._scans = {
             name: self.DeclareAbstractInputPort(f"{name}_scan", Value(object()))
@@ -111,6 +124,8 @@ class MeshcatRecorder(LeafSystem):
             self._world,
             other_stage=self._other_stage,
             other_name=self._other_name,
+            stage=self._stage,
+            stages=self._stages,
             title=title,
         )
         write_part(path, html)
@@ -123,7 +138,15 @@ class MeshcatRecorder(LeafSystem):
         for frame_id, X_WFs in self.drive.X_WFs.items():
             # Copies: what the ports give may be overwritten at the next step.
             X_WFs.append(RigidTransform(query_object.GetPoseInWorld(frame_id)))
-        X_WB = RigidTransform(self._odometry.Eval(context).X_WB)
+        odometry = self._odometry.Eval(context)
+        X_WB = RigidTransform(odometry.X_WB)
+        self.drive.speeds.append(float(odometry.V_WB_B.translational()[0]))
+        self.drive.specific_forces_I.append(
+            self._specific_force.Eval(context).copy()
+        )
+        self.drive.angular_velocities_I.append(
+            self._angular_velocity.Eval(context).copy()
+        )
         X_WBs = self.drive.X_WBs
         if X_WBs:
             step = X_WB.translation() - X_WBs[-1].translation()

@@ -27,6 +27,7 @@ from cns_drake.scenarios.recording_schedule import (
     first_points_topic,
 )
 from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.simulation.drive_in_progress import DriveInProgress
 from cns_drake.simulation.drive_recording import make_bag, resume_recording
 from cns_drake.simulation.loaded_drive import (
@@ -155,6 +156,8 @@ def _check_output(
 
 def _make_page(drive: LoadedDrive) -> MeshcatRecorder:
     other, other_name = shown_beside(drive.scenario)
+    stage = drive.scenario.stage
+    stages = () if stage is None else tuple(map_folder(drive.scenario).stages())
     return MeshcatRecorder(
         drive.world,
         X_BSs=drive.X_BSs,
@@ -162,6 +165,8 @@ def _make_page(drive: LoadedDrive) -> MeshcatRecorder:
         num_frames=drive.num_frames,
         other_stage=None if other is None else load_stage(other),
         other_name=other_name,
+        stage=stage,
+        stages=stages,
     )
 
 

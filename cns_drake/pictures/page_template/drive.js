@@ -5,10 +5,15 @@ const byId = (id) => document.getElementById(id);
 const node = (...path) => viewer.scene_tree.find(path);
 const car = node("vehicle", "base_link").object;
 const animator = viewer.animator;
+const marker = node("vehicle", "marker").object;
 const UP = new MeshCat.THREE.Vector3(0, 1, 0);
+const MARKER_AXIS = new MeshCat.THREE.Vector3(0, 0, 1);
 
-// Pose of the car when it was last looked at; null: nobody follows it.
+// Pose of the car when it was last looked at; null: the camera stands still.
 let followed = null;
+// Plots of the drive: where the value is said, and all values.
+const plots = [...document.querySelectorAll(".plot output")].map((output) => (
+  {output, values: output.dataset.values.split(",")}));
 // Where the camera stood before.
 let overview = null;
 
@@ -31,6 +36,21 @@ function look(position, target) {
   viewer.controls.target.copy(target);
   viewer.camera.lookAt(target);
   viewer.set_dirty();
+}
+
+// The marker stands above the car on the screen, whichever way the camera
+// looks, and so never hides it. From near and from afar it looks as large.
+function placeMarker() {
+  const {position} = carPose();
+  const away = viewer.camera.position.distanceTo(position);
+  const up = UP.clone().applyQuaternion(viewer.camera.quaternion);
+  position.addScaledVector(up, Math.max(2.5, 0.02 * away));
+  const inScene = marker.parent.getWorldQuaternion(
+    new MeshCat.THREE.Quaternion()).invert();
+  marker.position.copy(marker.parent.worldToLocal(position));
+  marker.quaternion.setFromUnitVectors(
+    MARKER_AXIS, up.applyQuaternion(inScene));
+  marker.scale.setScalar(away / 150);
 }
 
 // Camera and target move and turn with the car: a reader can go around it.
@@ -88,19 +108,26 @@ function setTime(time) {
   animator.display_progress(time);
 }
 
-function tell() {
+function showTime() {
   const minutes = (s) =>
     `${Math.floor(s / 60)}:${String(Math.floor(s % 60)).padStart(2, "0")}`;
   byId("time").value = animator.time;
   byId("clock").value =
     `${minutes(animator.time)} / ${minutes(animator.duration)}`;
   byId("play").textContent = animator.playing ? "Pause" : "Play";
+  const share = animator.time / animator.duration || 0;
+  byId("now").style.left = `${100 * share}%`;
+  for (const plot of plots) {
+    const value = plot.values[Math.round(share * (plot.values.length - 1))];
+    plot.output.value = `${value} ${plot.output.dataset.unit}`;
+  }
 }
 
 // Meshcat calls it before it draws a picture.
 viewer.render_callback = () => {
   if (followed) follow();
-  tell();
+  placeMarker();
+  showTime();
 };
 
 // Colours as they are, instead of a film's.
@@ -120,11 +147,15 @@ commands.then(() => {
   byId("play").addEventListener("click", () => {
     if (animator.playing) animator.pause();
     else animator.play();
-    tell();
+    showTime();
   });
   connectSwitch("follow", setFollowing);
   connectSwitch("change", setChanged);
   connectSwitch("points", show("scans"));
+  connectSwitch("layers", (on) => {
+    document.body.classList.toggle("layers", on);
+    if (on) viewer.gui.open();
+  });
   // On a narrow screen the city fits from farther away.
   const {camera, controls} = viewer;
   const farther = Math.max(1, 1.2 / camera.aspect);

@@ -75,12 +75,17 @@ def make_page(folder, other_stage=None):
         X_WBs,
         dict.fromkeys(moving_frames(world), X_WBs),
         [(0, grid.reshape(-1, 3)), (10, grid.reshape(-1, 3) + 10.0)],
+        speeds=[0.5 * frame for frame in range(NUM_FRAMES)],
+        specific_forces_I=[np.array([0.1, 0.2, 9.81])] * NUM_FRAMES,
+        angular_velocities_I=[np.array([0.0, 0.0, 0.1])] * NUM_FRAMES,
     )
     return make_drive_page(
         drive,
         world,
         other_stage=other_stage,
         other_name="stage <02>",
+        stage="01",
+        stages=("01", "02"),
         title="a < b",
     )
 
@@ -157,8 +162,7 @@ def reader(browser, page, request):
     """The page at the drive's start, standing still."""
     browser.open(page.as_uri(), *request.param)
     browser.wait_for('!document.getElementById("loading")')
-    if browser.evaluate("viewer.animator.playing"):
-        click(browser, "play")
+    browser.evaluate("viewer.animator.pause()")
     go_to(browser, 0.0)
     yield browser
     # Software that draws complains of its own slowness.
@@ -274,9 +278,50 @@ class TestInChromium:
             assert reader.evaluate(clock) == f"{text} / 0:10"
             assert is_visible(reader, "scans", "001") is (time >= 5.0)
 
+    def test_plots_say_the_value_at_the_time(self, reader):
+        for time in (0.0, 5.0, 10.0):
+            go_to(reader, time)
+            said = reader.evaluate(
+                '[...document.querySelectorAll(".plot output")]'
+                ".map((one) => one.value)"
+            )
+            # Half a metre a second more each frame.
+            assert said[0] == f"{3.6 * 0.5 * time / PERIOD:.1f} km/h"
+            assert said[1:] == ["0.1 m/s²", "0.2 m/s²", "5.7 deg/s"]
+            line = 'document.getElementById("now").style.left'
+            assert reader.evaluate(line) == f"{100 * time / 10.0:g}%"
+
+    @pytest.mark.parametrize("away", [[30, 20, 5], [0.1, 90, 0], [-9, 2, 9]])
+    def test_marker_is_above_the_car_on_the_screen(self, reader, away):
+        go_to(reader, 5.0)
+        x, y = reader.evaluate(
+            f"""(() => {{
+              const at = (name) => viewer.scene_tree.find(["vehicle", name])
+                .object.getWorldPosition(new MeshCat.THREE.Vector3());
+              const car = at("base_link");
+              viewer.controls.target.copy(car);
+              viewer.camera.position.set(...{away}).add(car);
+              viewer.camera.lookAt(car);
+              viewer.render();
+              const tip = at("marker").project(viewer.camera);
+              return tip.sub(car.project(viewer.camera)).toArray().slice(0, 2);
+            }})()"""
+        )
+        assert abs(x) < 1e-6
+        assert y > 0.02
+
+    def test_controls_of_meshcat_are_hidden_until_wanted(self, reader):
+        for is_on in (False, True, False):
+            seen = reader.evaluate("viewer.gui.domElement.checkVisibility()")
+            assert seen is is_on
+            click(reader, "layers")
+        click(reader, "layers")
+
     def test_drive_plays(self, reader):
+        # Even a slow machine presses the button again before the end.
+        reader.evaluate("viewer.animator.mixer.timeScale = 0.1")
         click(reader, "play")
-        reader.wait_for("viewer.animator.time > 0.2")
+        reader.wait_for("viewer.animator.time > 0.02")
         click(reader, "play")
         label = reader.evaluate('document.getElementById("play").textContent')
         assert label == "Play"

@@ -11,6 +11,7 @@ from helpers.meshcat_pages import (
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.multibody.math import SpatialVelocity
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.rendering import MultibodyPositionToGeometryPose
@@ -113,6 +114,15 @@ class _Car(LeafSystem):
         self.DeclareAbstractOutputPort(
             "odometry", lambda: Value(object()), self._odometry, time
         )
+        for name, factor in (("specific_force", 1), ("angular_velocity", 2)):
+            self.DeclareVectorOutputPort(
+                name,
+                3,
+                lambda context, out, factor=factor: out.SetFromVector(
+                    factor * np.array([1.0, 2.0, 3.0]) * context.get_time()
+                ),
+                time,
+            )
         for name in X_BSs:
             self.DeclareAbstractOutputPort(
                 f"{name}_scan",
@@ -135,7 +145,8 @@ class _Car(LeafSystem):
         X_WB = X_WB_at(context.get_time())
         self._X_WB.set_translation(X_WB.translation())
         self._X_WB.set_rotation(X_WB.rotation())
-        out.set_value(SimpleNamespace(X_WB=self._X_WB))
+        V_WB_B = SpatialVelocity([0.0, 0.0, 0.1], [SPEED, 0.0, 0.0])
+        out.set_value(SimpleNamespace(X_WB=self._X_WB, V_WB_B=V_WB_B))
 
 
 def drive(folder, stage, other_stage, num_frames=NUM_FRAMES, **kwargs):
@@ -160,7 +171,13 @@ def drive(folder, stage, other_stage, num_frames=NUM_FRAMES, **kwargs):
         scene_graph.get_query_output_port(),
         recorder.GetInputPort("geometry_query"),
     )
-    for name in ("odometry", "lidar_scan", "rear_scan"):
+    for name in (
+        "odometry",
+        "specific_force",
+        "angular_velocity",
+        "lidar_scan",
+        "rear_scan",
+    ):
         builder.Connect(car.GetOutputPort(name), recorder.GetInputPort(name))
     simulator = Simulator(builder.Build())
     simulator.AdvanceTo((num_frames - 1) * PERIOD)
@@ -291,12 +308,12 @@ def test_wheels_turn(early):
     assert abs(np.dot(last, expected)) == pytest.approx(1.0)
 
 
-def test_marker_is_above_the_vehicle(early):
-    keys = tracks(early)["/vehicle/marker"][".position"]
-    for frame in (0, 50):
-        above = keys[frame]["value"] - X_WB_at(frame * PERIOD).translation()
-        assert above[:2] == pytest.approx([0.0, 0.0])
-        assert above[2] > 2.0
+def test_motion_is_taken_down_at_every_frame(folder):
+    seen = drive(folder, "stage_01", None, num_frames=3).drive
+    assert seen.speeds == [SPEED] * 3
+    steps = np.outer(np.arange(3) * PERIOD, [1.0, 2.0, 3.0])
+    np.testing.assert_allclose(seen.specific_forces_I, steps)
+    np.testing.assert_allclose(seen.angular_velocities_I, 2 * steps)
 
 
 def test_scans_appear_where_they_were_taken(early):
