@@ -16,6 +16,7 @@ from evaluation.change.change_result import (
     ChangeResult,
     symmetric_changes,
 )
+from evaluation.recognition.fault_kinds import FAULT_KINDS, PairEvidence
 from evaluation.recognition.metrics import MODES
 from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.recognition.survival import Survival
@@ -66,6 +67,8 @@ class PageContent:
         change: Table I.
         recognition: Table II in its forms, that of mode all last but one.
         audit: all numbers.
+        why: what is wrong with wrong best places.
+        evidence: of it, by database and query.
         poses: how good the poses are that come with the places.
         costs: of the methods; without rows if they were not measured.
         illustrations: figures, already written.
@@ -83,6 +86,8 @@ class PageContent:
     change: Table
     recognition: Sequence[Table]
     audit: Table
+    why: Table
+    evidence: Mapping[tuple[str, str], PairEvidence]
     poses: Table
     costs: Table
     illustrations: Sequence[Illustration]
@@ -105,6 +110,7 @@ def write_page(path: Path, content: PageContent) -> None:
             content.drives,
             symmetric_changes(content.changes),
             content.pages,
+            content.evidence,
         )
     illustrations = _by_section(content.illustrations)
     drives_of_maps = _drives_of_maps(content)
@@ -134,6 +140,7 @@ def write_page(path: Path, content: PageContent) -> None:
         route_colours=route_colours(),
         route_bar=round(BAR_LENGTH),
         modes=list(zip(modes, tables, strict=True)),
+        fault_kinds=FAULT_KINDS,
         style=read_asset("page.css"),
         script=Markup("\n").join(map(read_asset, _SCRIPTS)),
         data=_to_script(data),

@@ -14,6 +14,7 @@ from matplotlib import image
 import numpy as np
 
 from evaluation.maps.thumbnails import CELL, HEIGHT_STEP, MAX_POINTS
+from evaluation.recognition.fault_kinds import PairEvidence, fault_kinds
 from evaluation.recognition.metrics import MODES
 from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.report.drawing import Legend
@@ -120,6 +121,7 @@ def browser_data(
     drives: Mapping[str, PageDrive],
     changes: Mapping[tuple[str, str, str], float],
     pages: Mapping[str, str],
+    evidence: Mapping[tuple[str, str], PairEvidence],
 ) -> dict:
     """Returns what the query browser reads, ready for JSON.
 
@@ -132,6 +134,8 @@ def browser_data(
         changes: TCR_sym of each pair.
         pages: drive -> address of its recording to look around in; drives
             without one may be left out.
+        evidence: of why best places are wrong, by database and query; pairs
+            may be left out.
     """
     pairs: dict[tuple, list[RecognitionResult]] = {}
     for result in recognitions:
@@ -153,7 +157,7 @@ def browser_data(
             for name in sorted(used)
         },
         "pairs": [
-            _pair_data(pair, results, drives, changes.get(pair))
+            _pair_data(pair, results, drives, changes.get(pair), evidence)
             for pair, results in pairs.items()
         ],
     }
@@ -185,6 +189,7 @@ def _pair_data(
     results: Sequence[RecognitionResult],
     drives: Mapping[str, PageDrive],
     change: float | None,
+    evidence: Mapping[tuple[str, str], PairEvidence],
 ) -> dict:
     by_method = {result.method: result for result in results}
     first = results[0].outcome
@@ -206,13 +211,18 @@ def _pair_data(
         ).tolist(),
         "matches": [np.flatnonzero(row).tolist() for row in retrieval.matches],
         "methods": [
-            _method_data(by_method[method])
+            _method_data(
+                by_method[method],
+                evidence.get((first.database, first.query)),
+            )
             for method in in_table_order(by_method)
         ],
     }
 
 
-def _method_data(result: RecognitionResult) -> dict:
+def _method_data(
+    result: RecognitionResult, evidence: PairEvidence | None
+) -> dict:
     scores = result.outcome.retrieval.scores
     outcomes = result.outcome.outcomes
     best, values = [], []
@@ -238,6 +248,7 @@ def _method_data(result: RecognitionResult) -> dict:
         "best": best,
         "scores": values,
         "ranks": [int(r) if np.isfinite(r) else None for r in ranks],
+        "why": fault_kinds(result, evidence) if evidence else None,
         "metrics": metrics,
         "recall": None if np.isnan(recall) else round(recall, 4),
     }

@@ -9,6 +9,7 @@ import math
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from evaluation.recognition.fault_kinds import PairEvidence, fault_kinds
 from evaluation.recognition.protocol import (
     PROTOCOL_COLUMNS,
     protocol_values,
@@ -39,6 +40,13 @@ _HEADER = (
     "translation_error",
     "rotation_error_deg",
     *PROTOCOL_COLUMNS,
+    "why",
+    "overlap",
+    "hidden",
+    "changed",
+    "changed_class",
+    "right_fit",
+    "wrong_fit",
 )
 
 
@@ -58,15 +66,25 @@ class DriveTrack:
 def query_table(
     results: Iterable[tuple[tuple[str, str, str], RecognitionResult]],
     tracks: Mapping[str, DriveTrack],
+    evidence: Mapping[tuple[str, str], PairEvidence],
 ) -> Table:
     """Returns one row for each pair, method and query, as it is asked.
 
     Args:
         results: each with the map, database and query that it stands for.
         tracks: drive -> its track, of all that occur.
+        evidence: of why best places are wrong, by database and query; those
+            without have nothing in its columns.
     """
     rows = tuple(
-        row for pair, result in results for row in _rows(pair, result, tracks)
+        row
+        for pair, result in results
+        for row in _rows(
+            pair,
+            result,
+            tracks,
+            evidence.get((result.outcome.database, result.outcome.query)),
+        )
     )
     return Table(_HEADER, rows)
 
@@ -75,6 +93,7 @@ def _rows(
     pair: tuple[str, str, str],
     result: RecognitionResult,
     tracks: Mapping[str, DriveTrack],
+    evidence: PairEvidence | None,
 ) -> Iterator[tuple[object, ...]]:
     outcome = result.outcome
     retrieval, outcomes = outcome.retrieval, outcome.outcomes
@@ -83,6 +102,7 @@ def _rows(
     protocol = protocol_values(outcome.protocol)
     asking, known = tracks[outcome.query], tracks[outcome.database]
     nothing = (None,) * (2 + len(_POSE))
+    kinds = fault_kinds(result, evidence) if evidence else []
     for query, frame in enumerate(retrieval.query_frames.tolist()):
         score = float(outcomes.best_scores[query])
         rank = float(outcomes.first_right_ranks[query])
@@ -108,6 +128,19 @@ def _rows(
             float(errors.translation[query]),
             float(errors.rotation_deg[query]),
             *protocol,
+            *(
+                (None,) * 7
+                if evidence is None
+                else (
+                    kinds[query] or None,
+                    float(evidence.overlaps[query]),
+                    float(evidence.hidden[query]),
+                    float(evidence.changed[query]),
+                    evidence.changed_classes[query] or None,
+                    float(evidence.right_fits[query]),
+                    float(evidence.fits[result.method][query]),
+                )
+            ),
         )
 
 

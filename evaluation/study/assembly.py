@@ -13,6 +13,7 @@ from evaluation.change.change_result import (
     symmetric_changes,
 )
 from evaluation.recognition.costs import Cost
+from evaluation.recognition.fault_kinds import PairEvidence
 from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,
     RetrievalProtocol,
@@ -25,6 +26,7 @@ from evaluation.report.curve_figures import (
     draw_auc_over_change,
     draw_pr_curves,
 )
+from evaluation.report.fault_tables import fault_numbers, fault_table
 from evaluation.report.metric_table import metric_numbers
 from evaluation.report.page_data import Illustration, PageDrive
 from evaluation.report.pose_tables import pose_numbers, pose_table
@@ -73,6 +75,8 @@ class _Collected:
     illustrations: list[Illustration] = field(default_factory=list)
     drives: dict[str, PageDrive] = field(default_factory=dict)
     recognitions: list[RecognitionResult] = field(default_factory=list)
+    # (Database, query) -> evidence.
+    evidence: dict[tuple[str, str], PairEvidence] = field(default_factory=dict)
 
 
 def assemble(
@@ -91,7 +95,8 @@ def assemble(
     Files: `report.html`, which holds everything; `report.md`; `survival`,
     `tcr`, `place_recognition` and `poses`, and with costs `costs`, each as
     .csv (all numbers), .md and .tex;
-    `metrics.csv`, what other benchmarks report; `queries.csv` and
+    `metrics.csv`, what other benchmarks report; `why.csv`, what is wrong
+    with wrong best places; `queries.csv` and
     `queries_unchanged.csv`, every query of the pairs and of their controls;
     and what is missing in the folder `figures`.
 
@@ -173,6 +178,10 @@ def _collect(
             if control is not None:
                 unchanged = _read_recognition(control, method, files)
             survivals.append(Survival.of(changed, unchanged))
+        names = pair[0].name, pair[1].name
+        evidence = read_part(files.recognition(*names).evidence)
+        if evidence is not None:
+            collected.evidence[names] = evidence
         for drive in (*pair, *(control or ())):
             if drive.name in collected.tracks:
                 continue
@@ -220,6 +229,9 @@ def _write_all(
     poses, cost = pose_table(recognitions), cost_table(costs)
     _write_queries(collected, output)
     _write(output / "metrics.csv", metric_numbers(recognitions).to_csv())
+    evidence = collected.evidence
+    _write(output / "why.csv", fault_numbers(recognitions, evidence).to_csv())
+    why = fault_table(recognitions, evidence)
     written = [
         ("survival", [survival], survival_numbers(collected.survivals)),
         ("tcr", [change], change_numbers),
@@ -245,6 +257,8 @@ def _write_all(
             change=change,
             recognition=recognition,
             audit=audit,
+            why=why,
+            evidence=evidence,
             poses=poses,
             costs=cost,
             illustrations=collected.illustrations,
@@ -264,6 +278,7 @@ def _write_all(
             change,
             recognition,
             audit,
+            why,
             poses,
             cost,
             collected.illustrations,
@@ -280,7 +295,8 @@ def _write_queries(collected: _Collected, output: Path) -> None:
         if one.unchanged is not None
     ]
     for name, results in (("queries", pairs), ("queries_unchanged", controls)):
-        table = query_table(results, collected.tracks)
+        evidence = collected.evidence if name == "queries" else {}
+        table = query_table(results, collected.tracks, evidence)
         _write(output / f"{name}.csv", table.to_csv())
 
 
@@ -292,6 +308,7 @@ def _to_markdown(
     change: Table,
     recognition: list[Table],
     audit: Table,
+    why: Table,
     poses: Table,
     cost: Table,
     shown: list[Illustration],
@@ -314,6 +331,7 @@ def _to_markdown(
     if audit.rows:
         parts.append("## Table II: place recognition\n")
         parts += [_captioned(table) for table in recognition]
+        parts += ["## Why best places are wrong\n", _captioned(why)]
         parts += ["## Pose, not only place\n", _captioned(poses)]
         parts += ["## All numbers\n", _captioned(audit)]
     if cost.rows:

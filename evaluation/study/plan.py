@@ -20,9 +20,11 @@ from evaluation.study.collection import (
     group_cities,
 )
 from evaluation.study.drive_source import DriveSource
+from evaluation.study.fault_evidence import FindEvidence
 from evaluation.study.figure_files import change_stems, routes_stem
 from evaluation.study.measurements import MeasureChange, RecognisePlaces
 from evaluation.study.method_costs import MeasureCosts
+from evaluation.study.parts import PartStep
 from evaluation.study.study_layout import StudyFiles, SurveyFiles
 from evaluation.study.surveys import Survey
 from evaluation.study.views import DrawChange, DrawCity
@@ -43,6 +45,7 @@ _RECOGNITION_COST = {
     "solid": 0.1,
 }
 _OTHER_RECOGNITION_COST = 2.0
+_EVIDENCE_COST = 8.0
 
 
 def plan_study(
@@ -137,7 +140,7 @@ def _compared_pairs(
     pairs = city.recognition_pairs(
         with_itself=protocol.exclude_recent is not None
     )
-    named = {f"{city.name} {d.stage} > {q.stage}": (d, q) for d, q in pairs}
+    named = {_pair_name(city, pair): pair for pair in pairs}
     for pair in pairs:
         control = city.unchanged_pair(*pair)
         if control is not None:
@@ -145,6 +148,11 @@ def _compared_pairs(
             name = f"control {database.name} > {query.name}"
             named[name] = control
     return named
+
+
+def _pair_name(city: City, pair: tuple[RecordingInfo, RecordingInfo]) -> str:
+    database, query = pair
+    return f"{city.name} {database.stage} > {query.stage}"
 
 
 def _roles(
@@ -212,7 +220,7 @@ def _recognition_job(
         for method in methods
     )
     results = files.recognition(database.name, query.name)
-    steps = tuple(
+    steps: tuple[PartStep, ...] = tuple(
         RecognisePlaces(
             city.name,
             (database.stage, query.stage),
@@ -223,6 +231,16 @@ def _recognition_job(
         )
         for method in methods
     )
+    if name == _pair_name(city, pair):
+        cost += _EVIDENCE_COST
+        evidence = FindEvidence(
+            (database.source, query.source),
+            methods,
+            results,
+            protocol,
+            results.evidence,
+        )
+        steps = (*steps, evidence)
     return Job(
         name=name,
         step=Steps(results.folder, steps),

@@ -55,6 +55,11 @@ class RecognitionFiles:
         """Returns the file of the `RecognitionResult` of a method."""
         return self.folder / f"{file_name(method.name)}.data"
 
+    @property
+    def evidence(self) -> Path:
+        """Returns the file of the `PairEvidence` of all methods."""
+        return self.folder / "why" / "evidence.data"
+
 
 @dataclass(frozen=True)
 class StudyFiles:

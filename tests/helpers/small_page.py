@@ -5,6 +5,7 @@ import numpy as np
 from evaluation.maps.thumbnails import thumbnail
 from evaluation.methods import make_method
 from evaluation.recognition.costs import Cost
+from evaluation.recognition.fault_kinds import PairEvidence
 from evaluation.recognition.place_recognition import judge_retrieval
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.protocol import PAPER_PROTOCOL
@@ -12,6 +13,7 @@ from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.recognition.retrieval import Retrieval
 from evaluation.recognition.survival import Survival
 from evaluation.report.cost_table import cost_table
+from evaluation.report.fault_tables import fault_table
 from evaluation.report.figures import top_view
 from evaluation.report.page import PageContent
 from evaluation.report.page_data import Illustration, make_drive
@@ -41,6 +43,16 @@ def make_content(folder, **changed):
         _result("ring++", [1, 2, 4, 0, 3]),
         _result("ring++", [0, 0, 1, 1, 1, 2, 2, 3, 3, 4], back=True),
     ]
+    nothing = np.full(5, np.nan)
+    # The second query is taken to a twin by Scan Context++; no other one is
+    # wrong and has a candidate.
+    fits = {"scan-context++": np.array([np.nan, 0.9, *nothing[2:]])}
+    fits["ring++"] = nothing
+    evidence = {
+        (f"{MAP}_01", f"{MAP}_04"): PairEvidence(
+            nothing, nothing, nothing, [""] * 5, np.full(5, 0.5), fits
+        )
+    }
     without_change = _result("scan-context++", [0, 1, 4, 6, 3])
     values = {
         "notes": [],
@@ -59,6 +71,8 @@ def make_content(folder, **changed):
             for mode in (None, "all", "filtered")
         ],
         "audit": audit_table(results),
+        "why": fault_table(results, evidence),
+        "evidence": evidence,
         "poses": pose_table(results),
         "costs": cost_table(
             [Cost("ring++", 1, 2000.0, 1.5, 20.25, 10, 12345.0)]

@@ -19,6 +19,8 @@ function showStatus() {
       ` – best match ${metres(state.query, best[0])} away, score ` +
       method.scores[state.query][0].toFixed(4));
   }
+  const why = method.why?.[state.query];
+  if (why) byId("status").append(` – ${why.replace("_", " ")}`);
   byId("query").value = state.query;
   byId("query").setAttribute(
     "aria-valuetext", `query ${state.query + 1}: ${WORDS[kind]}`);
@@ -169,6 +171,7 @@ function readAddress() {
   state.method = Math.max(0, pairNow().methods.findIndex(
     (one) => encodeURIComponent(one.name) === method));
   state.filter = byId("filter").value = "all";
+  state.why = byId("why").value = "";
   const frames = queryDriveNow().frames;
   state.query = Math.max(0, pairNow().queries.findIndex(
     (index) => frames[index] >= Number(frame)));
@@ -246,10 +249,12 @@ function start() {
     state.method = Number(event.target.value);
     go(state.query);
   });
-  byId("filter").addEventListener("change", (event) => {
-    state.filter = event.target.value;
-    go(state.query);
-  });
+  for (const choice of ["filter", "why"]) {
+    byId(choice).addEventListener("change", (event) => {
+      state[choice] = event.target.value;
+      go(state.query);
+    });
+  }
   byId("query").addEventListener(
     "input", (event) => go(Number(event.target.value)));
   byId("previous").addEventListener("click", () => step(-1));

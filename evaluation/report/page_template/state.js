@@ -17,7 +17,7 @@ const WORDS = {
   silent: "no candidate",
 };
 const byId = (id) => document.getElementById(id);
-const state = { pair: 0, method: 0, query: 0, rank: 0, filter: "all" };
+const state = { pair: 0, method: 0, query: 0, rank: 0, filter: "all", why: "" };
 
 function element(name, text, className) {
   const made = document.createElement(name);
@@ -46,6 +46,8 @@ function distance(pair, query, place) {
 
 /** Whether the choice of queries to show holds for one. */
 function fits(query) {
+  const method = methodNow();
+  if (state.why && method.why?.[query] !== state.why) return false;
   return state.filter === "all" ||
-    outcome(pairNow(), methodNow(), query) === state.filter;
+    outcome(pairNow(), method, query) === state.filter;
 }

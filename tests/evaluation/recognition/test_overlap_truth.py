@@ -11,13 +11,10 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from evaluation.methods import make_method
-from evaluation.recognition.overlap_truth import (
-    TOLERANCE,
-    SeenRanges,
-    overlap_matrix,
-)
+from evaluation.recognition.overlap_truth import overlap_matrix
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition.seen_surfaces import TOLERANCE, SeenSurfaces
 from evaluation.sequences import open_sequence
 
 # Beams of a degree, that miss the borders of cells.
@@ -38,19 +35,19 @@ def test_a_scan_shows_itself():
     rng = np.random.default_rng(0)
     points = rng.normal(size=(5000, 3)) * [20.0, 20.0, 2.0]
     points = np.vstack([points, [[0, 0, 5], [0, 0, -5], [-3, 0, 0]]])
-    assert SeenRanges.of(points).share_of(points) == 1.0
+    assert SeenSurfaces.of(points).share_of(points) == 1.0
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 @pytest.mark.parametrize(("off", "share"), [(-1e-9, 1.0), (1e-9, 0.0)])
 def test_the_tolerance_is_a_limit(side, off, share):
-    seen = SeenRanges.of(10.0 * BEAMS)
+    seen = SeenSurfaces.of(10.0 * BEAMS)
     other = (10.0 + side * (TOLERANCE + off)) * BEAMS
     assert seen.share_of(other) == share
 
 
 def test_what_is_hidden_or_not_there_is_not_shown():
-    seen = SeenRanges.of(10.0 * BEAMS)
+    seen = SeenSurfaces.of(10.0 * BEAMS)
     assert seen.share_of(np.vstack([10.0 * BEAMS, 20.0 * BEAMS])) == 0.5
     few = BEAMS[: len(BEAMS) // 3]
     assert seen.share_of(np.vstack([10.0 * BEAMS, 5.0 * few])) == pytest.approx(
@@ -61,9 +58,50 @@ def test_what_is_hidden_or_not_there_is_not_shown():
 
 
 def test_nothing():
-    seen = SeenRanges.of(np.zeros((0, 3)))
+    seen = SeenSurfaces.of(np.zeros((0, 3)))
     assert seen.share_of(BEAMS) == 0.0
-    assert np.isnan(SeenRanges.of(BEAMS).share_of(np.zeros((0, 3))))
+    assert np.isnan(SeenSurfaces.of(BEAMS).share_of(np.zeros((0, 3))))
+
+
+def walls_scan(p_WS, yaw, screens):
+    """Returns what a sensor sees of walls at y = 10 and y = -10, |x| < 10.
+
+    Screens hide, at y = 5 and y = -5, all that is right of x = 2 there.
+    """
+    turn = np.array(
+        [
+            [np.cos(yaw), -np.sin(yaw), 0.0],
+            [np.sin(yaw), np.cos(yaw), 0.0],
+            [0.0, 0.0, 1.0],
+        ]
+    )
+    d_W = BEAMS @ turn.T
+    with np.errstate(divide="ignore"):
+        times = (np.sign(d_W[:, 1]) * 10.0 - p_WS[1]) / d_W[:, 1]
+        on_screen = (np.sign(d_W[:, 1]) * 5.0 - p_WS[1]) / d_W[:, 1]
+    hidden = p_WS[0] + on_screen * d_W[:, 0] > 2.0
+    times = np.where(screens & hidden, on_screen, times)
+    x = p_WS[0] + times * d_W[:, 0]
+    kept = (np.abs(x) < 10.0) & (np.abs(d_W[:, 2]) < np.sin(np.radians(20.0)))
+    return (BEAMS * times[:, None])[kept & np.isfinite(times)]
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.7, -2.0])
+def test_two_walls_of_which_half_is_seen(yaw):
+    # The query sees both from the origin, in 90 deg of azimuth each; the
+    # place stands 2 m farther on, and sees of both what lies before x = 2.
+    query = walls_scan(np.zeros(3), 0.0, False)
+    place = np.array([2.0, 0.0, 0.0])
+    seen = SeenSurfaces.of(walls_scan(place, yaw, True))
+    c, s = np.cos(yaw), np.sin(yaw)
+    X = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    there = (query - place) @ X.T
+    share = (45.0 + np.degrees(np.arctan(2.0 / 10.0))) / 90.0
+    # Beams are a degree apart.
+    assert seen.share_of(there) == pytest.approx(share, abs=1.0 / 90.0)
+    assert seen.share_behind(there) == pytest.approx(
+        1.0 - share, abs=1.5 / 90.0
+    )
 
 
 def room_scan(X_WS, half):

@@ -5,6 +5,7 @@ import re
 from helpers.small_page import make_content
 import pytest
 
+from evaluation.recognition.fault_kinds import FAULT_KINDS
 from evaluation.report.page import write_page
 from evaluation.report.page_data import browser_data
 from evaluation.report.page_routes import route_picture
@@ -87,13 +88,19 @@ def test_recordings_are_linked(tmp_path):
     # In the summary and with the map; the browser makes its own.
     address = "../pages/metropolis_04.html?a=1&amp;b"
     assert text.count(f'<a href="{address}">') == 2
-    data = browser_data(content.recognitions, content.drives, {}, PAGES)
+    data = browser_data(content.recognitions, content.drives, {}, PAGES, {})
     assert data["drives"]["metropolis_04"]["page"] == PAGES["metropolis_04"]
     assert data["drives"]["metropolis_01"]["page"] is None
 
 
 def test_browser_data(content):
-    data = browser_data(content.recognitions, content.drives, {PAIR: 0.25}, {})
+    data = browser_data(
+        content.recognitions,
+        content.drives,
+        {PAIR: 0.25},
+        {},
+        content.evidence,
+    )
     pair, back = data["pairs"]
     assert pair["change"] == 0.25
     assert back["change"] is None
@@ -104,13 +111,27 @@ def test_browser_data(content):
     assert scan_context["best"][2] == []
     # At (10, 2) places 1, 2, 3 are true, and second to fourth are 0, 1, 2.
     assert scan_context["ranks"] == [1, 3, None, 1, None]
+    assert scan_context["why"] == [
+        *("", "twin", "no_candidate", "", "no_place"),
+    ]
+    assert [one["why"] for one in back["methods"]] == [None]
     assert ring["ranks"] == [1, 1, 1, 6, None]
     assert data["drives"]["metropolis_04"]["yaw"] == [1.571] * 5
 
 
+def test_reasons_are_offered_and_counted(text):
+    choice = text[text.index('<select id="why">') :]
+    choice = choice[: choice.index("</select>")]
+    assert re.findall(r'value="(\w*)"', choice) == ["", *FAULT_KINDS]
+    section = text[text.index("Why best places are wrong") :]
+    row = re.search(r"<tr>.*?Scan Context\+\+.*?</tr>", section, re.S).group()
+    # Of three wrong ones: a twin, no candidate, no place.
+    assert re.findall(r"(\d+) %", row) == ["33", "33", "33"]
+
+
 def test_many_scans_are_thinned(content, monkeypatch):
     monkeypatch.setattr("evaluation.report.page_data._POINTS_OF_A_PAGE", 150)
-    data = browser_data(content.recognitions, content.drives, {}, {})
+    data = browser_data(content.recognitions, content.drives, {}, {}, {})
     assert data["drives"]["metropolis_01"]["counts"] == [10] * 10
 
 

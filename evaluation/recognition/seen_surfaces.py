@@ -1,0 +1,206 @@
+"""Surfaces that a scan shows, between its returns.
+
+A scan samples the surfaces around its sensor. The four returns around a
+direction, one in each quadrant, say where the surface lies there: in the plane
+of the three nearest ones, or, at edges and where the beams graze it, between
+the nearest and the farthest of them.
+
+Line of sight, cast in the world of the sensor, is the oracle: of the points of
+scans that were taken up to 30 m away, 3 % more of them count as shown, and at
+most 7 % (Metropolis, 32 pairs of scans).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+import numpy as np
+
+from cns_drake.base.compiled import compiled
+
+# How far from a surface a point may lie that counts as shown [m].
+TOLERANCE = 0.2
+# A return this near to a direction stands for it by itself [deg]: edges of
+# roofs, and of the field of view, have returns on one side only.
+_NEAR_DEG = 0.75
+# Returns around a direction of which one is this many times as far away as
+# another are of two surfaces.
+_FARTHEST = 3.0
+# Directions are sought in cells of 1 deg, so many up and down, and sideways.
+_UP, _SIDE = 2, 1
+_ROWS, _COLUMNS = 180, 360
+_UNKNOWN, _SHOWN, _BEHIND = range(3)
+
+
+@dataclass(frozen=True)
+class SeenSurfaces:
+    """The returns of a scan, by direction.
+
+    Attributes:
+        points: (N, 3) in the frame of the sensor [m], sorted by cell.
+        angles_deg: (N, 2) elevation from -90 deg on, and azimuth from the
+            back on.
+        starts: of each cell in the points, row by row; the last is N.
+        reach: of the farthest return [m].
+    """
+
+    points: np.ndarray
+    angles_deg: np.ndarray
+    starts: np.ndarray
+    reach: float
+
+    @classmethod
+    def of(cls, points: np.ndarray) -> SeenSurfaces:
+        """Returns what a scan (N, 3), in its sensor's frame, shows."""
+        x, y, z = points.T.astype(np.float64)
+        elevation = np.degrees(np.arctan2(z, np.hypot(x, y))) + 90.0
+        azimuth = np.degrees(np.arctan2(y, x)) + 180.0
+        # Straight up, and straight back, round to the limit.
+        rows = np.minimum(elevation.astype(np.int64), _ROWS - 1)
+        cells = rows * _COLUMNS + azimuth.astype(np.int64) % _COLUMNS
+        order = np.argsort(cells, kind="stable")
+        return cls(
+            points=np.ascontiguousarray(points[order], dtype=np.float64),
+            angles_deg=np.stack([elevation, azimuth], axis=1)[order],
+            starts=np.searchsorted(
+                cells[order], np.arange(_ROWS * _COLUMNS + 1)
+            ),
+            reach=float(np.linalg.norm(points, axis=1).max(initial=0.0)),
+        )
+
+    def share_of(self, points: np.ndarray) -> float:
+        """Returns which part of points (N, 3) is shown; NaN without points.
+
+        Args:
+            points: in this sensor's frame.
+        """
+        return self._share(points, _SHOWN)
+
+    def share_behind(self, points: np.ndarray) -> float:
+        """Returns which part of points (N, 3) the seen surfaces hide.
+
+        These lie behind all returns around their direction.
+
+        Args:
+            points: in this sensor's frame.
+        """
+        return self._share(points, _BEHIND)
+
+    def hides(self, points: np.ndarray) -> np.ndarray:
+        """Returns which of points (N, 3) are behind, (N,) bool."""
+        return self._kinds(points) == _BEHIND
+
+    def _share(self, points: np.ndarray, kind: int) -> float:
+        if len(points) == 0:
+            return math.nan
+        return float(np.mean(self._kinds(points) == kind))
+
+    def _kinds(self, points: np.ndarray) -> np.ndarray:
+        return _classify(
+            np.ascontiguousarray(points, dtype=np.float64),
+            self.points,
+            self.angles_deg,
+            self.starts,
+        )
+
+
+@compiled
+def _find_corners(
+    p: np.ndarray,
+    angles: np.ndarray,
+    starts: np.ndarray,
+    corners: np.ndarray,
+    away: np.ndarray,
+) -> None:
+    """Finds the nearest return in each quadrant around a direction.
+
+    Args:
+        p: (3,) a point in the direction.
+        angles: see `SeenSurfaces`.
+        starts: likewise.
+        corners: (4,) to fill with indices of returns; -1 without one.
+        away: (4,) to fill with their angular distances [deg].
+    """
+    corners[:] = -1
+    away[:] = math.inf
+    flat = math.hypot(p[0], p[1])
+    elevation = math.degrees(math.atan2(p[2], flat)) + 90.0
+    azimuth = math.degrees(math.atan2(p[1], p[0])) + 180.0
+    # A degree of azimuth is less of an angle high up.
+    shrink = math.sin(math.radians(elevation))
+    row = min(int(elevation), _ROWS - 1)
+    column = int(azimuth)
+    for r in range(max(row - _UP, 0), min(row + _UP, _ROWS - 1) + 1):
+        for c in range(column - _SIDE, column + _SIDE + 1):
+            cell = r * _COLUMNS + c % _COLUMNS
+            for k in range(starts[cell], starts[cell + 1]):
+                up = angles[k, 0] - elevation
+                side = (angles[k, 1] - azimuth + 180.0) % 360.0 - 180.0
+                quadrant = 2 * int(up >= 0.0) + int(side >= 0.0)
+                distance = math.hypot(up, side * shrink)
+                if distance < away[quadrant]:
+                    away[quadrant] = distance
+                    corners[quadrant] = k
+
+
+@compiled
+def _is_on_plane(
+    p: np.ndarray, seen: np.ndarray, corners: np.ndarray, away: np.ndarray
+) -> bool:
+    """Returns whether a point lies on the plane of the nearest three returns.
+
+    That is, along its direction, within `TOLERANCE`.
+    """
+    order = np.argsort(away)
+    a = seen[corners[order[0]]]
+    u = seen[corners[order[1]]] - a
+    v = seen[corners[order[2]]] - a
+    nx = u[1] * v[2] - u[2] * v[1]
+    ny = u[2] * v[0] - u[0] * v[2]
+    nz = u[0] * v[1] - u[1] * v[0]
+    # The plane meets the ray at `part` times the point.
+    along = nx * p[0] + ny * p[1] + nz * p[2]
+    if along == 0.0:
+        return False
+    part = (nx * a[0] + ny * a[1] + nz * a[2]) / along
+    return abs(part - 1.0) * _length(p) <= TOLERANCE
+
+
+@compiled
+def _length(p: np.ndarray) -> float:
+    return math.sqrt(p[0] ** 2 + p[1] ** 2 + p[2] ** 2)
+
+
+@compiled
+def _classify(
+    asked: np.ndarray, seen: np.ndarray, angles: np.ndarray, starts: np.ndarray
+) -> np.ndarray:
+    """Returns whether each of M points is shown, hidden, or neither."""
+    kinds = np.full(len(asked), _UNKNOWN, np.int8)
+    corners = np.empty(4, np.int64)
+    away = np.empty(4)
+    for i in range(len(asked)):
+        p = asked[i]
+        distance = _length(p)
+        _find_corners(p, angles, starts, corners, away)
+        farthest, nearest, count, is_shown = 0.0, math.inf, 0, False
+        for quadrant in range(4):
+            corner = corners[quadrant]
+            if corner < 0:
+                continue
+            reach = _length(seen[corner])
+            count += 1
+            farthest, nearest = max(farthest, reach), min(nearest, reach)
+            is_alike = abs(reach - distance) <= TOLERANCE
+            is_shown = is_shown or (is_alike and away[quadrant] <= _NEAR_DEG)
+        if count >= 3 and not is_shown:
+            is_between = nearest - TOLERANCE <= distance <= farthest + TOLERANCE
+            is_shown = (
+                is_between and farthest <= _FARTHEST * nearest
+            ) or _is_on_plane(p, seen, corners, away)
+        if is_shown:
+            kinds[i] = _SHOWN
+        elif count > 0 and distance > farthest + TOLERANCE:
+            kinds[i] = _BEHIND
+    return kinds

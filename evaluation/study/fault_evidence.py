@@ -1,0 +1,278 @@
+"""Evidence on why best places are wrong, from the scans of two drives."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+import math
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from cns_drake.base.jobs.step import Reporter
+from cns_drake.base.points import xyz
+from cns_drake.base.poses import inverse, transform
+from cns_drake.base.progress import Track, silent
+from cns_drake.base.recordings.sequence import Sequence as Drive
+from evaluation.maps.voxel_maps import thin
+from evaluation.methods import MethodConfig, make_method
+from evaluation.recognition.fault_kinds import NEARLY, PairEvidence
+from evaluation.recognition.overlap_truth import sampled
+from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition.recognition_result import RecognitionResult
+from evaluation.recognition.seen_surfaces import SeenSurfaces
+from evaluation.sequences.sampling import within_range
+from evaluation.study.chosen_methods import MethodChoice
+from evaluation.study.drive_source import DriveSource
+from evaluation.study.parts import PartStep, part_digest, read_part
+from evaluation.study.study_layout import RecognitionFiles
+
+# From this height above the ground on, points count as standing [m].
+_STANDING = 0.5
+# Edge of the cells of which a scan keeps one point each, to be laid on
+# another one [m]; and how near two points coincide [m].
+_CELL = 0.5
+_COINCIDENT = 1.0
+
+
+@dataclass(frozen=True)
+class FindEvidence(PartStep):
+    """Writes the `PairEvidence` of two drives; None of one that closes no loop.
+
+    Attributes:
+        drives: database, and query.
+        methods: that answered.
+        results: what they made of the two.
+        protocol: by which they did.
+        part: to write.
+    """
+
+    drives: tuple[DriveSource, DriveSource]
+    methods: tuple[MethodChoice, ...]
+    results: RecognitionFiles
+    protocol: RetrievalProtocol
+    part: Path
+
+    def inputs(self) -> dict[str, object]:
+        return {
+            "results": [
+                part_digest(self.results.result(one)) for one in self.methods
+            ],
+            "drives": [one.identity() for one in self.drives],
+        }
+
+    def make(self, reporter: Reporter) -> PairEvidence | None:
+        results = []
+        for choice in self.methods:
+            # What a method kept may be of a type of its own.
+            choice.make()
+            results.append(read_part(self.results.result(choice)))
+        if None in results or not results:
+            return None
+        database, query = (source() for source in self.drives)
+        return find_evidence(
+            database, query, results, self.protocol, reporter.track
+        )
+
+
+def find_evidence(
+    database: Drive,
+    query: Drive,
+    results: Sequence[RecognitionResult],
+    protocol: RetrievalProtocol,
+    track: Track = silent,
+) -> PairEvidence:
+    """Looks at the scans of queries, of their matches and of wrong answers.
+
+    Args:
+        database: the drive whose places are known.
+        query: the drive that asks, in the same world frame.
+        results: of one method or several on the two.
+        protocol: by which they answered.
+        track: reports progress.
+
+    Raises:
+        InputError: a scan cannot be read.
+    """
+    first = results[0].outcome.retrieval
+    wrong = {one.method: _wrong_places(one) for one in results}
+    is_needed = np.asarray(first.matches.any(axis=0))
+    for places in wrong.values():
+        is_needed[places[places >= 0]] = True
+    shown = {}
+    for place in track(
+        np.flatnonzero(is_needed).tolist(),
+        f"why: seeing {database.name}",
+        int(is_needed.sum()),
+    ):
+        frame = int(first.database_frames[place])
+        shown[place] = _Shown.of(database, frame, protocol.max_range)
+    classes = {
+        number: str(one.get("class", "unknown"))
+        for drive in (database, query)
+        for number, one in (drive.instances or {}).items()
+    }
+    number = len(first.query_frames)
+    overlaps, hidden, changed, right_fits = np.full((4, number), math.nan)
+    changed_classes = [""] * number
+    fits = {method: np.full(number, math.nan) for method in wrong}
+    aligner = _Aligner()
+    for row in track(range(number), f"why: asking {query.name}", number):
+        frame = int(first.query_frames[row])
+        asking = _Shown.of(query, frame, protocol.max_range)
+        matches = np.flatnonzero(first.matches[row]).tolist()
+        right = None
+        if matches and len(asking.points):
+            seen = [
+                shown[k].seen.share_of(asking.seen_from(shown[k]))
+                for k in matches
+            ]
+            right = shown[matches[int(np.argmax(seen))]]
+            overlaps[row] = max(seen)
+            hidden[row] = right.seen.share_behind(asking.seen_from(right))
+            if classes:
+                changed[row], changed_classes[row] = _change(
+                    right, asking, classes
+                )
+        answers = {int(places[row]) for places in wrong.values()} - {-1}
+        found = {k: aligner.fit(asking, shown[k]) for k in answers}
+        if answers and right is not None:
+            right_fits[row] = aligner.fit(asking, right)
+        for method, places in wrong.items():
+            fits[method][row] = found.get(int(places[row]), math.nan)
+    return PairEvidence(
+        overlaps, hidden, changed, changed_classes, right_fits, fits
+    )
+
+
+def _wrong_places(result: RecognitionResult) -> np.ndarray:
+    """Returns (Q,) best places that are wrong and not just too far; or -1."""
+    outcome = result.outcome
+    best = outcome.retrieval.best_places
+    rows = np.arange(len(best))
+    is_far = (
+        outcome.retrieval.distances[rows, best]
+        > NEARLY * outcome.protocol.radius
+    )
+    is_wrong = outcome.outcomes.has_match & ~outcome.outcomes.is_right
+    return np.where(is_wrong & is_far, best, -1)
+
+
+@dataclass(frozen=True, eq=False)
+class _Shown:
+    """A scan.
+
+    Attributes:
+        X_WS: (4, 4) of its sensor.
+        points: (N, 3) in the frame of the sensor [m].
+        instances: (N,) of the structures that they lie on; None where the
+            recording does not say.
+    """
+
+    X_WS: np.ndarray
+    points: np.ndarray
+    instances: np.ndarray | None
+
+    @classmethod
+    def of(cls, drive: Drive, frame: int, max_range: float) -> _Shown:
+        scan = drive.scan(frame)
+        points = xyz(scan)
+        kept = within_range(points, max_range)
+        has_instances = "instance" in (scan.dtype.names or ())
+        return cls(
+            drive.X_WS[frame],
+            points[kept],
+            scan["instance"][kept] if has_instances else None,
+        )
+
+    @cached_property
+    def seen(self) -> SeenSurfaces:
+        return SeenSurfaces.of(self.points)
+
+    @cached_property
+    def standing(self) -> np.ndarray:
+        """(M, 3) points that stand, one a cell."""
+        return thin(self.points[self.points[:, 2] > _standing()], _CELL)
+
+    def seen_from(self, other: _Shown) -> np.ndarray:
+        """Returns some points in the frame of another scan's sensor."""
+        X_OS = inverse(other.X_WS) @ self.X_WS
+        return transform(X_OS, sampled(self.points))
+
+
+def _change(
+    place: _Shown, query: _Shown, classes: Mapping[int, str]
+) -> tuple[float, str]:
+    """Returns which part of two scans has come or gone, and mostly what.
+
+    That are standing points on structures of which the other scan shows
+    nothing, although nothing hides them from its sensor.
+
+    Args:
+        place: scan of the right place of the query.
+        query: its own scan.
+        classes: of the structures, by instance.
+    """
+    changed: Counter[str] = Counter()
+    total = 0
+    for one, other in ((place, query), (query, place)):
+        if one.instances is None or other.instances is None:
+            return math.nan, ""
+        points, instances = sampled(one.points), sampled(one.instances)
+        is_standing = points[:, 2] > _standing()
+        total += int(is_standing.sum())
+        is_gone = is_standing & ~np.isin(instances, other.instances)
+        X_OS = inverse(other.X_WS) @ one.X_WS
+        is_open = ~other.seen.hides(transform(X_OS, points[is_gone]))
+        changed.update(
+            classes.get(number, "unknown")
+            for number in instances[is_gone][is_open].tolist()
+        )
+    if not changed:
+        return (0.0 if total else math.nan), ""
+    # Of equal numbers, the first by name.
+    name = min(changed, key=lambda one: (-changed[one], one))
+    return changed.total() / total, name
+
+
+class _Aligner:
+    """Lays scans on each other as well as can be, whatever their poses."""
+
+    def __init__(self) -> None:
+        self._method = make_method("layered-overlap", {})
+
+    def fit(self, query: _Shown, place: _Shown) -> float:
+        """Returns the part of the standing points that coincide.
+
+        Of the query's or of the place's, whichever is less, at the pose that
+        layered overlap finds.
+        """
+        one, other = query.standing, place.standing
+        if not (len(one) and len(other)):
+            return 0.0
+        database = self._method.build_database(
+            [self._method.describe_place(place.points)]
+        )
+        X_PQ = self._method.relative_pose(
+            self._method.describe(query.points), database, 0
+        )
+        if X_PQ is None:
+            return 0.0
+        moved = transform(X_PQ, one)
+        return min(_met(moved, other), _met(other, moved))
+
+
+def _met(points: np.ndarray, others: np.ndarray) -> float:
+    """Returns which part of points has another one near."""
+    distances, _ = cKDTree(others).query(
+        points, distance_upper_bound=_COINCIDENT
+    )
+    return float(np.isfinite(distances).mean())
+
+
+def _standing() -> float:
+    """Returns the height from which on points stand, over the sensor [m]."""
+    return _STANDING - MethodConfig().sensor_height
