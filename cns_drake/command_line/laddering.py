@@ -34,7 +34,7 @@ def ladder(
         bool,
         typer.Option(
             "--levels",
-            help="The frozen levels alone: all causes together, three draws.",
+            help="The frozen levels alone: all causes together.",
         ),
     ] = False,
     cause: Annotated[
@@ -74,7 +74,10 @@ def ladder(
         )
         from cns_drake.studies.ladder_causes import CAUSES
         from cns_drake.studies.ladder_rungs import Extent
-        from cns_drake.studies.levels import LEVELS_EXTENT
+        from cns_drake.studies.levels import (
+            LEVELS_EXTENT,
+            LEVELS_PROTOCOL,
+        )
         from evaluation.recognition.protocol import PAPER_PROTOCOL
         from evaluation.study.chosen_methods import choose_methods
 
@@ -97,14 +100,10 @@ def ladder(
             "4), every other query, more than 300 places of other cities"
         )
     extent = replace(extent, causes=causes, seeds=range(1, seeds + 1))
+    if levels:
+        extent, protocol = LEVELS_EXTENT, LEVELS_PROTOCOL
     path, text = climb_ladder(
-        maps,
-        output,
-        cluster,
-        methods,
-        LEVELS_EXTENT if levels else extent,
-        protocol,
-        on_note=note,
+        maps, output, cluster, methods, extent, protocol, on_note=note
     )
     typer.echo(path)
     typer.echo(text)

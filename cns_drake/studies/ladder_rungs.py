@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from cns_drake.base.jobs.fingerprint import fingerprint
@@ -68,12 +68,17 @@ class Extent:
             level in its place.
         seeds: of the draws of what is random.
         most_places: most places of other cities.
+        strengths: cause -> level -> strength; construction's are the map's
+            stages.
     """
 
     causes: Collection[str] = CAUSES[1:]
     levels: Sequence[int] = (1, 2, 3, 4)
     seeds: Sequence[int] = (1,)
     most_places: int = 10_000
+    strengths: Mapping[str, Mapping[int, Any]] = field(
+        default_factory=lambda: STRENGTHS
+    )
 
 
 def plan_rungs(
@@ -89,7 +94,7 @@ def plan_rungs(
         InputError: the map's roads cannot be used.
     """
     plain = plain_drives(scenario)
-    known, notes = _known_strengths(scenario, extent.most_places)
+    known, notes = _known_strengths(scenario, extent)
     rungs = [Rung(NONE, 0, extent.seeds[0], "", plain)]
     for cause in CAUSES[1:]:
         if cause not in extent.causes or cause not in (*known, ALL):
@@ -131,11 +136,11 @@ def _rung(
 
 
 def _known_strengths(
-    scenario: Scenario, most_places: int
+    scenario: Scenario, extent: Extent
 ) -> tuple[dict[str, dict[int, Any]], list[str]]:
     """Returns the strengths that a map has, and what it lacks."""
     folder = map_folder(scenario)
-    known = {cause: dict(levels) for cause, levels in STRENGTHS.items()}
+    known = {cause: dict(levels) for cause, levels in extent.strengths.items()}
     notes = []
     before = [s for s in folder.stages() if s < str(scenario.stage)]
     known["construction"] = _stage_levels(before)
@@ -154,7 +159,7 @@ def _known_strengths(
     known["size"] = {
         level: number
         for level, number in known["size"].items()
-        if number <= most_places
+        if number <= extent.most_places
     }
     return {cause: levels for cause, levels in known.items() if levels}, notes
 

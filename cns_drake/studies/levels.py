@@ -1,17 +1,16 @@
 """Levels: frozen rungs of the ladder, and the results of methods on them.
 
-Level 0 is the world without a change; levels 1 to 4 have all causes together,
-each at that level of the ladder. Their drives are frozen: `worlds/levels.csv`
-holds what tells them from all others.
+Level 0 is the world without a change; levels 1 to 4 have all causes together.
+Their drives are frozen: `worlds/levels.csv` holds what tells them from all
+others.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from pathlib import Path
-import statistics
 
 from cns_drake.base.csv_files import read_records
 from cns_drake.base.errors import InputError
@@ -19,14 +18,23 @@ from cns_drake.base.jobs.fingerprint import fingerprint
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.scenarios.scenario_loading import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps, worlds_folder
-from cns_drake.studies.ladder_causes import ALL, NONE
+from cns_drake.studies.ladder_causes import ALL, NONE, STRENGTHS
 from cns_drake.studies.ladder_rungs import Extent, plan_rungs
+from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.report.method_titles import in_table_order, title
 from evaluation.report.tables import Table
 
-# The seeds were drawn before any method was run on them.
-LEVELS_EXTENT = Extent(causes=(ALL,), seeds=(6151, 3847, 9209))
-# A level is solved when the interval of the best method ends above this.
+# All causes together leave nothing to measure at the ladder's strengths.
+LEVEL_STRENGTHS = {
+    **STRENGTHS,
+    "weather": {1: 400.0, 2: 200.0, 3: 100.0, 4: 50.0},
+    "sensor": {4: "vlp-16"},
+    "size": {1: 300},
+}
+# The seed was drawn before any method was run on it.
+LEVELS_EXTENT = Extent(causes=(ALL,), seeds=(7208,), strengths=LEVEL_STRENGTHS)
+LEVELS_PROTOCOL = replace(PAPER_PROTOCOL, query_spacing=20.0)
+# A level is solved when the interval of the best method begins above this.
 _SOLVED = 0.98
 # Machines differ in the last digits of scores, and ties fall either way.
 _EQUAL = 1e-3
@@ -86,30 +94,31 @@ def read_results(files: Iterable[Path], levels: Levels) -> list[LevelResult]:
         levels: which there are.
 
     Raises:
-        InputError: a table cannot be read; a method lacks a level, was asked
-            by other drives, or has numbers that cannot be or that differ
-            between two tables.
+        InputError: a table cannot be read; a method lacks a level of a map,
+            was asked by other drives, or has numbers that cannot be or that
+            differ between two tables.
     """
-    kept: dict[str, tuple[Path, list[LevelResult]]] = {}
+    kept: dict[tuple[str, str], tuple[Path, list[LevelResult]]] = {}
     for file in files:
         found = list(_read_file(file, levels))
-        for method in dict.fromkeys(one.method for one in found):
-            mine = [one for one in found if one.method == method]
-            _check_complete(file, method, mine, levels)
-            before, others = kept.setdefault(method, (file, mine))
+        for key in dict.fromkeys((one.map_name, one.method) for one in found):
+            mine = [one for one in found if (one.map_name, one.method) == key]
+            _check_complete(file, *key, mine, levels)
+            before, others = kept.setdefault(key, (file, mine))
             if not _are_equal(mine, others):
-                raise InputError(f"{file}: {method}: differs from {before}")
+                name, method = key
+                raise InputError(
+                    f"{file}: {method} on {name}: differs from {before}"
+                )
     return [one for _, results in kept.values() for one in results]
 
 
 def _are_equal(some: list[LevelResult], others: list[LevelResult]) -> bool:
-    numbers = {
-        (one.map_name, one.level, one.radius_told): one.auc for one in others
-    }
+    numbers = {(one.level, one.radius_told): one.auc for one in others}
     return all(
         math.isclose(
             one.auc,
-            numbers[one.map_name, one.level, one.radius_told],
+            numbers[one.level, one.radius_told],
             abs_tol=_EQUAL,
         )
         for one in some
@@ -141,13 +150,17 @@ def _read_file(file: Path, levels: Levels) -> Iterable[LevelResult]:
 
 
 def _check_complete(
-    file: Path, method: str, found: Iterable[LevelResult], levels: Levels
+    file: Path,
+    map_name: str,
+    method: str,
+    found: Iterable[LevelResult],
+    levels: Levels,
 ) -> None:
-    there = [(one.map_name, one.level, one.radius_told) for one in found]
+    there = [(one.level, one.radius_told) for one in found]
     for name, level in levels:
         for told in (False, True):
-            number = there.count((name, level, told))
-            if number != 1:
+            number = there.count((level, told))
+            if name == map_name and number != 1:
                 raise InputError(
                     f"{file}: {method}: level {level} of {name}, radius_told "
                     f"{int(told)}: {number} rows instead of 1"
@@ -155,33 +168,31 @@ def _check_complete(
 
 
 def level_table(results: Iterable[LevelResult]) -> Table:
-    """Returns the table of all methods: AUC, the mean over the maps.
+    """Returns the table of all methods: AUC on each level of each map.
 
-    The last row says which levels are solved: for the best method, the
-    interval ends above 0.98 on every map.
+    The last row of a map says which levels are solved: the interval of the
+    best method begins above 0.98.
     """
     results = list(results)
     numbers = sorted({one.level for one in results})
     rows: list[tuple[object, ...]] = []
-    solved = dict.fromkeys(numbers, False)
-    for method in in_table_order(one.method for one in results):
-        for told in (False, True):
-            mine = [
-                [
-                    one
-                    for one in results
-                    if (one.method, one.radius_told, one.level)
-                    == (method, told, number)
-                ]
-                for number in numbers
-            ]
-            means = [statistics.fmean(one.auc for one in m) for m in mine]
-            rows.append((title(method), "yes" if told else "no", *means))
-            for number, same in zip(numbers, mine, strict=True):
-                least = min((one.low for one in same), default=math.nan)
-                solved[number] |= not told and least > _SOLVED
-    rows.append(
-        ("solved", "no", *("yes" if solved[n] else "no" for n in numbers))
-    )
-    header = ("method", "radius told", *(f"level {n}" for n in numbers))
+    for name in sorted({one.map_name for one in results}):
+        of_map = {
+            (one.method, one.radius_told, one.level): one
+            for one in results
+            if one.map_name == name
+        }
+        methods = in_table_order(method for method, _, _ in of_map)
+        for method in methods:
+            for told in (False, True):
+                found = [of_map[method, told, n].auc for n in numbers]
+                word = "yes" if told else "no"
+                rows.append((name, title(method), word, *found))
+        solved = [
+            any(of_map[one, False, n].low > _SOLVED for one in methods)
+            for n in numbers
+        ]
+        words = ("yes" if one else "no" for one in solved)
+        rows.append((name, "solved", "no", *words))
+    header = ("map", "method", "radius told", *(f"level {n}" for n in numbers))
     return Table(header, tuple(rows))

@@ -47,20 +47,35 @@ def test_the_levels_are_as_they_were_frozen():
     assert {level for _, level in frozen_levels()} == {0, 1, 2, 3, 4}
 
 
-def test_means_over_maps_and_what_is_solved(tmp_path):
+def test_maps_and_what_is_solved(tmp_path):
     ours = write(tmp_path / "ours.csv", rows("solid", HARD))
-    found = read_results([ours], LEVELS)
-    table = level_table(found)
-    assert table.header == ("method", "radius told", "level 0", "level 1")
-    first, _, solved = table.rows
-    assert first == ("SOLiD", "no", pytest.approx(0.8), pytest.approx(0.3))
-    assert solved[2:] == ("no", "no")
     easy = EASY | {("city", 1): 0.985}
     theirs = write(tmp_path / "theirs.csv", rows("theirs", easy))
     table = level_table(read_results([ours, theirs], LEVELS))
-    # In one map the interval begins at 0.975.
-    assert table.rows[-1][2:] == ("yes", "no")
-    assert len(table.rows) == 5
+    header = ("map", "method", "radius told", "level 0", "level 1")
+    assert table.header == header
+    assert table.rows == (
+        ("city", "SOLiD", "no", 0.7, 0.4),
+        ("city", "SOLiD", "yes", 0.7, 0.4),
+        ("city", "theirs", "no", 0.995, 0.985),
+        ("city", "theirs", "yes", 0.995, 0.985),
+        # The interval begins at 0.975.
+        ("city", "solved", "no", "yes", "no"),
+        ("town", "SOLiD", "no", 0.9, 0.2),
+        ("town", "SOLiD", "yes", 0.9, 0.2),
+        ("town", "theirs", "no", 0.995, 0.995),
+        ("town", "theirs", "yes", 0.995, 0.995),
+        ("town", "solved", "no", "yes", "yes"),
+    )
+
+
+def test_one_map_is_enough(tmp_path):
+    kept = [row for row in rows("solid", HARD) if row[0] == "city"]
+    found = read_results([write(tmp_path / "city.csv", kept)], LEVELS)
+    assert [row[0] for row in level_table(found).rows] == ["city"] * 3
+    path = write(tmp_path / "less.csv", kept[:-1])
+    with pytest.raises(InputError, match="level 1 of city, radius_told 1: 0"):
+        read_results([path], LEVELS)
 
 
 def test_a_method_in_two_tables_must_be_equal(tmp_path):
@@ -68,7 +83,7 @@ def test_a_method_in_two_tables_must_be_equal(tmp_path):
     same = write(tmp_path / "same.csv", rows("solid", HARD))
     other = write(tmp_path / "other.csv", rows("solid", EASY))
     assert read_results([one, same], LEVELS) == read_results([one], LEVELS)
-    with pytest.raises(InputError, match=r"other\.csv: solid: differs from"):
+    with pytest.raises(InputError, match=r"solid on town: differs from"):
         read_results([one, other], LEVELS)
 
 
