@@ -89,7 +89,7 @@ def add_lidar(
         lidar = add_lidar(builder, scene_graph, body, X_BS, "os1-64")
         builder.ExportOutput(lidar.GetOutputPort("scan"), "scan")
     """
-    check_lidar_arguments(builder, name, body, X_PS, pattern)
+    check_lidar_arguments(builder, scene_graph, name, body, X_PS, pattern)
     warn_of_nothing_to_see(scene_graph, options.get("role", Role.kPerception))
     _choose_measuring(
         options, pattern, returns, name, range_noise, dropout, seed

@@ -14,6 +14,7 @@ from cns_drake.sensors.beam_pattern import BeamPattern
 
 def check_lidar_arguments(
     builder: DiagramBuilder,
+    scene_graph: object,
     name: str,
     body: object,
     X_PS: object,
@@ -22,9 +23,15 @@ def check_lidar_arguments(
     """Checks what `add_lidar` is called with.
 
     Raises:
-        TypeError: the body, the pose or the pattern is something else.
+        TypeError: the SceneGraph, the body, the pose or the pattern is
+            something else.
         ValueError: the diagram has a system of that name.
     """
+    if not isinstance(scene_graph, SceneGraph):
+        raise TypeError(
+            f"scene_graph: {type(scene_graph).__name__} is no SceneGraph; "
+            "AddMultibodyPlantSceneGraph returns one beside the plant"
+        )
     if not isinstance(body, RigidBody | Frame | FrameId):
         cure = ""
         if isinstance(body, str):

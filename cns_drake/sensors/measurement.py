@@ -81,11 +81,13 @@ class MeasurementModel:
         """
         for name in ("resolution", "range_noise"):
             value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
+            real = isinstance(value, numbers.Real)
+            if not (real and math.isfinite(value) and value >= 0.0):
                 raise ValueError(f"{name}: {value!r} is no length")
         for name in ("dropout", "faint_dropout"):
             value = getattr(self, name)
-            if not 0.0 <= value <= 1.0:
+            real = isinstance(value, numbers.Real)
+            if not (real and 0.0 <= value <= 1.0):
                 raise ValueError(f"{name}: {value!r} is no probability")
         if not isinstance(self.seed, numbers.Integral) or self.seed < 0:
             raise ValueError(f"seed: {self.seed!r} is no integer from 0 on")

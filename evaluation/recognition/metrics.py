@@ -227,12 +227,27 @@ def judge(scores: np.ndarray, matches: np.ndarray) -> QueryOutcomes:
         scores: (Q, D), higher is more similar; NaN is no candidate.
         matches: (Q, D) bool, the truth.
 
+    Raises:
+        ValueError: scores are complex or masked, or no numbers, or the shapes
+            of the two differ.
+
     Example:
         from evaluation import judge, retrieve
 
         found = retrieve(database, query, method)
         outcomes = judge(found.scores, found.matches)
     """
+    values = np.asarray(scores)
+    if isinstance(scores, np.ma.MaskedArray) or values.dtype.kind not in "biuf":
+        raise ValueError(
+            f"scores are {type(scores).__name__} of {values.dtype}, not plain"
+            " numbers with NaN where a place is no candidate"
+        )
+    if values.ndim != 2 or values.shape != np.shape(matches):
+        raise ValueError(
+            f"scores of shape {values.shape}, matches of {np.shape(matches)}"
+        )
+    scores = values.astype(np.float64)
     num_queries, num_places = scores.shape
     candidate = ~np.isnan(scores)
     order = ranking(scores)

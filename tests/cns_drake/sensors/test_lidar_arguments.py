@@ -64,6 +64,8 @@ class Site:
         ({"pattern": "vlp-61"}, KeyError, "no LiDAR preset 'vlp-61'"),
         ({"range_noise": -0.1}, ValueError, "range_noise: -0.1 is no length"),
         ({"range_noise": np.nan}, ValueError, "range_noise: nan is no length"),
+        ({"range_noise": "x"}, ValueError, "range_noise: 'x' is no length"),
+        ({"dropout": "a"}, ValueError, "dropout: 'a' is no probability"),
         ({"dropout": 1.5}, ValueError, "dropout: 1.5 is no probability"),
         ({"seed": -1}, ValueError, "seed: -1 is no integer"),
         ({"seed": 0.5}, ValueError, "seed: 0.5 is no integer"),
@@ -78,6 +80,13 @@ class Site:
 def test_a_slip_is_found_at_once(options, error, fault):
     with pytest.raises(error, match=fault):
         Site().add(**options)
+
+
+def test_a_plant_is_no_scene_graph():
+    site = Site()
+    site.scene_graph = site.plant
+    with pytest.raises(TypeError, match="MultibodyPlant is no SceneGraph"):
+        site.add()
 
 
 def test_each_lidar_has_a_name_of_its_own():

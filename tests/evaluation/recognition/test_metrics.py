@@ -285,3 +285,23 @@ def test_scores_must_not_be_compared_by_value():
     assert plain.auc == bent.auc
     assert plain.f1_max == bent.f1_max
     np.testing.assert_array_equal(plain.recall_at_n, bent.recall_at_n)
+
+
+@pytest.mark.parametrize(
+    "scores",
+    [
+        np.array([[0.5 + 1j, 0.2]]),
+        np.ma.masked_array([[0.5, 0.2]], [[True, False]]),
+        np.array([["0.5", "0.2"]]),
+        np.array([0.5, 0.2]),
+        np.array([[0.5]]),
+    ],
+)
+def test_scores_that_are_none_are_refused(scores):
+    with pytest.raises(ValueError, match="scores"):
+        judge(scores, np.array([[True, False]]))
+
+
+def test_scores_of_unsigned_integers_keep_their_order():
+    found = judge(np.array([[0, 3]], np.uint8), np.array([[False, True]]))
+    assert found.is_right.all()
