@@ -23,8 +23,6 @@ from typing import Literal
 
 import numpy as np
 
-from evaluation.recognition.ranking import ranking
-
 Mode = Literal["all", "filtered"]
 MODES: tuple[Mode, ...] = ("all", "filtered")
 
@@ -247,17 +245,23 @@ def judge(scores: np.ndarray, matches: np.ndarray) -> QueryOutcomes:
         raise ValueError(
             f"scores of shape {values.shape}, matches of {np.shape(matches)}"
         )
-    scores = values.astype(np.float64)
+    scores = np.asarray(values, dtype=np.float64)
     num_queries, num_places = scores.shape
-    candidate = ~np.isnan(scores)
-    order = ranking(scores)
-    ranked_right = np.take_along_axis(matches & candidate, order, axis=1)
-    any_right = ranked_right.any(axis=1)
     first_right = np.full(num_queries, np.inf)
     best_scores = np.full(num_queries, np.nan)
-    if num_places:
-        first_right[any_right] = 1.0 + ranked_right[any_right].argmax(axis=1)
-        best_scores = scores[np.arange(num_queries), order[:, 0]]
+    # Row by row: of long drives, one array more of all pairs fills a memory.
+    for query, (row, is_match) in enumerate(zip(scores, matches, strict=True)):
+        candidates = np.flatnonzero(~np.isnan(row))
+        if len(candidates) == 0:
+            continue
+        found = row[candidates]
+        best_scores[query] = found.max()
+        right = np.flatnonzero(is_match[candidates])
+        if len(right):
+            first = right[found[right].argmax()]
+            better = found > found[first]
+            better[:first] |= found[:first] == found[first]
+            first_right[query] = 1.0 + np.count_nonzero(better)
     return QueryOutcomes(
         best_scores=best_scores,
         is_right=first_right == 1.0,

@@ -186,6 +186,7 @@ def _compare(
     indexed = method.build_database(places.descriptors)
     scores = [np.empty(is_known.shape) for _ in gate_radii]
     errors = [PoseErrors.unknown(len(queries.frames)) for _ in gate_radii]
+    distances = np.empty(is_known.shape)
     asking = track(
         range(len(queries.frames)),
         f"querying {query.name}",
@@ -193,6 +194,8 @@ def _compare(
     )
     for row in asking:
         asked = queries.descriptors[row]
+        offsets = queries.p_WSs[row] - places.p_WSs
+        distances[row] = np.linalg.norm(offsets, axis=1)
         ungated = score_places(
             method,
             queries.descriptors[: row + 1],
@@ -216,8 +219,6 @@ def _compare(
                 error.translation[row], error.rotation_deg[row] = pose_error(
                     X_PQ, places.X_WS[best], queries.X_WS[row]
                 )
-    offsets = queries.p_WSs[:, None, :] - places.p_WSs[None, :, :]
-    distances = np.linalg.norm(offsets, axis=2)
     if protocol.overlap is None:
         matches = distances <= protocol.radius
     else:

@@ -1,4 +1,5 @@
 import math
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -305,3 +306,19 @@ def test_scores_that_are_none_are_refused(scores):
 def test_scores_of_unsigned_integers_keep_their_order():
     found = judge(np.array([[0, 3]], np.uint8), np.array([[False, True]]))
     assert found.is_right.all()
+
+
+def test_long_drives_need_no_array_more_of_all_pairs():
+    rng = np.random.default_rng(0)
+    scores = rng.random((200, 5000))
+    matches = rng.random(scores.shape) < 0.01
+    tracemalloc.start()
+    found = judge(scores, matches)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 0.1 * scores.nbytes
+    order = ranking(scores)
+    right = np.take_along_axis(matches, order, axis=1)
+    np.testing.assert_array_equal(
+        found.first_right_ranks, 1 + right.argmax(axis=1)
+    )
