@@ -94,9 +94,8 @@ _LidarName = Annotated[
 _OwnMethods = Annotated[
     list[Path] | None,
     typer.Option(
-        help="Python file that registers a method, to run besides the"
-        " shipped ones;"
-        " may be repeated."
+        help="Python file that registers a method, or map-closures, to run"
+        " besides the shipped ones; may be repeated."
     ),
 ]
 _Jobs = Annotated[

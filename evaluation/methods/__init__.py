@@ -12,6 +12,7 @@ from evaluation.methods.method import (
     MethodConfig,
     known_methods,
     make_method,
+    optional_methods,
     register,
     shipped_methods,
 )
@@ -21,6 +22,7 @@ __all__ = [
     "MethodConfig",
     "known_methods",
     "make_method",
+    "optional_methods",
     "register",
     "shipped_methods",
 ]

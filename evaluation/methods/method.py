@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Callable, Mapping, Sequence
+import importlib
 from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
@@ -179,6 +180,9 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
 
 
 _METHODS: dict[str, type[Method]] = {}
+# Methods that need a package of their own: name -> module. They are run when
+# they are named, and never by default.
+_OPTIONAL = {"map-closures": "evaluation.methods.map_closures"}
 
 _MethodClass = TypeVar("_MethodClass", bound=type[Method])
 
@@ -223,13 +227,19 @@ def known_methods() -> tuple[str, ...]:
     return tuple(sorted(_METHODS))
 
 
+def optional_methods() -> tuple[str, ...]:
+    """Returns the names of those that need a package of their own."""
+    return tuple(sorted(_OPTIONAL))
+
+
 def shipped_methods() -> tuple[str, ...]:
-    """Returns the names of those that are part of this package."""
+    """Returns the names of those of this package that run by default."""
     package = __name__.rpartition(".")[0]
     return tuple(
         name
         for name in known_methods()
         if _METHODS[name].__module__.startswith(f"{package}.")
+        and name not in _OPTIONAL
     )
 
 
@@ -245,11 +255,11 @@ def make_method(name: str, parameters: Mapping[str, Any]) -> Method:
 
         method = make_method("solid", {"sensor_height": 1.8})
     """
+    if name in _OPTIONAL:
+        importlib.import_module(_OPTIONAL[name])
     if name not in _METHODS:
-        raise InputError(
-            f"--method: no method {name!r}"
-            f" (known: {', '.join(known_methods())})"
-        )
+        known = ", ".join(sorted({*_METHODS, *_OPTIONAL}))
+        raise InputError(f"--method: no method {name!r} (known: {known})")
     method = _METHODS[name]
     for key in parameters:
         if key not in method.Config.model_fields:

@@ -12,6 +12,7 @@ from evaluation.methods import (
     Method,
     known_methods,
     make_method,
+    optional_methods,
     shipped_methods,
 )
 from evaluation.methods.own_file import load_method
@@ -87,17 +88,23 @@ def choose_methods(
     """Returns the methods of this package, and those of some files.
 
     Args:
-        files: Python files that register a method each.
+        files: Python files that register a method each, or names of optional
+            methods of this package.
         settings: `METHOD.NAME=VALUE` of parameters that are not as by
             default.
 
     Raises:
         InputError: if a file registers no method, or one that is there
-            already, or a setting is not known or does not fit.
+            already, an optional method is not installed, or a setting is not
+            known or does not fit.
     """
     chosen = [MethodChoice(name) for name in shipped_methods()]
     stems = set()
     for file in files:
+        if str(file) in optional_methods():
+            chosen.append(MethodChoice(str(file)))
+            chosen[-1].make()  # Whether it is installed is known at once.
+            continue
         path = Path(file).absolute()
         # Modules of one name would replace each other.
         if path.stem in stems:

@@ -1,0 +1,153 @@
+"""MapClosures (Gupta et al., ICRA 2024), from its own package.
+
+Local maps are seen from above as images of density; ORB keypoints of two
+images that agree on a motion in the plane are inliers, and their number is
+the score. The package `map-closures` does all of that. It is an optional
+extra, since it needs an older NumPy.
+
+The package offers one step only, which aligns a local map with all earlier
+ones and then keeps it. Two things follow. Queries join the database, as in the
+package's own program; what they have in common with each other does not count
+here. And n local maps cost about n^2 / 2 alignments.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+from pydantic import PositiveFloat, PositiveInt
+
+from cns_drake.base.errors import InputError
+from evaluation.maps.voxel_maps import thin
+from evaluation.methods.method import Method, MethodConfig, register
+
+# Numbers of queries begin this far after those of places, since the package
+# compares no map with its direct predecessors.
+_GAP = 1000
+# More than there are local maps.
+_ALL = 1 << 20
+
+
+class MapClosuresConfig(MethodConfig):
+    """Parameters of MapClosures; defaults are those of the package.
+
+    The height of the sensor is not used: the package finds the ground.
+
+    Attributes:
+        density_map_resolution: length of a pixel, and of the voxels to which
+            local maps are thinned [m].
+        density_threshold: density below which a pixel is empty, as a part of
+            the greatest.
+        hamming_distance_threshold: bits by which keypoints that match may
+            differ.
+    """
+
+    density_map_resolution: PositiveFloat = 0.5
+    density_threshold: PositiveFloat = 0.05
+    hamming_distance_threshold: PositiveInt = 50
+
+
+@dataclass
+class MapClosuresDatabase:
+    """The local maps of a drive, and what the last query has found.
+
+    Attributes:
+        num_places: local maps that queries may find.
+        program: of the package, which has aligned all of them.
+        num_queries: that have joined them.
+        query: the last one.
+        found: place -> inliers and pose X_PQ (4, 4) of the last one.
+    """
+
+    num_places: int
+    program: Any
+    num_queries: int = 0
+    query: np.ndarray | None = None
+    found: dict[int, tuple[int, np.ndarray]] = field(default_factory=dict)
+
+
+@register("map-closures")
+class MapClosures(Method[np.ndarray, MapClosuresDatabase]):
+    """MapClosures, by its own package.
+
+    Descriptors are local maps (N, 3), thinned. A hundred scans are about
+    50 m of a drive at 10 m/s and 20 scans a second.
+    """
+
+    Config = MapClosuresConfig
+    config: MapClosuresConfig
+    scans_per_place = 100
+
+    def __init__(self, config: MapClosuresConfig | None = None):
+        """Prepares the package.
+
+        Raises:
+            InputError: it is not installed.
+        """
+        super().__init__(config)
+        try:
+            from map_closures import config as package_config
+            from map_closures import map_closures
+        except ImportError as error:
+            raise InputError(
+                "map-closures: not installed; pip install"
+                " 'cns-drake[map-closures]' (NumPy below 2.3) gets it"
+            ) from error
+        settings = self.config.model_dump(exclude={"sensor_height"})
+        values = package_config.MapClosuresConfig(**settings)
+        self._make_program: Callable[[], Any] = partial(
+            map_closures.MapClosures, values
+        )
+
+    def describe(self, points: np.ndarray) -> np.ndarray:
+        return thin(points, self.config.density_map_resolution)
+
+    def build_database(
+        self, places: Sequence[np.ndarray]
+    ) -> MapClosuresDatabase:
+        program = self._make_program()
+        for number, place in enumerate(places):
+            program.get_top_k_closures(number, place, 1)
+        return MapClosuresDatabase(len(places), program)
+
+    def score(
+        self,
+        query: np.ndarray,
+        database: MapClosuresDatabase,
+        *,
+        exhaustive: bool = False,
+    ) -> np.ndarray:
+        self._find(query, database)
+        scores = np.full(database.num_places, np.nan)
+        for place, (inliers, _) in database.found.items():
+            scores[place] = inliers
+        return scores
+
+    def relative_pose(
+        self, query: np.ndarray, database: MapClosuresDatabase, place: int
+    ) -> np.ndarray | None:
+        self._find(query, database)
+        found = database.found.get(place)
+        return None if found is None else found[1]
+
+    def _find(self, query: np.ndarray, database: MapClosuresDatabase) -> None:
+        """Aligns a query with all places, unless that was the last thing."""
+        if database.query is query:
+            return
+        number = database.num_places + _GAP + database.num_queries
+        closures = database.program.get_top_k_closures(number, query, _ALL)
+        database.num_queries += 1
+        database.query = query
+        # The package has the motion from the earlier map to the later one.
+        database.found = {
+            one.source_id: (
+                one.number_of_inliers,
+                np.linalg.inv(np.asarray(one.pose)),
+            )
+            for one in closures
+            if one.source_id < database.num_places and one.number_of_inliers > 0
+        }
