@@ -20,7 +20,8 @@ function showStatus() {
       method.scores[state.query][0].toFixed(4));
   }
   const why = method.why?.[state.query];
-  if (why) byId("status").append(` – ${why.replace("_", " ")}`);
+  if (kind === "wrong" && why)
+    byId("status").append(` – ${why.replace("_", " ")}`);
   byId("query").value = state.query;
   byId("query").setAttribute(
     "aria-valuetext", `query ${state.query + 1}: ${WORDS[kind]}`);

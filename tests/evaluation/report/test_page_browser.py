@@ -226,6 +226,21 @@ def test_only_wrong_ones(reader):
     assert reader.evaluate('byId("filtered").value') == "5 of 5"
 
 
+def test_only_those_of_one_reason(reader):
+    choose(reader, "why", "twin")
+    shown(reader, 0, 0, 1, 0)
+    assert reader.evaluate('byId("filtered").value') == "1 of 5"
+    assert status(reader).endswith(" – twin")
+    choose(reader, "filter", "right")
+    assert reader.evaluate('byId("filtered").value') == "0 of 5"
+    choose(reader, "filter", "all")
+    choose(reader, "why", "no_place")
+    shown(reader, 0, 0, 4, 0)
+    assert status(reader).startswith("Query 5 of 5, Scan Context++: no true")
+    choose(reader, "why", "")
+    assert reader.evaluate('byId("filtered").value') == "5 of 5"
+
+
 def test_verdicts_of_all_methods(reader):
     reader.press("ArrowRight")
     shown(reader, 0, 0, 1, 0)
