@@ -11,9 +11,14 @@ import threading
 from types import TracebackType
 from typing import Any
 
-# How many messages may wait. What waits is lost when the process is killed,
-# so these are two frames with one LiDAR; a longer queue gained nothing.
-_WAITING = 8
+# How many messages may wait, each with the small ones before it. They are lost
+# when the process is killed: two frames with one LiDAR; a longer queue gained
+# nothing.
+_WAITING = 2
+# Smaller messages wait for the next larger one, this many at most: handing
+# one over takes longer than making it.
+_SMALL_BYTES = 1024
+_MOST_HELD = 64
 
 
 class BackgroundWriter:
@@ -32,6 +37,7 @@ class BackgroundWriter:
         """
         self._write = write
         self._messages: queue.Queue = queue.Queue(_WAITING)
+        self._held: list[tuple[Any, ...]] = []
         self._error: BaseException | None = None
         self._dropping = False
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -47,6 +53,7 @@ class BackgroundWriter:
         traceback: TracebackType | None,
     ) -> None:
         self._dropping = exception_type is not None
+        self._messages.put(self._held)
         self._messages.put(None)
         self._thread.join()
         if exception_type is None:
@@ -59,7 +66,12 @@ class BackgroundWriter:
             Whatever writing an earlier message raised.
         """
         self._raise_error()
-        self._messages.put(message)
+        self._held.append(message)
+        size = sum(len(one) for one in message if isinstance(one, bytes))
+        if 0 < size < _SMALL_BYTES and len(self._held) < _MOST_HELD:
+            return
+        self._messages.put(self._held)
+        self._held = []
 
     def _raise_error(self) -> None:
         if self._error is not None:
@@ -68,9 +80,10 @@ class BackgroundWriter:
     def _run(self) -> None:
         # After an error messages are still taken, so that nobody waits for
         # room in the queue for ever.
-        while (message := self._messages.get()) is not None:
-            if self._error is None and not self._dropping:
-                try:
-                    self._write(*message)
-                except BaseException as error:
-                    self._error = error
+        while (messages := self._messages.get()) is not None:
+            for message in messages:
+                if self._error is None and not self._dropping:
+                    try:
+                        self._write(*message)
+                    except BaseException as error:
+                        self._error = error

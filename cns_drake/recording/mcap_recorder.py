@@ -33,6 +33,7 @@ from cns_drake.recording.image_messages import (
     make_camera_info,
     make_image,
 )
+from cns_drake.recording.imu_packing import ImuPacker
 from cns_drake.recording.object_messages import make_detections
 from cns_drake.recording.rosbag2_metadata import Topic
 from cns_drake.recording.schedule import Schedule, make_schedule
@@ -164,7 +165,7 @@ class McapRecorder(LeafSystem):
         self._X_BI = X_BI
         self._cameras = dict(cameras or {})
         self._layouts = dict(layouts or {})
-        self._imu_variances = imu_variances
+        self._imu_packer = ImuPacker(imu_variances)
         self._start_ns = start_ns
         self._has_begun = False
         if (period is None) == (schedule is None):
@@ -176,6 +177,7 @@ class McapRecorder(LeafSystem):
             schedule = make_schedule({topic.name: period for topic in topics})
         assert schedule is not None
         self._schedule = schedule
+        self._period = schedule.period
 
         self._odometry = self.DeclareAbstractInputPort(
             "odometry", Value(object())
@@ -215,7 +217,7 @@ class McapRecorder(LeafSystem):
             self._poses[name] = (self._declare_pose(name), camera.X_BC)
         self.DeclareInitializationPublishEvent(publish=_warn_of_early_start)
         self.DeclarePeriodicPublishEvent(
-            period_sec=self._schedule.period,
+            period_sec=self._period,
             offset_sec=0.0,
             publish=self._publish,
         )
@@ -242,7 +244,11 @@ class McapRecorder(LeafSystem):
         if _IMU.name in due:
             outgoing |= self._feel(context, stamp_ns)
         objects = self._objects
-        if objects is not None and objects.HasValue(context):
+        if (
+            objects is not None
+            and _OBJECTS.name in due
+            and objects.HasValue(context)
+        ):
             outgoing[_OBJECTS] = make_detections(
                 objects.Eval(context), stamp_ns
             )
@@ -280,7 +286,7 @@ class McapRecorder(LeafSystem):
         return outgoing
 
     def _feel(self, context: Context, stamp_ns: int) -> dict[Topic, Any]:
-        """Returns the message of the IMU."""
+        """Returns the message of the IMU, serialised."""
         angular_velocity = _eval(self._angular_velocity, context)
         specific_force = _eval(self._specific_force, context)
         if angular_velocity is None and specific_force is None:
@@ -292,15 +298,10 @@ class McapRecorder(LeafSystem):
             odometry = _eval(self._odometry, context)
             if odometry is not None:
                 R_WI = odometry.X_WB.rotation() @ self._X_BI.rotation()
-        return {
-            _IMU: messages.make_imu(
-                R_WI,
-                angular_velocity,
-                specific_force,
-                stamp_ns,
-                self._imu_variances,
-            )
-        }
+        packed = self._imu_packer.pack(
+            R_WI, angular_velocity, specific_force, stamp_ns
+        )
+        return {_IMU: packed}
 
     def _scan(
         self, context: Context, name: str, stamp_ns: int
@@ -341,16 +342,17 @@ class McapRecorder(LeafSystem):
     def _write(
         self, topic: Topic, message: Any, stamp_ns: int, sequence: int
     ) -> None:
-        self._bag.write(
-            topic.name, stamp_ns, ros_types.serialize(message), sequence
-        )
+        data = message
+        if not isinstance(message, bytes):
+            data = ros_types.serialize(message)
+        self._bag.write(topic.name, stamp_ns, data, sequence)
 
     def _tick(self, time: float) -> int:
-        ticks = time / self._schedule.period
+        ticks = time / self._period
         if abs(ticks - round(ticks)) > _TICK_TOLERANCE:
             raise ValueError(
                 f"time {time} s is no multiple of the period "
-                f"{self._schedule.period} s"
+                f"{self._period} s"
             )
         if round(ticks) < 0:
             raise ValueError(f"time {time} s: a recording starts at time zero")
