@@ -11,7 +11,7 @@ from cns_drake.motion.trajectory import Trajectory
 
 # Samples that are computed at once, and how far the time asked for may be off
 # a sample's, in samples.
-_BLOCK = 64
+_BLOCK = 512
 _TOLERANCE = 1e-6
 
 

@@ -351,8 +351,7 @@ class McapRecorder(LeafSystem):
         ticks = time / self._period
         if abs(ticks - round(ticks)) > _TICK_TOLERANCE:
             raise ValueError(
-                f"time {time} s is no multiple of the period "
-                f"{self._period} s"
+                f"time {time} s is no multiple of the period {self._period} s"
             )
         if round(ticks) < 0:
             raise ValueError(f"time {time} s: a recording starts at time zero")

@@ -20,7 +20,7 @@ from cns_drake.scene.structure_table import StructureTable
 from cns_drake.sensors.returns.closed_surfaces import is_closed
 
 # Kinds of materials.
-LAMBERT, RETRO, GLASS, LEAVES = range(4)
+LAMBERT, RETRO, GLASS, LEAVES, BEADS = range(5)
 
 # Class -> reflectivity of a dark and of a bright colour; equal where the
 # colour says nothing near 900 nm.
@@ -70,8 +70,10 @@ class Materials(NamedTuple):
     """What each of G geometries is made of.
 
     Attributes:
-        kind: (G,) uint8, `LAMBERT`, `RETRO`, `GLASS` or `LEAVES`; the last
-            of what is a volume of leaves, and not of single leaves.
+        kind: (G,) uint8, `LAMBERT`, `RETRO`, `GLASS`, `LEAVES` (of what is
+            a volume of leaves, and not of single leaves) or `BEADS`, the
+            retro-reflector of road markings, which works at any angle:
+            EN 1436 measures it 1.24 deg above the road.
         reflectivity: (G,) float32, of a retro-reflector in units of a
             Lambertian target of reflectivity 1 that faces the beam.
         leaf_area_density: (G,) float32 [1/m].
@@ -132,7 +134,7 @@ def _material(
     if words & {"glass", "panes", "windows"}:
         return GLASS, _GLASS_DUST, 0.0
     if geometry.structure.startswith("markings"):
-        return RETRO, _MARKINGS, 0.0
+        return BEADS, _MARKINGS, 0.0
     if entry.semantic_class == "traffic-sign" and words & {"plate", "blade"}:
         return RETRO, _SHEETING, 0.0
     if "plate" in words:

@@ -22,6 +22,7 @@ from cns_drake.sensors.returns.counter_random import uniform
 from cns_drake.sensors.returns.light import Light
 from cns_drake.sensors.returns.link_budget import LinkBudget
 from cns_drake.sensors.returns.materials import (
+    BEADS,
     GLASS,
     LEAVES,
     RETRO,
@@ -40,7 +41,7 @@ _SKIN = 1e-3
 # Light is not followed where a white target right behind would send back less
 # than this SNR.
 _FAINT_SNR = 3.0
-# A retro-reflector works up to this angle of incidence.
+# The sheeting of signs and plates works up to this angle of incidence.
 _RETRO_COSINE = np.cos(np.deg2rad(60.0))
 # Panes are flat to this angle: within it and the beam's own they send the
 # mirrored light back to the unit [rad].
@@ -283,10 +284,11 @@ def add_light(
     light.beam[part] = beam
     light.distance[part] = distance
     energy = share * materials.reflectivity[geometry]
-    if materials.kind[geometry] != RETRO:
+    kind = materials.kind[geometry]
+    if kind == RETRO:
+        energy *= cosine > _RETRO_COSINE
+    elif kind != BEADS:
         energy *= cosine
-    elif cosine <= _RETRO_COSINE:
-        energy = 0.0
     light.energy[part] = energy
     light.geometry[part] = geometry
 

@@ -47,6 +47,25 @@ def test_few_messages_wait():
     assert max(lags) <= 10
 
 
+def test_small_messages_go_with_the_next_large_one():
+    written, has_large = [], threading.Event()
+
+    def write(data):
+        written.append(data)
+        if len(data) > 1000:
+            has_large.set()
+
+    small = [bytes([k]) for k in range(70)]
+    with BackgroundWriter(write) as writer:
+        # So many are handed over without waiting any longer.
+        for data in small:
+            writer.write(data)
+        writer.write(bytes(5000))
+        writer.write(b"last")
+        assert has_large.wait(10.0)
+    assert written == [*small, bytes(5000), b"last"]
+
+
 def test_an_error_is_raised_at_the_latest_on_leaving():
     def write(k):
         raise OSError(f"disk full at {k}")

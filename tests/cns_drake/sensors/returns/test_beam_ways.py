@@ -161,6 +161,27 @@ def test_retro_reflectors_shine_at_any_angle():
     assert bright[0] == bright[1] > 100.0
 
 
+@pytest.mark.parametrize("above_deg", [60.0, 20.0, 3.0])
+def test_markings_shine_however_flat_they_are_seen(above_deg):
+    """pi times 150 mcd/m2/lx, which EN 1436 asks for 1.24 deg above them."""
+    road = StructureTable(
+        [
+            StructureEntry(1, "markings", "road"),
+            StructureEntry(2, "asphalt", "road"),
+        ]
+    )
+    bright = {}
+    tilt = np.deg2rad(90.0 - above_deg)
+    for name in ("markings", "asphalt"):
+        X_WG = RigidTransform(RollPitchYaw(0.0, 0.0, tilt), [12.0, 0.0, 0.0])
+        points = scan(
+            [plate(name, None, X_WG)], ahead(100), unit(), structures=road
+        )
+        bright[name] = np.median(points["intensity"])
+    assert bright["markings"] == 47.0
+    assert bright["asphalt"] == np.rint(15.0 * np.sin(np.deg2rad(above_deg)))
+
+
 def test_every_class_is_made_of_something():
     """Also those of traffic: a bright coat sends back more than a dark one."""
     for name in CLASS_IDS:
