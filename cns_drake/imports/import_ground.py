@@ -100,10 +100,12 @@ def guess_ground(feet: np.ndarray, corners: np.ndarray) -> Ground:
     xs = np.arange(low[0], high[0] + cell, cell)
     ys = np.arange(low[1], high[1] + cell, cell)
     x, y = np.meshgrid(xs, ys)
-    z = NearestNDInterpolator(feet[:, :2], feet[:, 2])(x, y)
+    z = np.full(x.shape, np.nan)
     if len(feet) >= 4 and np.linalg.matrix_rank(feet[:, :2] - feet[0, :2]) == 2:
-        inside = LinearNDInterpolator(feet[:, :2], feet[:, 2])(x, y)
-        z = np.where(np.isnan(inside), z, inside)
+        z = LinearNDInterpolator(feet[:, :2], feet[:, 2])(x, y)
+    outside = np.isnan(z)
+    nearest = NearestNDInterpolator(feet[:, :2], feet[:, 2])
+    z[outside] = nearest(x[outside], y[outside])
     return Ground(xs, ys, gaussian_filter(z, _SMOOTHING, mode="nearest"))
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import shapely
+from shapely import STRtree
 from shapely.geometry import LineString, MultiLineString, MultiPolygon
 from shapely.geometry.base import BaseGeometry
 
@@ -148,14 +149,22 @@ def missing_sidewalks(
         if one.structure.semantic_class in ("building", "road", "sidewalk")
         or one.kind.startswith("Water")
     ]
-    taken = _covered(np.concatenate([np.zeros((0, 3, 3)), *shapes]))
+    triangles = np.concatenate([np.zeros((0, 3, 3)), *shapes])
+    rings = np.round(triangles[:, [0, 1, 2, 0], :2], 3)
     lanes = [line.buffer(street.width / 2.0, 4) for street, line in near]
-    taken = _areas(shapely.union_all([taken, *lanes], grid_size=1.0 / _MM))
+    taken = np.concatenate([shapely.polygons(rings), lanes])
+    # Whole cities take long to unite: only what is near each street counts.
+    tree = STRtree(taken)
+    made: list[BaseGeometry] = []
     for street, line in lacking:
         strip = line.buffer(street.width / 2.0 + _SIDEWALK, 4)
-        area = shapely.difference(strip, taken, grid_size=1.0 / _MM)
-        area = _areas(area)
-        taken = _areas(shapely.union(taken, area, grid_size=1.0 / _MM))
+        others = [
+            *taken[tree.query(strip, "intersects")],
+            *(area for area in made if area.intersects(strip)),
+        ]
+        covered = shapely.union_all(others, grid_size=1.0 / _MM)
+        area = _areas(shapely.difference(strip, covered, grid_size=1.0 / _MM))
+        made.append(area)
         surface = [
             flat_surface(part, _KERB_HEIGHT, street.name, ImportFaults())
             for part in parts_of(area)
@@ -169,13 +178,6 @@ def missing_sidewalks(
                 {"surface": np.concatenate(surface)},
                 {},
             )
-
-
-def _covered(triangles: np.ndarray) -> BaseGeometry:
-    """Returns what triangles (M, 3, 3) cover, seen from above."""
-    rings = np.round(triangles[:, [0, 1, 2, 0], :2], 3)
-    areas = shapely.polygons(rings)
-    return _areas(shapely.union_all(areas, grid_size=1.0 / _MM))
 
 
 def _areas(geometry: BaseGeometry) -> MultiPolygon:
