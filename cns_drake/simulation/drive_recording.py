@@ -22,9 +22,9 @@ from cns_drake.scenarios.recording_schedule import (
 )
 from cns_drake.scenarios.scenario_files import describe_scenario
 from cns_drake.scenarios.sensor_making import sensor_pose
-from cns_drake.scene.world import World
 from cns_drake.simulation.loaded_drive import LoadedDrive
 from cns_drake.simulation.run_progress import NoteCallback, ProgressCallback
+from cns_drake.simulation.structure_list import structure_list
 
 
 def make_bag(
@@ -47,7 +47,7 @@ def make_bag(
         start_ns=START_NS,
         attachments={
             "scenario.json": described,
-            "structures.json": _structure_list(drive.world),
+            "structures.json": structure_list(drive.world),
             "calibration.json": make_calibration(
                 drive.X_BSs, sensor_pose(scenario.imu)
             ),
@@ -98,16 +98,3 @@ def resume_recording(
     if frames > 0:
         on_frame(frames, num_frames)
     return frames
-
-
-def _structure_list(world: World) -> list[dict]:
-    return [
-        {
-            "instance": entry.instance,
-            "name": entry.name,
-            "class": entry.semantic_class,
-            "label": entry.label,
-            **({"causes": list(entry.causes)} if entry.causes else {}),
-        }
-        for entry in world.structures
-    ]

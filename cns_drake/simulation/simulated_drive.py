@@ -6,12 +6,14 @@ descriptions, in about half the time.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from pydrake.math import RigidTransform
 
 from cns_drake.base.jobs.fingerprint import code_digest
+from cns_drake.base.recordings.sequence import index_instances
 from cns_drake.motion.sweep import Sweep
 from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.provenance import digest_inputs
@@ -32,6 +34,7 @@ from cns_drake.simulation.scenario_traffic import (
 )
 from cns_drake.simulation.stage_loading import load_stage
 from cns_drake.simulation.still_world import make_still_world
+from cns_drake.simulation.structure_list import structure_list
 from cns_drake.traffic.traffic_adding import make_traffic
 
 
@@ -94,6 +97,7 @@ class SimulatedSequence(PlannedSequence):
                 structures=world.structures,
                 turn=self.period,
             )
+        self._instances = index_instances(structure_list(world), self.name)
         self._has_traffic = traffic is not None
         distorts = self._column_t is not None
         self._lidar = Lidar(
@@ -111,6 +115,10 @@ class SimulatedSequence(PlannedSequence):
         )
         self._diagram = make_still_world(world, self._lidar, traffic)
         self._context = self._diagram.CreateDefaultContext()
+
+    @property
+    def instances(self) -> Mapping[int, Mapping]:
+        return self._instances
 
     def scan(self, index: int) -> np.ndarray:
         context = self._lidar.GetMyMutableContextFromRoot(self._context)
