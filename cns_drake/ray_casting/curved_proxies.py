@@ -31,6 +31,9 @@ _SIDES = 16
 # precision confuses: a part of the radius, and [m].
 _MARGIN = 0.005
 _GAP = 1e-3
+# How far about places shapes are looked for, so that the next places have
+# theirs found already [m].
+_NEARBY = 10.0
 
 
 @lru_cache(maxsize=1000)
@@ -79,6 +82,8 @@ class NearCurvedShapes:
             [np.linalg.norm(group.X_FL[:3, :3], 2) for group in groups]
         )
         self._near: _Sorted | None = None
+        # The box of O out of which no shape is among those that are placed.
+        self._box = (np.full(3, np.inf), np.full(3, -np.inf))
 
     def forget_places(self) -> None:
         """Has the shapes placed anew where their groups are now."""
@@ -90,47 +95,68 @@ class NearCurvedShapes:
         That is, within what a shape's polyhedron sweeps during the turn.
         """
         result = np.zeros(len(p_OSset), bool)
-        if len(self._rows):
-            if self._near is None:
+        if len(self._rows) and len(p_OSset):
+            low, high = p_OSset.min(axis=0), p_OSset.max(axis=0)
+            if (
+                self._near is None
+                or (low < self._box[0]).any()
+                or (high > self._box[1]).any()
+            ):
+                self._box = (low - _NEARBY, high + _NEARBY)
                 self._near = self._place()
             _find_near(self._near, p_OSset, result)
         return result
 
     def _place(self) -> _Sorted:
+        """Returns the shapes that reach into the box, where they are."""
+        in_sight = np.array([group.in_sight for group in self._groups])
+        seen = [k for k, group in enumerate(self._groups) if group.in_sight]
         X_OLs = np.tile(np.eye(4), (len(self._groups), 1, 1))
-        X_OLs[:, :3] = [group.X_OL for group in self._groups]
-        X_GOs = self._X_GLs @ np.linalg.inv(X_OLs)[self._rows]
-        places = (X_OLs[self._rows] @ self._p_LGs)[:, :3, 0]
-        stretches = self._stretches[self._rows]
-        reaches = stretches * self._sizes.sum(axis=1)
-        travels = self._travels(places, reaches)
+        X_OLs[seen, :3] = np.reshape(
+            [self._groups[k].X_OL for k in seen], (-1, 3, 4)
+        )
+        shapes = np.flatnonzero(in_sight[self._rows])
+        rows = self._rows[shapes]
+        places = (X_OLs[rows] @ self._p_LGs[shapes])[:, :3, 0]
+        reaches = self._stretches[rows] * self._sizes[shapes].sum(axis=1)
+        travels = self._travels(rows, places, reaches)
+        reaches += travels
+        inside = np.flatnonzero(
+            (places + reaches[:, None] >= self._box[0]).all(axis=1)
+            & (places - reaches[:, None] <= self._box[1]).all(axis=1)
+        )
+        shapes, rows = shapes[inside], rows[inside]
+        X_GOs = self._X_GLs[shapes] @ np.linalg.inv(X_OLs[rows])
         # Bounds the largest of its singular values.
         shrink = np.linalg.norm(X_GOs[:, :3, :3], axis=(1, 2))
-        reaches += travels
+        places, reaches = places[inside], reaches[inside]
+        sizes, travels = self._sizes[shapes], travels[inside]
         order = np.argsort(places[:, 0] - reaches)
         return _Sorted(
             places[order],
             reaches[order],
             X_GOs[order],
-            self._sizes[order, 0],
-            (self._sizes[:, 1] + shrink * travels)[order],
+            sizes[order, 0],
+            (sizes[:, 1] + shrink * travels)[order],
             (places[:, 0] - reaches)[order],
-            2.0 * reaches.max(),
+            2.0 * reaches.max(initial=0.0),
         )
 
-    def _travels(self, places: np.ndarray, reaches: np.ndarray) -> np.ndarray:
-        """Returns how far each shape goes at most during a turn."""
+    def _travels(
+        self, rows: np.ndarray, places: np.ndarray, reaches: np.ndarray
+    ) -> np.ndarray:
+        """Returns how far shapes of groups go at most during a turn."""
         ways, angles = np.zeros((2, len(self._groups)))
         p_OFs = np.zeros((len(self._groups), 3))
         for row, group in enumerate(self._groups):
-            if group.motion is None:
+            if group.motion is None or not group.in_sight:
                 continue
             angle = np.linalg.norm(group.motion.w) * group.motion.duration
             angles[row] = min(float(angle), 2.0)
             ways[row] = np.linalg.norm(group.motion.v) * group.motion.duration
             p_OFs[row] = group.X_OL @ np.linalg.inv(group.X_FL)[:, 3]
-        arms = np.linalg.norm(places - p_OFs[self._rows], axis=1) + reaches
-        return ways[self._rows] + angles[self._rows] * arms
+        arms = np.linalg.norm(places - p_OFs[rows], axis=1) + reaches
+        return ways[rows] + angles[rows] * arms
 
 
 class _Sorted(NamedTuple):

@@ -64,6 +64,8 @@ def load() -> ctypes.CDLL:
         ("rtcReleaseScene", None, [pointer]),
         ("rtcNewGeometry", pointer, [pointer, integer]),
         ("rtcCommitGeometry", None, [pointer]),
+        ("rtcEnableGeometry", None, [pointer]),
+        ("rtcDisableGeometry", None, [pointer]),
         ("rtcReleaseGeometry", None, [pointer]),
         ("rtcAttachGeometry", uint, [pointer, pointer]),
         ("rtcSetGeometryMask", None, [pointer, uint]),

@@ -99,6 +99,7 @@ class EmbreeHierarchy:
         moving = [row for row in self.rows if row not in fixed]
         self._top, self._instances = 0, {}
         self._in_motion: set[int] = set()
+        self._disabled: set[int] = set()
         if moving:
             self._top = self._new_scene()
             self._instances = {
@@ -149,8 +150,18 @@ class EmbreeHierarchy:
         }
 
     def place(self, rows: Collection[int]) -> None:
-        """Moves groups to where their `X_OL` says."""
-        moved = [row for row in rows if row in self._instances]
+        """Moves groups to where their `X_OL` says, if they are in sight."""
+        changed = [row for row in rows if row in self._instances]
+        for row in changed:
+            handle = self._instances[row]
+            if not self._groups[row].in_sight:
+                # The fewer there are, the faster all is built and met.
+                self._lib.rtcDisableGeometry(handle)
+                self._disabled.add(row)
+            elif row in self._disabled:
+                self._lib.rtcEnableGeometry(handle)
+                self._disabled.remove(row)
+        moved = [row for row in changed if self._groups[row].in_sight]
         still = [row for row in moved if self._groups[row].motion is None]
         for row in moved:
             handle = self._instances[row]
@@ -166,7 +177,7 @@ class EmbreeHierarchy:
                 np.array([self._instances[row] for row in still], np.uintp),
                 np.array([self._groups[row].X_OL for row in still], np.float32),
             )
-        if moved:
+        if changed:
             self._lib.rtcCommitScene(self._top)
 
     def _set_motion(self, row: int, handle: int) -> None:

@@ -59,6 +59,8 @@ class Open3dScene:
         times = rays.times[np.arange(num_rays) % len(rays.times)]
         result = Hits.misses(num_rays, with_normals)
         for row, group in enumerate(self._groups):
+            if not group.in_sight:
+                continue
             X_OL = group.X_OL_at(times[: None if group.motion else 1])
             R_LO = np.linalg.inv(X_OL[:, :, :3])
             # Not of unit length in a stretched group: then distances along

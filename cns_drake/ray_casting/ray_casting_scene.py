@@ -19,11 +19,17 @@ from pydrake.math import RigidTransform
 from cns_drake.ray_casting.facing import face_origins
 from cns_drake.ray_casting.group_motion import Motion
 from cns_drake.ray_casting.half_spaces import cast_on_planes
+from cns_drake.ray_casting.moving_groups import (
+    EVERYWHERE,
+    NOTHING_KNOWN,
+    Ball,
+    KnownPoses,
+    MovingGroups,
+)
 from cns_drake.ray_casting.ray_groups import (
     NO_MOTIONS,
     RayGroup,
     group_geometries,
-    place_all,
     take_over,
 )
 from cns_drake.ray_casting.rays import Hits, Rays
@@ -111,29 +117,26 @@ class RayCastingScene:
         self._scene: EmbreeScene | Open3dScene = _make_scene(
             solid, num_threads, None if previous is None else previous._scene
         )
-        self._moving = [
-            row
-            for row, group in enumerate(self._groups)
-            if group.frame_id is not None
-        ]
-        self._X_FLs = np.array([self._groups[row].X_FL for row in self._moving])
+        self._moving = MovingGroups(self._groups, self._p_WO)
 
     def set_frame_poses(
         self,
         calc_X_WF: Callable[[FrameId], RigidTransform],
         motions: Mapping[FrameId, Motion] = NO_MOTIONS,
+        known: KnownPoses = NOTHING_KNOWN,
+        seen: Ball = EVERYWHERE,
     ) -> None:
         """Moves the geometry of the frames that are not anchored.
 
         Args:
             calc_X_WF: gives the pose of a frame in the world.
             motions: of the frames that go on moving while rays are cast.
+            known: poses of frames for which `calc_X_WF` is not asked.
+            seen: where the rays that are cast next can meet anything.
         """
-        if self._moving:
-            groups = [self._groups[row] for row in self._moving]
-            X_FLs, p_WO = self._X_FLs, self._p_WO
-            place_all(groups, X_FLs, p_WO, calc_X_WF, motions)
-            self._scene.place(self._moving)
+        placed = self._moving.place(calc_X_WF, motions, known, seen)
+        if placed:
+            self._scene.place(placed)
 
     def cast_rays(
         self,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -44,6 +44,8 @@ class RayGroup:
         X_OL: (3, 4) affine map from L to the scene's origin, at the start of
             a turn; there is none before `place`.
         motion: of F during the turn, None if it stays.
+        in_sight: whether rays can meet it; elsewhere `X_OL` and `motion` are
+            those of an earlier turn.
     """
 
     frame_id: FrameId | None
@@ -53,6 +55,7 @@ class RayGroup:
     is_copy: bool = False
     X_OL: np.ndarray = field(init=False)
     motion: Motion | None = None
+    in_sight: bool = True
 
     @property
     def is_half_space(self) -> bool:
@@ -65,6 +68,7 @@ class RayGroup:
         motions: Mapping[FrameId, Motion] = NO_MOTIONS,
     ) -> None:
         """Sets `X_OL` and `motion` by those of the group's frame."""
+        self.in_sight = True
         X_WL = self.X_FL
         if self.frame_id is not None:
             X_WL = calc_X_WF(self.frame_id).GetAsMatrix4() @ X_WL
@@ -208,35 +212,6 @@ def _find_shared(
         for key, count in num_triangles.items()
         if count > MOST_COPIED_TRIANGLES and copies[key] > 1
     )
-
-
-def place_all(
-    groups: Sequence[RayGroup],
-    X_FLs: np.ndarray,
-    p_WO: np.ndarray,
-    calc_X_WF: Callable[[FrameId], RigidTransform],
-    motions: Mapping[FrameId, Motion] = NO_MOTIONS,
-) -> None:
-    """Does what `RayGroup.place` does for groups on frames, all at once.
-
-    Args:
-        groups: N of them.
-        X_FLs: (N, 4, 4) their `X_FL`.
-        p_WO: the scene's origin.
-        calc_X_WF: gives the pose of a frame in the world.
-        motions: of the frames that move during the turn.
-    """
-    frames = [group.frame_id for group in groups]
-    X_WFs = np.array(
-        [calc_X_WF(f).GetAsMatrix4() for f in frames if f is not None]
-    )
-    X_OLs = (X_WFs @ X_FLs)[:, :3]
-    X_OLs[:, :, 3] -= p_WO
-    for group, frame_id, X_OL in zip(groups, frames, X_OLs, strict=True):
-        group.X_OL = X_OL
-        group.motion = None
-        if motions and frame_id is not None:
-            group.motion = motions.get(frame_id)
 
 
 def take_over(groups: list[RayGroup], previous: Iterable[RayGroup]) -> None:

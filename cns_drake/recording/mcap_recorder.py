@@ -34,7 +34,12 @@ from cns_drake.recording.image_messages import (
     make_image,
 )
 from cns_drake.recording.imu_packing import ImuPacker
-from cns_drake.recording.object_messages import make_detections
+from cns_drake.recording.object_messages import (
+    BoxMessages,
+    marked_boxes,
+    marked_detections,
+    motion_table,
+)
 from cns_drake.recording.rosbag2_metadata import Topic
 from cns_drake.recording.schedule import Schedule, make_schedule
 
@@ -42,8 +47,10 @@ _TF_STATIC = Topic("/tf_static", ros_types.TF, latched=True)
 _TF = Topic("/tf", ros_types.TF)
 _ODOMETRY = Topic("/odometry", ros_types.ODOMETRY)
 _IMU = Topic("/imu/data", ros_types.IMU)
-OBJECTS_TOPIC = "/objects"
-_OBJECTS = Topic(OBJECTS_TOPIC, ros_types.DETECTIONS_3D)
+_OBJECTS = Topic("/objects", ros_types.DETECTIONS_3D)
+_BOXES = Topic("/objects/boxes", ros_types.SCENE_UPDATE)
+_MOTION = Topic("/objects/motion", ros_types.POINT_CLOUD)
+OBJECT_TOPICS = (_OBJECTS, _BOXES, _MOTION)
 
 # Events of a periodic schedule come at exact multiples of the period; only
 # the rounding of that product separates their times from a tick's, in ticks.
@@ -96,7 +103,7 @@ class McapRecorder(LeafSystem):
     - `angular_velocity`: w_WI_I, vector of size 3 [rad/s].
     - `R_WI`: abstract, a RotationMatrix; without this port the orientation of
       I is that of the odometry.
-    - `objects`: abstract, of each a `RecordedObject`.
+    - `objects`: abstract, `RecordedObjects`.
     - `<lidar>_scan`: abstract, structured array of points expressed in S.
     - `<lidar>_pose`: abstract, X_WS.
     - `<camera>_color`, `_depth`, `_label`: images as Drake's RgbdSensor gives
@@ -196,6 +203,8 @@ class McapRecorder(LeafSystem):
             self._objects = self.DeclareAbstractInputPort(
                 "objects", Value(object())
             )
+        self._detections = BoxMessages(marked_detections)
+        self._boxes = BoxMessages(marked_boxes)
         self._scans = {
             name: self.DeclareAbstractInputPort(f"{name}_scan", Value(object()))
             for name in X_BSs
@@ -243,15 +252,8 @@ class McapRecorder(LeafSystem):
             outgoing |= self._locate(context, stamp_ns)
         if _IMU.name in due:
             outgoing |= self._feel(context, stamp_ns)
-        objects = self._objects
-        if (
-            objects is not None
-            and _OBJECTS.name in due
-            and objects.HasValue(context)
-        ):
-            outgoing[_OBJECTS] = make_detections(
-                objects.Eval(context), stamp_ns
-            )
+        if _OBJECTS.name in due:
+            outgoing |= self._list_objects(context, stamp_ns)
         for name in self._scans:
             if _points_topic(name).name in due:
                 outgoing |= self._scan(context, name, stamp_ns)
@@ -302,6 +304,23 @@ class McapRecorder(LeafSystem):
             R_WI, angular_velocity, specific_force, stamp_ns
         )
         return {_IMU: packed}
+
+    def _list_objects(
+        self, context: Context, stamp_ns: int
+    ) -> dict[Topic, Any]:
+        """Returns the messages of what moves."""
+        objects = None
+        if self._objects is not None:
+            objects = _eval(self._objects, context)
+        if objects is None:
+            return {}
+        return {
+            _OBJECTS: self._detections.encode(objects, stamp_ns),
+            _BOXES: self._boxes.encode(objects, stamp_ns),
+            _MOTION: messages.make_point_cloud(
+                motion_table(objects), messages.MAP_FRAME, stamp_ns
+            ),
+        }
 
     def _scan(
         self, context: Context, name: str, stamp_ns: int
@@ -408,7 +427,7 @@ def recording_topics(
         topics.append(_camera_info_topic(name))
     topics += [_IMU] if with_imu else []
     topics += [_ODOMETRY] if with_odometry else []
-    topics += [_OBJECTS] if with_objects else []
+    topics += OBJECT_TOPICS if with_objects else []
     return (*topics, _TF, _TF_STATIC)
 
 

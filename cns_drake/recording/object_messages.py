@@ -1,63 +1,198 @@
-"""ROS 2 messages of what moves: boxes as detections."""
+"""ROS 2 messages of what moves: detections, boxes to look at, velocities."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 import numpy as np
-from pydrake.math import RigidTransform
 
-from cns_drake.base.recordings.ros_types import DETECTIONS_3D, message_class
-from cns_drake.recording.messages import (
-    MAP_FRAME,
-    make_header,
-    make_pose,
-    make_vector,
+from cns_drake.base.recordings.ros_types import (
+    DETECTIONS_3D,
+    SCENE_UPDATE,
+    message_class,
 )
+from cns_drake.recording.message_template import (
+    STAMP_MARK_NS,
+    MessageTemplate,
+    number_marks,
+)
+from cns_drake.recording.messages import MAP_FRAME
+
+# Position, orientation and size of a box.
+_NUMBERS = 10
+# A record of the table of velocities.
+MOTION_DTYPE = np.dtype(
+    [
+        ("x", "<f4"),
+        ("y", "<f4"),
+        ("z", "<f4"),
+        ("vx", "<f4"),
+        ("vy", "<f4"),
+        ("vz", "<f4"),
+        ("yaw_rate", "<f4"),
+        ("instance", "<u2"),
+        ("moving", "<u2"),
+    ]
+)
+_DELETE_ALL = 1
+_RGB = {"person": (0.95, 0.35, 0.2), "bicyclist": (0.95, 0.75, 0.1)}
+_OTHER_RGB = (0.2, 0.6, 0.95)
+_OPACITY = 0.45
 
 
-class RecordedObject(Protocol):
-    """What a recording needs of a vehicle or a walker."""
+class RecordedObjects(Protocol):
+    """What a recording needs of N vehicles and walkers.
+
+    Ids in points and tables (N,), classes, middles (N, 3) [m] and
+    orientations (N, 4) of boxes in the map, their length, width, height
+    (N, 3) [m], velocities (N, 3) [m/s], yaw rates (N,) [rad/s], and whether
+    each is labelled as moving (N,).
+    """
 
     @property
-    def instance(self) -> int:
-        """Its id in points and tables."""
-        ...
+    def instance(self) -> np.ndarray: ...
 
     @property
-    def semantic_class(self) -> str:
-        """A key of `CLASS_IDS`."""
-        ...
+    def semantic_classes(self) -> tuple[str, ...]: ...
 
     @property
-    def X_WO(self) -> RigidTransform:
-        """Pose of the middle of its box."""
-        ...
+    def p_WO(self) -> np.ndarray: ...
 
     @property
-    def size(self) -> tuple[float, float, float]:
-        """Length, width, height of its box [m]."""
-        ...
+    def quat_xyzw(self) -> np.ndarray: ...
+
+    @property
+    def sizes(self) -> np.ndarray: ...
+
+    @property
+    def v_WO(self) -> np.ndarray: ...
+
+    @property
+    def yaw_rate(self) -> np.ndarray: ...
+
+    @property
+    def is_moving(self) -> np.ndarray: ...
 
 
-def make_detections(objects: Iterable[RecordedObject], stamp_ns: int) -> Any:
-    """Returns a Detection3DArray with the boxes of objects in the map.
+class BoxMessages:
+    """Makes one message of all boxes at a time."""
+
+    def __init__(
+        self, make: Callable[[Sequence[tuple[int, str]], np.ndarray], Any]
+    ):
+        """Takes what makes a message of marks.
+
+        Args:
+            make: `marked_detections` or `marked_boxes`.
+        """
+        self._make = make
+        self._who: list[tuple[int, str]] | None = None
+        self._template: MessageTemplate | None = None
+
+    def encode(self, objects: RecordedObjects, stamp_ns: int) -> bytes:
+        """Returns the CDR form of the message.
+
+        Args:
+            objects: all that are there.
+            stamp_ns: the time of all of them [ns].
+        """
+        who = list(
+            zip(
+                objects.instance.tolist(), objects.semantic_classes, strict=True
+            )
+        )
+        if self._template is None or who != self._who:
+            count = _NUMBERS * len(who)
+            marks = number_marks(count).reshape(-1, _NUMBERS)
+            self._template = MessageTemplate(self._make(who, marks), count)
+            self._who = who
+        numbers = np.column_stack(
+            [objects.p_WO, objects.quat_xyzw, objects.sizes]
+        )
+        return self._template.fill(numbers.ravel(), stamp_ns)
+
+
+def marked_detections(
+    who: Sequence[tuple[int, str]], numbers: np.ndarray
+) -> Any:
+    """Returns a Detection3DArray in the map, with a mark as its stamp.
 
     Args:
-        objects: all that are there.
-        stamp_ns: the time of all of them [ns].
+        who: id and class of N objects.
+        numbers: (N, 10) position, orientation (x, y, z, w) and size.
     """
     return message_class(DETECTIONS_3D)(
-        header=make_header(MAP_FRAME, stamp_ns),
-        detections=[_detection(one, stamp_ns) for one in objects],
+        header=_header(),
+        detections=[
+            _detection(instance, name, row)
+            for (instance, name), row in zip(who, numbers, strict=True)
+        ],
     )
 
 
-def _detection(one: RecordedObject, stamp_ns: int) -> Any:
-    pose = make_pose(one.X_WO)
+def marked_boxes(who: Sequence[tuple[int, str]], numbers: np.ndarray) -> Any:
+    """Returns a SceneUpdate that replaces all boxes by those of N objects.
+
+    Args:
+        who, numbers: see `marked_detections`.
+    """
+    deletion = message_class("foxglove_msgs/msg/SceneEntityDeletion")(
+        timestamp=_stamp(), type=_DELETE_ALL, id=""
+    )
+    return message_class(SCENE_UPDATE)(
+        deletions=[deletion],
+        entities=[
+            _entity(instance, name, row)
+            for (instance, name), row in zip(who, numbers, strict=True)
+        ],
+    )
+
+
+def motion_table(objects: RecordedObjects) -> np.ndarray:
+    """Returns (N,) records of where objects are and how they move."""
+    table = np.zeros(len(objects.instance), MOTION_DTYPE)
+    for names, values in (("x y z", objects.p_WO), ("vx vy vz", objects.v_WO)):
+        for k, name in enumerate(names.split()):
+            table[name] = values[:, k]
+    table["yaw_rate"] = objects.yaw_rate
+    table["instance"] = objects.instance
+    table["moving"] = objects.is_moving
+    return table
+
+
+def _stamp() -> Any:
+    sec, nanosec = STAMP_MARK_NS
+    return message_class("builtin_interfaces/msg/Time")(
+        sec=sec, nanosec=nanosec
+    )
+
+
+def _header() -> Any:
+    return message_class("std_msgs/msg/Header")(
+        stamp=_stamp(), frame_id=MAP_FRAME
+    )
+
+
+def _pose(numbers: np.ndarray) -> Any:
+    x, y, z, *quat_xyzw = (float(number) for number in numbers)
+    return message_class("geometry_msgs/msg/Pose")(
+        position=message_class("geometry_msgs/msg/Point")(x=x, y=y, z=z),
+        orientation=message_class("geometry_msgs/msg/Quaternion")(
+            **dict(zip("xyzw", quat_xyzw, strict=True))
+        ),
+    )
+
+
+def _size(numbers: np.ndarray) -> Any:
+    x, y, z = (float(number) for number in numbers)
+    return message_class("geometry_msgs/msg/Vector3")(x=x, y=y, z=z)
+
+
+def _detection(instance: int, semantic_class: str, numbers: np.ndarray) -> Any:
+    pose = _pose(numbers[:7])
     hypothesis = message_class("vision_msgs/msg/ObjectHypothesis")(
-        class_id=one.semantic_class, score=1.0
+        class_id=semantic_class, score=1.0
     )
     certain = message_class("geometry_msgs/msg/PoseWithCovariance")(
         pose=pose, covariance=np.zeros(36)
@@ -66,11 +201,39 @@ def _detection(one: RecordedObject, stamp_ns: int) -> Any:
         hypothesis=hypothesis, pose=certain
     )
     box = message_class("vision_msgs/msg/BoundingBox3D")(
-        center=pose, size=make_vector(np.array(one.size))
+        center=pose, size=_size(numbers[7:])
     )
     return message_class("vision_msgs/msg/Detection3D")(
-        header=make_header(MAP_FRAME, stamp_ns),
-        results=[result],
-        bbox=box,
-        id=str(one.instance),
+        header=_header(), results=[result], bbox=box, id=str(instance)
+    )
+
+
+def _entity(instance: int, semantic_class: str, numbers: np.ndarray) -> Any:
+    r, g, b = _RGB.get(semantic_class, _OTHER_RGB)
+    cube = message_class("foxglove_msgs/msg/CubePrimitive")(
+        pose=_pose(numbers[:7]),
+        size=_size(numbers[7:]),
+        color=message_class("foxglove_msgs/msg/Color")(
+            r=r, g=g, b=b, a=_OPACITY
+        ),
+    )
+    named = message_class("foxglove_msgs/msg/KeyValuePair")(
+        key="class", value=semantic_class
+    )
+    forever = message_class("builtin_interfaces/msg/Duration")(sec=0, nanosec=0)
+    return message_class("foxglove_msgs/msg/SceneEntity")(
+        timestamp=_stamp(),
+        frame_id=MAP_FRAME,
+        id=str(instance),
+        lifetime=forever,
+        frame_locked=False,
+        metadata=[named],
+        arrows=[],
+        cubes=[cube],
+        spheres=[],
+        cylinders=[],
+        lines=[],
+        triangles=[],
+        texts=[],
+        models=[],
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from cns_drake.recording.mcap_recorder import (
-    OBJECTS_TOPIC,
+    OBJECT_TOPICS,
     recording_topics,
 )
 from cns_drake.recording.rosbag2_metadata import Topic
@@ -53,13 +53,12 @@ def drive_schedule(scenario: Scenario) -> Schedule:
         "/imu/data": imu_rate(scenario),
         "/odometry": odometry,
         "/tf": odometry,
-        OBJECTS_TOPIC: fastest,
     }
+    if not scenario.traffic.is_off:
+        rates |= {topic.name: fastest for topic in OBJECT_TOPICS}
     for topic in scenario_topics(scenario):
         if not topic.latched and topic.name not in rates:
             rates[topic.name] = scenario.lidars[topic.name.split("/")[1]].rate
-    if scenario.traffic.is_off:
-        del rates[OBJECTS_TOPIC]
     periods = {name: 1.0 / rate for name, rate in rates.items()}
     if scenario.frames is None:
         return make_schedule(periods)

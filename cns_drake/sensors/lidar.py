@@ -14,7 +14,8 @@ from pydrake.perception import PointCloud
 from pydrake.systems.framework import Context, LeafSystem, ValueProducer
 
 from cns_drake.ray_casting.group_motion import Motion
-from cns_drake.scene.structure_table import StructureTable
+from cns_drake.ray_casting.moving_groups import Ball, KnownPoses
+from cns_drake.scene.structure_table import MAX_INSTANCE, StructureTable
 from cns_drake.sensors.beam_pattern import POINT_DTYPE, BeamPattern, Beams
 from cns_drake.sensors.measurement import IDEAL, MeasurementModel, Returns
 from cns_drake.sensors.point_assembly import BeamTable, assemble_points
@@ -37,6 +38,7 @@ class Lidar(LeafSystem):
         - sweep (if it is declared)
         - body_spatial_velocities (if it is declared)
         - moving_instances (optional)
+        - frame_poses (if it is declared)
         output_ports:
         - scan
         - point_cloud_S
@@ -69,6 +71,9 @@ class Lidar(LeafSystem):
     `moving_instances` (abstract, the instance ids of structures) says what
     moves: its points have the label of the moving class.
 
+    `frame_poses` (abstract, an (M, 4, 4) array) has poses X_WF that the
+    SceneGraph has as well; a LiDAR takes many of them from an array faster.
+
     Drake cannot cast rays, so the system reads shapes and poses from the
     QueryObject and casts on a hierarchy of its own, in which what changed is
     built anew. `geometry_revision` (from `geometry_revision_port`) tells when
@@ -91,6 +96,7 @@ class Lidar(LeafSystem):
         returns: CalibratedReturns | None = None,
         with_sweep: bool = False,
         moving_bodies: Mapping[FrameId, int] | None = None,
+        posed_frames: Mapping[FrameId, int] | None = None,
         role: Role = Role.kPerception,
         unseen: Collection[FrameId | GeometryId] | None = None,
         structures: StructureTable | None = None,
@@ -109,6 +115,8 @@ class Lidar(LeafSystem):
             with_sweep: whether the port `sweep` tells its poses.
             moving_bodies: frame -> index of the body of it in the port
                 `body_spatial_velocities`, which there is if this is given.
+            posed_frames: frame -> row of its pose in the port `frame_poses`,
+                which there is if this is given.
             role: of the geometry that it sees.
             unseen: frames and geometries that it does not see; by default
                 P, unless that is the world's frame.
@@ -161,6 +169,15 @@ class Lidar(LeafSystem):
         motion_tickets = set()
         if self._velocities is not None:
             motion_tickets.add(self._velocities.ticket())
+        self._frame_poses = None
+        self._posed_frames = dict(posed_frames or {})
+        if posed_frames is not None:
+            self._frame_poses = self.DeclareAbstractInputPort(
+                "frame_poses", Value(np.zeros((0, 4, 4)))
+            )
+            # What is out of sight is not moved.
+            motion_tickets.add(self._frame_poses.ticket())
+            motion_tickets |= self._pose_prerequisites()
         # Kept as long as nothing changes in the SceneGraph.
         self._seen = self.DeclareCacheEntry(
             description="ray-casting scene",
@@ -224,11 +241,26 @@ class Lidar(LeafSystem):
         revision = None
         if self._revision.HasValue(context):
             revision = self._revision.Eval(context)
-        seen.update(
-            self._geometry_query.Eval(context),
-            revision,
-            self._calc_motions(context),
-        )
+        query_object = self._geometry_query.Eval(context)
+        motions = self._calc_motions(context)
+        if self._frame_poses is None:
+            seen.update(query_object, revision, motions)
+        else:
+            known = KnownPoses(
+                self._posed_frames, self._frame_poses.Eval(context)
+            )
+            ball = self._calc_ball(context)
+            seen.update(query_object, revision, motions, known, ball)
+
+    def _calc_ball(self, context: Context) -> Ball:
+        """Returns the ball in which beams can meet anything."""
+        model = self._returns or self._measurement
+        reach = model.reach(self._pattern.max_range)
+        p_WSset, _ = self._calc_poses(context)
+        middle = p_WSset.mean(axis=0)
+        way = np.linalg.norm(p_WSset - middle, axis=1).max()
+        # A metre more than what rounding and fused beams could reach.
+        return Ball(middle, float(reach + way) + 1.0)
 
     def _calc_motions(self, context: Context) -> dict[FrameId, Motion]:
         """Returns the motion of each frame that does not stay."""
@@ -319,8 +351,9 @@ class Lidar(LeafSystem):
         """Returns the class of each geometry, as what moves has it."""
         if not self._moving.HasValue(context):
             return seen.label
-        moves = np.isin(seen.instance, self._moving.Eval(context))
-        return np.where(moves, seen.moving_label, seen.label)
+        moves = np.zeros(MAX_INSTANCE + 1, bool)
+        moves[self._moving.Eval(context)] = True
+        return np.where(moves[seen.instance], seen.moving_label, seen.label)
 
     def _frame(self, context: Context) -> int:
         return round(context.get_time() / self._pattern.period)

@@ -17,6 +17,12 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform
 
 from cns_drake.ray_casting.group_motion import Motion
+from cns_drake.ray_casting.moving_groups import (
+    EVERYWHERE,
+    NOTHING_KNOWN,
+    Ball,
+    KnownPoses,
+)
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.ray_casting.ray_groups import NO_MOTIONS
 from cns_drake.scene.perception_geometry import (
@@ -82,6 +88,8 @@ class SeenGeometry:
         query_object: QueryObject,
         revision: int | None,
         motions: Mapping[FrameId, Motion] = NO_MOTIONS,
+        known: KnownPoses = NOTHING_KNOWN,
+        seen: Ball = EVERYWHERE,
     ) -> None:
         """Moves what moves, and builds anew what changed.
 
@@ -90,6 +98,8 @@ class SeenGeometry:
             revision: of the geometry (`geometry_revision_port`), None if it
                 is not known. Then all geometries are looked at.
             motions: of the frames that move during the turn.
+            known: poses of frames for which `query_object` is not asked.
+            seen: where beams can meet anything.
 
         Raises:
             InputError: see `GeometryReader.read`.
@@ -98,12 +108,14 @@ class SeenGeometry:
             self._read(query_object.inspector())
         if self.scene is None or not self._is_built(query_object):
             self._build(query_object)
-            is_placed = not motions
+            is_placed = not motions and known is NOTHING_KNOWN
         else:
             is_placed = False
         assert self.scene is not None
         if not is_placed:
-            self.scene.set_frame_poses(query_object.GetPoseInWorld, motions)
+            self.scene.set_frame_poses(
+                query_object.GetPoseInWorld, motions, known, seen
+            )
         self._revision = revision
 
     def materials(self, *, is_wet: bool) -> Materials:

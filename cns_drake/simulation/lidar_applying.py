@@ -69,6 +69,7 @@ def apply_lidar_config(
         unseen=[plant.get_body(k) for k in plant.GetBodyIndices(world.vehicle)],
         with_sweep=distorts,
         moving_bodies=moving,
+        posed_frames=None if traffic is None else traffic.moving_frames,
         structures=world.structures,
         anchored_frames=world.anchored_frames(),
         num_threads=num_threads,

@@ -110,6 +110,7 @@ class SimulatedSequence(PlannedSequence):
             moving_bodies=(
                 traffic.moving_frames if traffic and distorts else None
             ),
+            posed_frames=traffic.moving_frames if traffic else None,
             structures=world.structures,
             anchored_frames=world.anchored_frames(),
         )

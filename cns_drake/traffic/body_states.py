@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from cns_drake.traffic.body_shapes import Limb
 from cns_drake.traffic.traffic_plan import TrafficPlan
@@ -40,8 +39,12 @@ class BodyStates(NamedTuple):
     @property
     def R_WB(self) -> np.ndarray:
         """The (N, 3, 3) orientations."""
-        angles = np.stack([self.yaw, self.pitch], axis=1)
-        return Rotation.from_euler("ZY", angles).as_matrix()
+        return _matrices(self.yaw, self.pitch)
+
+    @property
+    def quat_xyzw(self) -> np.ndarray:
+        """The (N, 4) orientations as unit quaternions."""
+        return _quaternions(self.yaw, self.pitch)
 
     @property
     def speed(self) -> np.ndarray:
@@ -83,14 +86,34 @@ class LimbTable:
 
     def poses(self, states: BodyStates) -> tuple[np.ndarray, np.ndarray]:
         """Returns R_WL (M, 3, 3) and p_WL (M, 3) of all limbs [m]."""
-        R_WB = states.R_WB[self.body]
-        angle = self._swing * states.swing[self.body]
-        # Forwards is about -y.
-        c, s = np.cos(angle), -np.sin(angle)
-        R_BL = np.zeros((len(angle), 3, 3))
-        R_BL[:, 0, 0], R_BL[:, 0, 2] = c, s
-        R_BL[:, 1, 1] = 1.0
-        R_BL[:, 2, 0], R_BL[:, 2, 2] = -s, c
+        yaw, pitch = self._angles(states)
         p_WB = np.where(states.present[:, None], states.p_WB, _AWAY)
+        R_WB = states.R_WB[self.body]
         p_WL = p_WB[self.body] + np.einsum("nij,nj->ni", R_WB, self._joint)
-        return R_WB @ R_BL, p_WL
+        return _matrices(yaw, pitch), p_WL
+
+    def quat_xyzw(self, states: BodyStates) -> np.ndarray:
+        """Returns the (M, 4) orientations of all limbs."""
+        return _quaternions(*self._angles(states))
+
+    def _angles(self, states: BodyStates) -> tuple[np.ndarray, np.ndarray]:
+        """Returns yaw and pitch of all limbs [rad]."""
+        swing = self._swing * states.swing[self.body]
+        # Forwards is about -y.
+        return states.yaw[self.body], states.pitch[self.body] - swing
+
+
+def _matrices(yaw: np.ndarray, pitch: np.ndarray) -> np.ndarray:
+    """Returns (N, 3, 3) rotations about y, then about z [rad]."""
+    (cy, sy), (cp, sp) = ((np.cos(a), np.sin(a)) for a in (yaw, pitch))
+    R = np.zeros((len(yaw), 3, 3))
+    R[:, 0, 0], R[:, 0, 1], R[:, 0, 2] = cy * cp, -sy, cy * sp
+    R[:, 1, 0], R[:, 1, 1], R[:, 1, 2] = sy * cp, cy, sy * sp
+    R[:, 2, 0], R[:, 2, 2] = -sp, cp
+    return R
+
+
+def _quaternions(yaw: np.ndarray, pitch: np.ndarray) -> np.ndarray:
+    """Returns what `_matrices` does as (N, 4) quaternions, x y z w."""
+    (cy, sy), (cp, sp) = ((np.cos(a / 2), np.sin(a / 2)) for a in (yaw, pitch))
+    return np.column_stack([-sy * sp, cy * sp, sy * cp, cy * cp])

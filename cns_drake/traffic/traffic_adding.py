@@ -11,7 +11,6 @@ from pydrake.geometry import (
     Capsule,
     Cylinder,
     FrameId,
-    GeometryFrame,
     GeometryInstance,
     IllustrationProperties,
     Mesh,
@@ -22,6 +21,8 @@ from pydrake.geometry import (
     SourceId,
 )
 from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.framework import DiagramBuilder, System
 
 from cns_drake.base.errors import InputError
@@ -39,6 +40,8 @@ from cns_drake.traffic.body_shapes import (
 )
 from cns_drake.traffic.traffic_motion import TrafficBody, TrafficMotion
 from cns_drake.traffic.traffic_plan import TrafficPlan
+
+_UNIT_MASS = SpatialInertia.SolidSphereWithMass(1.0, 1.0)
 
 
 def traffic_structures(plan: TrafficPlan, first: int = 1) -> StructureTable:
@@ -91,7 +94,10 @@ def make_traffic(
     if structures is None:
         structures = traffic_structures(plan)
     entries = [structures[entry.name] for entry in traffic_structures(plan)]
-    source = scene_graph.RegisterSource(name)
+    # A free body for each limb, so that Drake computes where frames are.
+    plant = MultibodyPlant(time_step=0.0)
+    plant.set_name(name)
+    source = plant.RegisterAsSourceForSceneGraph(scene_graph)
     bodies = []
     for k, entry in enumerate(entries):
         rng = np.random.default_rng([seed, k])
@@ -99,13 +105,14 @@ def make_traffic(
             limbs = vehicle_limbs(plan.kinds[k], rng)
         else:
             limbs = walker_limbs(rng)
-        frames = _register(scene_graph, source, entry.name, limbs)
+        frames = _register(scene_graph, plant, source, entry.name, limbs)
         bodies.append(
             TrafficBody(
                 entry.instance, entry.name, entry.semantic_class, limbs, frames
             )
         )
-    return TrafficMotion(plan, bodies, source, turn)
+    plant.Finalize()
+    return TrafficMotion(plan, bodies, plant, turn)
 
 
 def add_traffic(
@@ -163,11 +170,13 @@ def connect_traffic(
     Args:
         builder: of the diagram.
         traffic: what moves.
-        lidar: labels what moves as moving.
+        lidar: labels what moves as moving; made with the `moving_frames` of
+            `traffic` as `posed_frames`.
         goes_on: whether it sees traffic go on while it turns; then it was
-            made with the `moving_frames` of `traffic` as `moving_bodies`.
+            made with them as `moving_bodies`, too.
     """
     wanted = ["moving_instances"]
+    wanted += ["frame_poses"] if lidar.HasInputPort("frame_poses") else []
     wanted += ["body_spatial_velocities"] if goes_on else []
     for port in wanted:
         builder.Connect(traffic.GetOutputPort(port), lidar.GetInputPort(port))
@@ -175,15 +184,16 @@ def connect_traffic(
 
 def _register(
     scene_graph: SceneGraph,
+    plant: MultibodyPlant,
     source: SourceId,
     name: str,
     limbs: Sequence[Limb],
 ) -> tuple[FrameId, ...]:
     frames = []
     for limb in limbs:
-        frame = scene_graph.RegisterFrame(
-            source, GeometryFrame(f"{name}_{limb.name}")
-        )
+        # Nothing depends on the mass.
+        body = plant.AddRigidBody(f"{name}_{limb.name}", _UNIT_MASS)
+        frame = plant.GetBodyFrameIdOrThrow(body.index())
         frames.append(frame)
         for one in limb.shapes:
             geometry = scene_graph.RegisterGeometry(

@@ -7,49 +7,53 @@ from typing import NamedTuple
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
-from pydrake.geometry import FrameId, FramePoseVector, SourceId
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.geometry import FrameId, FramePoseVector
 from pydrake.multibody.math import SpatialVelocity
-from pydrake.systems.framework import Context, LeafSystem
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import Context, LeafSystem, ValueProducer
 from scipy.spatial.transform import Rotation
 
 from cns_drake.traffic.body_shapes import Limb
-from cns_drake.traffic.body_states import LimbTable, bodies_at
+from cns_drake.traffic.body_states import BodyStates, LimbTable, bodies_at
 from cns_drake.traffic.traffic_plan import WALKER_SIZE, TrafficPlan
 
 # What is faster is labelled as moving, what is slower as standing [m/s].
 MOVING_SPEED = 0.5
 
 
-class TrafficObject(NamedTuple):
-    """A vehicle or a walker at a time.
+class TrafficObjects(NamedTuple):
+    """The vehicles and walkers that are there at a time: N of them.
 
     Attributes:
-        instance: its id in points and tables.
-        name: of its structure.
-        semantic_class: a key of `CLASS_IDS`.
-        X_WO: pose of the middle of its box.
-        size: length, width, height of its box [m].
-        v_WO: velocity [m/s].
-        yaw_rate: [rad/s].
-        is_moving: whether it is faster than `MOVING_SPEED`.
+        instance: (N,) uint16 ids in points and tables.
+        names: of their structures.
+        semantic_classes: keys of `CLASS_IDS`.
+        p_WO: (N, 3) middles of their boxes [m].
+        quat_xyzw: (N, 4) orientations of their boxes.
+        sizes: (N, 3) length, width, height of their boxes [m].
+        v_WO: (N, 3) velocities [m/s].
+        yaw_rate: (N,) [rad/s].
+        is_moving: (N,) whether each is faster than `MOVING_SPEED`.
     """
 
-    instance: int
-    name: str
-    semantic_class: str
-    X_WO: RigidTransform
-    size: tuple[float, float, float]
+    instance: np.ndarray
+    names: tuple[str, ...]
+    semantic_classes: tuple[str, ...]
+    p_WO: np.ndarray
+    quat_xyzw: np.ndarray
+    sizes: np.ndarray
     v_WO: np.ndarray
-    yaw_rate: float
-    is_moving: bool
+    yaw_rate: np.ndarray
+    is_moving: np.ndarray
 
 
 class TrafficBody(NamedTuple):
     """What a vehicle or a walker is.
 
     Attributes:
-        instance, name, semantic_class: see `TrafficObject`.
+        instance: its id in points and tables.
+        name: of its structure.
+        semantic_class: a key of `CLASS_IDS`.
         limbs: what moves as one.
         frames: of the limbs.
     """
@@ -69,24 +73,26 @@ class TrafficMotion(LeafSystem):
         name: TrafficMotion
         output_ports:
         - geometry_pose
+        - frame_poses
         - body_spatial_velocities
         - moving_instances
         - objects
 
     `geometry_pose` is for the SceneGraph with which the bodies are
-    registered. `body_spatial_velocities` is abstract, a list over all limbs
-    of V_WL, expressed in the world: those that take a limb from where it is
-    to where it is a turn later, as a LiDAR wants them that goes on turning
-    meanwhile. `moving_instances` is abstract, the (N,) instance ids of who is
-    faster than `MOVING_SPEED`; `objects` a tuple of `TrafficObject`, of
-    everybody who is there. All depend on time alone.
+    registered. `frame_poses` is abstract, the same poses as one (M, 4, 4)
+    array over all limbs: X_WL. `body_spatial_velocities` is abstract, a list
+    over all limbs of V_WL, expressed in the world: those that take a limb
+    from where it is to where it is a turn later, as a LiDAR wants them that
+    goes on turning meanwhile. `moving_instances` is abstract, the (N,)
+    instance ids of who is faster than `MOVING_SPEED`; `objects` the
+    `TrafficObjects`. All depend on time alone.
     """
 
     def __init__(
         self,
         plan: TrafficPlan,
         bodies: Sequence[TrafficBody],
-        source_id: SourceId,
+        plant: MultibodyPlant,
         turn: float,
     ):
         """Prepares the motion.
@@ -94,50 +100,82 @@ class TrafficMotion(LeafSystem):
         Args:
             plan: who is where.
             bodies: of the vehicles, then of the walkers of the plan.
-            source_id: of their geometry.
+            plant: has a free body for each limb, in the same order, and is
+                the source of their geometry.
             turn: how long a LiDAR's turn takes [s].
         """
         super().__init__()
-        self.source_id = source_id
+        self.source_id = plant.get_source_id()
         self._plan = plan
         self._bodies = tuple(bodies)
         self._limbs = LimbTable([body.limbs for body in bodies])
         self._frames = [frame for body in bodies for frame in body.frames]
+        # Drake's own kinematics fill a FramePoseVector ten times as fast as
+        # calls from Python do, one for each frame.
+        self._plant = plant
+        self._plant_context = plant.CreateDefaultContext()
         self._turn = turn
-        self._sizes = [kind.size for kind in plan.kinds]
-        self._sizes += [WALKER_SIZE] * (len(bodies) - len(plan.kinds))
+        self._instances = np.array([b.instance for b in bodies], np.uint16)
+        self._sizes = np.array(
+            [kind.size for kind in plan.kinds]
+            + [WALKER_SIZE] * (len(bodies) - len(plan.kinds))
+        ).reshape(-1, 3)
+        now = {self.time_ticket()}
+        self._states = self.DeclareCacheEntry(
+            description="where bodies are",
+            value_producer=ValueProducer(
+                allocate=lambda: Value(object()), calc=self._calc_states
+            ),
+            prerequisites_of_calc=now,
+        )
+        self._poses = self.DeclareAbstractOutputPort(
+            "frame_poses",
+            lambda: Value(np.zeros((0, 4, 4))),
+            self._calc_frame_poses,
+            now,
+        )
         for name, model, calc in (
             ("geometry_pose", FramePoseVector(), self._calc_pose),
             ("moving_instances", np.zeros(0, np.uint16), self._calc_moving),
             ("objects", (), self._calc_objects),
         ):
             self.DeclareAbstractOutputPort(
-                name,
-                lambda model=model: Value(model),
-                calc,
-                {self.time_ticket()},
+                name, lambda model=model: Value(model), calc, now
             )
         self.DeclareAbstractOutputPort(
             "body_spatial_velocities",
             lambda: AbstractValue.Make([SpatialVelocity()]),
             self._calc_velocities,
-            {self.time_ticket()},
+            now,
         )
 
     @property
     def moving_frames(self) -> dict[FrameId, int]:
-        """Limb's frame -> its row in `body_spatial_velocities`."""
+        """Limb's frame -> its row in the ports of all limbs."""
         return {frame: k for k, frame in enumerate(self._frames)}
 
+    def _calc_states(self, context: Context, value: AbstractValue) -> None:
+        value.set_value(bodies_at(self._plan, context.get_time()))
+
+    def _calc_frame_poses(
+        self, context: Context, output: AbstractValue
+    ) -> None:
+        X_WLs = np.tile(np.eye(4), (len(self._frames), 1, 1))
+        X_WLs[:, :3, :3], X_WLs[:, :3, 3] = self._limbs.poses(
+            self._states.Eval(context)
+        )
+        output.set_value(X_WLs)
+
     def _calc_pose(self, context: Context, output: AbstractValue) -> None:
-        states = bodies_at(self._plan, context.get_time())
-        poses = FramePoseVector()
-        for frame, R_WL, p_WL in zip(
-            self._frames, *self._limbs.poses(states), strict=True
-        ):
-            rotation = RotationMatrix(R_WL)
-            poses.set_value(frame, RigidTransform(rotation, p_WL))
-        output.set_value(poses)
+        X_WLs = self._poses.Eval(context)
+        # Of each free body, quaternion (real part first) and position.
+        q = np.empty((len(X_WLs), 7))
+        quat_xyzw = self._limbs.quat_xyzw(self._states.Eval(context))
+        q[:, :4] = quat_xyzw[:, [3, 0, 1, 2]]
+        q[:, 4:] = X_WLs[:, :3, 3]
+        self._plant.SetPositions(self._plant_context, q.ravel())
+        port = self._plant.get_geometry_pose_output_port()
+        output.SetFrom(port.EvalAbstract(self._plant_context))
 
     def _calc_velocities(self, context: Context, output: AbstractValue) -> None:
         t = context.get_time()
@@ -151,30 +189,24 @@ class TrafficMotion(LeafSystem):
         output.set_value(list(map(SpatialVelocity, w, v)))
 
     def _calc_moving(self, context: Context, output: AbstractValue) -> None:
-        states = bodies_at(self._plan, context.get_time())
-        instances = np.array([b.instance for b in self._bodies], np.uint16)
-        output.set_value(instances[states.speed > MOVING_SPEED])
+        speed = self._states.Eval(context).speed
+        output.set_value(self._instances[speed > MOVING_SPEED])
 
     def _calc_objects(self, context: Context, output: AbstractValue) -> None:
-        states = bodies_at(self._plan, context.get_time())
-        R_WBs = states.R_WB
-        objects = []
-        for k, (body, size) in enumerate(
-            zip(self._bodies, self._sizes, strict=True)
-        ):
-            if states.present[k]:
-                R_WO = RotationMatrix(R_WBs[k])
-                up = R_WBs[k] @ (0.0, 0.0, size[2] / 2)
-                objects.append(
-                    TrafficObject(
-                        body.instance,
-                        body.name,
-                        body.semantic_class,
-                        RigidTransform(R_WO, states.p_WB[k] + up),
-                        size,
-                        states.v_WB[k],
-                        float(states.yaw_rate[k]),
-                        bool(states.speed[k] > MOVING_SPEED),
-                    )
-                )
-        output.set_value(tuple(objects))
+        states: BodyStates = self._states.Eval(context)
+        rows = np.flatnonzero(states.present)
+        R_WOs, sizes = states.R_WB[rows], self._sizes[rows]
+        bodies = [self._bodies[k] for k in rows]
+        output.set_value(
+            TrafficObjects(
+                self._instances[rows],
+                tuple(body.name for body in bodies),
+                tuple(body.semantic_class for body in bodies),
+                states.p_WB[rows] + R_WOs[:, :, 2] * sizes[:, 2:] / 2,
+                states.quat_xyzw[rows],
+                sizes,
+                states.v_WB[rows],
+                states.yaw_rate[rows],
+                states.speed[rows] > MOVING_SPEED,
+            )
+        )

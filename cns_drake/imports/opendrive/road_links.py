@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+from cns_drake.base.xml_elements import Element
 from cns_drake.imports.import_faults import ImportFaults
-from cns_drake.imports.opendrive.xml_elements import Element
 
 _ENDS = ("predecessor", "successor")
 

@@ -11,6 +11,7 @@ import re
 import numpy as np
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.xml_elements import Element, read_elements
 from cns_drake.imports.import_faults import ImportFaults
 from cns_drake.imports.opendrive.plan_view import (
     Arc,
@@ -29,7 +30,6 @@ from cns_drake.imports.opendrive.road_model import (
     RoadMark,
 )
 from cns_drake.imports.opendrive.road_things import read_things
-from cns_drake.imports.opendrive.xml_elements import Element, read_elements
 
 _KNOWN = frozenset(
     (

@@ -7,9 +7,9 @@ import math
 
 import numpy as np
 
+from cns_drake.base.xml_elements import Element
 from cns_drake.imports.import_faults import ImportFaults
 from cns_drake.imports.opendrive.road_model import Thing
-from cns_drake.imports.opendrive.xml_elements import Element
 
 _MOST_REPEATS = 10_000
 # What is repeated without a distance is cut into pieces so long [m].

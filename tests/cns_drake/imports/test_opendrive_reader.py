@@ -61,7 +61,7 @@ def test_files_that_are_none(tmp_path, text, fault):
 
 
 def test_more_elements_than_any_road_map_has(tmp_path, monkeypatch):
-    name = "cns_drake.imports.opendrive.xml_elements._MOST_ELEMENTS"
+    name = "cns_drake.base.xml_elements._MOST_ELEMENTS"
     monkeypatch.setattr(name, 1000)
     path = tmp_path / "a.xodr"
     path.write_text("<OpenDRIVE>" + "<road/>" * 2000 + "</OpenDRIVE>")

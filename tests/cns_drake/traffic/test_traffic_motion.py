@@ -5,6 +5,7 @@ from pydrake.geometry import Role, SceneGraph
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import DiagramBuilder
 import pytest
+from scipy.spatial.transform import Rotation
 
 from cns_drake.scene.perception_geometry import read_perception_geometry
 from cns_drake.sensors.lidar import Lidar
@@ -45,7 +46,7 @@ def make_plan():
     )
 
 
-def make_diagram(plan, goes_on):
+def make_diagram(plan, goes_on, is_posed=True):
     builder = DiagramBuilder()
     scene_graph = builder.AddSystem(SceneGraph())
     structures = traffic_structures(plan, 101)
@@ -63,6 +64,7 @@ def make_diagram(plan, goes_on):
             make_beam_pattern("os1-128", 0.05),
             structures=structures,
             moving_bodies=traffic.moving_frames if goes_on else None,
+            posed_frames=traffic.moving_frames if is_posed else None,
         ),
     )
     place_traffic(builder, scene_graph, traffic)
@@ -165,18 +167,40 @@ def test_points_in_boxes_are_those_of_instances(scanned):
     objects = traffic.GetOutputPort("objects").Eval(
         traffic.GetMyContextFromRoot(context)
     )
-    assert [one.instance for one in objects] == [101, 102, 103, 104, 105]
+    assert objects.instance.tolist() == [101, 102, 103, 104, 105]
     p_WR = X_WS.multiply(np.stack([scan[c] for c in "xyz"]).astype(float))
-    for one in objects:
-        p_OR = one.X_WO.inverse().multiply(p_WR)
-        half = np.array(one.size)[:, None] / 2
+    for k, instance in enumerate(objects.instance):
+        R_WO = Rotation.from_quat(objects.quat_xyzw[k]).as_matrix()
+        p_OR = R_WO.T @ (p_WR - objects.p_WO[k][:, None])
+        half = objects.sizes[k][:, None] / 2
         inside = (np.abs(p_OR) <= half + 1e-3).all(axis=0)
-        own = scan["instance"] == one.instance
+        own = scan["instance"] == instance
         np.testing.assert_array_equal(inside, own)
-    moving = [one.instance for one in objects if one.is_moving]
+    moving = objects.instance[objects.is_moving].tolist()
     assert moving == [101, 103, 104]
-    np.testing.assert_allclose(np.linalg.norm(objects[0].v_WO), 6.0, rtol=2e-4)
-    assert objects[0].yaw_rate == pytest.approx(0.3, rel=1e-6)
+    np.testing.assert_allclose(np.linalg.norm(objects.v_WO[0]), 6.0, rtol=2e-4)
+    assert objects.yaw_rate[0] == pytest.approx(0.3, rel=1e-6)
+
+
+def test_poses_as_one_array_are_those_of_the_scene_graph(scanned):
+    """And a LiDAR sees the same with either of them."""
+    scan, traffic, scene_graph, _, _, context, goes_on = scanned
+    query_object = scene_graph.get_query_output_port().Eval(
+        scene_graph.GetMyContextFromRoot(context)
+    )
+    X_WLs = traffic.GetOutputPort("frame_poses").Eval(
+        traffic.GetMyContextFromRoot(context)
+    )
+    for frame, row in traffic.moving_frames.items():
+        np.testing.assert_allclose(
+            query_object.GetPoseInWorld(frame).GetAsMatrix4(),
+            X_WLs[row],
+            atol=1e-13,
+        )
+    other, *_ = make_diagram(make_plan(), goes_on, is_posed=False)
+    np.testing.assert_array_equal(other["instance"], scan["instance"])
+    for axis in "xyz":
+        np.testing.assert_allclose(other[axis], scan[axis], atol=2e-3)
 
 
 def test_limbs_stay_in_the_walkers_box():

@@ -1,0 +1,174 @@
+"""Groups that move, and which of them have to be placed anew."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from pydrake.geometry import FrameId
+from pydrake.math import RigidTransform
+
+from cns_drake.ray_casting.group_motion import Motion
+from cns_drake.ray_casting.ray_groups import NO_MOTIONS, Member, RayGroup
+from cns_drake.scene.surfaces import (
+    CapsuleSurface,
+    CylinderSurface,
+    EllipsoidSurface,
+    TriangleSurface,
+)
+
+
+class KnownPoses(NamedTuple):
+    """Poses of frames as one array.
+
+    Attributes:
+        rows: frame -> its row in the array; always the same object.
+        X_WFs: (M, 4, 4) poses in the world.
+    """
+
+    rows: Mapping[FrameId, int]
+    X_WFs: np.ndarray
+
+
+class Ball(NamedTuple):
+    """A ball in the world.
+
+    Attributes:
+        p_W: its centre [m].
+        radius: [m].
+    """
+
+    p_W: np.ndarray
+    radius: float
+
+
+NOTHING_KNOWN = KnownPoses({}, np.zeros((0, 4, 4)))
+EVERYWHERE = Ball(np.zeros(3), np.inf)
+
+
+class MovingGroups:
+    """The groups of a scene that are on frames which are not anchored."""
+
+    def __init__(self, groups: Sequence[RayGroup], p_WO: np.ndarray):
+        """Takes groups that are placed.
+
+        Args:
+            groups: all groups of the scene.
+            p_WO: the scene's origin.
+        """
+        self._groups = groups
+        self._p_WO = p_WO
+        self._rows = [
+            row
+            for row, group in enumerate(groups)
+            if group.frame_id is not None
+        ]
+        moving = [groups[row] for row in self._rows]
+        self._frames = [group.frame_id for group in moving]
+        self._X_FLs = np.array([group.X_FL for group in moving])
+        self._X_OLs = np.array([group.X_OL for group in moving])
+        self._radii = np.array([_radius_about_F(group) for group in moving])
+        self._known: Mapping[FrameId, int] = NOTHING_KNOWN.rows
+        self._known_rows = np.full(len(moving), -1)
+        self._in_sight = np.ones(len(moving), bool)
+        self._was_in_motion = np.zeros(len(moving), bool)
+
+    def place(
+        self,
+        calc_X_WF: Callable[[FrameId], RigidTransform],
+        motions: Mapping[FrameId, Motion] = NO_MOTIONS,
+        known: KnownPoses = NOTHING_KNOWN,
+        seen: Ball = EVERYWHERE,
+    ) -> list[int]:
+        """Sets `X_OL`, `motion` and `in_sight` of groups.
+
+        Groups that are out of sight stay where they are, and so do those
+        whose frames have not moved.
+
+        Args:
+            calc_X_WF: gives the pose of a frame in the world.
+            motions: of the frames that move during the turn.
+            known: poses of frames for which `calc_X_WF` is not asked.
+            seen: where rays can meet anything.
+
+        Returns:
+            The rows of the groups that were placed.
+        """
+        if not self._rows:
+            return []
+        frames = self._frames
+        X_WFs = self._find_poses(calc_X_WF, known)
+        X_OLs = (X_WFs @ self._X_FLs)[:, :3]
+        X_OLs[:, :, 3] -= self._p_WO
+        moves = np.zeros(len(frames), bool)
+        if motions:
+            moves = np.array([frame in motions for frame in frames])
+        reaches = self._radii.copy()
+        for k in np.flatnonzero(moves):
+            motion = motions[frames[k]]
+            reaches[k] += np.linalg.norm(motion.v) * motion.duration
+        in_sight = _meets(seen, X_WFs[:, :3, 3], reaches)
+        differs = (X_OLs != self._X_OLs).any(axis=(1, 2))
+        differs |= moves | self._was_in_motion
+        placed = np.flatnonzero(
+            (in_sight & differs) | (in_sight != self._in_sight)
+        )
+        for k in placed:
+            group = self._groups[self._rows[k]]
+            group.X_OL = X_OLs[k]
+            group.motion = motions[frames[k]] if moves[k] else None
+            group.in_sight = bool(in_sight[k])
+        self._X_OLs[placed] = X_OLs[placed]
+        self._was_in_motion[placed] = moves[placed]
+        self._in_sight = in_sight
+        return [self._rows[k] for k in placed]
+
+    def _find_poses(
+        self,
+        calc_X_WF: Callable[[FrameId], RigidTransform],
+        known: KnownPoses,
+    ) -> np.ndarray:
+        """Returns the (G, 4, 4) poses of frames."""
+        if known.rows is not self._known:
+            self._known = known.rows
+            self._known_rows = np.array(
+                [known.rows.get(frame, -1) for frame in self._frames]
+            )
+        X_WFs = np.empty((len(self._frames), 4, 4))
+        rows = self._known_rows
+        X_WFs[rows >= 0] = known.X_WFs[rows[rows >= 0]]
+        for k in np.flatnonzero(rows < 0):
+            X_WFs[k] = calc_X_WF(self._frames[k]).GetAsMatrix4()
+        return X_WFs
+
+
+def _meets(ball: Ball, places: np.ndarray, radii: np.ndarray) -> np.ndarray:
+    """Returns which balls at places [m], of radii [m], meet a ball."""
+    distance = np.linalg.norm(places - ball.p_W, axis=1)
+    return distance <= ball.radius + radii
+
+
+def _radius_about_F(group: RayGroup) -> float:
+    """Returns how far from F's origin a group reaches at most [m]."""
+    stretch = float(np.linalg.norm(group.X_FL[:3, :3], 2))
+    middle = float(np.linalg.norm(group.X_FL[:3, 3]))
+    return middle + stretch * _radius_about_L(group.members)
+
+
+def _radius_about_L(members: Iterable[Member]) -> float:
+    radii = []
+    for _, X_LG, surface in members:
+        if isinstance(surface, TriangleSurface):
+            p_LVset = surface.p_GVset @ X_LG.rotation().matrix().T
+            p_LVset = p_LVset + X_LG.translation()
+            radii.append(float(np.linalg.norm(p_LVset, axis=1).max(initial=0)))
+            continue
+        if isinstance(surface, EllipsoidSurface):
+            radius = max(surface.semi_axes)
+        elif isinstance(surface, CylinderSurface | CapsuleSurface):
+            radius = surface.radius + surface.length / 2.0
+        else:
+            radius = np.inf
+        radii.append(float(np.linalg.norm(X_LG.translation())) + radius)
+    return max(radii)

@@ -1,0 +1,76 @@
+"""Messages of which only numbers and the stamp change.
+
+Their CDR form is made once; then the numbers are put where they belong, which
+takes a hundredth of the time.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from cns_drake.base.recordings.ros_types import serialize
+
+# What stands in a message for its numbers: these and the following integers,
+# which are exact in double precision and larger than any measurement.
+_FIRST_MARK = 2.0**52
+# What stands for the stamp: seconds and nanoseconds. No stamp of a drive has
+# more than 10^9 nanoseconds.
+_SEC_MARK, _NANOSEC_MARK = 0x5A17C0DE, 0x71B3E5A9
+STAMP_MARK_NS = (_SEC_MARK, _NANOSEC_MARK)
+# CDR says how it is encoded first; places are aligned from there on.
+_ENCAPSULATION = 4
+
+
+def number_marks(count: int) -> np.ndarray:
+    """Returns (count,) numbers to make the message of a template with."""
+    return _FIRST_MARK + np.arange(count)
+
+
+class MessageTemplate:
+    """The CDR form of a message, with places for float64 and for a stamp."""
+
+    def __init__(self, message: Any, num_numbers: int):
+        """Finds the places.
+
+        Args:
+            message: made with `number_marks(num_numbers)` and with times of
+                the seconds and nanoseconds of `STAMP_MARK_NS`.
+            num_numbers: N.
+
+        Raises:
+            ValueError: a number is missing.
+        """
+        self._data = np.frombuffer(serialize(message), np.uint8)
+        numbers, words = self._views(self._data)
+        with np.errstate(invalid="ignore"):
+            which = numbers - _FIRST_MARK
+            self._places = np.flatnonzero(
+                (which >= 0) & (which < num_numbers) & (which % 1 == 0)
+            )
+        self._which = which[self._places].astype(int)
+        if len(np.unique(self._which)) != num_numbers:
+            raise ValueError("a message lacks some of its numbers")
+        self._stamps = np.flatnonzero(
+            (words[:-1] == _SEC_MARK) & (words[1:] == _NANOSEC_MARK)
+        )
+
+    @staticmethod
+    def _views(data: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Returns all that can be a float64, and all that can be a uint32."""
+        body = data[_ENCAPSULATION:]
+        return (
+            body[: len(body) // 8 * 8].view("<f8"),
+            body[: len(body) // 4 * 4].view("<u4"),
+        )
+
+    def fill(self, numbers: np.ndarray, stamp_ns: int) -> bytes:
+        """Returns the CDR form of the message with N numbers and a stamp."""
+        data = self._data.copy()
+        floats, words = self._views(data)
+        floats[self._places] = numbers[self._which]
+        words[self._stamps], words[self._stamps + 1] = divmod(
+            stamp_ns, 1_000_000_000
+        )
+        return data.tobytes()
