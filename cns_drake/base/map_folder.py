@@ -9,6 +9,7 @@ ROADS_NAME = "roads.yaml"
 PLAN_NAME = "city.yaml"
 STAGES_NAME = "stages.yaml"
 STRUCTURES_NAME = "structures.csv"
+LANES_NAME = "lanes.json"
 MESH_FOLDER = "meshes"
 
 
@@ -36,6 +37,11 @@ class MapFolder:
     def roads(self) -> Path:
         """The road network."""
         return self.path / ROADS_NAME
+
+    @property
+    def lanes(self) -> Path:
+        """Lanes and walkways of an imported map, for traffic."""
+        return self.path / LANES_NAME
 
     @property
     def plan(self) -> Path:

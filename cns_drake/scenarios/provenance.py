@@ -60,10 +60,10 @@ def digest_inputs(
         watch: also takes down each file, before it is read.
 
     Returns:
-        `world`, `vehicle`, and `structures`, `suspension`, `roads`,
-        `waypoints` or `kalibr` where there are such -> hexadecimal digest. It
-        depends on contents and on the relative names alone, not on where the
-        files lie.
+        `world`, `vehicle`, and `structures`, `suspension`, `roads`, `lanes`,
+        `waypoints`, `fcd` or `kalibr` where there are such -> hexadecimal
+        digest. It depends on contents and on the relative names alone, not on
+        where the files lie.
 
     Raises:
         InputError: a file cannot be read.
@@ -77,12 +77,15 @@ def digest_inputs(
     if scenario.waypoints is not None:
         inputs["waypoints"] = Path(scenario.waypoints)
     roads = map_folder(scenario).roads
-    if (
-        scenario.waypoints is None
-        or not scenario.traffic.is_off
-        or (not scenario.transient.is_off and roads.is_file())
+    has_traffic = not scenario.traffic.is_off
+    if scenario.waypoints is None or (
+        roads.is_file() and (has_traffic or not scenario.transient.is_off)
     ):
         inputs["roads"] = roads
+    elif has_traffic:
+        inputs["lanes"] = map_folder(scenario).lanes
+    if scenario.traffic.fcd is not None:
+        inputs["fcd"] = Path(scenario.traffic.fcd)
     watch = watch or FileWatch()
     digests = {name: digest_file(path, watch) for name, path in inputs.items()}
     if scenario.imu.kalibr is not None:
@@ -116,6 +119,9 @@ def recording_fingerprint(scenario: Scenario, inputs: dict[str, str]) -> str:
     if scenario.imu.kalibr is not None:
         update = {"kalibr": KALIBR_FILE}
         places["imu"] = scenario.imu.model_copy(update=update)
+    if scenario.traffic.fcd is not None:
+        update = {"fcd": Path(scenario.traffic.fcd).name}
+        places["traffic"] = scenario.traffic.model_copy(update=update)
     return fingerprint(
         {
             # As text, since the order of LiDARs matters.

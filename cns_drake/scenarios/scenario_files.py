@@ -53,6 +53,9 @@ def check_files(scenario: Scenario, source: object = None) -> None:
                 f"{source}: imu.kalibr: {scenario.imu.kalibr}: no such file"
             )
         imu_rate(scenario)
+    fcd = scenario.traffic.fcd
+    if fcd is not None and not os.path.isfile(fcd):
+        raise InputError(f"{source}: traffic.fcd: {fcd}: no such file")
     has_traffic = not scenario.traffic.is_off
     if scenario.map is None:
         if has_traffic:
@@ -73,10 +76,10 @@ def check_files(scenario: Scenario, source: object = None) -> None:
             f"{source}: stage: map '{scenario.map}' has no stage "
             f"'{scenario.stage}'; it has: {stages}"
         )
-    if has_traffic and not os.path.isfile(folder.roads):
+    if has_traffic and not (folder.roads.is_file() or folder.lanes.is_file()):
         raise InputError(
-            f"{source}: traffic: the map has no roads: {folder.roads}: no such "
-            "file"
+            f"{source}: traffic: the map has no roads: neither "
+            f"{folder.roads.name} nor {folder.lanes.name} in {folder.path}"
         )
 
 
@@ -102,4 +105,10 @@ def describe_scenario(scenario: Scenario, folder: Path | None = None) -> dict:
             values[field] = os.path.relpath(place, folder.resolve())
     if scenario.imu.kalibr is not None:
         values["imu"]["kalibr"] = KALIBR_FILE
+    fcd = scenario.traffic.fcd
+    if fcd is not None:
+        values["traffic"]["fcd"] = Path(fcd).name
+        if folder is not None:
+            place = os.path.relpath(fcd, folder.resolve())
+            values["traffic"]["fcd"] = place
     return values

@@ -85,20 +85,21 @@ def read_scenario_file(path: Path) -> Scenario:
                 values[field] = str((path.parent / place).resolve())
             except ValueError as error:
                 raise InputError(f"{path}: {field}: {error}") from error
-    find_kalibr(values, path)
+    find_files(values, path)
     scenario = make_scenario(values, path)
     scenario._file = path
     return scenario
 
 
-def find_kalibr(values: dict, path: Path) -> None:
-    """Makes the path of the IMU's noise one that holds everywhere.
+def find_files(values: dict, path: Path) -> None:
+    """Makes paths in sections ones that hold everywhere.
 
     Args:
         values: fields of a scenario or a family, to change.
-        path: the file that they are from; the path is relative to it.
+        path: the file that they are from; the paths are relative to it.
     """
-    imu = values.get("imu")
-    if isinstance(imu, dict) and isinstance(imu.get("kalibr"), str):
-        kalibr = str((path.parent / imu["kalibr"]).resolve())
-        values["imu"] = {**imu, "kalibr": kalibr}
+    for section, field in (("imu", "kalibr"), ("traffic", "fcd")):
+        fields = values.get(section)
+        if isinstance(fields, dict) and isinstance(fields.get(field), str):
+            place = str((path.parent / fields[field]).resolve())
+            values[section] = {**fields, field: place}

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from cns_drake.scenarios.section import Section
+from cns_drake.scenarios.section import Section, field_off_by_default
 
 # No map holds more.
 _MOST = 2000
@@ -18,13 +18,25 @@ class TrafficConfig(Section):
             drive along the map's roads.
         walkers: how many people walk on its sidewalks and crossings.
         seed: seed of their kinds, starts and ways.
+        fcd: a trace of SUMO (floating-car data) to play instead; then there
+            is nobody else.
     """
 
     vehicles: int = Field(default=0, ge=0, le=_MOST)
     walkers: int = Field(default=0, ge=0, le=_MOST)
     seed: int = Field(default=1, ge=0)
+    fcd: str | None = field_off_by_default(None)
+
+    @model_validator(mode="after")
+    def _check_fcd(self) -> TrafficConfig:
+        if self.fcd is not None and (self.vehicles or self.walkers):
+            raise ValueError(
+                "fcd: the trace says who is there; leave out vehicles and "
+                "walkers"
+            )
+        return self
 
     @property
     def is_off(self) -> bool:
         """Whether nobody moves."""
-        return self.vehicles == self.walkers == 0
+        return self.fcd is None and self.vehicles == self.walkers == 0

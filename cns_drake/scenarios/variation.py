@@ -51,7 +51,7 @@ from cns_drake.scenarios.scenario_files import (
     map_folder,
     world_file,
 )
-from cns_drake.scenarios.scenario_loading import find_kalibr, load_scenario
+from cns_drake.scenarios.scenario_loading import find_files, load_scenario
 from cns_drake.scenarios.shipped import shipped_sequences
 from cns_drake.scene.world import load_world, structures_in
 
@@ -163,7 +163,7 @@ def load_family(path: Path, redraw: Redraw | None = None) -> list[Scenario]:
     """
     values = read_yaml(path)
     if isinstance(values, dict):
-        find_kalibr(values, path)
+        find_files(values, path)
     try:
         family = Family.model_validate(values)
     except ValidationError as error:

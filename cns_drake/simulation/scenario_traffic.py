@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.map_folder import MapFolder
 from cns_drake.motion.trajectory import Trajectory
 from cns_drake.recording.frame_clock import FRAME_PERIOD
 from cns_drake.roads.network import load_road_network
+from cns_drake.scenarios.planning import count_frames
+from cns_drake.scenarios.rates import frame_period
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import check_files, map_folder
+from cns_drake.scenarios.traffic_config import TrafficConfig
 from cns_drake.scene.world import World
+from cns_drake.traffic.fcd_trace import read_fcd
+from cns_drake.traffic.fcd_traffic import play_trace
+from cns_drake.traffic.lane_file import read_lanes
+from cns_drake.traffic.lane_graph import LaneGraph
 from cns_drake.traffic.presence import EgoBox
 from cns_drake.traffic.road_lanes import make_lane_graph
 from cns_drake.traffic.starting_places import (
@@ -21,7 +31,7 @@ from cns_drake.traffic.starting_places import (
 )
 from cns_drake.traffic.traffic_adding import traffic_structures
 from cns_drake.traffic.traffic_plan import TrafficPlan, plan_traffic
-from cns_drake.traffic.walkways import make_walkways
+from cns_drake.traffic.walkways import Walkway, make_walkways
 
 # Size of the car in worlds/vehicle.sdf, with mirrors and wheels [m].
 EGO_BOX = EgoBox(rear=-1.05, front=3.75, half_width=1.05)
@@ -38,7 +48,7 @@ def plan_scenario_traffic(
 
     Raises:
         InputError: the map has no roads or sidewalks, or they do not hold so
-            many.
+            many; or the trace cannot be played here.
 
     Example:
         from cns_drake import load_scenario, plan_drive, plan_scenario_traffic
@@ -49,28 +59,26 @@ def plan_scenario_traffic(
     wanted = scenario.traffic
     where = f"{scenario.source}: traffic"
     check_files(scenario)
-    network = load_road_network(map_folder(scenario).roads)
-    graph = make_lane_graph(network)
-    room = room_for_vehicles(graph)
-    if wanted.vehicles > room:
-        raise InputError(
-            f"{where}: vehicles: {wanted.vehicles} asked for, the roads hold "
-            f"{room}"
-        )
-    walkways = make_walkways(network, graph)
-    room = room_for_walkers(walkways)
-    if wanted.walkers and not room:
-        raise InputError(f"{where}: walkers: the map has no sidewalks")
-    if wanted.walkers > room:
-        raise InputError(
-            f"{where}: walkers: {wanted.walkers} asked for, the sidewalks hold "
-            f"{room}"
-        )
+    graph, walkways = _load_ways(map_folder(scenario))
 
     def ego(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         R_WB, p_WB = trajectory.poses(np.minimum(t, trajectory.duration))
         return p_WB[:, :2], np.unwrap(np.arctan2(R_WB[:, 1, 0], R_WB[:, 0, 0]))
 
+    if wanted.fcd is not None:
+        trace = Path(wanted.fcd)
+        num_frames = count_frames(scenario, trajectory)
+        return play_trace(
+            read_fcd(trace),
+            trace,
+            graph,
+            walkways,
+            seed=wanted.seed,
+            duration=(num_frames - 1) * frame_period(scenario.lidars),
+            ego=ego,
+            ego_box=EGO_BOX,
+        )
+    _check_room(wanted, where, graph, walkways)
     plan = plan_traffic(
         graph,
         walkways,
@@ -85,6 +93,42 @@ def plan_scenario_traffic(
     if wanted.vehicles and not plan.kinds:
         raise InputError(f"{where}: the car leaves no room for vehicles")
     return plan
+
+
+def _load_ways(folder: MapFolder) -> tuple[LaneGraph, list[Walkway]]:
+    """Returns what vehicles and walkers follow on a map."""
+    if not folder.roads.is_file():
+        return read_lanes(folder.lanes)
+    network = load_road_network(folder.roads)
+    graph = make_lane_graph(network)
+    return graph, make_walkways(network, graph)
+
+
+def _check_room(
+    wanted: TrafficConfig,
+    where: str,
+    graph: LaneGraph,
+    walkways: Sequence[Walkway],
+) -> None:
+    """Checks that roads and sidewalks hold so many.
+
+    Raises:
+        InputError: they do not.
+    """
+    room = room_for_vehicles(graph)
+    if wanted.vehicles > room:
+        raise InputError(
+            f"{where}: vehicles: {wanted.vehicles} asked for, the roads hold "
+            f"{room}"
+        )
+    room = room_for_walkers(walkways)
+    if wanted.walkers and not room:
+        raise InputError(f"{where}: walkers: the map has no sidewalks")
+    if wanted.walkers > room:
+        raise InputError(
+            f"{where}: walkers: {wanted.walkers} asked for, the sidewalks hold "
+            f"{room}"
+        )
 
 
 def with_traffic(world: World, plan: TrafficPlan) -> World:

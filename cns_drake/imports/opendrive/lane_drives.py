@@ -46,6 +46,15 @@ class BandGraph(WayGraph):
         self._roads = np.array([band.road.name for band in self._bands])
         super().__init__(np.array(lengths), *self._link())
 
+    def driven(self) -> list[tuple[LaneBand, np.ndarray]]:
+        """Returns each lane with its middle (N, 3) as it is driven [m]."""
+        return list(zip(self._bands, self._lines, strict=True))
+
+    def followers(self) -> list[tuple[int, int]]:
+        """Returns numbers of lanes of which the second follows the first."""
+        before, after = self._link()
+        return list(zip(before.tolist(), after.tolist(), strict=True))
+
     def _link(self) -> tuple[np.ndarray, np.ndarray]:
         lines = self._lines
         starts = np.array([line[0] for line in lines]).reshape(-1, 3)

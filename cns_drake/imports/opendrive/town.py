@@ -31,6 +31,7 @@ from cns_drake.imports.opendrive.imported_streets import (
 )
 from cns_drake.imports.opendrive.lane_bands import LaneBand, lane_bands
 from cns_drake.imports.opendrive.lane_drives import find_lane_drives
+from cns_drake.imports.opendrive.lane_traffic import lanes_for_traffic
 from cns_drake.imports.opendrive.road_heights import RoadHeights
 from cns_drake.imports.opendrive.road_levels import split_levels
 from cns_drake.imports.opendrive.road_marks import road_marks
@@ -63,6 +64,7 @@ class Town:
         stages: what stands when.
         streets: the areas of the roads that lie on the ground.
         drives: two, or fewer, through it.
+        lanes: the text of the file of lanes, None where traffic has none.
         kinds: what there is -> how many.
         faults: what was repaired or left out.
     """
@@ -73,6 +75,7 @@ class Town:
     stages: Stages
     streets: ImportedStreets
     drives: list[Drive]
+    lanes: str | None
     kinds: dict[str, int]
     faults: ImportFaults
 
@@ -187,6 +190,7 @@ def _build(
         Stages.model_validate(stages),
         streets,
         find_lane_drives(bands),
+        lanes_for_traffic(bands, kerb),
         _kinds(roads, things, decks, marks, generated),
         faults,
     )

@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 import yaml
 
-from cns_drake.base.map_folder import MESH_FOLDER, stage_name
+from cns_drake.base.map_folder import LANES_NAME, MESH_FOLDER, stage_name
 from cns_drake.city.generation.generate import render_stages
 from cns_drake.city.geometry.polygons import polygons_of
 from cns_drake.city.geometry.structures import MeshShape, Structure
@@ -65,6 +65,8 @@ def write_town(
     (draft / MESH_FOLDER).mkdir(exist_ok=True)
     for name, text in files.items():
         (draft / name).write_text(text, "utf-8")
+    if town.lanes is not None:
+        (draft / LANES_NAME).write_text(town.lanes, "utf-8")
     _write_facts(draft, source, town)
     write_drives(
         draft,

@@ -56,7 +56,8 @@ def test_a_map_without_roads(town):
     roads = town / "roads.yaml"
     roads.unlink()
     assert fault(scenario, walkers=1) == (
-        f"tiny_01: traffic: the map has no roads: {roads}: no such file"
+        "tiny_01: traffic: the map has no roads: neither roads.yaml nor "
+        f"lanes.json in {town}"
     )
 
 

@@ -1,0 +1,223 @@
+"""Traffic that a trace of SUMO has recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+import zlib
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from cns_drake.base.errors import InputError
+from cns_drake.traffic.fcd_trace import FcdTrace, TracedObject
+from cns_drake.traffic.lane_graph import LaneGraph
+from cns_drake.traffic.overlaps import find_overlaps
+from cns_drake.traffic.presence import EgoBox
+from cns_drake.traffic.tracks import Tracks
+from cns_drake.traffic.traffic_plan import EgoPath, TrafficPlan
+from cns_drake.traffic.vehicle_kinds import KINDS, VehicleKind
+from cns_drake.traffic.walker_steps import (
+    WALKER_LENGTH,
+    WALKER_WIDTH,
+    gait_rate,
+)
+from cns_drake.traffic.walkways import Walkway
+
+# Half of the vehicles of a map's own trace are nearer to its lanes [m].
+_OFF_ROAD = 5.0
+# Part of the name of a type -> kind; the first that fits counts.
+_KINDS_BY_WORD = (
+    ("bicycle", "bicycle"),
+    ("bike", "bicycle"),
+    ("motorcycle", "motorcycle"),
+    ("moped", "motorcycle"),
+    ("bus", "bus"),
+    ("coach", "bus"),
+    ("truck", "box_truck"),
+    ("trailer", "box_truck"),
+    ("van", "van"),
+    ("delivery", "van"),
+)
+_CARS = tuple(kind for kind in KINDS if kind.semantic_class == "car")
+
+
+def play_trace(
+    trace: FcdTrace,
+    path: Path,
+    graph: LaneGraph,
+    walkways: Sequence[Walkway],
+    *,
+    seed: int,
+    duration: float,
+    ego: EgoPath,
+    ego_box: EgoBox,
+) -> TrafficPlan:
+    """Returns the traffic of a trace, whose first time is that of the drive.
+
+    Who would meet the ego car, whom SUMO has not seen, is left out.
+
+    Args:
+        trace: what to play.
+        path: its file, for errors.
+        graph: lanes of the map; heights are theirs.
+        walkways: of the map; likewise.
+        seed: of what kinds of cars there are.
+        duration: of the drive [s].
+        ego: where the ego car is.
+        ego_box: what it covers.
+
+    Raises:
+        InputError: the trace is shorter than the drive, or is of another map.
+    """
+    if trace.duration < duration - 1e-6:
+        raise InputError(
+            f"{path}: the trace has {trace.duration:g} s from "
+            f"{trace.begin:g} s on, the drive takes {duration:.2f} s: record "
+            "more, or lower frames"
+        )
+    lanes = np.concatenate([piece.points for piece in graph.pieces])
+    _check_place(trace, path, lanes)
+    kinds = [_kind(one, seed) for one in trace.vehicles]
+    heights = _Heights(lanes)
+    vehicles = _make_tracks(
+        trace,
+        trace.vehicles,
+        [
+            _vehicle_rows(*pair, heights)
+            for pair in zip(trace.vehicles, kinds, strict=True)
+        ],
+    )
+    heights = _Heights(
+        np.concatenate([lanes, *(walkway.points for walkway in walkways)])
+    )
+    walkers = _make_tracks(
+        trace,
+        trace.persons,
+        [_person_rows(one, heights, trace.dt) for one in trace.persons],
+    )
+    half = [(kind.size[0] / 2, kind.size[1] / 2) for kind in kinds]
+    kept = ~_meet_ego(vehicles, half, ego, ego_box)
+    half = [(WALKER_LENGTH / 2, WALKER_WIDTH / 2)] * len(trace.persons)
+    kept_walkers = ~_meet_ego(walkers, half, ego, ego_box)
+    return TrafficPlan(
+        tuple(kind for kind, one in zip(kinds, kept, strict=True) if one),
+        vehicles.select(kept),
+        walkers.select(kept_walkers),
+        int((~kept).sum() + (~kept_walkers).sum()),
+    )
+
+
+def _check_place(trace: FcdTrace, path: Path, lanes: np.ndarray) -> None:
+    """Checks that vehicles are on lanes, or persons near them.
+
+    Raises:
+        InputError: they are not.
+    """
+    traced = trace.vehicles or trace.persons
+    places = np.concatenate([one.xy for one in traced])
+    distances, _ = cKDTree(lanes[:, :2]).query(places)
+    off_road = _OFF_ROAD if trace.vehicles else 10.0 * _OFF_ROAD
+    if np.median(distances) > off_road:
+        raise InputError(
+            f"{path}: half of it is more than {off_road:g} m from the map's "
+            f"lanes: it lies at {_extent(places)}, they at "
+            f"{_extent(lanes)}; give a trace of this map, without an offset"
+        )
+
+
+def _extent(places: np.ndarray) -> str:
+    low, high = places.min(axis=0), places.max(axis=0)
+    return f"x {low[0]:.0f} to {high[0]:.0f}, y {low[1]:.0f} to {high[1]:.0f} m"
+
+
+class _Heights:
+    """Heights of the ground at places."""
+
+    def __init__(self, points: np.ndarray):
+        """Takes (N, 3) points on the ground [m]."""
+        self._tree = cKDTree(points[:, :2])
+        self._z = points[:, 2]
+
+    def at(self, xy: np.ndarray) -> np.ndarray:
+        """Returns those of the nearest points, weighted by distance."""
+        distance, near = self._tree.query(xy, k=min(4, len(self._z)))
+        distance, near = (
+            np.reshape(values, (len(xy), -1)) for values in (distance, near)
+        )
+        weight = 1.0 / np.maximum(distance, 0.05) ** 2
+        return np.sum(weight * self._z[near], axis=1) / weight.sum(axis=1)
+
+
+def _kind(one: TracedObject, seed: int) -> VehicleKind:
+    """Returns what a vehicle is: by its type, and else some car."""
+    text = one.type_name.lower().replace("default_biketype", "bicycle")
+    for word, name in _KINDS_BY_WORD:
+        if word in text:
+            return next(kind for kind in KINDS if kind.name == name)
+    for kind in KINDS:
+        if kind.name == text:
+            return kind
+    rng = np.random.default_rng([seed, zlib.crc32(one.name.encode())])
+    return _CARS[int(rng.integers(len(_CARS)))]
+
+
+def _vehicle_rows(
+    one: TracedObject, kind: VehicleKind, heights: _Heights
+) -> np.ndarray:
+    """Returns the (M, 5) coordinates of a vehicle; see `TrafficPlan`."""
+    ahead = np.column_stack([np.cos(one.yaw), np.sin(one.yaw)])
+    xy = one.xy - kind.size[0] / 2 * ahead
+    # Upwards is about -y.
+    return np.column_stack([xy, heights.at(xy), one.yaw, -one.slope])
+
+
+def _person_rows(one: TracedObject, heights: _Heights, dt: float) -> np.ndarray:
+    """Returns the (M, 5) coordinates of a walker; see `TrafficPlan`."""
+    steps = np.linalg.norm(np.diff(one.xy, axis=0), axis=1)
+    turned = dt * np.array([gait_rate(step / dt) for step in steps])
+    start = zlib.crc32(one.name.encode()) % 1000 * 2e-3 * np.pi
+    phase = start + np.concatenate([[0.0], np.cumsum(turned)])
+    return np.column_stack([one.xy, heights.at(one.xy), one.yaw, phase])
+
+
+def _make_tracks(
+    trace: FcdTrace,
+    traced: Sequence[TracedObject],
+    rows: Sequence[np.ndarray],
+) -> Tracks:
+    """Returns tracks of objects that are there at some of the times."""
+    values = np.zeros((trace.num_steps, len(traced), 5))
+    present = np.zeros((trace.num_steps, len(traced)), bool)
+    times = np.arange(trace.num_steps)
+    for k, (one, own) in enumerate(zip(traced, rows, strict=True)):
+        # While it is not there, it stays where it was, or will be.
+        last = np.searchsorted(one.steps, times, side="right") - 1
+        values[:, k] = own[np.maximum(last, 0)]
+        present[one.steps, k] = True
+    return Tracks(trace.dt, values, present)
+
+
+def _meet_ego(
+    tracks: Tracks,
+    half: Sequence[tuple[float, float]],
+    ego: EgoPath,
+    box: EgoBox,
+) -> np.ndarray:
+    """Returns (N,) whether each ever overlaps the ego car."""
+    num = len(half)
+    # Often enough to see whoever crosses the car's way.
+    times = np.arange(0.0, tracks.duration, min(tracks.dt, 0.1))
+    poses = np.full((len(times), 1 + num, 3), np.nan)
+    xy, yaw = ego(times)
+    middle = (box.rear + box.front) / 2
+    ahead = np.column_stack([np.cos(yaw), np.sin(yaw)])
+    poses[:, 0] = np.column_stack([xy + middle * ahead, yaw])
+    for k, time in enumerate(times):
+        there = np.flatnonzero(tracks.is_present(time))
+        values, _ = tracks.at(time)
+        poses[k, 1 + there] = values[there][:, [0, 1, 3]]
+    halves = np.array([((box.front - box.rear) / 2, box.half_width), *half])
+    found = np.zeros((1 + num, 1 + num), bool)
+    find_overlaps(poses, halves, found)
+    return found[0, 1:]

@@ -1,0 +1,193 @@
+"""Lanes of somebody else's map as traffic follows them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from cns_drake.traffic.lane_graph import (
+    SPACING,
+    LaneGraph,
+    Piece,
+    resampled,
+    without_dead_ends,
+)
+
+# A lane must have room for any vehicle; a shorter one is part of the ways
+# that lead over it [m].
+_SHORTEST_LANE = 14.0
+# Vehicles stop so far before the end of a lane, in steps of `SPACING`.
+_STOP_STEPS = 2
+# Nobody follows more short lanes at once, and from no lane lead more ways.
+_MOST_SHORT, _MOST_WAYS = 8, 12
+
+
+class DirectedLane(NamedTuple):
+    """A lane in one direction.
+
+    Attributes:
+        points: (N, 3) its middle in driving direction [m].
+        limit: speed limit [m/s].
+        connects: whether it leads through a junction.
+    """
+
+    points: np.ndarray
+    limit: float
+    connects: bool
+
+
+def join_lanes(
+    lanes: Sequence[DirectedLane], links: Iterable[tuple[int, int]]
+) -> LaneGraph:
+    """Returns lanes with ways between them.
+
+    Args:
+        lanes: as a map has them, cut wherever it cuts them.
+        links: numbers of lanes of which the second follows the first.
+
+    Returns:
+        A graph without signals, crossings and changes of lanes. It may be
+        empty, if vehicles cannot go on for ever anywhere.
+    """
+    merged, after = _merge(lanes, links)
+    points = [resampled(lane.points) for lane in merged]
+    long = [
+        k
+        for k, lane in enumerate(merged)
+        if not lane.connects and SPACING * len(points[k]) >= _SHORTEST_LANE
+    ]
+    number = {k: row for row, k in enumerate(long)}
+    clusters = _Clusters()
+    ways = []
+    for k in long:
+        for short, last in _ways(k, after, set(long)):
+            line = np.concatenate(
+                [
+                    points[k][-_STOP_STEPS - 1 :],
+                    *(points[one] for one in short),
+                    points[last][: _STOP_STEPS + 1],
+                ]
+            )
+            limit = min(merged[one].limit for one in (k, *short, last))
+            ways.append((k, last, line, limit))
+            clusters.join((k, "end"), (last, "start"))
+            for one in short:
+                clusters.join((k, "end"), (one, "whole"))
+    junctions = {
+        key: row
+        for row, key in enumerate(
+            dict.fromkeys(clusters.of((k, "end")) for k in long)
+        )
+    }
+    pieces = [
+        Piece(
+            points[k][_STOP_STEPS:-_STOP_STEPS],
+            merged[k].limit,
+            False,
+            after=tuple(
+                len(long) + row for row, way in enumerate(ways) if way[0] == k
+            ),
+            junction=junctions[clusters.of((k, "end"))],
+        )
+        for k in long
+    ]
+    pieces += [
+        Piece(
+            resampled(line),
+            limit,
+            True,
+            (number[last],),
+            junction=junctions[clusters.of((k, "end"))],
+        )
+        for k, last, line, limit in ways
+    ]
+    kept = tuple(without_dead_ends(pieces))
+    count = 1 + max((piece.junction for piece in kept), default=-1)
+    return LaneGraph(kept, phases=(1,) * count)
+
+
+def _merge(
+    lanes: Sequence[DirectedLane], links: Iterable[tuple[int, int]]
+) -> tuple[list[DirectedLane], list[list[int]]]:
+    """Returns lanes that go on alone as one, and what follows each."""
+    after: list[list[int]] = [[] for _ in lanes]
+    before: list[list[int]] = [[] for _ in lanes]
+    for first, second in links:
+        after[first].append(second)
+        before[second].append(first)
+
+    def goes_on(k: int) -> bool:
+        if len(after[k]) != 1:
+            return False
+        (other,) = after[k]
+        return (
+            len(before[other]) == 1
+            and other != k
+            and not lanes[k].connects
+            and not lanes[other].connects
+        )
+
+    chains: list[list[int]] = []
+    placed: set[int] = set()
+    heads = [
+        k
+        for k in range(len(lanes))
+        if len(before[k]) != 1 or not goes_on(before[k][0])
+    ]
+    # After the heads come rings, which begin anywhere.
+    for head in (*heads, *range(len(lanes))):
+        if head in placed:
+            continue
+        chain = [head]
+        placed.add(head)
+        while goes_on(chain[-1]) and after[chain[-1]][0] not in placed:
+            chain.append(after[chain[-1]][0])
+            placed.add(chain[-1])
+        chains.append(chain)
+    number = {chain[0]: row for row, chain in enumerate(chains)}
+    merged = [
+        DirectedLane(
+            np.concatenate([lanes[k].points for k in chain]),
+            min(lanes[k].limit for k in chain),
+            lanes[chain[0]].connects,
+        )
+        for chain in chains
+    ]
+    return merged, [
+        [number[k] for k in after[chain[-1]] if k in number] for chain in chains
+    ]
+
+
+def _ways(
+    first: int, after: Sequence[Sequence[int]], long: set[int]
+) -> Iterator[tuple[tuple[int, ...], int]]:
+    """Yields short lanes and the long lane to which they lead."""
+    waiting: list[tuple[int, ...]] = [()]
+    found = 0
+    while waiting and found < _MOST_WAYS:
+        short = waiting.pop(0)
+        for k in after[short[-1] if short else first]:
+            if k in long:
+                if k != first:
+                    yield short, k
+                    found += 1
+            elif k not in short and len(short) < _MOST_SHORT:
+                waiting.append((*short, k))
+
+
+class _Clusters:
+    """Places that belong together."""
+
+    def __init__(self) -> None:
+        self._parent: dict[tuple[int, str], tuple[int, str]] = {}
+
+    def of(self, key: tuple[int, str]) -> tuple[int, str]:
+        """Returns the one that stands for all of a place's cluster."""
+        while (parent := self._parent.get(key, key)) != key:
+            key = parent
+        return key
+
+    def join(self, one: tuple[int, str], other: tuple[int, str]) -> None:
+        self._parent[self.of(other)] = self.of(one)

@@ -1,0 +1,206 @@
+"""Traces of SUMO, played: places, headings and velocities in closed form."""
+
+import re
+
+import numpy as np
+import pytest
+
+from cns_drake.base.errors import InputError
+from cns_drake.traffic.fcd_trace import read_fcd
+from cns_drake.traffic.fcd_traffic import play_trace
+from cns_drake.traffic.lane_graph import LaneGraph, Piece
+from cns_drake.traffic.presence import EgoBox
+from cns_drake.traffic.walker_steps import gait_rate
+
+DT, RADIUS, RATE = 0.1, 30.0, 0.2
+TURN = np.linspace(0.0, 2 * np.pi, 400)
+SLOPE = 0.05
+GRAPH = LaneGraph(
+    (
+        Piece(
+            np.column_stack(
+                [
+                    RADIUS * np.cos(TURN),
+                    RADIUS * np.sin(TURN),
+                    2.0 + SLOPE * RADIUS * np.cos(TURN),
+                ]
+            ),
+            13.9,
+            False,
+        ),
+    )
+)
+EGO_BOX = EgoBox(-1.05, 3.75, 1.05)
+
+
+def far_away(times):
+    return np.tile((500.0, 0.0), (len(times), 1)), np.zeros(len(times))
+
+
+def front_of_bus(t, length):
+    """Its middle goes round a circle; so does its front, turned by as much."""
+    angle = RATE * t
+    yaw = angle + np.pi / 2
+    middle = RADIUS * np.array([np.cos(angle), np.sin(angle)])
+    return middle + length / 2 * np.array([np.cos(yaw), np.sin(yaw)]), yaw
+
+
+def write_trace(path, count=80, change=lambda text: text):
+    """A bus goes round, a car comes at 2 s and goes at 4 s, one walks."""
+    length = 11.26
+    rows = ['<?xml version="1.0"?>', "<fcd-export>"]
+    for k in range(count):
+        t = k * DT
+        xy, yaw = front_of_bus(t, length)
+        angle = (90.0 - np.degrees(yaw)) % 360.0
+        rows.append(f'<timestep time="{100 + t:.2f}">')
+        rows.append(
+            f'<vehicle id="b" x="{xy[0]:.6f}" y="{xy[1]:.6f}" '
+            f'angle="{angle:.6f}" type="city_bus" speed="6" slope="2"/>'
+        )
+        if 20 <= k <= 40:
+            rows.append(
+                f'<vehicle id="c" x="{-RADIUS}" y="{7 * t - 20:.6f}" '
+                'angle="0" type="DEFAULT_VEHTYPE" speed="7" pos="1" '
+                'lane="e_0"/>'
+            )
+        rows.append(
+            f'<person id="p" x="{20 - 1.25 * t:.6f}" y="3" angle="270" '
+            'speed="1.25" pos="1" edge="e"/>'
+        )
+        rows.append("</timestep>")
+    rows.append("</fcd-export>")
+    path.write_text(change("\n".join(rows)))
+    return path
+
+
+def play(path, duration=7.0, ego=far_away, seed=1):
+    return play_trace(
+        read_fcd(path), path, GRAPH, [], seed=seed, duration=duration,
+        ego=ego, ego_box=EGO_BOX,
+    )  # fmt: skip
+
+
+@pytest.fixture
+def trace(tmp_path):
+    return write_trace(tmp_path / "trace.xml")
+
+
+def test_places_and_velocities(trace):
+    plan = play(trace)
+    assert plan.kinds[0].name == "bus"
+    assert plan.kinds[1].semantic_class == "car"
+    assert plan.left_out == 0
+    for t in (0.1, 0.1 + 1e-9, 1.234, 3.05, 5.5, 6.999):
+        (values, rates) = plan.vehicles.at(t)
+        angle = RATE * t
+        expected = RADIUS * np.array([np.cos(angle), np.sin(angle)])
+        np.testing.assert_allclose(values[0, :2], expected, atol=1e-5)
+        np.testing.assert_allclose(
+            rates[0, :2],
+            RATE * RADIUS * np.array([-np.sin(angle), np.cos(angle)]),
+            atol=2e-3,
+        )
+        assert values[0, 3] == pytest.approx(angle + np.pi / 2, abs=1e-6)
+        assert rates[0, 3] == pytest.approx(RATE, abs=1e-6)
+        # Uphill is nose up, which is a turn about -y.
+        assert values[0, 4] == pytest.approx(-np.radians(2.0))
+        height = 2.0 + SLOPE * expected[0]
+        assert values[0, 2] == pytest.approx(height, abs=2e-2)
+        walkers, walker_rates = plan.walkers.at(t)
+        np.testing.assert_allclose(walkers[0, :2], [20 - 1.25 * t, 3.0])
+        assert abs(walkers[0, 3]) == pytest.approx(np.pi)
+        np.testing.assert_allclose(walker_rates[0, :2], [-1.25, 0], atol=1e-9)
+        assert walker_rates[0, 4] == pytest.approx(gait_rate(1.25))
+
+
+def test_velocities_are_continuous(trace):
+    plan = play(trace)
+    for knot in DT * np.arange(1, 70):
+        before, after = (
+            plan.vehicles.at(knot + sign * 1e-9)[1] for sign in (-1, 1)
+        )
+        there = plan.vehicles.is_present(knot - 1e-6)
+        there &= plan.vehicles.is_present(knot + 1e-6)
+        np.testing.assert_allclose(before[there], after[there], atol=1e-5)
+
+
+def test_who_comes_and_goes(trace):
+    plan = play(trace)
+    for t, there in ((1.95, False), (2.05, True), (3.95, True), (4.05, False)):
+        assert plan.vehicles.is_present(t).tolist() == [True, there]
+    values, rates = plan.vehicles.at(3.05)
+    half = plan.kinds[1].size[0] / 2
+    expected = [-RADIUS, 7 * 3.05 - 20 - half]
+    np.testing.assert_allclose(values[1, :2], expected, atol=1e-9)
+    np.testing.assert_allclose(rates[1, :2], [0.0, 7.0], atol=1e-9)
+
+
+def test_the_same_trace_gives_the_same_plan(trace):
+    one, other = play(trace), play(trace)
+    np.testing.assert_array_equal(one.vehicles.values, other.vehicles.values)
+    assert one.kinds == other.kinds
+    kinds = {play(trace, seed=seed).kinds[1].name for seed in range(20)}
+    assert len(kinds) > 2
+
+
+def test_who_would_meet_the_ego_car_is_left_out(trace):
+    def ego(times):
+        # It stands where the car passes at 3.5 s.
+        return np.tile((-RADIUS, 4.0), (len(times), 1)), np.zeros(len(times))
+
+    plan = play(trace, ego=ego)
+    assert [kind.name for kind in plan.kinds] == ["bus"]
+    assert plan.left_out == 1
+    assert plan.walkers.values.shape[1] == 1
+
+
+def fault(path, **options):
+    with pytest.raises(InputError) as error:
+        play(path, **options)
+    assert "\n" not in str(error.value)
+    assert str(error.value).startswith(f"{path}: ")
+    return str(error.value)[len(f"{path}: ") :]
+
+
+def test_a_trace_that_is_too_short(trace):
+    play(trace, duration=7.9)
+    assert fault(trace, duration=7.91) == (
+        "the trace has 7.9 s from 100 s on, the drive takes 7.91 s: record "
+        "more, or lower frames"
+    )
+
+
+def test_a_trace_of_another_map(tmp_path):
+    def move(text):
+        return re.sub(
+            r' x="([^"]+)"', lambda m: f' x="{float(m[1]) + 900}"', text
+        )
+
+    path = write_trace(tmp_path / "moved.xml", change=move)
+    assert re.fullmatch(
+        r"half of it is more than 5 m from the map's lanes: it lies at "
+        r"x 8\d\d to 9\d\d, .* m, they at x -30 to 30, y -30 to 30 m; give "
+        r"a trace of this map, without an offset",
+        fault(path),
+    )
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ('time="103.00"', 'time="103.05"', "timestep 103.05: times are not ev"),
+        ('time="103.00"', 'time="x"', "line .*: timestep: time: 'x' is no num"),
+        ('angle="0" ', "", "line .*: vehicle: no angle"),
+        ('id="c"', 'id="b"', "line .*: vehicle 'b' is there twice"),
+        ("</fcd-export>", "", "cannot be parsed: line .*: no element found"),
+        ("fcd-export", "sumo", "line 2: sumo is no fcd-export"),
+        ("vehicle|person", "container", "no vehicle and no person"),
+        ("<fcd-export>", '<!DOCTYPE a [<!ENTITY b "c">]><fcd-export>', "line"),
+    ],
+)
+def test_what_is_no_trace(tmp_path, old, new, expected):
+    path = write_trace(
+        tmp_path / "bad.xml", change=lambda text: re.sub(old, new, text)
+    )
+    assert re.match(expected, fault(path))
