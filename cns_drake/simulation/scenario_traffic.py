@@ -142,7 +142,7 @@ def with_traffic(world: World, plan: TrafficPlan) -> World:
     notes = world.notes
     if plan.left_out:
         notes += (
-            f"traffic: {plan.left_out} fewer than asked for: they had no way "
-            "past the others",
+            f"traffic: {plan.left_out} left out: they would have met others "
+            "or the car",
         )
     return replace(world, structures=table.joined(entries), notes=notes)
