@@ -3,22 +3,22 @@
 from pathlib import Path
 
 import numpy as np
-from pydrake.geometry import Meshcat, Rgba
+from pydrake.geometry import Meshcat
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.math import SpatialVelocity
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
-from pydrake.perception import PointCloud
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 import typer
 
 from cns_drake import add_lidar, save_meshcat_page
+from cns_drake.pictures.daylight import set_view
+from cns_drake.pictures.meshcat_drawing import draw_body, draw_points
+from cns_drake.scene.perception_geometry import read_perception_geometry
 
-ROOT, MODELS = (
-    Path(__file__).parents[1],
-    ("worlds/downtown/stage_04.sdf", "diagrams/models/drone.sdf"),
-)
+ROOT = Path(__file__).parents[1]
+MODELS = "worlds/downtown/stage_04.sdf", "diagrams/models/drone.sdf"
 X_WB = RigidTransform(RollPitchYaw(0.0, 0.1, 0.0), [-110.0, 0.0, 15.0])
 X_BS = RigidTransform(RollPitchYaw(np.pi, 0, 0), [0, 0, -0.1])  # Head down.
 V_WB = SpatialVelocity(w=[0.0, 0.0, 0.2], v=[15.0, 0.0, 0.0])
@@ -32,11 +32,9 @@ def main(page: Path = Path("drone.html"), duration: float = 6.0) -> None:
     plant.set_gravity_enabled(instance, False)
     plant.Finalize()
     body = plant.GetBodyByName("body")
-    lidar = add_lidar(
-        builder, scene_graph, body, X_BS, "mid-360", motion_distortion=True
-    )
-    simulator = Simulator(builder.Build())
-    context = simulator.get_mutable_context()
+    options = {"motion_distortion": True}
+    lidar = add_lidar(builder, scene_graph, body, X_BS, "mid-360", **options)
+    context = (simulator := Simulator(builder.Build())).get_mutable_context()
     of_plant = plant.GetMyMutableContextFromRoot(context)
     plant.SetFreeBodyPose(of_plant, body, X_WB)
     plant.SetFreeBodySpatialVelocity(of_plant, body, V_WB)
@@ -44,14 +42,16 @@ def main(page: Path = Path("drone.html"), duration: float = 6.0) -> None:
     while context.get_time() < duration - 1e-6:
         simulator.AdvanceTo(context.get_time() + lidar.pattern.period)
         cloud = port.Eval(lidar.GetMyContextFromRoot(context))
-        frames.append(cloud.xyzs().copy())
-    points = np.concatenate(frames, axis=1)
-    cloud = PointCloud(points.shape[1])
-    cloud.mutable_xyzs()[:] = points
-    meshcat = Meshcat()
-    meshcat.SetObject("cloud", cloud, 0.12, Rgba(0.1, 0.3, 0.6))
-    meshcat.SetCameraPose([-125.0, -25.0, 45.0], [-60.0, 0.0, 5.0])
-    print(f"{points.shape[1]} returns")
+        frames.append(cloud.xyzs().T.copy())
+    print(f"{len(points := np.concatenate(frames))} returns")
+    meshcat, inspector = Meshcat(), scene_graph.model_inspector()
+    own = plant.GetBodyFrameIdOrThrow(body.index())
+    for path, wanted in (("drone", own.__eq__), ("city", own.__ne__)):
+        draw_body(meshcat, path, read_perception_geometry(inspector, wanted))
+    draw_points(meshcat, "cloud", points)  # Coloured by height.
+    meshcat.SetTransform("drone", X := body.EvalPoseInWorld(of_plant))
+    set_view(meshcat, points.min(axis=0), points.max(axis=0))
+    meshcat.SetCameraPose(X @ [-5, -3, 2.5], X.translation())
     save_meshcat_page(meshcat, page)
 
 
