@@ -181,6 +181,7 @@ def sea(
     if not coasts:
         return
     lines = [LineString(local(way.line)) for way in coasts]
+    lines = [line for line in lines if line.length > 0.0]
     merged = shapely.get_parts(shapely.line_merge(shapely.union_all(lines)))
     whole = box(*limits.ravel().tolist())
     cuts = [_prolonged(line, whole).intersection(whole) for line in merged]
@@ -210,6 +211,8 @@ def _prolonged(line: LineString, whole: BaseGeometry) -> LineString:
     for end, before in ((0, 1), (-1, -2)):
         if whole.contains(Point(points[end])):
             way = points[end] - points[before]
+            if not way.any():
+                continue
             far = points[end] + _BEYOND * way / np.hypot(*way)
             points = (
                 np.vstack([far, points])

@@ -46,7 +46,8 @@ def lane_marks(
             middles = np.arange(_GAP, line.length - _DASH, _DASH + _GAP)
             places = shapely.line_interpolate_point(line, middles)
             free = street.width / 2.0 + _BEFORE
-            kept = shapely.distance(places, junctions) > free
+            # Where there is no junction, the distance is not a number.
+            kept = ~(shapely.distance(places, junctions) <= free)
             dashes = [_dash(line, s) for s in middles[kept].tolist()]
             if dashes:
                 yield make_imported(

@@ -68,6 +68,8 @@ def test_the_sea_lies_right_of_the_coast(tmp_path, is_eastward):
     # It ends within the city, where the file was cut.
     line = [(-30, 0), (0, 0), (70, 0)]
     osm.way(line if is_eastward else line[::-1], natural="coastline")
+    # Of no account: it has no length.
+    osm.way([(10, 30), (10, 30)], natural="coastline")
     # Around an island the land is inside.
     island = [(0, -60), (20, -60), (20, -40), (0, -40)]
     osm.way(island, closed=True, natural="coastline")
@@ -140,5 +142,7 @@ def test_marks_lie_on_the_middle_and_end_before_junctions():
     # Half of the street, 4 m before the junction, and half a dash.
     assert np.abs(x - 50.0).min() > 4.0 + 4.0 - 1.5 - 1e-9
     assert area(marks) == pytest.approx(len(x) / 2 * 3.0 * 0.12)
+    (free,) = lane_marks(streets[:1], [Drive(path, path)])
+    assert len(free.triangles) > len(marks.triangles)
     far = path + np.array([0.0, 500.0])
     assert not list(lane_marks(streets, [Drive(far, far)]))
