@@ -203,7 +203,7 @@ def test_report_is_the_same_whoever_works(recordings, report, tmp_path):
         reference_for=reference_for,
     )
     files = studies.report_files(tmp_path)
-    assert len(files) == 17 + 18
+    assert len(files) == 18 + 18
     assert files == studies.report_files(report)
 
 
