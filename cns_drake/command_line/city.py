@@ -32,7 +32,7 @@ def city(
     ] = False,
     seed: Annotated[
         int,
-        typer.Option(min=0, metavar="N", help="Of what --start draws by lot."),
+        typer.Option(min=0, metavar="N", help="Seed of --start's draws."),
     ] = 0,
     check: Annotated[
         bool,

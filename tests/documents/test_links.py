@@ -50,3 +50,11 @@ def test_readme_is_short():
 def test_moving_picture_is_small():
     picture = documents.ROOT / "docs/pictures/drive.webp"
     assert picture.stat().st_size < 5e6
+
+
+@pytest.mark.parametrize("page", PAGES.values(), ids=PAGES)
+def test_sentences_begin_with_their_subject(page):
+    begun = re.findall(
+        r"(?:^|[.:;] |\| |- )(?:Of|Who|So) \w+", documents.prose(page), re.M
+    )
+    assert not begun
