@@ -63,7 +63,7 @@ def import_city(
         int,
         typer.Option(
             min=0,
-            help="Seed of what is drawn by lot: by --grow, and the buildings along "
+            help="Seed of the draws of --grow, and of the buildings along "
             "roads that have none (OpenDRIVE).",
         ),
     ] = 0,
