@@ -53,8 +53,28 @@ def cannot_tell(*arguments):
 
 
 def note_process(path, reporter):
+    """Writes its number, its session, and the numbers of its parents."""
+    import psutil
+
     reporter.note("here I am")
-    path.write_text(f"{os.getpid()} {os.getppid()} {os.getsid(0)}")
+    numbers = [os.getpid(), os.getsid(0)]
+    numbers += [parent.pid for parent in psutil.Process().parents()[:2]]
+    path.write_text(" ".join(map(str, numbers)))
+
+
+def kill_parent_once(tries, path, reporter):
+    """Kills the process that started this one, the first time."""
+    with tries.open("a") as stream:
+        stream.write("x")
+    if len(tries.read_text()) == 1:
+        os.kill(os.getppid(), signal.SIGKILL)
+    path.write_text("at last")
+
+
+def leave_a_trace(path, reporter):
+    """Changes the process, after it has written how it found it."""
+    path.write_text(os.environ.get("LEFT_BY_A_JOB", "nothing"))
+    os.environ["LEFT_BY_A_JOB"] = "a trace"
 
 
 def refuse(reporter):
@@ -122,7 +142,7 @@ def note_ports(path, reporter):
     """Writes on how many processes there are, and who listens where."""
     import psutil
 
-    processes = [psutil.Process(), psutil.Process(os.getppid())]
+    processes = [psutil.Process(), *psutil.Process().parents()[:2]]
     ports = [
         connection.laddr
         for process in processes

@@ -18,6 +18,7 @@ import subprocess
 import sys
 import threading
 import traceback
+from typing import Protocol
 
 from cns_drake.base.errors import InputError, one_line
 from cns_drake.base.files import exclusive
@@ -45,12 +46,6 @@ _ALLOCATION = {
     "MALLOC_TRIM_THRESHOLD_": str(1 << 28),
 }
 
-# The search path is the parent's, not what the folder it runs in makes of it.
-_START = (
-    "import sys; number, *sys.path[:] = sys.argv[1:]; "
-    f"from {__name__} import main; main(int(number))"
-)
-
 
 class JobError(Exception):
     """A job cannot be done; the message is one line that says why."""
@@ -60,10 +55,75 @@ class ProcessDiedError(Exception):
     """The process of a job was killed, or crashed, or was asked to end."""
 
 
+class StartedProcess(Protocol):
+    """A process that has begun; `subprocess.Popen` is one."""
+
+    def terminate(self) -> None:
+        """Asks it to end."""
+
+    def kill(self) -> None:
+        """Ends it at once."""
+
+    def wait(self, timeout: float | None = None, /) -> int:
+        """Returns its status, that of a signal as a negative number.
+
+        Raises:
+            subprocess.TimeoutExpired: it takes longer [s].
+        """
+
+
+# Starts the process of a pickled job; returns it and what leads to it.
+Start = Callable[[bytes], tuple[Connection, StartedProcess]]
+
+
+def start_interpreter(
+    function: Callable[[int], None],
+) -> tuple[Connection, subprocess.Popen]:
+    """Starts an interpreter that runs a function.
+
+    Args:
+        function: of a module; takes the number of the file descriptor that
+            leads here.
+
+    Returns:
+        What leads to it, and the process. It is in a session of its own, so
+        that no Ctrl-C reaches it: whoever is interrupted there ends its jobs
+        in good order.
+    """
+    # The search path is the parent's, not what its folder makes of it.
+    code = (
+        "import sys; number, *sys.path[:] = sys.argv[1:]; "
+        f"from {function.__module__} import {function.__name__} as run; "
+        "run(int(number))"
+    )
+    ours, theirs = Pipe()
+    with theirs:  # The pipe then ends with the process.
+        number = theirs.fileno()
+        process = subprocess.Popen(
+            [sys.executable, "-c", code, str(number), *sys.path],
+            env={**os.environ, **_ALLOCATION},
+            pass_fds=[number],
+            stdin=subprocess.DEVNULL,
+            stdout=_STDERR,
+            start_new_session=True,
+        )
+    return ours, process
+
+
+def start_anew(job: bytes) -> tuple[Connection, StartedProcess]:
+    """Starts a job in an interpreter that imports everything anew."""
+    connection, process = start_interpreter(main)
+    # Where it has died already, that shows when its end is awaited.
+    with contextlib.suppress(ConnectionError):
+        connection.send_bytes(job)
+    return connection, process
+
+
 def run_process(
     job: bytes,
     on_message: Callable[..., None],
     is_wanted: Callable[[], bool],
+    start: Start = start_anew,
 ) -> None:
     """Runs a job in a process of its own and waits for its end.
 
@@ -71,27 +131,16 @@ def run_process(
         job: a pickled `Step`.
         on_message: takes the job's messages; see `Reporter`.
         is_wanted: asked often; where it says no, the process is ended.
+        start: starts the process.
 
     Raises:
         JobError: the job cannot be done.
         ProcessDiedError: its process ended before it was done.
     """
-    ours, theirs = Pipe()
-    # In a session of its own no Ctrl-C reaches it: whoever is interrupted
-    # there ends its jobs in good order.
-    command = [sys.executable, "-c", _START, str(theirs.fileno()), *sys.path]
-    process = subprocess.Popen(
-        command,
-        env={**os.environ, **_ALLOCATION},
-        pass_fds=[theirs.fileno()],
-        stdin=subprocess.DEVNULL,
-        stdout=_STDERR,
-        start_new_session=True,
-    )
-    theirs.close()  # The pipe then ends with the process.
+    ours, process = start(job)
     with ours:
         try:
-            kind, text = _listen(ours, job, on_message, is_wanted)
+            kind, text = _listen(ours, on_message, is_wanted)
         finally:
             status = _end(process)
     if kind == "fault":
@@ -102,13 +151,11 @@ def run_process(
 
 def _listen(
     connection: Connection,
-    job: bytes,
     on_message: Callable[..., None],
     is_wanted: Callable[[], bool],
 ) -> tuple[str, str]:
     """Returns the last message of a job, "" if it just ended."""
     with contextlib.suppress(EOFError, ConnectionError):
-        connection.send_bytes(job)
         while is_wanted():
             if connection.poll(_LOOK_INTERVAL):
                 kind, *values = connection.recv()
@@ -118,7 +165,7 @@ def _listen(
     return "", ""
 
 
-def _end(process: subprocess.Popen) -> int:
+def _end(process: StartedProcess) -> int:
     """Sees that a process ends, and returns its status."""
     process.terminate()
     try:
@@ -147,6 +194,17 @@ def main(number: int) -> None:
         number: of the file descriptor that leads to the parent.
     """
     connection = Connection(number)
+    with contextlib.suppress(EOFError, ConnectionError):
+        work(connection, connection.recv_bytes())
+
+
+def work(connection: Connection, job: bytes) -> None:
+    """Runs a job; the rest of its process.
+
+    Args:
+        connection: leads to the parent.
+        job: a pickled `Step`.
+    """
     interrupt_on_termination(once=True)
 
     def send(*message: object) -> None:
@@ -155,7 +213,6 @@ def main(number: int) -> None:
             connection.send(message)
 
     try:
-        job = connection.recv_bytes()
         threading.Thread(
             target=_end_with_parent, args=(connection,), daemon=True
         ).start()

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 import contextlib
+import sys
 import threading
 from typing import Protocol
 
-from cns_drake.base.jobs.job_process import run_process
+from cns_drake.base.jobs.job_process import run_process, start_anew
+from cns_drake.base.jobs.job_server import JobServer
 
 # Takes a message of a job: the kind, the job's name, and values. Besides what
 # the job reports itself these are "started", "ended", and at last "result" with
@@ -34,6 +36,9 @@ class Workers(Protocol):
 class LocalWorkers:
     """Starts every job at once: the caller sees to it that there is room.
 
+    On Linux their processes are forked from one that has imported what they
+    need; elsewhere libraries are not made for it.
+
     Nothing listens on any port, since whoever reached that could run
     programs here.
     """
@@ -42,6 +47,7 @@ class LocalWorkers:
         self._listener = listener
         self._stopped = threading.Event()
         self._threads: list[threading.Thread] = []
+        self._server = JobServer() if sys.platform == "linux" else None
 
     def submit(self, name: str, job: bytes, priority: float) -> None:
         del priority
@@ -58,6 +64,8 @@ class LocalWorkers:
         """Waits until nothing runs any more."""
         for thread in self._threads:
             thread.join()
+        if self._server is not None:
+            self._server.stop()
 
     def _run(self, name: str, job: bytes) -> None:
         error: Exception | None = None
@@ -67,6 +75,7 @@ class LocalWorkers:
                 job,
                 lambda kind, *values: self._listener(kind, name, *values),
                 lambda: not self._stopped.is_set(),
+                self._server.start if self._server else start_anew,
             )
         except Exception as caught:  # Whatever it is, it is reported.
             error = caught

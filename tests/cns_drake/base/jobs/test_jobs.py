@@ -21,7 +21,9 @@ from cns_drake.base.jobs.job_process import (
     JobError,
     ProcessDiedError,
     run_process,
+    start_anew,
 )
+from cns_drake.base.jobs.job_server import JobServer
 from cns_drake.base.jobs.running import Job, run_jobs
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.processors import num_cores
@@ -126,9 +128,9 @@ def test_what_is_needed_is_there_and_faults_stay_alone(tmp_path, capsys):
     # No lock is left behind.
     assert {path.name for path in tmp_path.iterdir()} == set("abcdpstu")
     # A process and a session of its own, for which Ctrl-C is not meant.
-    pid, parent, session = map(int, process.read_text().split())
+    pid, session, *parents = map(int, process.read_text().split())
     assert pid == session
-    assert parent == os.getpid() != pid
+    assert os.getpid() in parents
     told = capsys.readouterr().err
     assert "here I am" in told
     assert "ZeroDivisionError" in told
@@ -246,7 +248,7 @@ def test_nobody_else_can_reach_local_jobs(tmp_path):
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
         check=True,
     )
-    assert path.read_text() == "processes 2, ports []"
+    assert path.read_text() == "processes 3, ports []"
 
 
 def test_nothing_to_do_starts_nothing():
@@ -272,7 +274,18 @@ def test_names_differ():
         run_jobs(jobs, Cluster())
 
 
-def test_a_job_that_is_not_wanted_ends(tmp_path):
+@pytest.fixture(params=["anew", "forked"])
+def start(request):
+    """Starts the process of a job, in either way."""
+    if request.param == "anew":
+        yield start_anew
+        return
+    server = JobServer()
+    yield server.start
+    server.stop()
+
+
+def test_a_job_that_is_not_wanted_ends(tmp_path, start):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     told = []
@@ -288,11 +301,15 @@ def test_a_job_that_is_not_wanted_ends(tmp_path):
             pickle.dumps(Call(job_functions.hold, (pipe,))),
             lambda *message: None,
             is_wanted,
+            start,
         )
     assert not psutil.pid_exists(told[0])
 
 
-def test_a_job_ends_with_its_parent_even_if_that_is_killed(tmp_path):
+@pytest.mark.parametrize(
+    "start", ["job_process.start_anew", "job_server.JobServer().start"]
+)
+def test_a_job_ends_with_its_parent_even_if_that_is_killed(tmp_path, start):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     parent = subprocess.Popen(
@@ -302,10 +319,11 @@ def test_a_job_ends_with_its_parent_even_if_that_is_killed(tmp_path):
             "import pickle, sys\n"
             "from pathlib import Path\n"
             "from helpers import job_functions\n"
-            "from cns_drake.base.jobs.job_process import run_process\n"
+            "from cns_drake.base.jobs import job_process, job_server\n"
             "job = job_functions.Call("
             "job_functions.hold, (Path(sys.argv[1]),))\n"
-            "run_process(pickle.dumps(job), print, lambda: True)\n",
+            "job_process.run_process("
+            f"pickle.dumps(job), print, lambda: True, {start})\n",
             pipe,
         ],
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
@@ -316,10 +334,31 @@ def test_a_job_ends_with_its_parent_even_if_that_is_killed(tmp_path):
     assert psutil.wait_procs([process], timeout=600)[1] == []
 
 
-def test_a_function_that_cannot_be_imported_is_a_fault():
+def test_a_function_that_cannot_be_imported_is_a_fault(start):
     missing = b"cno_such_module\nfunction\n."  # A pickle, by hand.
     with pytest.raises(JobError, match=r"^ModuleNotFoundError: "):
-        run_process(missing, lambda *message: None, lambda: True)
+        run_process(missing, lambda *message: None, lambda: True, start)
+
+
+def test_forked_jobs_leave_nothing_to_each_other(tmp_path):
+    jobs = [
+        job(name, job_functions.leave_a_trace, tmp_path / name)
+        for name in "abc"
+    ]
+    run_jobs(jobs, Cluster(num_workers=1))
+    assert [(tmp_path / name).read_text() for name in "abc"] == ["nothing"] * 3
+
+
+def test_a_job_survives_the_process_that_it_was_forked_from(tmp_path, capsys):
+    """How it ended cannot be found out then: it starts again elsewhere."""
+    tries, path = tmp_path / "tries", tmp_path / "path"
+    run_jobs(
+        [job("survives", job_functions.kill_parent_once, tries, path)],
+        Cluster(num_workers=1),
+    )
+    assert path.read_text() == "at last"
+    assert tries.read_text() == "xx"
+    assert "it starts again" in capsys.readouterr().err
 
 
 def test_freed_memory_is_kept_whatever_dask_has_its_workers_do(

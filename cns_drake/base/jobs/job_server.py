@@ -1,0 +1,194 @@
+"""A process that imports what jobs need, and forks a process for each.
+
+A job of a study takes a few seconds, and an interpreter of its own one or two
+to import what the job needs. Forked, it has that already, and is a process of
+its own all the same. What is imported starts no threads but those of linear
+algebra, which come through a fork.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import contextlib
+import gc
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
+from multiprocessing.reduction import recv_handle, send_handle
+import os
+import pickle
+import signal
+import subprocess
+import threading
+import time
+
+from cns_drake.base.jobs.fingerprint import code_digest
+from cns_drake.base.jobs.job_process import (
+    ProcessDiedError,
+    start_interpreter,
+    work,
+)
+
+# How often the end of a process is looked for [s].
+_LOOK_INTERVAL = 0.01
+
+
+class JobServer:
+    """Starts the processes of jobs on this machine.
+
+    Threads may use it side by side.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._server: _Server | None = None
+
+    def start(self, job: bytes) -> tuple[Connection, _Forked]:
+        """Starts the process of a pickled job; see `job_process.Start`.
+
+        Raises:
+            ProcessDiedError: the server ends whenever it loads the job.
+        """
+        with self._lock:
+            if self._server is None or not self._server.is_alive():
+                self._server = _Server()
+            server = self._server
+        return server.start(job)
+
+    def stop(self) -> None:
+        """Ends the server; processes that it has started go on."""
+        with self._lock:
+            if self._server is not None:
+                self._server.stop()
+
+
+class _Server:
+    """The server's process, as its parent sees it."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._connection, self._process = start_interpreter(serve)
+
+    def is_alive(self) -> bool:
+        return self._process.poll() is None
+
+    def start(self, job: bytes) -> tuple[Connection, _Forked]:
+        ours, theirs = Pipe()
+        try:
+            with theirs, self._asked(), self._lock:
+                self._connection.send(("start", job))
+                send_handle(
+                    self._connection, theirs.fileno(), self._process.pid
+                )
+                number = self._connection.recv()
+        except ProcessDiedError:
+            ours.close()
+            raise
+        return ours, _Forked(self, number)
+
+    def signal(self, number: int, signal_number: int) -> None:
+        """Sends a signal to a process that the server has started."""
+        with self._asked(), self._lock:
+            self._connection.send(("signal", number, signal_number))
+            self._connection.recv()
+
+    def status(self, number: int) -> int | None:
+        """Returns the status of a process, None before its end."""
+        with self._asked(), self._lock:
+            self._connection.send(("status", number))
+            return self._connection.recv()
+
+    def stop(self) -> None:
+        with self._lock:
+            self._connection.close()
+        self._process.wait()
+
+    @contextlib.contextmanager
+    def _asked(self) -> Iterator[None]:
+        """Turns the end of the server into an error that says so."""
+        try:
+            yield
+        except (EOFError, OSError) as error:
+            status = self._process.wait()
+            raise ProcessDiedError(
+                f"the process that starts jobs ended with status {status}"
+            ) from error
+
+
+class _Forked:
+    """A process that the server has started."""
+
+    def __init__(self, server: _Server, number: int):
+        self._server = server
+        self._number = number
+
+    def terminate(self) -> None:
+        self._server.signal(self._number, signal.SIGTERM)
+
+    def kill(self) -> None:
+        self._server.signal(self._number, signal.SIGKILL)
+
+    def wait(self, timeout: float | None = None, /) -> int:
+        deadline = None if timeout is None else time.monotonic() + timeout
+        while (status := self._server.status(self._number)) is None:
+            if deadline is not None and time.monotonic() > deadline:
+                raise subprocess.TimeoutExpired("job", timeout or 0.0)
+            time.sleep(_LOOK_INTERVAL)
+        return status
+
+
+def serve(number: int) -> None:
+    """Starts processes until the parent has gone; the server's process.
+
+    Args:
+        number: of the file descriptor that leads to the parent.
+    """
+    forked = _serve(Connection(number))
+    if forked is not None:  # This is the process of a job.
+        work(*forked)
+
+
+def _serve(parent: Connection) -> tuple[Connection, bytes] | None:
+    """Answers a parent; returns what a forked process has to do."""
+    statuses: dict[int, int | None] = {}
+    while True:
+        try:
+            kind, *values = parent.recv()
+        except (EOFError, ConnectionError):
+            return None
+        answer: int | None = None
+        if kind == "start":
+            (job,) = values
+            connection = Connection(recv_handle(parent))
+            _import_for(job)
+            answer = os.fork()
+            if answer == 0:
+                os.setsid()
+                parent.close()
+                return connection, job
+            connection.close()
+            statuses[answer] = None
+        else:
+            number, *signals = values
+            if statuses[number] is None:
+                statuses[number] = _look(number)
+            # A number that is free again may be another's.
+            if statuses[number] is None and signals:
+                os.kill(number, *signals)
+            elif not signals:
+                answer = statuses[number]
+        with contextlib.suppress(ConnectionError):
+            parent.send(answer)
+
+
+def _import_for(job: bytes) -> None:
+    """Imports what a job needs; its process reports what is wrong with it."""
+    with contextlib.suppress(Exception):
+        code_digest(type(pickle.loads(job)).__module__)
+    # No collection writes to memory that the processes share.
+    gc.freeze()
+
+
+def _look(number: int) -> int | None:
+    """Returns the status of a child that has ended, None before."""
+    ended, status = os.waitpid(number, os.WNOHANG)
+    return os.waitstatus_to_exitcode(status) if ended else None
