@@ -2,25 +2,25 @@
 
 from pathlib import Path
 
+from matplotlib.cm import turbo
 import numpy as np
-from pydrake.geometry import Meshcat
+from pydrake.geometry import Meshcat, MeshcatVisualizer
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.math import SpatialVelocity
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+from pydrake.perception import BaseField, Fields, PointCloud
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 import typer
 
 from cns_drake import add_lidar, save_meshcat_page
-from cns_drake.pictures.daylight import set_view
-from cns_drake.pictures.meshcat_drawing import draw_body, draw_points
-from cns_drake.scene.perception_geometry import read_perception_geometry
 
 ROOT = Path(__file__).parents[1]
 MODELS = "worlds/downtown/stage_04.sdf", "diagrams/models/drone.sdf"
 X_WB = RigidTransform(RollPitchYaw(0.0, 0.1, 0.0), [-110.0, 0.0, 15.0])
 X_BS = RigidTransform(RollPitchYaw(np.pi, 0, 0), [0, 0, -0.1])  # Head down.
+_FIELDS = Fields(BaseField.kXYZs | BaseField.kRGBs)
 V_WB = SpatialVelocity(w=[0.0, 0.0, 0.2], v=[15.0, 0.0, 0.0])
 
 
@@ -34,6 +34,7 @@ def main(page: Path = Path("drone.html"), duration: float = 6.0) -> None:
     body = plant.GetBodyByName("body")
     options = {"motion_distortion": True}
     lidar = add_lidar(builder, scene_graph, body, X_BS, "mid-360", **options)
+    MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat := Meshcat())
     context = (simulator := Simulator(builder.Build())).get_mutable_context()
     of_plant = plant.GetMyMutableContextFromRoot(context)
     plant.SetFreeBodyPose(of_plant, body, X_WB)
@@ -42,16 +43,15 @@ def main(page: Path = Path("drone.html"), duration: float = 6.0) -> None:
     while context.get_time() < duration - 1e-6:
         simulator.AdvanceTo(context.get_time() + lidar.pattern.period)
         cloud = port.Eval(lidar.GetMyContextFromRoot(context))
-        frames.append(cloud.xyzs().T.copy())
-    print(f"{len(points := np.concatenate(frames))} returns")
-    meshcat, inspector = Meshcat(), scene_graph.model_inspector()
-    own = plant.GetBodyFrameIdOrThrow(body.index())
-    for path, wanted in (("drone", own.__eq__), ("city", own.__ne__)):
-        draw_body(meshcat, path, read_perception_geometry(inspector, wanted))
-    draw_points(meshcat, "cloud", points)  # Coloured by height.
-    meshcat.SetTransform("drone", X := body.EvalPoseInWorld(of_plant))
-    set_view(meshcat, points.min(axis=0), points.max(axis=0))
-    meshcat.SetCameraPose(X @ [-5, -3, 2.5], X.translation())
+        frames.append(cloud.xyzs()[:, ::5].copy())
+    points = np.concatenate(frames, axis=1)
+    cloud = PointCloud(points.shape[1], _FIELDS)
+    cloud.mutable_xyzs()[:] = points
+    cloud.mutable_rgbs()[:] = turbo(points[2] / 30.0, bytes=True)[:, :3].T
+    meshcat.SetObject("cloud", cloud, point_size=0.12)
+    X_WE = body.EvalPoseInWorld(of_plant)  # Where the flight ends.
+    meshcat.SetCameraPose(X_WE @ [-5, -3, 2.5], X_WE.translation())
+    print(f"{points.shape[1]} returns, one of five")
     save_meshcat_page(meshcat, page)
 
 
