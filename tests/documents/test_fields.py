@@ -11,7 +11,10 @@ from docs import reference_pages
 from docs.reference_pages import CITY, FAMILY, METHODS, SCENARIO
 
 PAGES = reference_pages.pages()
-MODELS = [*{*SCENARIO.values(), *FAMILY.values(), *CITY.values()}]
+# Each once, in one order for all processes of a run.
+MODELS = [
+    *dict.fromkeys((*SCENARIO.values(), *FAMILY.values(), *CITY.values()))
+]
 MODELS += METHODS.values()
 
 
