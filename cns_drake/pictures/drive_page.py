@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 import contextlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import logging
 
 import numpy as np
@@ -15,6 +15,7 @@ from pydrake.geometry import (
     MeshcatParams,
     Rgba,
     Role,
+    SceneGraphInspector,
 )
 from pydrake.math import RigidTransform
 
@@ -30,7 +31,10 @@ from cns_drake.pictures.meshcat_drawing import (
     draw_route,
 )
 from cns_drake.pictures.static_page import make_static_page
-from cns_drake.scene.perception_geometry import read_perception_geometry
+from cns_drake.scene.perception_geometry import (
+    PerceptionGeometry,
+    read_perception_geometry,
+)
 from cns_drake.scene.world import World
 
 # What is not there is seen through, hidden by what is there in its place, and
@@ -42,6 +46,9 @@ _UNREAL = {
     "material.polygonOffsetFactor": 1.0,
     "material.polygonOffsetUnits": 4.0,
 }
+# Traffic has a pose in every so many frames, which keeps pages small: at 10 m/s
+# in the tightest turns the page is 0.1 m off between them.
+_TRAFFIC_INTERVAL = 5
 
 
 @dataclass(frozen=True)
@@ -58,6 +65,9 @@ class Drive:
         specific_forces_I: what the IMU measures at each frame in its frame I
             [m/s^2].
         angular_velocities_I: likewise w_WI_I [rad/s].
+        limbs: for a frame F that leads others, the poses in F of all frames
+            that the page moves as one with it, F among them.
+        names: of the frames that lead, under which the page shows them.
     """
 
     period: float
@@ -67,6 +77,10 @@ class Drive:
     speeds: list[float] = field(default_factory=list)
     specific_forces_I: list[np.ndarray] = field(default_factory=list)
     angular_velocities_I: list[np.ndarray] = field(default_factory=list)
+    limbs: dict[FrameId, dict[FrameId, RigidTransform]] = field(
+        default_factory=dict
+    )
+    names: dict[FrameId, str] = field(default_factory=dict)
 
 
 def make_drive_page(
@@ -172,13 +186,15 @@ def _animate(meshcat: Meshcat, drive: Drive, world: World) -> None:
     """Draws what moves and the scans, and plays them over the drive."""
     animation = MeshcatAnimation(frames_per_second=1.0 / drive.period)
     inspector = world.scene_graph.model_inspector()
-    for path, frame_id in _moving_paths(world, drive.X_WFs).items():
+    own = [frame for frame in drive.X_WFs if frame not in drive.limbs]
+    for path, frame_id in _moving_paths(world, own).items():
         draw_body(
             meshcat,
             path,
             read_perception_geometry(inspector, frame_id.__eq__),
         )
         _move(meshcat, animation, path, drive.X_WFs[frame_id])
+    _animate_limbs(meshcat, animation, drive, inspector)
     # The page's script places it.
     draw_marker(meshcat, "/vehicle/marker")
     for k, (frame, p_WRset) in enumerate(drive.scans):
@@ -193,15 +209,44 @@ def _animate(meshcat: Meshcat, drive: Drive, world: World) -> None:
     meshcat.SetAnimation(animation)
 
 
+def _animate_limbs(
+    meshcat: Meshcat,
+    animation: MeshcatAnimation,
+    drive: Drive,
+    inspector: SceneGraphInspector,
+) -> None:
+    """Draws what moves with its limbs as one."""
+    # The frame that leads each limb, and the pose of the limb in it.
+    led = {
+        limb: (leading, X_FL)
+        for leading, X_FLs in drive.limbs.items()
+        for limb, X_FL in X_FLs.items()
+    }
+    drawn: dict[FrameId, list[PerceptionGeometry]] = {
+        f: [] for f in drive.limbs
+    }
+    if led:
+        for one in read_perception_geometry(inspector, led.__contains__):
+            leading, X_FL = led[one.frame_id]
+            drawn[leading].append(replace(one, X_FG=X_FL @ one.X_FG))
+    for leading, geometries in drawn.items():
+        path = f"/moving/{drive.names[leading]}"
+        draw_body(meshcat, path, geometries)
+        _move(meshcat, animation, path, drive.X_WFs[leading], _TRAFFIC_INTERVAL)
+
+
 def _move(
     meshcat: Meshcat,
     animation: MeshcatAnimation,
     path: str,
     X_WFs: Sequence[RigidTransform],
+    interval: int = 1,
 ) -> None:
+    """Moves a path; between frames of an interval the page interpolates."""
     meshcat.SetTransform(path, X_WFs[0])
-    for frame, X_WF in enumerate(X_WFs):
-        animation.SetTransform(frame, path, X_WF)
+    last = len(X_WFs) - 1
+    for frame in {*range(0, last, interval), last}:
+        animation.SetTransform(frame, path, X_WFs[frame])
 
 
 def _moving_paths(

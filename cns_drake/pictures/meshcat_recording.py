@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from pydrake.common.value import Value
-from pydrake.geometry import QueryObject
+from pydrake.geometry import FrameId, QueryObject
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, EventStatus, LeafSystem
 
@@ -109,6 +109,18 @@ class MeshcatRecorder(LeafSystem):
         )
         self.DeclareForcedPublishEvent(self._publish)
 
+    def show_too(self, name: str, frames: Sequence[FrameId]) -> None:
+        """Shows something else that moves, its limbs as at the first frame.
+
+        Args:
+            name: unique, for the page.
+            frames: of its geometry; the first leads.
+        """
+        leading = frames[0]
+        self.drive.X_WFs[leading] = []
+        self.drive.names[leading] = name
+        self.drive.limbs[leading] = dict.fromkeys(frames, RigidTransform())
+
     def save(self, path: Path, *, title: str = "cns-drake") -> None:
         """Writes the page of the drive up to now.
 
@@ -138,6 +150,11 @@ class MeshcatRecorder(LeafSystem):
         for frame_id, X_WFs in self.drive.X_WFs.items():
             # Copies: what the ports give may be overwritten at the next step.
             X_WFs.append(RigidTransform(query_object.GetPoseInWorld(frame_id)))
+        if not self.drive.X_WBs:
+            for leading, X_FLs in self.drive.limbs.items():
+                X_FW = self.drive.X_WFs[leading][0].inverse()
+                for limb in X_FLs:
+                    X_FLs[limb] = X_FW @ query_object.GetPoseInWorld(limb)
         odometry = self._odometry.Eval(context)
         X_WB = RigidTransform(odometry.X_WB)
         self.drive.speeds.append(float(odometry.V_WB_B.translational()[0]))

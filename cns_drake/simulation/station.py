@@ -136,6 +136,9 @@ def make_station(
 
     if moving is not None:
         measured["objects"] = moving.GetOutputPort("objects")
+        if page is not None:
+            for body in moving.bodies:
+                page.show_too(body.name, body.frames)
 
     recorders = {"meshcat_recorder": page}
     if bag is not None:

@@ -150,6 +150,11 @@ class TrafficMotion(LeafSystem):
         )
 
     @property
+    def bodies(self) -> tuple[TrafficBody, ...]:
+        """The vehicles, then the walkers."""
+        return self._bodies
+
+    @property
     def moving_frames(self) -> dict[FrameId, int]:
         """Limb's frame -> its row in the ports of all limbs."""
         return {frame: k for k, frame in enumerate(self._frames)}

@@ -2,12 +2,15 @@
 
 import shutil
 
+from helpers.meshcat_pages import objects, read_commands, tracks
 from helpers.small_city import ROADS
 from helpers.small_map import write_small_map
 from helpers.tiny_drive import tiny_scenario
 from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from cns_drake.base.recordings.mcap_sequence import McapSequence
 from cns_drake.export.exporting import export_sequence
@@ -99,6 +102,60 @@ def test_a_shorter_recording_begins_alike(scenario, recording, tmp_path):
     whole = messages(recording)
     assert {topic for topic, _, _ in cut} >= {"/objects", "/lidar/points"}
     assert cut == [one for one in whole if one[1] <= cut[-1][1]]
+
+
+def test_a_page_moves_vehicles_and_walkers(scenario, tmp_path):
+    """As the boxes of the recording do, which are fixed to vehicles."""
+    short = scenario.model_copy(update={"frames": 12})
+    page = tmp_path / "page.html"
+    folder = simulate(short, tmp_path, page_file=page).folder
+    commands = read_commands(page.read_text())
+    drawn, moved = objects(commands), tracks(commands)
+    names = {
+        str(number): one["name"]
+        for number, one in McapSequence(folder).instances.items()
+    }
+    boxes = read_boxes(folder)
+    first, last = boxes[0], boxes[-1]
+    walkers = [name for name in names.values() if name.startswith("walker")]
+    assert len(walkers) == 60
+    assert moved.keys() >= {f"/moving/{name}" for name in walkers}
+    ways = []
+    for number in first.keys() & last.keys():
+        if not names[number].startswith("traffic"):
+            continue
+        path = f"/moving/{names[number]}"
+        assert any(key.startswith(f"{path}/") for key in drawn)
+        keys = moved[path]
+        assert [key["time"] for key in keys[".position"]] == [0, 5, 10, 11]
+        p_FCs = [
+            Rotation.from_quat(keys[".quaternion"][k]["value"]).inv()
+            .apply(box - keys[".position"][k]["value"])
+            for k, box in ((0, first[number]), (-1, last[number]))
+        ]  # fmt: skip
+        np.testing.assert_allclose(p_FCs[1], p_FCs[0], atol=1e-6)
+        ways.append(np.linalg.norm(last[number] - first[number]))
+    assert len(ways) > 5
+    assert max(ways) > 1.0
+
+
+def read_boxes(folder):
+    """Returns for each message of `/objects` the centres of boxes, by id."""
+    with (folder / f"{folder.name}_0.mcap").open("rb") as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+        return [
+            {
+                one.id: np.array(
+                    [
+                        one.bbox.center.position.x,
+                        one.bbox.center.position.y,
+                        one.bbox.center.position.z,
+                    ]
+                )
+                for one in message.detections
+            }
+            for *_, message in reader.iter_decoded_messages(["/objects"])
+        ]
 
 
 def test_kitti_has_moving_labels_and_instances(recording, moving, tmp_path):
