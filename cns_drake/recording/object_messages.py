@@ -17,7 +17,7 @@ from cns_drake.recording.message_template import (
     MessageTemplate,
     number_marks,
 )
-from cns_drake.recording.messages import MAP_FRAME
+from cns_drake.recording.messages import MAP_FRAME, make_vector
 
 # Position, orientation and size of a box.
 _NUMBERS = 10
@@ -184,11 +184,6 @@ def _pose(numbers: np.ndarray) -> Any:
     )
 
 
-def _size(numbers: np.ndarray) -> Any:
-    x, y, z = (float(number) for number in numbers)
-    return message_class("geometry_msgs/msg/Vector3")(x=x, y=y, z=z)
-
-
 def _detection(instance: int, semantic_class: str, numbers: np.ndarray) -> Any:
     pose = _pose(numbers[:7])
     hypothesis = message_class("vision_msgs/msg/ObjectHypothesis")(
@@ -201,7 +196,7 @@ def _detection(instance: int, semantic_class: str, numbers: np.ndarray) -> Any:
         hypothesis=hypothesis, pose=certain
     )
     box = message_class("vision_msgs/msg/BoundingBox3D")(
-        center=pose, size=_size(numbers[7:])
+        center=pose, size=make_vector(numbers[7:])
     )
     return message_class("vision_msgs/msg/Detection3D")(
         header=_header(), results=[result], bbox=box, id=str(instance)
@@ -212,7 +207,7 @@ def _entity(instance: int, semantic_class: str, numbers: np.ndarray) -> Any:
     r, g, b = _RGB.get(semantic_class, _OTHER_RGB)
     cube = message_class("foxglove_msgs/msg/CubePrimitive")(
         pose=_pose(numbers[:7]),
-        size=_size(numbers[7:]),
+        size=make_vector(numbers[7:]),
         color=message_class("foxglove_msgs/msg/Color")(
             r=r, g=g, b=b, a=_OPACITY
         ),

@@ -85,16 +85,10 @@ class _Server:
             raise
         return ours, _Forked(self, number)
 
-    def signal(self, number: int, signal_number: int) -> None:
-        """Sends a signal to a process that the server has started."""
+    def ask(self, kind: str, *values: int) -> int | None:
+        """Returns the answer to a request; see `_serve`."""
         with self._asked(), self._lock:
-            self._connection.send(("signal", number, signal_number))
-            self._connection.recv()
-
-    def status(self, number: int) -> int | None:
-        """Returns the status of a process, None before its end."""
-        with self._asked(), self._lock:
-            self._connection.send(("status", number))
+            self._connection.send((kind, *values))
             return self._connection.recv()
 
     def stop(self) -> None:
@@ -122,14 +116,14 @@ class _Forked:
         self._number = number
 
     def terminate(self) -> None:
-        self._server.signal(self._number, signal.SIGTERM)
+        self._server.ask("signal", self._number, signal.SIGTERM)
 
     def kill(self) -> None:
-        self._server.signal(self._number, signal.SIGKILL)
+        self._server.ask("signal", self._number, signal.SIGKILL)
 
     def wait(self, timeout: float | None = None, /) -> int:
         deadline = None if timeout is None else time.monotonic() + timeout
-        while (status := self._server.status(self._number)) is None:
+        while (status := self._server.ask("status", self._number)) is None:
             if deadline is not None and time.monotonic() > deadline:
                 raise subprocess.TimeoutExpired("job", timeout or 0.0)
             time.sleep(_LOOK_INTERVAL)
@@ -171,11 +165,11 @@ def _serve(parent: Connection) -> tuple[Connection, bytes] | None:
             number, *signals = values
             if statuses[number] is None:
                 statuses[number] = _look(number)
-            # A number that is free again may be another's.
-            if statuses[number] is None and signals:
-                os.kill(number, *signals)
-            elif not signals:
+            if kind == "status":
                 answer = statuses[number]
+            # A number that is free again may be another's.
+            elif statuses[number] is None:
+                os.kill(number, *signals)
         with contextlib.suppress(ConnectionError):
             parent.send(answer)
 
