@@ -120,6 +120,20 @@ class McapFile:
             self._locations[topic] = self._read_locations(topic)
         return self._locations[topic]
 
+    def step_back_ns(self, topic: str) -> int:
+        """Returns how far a topic's log time goes back, in the file's order.
+
+        Returns:
+            The largest step back between two neighbours [ns]; 0 without one.
+
+        Raises:
+            InputError: if the index cannot be read.
+        """
+        places = self.locate(topic)
+        order = np.lexsort((places["offset"], places["chunk"]))
+        times_ns = places["log_time_ns"][order].astype(np.int64)
+        return max(0, -int(np.diff(times_ns).min(initial=0)))
+
     def read(self, location: np.void) -> memoryview:
         """Returns the serialised message at a location.
 

@@ -26,6 +26,9 @@ _ODOMETRY_TOPIC = "/odometry"
 _IMU_TOPIC = "/imu/data"
 _TF_STATIC_TOPIC = "/tf_static"
 _KALIBR = "imu.yaml"
+# Messages that lie in a file this much later than others of their time are not
+# late but of a clock that was set back [s].
+_LATEST = 1.0
 
 
 class McapSequence(Sequence):
@@ -105,16 +108,24 @@ class McapSequence(Sequence):
 
     @property
     def notes(self) -> tuple[str, ...]:
+        notes = []
+        for topic in (self._lidar_topic, _ODOMETRY_TOPIC):
+            back = self._file.step_back_ns(topic) * 1e-9
+            if back > _LATEST:
+                notes.append(
+                    f"{self._path}: {topic}: the clock goes back by {back:.3g}"
+                    " s; messages are read in the order of their log times"
+                )
         lidars = (self.scenario or {}).get("lidars")
         lidar = (
             lidars.get(self.lidar_name) if isinstance(lidars, dict) else None
         )
-        if not (isinstance(lidar, dict) and lidar.get("motion_distortion")):
-            return ()
-        return (
-            f"{self._path}: taken while the LiDAR moved, and used as taken"
-            " (evaluation.sequences.deskewing takes the motion out)",
-        )
+        if isinstance(lidar, dict) and lidar.get("motion_distortion"):
+            notes.append(
+                f"{self._path}: taken while the LiDAR moved, and used as taken"
+                " (evaluation.sequences.deskewing takes the motion out)"
+            )
+        return tuple(notes)
 
     @property
     def scenario(self) -> Mapping | None:

@@ -2,6 +2,7 @@ import builtins
 import struct
 import tracemalloc
 
+from helpers.contradictions import read_messages, write_messages
 from helpers.drive_files import (
     PERIOD_NS,
     T0_NS,
@@ -130,6 +131,27 @@ def test_a_scan_is_read_without_reading_the_file(tmp_path, monkeypatch):
     sequence = open_sequence(path)
     np.testing.assert_array_equal(sequence.scan(41), scans[41])
     assert 0 < read < 0.1 * path.stat().st_size
+
+
+@pytest.mark.parametrize(
+    ("back_ns", "is_noted"), [(10**9, False), (10**9 + 1, True)]
+)
+def test_a_clock_that_was_set_back_is_noted(tmp_path, back_ns, is_noted):
+    path, scans, _ = record(tmp_path / "s")
+    messages, attachments = read_messages(path.read_bytes())
+    half = T0_NS + 3 * PERIOD_NS
+    later = [one for one in messages if one.log_time >= half]
+    ahead_ns = back_ns - (later[-1].log_time - messages[0].log_time)
+    moved = [one.copy(log_time=one.log_time + ahead_ns) for one in later]
+    earlier = [one for one in messages if one.log_time < half]
+    path.write_bytes(write_messages([*moved, *earlier], attachments))
+
+    sequence = open_sequence(path)
+
+    np.testing.assert_array_equal(sequence.scan(0), scans[0])
+    np.testing.assert_array_equal(sequence.scan(6), scans[6])
+    topics = {note.split(": ")[1] for note in sequence.notes}
+    assert topics == ({"/lidar/points", "/odometry"} if is_noted else set())
 
 
 def test_scenario_and_structures(tmp_path):
