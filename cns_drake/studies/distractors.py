@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -31,11 +32,13 @@ def distracting_drives(
     """Returns drives through other cities with about so many places.
 
     These are the shipped drives of other maps, each through its own stage;
-    then through the other stages; then through those cities drawn anew.
+    then those of this map, along the same streets between other buildings, if
+    it is shipped; then the drives of other maps through the other stages; then
+    through those cities drawn anew.
 
     Args:
-        asking: a drive through the map that is left out; its LiDARs measure
-            the others, too.
+        asking: a drive through the city whose places are not to stand among
+            these; its LiDARs measure the others, too.
         number: of places.
         spacing: between two places [m].
         output: folder for cities that are drawn anew.
@@ -67,34 +70,33 @@ def _drives(
     asking: Scenario, output: Path, cluster: Cluster
 ) -> Iterator[Scenario]:
     """Yields drives without end."""
-    maps = {
-        name: MapFolder(path)
-        for name, path in shipped_maps().items()
-        if name != Path(str(asking.map)).name
-    }
+    maps = {name: MapFolder(path) for name, path in shipped_maps().items()}
     sequences = {
         name: [load_scenario(path) for path in folder.recordable_sequences()]
         for name, folder in maps.items()
     }
-    for same in sequences.values():
-        yield from same
-    for name, same in sequences.items():
+    own = Path(str(asking.map)).name
+    others = [name for name in maps if name != own]
+
+    def redrawn(name: str, seed: int) -> Iterator[Scenario]:
+        cities = redraw_cities(maps[name].path, _STAGE, [seed], output, cluster)
+        for one in sequences[name]:
+            yield _elsewhere(one, str(cities[seed]), _STAGE, f"c{seed}")
+
+    for name in others:
+        yield from sequences[name]
+    if own in maps:
+        yield from redrawn(own, 1)
+    for name in others:
         for stage in maps[name].stages():
             yield from (
                 _elsewhere(one, one.map, stage, stage)
-                for one in same
+                for one in sequences[name]
                 if one.stage != stage
             )
-    seed = 0
-    while True:
-        seed += 1
-        for name, same in sequences.items():
-            cities = redraw_cities(
-                maps[name].path, _STAGE, [seed], output, cluster
-            )
-            for one in same:
-                place = str(cities[seed])
-                yield _elsewhere(one, place, _STAGE, f"c{seed}")
+    for seed in itertools.count(1):
+        for name in others:
+            yield from redrawn(name, seed)
 
 
 def _elsewhere(

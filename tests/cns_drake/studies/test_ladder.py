@@ -1,6 +1,7 @@
 """`cns-drake ladder`: what its rungs change, and what it writes."""
 
 import csv
+from pathlib import Path
 import shutil
 
 from helpers import documents, studies
@@ -12,7 +13,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.scenarios.scenario_loading import load_scenario
 from cns_drake.simulation.simulated_drive import SimulatedDrive
-from cns_drake.studies import ladder
+from cns_drake.studies import distractors, ladder
 from cns_drake.studies.distractors import distracting_drives
 from cns_drake.studies.ladder import climb_ladder
 from cns_drake.studies.ladder_causes import CAUSES, STRENGTHS
@@ -160,6 +161,26 @@ def test_distracting_drives_are_of_other_cities(tmp_path, monkeypatch):
     assert all("metropolis" not in drive.name for drive in drives)
     assert len({drive.name for drive in drives}) == len(drives)
     assert distracting_drives(asking, 0, 5.0, tmp_path, Cluster()) == []
+
+
+def test_many_distracting_drives_have_twin_blocks(tmp_path, monkeypatch):
+    drawn = []
+
+    def redraw(folder, stage, seeds, output, cluster):
+        drawn.append((folder.name, *seeds))
+        return {seed: output / f"{folder.name}_c{seed}" for seed in seeds}
+
+    monkeypatch.setattr(distractors, "redraw_cities", redraw)
+    monkeypatch.setattr(distractors, "_num_places", lambda *_: 1)
+    asking = load_scenario("suburbia_02")
+    drives = distracting_drives(asking, 40, 5.0, tmp_path, Cluster())
+    maps = [Path(drive.map).name for drive in drives]
+    # Ten shipped drives of the others, two of the same streets, and so on.
+    assert maps.index("suburbia_c1") == 10
+    assert maps.count("suburbia_c1") == 2
+    assert "suburbia" not in maps
+    assert drawn == [("suburbia", 1), ("downtown", 1)]
+    assert len({drive.name for drive in drives}) == 40
 
 
 @pytest.mark.slow
