@@ -10,16 +10,18 @@ from typing import Any
 import numpy as np
 
 from cns_drake.base import points as point_arrays
-from cns_drake.base import poses
 from cns_drake.base.errors import InputError
 from cns_drake.base.json_text import parse_json
 from cns_drake.base.recordings import mcap_messages, ros_types
 from cns_drake.base.recordings.mcap_file import McapFile
-from cns_drake.base.recordings.mcap_messages import xyz, xyzw
 from cns_drake.base.recordings.motion import IMU_DTYPE, ODOMETRY_DTYPE
 from cns_drake.base.recordings.point_cloud2 import to_points, to_records
 from cns_drake.base.recordings.point_layouts import from_layout
 from cns_drake.base.recordings.sequence import Sequence, index_instances
+from cns_drake.base.recordings.static_transforms import (
+    StaticTransforms,
+    checked_poses,
+)
 
 _LIDAR_TOPIC = "/lidar/points"
 _ODOMETRY_TOPIC = "/odometry"
@@ -233,7 +235,9 @@ class McapSequence(Sequence):
                 f" ({len(missing)} of {len(self)} scans have none)"
             )
         matching = odometry[[rows[stamp] for stamp in stamps_ns]]
-        X_WB = self._to_poses(matching["position"], matching["quat_xyzw"])
+        X_WB = checked_poses(
+            matching["position"], matching["quat_xyzw"], str(self._path)
+        )
         return stamps_ns, X_WB @ self.X_BS
 
     @cached_property
@@ -293,56 +297,15 @@ class McapSequence(Sequence):
     def _mount(self, message: Any) -> np.ndarray:
         """Returns the pose of a sensor's frame, that of its message, in B."""
         base = self._first(_ODOMETRY_TOPIC).child_frame_id
-        sensor = message.header.frame_id
-        X_CS = np.eye(4)
-        child = sensor
-        for _ in range(len(self._edges) + 1):
-            if child == base:
-                return X_CS
-            if child not in self._edges:
-                break
-            child, p_PC, quat_PC = self._edges[child]
-            X_CS = self._to_poses(np.array(p_PC), np.array(quat_PC)) @ X_CS
-        raise InputError(
-            f"{self._path}: {_TF_STATIC_TOPIC}: no transform from {base} to"
-            f" {sensor}"
-        )
+        return self._transforms.pose(base, message.header.frame_id)
 
     @cached_property
-    def _edges(self) -> dict[str, tuple]:
-        """Frame C -> its parent P, p_PC, quat_xyzw_PC, from /tf_static."""
-        edges: dict[str, tuple] = {}
-        for place in self._file.locate(_TF_STATIC_TOPIC):
-            for edge in self._message(_TF_STATIC_TOPIC, place).transforms:
-                child, transform = edge.child_frame_id, edge.transform
-                new = (
-                    edge.header.frame_id,
-                    xyz(transform.translation),
-                    xyzw(transform.rotation),
-                )
-                # Repeated, it says nothing new.
-                old = edges.setdefault(child, new)
-                if old != new:
-                    raise InputError(
-                        f"{self._path}: {_TF_STATIC_TOPIC}: {child}: at"
-                        f" {mcap_messages.stamp_ns(edge.header)} ns {new},"
-                        f" before {old}"
-                    )
-        return edges
-
-    def _to_poses(self, p: np.ndarray, quat_xyzw: np.ndarray) -> np.ndarray:
-        """Returns poses (..., 4, 4) of positions and quaternions."""
-        if not (np.isfinite(p).all() and np.isfinite(quat_xyzw).all()):
-            raise InputError(f"{self._path}: a pose is not finite")
-        if not (np.abs(p) < poses.FARTHEST).all():
-            raise InputError(
-                f"{self._path}: a pose is {np.abs(p).max():g} m from the origin"
-            )
-        try:
-            R = poses.rotation_from_quaternion(quat_xyzw)
-        except ValueError as error:
-            raise InputError(f"{self._path}: a pose has {error}") from error
-        return poses.make_pose(R, p)
+    def _transforms(self) -> StaticTransforms:
+        messages = (
+            self._message(_TF_STATIC_TOPIC, place)
+            for place in self._file.locate(_TF_STATIC_TOPIC)
+        )
+        return StaticTransforms(messages, f"{self._path}: {_TF_STATIC_TOPIC}")
 
     def _first(self, topic: str) -> Any:
         return self._message(topic, self._file.locate(topic)[0])
