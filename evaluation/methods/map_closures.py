@@ -5,10 +5,11 @@ images that agree on a motion in the plane are inliers, and their number is
 the score. The package `map-closures` does all of that. It is an optional
 extra, since it needs an older NumPy.
 
-The package offers one step only, which aligns a local map with all earlier
-ones and then keeps it. Two things follow. Queries join the database, as in the
-package's own program; what they have in common with each other does not count
-here. And n local maps cost about n^2 / 2 alignments.
+The package offers one step only, which keeps a local map and aligns it with all
+that have lower numbers. Queries therefore join the database, as in the
+package's own program. Numbers fall here, each below the one before, and places
+have lower ones than queries: a place is then aligned with none when it is kept,
+and a query with all places but with no other query.
 """
 
 from __future__ import annotations
@@ -25,11 +26,10 @@ from cns_drake.base.errors import InputError
 from evaluation.maps.voxel_maps import thin
 from evaluation.methods.method import Method, MethodConfig, register
 
-# Numbers of queries begin this far after those of places, since the package
-# compares no map with its direct predecessors.
-_GAP = 1000
-# More than there are local maps.
-_ALL = 1 << 20
+# More than there are local maps; and the number of the first query. Those of
+# the next ones fall and stay far above those of places, since the package
+# leaves out the maps numbered just below.
+_ALL = 1 << 17
 
 
 class MapClosuresConfig(MethodConfig):
@@ -57,7 +57,7 @@ class MapClosuresDatabase:
 
     Attributes:
         num_places: local maps that queries may find.
-        program: of the package, which has aligned all of them.
+        program: of the package, which keeps all of them.
         num_queries: that have joined them.
         query: the last one.
         found: place -> inliers and pose X_PQ (4, 4) of the last one.
@@ -110,8 +110,8 @@ class MapClosures(Method[np.ndarray, MapClosuresDatabase]):
         self, places: Sequence[np.ndarray]
     ) -> MapClosuresDatabase:
         program = self._make_program()
-        for number, place in enumerate(places):
-            program.get_top_k_closures(number, place, 1)
+        for number in reversed(range(len(places))):
+            program.get_top_k_closures(number, places[number], 1)
         return MapClosuresDatabase(len(places), program)
 
     def score(
@@ -138,7 +138,7 @@ class MapClosures(Method[np.ndarray, MapClosuresDatabase]):
         """Aligns a query with all places, unless that was the last thing."""
         if database.query is query:
             return
-        number = database.num_places + _GAP + database.num_queries
+        number = _ALL - database.num_queries
         closures = database.program.get_top_k_closures(number, query, _ALL)
         database.num_queries += 1
         database.query = query
