@@ -86,7 +86,9 @@ class MeasureRung(PartStep):
         queries = self._described(self.query, "queries", reporter, query_scans)
         overlaps = None
         found = []
-        for choice in self.methods:
+        for choice in reporter.track(
+            self.methods, "comparing", len(self.methods)
+        ):
             database = places.pop(choice.name, None) or read_part(
                 _file(self.database, choice)
             )
