@@ -578,7 +578,7 @@ NOT_RUN = {
     "runs it on a short drive",
     "cns-drake ladder --levels": "hours of work; the recipe ladder climbs some "
     "of it",
-    "cns-drake simulate metropolis_03 --returns calibrated": "records two whole "
+    "cns-drake simulate metropolis_03 --returns calibrated": "records two "
     "drives, for minutes; test_cli scans with calibrated returns",
     "cns-drake levels mine": "needs these hours; test_levels has such tables",
     "cns-drake levels ours": "likewise",
