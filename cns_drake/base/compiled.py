@@ -23,6 +23,9 @@ def compiled(function: _Function) -> _Function:
     compiles anew. Numba looks only at the file of the function itself for
     changes: a function may call compiled ones of its own folder besides, of
     which any change has all of the folder compiled anew.
+
+    An array is best written number by number: where it is assigned to a part
+    of another one, numba compiles a message about shapes, for seconds.
     """
     # Numba asks where to keep code while it decorates, and asks nobody else.
     before = numba.config.CACHE_DIR

@@ -62,7 +62,8 @@ def run_steps(
     for k in range(len(presence.until)):
         write_poses(lanes, vehicles, vehicle_poses[k])
         for i in range(len(walkers.speed)):
-            walker_poses[k, i, :2] = walkers.xy[i]
+            walker_poses[k, i, 0] = walkers.xy[i, 0]
+            walker_poses[k, i, 1] = walkers.xy[i, 1]
             walker_poses[k, i, 2] = height_of(ways, walkers, i)
             walker_poses[k, i, 3] = walkers.yaw[i]
             walker_poses[k, i, 4] = walkers.phase[i]

@@ -201,7 +201,8 @@ def grant_ways(
             since[i] = vehicles.since[i]
             if 0.0 < presence.until[k, lane] < _EGO_IS_NEAR:
                 since[i] = presence.until[k, lane] - _GOES_FIRST
-    since[num_vehicles:] = permits.waits
+    for c in range(num_crossings):
+        since[num_vehicles + c] = permits.waits[c]
     blocked = np.zeros(len(permits.small), np.bool_)
     for who in np.argsort(since):
         if since[who] == np.inf:

@@ -189,6 +189,7 @@ def write_poses(
         rear = place_of(lanes, vehicles, i, half - vehicles.rear_axle[i])
         ahead = front - rear
         ahead /= np.sqrt(np.sum(ahead**2))
-        poses[i, :3] = rear - vehicles.rear_axle[i] * ahead
+        for axis in range(3):
+            poses[i, axis] = rear[axis] - vehicles.rear_axle[i] * ahead[axis]
         poses[i, 3] = np.arctan2(ahead[1], ahead[0])
         poses[i, 4] = -np.arcsin(ahead[2])

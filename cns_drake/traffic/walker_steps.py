@@ -246,17 +246,16 @@ def step_walkers(
             wanted = (
                 walkers.speed[i] * step / max(np.sqrt(np.sum(step**2)), 1e-6)
             )
-        force[i] += (wanted - walkers.velocity[i]) / _RELAXATION
+        for k in range(2):
+            lacking = wanted[k] - walkers.velocity[i, k]
+            force[i, k] += lacking / _RELAXATION
         here = ways.points[_row(ways, way, forward, walkers.at[i]), :2]
         off = np.sum((walkers.xy[i] - here) * right)
         for side in (-1.0, 1.0):
             room = half - side * off
-            force[i] -= (
-                side
-                * _EDGE_STRENGTH
-                * np.exp(-max(room, 0.0) / _EDGE_REACH)
-                * right
-            )
+            push = side * _EDGE_STRENGTH * np.exp(-max(room, 0.0) / _EDGE_REACH)
+            force[i, 0] -= push * right[0]
+            force[i, 1] -= push * right[1]
     for c in range(len(waited)):
         if not waited[c]:
             permits.waits[c] = np.inf
@@ -457,4 +456,5 @@ def _keep_on_way(
     distance = np.sqrt(np.sum(back**2))
     if distance > most:
         back *= most / distance
-    walkers.xy[i] += back
+    walkers.xy[i, 0] += back[0]
+    walkers.xy[i, 1] += back[1]

@@ -195,9 +195,10 @@ def _decompress_lzf(packed: np.ndarray, plain: np.ndarray) -> bool:
             length = control + 1
             if source + length > len(packed) or target + length > len(plain):
                 return False
-            plain[target : target + length] = packed[source : source + length]
-            source += length
-            target += length
+            for _ in range(length):
+                plain[target] = packed[source]
+                source += 1
+                target += 1
             continue
         length = control >> 5
         if length == 7:

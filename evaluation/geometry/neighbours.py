@@ -166,7 +166,8 @@ def _search(
     for group in range(num_groups):
         first, last = starts[group], starts[group + 1]
         num_near = num_groups
-        near[:] = np.arange(num_groups)
+        for index in range(num_groups):
+            near[index] = index
         for point in range(first, last):
             px, py, pz = x[point], y[point], z[point]
             limit = np.inf

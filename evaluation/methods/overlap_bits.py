@@ -133,8 +133,11 @@ def fine_bits(cells: np.ndarray, starts: np.ndarray) -> np.ndarray:
             for near in range(max(column - 1, 0), min(column + 2, GRID)):
                 wide[layer, row, near // WORD] |= one << np.uint64(near % WORD)
     result = wide.copy()
-    result[:, 1:] |= wide[:, :-1]
-    result[:, :-1] |= wide[:, 1:]
+    for layer in range(NUM_LAYERS):
+        for row in range(GRID - 1):
+            for word in range(words):
+                result[layer, row + 1, word] |= wide[layer, row, word]
+                result[layer, row, word] |= wide[layer, row + 1, word]
     return result
 
 

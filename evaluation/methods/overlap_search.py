@@ -128,7 +128,8 @@ def overlaps_nearby(
                     )
                     if total > counts[n]:
                         counts[n] = total
-                        poses[n] = heading, right, up
+                        poses[n, 0] = heading
+                        poses[n, 1], poses[n, 2] = right, up
     return counts, poses
 
 
@@ -161,10 +162,7 @@ def climb(
         (3 + layers,) int64: the pose, and the query's cells that meet some
         of the place, in each layer.
     """
-    num_layers = len(weights)
-    best = np.zeros(3 + num_layers, np.int64)
-    best[:3] = start
-    best[3:] = _common(cells, starts, place, turns, best)
+    best = np.concatenate((start, _common(cells, starts, place, turns, start)))
     for level in range(len(steps)):
         while True:
             centre = best.copy()
@@ -179,7 +177,7 @@ def climb(
                         pose[2] += dc * steps[level, 1]
                         found = _common(cells, starts, place, turns, pose)
                         if (found * weights).sum() > (best[3:] * weights).sum():
-                            best[:3], best[3:] = pose, found
+                            best = np.concatenate((pose, found))
             if (best == centre).all():
                 break
     return best

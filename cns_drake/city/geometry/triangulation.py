@@ -180,10 +180,11 @@ def _ears(points: np.ndarray) -> tuple[np.ndarray, bool]:
             k = (start + step) % count
             a, b, c = left[(k - 1) % count], left[k], left[(k + 1) % count]
             if _is_ear(points, left[:count], a, b, c):
-                triangles[found] = a, b, c
+                _write(triangles, found, a, b, c)
                 found += 1
-                left[k : count - 1] = left[k + 1 : count].copy()
                 count -= 1
+                for i in range(k, count):
+                    left[i] = left[i + 1]
                 # Going on behind the ear avoids fans of thin triangles.
                 start = k
                 is_cut = True
@@ -194,9 +195,14 @@ def _ears(points: np.ndarray) -> tuple[np.ndarray, bool]:
                     return triangles[:found], False
             return triangles[:found], True
     if count == 3 and _side(points, left[0], left[1], left[2]) > 0:
-        triangles[found] = left[0], left[1], left[2]
+        _write(triangles, found, left[0], left[1], left[2])
         found += 1
     return triangles[:found], True
+
+
+@compiled
+def _write(triangles: np.ndarray, row: int, a: int, b: int, c: int) -> None:
+    triangles[row, 0], triangles[row, 1], triangles[row, 2] = a, b, c
 
 
 @compiled
