@@ -7,7 +7,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 from scipy.ndimage import gaussian_filter
-from shapely.geometry import Point
+import shapely
+from shapely.geometry import MultiPoint, Point
 
 from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.structures import (
@@ -27,6 +28,8 @@ _MOST_CELLS = 500
 # so that pavements are seen and not it [m].
 _SMOOTHING = 1.5
 _DEPTH = 0.1
+# Farther from the convex hull of the feet nothing lies between them [m].
+_BESIDE_HULL = 1.0
 # Length of an edge that is not parted before, and points at once.
 _MOST_STEPS = 256
 _AT_ONCE = 1_000_000
@@ -102,7 +105,12 @@ def guess_ground(feet: np.ndarray, corners: np.ndarray) -> Ground:
     x, y = np.meshgrid(xs, ys)
     z = np.full(x.shape, np.nan)
     if len(feet) >= 4 and np.linalg.matrix_rank(feet[:, :2] - feet[0, :2]) == 2:
-        z = LinearNDInterpolator(feet[:, :2], feet[:, 2])(x, y)
+        # SciPy looks long for places outside of the convex hull.
+        hull = MultiPoint(feet[:, :2]).convex_hull.buffer(_BESIDE_HULL)
+        near = shapely.contains_xy(hull, x, y)
+        z[near] = LinearNDInterpolator(feet[:, :2], feet[:, 2])(
+            x[near], y[near]
+        )
     outside = np.isnan(z)
     nearest = NearestNDInterpolator(feet[:, :2], feet[:, 2])
     z[outside] = nearest(x[outside], y[outside])

@@ -53,7 +53,7 @@ def draw_overview(
         for colour, triangles in alike.items():
             axes.add_collection(
                 PolyCollection(
-                    list(np.concatenate(triangles)[:, :, :2]),
+                    np.concatenate(triangles)[:, :, :2],
                     facecolors=[colour],
                     # Else fine lines show between triangles.
                     edgecolors="face",

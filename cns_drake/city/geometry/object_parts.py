@@ -151,7 +151,10 @@ def ground_footprint(
     corners: list[np.ndarray] = [np.zeros((0, 2))]
     for part in parts:
         p, triangles = part_triangles(part, meshes)
-        corners.append(p[p[:, 2] <= HEADROOM, :2])
+        is_low = p[:, 2] <= HEADROOM
+        corners.append(p[is_low, :2])
+        if is_low.all():
+            continue
         for i, j in ((0, 1), (1, 2), (2, 0)):
             a, b = p[triangles[:, i]], p[triangles[:, j]]
             cut = (a[:, 2] - HEADROOM) * (b[:, 2] - HEADROOM) < 0

@@ -17,6 +17,8 @@ from shapely.geometry import LinearRing, Polygon
 from cns_drake.base.compiled import compiled
 
 _MM = 1000.0
+# Edges that are compared with all corners at a time.
+_EDGES_AT_ONCE = 256
 # A corner or point as whole millimetres.
 _Point = tuple[int, int]
 
@@ -63,15 +65,25 @@ def _with_corners_on_edges(
 ) -> list[_Point]:
     """Returns a ring with a corner wherever another ring touches it."""
     points = np.array(corners, dtype=np.int64)
+    starts = np.array(ring, dtype=np.int64)
+    ways = np.roll(starts, -1, axis=0) - starts
     result = []
-    for a, b in _edges(ring):
-        result.append(a)
-        along, offset = np.subtract(b, a), points - a
-        on_line = along[0] * offset[:, 1] == along[1] * offset[:, 0]
-        part = offset @ along
-        inside = on_line & (part > 0) & (part < along @ along)
-        order = np.argsort(part[inside], kind="stable")
-        result += [corners[i] for i in np.flatnonzero(inside)[order]]
+    for first in range(0, len(ring), _EDGES_AT_ONCE):
+        start = starts[first : first + _EDGES_AT_ONCE, None]
+        along = ways[first : first + _EDGES_AT_ONCE, None]
+        offset = points - start
+        on_line = along[..., 0] * offset[..., 1] == (
+            along[..., 1] * offset[..., 0]
+        )
+        part = (offset * along).sum(axis=2)
+        inside = on_line & (part > 0) & (part < (along * along).sum(axis=2))
+        has_some = inside.any(axis=1).tolist()
+        for k, corner in enumerate(ring[first : first + _EDGES_AT_ONCE]):
+            result.append(corner)
+            if has_some[k]:
+                those = np.flatnonzero(inside[k])
+                order = np.argsort(part[k, those], kind="stable")
+                result += [corners[i] for i in those[order]]
     return result
 
 

@@ -24,9 +24,9 @@ _SIGN_REACH, _SIGN_HEIGHT = 0.15, 0.5
 _BALCONY_REACH, _BALCONY_WIDTH = 1.15, 3.0
 _AWNING_REACH, _AWNING_HEIGHT = 1.1, 0.55
 _SILL_HEIGHT, _SILL_BESIDE, _SILL_REACH = 0.08, 0.08, 0.07
-# Windows farther from drives have no sills, or no frames, or lie in the plane
-# of their wall, and walls have no plinths [m].
-_SILLS_WITHIN, _FRAMES_WITHIN, _RECESSES_WITHIN = 15.0, 30.0, 45.0
+# Windows farther from drives have no sills, or no frames, or lie on their wall
+# and not in recesses, and walls have no plinths [m].
+_SILLS_WITHIN, _FRAMES_WITHIN, _RECESSES_WITHIN = 12.0, 20.0, 25.0
 # Nothing that is lower may hang over the way of a car, with so much room
 # beside the middle of it [m].
 _TALLEST_CAR, _BESIDE = 4.0, 2.5
@@ -89,10 +89,8 @@ def add_facade(
     has_balconies = style.balconies and bool(rng.random() < 0.6)
     if has_balconies:
         plan = opened_to_floor(plan, balcony_windows(plan))
-    if to_drive > _RECESSES_WITHIN:
-        flush = np.zeros_like(plan.openings.depth)
-        plan = replace(plan, openings=plan.openings._replace(depth=flush))
-    wall = open_wall(panel, plan.openings)
+    has_recesses = to_drive < _RECESSES_WITHIN
+    wall = open_wall(panel, plan.openings, has_recesses)
     if wall is None:
         faces.add("body", panel.triangles)
     else:

@@ -15,6 +15,8 @@ from cns_drake.imports.dressing.wall_panels import Panel
 # a frame is so wide [m].
 _BESIDE = 0.1
 _FRAME = 0.09
+# What is not cut into a panel lies so far before it [m].
+_ON_WALL = 0.02
 _EXACT = 1e-3
 _LEAST_AREA = 1e-4
 # The faces of a box on a panel: the limits (left, right, bottom, top, out and
@@ -133,13 +135,17 @@ def _quads(
     return panel.place(x, z, out)
 
 
-def open_wall(panel: Panel, openings: Openings) -> OpenedWall | None:
-    """Returns a panel with recesses; None where none fits.
+def open_wall(
+    panel: Panel, openings: Openings, has_recesses: bool = True
+) -> OpenedWall | None:
+    """Returns a panel with windows and doors; None where none fits.
 
     Args:
         panel: the wall.
         openings: within its bounding rectangle; rows that leave the outline
             of a panel which is no rectangle are left out, from the top down.
+        has_recesses: whether they are cut into the panel; if not, panes and
+            doors lie on it, which takes far fewer triangles.
     """
     area = (0.0, panel.length, 0.0, panel.height)
     rest = np.zeros((0, 3, 3))
@@ -153,6 +159,10 @@ def open_wall(panel: Panel, openings: Openings) -> OpenedWall | None:
         return None
     openings = openings.chosen(np.lexsort([openings.x0, openings.row]))
     _, x0, x1, z0, z1, depth, _ = openings
+    if not has_recesses:
+        backs = fronts(panel, x0, x1, z0, z1, _ON_WALL)
+        empty = np.zeros((0, 4, 3))
+        return OpenedWall(empty, panel.triangles, backs, openings)
     quads = fronts(panel, *_wall_between(openings, area))
     if depth.any():
         reveals = sides(panel, x0, x1, z0, z1, -depth)

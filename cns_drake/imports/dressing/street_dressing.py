@@ -17,6 +17,7 @@ from cns_drake.city.geometry.structures import Structure
 from cns_drake.city.placement.frontage import station_at
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plan.weighted import pick
+from cns_drake.imports.dressing.round_parts import without_curves
 from cns_drake.imports.dressing.upper_sides import UpperSides, turned_up
 from cns_drake.imports.foreign_city import Imported, Thing
 from cns_drake.imports.import_ground import Ground
@@ -226,7 +227,7 @@ class _Placing:
     ) -> bool:
         """Places an object, if there is room for it."""
         builder = OBJECTS[kind]
-        model = builder.build(rng)
+        model = without_curves(builder.build(rng))
         footprint = placed(model.footprint, xy, yaw)
         if (
             self.paths.distance(footprint) < _FROM_DRIVE
