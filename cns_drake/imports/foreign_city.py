@@ -41,6 +41,7 @@ class Imported:
         lod: level of detail; 0 if it is not known.
         original: name of the structure that it is a variant of; its own if
             empty.
+        is_gone: whether it stands no more, and it is not told since when.
     """
 
     structure: Structure
@@ -51,6 +52,7 @@ class Imported:
     tags: Mapping[str, str] = field(default_factory=dict)
     lod: float = 0.0
     original: str = ""
+    is_gone: bool = False
 
     @property
     def lot_name(self) -> str:

@@ -12,6 +12,7 @@ from shapely import STRtree
 
 from cns_drake.city.geometry.structures import MeshShape
 from cns_drake.imports.foreign_city import Imported
+from cns_drake.imports.gone_buildings import with_gone
 from cns_drake.imports.lots import lot
 from cns_drake.imports.staged_city import StagedCity
 
@@ -33,10 +34,12 @@ class Growth:
     Attributes:
         missing: buildings that are not there at the first stage.
         lower: building -> the part of its height that it has there.
+        gone: buildings of the file that stood there and stand no more.
     """
 
     missing: tuple[str, ...]
     lower: dict[str, float]
+    gone: tuple[str, ...] = ()
 
 
 def grow(city: StagedCity, part: float, seed: int) -> tuple[StagedCity, Growth]:
@@ -46,7 +49,8 @@ def grow(city: StagedCity, part: float, seed: int) -> tuple[StagedCity, Growth]:
     whatever else a file holds.
 
     Args:
-        city: of one stage.
+        city: of one stage; what is gone by then stands at the first, and what
+            has its place today does not.
         part: of its buildings that are not there at first, or lower.
         seed: of the lot.
     """
@@ -70,12 +74,26 @@ def grow(city: StagedCity, part: float, seed: int) -> tuple[StagedCity, Growth]:
             variants[one] = None
     first = [new for one in last if (new := variants.get(one, one)) is not None]
     extra = [new for new in variants.values() if new is not None]
+    stood: list[Imported] = []
+    if city.gone:
+        before = first
+        first = with_gone(city.gone, before)
+        stood = [one for one in first if one in set(city.gone)]
+        replaced = set(before) - set(first)
+        missing += [one.lot_name for one in replaced]
+        extra = [one for one in extra if one not in replaced]
+        lower = {n: h for n, h in lower.items() if n not in missing}
     grown = replace(
         city,
         standing={"01": first, "02": last},
-        kept=[*city.kept, *extra],
+        kept=[*city.kept, *extra, *stood],
+        gone=(),
     )
-    return grown, Growth(tuple(sorted(missing)), dict(sorted(lower.items())))
+    return grown, Growth(
+        tuple(sorted(missing)),
+        dict(sorted(lower.items())),
+        tuple(one.structure.name for one in stood),
+    )
 
 
 def _drawn(

@@ -161,6 +161,7 @@ def _drawn(options: ImportOptions, growth: Growth | None) -> dict:
             "seed": options.seed,
             "missing": list(growth.missing),
             "part_of_height": growth.lower,
+            **({"gone_since": list(growth.gone)} if growth.gone else {}),
         }
     }
 

@@ -34,6 +34,7 @@ from cns_drake.imports.osm_reading import (
     Tags,
     is_building,
     read_openstreetmap,
+    was_building,
 )
 from cns_drake.imports.osm_streets import (
     crossing_stripes,
@@ -62,7 +63,8 @@ def import_openstreetmap(
         path: of the file.
         year_attribute: see `construction_year`.
         dressed: whether the sea, and grounds by what they are made of, are
-            made, and bridges have parapets or are left out.
+            made, bridges have parapets or are left out, and buildings are
+            made that are gone since a date that is not told.
 
     Raises:
         InputError: if it cannot be read, has no building, or is larger than
@@ -70,8 +72,12 @@ def import_openstreetmap(
     """
     features = read_openstreetmap(path)
     faults = features.faults
-    buildings = [one for one in features.areas if is_building(one.tags)]
-    buildings = list(standing_buildings(buildings, faults))
+    buildings = [
+        one
+        for one in features.areas
+        if is_building(one.tags) or (dressed and was_building(one.tags))
+    ]
+    buildings = list(standing_buildings(buildings, faults, dressed))
     if not buildings:
         raise InputError(f"{path}: no building in it")
     bounds = np.array([p.bounds for one in buildings for p in one.polygons])

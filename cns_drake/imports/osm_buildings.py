@@ -6,7 +6,7 @@ https://wiki.openstreetmap.org/wiki/Simple_3D_Buildings
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -46,16 +46,20 @@ class _Block:
 
 
 def standing_buildings(
-    areas: Iterable[OsmArea], faults: ImportFaults
+    areas: Iterable[OsmArea], faults: ImportFaults, with_gone: bool = False
 ) -> Iterator[OsmArea]:
     """Yields the buildings and parts that stand or stood above the ground.
 
-    What does not stand any more has to tell until when it did.
+    Args:
+        areas: that are meant to be buildings.
+        faults: counts those that are left out.
+        with_gone: whether what stands no more is among them even if it is
+            not told until when it did.
     """
     for one in areas:
         absent = why_absent(one.tags)
-        is_past = absent == "demolished" and told_year(
-            one.tags.get("end_date", "")
+        is_past = absent == "demolished" and (
+            with_gone or told_year(one.tags.get("end_date", ""))
         )
         if absent is None or is_past:
             yield one
@@ -79,7 +83,11 @@ def make_buildings(
             for one in sound_parts(local.polygon(polygon), name, faults):
                 group.append(_Block(name, tags, one, low, high, roof))
     of_outline: dict[int, list[_Block]] = {}
-    tree_of_outlines = STRtree([one.polygon for one in outlines])
+    # Parts are not of what has stood in their place.
+    outlines.sort(key=lambda one: _is_gone(one.tags))
+    tree_of_outlines = STRtree(
+        [one.polygon for one in outlines if not _is_gone(one.tags)]
+    )
     alone = []
     for part in parts:
         inside = tree_of_outlines.query(
@@ -112,7 +120,7 @@ def make_buildings(
         taken[whole.name] = taken.get(whole.name, 0) + 1
         copy = taken[whole.name]
         number = f"_{copy}" if copy > 1 else ""
-        yield make_imported(
+        made = make_imported(
             f"building_{whole.name}{number}",
             "building",
             "Building",
@@ -124,6 +132,15 @@ def make_buildings(
             tags={**blocks[0].tags, **whole.tags},
             lod=1.0,
         )
+        yield replace(made, is_gone=True) if _is_gone(whole.tags) else made
+
+
+def _is_gone(tags: Tags) -> bool:
+    """Tells whether a building stands no more since it is not told when."""
+    return (
+        told_year(tags.get("end_date", "")) is None
+        and why_absent(tags) == "demolished"
+    )
 
 
 def _with_parts(outline: _Block, parts: list[_Block]) -> list[_Block]:

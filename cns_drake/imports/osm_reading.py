@@ -224,8 +224,10 @@ def is_building(tags: Tags) -> bool:
     return (
         is_told(tags, "building")
         or is_told(tags, "building:part")
-        or (
-            "end_date" in tags
-            and any(is_told(tags, f"{stage}:building") for stage in _GONE)
-        )
+        or ("end_date" in tags and was_building(tags))
     )
+
+
+def was_building(tags: Tags) -> bool:
+    """Tells whether a key says that there was a building."""
+    return any(is_told(tags, f"{stage}:building") for stage in _GONE)

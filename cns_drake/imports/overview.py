@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
@@ -51,9 +52,12 @@ def draw_overview(
             if one.is_ground == is_ground and one.kind != "TINRelief":
                 alike.setdefault(_colour(one), []).append(one.triangles)
         for colour, triangles in alike.items():
+            # An array, which the library takes faster than a list, is none of
+            # what its hints allow.
+            corners_xy: Any = np.concatenate(triangles)[:, :, :2]
             axes.add_collection(
                 PolyCollection(
-                    np.concatenate(triangles)[:, :, :2],
+                    corners_xy,
                     facecolors=[colour],
                     # Else fine lines show between triangles.
                     edgecolors="face",

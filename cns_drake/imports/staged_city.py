@@ -11,6 +11,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.city.generation.generate import MAX_STRUCTURES
 from cns_drake.imports.building_years import stage_names, stands_at
 from cns_drake.imports.foreign_city import ForeignCity, Imported
+from cns_drake.imports.gone_buildings import with_gone
 from cns_drake.imports.import_faults import ImportFaults
 from cns_drake.imports.import_report import ImportOptions
 from cns_drake.imports.near_drives import keep_near
@@ -29,12 +30,15 @@ class StagedCity:
         kept: those that stand at some stage.
         undated: how many buildings have no year.
         dated: how many have one.
+        gone: buildings that stand no more, if there is but one stage, that
+            of today.
     """
 
     standing: dict[str, list[Imported]]
     kept: list[Imported]
     undated: int
     dated: int
+    gone: Sequence[Imported] = ()
 
     def near(
         self, drives: Sequence[Drive], distance: float, faults: ImportFaults
@@ -111,14 +115,25 @@ def stage_city(
         stage: [
             one
             for one in found
-            if not _has_years(one)
-            or stands_at(one.year, one.until, k, options.years, options.undated)
+            if not _has_years(one) or _stands(one, k, options)
         ]
         for k, stage in enumerate(stage_names(options.years))
     }
+    gone: list[Imported] = []
+    if options.grow is not None:
+        (today,) = map(set, standing.values())
+        gone = [one for one in found if one not in today]
+    elif any(one.is_gone for one in found):
+        standing = {
+            stage: with_gone(
+                [one for one in some if one.is_gone],
+                [one for one in some if not one.is_gone],
+            )
+            for stage, some in standing.items()
+        }
     ever = {one for some in standing.values() for one in some}
     for one in found:
-        if one not in ever:
+        if one not in ever and one not in gone:
             kind = f"building {_why_never(one, options)}, left out"
             city.faults.add(kind, one.structure.name)
     kept = [one for one in found if one in ever]
@@ -131,7 +146,22 @@ def stage_city(
         raise InputError(f"{source}: nothing stands at any stage")
     years = [one.year for one in found if _has_years(one)]
     undated = years.count(None)
-    return StagedCity(standing, kept, undated, len(years) - undated)
+    return StagedCity(standing, kept, undated, len(years) - undated, gone)
+
+
+def _stands(one: Imported, stage: int, options: ImportOptions) -> bool:
+    """Tells whether a structure stands at the stage of a number.
+
+    What is gone since a date that is not told stood at all stages but the
+    last, as far as its year, or the lack of one, allows.
+    """
+    years, undated = options.years, options.undated
+    if one.is_gone:
+        past = years[:-1]
+        return stage < len(past) and stands_at(
+            one.year, None, stage, past, undated
+        )
+    return stands_at(one.year, one.until, stage, years, undated)
 
 
 def _together(city: ForeignCity) -> list[Imported]:
@@ -162,6 +192,8 @@ def _why_never(one: Imported, options: ImportOptions) -> str:
     first = options.years[0] if options.years else None
     if one.until is not None and (first is None or one.until <= first):
         return "demolished before the first stage" if first else "demolished"
+    if one.is_gone and len(options.years) < 2:
+        return "demolished"
     if one.year is None:
         return "without a year"
     if options.years and one.year > options.years[-1]:

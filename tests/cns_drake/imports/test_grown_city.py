@@ -12,6 +12,7 @@ import yaml
 
 from cns_drake.base.errors import InputError
 from cns_drake.command_line.cli import app
+from cns_drake.imports.building_years import Undated
 from cns_drake.imports.import_map import import_city
 from cns_drake.imports.import_report import ImportOptions
 from cns_drake.imports.told_dates import told_year
@@ -178,3 +179,62 @@ def test_what_is_gone_stood_in_its_time(tmp_path):
     counts = {kind: count for kind, count, _ in report.faults}
     assert counts["building demolished, left out"] == 4
     assert np.isclose(report.stages["01"], 1)
+
+
+def write_gone(path):
+    """Writes three houses, two of which were built where others stood."""
+    osm = OsmWriter()
+    number = {
+        "old": osm.box(0, 0, 10, 10, building="yes"),
+        "razed": osm.box(40, 0, 10, 10, razed__building="yes"),
+        "new": osm.box(43, 2, 10, 10, building="yes"),
+        "was": osm.box(80, 0, 10, 10, was__building="yes", start_date="1950"),
+        "dated": osm.box(82, 0, 9, 9, building="yes", start_date="1990"),
+        "part": osm.box(83, 1, 2, 2, building__part="yes", height="30"),
+        "historic": osm.box(120, 0, 10, 10, historic__building="yes"),
+        "until": osm.box(160, 0, 9, 9, razed__building="yes", end_date="1980"),
+    }
+    return number, osm.write(path / "city.osm")
+
+
+@pytest.mark.parametrize(
+    ("undated", "first", "second", "third"),
+    [
+        # The house of 1990 was there in 2000: what it replaced was not.
+        (Undated.FIRST, "old razed was historic until",
+         "old razed dated historic", "old new dated"),
+        (Undated.LAST, "was", "razed historic dated", "old new dated"),
+        (Undated.NEVER, "was", "dated", "dated"),
+    ],
+)  # fmt: skip
+def test_what_is_gone_without_a_date_stood_before_the_last_stage(
+    tmp_path, undated, first, second, third
+):
+    number, source = write_gone(tmp_path)
+    options = ImportOptions((1960, 2000, 2020), undated=undated, dressed=True)
+    import_city(source, tmp_path / "town", options)
+    for stage, some in (("01", first), ("02", second), ("03", third)):
+        expected = {f"building_w{number[name]}" for name in some.split()}
+        found = names(tmp_path / "town", stage)
+        assert {name for name in found if "building" in name} == expected
+
+
+def test_the_first_stage_by_lot_has_what_is_gone(tmp_path):
+    number, source = write_gone(tmp_path)
+    import_city(
+        source, tmp_path / "town", ImportOptions(grow=0.01, dressed=True)
+    )
+    name = {key: f"building_w{value}" for key, value in number.items()}
+    first, last = (
+        {one for one in names(tmp_path / "town", stage) if "building" in one}
+        for stage in ("01", "02")
+    )
+    assert last == {name["old"], name["new"], name["dated"]}
+    gone = [name["razed"], name["historic"], name["until"]]
+    assert first == {name["old"], name["dated"], *gone}
+    facts = yaml.safe_load((tmp_path / "town" / "import.yaml").read_text())
+    assert facts["first_stage_by_lot"]["missing"] == [name["new"]]
+    assert sorted(facts["first_stage_by_lot"]["gone_since"]) == sorted(gone)
+    plain = import_city(source, tmp_path / "plain", ImportOptions())
+    counts = {kind: count for kind, count, _ in plain.faults}
+    assert sum(n for kind, n in counts.items() if ":building" in kind) == 3
