@@ -79,17 +79,18 @@ class TakingTurns:
         cast: those of Open3D for the same rays [s].
     """
 
-    def __init__(self, scenario: Scenario, segment: int):
+    def __init__(self, sequence: str, scenario: Scenario, segment: int):
         """Prepares Open3D.
 
         Args:
+            sequence: name or file of the scenario.
             scenario: what is recorded.
             segment: frames to a turn.
         """
         self.recorded: list[np.ndarray] = []
         self.cast: list[np.ndarray] = []
         self._segment = segment
-        self._stage = Open3dStage(read_stage(scenario.name))
+        self._stage = Open3dStage(read_stage(sequence))
         self._drive = plan_drive(scenario)
         (lidar,) = scenario.lidars.values()
         self._X_BS = sensor_pose(lidar)
@@ -160,7 +161,7 @@ def take_turns(sequence: str, rounds: int, segment: int, label: str) -> None:
     """Prints how long a recording takes beside Open3D."""
     scenario = load_scenario(sequence)
     scenario = scenario.model_copy(update={"frames": (rounds + 1) * segment})
-    turns = TakingTurns(scenario, segment)
+    turns = TakingTurns(sequence, scenario, segment)
     with tempfile.TemporaryDirectory() as folder:
         simulate(
             scenario,

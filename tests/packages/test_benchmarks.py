@@ -4,17 +4,18 @@ from pathlib import Path
 import subprocess
 import sys
 
+from helpers.small_map import write_town
 import pytest
 
 FOLDER = Path(__file__).parents[1] / "benchmarks"
 # Program -> arguments, and a word of what it prints.
 RUNS = {
-    "ray_casting_rates.py": (("riverside_01", "--rounds", 1), "Mrays/s"),
+    "ray_casting_rates.py": (("{drive}", "--rounds", 1), "Mrays/s"),
     "recording.py": (
-        ("riverside_01", "--rounds", 1, "--frames", 2),
+        ("{drive}", "--rounds", 1, "--frames", 2),
         "ms a frame",
     ),
-    "start.py": (("riverside_01", "--runs", 2), "simulate riverside_01"),
+    "start.py": (("{drive}", "--runs", 2), "simulate "),
     "tcr_of_large_maps.py": (("--points", 5000), "TCR_sym"),
 }
 # They take minutes or a recording, need packages of the extra `benchmark`, or
@@ -36,12 +37,21 @@ def test_each_benchmark_is_accounted_for():
     assert found == RUNS.keys() | BY_HAND | SHARED
 
 
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory):
+    """File of a drive through a map of a few boxes."""
+    routes = {"01": "metropolis_01"}
+    town = write_town(tmp_path_factory.mktemp("maps") / "town", routes, 3)
+    return town / "sequence_01.yaml"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNS)
-def test_it_runs(name):
+def test_it_runs(name, drive):
     arguments, word = RUNS[name]
+    words = [str(argument).format(drive=drive) for argument in arguments]
     done = subprocess.run(
-        [sys.executable, FOLDER / name, *map(str, arguments)],
+        [sys.executable, FOLDER / name, *words],
         capture_output=True,
         text=True,
     )

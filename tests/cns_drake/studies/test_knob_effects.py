@@ -53,7 +53,9 @@ def town(tmp_path_factory):
 
 def test_each_knob_is_taken_back(town):
     effects = knob_effects(
-        drive(town, "01", aside=0.6), drive(town, "02"), Cluster(num_workers=2)
+        drive(town, "01", aside=0.6, frames=60),
+        drive(town, "02", frames=60),
+        Cluster(num_workers=2),
     )
     change = {e.title: e.points[0].tcr_sym for e in effects}
     as_it_is, centred, present, high, unchanged = change.values()
@@ -82,7 +84,9 @@ def test_what_is_not_there_is_not_taken_back(town):
     stages.write_text(text.replace("absent: {a house: [office_001]}\n", "\n"))
     try:
         effects = knob_effects(
-            drive(town, "01"), drive(town, "02"), Cluster(num_workers=2)
+            drive(town, "01", frames=30),
+            drive(town, "02", frames=30),
+            Cluster(num_workers=1),
         )
     finally:
         stages.write_text(text)
