@@ -1,7 +1,6 @@
 """Cities that change, driven and recorded by simulated LiDAR in Drake.
 
-What is public is in `__all__`; each name loads what it needs when it is first
-asked for.
+The public names are in `__all__`. A name is imported when it is first used.
 """
 
 import importlib
@@ -99,7 +98,7 @@ __all__ = [
     "simulate",
 ]
 
-# Module -> what it gives.
+# Module -> the public names it defines.
 _HOMES = {
     "cns_drake.base.errors": ("InputError",),
     "cns_drake.command_line.sequence_script": ("run_script", "run_sequence"),

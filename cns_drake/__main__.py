@@ -15,7 +15,7 @@ from cns_drake.base.interrupts import (  # noqa: E402
 
 
 def main() -> None:
-    """Runs the command; an interrupt while it is imported is no fault."""
+    """Runs the command; an interrupt during its import is not an error."""
     try:
         interrupt_on_termination()
         with uninterrupted():

@@ -1,1 +1,1 @@
-"""What the simulator and the evaluation share: errors, files, jobs, formats."""
+"""Code that simulator and evaluation share: errors, files, jobs, formats."""

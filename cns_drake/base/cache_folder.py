@@ -1,4 +1,4 @@
-"""Where a user's machine keeps what can be made again."""
+"""The folder for files that can be made again at any time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scans in the formats of files that hold one each."""
+"""Scans in file formats that hold one scan a file."""
 
 from __future__ import annotations
 

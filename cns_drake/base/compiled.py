@@ -27,7 +27,7 @@ def compiled(function: _Function) -> _Function:
     An array is best written number by number: where it is assigned to a part
     of another one, numba compiles a message about shapes, for seconds.
     """
-    # Numba asks where to keep code while it decorates, and asks nobody else.
+    # Numba reads the cache folder while it decorates, and only from here.
     before = numba.config.CACHE_DIR
     own_folder = Path(function.__code__.co_filename).parent
     numba.config.CACHE_DIR = str(

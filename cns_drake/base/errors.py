@@ -1,4 +1,4 @@
-"""The error that a user can mend."""
+"""Errors that a user can mend."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class InputError(Exception):
     and the fault. The command line prints it and exits with status 2.
 
     Attributes:
-        exit_status: of a command that ends with it.
+        exit_status: exit status of a command that ends with this error.
 
     Example:
         from evaluation import InputError, open_sequence
@@ -40,7 +40,7 @@ class InputError(Exception):
 class FailedJobsError(InputError):
     """Some jobs of many could not be done; the message names them all.
 
-    As everything else was done, the exit status is another one.
+    The exit status differs from InputError's, since all other jobs were done.
     """
 
     exit_status = 1
@@ -49,8 +49,8 @@ class FailedJobsError(InputError):
 def one_line(message: object) -> str:
     """Returns a message as one printable line of bounded length.
 
-    What it quotes of a file may hold anything: line breaks, and what steers
-    a terminal.
+    Text that the message quotes from a file may hold line breaks and control
+    characters of a terminal.
     """
     text = str(message)
     shown = "".join(c if c.isprintable() else " " for c in text[:_LONGEST])
@@ -67,11 +67,11 @@ def describe_validation_error(
     Args:
         source: the file or object that was validated.
         error: a `pydantic.ValidationError`.
-        model: its model, which has the right names for misspelt fields.
+        model: the pydantic model, used to suggest the names of misspelt fields.
     """
     fault = error.errors()[0]
     field = ".".join(str(part) for part in fault["loc"]) or "(top level)"
-    # pydantic puts this before what our own validators say.
+    # pydantic puts this before the message of one of our validators.
     message = fault["msg"].removeprefix("Value error, ")
     message += _advice(fault, model)
     more = error.error_count() - 1
@@ -80,7 +80,7 @@ def describe_validation_error(
 
 
 def _advice(fault: Mapping[str, Any], model: type[BaseModel] | None) -> str:
-    """Returns what to write instead, where that is plain."""
+    """Returns advice on what to write instead; "" if none is obvious."""
     place, given = fault["loc"], fault["input"]
     if fault["type"] == "extra_forbidden" and model is not None and place:
         # Slow to import, and rarely needed.

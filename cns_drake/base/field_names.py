@@ -1,4 +1,4 @@
-"""Fields of models that a misspelt key may stand for."""
+"""Suggestions for misspelt keys: the most similar field of a model."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ def nearest_field(
 
     Args:
         model: of the whole file.
-        place: keys and indices that lead to the unknown field, itself the
-            last.
+        place: keys and indices that lead to the unknown field; the last is the
+            field itself.
     """
     kinds: list[object] = [model]
     for part in place[:-1]:
@@ -33,7 +33,7 @@ def nearest_field(
 
 
 def _models(kind: object) -> Iterator[type[BaseModel]]:
-    """Yields the models that an annotation speaks of at its top."""
+    """Yields the models that an annotation names at its top level."""
     if isinstance(kind, type) and issubclass(kind, BaseModel):
         yield kind
     elif typing.get_origin(kind) not in (list, dict, tuple):

@@ -13,7 +13,7 @@ import stat
 from cns_drake.base.errors import InputError
 
 _WRITTEN_BYTES = 1 << 26
-# Some file systems allow 255; there are endings, and names of several parts.
+# Some file systems allow 255; this leaves room for endings and joined names.
 _LONGEST_NAME_BYTES = 120
 _KEPT_CHARACTERS = 20
 
@@ -39,10 +39,10 @@ def user_errors(path: Path | str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def completing(path: Path) -> Iterator[Path]:
-    """Yields where to write what shall become the file `path`.
+    """Yields a temporary path to write; it becomes the file `path`.
 
-    On leaving normally the file is on the disk and gets its name; on an
-    exception it goes away.
+    When the block ends normally, the file is on the disk and gets its name. On
+    an exception it is removed.
 
     Raises:
         InputError: if it cannot be written.
@@ -58,10 +58,10 @@ def completing(path: Path) -> Iterator[Path]:
 
 
 def check_regular(path: Path) -> None:
-    """Refuses what is no file: a device never ends, a pipe may never begin.
+    """Refuses paths that are not regular files, such as devices and pipes.
 
     Raises:
-        InputError: if it is another thing, or there is none.
+        InputError: if the path is something else, or does not exist.
     """
     with user_errors(path):
         mode = path.stat().st_mode
@@ -76,11 +76,11 @@ def read_bytes(path: Path, limit: int = _WRITTEN_BYTES) -> bytes:
 
     Args:
         path: the file.
-        limit: how long it may be [bytes]; by default what is written by hand
-            or by a program for people.
+        limit: greatest size [bytes]; the default is ample for files written by
+            hand.
 
     Raises:
-        InputError: if it cannot be read, is none or is too large.
+        InputError: if it cannot be read, does not exist or is too large.
     """
     check_regular(path)
     with user_errors(path), open(path, "rb") as stream:
@@ -91,11 +91,11 @@ def read_bytes(path: Path, limit: int = _WRITTEN_BYTES) -> bytes:
 
 
 def file_name(text: str) -> str:
-    """Returns a name that is that of a file, and leads nowhere else.
+    """Returns a text as a file name that cannot lead to another folder.
 
-    Names that a recording holds, of its map, its stage or itself, become
-    parts of paths only by this. Usual names stay as they are; others keep
-    what is harmless of them, and different ones stay different.
+    Names from a recording (its own, its map's, its stage's) pass through here
+    before they become parts of paths. Usual names stay as they are. Other names
+    keep their harmless characters, and different names stay different.
 
     Args:
         text: any.
@@ -146,7 +146,7 @@ def complete_part(path: Path) -> None:
 
 
 def check_writable(path: Path) -> None:
-    """Finds out before a long run whether a file can be written at its end.
+    """Checks before a long run that a file can be written at its end.
 
     Creates the folder if need be and leaves nothing else behind.
 
@@ -155,7 +155,9 @@ def check_writable(path: Path) -> None:
     """
     with user_errors(path):
         if path.is_dir():
-            raise InputError(f"{path}: there is a folder of this name")
+            raise InputError(
+                f"{path}: a folder has this name; give another file name"
+            )
         path.parent.mkdir(parents=True, exist_ok=True)
         part = part_path(path)
         part.touch()
@@ -174,7 +176,7 @@ def make_folder(path: Path) -> None:
 
 @contextlib.contextmanager
 def exclusive(path: Path, on_wait: Callable[[], None]) -> Iterator[None]:
-    """Keeps other processes that ask for the same out, while the block runs.
+    """Keeps other processes that lock the same path out while the block runs.
 
     The file `<path>.lock` is locked meanwhile, also for other machines if
     the file system has locks. It is unlocked however the process ends.
@@ -208,8 +210,8 @@ def _lock(
         on_wait()
         fcntl.flock(stream, fcntl.LOCK_EX)
     except OSError:
-        pass  # Some network file systems have no locks; then there is none.
-    # Whoever had it before has removed it; others may have made it anew.
+        pass  # Some network file systems have no locks.
+    # Its former owner may have removed it, and another one made it anew.
     try:
         if not os.path.samestat(os.stat(lock), os.fstat(stream.fileno())):
             return False

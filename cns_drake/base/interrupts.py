@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM: when they may strike, and how they end a process."""
+"""Ctrl-C and SIGTERM: when they may interrupt, and how they end a process."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import NoReturn
 
 # Exit status of a process that was interrupted, as shells have it.
 INTERRUPTED = 130
-# What interrupts.
+# The signals that interrupt.
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
@@ -21,8 +21,8 @@ def interrupt_on_termination(once: bool = False) -> None:
     """Makes SIGTERM an exception, so that open files are closed.
 
     Args:
-        once: ignore the signal from then on, so that it cannot interrupt the
-            closing; for a process that somebody else can still kill.
+        once: ignore later signals, so that they cannot interrupt the closing;
+            for a process that another process can still kill.
     """
 
     def interrupt(signal_number: int, frame: FrameType | None) -> None:
@@ -37,13 +37,13 @@ def interrupt_on_termination(once: bool = False) -> None:
 def uninterrupted() -> Iterator[None]:
     """Makes interrupts wait; for imports.
 
-    An extension module that is interrupted while it is initialised fails
-    with another error, or brings the process down later. Blocking the
-    signals would not do: a library's threads can take them as well.
+    An extension module that is interrupted while it is initialised fails with
+    another error, or crashes the process later. Blocking the signals would not
+    help: a library's threads can receive them as well.
     """
     waiting: list[int] = []
     before = {}
-    # Only there can handlers be set, and only there they run.
+    # Handlers can be set, and run, in the main thread only.
     if threading.current_thread() is threading.main_thread():
         before = {
             number: signal.signal(number, lambda n, frame: waiting.append(n))
@@ -69,7 +69,7 @@ def interrupts_wait() -> Iterator[Callable[[], None]]:
     that are ignored, or that end the process, stay so.
     """
     handlers: dict[int, Callable[[int, FrameType | None], object]] = {}
-    # Only there can handlers be set, and only there they run.
+    # Handlers can be set, and run, in the main thread only.
     if threading.current_thread() is threading.main_thread():
         handlers = {
             number: handler
@@ -110,9 +110,9 @@ def ignore_interrupts() -> None:
 def end_interrupted() -> NoReturn:
     """Ends a process that was interrupted, at once.
 
-    All that was open has been closed by the exception on its way. What else
-    an interpreter does at its end is left out: an interrupted computation in
-    a library can leave it in a state in which that fails.
+    The exception has closed all open files on its way. The rest of an
+    interpreter's shutdown is left out: it can fail after a library was
+    interrupted in a computation.
     """
     with contextlib.suppress(OSError, ValueError):
         sys.stdout.flush()

@@ -1,4 +1,4 @@
-"""JSON as it is read here: within bounds, and of text that can be written."""
+"""Reading JSON within bounds, and only with text that can be written."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-# Data of people and programs are far from it.
+# Real data stay far below this.
 _DEEPEST = 50
 _STRING = re.compile(r'"(?:[^"\\]|\\.)*"', re.DOTALL)
 # A backslash is found in strings only.
 _ESCAPE = re.compile(rb"\\.", re.DOTALL)
-# What may stand for a zero, or for half of a pair of surrogates.
+# Escapes of a zero, or of half a pair of surrogates.
 _SUSPECT = re.compile(rb"\\u(?:0000|[dD][89a-fA-F])")
 # Brackets are counted in pieces, for memory's sake [bytes].
 _PIECE = 1 << 24
@@ -26,14 +26,14 @@ def parse_json(data: bytes) -> Any:
         data: in UTF-8.
 
     Raises:
-        ValueError: if it is none, is nested too deep, has a key twice, or
-            holds text that no file, terminal or path takes.
+        ValueError: if it is not JSON, is nested too deep, has a key twice, or
+            holds text that cannot stand in a file, terminal or path.
     """
     text = data.decode("utf-8-sig")
     if _depth(data) > _DEEPEST:
         raise ValueError(f"nested more than {_DEEPEST} deep")
     if _SUSPECT.search(data):
-        # The only way to write either: both are no text.
+        # Both can be written only as escapes, and neither is text.
         for string in _STRING.findall(text):
             if "\0" in (word := json.loads(string)):
                 raise ValueError("a zero in a text")
@@ -45,7 +45,7 @@ def parse_json(data: bytes) -> Any:
 
 
 def _without_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Returns an object; of keys that are there twice, one would be lost."""
+    """Returns an object; refuses a key that is there twice."""
     value = dict(pairs)
     if len(value) < len(pairs):
         keys = [key for key, _ in pairs]
@@ -61,7 +61,7 @@ def _depth(data: bytes) -> int:
     deepest, depth, in_string = 0, 0, False
     for start in range(0, len(data), _PIECE):
         octets = np.frombuffer(data, np.uint8)[start : start + _PIECE]
-        # Quotes take turns in beginning and ending a string.
+        # Quotes begin and end strings in turn.
         quotes = np.flatnonzero(octets == ord('"'))
         opening = np.flatnonzero((octets == ord("[")) | (octets == ord("{")))
         closing = np.flatnonzero((octets == ord("]")) | (octets == ord("}")))

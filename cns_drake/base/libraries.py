@@ -1,4 +1,4 @@
-"""Shared libraries of the system, which the wheels of others want."""
+"""Shared libraries of the system that the wheels of others need."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import re
 _MISSING = re.compile(
     r"(lib[\w.+-]+?)\.so[\w.]*: cannot open shared object file"
 )
-# Library -> Debian's package. Drake wants the first, Open3D the others.
+# Library -> Debian's package. Drake needs the first, Open3D the others.
 _PACKAGES = {
     "libglib-2.0": "libglib2.0-0",
     "libgobject-2.0": "libglib2.0-0",

@@ -1,4 +1,4 @@
-"""What lies where in the folder of a map."""
+"""The files in the folder of a map."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class MapFolder:
 
     @property
     def stage_plan(self) -> Path:
-        """What each stage lacks."""
+        """The table of the structures that each stage lacks."""
         return self.path / STAGES_NAME
 
     @property

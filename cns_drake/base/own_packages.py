@@ -1,7 +1,7 @@
-"""Which package of the name `evaluation` a process finds.
+"""Checks which package named `evaluation` a process imports.
 
-Many a project has a folder `evaluation`. The simulator needs ours for studies
-alone, and says so where another one stands in its place.
+Many projects have a folder `evaluation`. The simulator needs ours for studies
+only, and refuses another package in its place.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import os
 
 from cns_drake.base.errors import InputError
 
-# Where `cns_drake` and `evaluation` lie side by side.
+# The folder that holds `cns_drake` and `evaluation`.
 _ROOT = os.path.realpath(os.path.join(os.path.dirname(__file__), "../.."))
 
 
@@ -34,7 +34,7 @@ def check_evaluation() -> None:
     """Refuses a process in which `import evaluation` gives another package.
 
     Raises:
-        InputError: the package that stands in the way, and what to do.
+        InputError: names the other package, and what to do.
     """
     spec = find_spec("evaluation")
     ours = os.path.join(_ROOT, "evaluation", "__init__.py")
@@ -47,4 +47,7 @@ def check_evaluation() -> None:
             " cns-drake evaluates with; rename it, or take its folder out of"
             " PYTHONPATH"
         )
-    raise InputError(f"{ours}: the package 'evaluation' is not installed")
+    raise InputError(
+        f"{ours}: the package 'evaluation' is not installed; install "
+        "cns-drake anew"
+    )

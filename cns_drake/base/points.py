@@ -1,8 +1,8 @@
 """Point clouds as structured arrays: one record per point.
 
-A cloud has at least the scalar fields `x`, `y` and `z` [m]; what else a file
-holds (intensity, ring, label) keeps its name and type. This is the one form
-in which scans and maps travel between readers and what uses them.
+A cloud has at least the scalar fields `x`, `y` and `z` [m]; other fields of a
+file (intensity, ring, label) keep their names and types. All readers return
+scans and maps in this form.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import DTypeLike
 
-# No LiDAR sees that far [m]: numbers beyond are no coordinates of a return.
+# No LiDAR sees that far [m]; larger numbers are not coordinates.
 FARTHEST_RETURN = 10_000.0
 
 
@@ -22,7 +22,7 @@ def xyz(points: np.ndarray, dtype: DTypeLike = np.float64) -> np.ndarray:
         dtype: type of the result.
     """
     coordinates = np.empty((len(points), 3), dtype=dtype)
-    # There are NaN whose mere conversion is worth a warning to NumPy.
+    # NumPy warns when it converts some NaN.
     with np.errstate(invalid="ignore"):
         for axis, name in enumerate("xyz"):
             coordinates[:, axis] = points[name]
@@ -30,9 +30,10 @@ def xyz(points: np.ndarray, dtype: DTypeLike = np.float64) -> np.ndarray:
 
 
 def check_near(points: np.ndarray, limit: float, first: int = 0) -> None:
-    """Refuses coordinates that are none: bytes of something else.
+    """Refuses numbers that cannot be coordinates, such as misread bytes.
 
-    What is not finite passes: many sensors say so of a beam that met nothing.
+    Values that are not finite pass: many sensors store them for beams without a
+    return.
 
     Args:
         points: (N,) structured array.
@@ -43,7 +44,7 @@ def check_near(points: np.ndarray, limit: float, first: int = 0) -> None:
         ValueError: if one does.
     """
     for name in "xyz":
-        # Half precision ends before some limits, and calls that an overflow.
+        # Some limits exceed half precision, which would warn of an overflow.
         with np.errstate(over="ignore", invalid="ignore"):
             far = (np.abs(points[name]) >= limit) & np.isfinite(points[name])
         if far.any():

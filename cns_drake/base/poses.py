@@ -77,5 +77,5 @@ def interpolate(
 
 
 def transform(X: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """Returns the points p (N, 3), expressed through one pose X (4, 4)."""
+    """Returns the points p (N, 3), transformed by one pose X (4, 4)."""
     return p @ X[:3, :3].T + X[:3, 3]

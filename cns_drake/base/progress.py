@@ -1,11 +1,11 @@
-"""How long work reports on itself."""
+"""Progress of long work."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from typing import Any
 
-# Where there is no terminal, a line of progress this often [s].
+# Without a terminal, a line of progress is printed this often [s].
 LINE_INTERVAL = 5.0
 # Wraps the items of a long loop: (items, what is being done, how many).
 Track = Callable[[Iterable[Any], str, int], Iterable[Any]]

@@ -1,4 +1,4 @@
-"""Progress bars on stderr, each one line however narrow the terminal."""
+"""Progress bars on stderr; each takes one line in any terminal."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from cns_drake.base.progress import LINE_INTERVAL
 
 
 class _ShortenedColumn(TextColumn):
-    """Text that gives way in a narrow terminal instead of wrapping."""
+    """Text that is shortened in a narrow terminal instead of wrapped."""
 
     def render(self, task: Task) -> Text:
         text = super().render(task)
@@ -34,7 +34,7 @@ class _ShortenedColumn(TextColumn):
 
 
 def fixed_column() -> Column:
-    """Returns the layout of what is never wrapped."""
+    """Returns a column of text that is never wrapped."""
     return Column(no_wrap=True)
 
 
@@ -44,9 +44,8 @@ def show_bars(
 ) -> Iterator[Progress]:
     """Shows progress bars, each one line.
 
-    The field `note` of a task is shown behind its bar. Where there is no
-    terminal, no bar is drawn: it would be drawn once, at the end, beside an
-    error's line.
+    The field `note` of a task is shown behind its bar. Without a terminal no
+    bar is drawn: it would appear only once, at the end, beside an error's line.
 
     Args:
         columns: shown between bar and note.
@@ -70,7 +69,7 @@ def show_bars(
 
 def print_note(progress: Progress, text: str) -> None:
     """Prints a line above the progress bars."""
-    # Where there is no terminal, a line stays one line.
+    # Without a terminal a line is not wrapped.
     progress.console.print(text, soft_wrap=True, markup=False, highlight=False)
 
 
@@ -78,7 +77,7 @@ def print_note(progress: Progress, text: str) -> None:
 def show_progress(console: Console | None = None) -> Iterator[Progress]:
     """Shows progress bars, each one line, with elapsed and remaining time.
 
-    See `show_bars`; where there is no terminal, see `count_progress`.
+    See `show_bars`; without a terminal see `count_progress`.
 
     Args:
         console: where; stderr by default.
@@ -100,8 +99,7 @@ def count_progress(
 ) -> Callable[[int, int], None]:
     """Returns a callback that shows how many frames of how many are done.
 
-    On a terminal the bar moves; elsewhere a line says the same every few
-    seconds.
+    On a terminal the bar moves; elsewhere a line is printed every few seconds.
 
     Args:
         progress: where the task is shown.

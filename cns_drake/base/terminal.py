@@ -1,4 +1,4 @@
-"""How the command line talks: results, progress, and one-line errors."""
+"""Output of the command line: results, progress, and one-line errors."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from cns_drake.base.libraries import missing_library
 from cns_drake.base.progress import LINE_INTERVAL
 from cns_drake.base.version import __version__
 
-# All errors of usage are click's UsageError, which new versions of Typer
-# bring along under a private name; public is only this class derived from it.
+# All errors of usage are click's UsageError. New versions of Typer contain it
+# under a private name; only this derived class is public.
 _UsageError: Any = typer.BadParameter.__base__
 
 
@@ -36,7 +36,7 @@ def plain_app(**settings: Any) -> typer.Typer:
     columns leave little room for words on a narrow terminal.
 
     Args:
-        **settings: more of what `typer.Typer` takes.
+        **settings: more arguments of `typer.Typer`.
     """
     return typer.Typer(
         rich_markup_mode=None, pretty_exceptions_enable=False, **settings
@@ -47,7 +47,7 @@ def make_program(name: str, summary: str, epilog: str) -> typer.Typer:
     """Returns a program without commands, to which they are added.
 
     It has `--version` and the options of shell completion, and shows its help
-    if called with nothing.
+    when called without arguments.
 
     Args:
         name: of the program.
@@ -96,7 +96,7 @@ def run(app: typer.Typer, program: str) -> NoReturn:
         interrupt_on_termination()
         _check_arguments()
         status = app(prog_name=program, standalone_mode=False) or 0
-        if status == INTERRUPTED:  # Typer has caught the interrupt itself.
+        if status == INTERRUPTED:  # Typer has caught it already.
             message = "interrupted"
         sys.stdout.flush()
     except _UsageError as error:
@@ -106,7 +106,7 @@ def run(app: typer.Typer, program: str) -> NoReturn:
     except (KeyboardInterrupt, typer.Abort):
         message, status = "interrupted", INTERRUPTED
     except BrokenPipeError:
-        # Whoever read the results has seen enough of them.
+        # The reader of the results has closed the pipe.
         _forget_results()
         status = 0
     except MemoryError:
@@ -123,13 +123,13 @@ def run(app: typer.Typer, program: str) -> NoReturn:
             raise
         message, status = f"error: {fault}", 2
     except SystemExit as error:
-        # Drake's C++ asks Python to end where a condition of its own fails.
+        # Drake's C++ raises SystemExit when one of its own checks fails.
         status = error.code if isinstance(error.code, int) else 2
         if isinstance(error.code, str):
             message = f"error: {error.code}"
     except UnicodeError as error:
         message, status = f"error: a name that is no text ({error})", 2
-    # What the command does is done; nothing is left to interrupt.
+    # The command has done its work; nothing is left to interrupt.
     ignore_interrupts()
     if message is not None:
         print(f"{program}: {' '.join(message.split())}", file=sys.stderr)
@@ -139,17 +139,17 @@ def run(app: typer.Typer, program: str) -> NoReturn:
 
 
 def _open_standard_streams() -> None:
-    """Gives a process that was started without them its three streams.
+    """Opens the three standard streams where a process lacks them.
 
-    The next file to be opened would take their places, and what is printed
-    would end up in it.
+    Otherwise the next opened file would take their place and receive what is
+    printed.
     """
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         try:
             os.fstat(number)
         except OSError:
-            # For reading, so that a result that is lost is an error; what is
-            # said to people beside it may be lost.
+            # stdout is opened for reading, so that a lost result is an error;
+            # messages on stderr may be lost.
             writes = os.O_WRONLY if name == "stderr" else os.O_RDONLY
             opened = os.open(os.devnull, writes)
             if opened != number:
@@ -160,7 +160,7 @@ def _open_standard_streams() -> None:
 
 
 def _check_arguments() -> None:
-    """Refuses arguments that could be neither printed nor recorded."""
+    """Refuses arguments that can be neither printed nor recorded."""
     for word in sys.argv[1:]:
         try:
             word.encode()
@@ -170,11 +170,11 @@ def _check_arguments() -> None:
 
 
 def _forget_results() -> None:
-    """Sends what is still to be printed nowhere.
+    """Discards output that is still to be printed.
 
     Python flushes once more at its end, which must not fail again.
     """
-    # In a test it is no file.
+    # In a test the stream is no file.
     with contextlib.suppress(OSError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
@@ -199,7 +199,7 @@ def track(items: Iterable[Any], description: str, total: int) -> Iterable[Any]:
 def _track_by_lines(
     items: Iterable[Any], description: str, total: int
 ) -> Iterator[Any]:
-    """Says every few seconds how many of the items are done."""
+    """Prints every few seconds how many items are done."""
     said = time.monotonic()
     for done, item in enumerate(items):
         if time.monotonic() - said >= LINE_INTERVAL:
@@ -209,7 +209,7 @@ def _track_by_lines(
 
 
 def note(message: str) -> None:
-    """Tells the user something that is no result."""
+    """Prints a note for the user on stderr."""
     print(message, file=sys.stderr)
 
 

@@ -1,4 +1,4 @@
-"""XML of somebody else's, read without trusting it."""
+"""Reading XML from untrusted sources."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ _MOST_BYTES = 256 * 2**20
 _MOST_ELEMENTS = 1_000_000
 _DEEPEST = 100
 _LONGEST_VALUE = 1000
-# No number of a road network is larger [m, rad, 1/m].
+# Larger than any number in a road network [m, rad, 1/m].
 _LARGEST = 1e8
 
 
 class Element:
-    """An element and those of its children that are known.
+    """An element and its children with known tags.
 
     Attributes:
         tag: its name.
         line: on which it begins.
         attributes: as texts.
         children: in their order.
-        content: the beginning of what stands in it.
+        content: the beginning of its text.
     """
 
     __slots__ = ("attributes", "children", "content", "line", "tag")
@@ -64,8 +64,8 @@ class Element:
         """Returns an attribute that is a number.
 
         Raises:
-            ValueError: if it is none, or too large for a road, or missing
-                and has no default.
+            ValueError: if it is not a number, is too large for a road, or is
+                missing and has no default.
         """
         if default is not None and name not in self.attributes:
             return default
@@ -87,7 +87,7 @@ def read_elements(path: Path, root: str, known: Collection[str]) -> Element:
         path: the file.
         root: tag of its outermost element.
         known: tags of the elements that are kept, with their known children;
-            others are passed over with all that is in them.
+            other elements are skipped with all they hold.
 
     Raises:
         InputError: if it cannot be read, is no XML, has another root, holds
@@ -95,7 +95,7 @@ def read_elements(path: Path, root: str, known: Collection[str]) -> Element:
     """
     parser = expat.ParserCreate()
     top = Element("", 0, {})
-    # None stands for an element that is passed over.
+    # None stands for an element that is skipped.
     open_: list[Element | None] = [top]
     count = 0
 

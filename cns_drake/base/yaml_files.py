@@ -1,4 +1,4 @@
-"""YAML as it is read here: strictly, and within bounds."""
+"""Reading YAML strictly and within bounds."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import yaml
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
 
-# Data that are written by hand are far from either.
+# Files written by hand stay far below both.
 _DEEPEST = 50
 _MOST_NODES = 1_000_000
 
@@ -19,8 +19,8 @@ def read_yaml(path: Path) -> Any:
     """Returns what a YAML file holds; None if it is empty.
 
     Raises:
-        InputError: the file cannot be read, is not YAML, stands for more
-            than it should or has a key twice.
+        InputError: the file cannot be read, is not YAML, expands to too many
+            values or has a key twice.
     """
     text = read_bytes(path)
     try:
@@ -32,9 +32,9 @@ def read_yaml(path: Path) -> Any:
 def parse_yaml(text: str | bytes, loader: type = yaml.CSafeLoader) -> Any:
     """Parses a document of YAML.
 
-    Aliases are understood, but a few lines of them must not stand for more
-    than a memory holds, nor for something that contains itself. A key that
-    is there twice is a slip of which YAML's libraries take the last.
+    Aliases are resolved within bounds: a few lines of them could expand to more
+    than memory holds, or contain themselves. A key that is there twice is
+    refused; YAML's libraries would silently use the last.
 
     Args:
         text: the document, as bytes in an encoding of YAML.
@@ -44,7 +44,7 @@ def parse_yaml(text: str | bytes, loader: type = yaml.CSafeLoader) -> Any:
         Its value; None for an empty document.
 
     Raises:
-        ValueError: in one line, if it is none or out of bounds.
+        ValueError: in one line, if it is not YAML or out of bounds.
     """
     try:
         _check_depth(text, loader)
@@ -59,7 +59,7 @@ def parse_yaml(text: str | bytes, loader: type = yaml.CSafeLoader) -> Any:
             parser.dispose()
     except (
         yaml.YAMLError,
-        # What the constructors of numbers and dates trip over.
+        # Errors of the constructors of numbers and dates.
         ArithmeticError,
         AttributeError,
         LookupError,
@@ -72,7 +72,7 @@ def parse_yaml(text: str | bytes, loader: type = yaml.CSafeLoader) -> Any:
 
 
 def _check_depth(text: str | bytes, loader: type) -> None:
-    """Refuses what is nested so deep that making nodes of it would crash.
+    """Refuses YAML whose nesting is too deep for the parser of nodes.
 
     Raises:
         ValueError: if it is.
@@ -84,7 +84,7 @@ def _check_depth(text: str | bytes, loader: type) -> None:
         elif isinstance(event, yaml.CollectionEndEvent):
             depth -= 1
         if depth > _DEEPEST:
-            # What a parser finds has a place.
+            # An error of the parser has a line.
             assert event.start_mark is not None
             line = event.start_mark.line + 1
             raise ValueError(f"line {line}: nested more than {_DEEPEST} deep")
@@ -95,7 +95,8 @@ def _check(node: yaml.Node, sizes: dict[int, int]) -> int:
 
     Args:
         node: the node.
-        sizes: of the nodes seen before by their id; 0 for those above.
+        sizes: sizes of the nodes seen before, by id; 0 for the nodes that
+            contain this one.
 
     Raises:
         ValueError: if it is out of bounds.

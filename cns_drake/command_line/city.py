@@ -26,8 +26,9 @@ def city(
         bool,
         typer.Option(
             "--start",
-            help="First write what is missing besides roads.yaml: a plan with "
-            "a district for each block, two stages, a sequence for each.",
+            help="First write the missing files besides roads.yaml: a plan "
+            "with a district for each block, two stages, a sequence for "
+            "each.",
         ),
     ] = False,
     seed: Annotated[
@@ -45,19 +46,19 @@ def city(
         bool,
         typer.Option(
             "--repair-stages",
-            help="In stages.yaml, give structures that stand where "
-            "structures.csv has them the names that they have since the plan "
-            "has grown.",
+            help="Update stages.yaml after the plan has grown: structures "
+            "that have kept their place in structures.csv get their new "
+            "names.",
         ),
     ] = False,
     calibrate: Annotated[
         tuple[str, str] | None,
         typer.Option(
             metavar="EARLIER LATER",
-            help="Generate nothing; simulate the sequences of two stages, such "
-            "as 01 04, and what becomes of TCR_sym and of each method without "
-            "the offset of the routes, without what is absent, and without "
-            "what is lower.",
+            help="Generate nothing. Simulate the sequences of two stages, "
+            "such as 01 04, and show TCR_sym and each method without the "
+            "offset of the routes, without absent structures, and "
+            "without lower ones.",
         ),
     ] = None,
     jobs: Jobs = None,
@@ -91,7 +92,7 @@ def city(
 def _calibrate(
     folder: Path, earlier: str, later: str, jobs: int | None
 ) -> None:
-    with uninterrupted():  # Only who calibrates needs the evaluation.
+    with uninterrupted():  # Only --calibrate needs the evaluation.
         from cns_drake.base.jobs.cluster import choose_cluster
         from cns_drake.scenarios.scenario_loading import load_scenario
         from cns_drake.studies.knob_effects import effect_lines, knob_effects

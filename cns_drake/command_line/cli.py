@@ -1,7 +1,7 @@
 """The command `cns-drake`: its commands, each with an example.
 
-Everything slow to import is imported by the command that needs it, so that
-`--help` and `list` answer at once; interrupts wait meanwhile.
+Each command imports its slow modules itself, so that `--help` and `list` answer
+at once. Interrupts wait during imports.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from cns_drake.imports.import_report import DriveOn, ImportOptions
 if TYPE_CHECKING:
     from cns_drake.imports.import_report import ImportReport
 
-# Part of the buildings that the first stage of a city without years lacks.
+# Share of the buildings that the first stage of a city without years lacks.
 _GROW = 0.3
 
 
@@ -38,41 +38,40 @@ def import_city(
         list[int] | None,
         typer.Option(
             metavar="YEAR ...",
-            help="A stage for each year: what was built until then.",
+            help="A stage for each year, with the buildings built until then.",
         ),
     ] = None,
     year_attribute: Annotated[
         str | None,
         typer.Option(
             metavar="NAME",
-            help="Attribute that holds the year; one of the usual ones if "
-            "left out.",
+            help="Attribute that holds the year; a usual name by default.",
         ),
     ] = None,
     undated: Annotated[
         Undated,
-        typer.Option(help="From which stage on what has no year is there."),
+        typer.Option(help="First stage with the buildings that have no year."),
     ] = Undated.FIRST,
     lod: Annotated[
         float | None,
         typer.Option(
-            help="Level of detail; the highest of each object if left out."
+            help="Level of detail; the highest of each object by default."
         ),
     ] = None,
     seed: Annotated[
         int,
         typer.Option(
             min=0,
-            help="Seed of the draws of --grow, and of the buildings along "
-            "roads that have none (OpenDRIVE).",
+            help="Seed of the draws of --grow, and of buildings drawn along "
+            "roads without any (OpenDRIVE).",
         ),
     ] = 0,
     along: Annotated[
         Path | None,
         typer.Option(
             metavar="WAYPOINTS",
-            help="CSV file of a drive of your own, x and y in the map, in "
-            "place of the two that are proposed.",
+            help="CSV file of your own drive, x and y in the map, in place of "
+            "the two proposed ones.",
         ),
     ] = None,
     within: Annotated[
@@ -87,8 +86,8 @@ def import_city(
     drive_on: Annotated[
         DriveOn | None,
         typer.Option(
-            help="Side of the streets on which cars drive; the right if "
-            "neither this nor the file says so.",
+            help="Side of the street on which cars drive; by default the "
+            "file's, or else the right.",
         ),
     ] = None,
     grow: Annotated[
@@ -97,14 +96,14 @@ def import_city(
             min=0.01,
             max=0.9,
             metavar="PART",
-            help="A first stage in which that part of the buildings is not "
-            "there yet, or lower, by lot; 0.3 where there are no --years.",
+            help="Add a first stage that lacks this share of the buildings, "
+            "drawn by lot, or has them lower; 0.3 without --years.",
         ),
     ] = None,
     plain: Annotated[
         bool,
         typer.Option(
-            "--plain", help="Only what the file has: nothing drawn by lot."
+            "--plain", help="Only the content of the file; draw nothing by lot."
         ),
     ] = False,
 ) -> None:
@@ -154,16 +153,16 @@ def import_city(
 def _shortcomings(
     report: ImportReport, output: Path, options: ImportOptions
 ) -> Iterator[str]:
-    """Yields what a study of the map would lack, and what to do."""
+    """Yields advice on what a study of the map would lack."""
     waypoints = (
         f"draw waypoints on {output / 'from_above.png'} (docs/imports.md)"
     )
     if not report.drives:
         yield f"no street wide and long enough was found; {waypoints}"
     elif len(report.drives) == 1 and options.along is None:
-        yield f"no second way that shares a part of the first; {waypoints}"
+        yield f"no second route shares a part of the first; {waypoints}"
     if len(report.stages) == 1:
-        yield "one stage: give --years or --grow to study change"
+        yield "there is only one stage; give --years or --grow to study change"
     elif options.years and report.undated > report.dated:
         numbers = list(report.stages.values())
         yield (

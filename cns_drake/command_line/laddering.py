@@ -27,14 +27,15 @@ def ladder(
         bool,
         typer.Option(
             "--quick",
-            help="The strongest level of each cause, and every other query.",
+            help="Only the strongest level of each cause, and every other "
+            "query.",
         ),
     ] = False,
     levels: Annotated[
         bool,
         typer.Option(
             "--levels",
-            help="The frozen levels alone: all causes together.",
+            help="Only the frozen levels, with all causes together.",
         ),
     ] = False,
     cause: Annotated[
@@ -49,7 +50,7 @@ def ladder(
         typer.Option(
             min=1,
             metavar="N",
-            help="Draw N times what is random, and give means.",
+            help="Repeat all random draws N times, and give means.",
         ),
     ] = 1,
     method: MethodFiles = None,
@@ -58,10 +59,10 @@ def ladder(
 ) -> None:
     """What each change costs each method.
 
-    One drive asks a database of its own route, with one cause of change
-    between the two at a time, and with all together. None is recorded. Writes
-    ladder.csv, queries.csv and a figure.
-    Interrupted, the same command goes on where it was.
+    One drive queries a database of its own route, with one cause of change
+    between the two at a time, and with all together. No drive is recorded.
+    Writes ladder.csv, queries.csv and a figure. After an interruption the same
+    command goes on where it was.
     """
     with uninterrupted():
         from dataclasses import replace
@@ -83,7 +84,8 @@ def ladder(
 
     if levels and (quick or cause or seeds > 1):
         raise InputError(
-            "--levels: they are frozen; leave out --quick, --cause and --seeds"
+            "--levels: the levels are frozen; leave out --quick, --cause and "
+            "--seeds"
         )
     cluster = choose_cluster(jobs, scheduler)
     methods = choose_methods(method or ())
@@ -91,7 +93,7 @@ def ladder(
     for name in causes:
         if name not in CAUSES:
             known = ", ".join(CAUSES)
-            raise InputError(f"--cause: no cause {name!r} (known: {known})")
+            raise InputError(f"--cause: no cause {name!r} (there are: {known})")
     extent, protocol = Extent(), PAPER_PROTOCOL
     if quick:
         extent, protocol = QUICK_EXTENT, QUICK_PROTOCOL
@@ -113,13 +115,13 @@ def levels(
     results: Annotated[
         list[Path],
         typer.Argument(
-            metavar="RESULTS.csv", help="Tables that ladder --levels wrote."
+            metavar="RESULTS.csv", help="Tables written by ladder --levels."
         ),
     ],
 ) -> None:
     """Check results on the frozen levels.
 
-    Prints one table of all of them, as Markdown.
+    Prints one table of all of them in Markdown.
     """
     with uninterrupted():
         from cns_drake.studies.levels import (

@@ -27,7 +27,7 @@ _HEADINGS = (
     "structures",
     "triangles",
 )
-# Columns that find no room go in this order.
+# Columns without room are dropped in this order.
 _GIVE_WAY = (
     "map",
     "structures",
@@ -45,15 +45,15 @@ def list_sequences(
         list[Path] | None,
         typer.Argument(
             metavar="FOLDER",
-            help="Folders of maps of your own; the shipped ones if none.",
+            help="Folders of your own maps; the shipped ones by default.",
         ),
     ] = None,
 ) -> None:
     """List sequences and their figures.
 
-    Length and time of the drive, the frames recorded of it, and the
-    structures and triangles of its stage. A narrow terminal shows fewer
-    columns; where the output is no terminal, all of them are there.
+    Shows length and time of each drive, its recorded frames, and the structures
+    and triangles of its stage. A narrow terminal shows fewer columns; a file or
+    pipe gets all of them.
     """
     with uninterrupted():
         from cns_drake.scenarios.sequence_table import sequence_rows
@@ -77,8 +77,8 @@ def table_lines(rows: list[SequenceRow], width: int | None) -> Iterator[str]:
 
     Args:
         rows: the sequences.
-        width: the most characters that a line may have, for which columns
-            give way, but never the names; None to keep all columns.
+        width: the most characters of a line; columns other than the names are
+            dropped to keep it. None keeps all columns.
     """
     lines = [_HEADINGS] + [
         (

@@ -42,29 +42,29 @@ Jobs = Annotated[
     int | None,
     typer.Option(
         metavar="N",
-        help="Work on this machine, on N jobs side by side; as many as it has "
-        "cores by default.",
+        help="Work on this machine, on N jobs side by side; by default one "
+        "for each core.",
     ),
 ]
 Scheduler = Annotated[
     str | None,
     typer.Option(
         metavar="ADDRESS",
-        help="Work on the cluster of this Dask scheduler; by default that of "
-        "DASK_SCHEDULER_ADDRESS, if that is set.",
+        help="Work on the cluster of this Dask scheduler; by default "
+        "DASK_SCHEDULER_ADDRESS, if set.",
     ),
 ]
 Maps = Annotated[
     list[str] | None,
     typer.Argument(
         metavar="MAP",
-        help="Which maps, by name or folder; all shipped ones by default.",
+        help="Maps, by name or folder; all shipped ones by default.",
     ),
 ]
 MethodFiles = Annotated[
     list[Path] | None,
     typer.Option(
-        help="Python file that registers a method, to run besides those of "
+        help="Python file that registers a method to run besides those of "
         "cns-eval; may be repeated."
     ),
 ]

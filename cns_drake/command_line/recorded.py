@@ -1,4 +1,4 @@
-"""Commands on recordings: other layouts, and what is left of damaged ones."""
+"""Commands on recordings: export to other layouts, repair of damaged ones."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ def export(
         ExportFormat,
         typer.Option(
             "--format",
-            help="Layout of the CNS data set, or KITTI odometry; or the "
-            "trajectory alone, as TUM.",
+            help="Layout: CNS data set, KITTI odometry, or TUM (the "
+            "trajectory alone).",
         ),
     ],
     output: Annotated[
@@ -43,14 +43,17 @@ def export(
     ],
     sensor: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="Which LiDAR, if there are several."),
+        typer.Option(
+            metavar="NAME", help="Name of the LiDAR, if there are several."
+        ),
     ] = None,
     absent_in: Annotated[
         str | None,
         typer.Option(
             metavar="STAGE",
-            help="Label points on what this stage of the map lacks as "
-            "SemanticKITTI labels what moves (252 to 259); with kitti.",
+            help="Label points on structures that this stage of the map lacks "
+            "with SemanticKITTI's labels of moving objects (252 to 259); "
+            "with kitti.",
         ),
     ] = None,
 ) -> None:
@@ -74,9 +77,7 @@ def export(
 def repair(
     file: Annotated[
         Path,
-        typer.Argument(
-            metavar="FILE", help="Any MCAP file, or what is left of one."
-        ),
+        typer.Argument(metavar="FILE", help="Any MCAP file, whole or damaged."),
     ],
     output: Annotated[
         Path | None,

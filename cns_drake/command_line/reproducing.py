@@ -29,15 +29,15 @@ def reproduce(
         bool | None,
         typer.Option(
             "--pages/--no-pages",
-            help="Also make a web page of each drive; by default, unless "
-            "--quick is given.",
+            help="Also make a web page of each drive; the default without "
+            "--quick.",
         ),
     ] = None,
     quick: Annotated[
         bool,
         typer.Option(
             "--quick",
-            help="The report alone: simulate without recording.",
+            help="Only the report: simulate without recording.",
         ),
     ] = False,
     parameter: Settings = None,
@@ -51,7 +51,9 @@ def reproduce(
 
     cluster = choose_cluster(jobs, scheduler)
     if quick and pages:
-        raise InputError("--quick and --pages: give one of them")
+        raise InputError(
+            "--quick and --pages exclude each other; give one of them"
+        )
     report = reproduce_maps(
         maps,
         output,

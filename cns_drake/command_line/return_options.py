@@ -1,4 +1,4 @@
-"""Options that say how LiDARs measure, and in which weather."""
+"""Options of LiDAR returns and of weather."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Kind = Literal["ideal", "calibrated"]
 
 
 class ReturnsName(str, Enum):
-    """How LiDARs measure."""
+    """Models of LiDAR returns."""
 
     IDEAL = "ideal"
     CALIBRATED = "calibrated"
@@ -55,10 +55,10 @@ def choose_returns(
     rain: float,
     snowfall: float,
 ) -> tuple[Kind | None, WeatherConfig | None]:
-    """Returns how LiDARs measure, and the weather; None where nothing is said.
+    """Returns the returns and the weather of the options; None if not given.
 
     Raises:
-        InputError: a value makes no sense; its option is named.
+        InputError: a value is out of range; the message names its option.
     """
     if fog is None and not rain and not snowfall:
         return None if returns is None else _KINDS[returns], None

@@ -55,7 +55,7 @@ def run_sequence(
         overwrite: replace an existing recording.
 
     Raises:
-        InputError: something of this cannot be used.
+        InputError: an argument cannot be used.
 
     Example:
         from pathlib import Path

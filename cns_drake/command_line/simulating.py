@@ -53,15 +53,16 @@ def simulate(
             min=0,
             max=2000,
             metavar="N",
-            help="N vehicles and N walkers, in place of the scenario's.",
+            help="Numbers of vehicles and of walkers, in place of the "
+            "scenario's.",
         ),
     ] = None,
     transient: Annotated[
         list[str] | None,
         typer.Option(
             metavar="SWITCH=VALUE,...",
-            help="What came and went: parked_cars, leaves, snow, scaffolds, "
-            "works, furniture, seed; may be given many times.",
+            help="A passing change and its strength: parked_cars, leaves, "
+            "snow, scaffolds, works, furniture, seed; may be repeated.",
         ),
     ] = None,
     recording: Recording = None,
@@ -103,7 +104,7 @@ def _switches(texts: Iterable[str]) -> dict[str, str]:
             name, equals, value = (part.strip() for part in item.partition("="))
             if not (name and equals and value) or name in found:
                 raise InputError(
-                    f"--transient: '{item}' is not one value of a switch, "
+                    f"--transient: '{item}' is not of the form SWITCH=VALUE, "
                     "such as snow=0.2"
                 )
             found[name] = value
@@ -136,8 +137,8 @@ def scan(
         list[Path] | None,
         typer.Option(
             metavar="DIR",
-            help="Where to look for model://, before GZ_SIM_RESOURCE_PATH "
-            "and SDF_PATH; may be given many times.",
+            help="Folder to search for model://, before GZ_SIM_RESOURCE_PATH "
+            "and SDF_PATH; may be repeated.",
         ),
     ] = None,
 ) -> None:
@@ -195,15 +196,15 @@ def generate(
         Path | None,
         typer.Option(
             metavar="FAMILY.yaml",
-            help="Record the members of a family, whose scenario files go to "
-            "<output>/scenarios and whose own cities to <output>/cities, and "
-            "whatever is named.",
+            help="Record the members of a family besides the named sequences. "
+            "Their scenario files go to <output>/scenarios, cities of "
+            "their own to <output>/cities.",
         ),
     ] = None,
 ) -> None:
     """Record many sequences.
 
-    Finished ones are skipped, interrupted ones go on where they were.
+    Finished recordings are skipped; interrupted ones go on where they were.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster

@@ -49,10 +49,9 @@ def trend(
 ) -> None:
     """AUC over TCR_sym, of a family of drives.
 
-    None of them is recorded. Writes trend.csv and a figure with 95 % bands:
-    AUC, and the share of it that is kept. Without change is the same route
-    through the city of the query.
-    Interrupted, the same command goes on where it was.
+    No drive is recorded. Writes trend.csv and a figure with 95 % bands: AUC,
+    and the share of it that is kept against the same route without change.
+    After an interruption the same command goes on where it was.
     """
     with uninterrupted():
         from cns_drake.base.jobs.cluster import choose_cluster
@@ -88,13 +87,13 @@ def trend(
 def family_controls(
     members: Sequence[Scenario], asking: Scenario
 ) -> dict[str, Scenario]:
-    """Returns member -> its drive through the city of the drive that asks.
+    """Returns member -> its drive through the city of the query drive.
 
-    Members that differ by nothing but their city share one.
+    Members that differ only by their city share one.
 
     Args:
         members: of a family.
-        asking: the drive that asks them.
+        asking: the query drive.
     """
     city = {
         name: getattr(asking, name)

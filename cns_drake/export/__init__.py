@@ -1,1 +1,1 @@
-"""Recorded sequences in the layouts of data sets that exist already."""
+"""Exports of recorded sequences to the layouts of existing data sets."""

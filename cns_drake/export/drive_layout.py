@@ -1,4 +1,4 @@
-"""What the exporters of all layouts have in common."""
+"""The common part of all exporters."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from cns_drake.base.poses import FARTHEST
 from cns_drake.base.recordings.mcap_sequence import McapSequence
 from cns_drake.recording.rosbag2_metadata import to_yaml
 
-# What may become the name of a folder: nothing that leads out of it.
+# Text that may become the name of a folder: it cannot lead out of it.
 _NAME = re.compile(r"\w[\w.-]*")
 _ROUNDING = 1e-9
 
@@ -27,18 +27,16 @@ class Layout:
     Paths are relative to the folder of all drives.
 
     Attributes:
-        files: path (with `<place holders>`) -> what is there, for people.
-        drive_folder: of a sequence -> the folder that is its drive alone.
-        outer_files: of a sequence -> path -> text of what lies outside of
-            that folder.
-        inner_files: likewise within that folder, relative to it; without
-            the scans.
-        scan_files: of a frame's number, its stamp [ns] and its scan -> what
-            is stored of it: path in the drive's folder -> content. None
-            where nothing is.
-        shared_outer_files: whether those outside the folder are one for all
-            drives, so that they must agree.
-        has_labels: whether points have them.
+        files: path (with `<place holders>`) -> its content in words.
+        drive_folder: sequence -> the folder of its drive alone.
+        outer_files: sequence -> path -> text of the files outside that folder.
+        inner_files: likewise inside that folder, relative to it, without the
+            scans.
+        scan_files: frame number, stamp [ns] and scan -> its files: path in the
+            drive's folder -> content. None for layouts without scans.
+        shared_outer_files: whether all drives share the outer files, which must
+            then agree.
+        has_labels: whether points have labels.
     """
 
     files: dict[str, str]
@@ -51,13 +49,15 @@ class Layout:
 
 
 def checked_name(sequence: McapSequence, text: str) -> str:
-    """Returns a part of a path that a recording names.
+    """Returns a name from a recording as a part of a path.
 
     Raises:
-        InputError: if it could lead elsewhere.
+        InputError: if the name could lead elsewhere.
     """
     if not _NAME.fullmatch(text):
-        raise InputError(f"{sequence.name}: {text!r} is no name of a folder")
+        raise InputError(
+            f"{sequence.name}: {text!r} cannot be the name of a folder"
+        )
     return text
 
 
@@ -82,7 +82,7 @@ def imu_files(sequence: McapSequence) -> dict[str, str]:
 
 
 def structure_files(sequence: McapSequence) -> dict[str, str]:
-    """Returns `structures.json`, what the instances are, if it is known."""
+    """Returns `structures.json`, the table of instances, if recorded."""
     if sequence.instances is None:
         return {}
     table = list(sequence.instances.values())
@@ -92,10 +92,12 @@ def structure_files(sequence: McapSequence) -> dict[str, str]:
 def unit_quaternions(sequence: McapSequence) -> np.ndarray:
     """Returns the orientations of the odometry, (M, 4) of unit length.
 
-    Those of a recording need a direction only; readers of text want a unit.
+    Quaternions of a recording may have any length; readers of text need unit
+    length.
 
     Raises:
-        InputError: if one has no direction, or a position is none.
+        InputError: if a quaternion has no direction, or a position is not
+            finite.
     """
     quat_xyzw = sequence.odometry["quat_xyzw"]
     with np.errstate(over="ignore", invalid="ignore"):
@@ -110,7 +112,7 @@ def unit_quaternions(sequence: McapSequence) -> np.ndarray:
             f" {sequence.odometry['stamp_ns'][row]} ns has the position"
             f" {position[row]} and the quaternion {quat_xyzw[row]}"
         )
-    # What is one up to rounding stays as it is.
+    # A length of one, up to rounding, stays as it is.
     off = np.abs(length - 1.0) > _ROUNDING
     return np.where(off, quat_xyzw / length, quat_xyzw)
 
@@ -121,5 +123,5 @@ def seconds(stamp_ns: int) -> str:
 
 
 def join_rows(rows: Iterable[Iterable[object]], separator: str) -> str:
-    """Returns a table as text; floats lose nothing."""
+    """Returns a table as text; floats keep all their digits."""
     return "".join(f"{separator.join(map(repr, row))}\n" for row in rows)

@@ -1,8 +1,8 @@
 """Exporting one recording into a folder of drives.
 
-The folder may hold several drives of one format. It is known to be ours by
-`export.yaml`, which says what its files are. A drive's own folder grows
-under a `.part` name and gets its final one when all of it is there.
+The folder may hold several drives of one format. The file `export.yaml`, which
+describes its files, marks it as ours. A drive's own folder grows under a
+`.part` name and gets its final one when all of it is there.
 """
 
 from __future__ import annotations
@@ -47,18 +47,18 @@ def export_sequence(
         format_name: `cns`, `kitti` or `tum`.
         output: the folder of drives; new, empty, or one that this function
             has written drives of the same format to.
-        lidar: whose scans, if the recording has several LiDARs.
-        absent_in: another stage of the recording's map; points of what is
-            absent there get the labels of `MarkedSequence`.
+        lidar: name of the LiDAR to export, if the recording has several.
+        absent_in: another stage of the recording's map; points of structures
+            that are absent there get the labels of `MarkedSequence`.
         on_frame: takes how many frames of how many are done.
 
     Returns:
         The folder of the drive.
 
     Raises:
-        InputError: if the recording cannot be read, the folder is of
-            another origin or has this drive already, the files cannot be
-            written, or there is nothing to compare, or to put labels.
+        InputError: if the recording cannot be read, the folder was not made by
+            an export or has this drive already, the files cannot be written, or
+            labels are asked for and impossible.
     """
     layout = _LAYOUTS[format_name]
     if absent_in is not None and not layout.has_labels:
@@ -68,7 +68,7 @@ def export_sequence(
     if absent_in is None:
         sequence = McapSequence(recording, lidar)
     else:
-        # Drake takes a while to load, and only this needs it.
+        # Drake takes a while to load, and only marks need it.
         from cns_drake.export.marked_sequence import MarkedSequence
 
         sequence = MarkedSequence(recording, lidar, absent_in)
@@ -79,7 +79,10 @@ def export_sequence(
     }
     _claim(output, format_name, layout)
     if drive.exists():
-        raise InputError(f"{drive}: is there already")
+        raise InputError(
+            f"{drive}: this drive is there already; remove it or give another "
+            "folder"
+        )
     if layout.shared_outer_files:
         for path, text in outer.items():
             _check_equal(path, text)
@@ -96,7 +99,7 @@ def export_sequence(
 
 
 def _claim(output: Path, format_name: str, layout: Layout) -> None:
-    """Makes the folder of drives, or finds that it is one of ours."""
+    """Makes the folder of drives, or checks that it is one of ours."""
     marker = output / _MARKER
     with user_errors(output):
         if marker.is_file():
@@ -104,7 +107,8 @@ def _claim(output: Path, format_name: str, layout: Layout) -> None:
             return
         if output.exists() and (not output.is_dir() or any(output.iterdir())):
             raise InputError(
-                f"{output}: holds something else; give a new or an empty folder"
+                f"{output}: the folder holds other files; give a new or an "
+                "empty one"
             )
         output.mkdir(parents=True, exist_ok=True)
     values = {
@@ -120,7 +124,10 @@ def _check_marker(marker: Path, format_name: str) -> None:
     found = values.get("format") if isinstance(values, dict) else None
     # A list of YAML is no key.
     if not isinstance(found, str) or found not in _LAYOUTS:
-        raise InputError(f"{marker}: not of an export by cns-drake")
+        raise InputError(
+            f"{marker}: not written by an export of cns-drake; give another "
+            "folder"
+        )
     if found != format_name:
         raise InputError(f"{marker}: format: the folder holds {found} drives")
 
@@ -141,7 +148,7 @@ def _write_drive(
     on_frame: Callable[[int, int], None],
 ) -> None:
     with user_errors(folder):
-        # What an export left that was killed.
+        # Left behind by an export that was killed.
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
         for name, text in layout.inner_files(sequence).items():

@@ -47,7 +47,7 @@ def _number(sequence: McapSequence) -> str:
 
 
 def _name(sequence: McapSequence) -> str:
-    """Returns the drive's name; after the first LiDAR with the LiDAR's."""
+    """Returns the drive's name; later LiDARs add their own name."""
     if sequence.lidar_name == sequence.lidar_names[0]:
         return sequence.name
     return f"{sequence.name}_{sequence.lidar_name}"
@@ -106,22 +106,26 @@ KITTI = Layout(
         " recording, plus 200 for the third",
         "poses/<NN>.txt": "upper 3 x 4 of the camera's pose in its frame at"
         " the first scan, a row a scan",
-        "sequences/<NN>/poses.txt": "the same, where tools for SemanticKITTI"
-        " look for it",
+        "sequences/<NN>/poses.txt": "the same, at the place where tools for "
+        "SemanticKITTI look",
         "sequences/<NN>/calib.txt": "Tr: upper 3 x 4 of the LiDAR's pose in"
         " the camera's frame. There is no camera: its axes (right, down,"
         " forward) are put into the LiDAR, and P0 to P3 are the identity",
         "sequences/<NN>/times.txt": "seconds since the first scan",
         "sequences/<NN>/velodyne/<frame>.bin": "x, y, z [m] and intensity,"
         " float32, in the LiDAR's frame",
-        "sequences/<NN>/labels/<frame>.label": "uint32 a point: class (id of"
-        " SemanticKITTI) + 65536 * instance; 252 to 259 for what is absent in"
-        " another stage, where structures.json says so",
+        "sequences/<NN>/labels/<frame>.label": "uint32 a point: class (id of "
+        "SemanticKITTI) + 65536 * "
+        "instance; 252 to 259 for "
+        "structures that are absent "
+        "in another stage (absent_in "
+        "in structures.json)",
         "sequences/<NN>/first_pose.txt": "upper 3 x 4 of the LiDAR's pose in"
         " the world at the first scan, the same world for all drives of a"
         " map",
-        "sequences/<NN>/structures.json": "what the instances are, and in"
-        " which other stage they are absent, if asked for",
+        "sequences/<NN>/structures.json": "the table of instances, and the "
+        "other stage in which they are "
+        "absent, if asked for",
         "sequences/<NN>/imu.yaml": "noise of the IMU, if it has noise, as"
         " Kalibr has it",
         "sequences/<NN>/scenario.yaml": "what was simulated",

@@ -23,9 +23,9 @@ class MarkedSequence(McapSequence):
     """A recording compared with another stage of its map.
 
     A structure is absent there if no visual of that stage is part of it; a
-    lower building is present. Labels of points on what is absent are those
-    of SemanticKITTI for what moves; all other labels are as recorded. The
-    table of structures says `"absent_in": <stage>` of what is absent.
+    lower building is present. Points on absent structures get SemanticKITTI's
+    labels of moving objects; all other labels are as recorded. In the table of
+    structures, absent ones get `"absent_in": <stage>`.
     """
 
     def __init__(self, path: Path, lidar: str | None, stage: str):
@@ -38,8 +38,8 @@ class MarkedSequence(McapSequence):
 
         Raises:
             InputError: if the recording cannot be read, was not taken in a
-                map's stage or has no structures, the map is not there any
-                more, has other structures by now, or lacks that stage.
+                map's stage or has no structures, the map is missing, has other
+                structures by now, or lacks that stage.
         """
         super().__init__(path, lidar)
         self._stage = stage
@@ -98,12 +98,10 @@ class MarkedSequence(McapSequence):
     def _map_folder(self) -> MapFolder:
         place = (self.scenario or {}).get("map")
         if not isinstance(place, str):
-            raise InputError(
-                f"{self._path}: was not recorded in a stage of a map"
-            )
+            raise InputError(f"{self._path}: not recorded in a stage of a map")
         if place in shipped_maps():
             return MapFolder(shipped_maps()[place])
-        # The recording has the map's name; the file beside it says where.
+        # The recording has the map's name; the file beside it has its folder.
         beside = read_scenario(self._path.parent) or {}
         folder = self._path.parent / str(beside.get("map", place))
         if not folder.is_dir():
@@ -113,7 +111,7 @@ class MarkedSequence(McapSequence):
     def _check_structures(
         self, table: Path, recorded: Mapping[int, Mapping]
     ) -> None:
-        """Checks that names stand for what they did when it was recorded."""
+        """Checks that the names still belong to the recorded structures."""
         for listed in load_structure_table(table):
             entry = recorded.get(listed.instance, {})
             if (entry.get("name"), entry.get("class")) != (

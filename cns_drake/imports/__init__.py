@@ -1,1 +1,1 @@
-"""Cities of others as maps: what their files hold, and drives through them."""
+"""Imports: real cities and road networks become maps with drives."""

@@ -1,4 +1,4 @@
-"""When objects of a city were built, and the stages that follow."""
+"""Years of construction of a city's objects, and stages made from them."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from cns_drake.base.errors import InputError
 from cns_drake.imports.import_faults import ImportFaults
 from cns_drake.imports.told_dates import told_year
 
-# The usual attributes, small letters, most telling first: 3DBAG, CityGML,
-# 3D BAG's forerunners, OpenStreetMap.
+# The usual attributes, small letters, most reliable first: 3DBAG, CityGML, 3D
+# BAG's forerunners, OpenStreetMap.
 _USUAL = (
     "oorspronkelijkbouwjaar",
     "yearofconstruction",
@@ -27,14 +27,14 @@ _USUAL = (
     "baujahr",
     "start_date",
 )
-# Written where the year is not known; the second in Dutch registers alone.
+# Placeholders for an unknown year; the second one in Dutch registers only.
 _PLACEHOLDER = 9999
 _DUTCH_PLACEHOLDER = 1005
 _DUTCH = ("oorspronkelijkbouwjaar", "bouwjaar")
 
 
 class Undated(str, Enum):
-    """The stage from which on what has no year is there."""
+    """The first stage that has the buildings without a year."""
 
     FIRST = "first"
     LAST = "last"
@@ -47,13 +47,13 @@ def construction_year(
     name: str = "",
     faults: ImportFaults | None = None,
 ) -> int | None:
-    """Returns the year in which something was built, if the file has it.
+    """Returns the year in which an object was built, if the file has it.
 
     Args:
         attributes: of the object.
-        attribute: that tells it; one of the usual ones if None.
+        attribute: the attribute that holds the year; the usual ones if None.
         name: of the object.
-        faults: counts what stands in place of a year, and years to come.
+        faults: counts values that are not years, and years to come.
     """
     faults = faults or ImportFaults()
     if attribute is not None:
@@ -67,7 +67,7 @@ def construction_year(
             continue
         is_dutch = key.lower() in _DUTCH
         if year == _PLACEHOLDER or (is_dutch and year == _DUTCH_PLACEHOLDER):
-            faults.add(f"{year} in place of a year, taken as none", name)
+            faults.add(f"{year} in place of a year, taken as no year", name)
             continue
         if year > datetime.date.today().year:
             faults.add("year after today", name)
@@ -92,7 +92,7 @@ def stage_names(years: Sequence[int]) -> list[str]:
     if any(a >= b for a, b in pairwise(years)):
         listed = " ".join(map(str, years))
         raise InputError(
-            f"--years: {listed}: each must be after the one before"
+            f"--years: {listed}: each year must be after the one before"
         )
     return [f"{number:02d}" for number in range(1, max(len(years), 1) + 1)]
 
@@ -104,14 +104,14 @@ def stands_at(
     years: Sequence[int],
     undated: Undated,
 ) -> bool:
-    """Tells whether something stands at a stage.
+    """Returns whether an object stands at a stage.
 
     Args:
-        year: in which it was built; None if it is not known.
-        until: in which it was demolished, if it was.
+        year: year in which it was built; None if unknown.
+        until: year in which it was demolished, if it was.
         stage: number of the stage, from 0 on.
-        years: of the stages; without any, all stands that does today.
-        undated: what becomes of it without a year.
+        years: of the stages; without any, everything of today stands.
+        undated: the stage of objects without a year.
     """
     if not years:
         return until is None or until > datetime.date.today().year

@@ -27,7 +27,7 @@ from cns_drake.imports.reference_systems import (
 # A face: the corners (N, 3) of its outer ring, then those of its holes.
 Face = list[np.ndarray]
 
-# Nothing on Earth lies farther from the origin of a survey grid [m].
+# No place on Earth is farther from the origin of a survey grid [m].
 _FARTHEST = 1e8
 _NESTING = {
     "MultiSurface": 0,
@@ -43,10 +43,9 @@ class CityGeometry:
     """One geometry of an object.
 
     Attributes:
-        lod: level of detail, such as 2.2; 0 if it is not told.
+        lod: level of detail, such as 2.2; 0 if the file has none.
         faces: all of them.
-        kinds: of each face what it is of, such as RoofSurface; "" where it
-            is not told.
+        kinds: the type of each face, such as RoofSurface; "" if unknown.
         is_solid: whether the faces close a solid.
     """
 
@@ -65,7 +64,7 @@ class CityObject:
         kind: its type, such as Building.
         attributes: as the file has them.
         parents: ids.
-        geometries: that could be read.
+        geometries: the readable ones.
     """
 
     name: str
@@ -77,12 +76,12 @@ class CityObject:
 
 @dataclass
 class CityFile:
-    """What a file holds.
+    """The content of a file.
 
     Attributes:
         objects: by id.
-        system: what its coordinates mean.
-        faults: what could not be read.
+        system: its reference system.
+        faults: counts of unreadable parts.
     """
 
     objects: dict[str, CityObject] = field(default_factory=dict)
@@ -92,7 +91,7 @@ class CityFile:
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Returns the least and the greatest coordinates, (3,) each [m].
 
-        Some object has a face.
+        At least one object must have a face.
         """
         points = np.concatenate(
             [
@@ -130,7 +129,7 @@ def read_cityjson(path: Path) -> CityFile:
             raise InputError(f"{where}: type {kind!r} is not CityJSON")
         _read_objects(document, whole, where, city)
     if not city.objects:
-        raise InputError(f"{path}: no object in it")
+        raise InputError(f"{path}: the file has no objects")
     _check_metres(city, path)
     return city
 
@@ -232,18 +231,19 @@ def _read_objects(
 
 
 def _settle_axes(city: CityFile, vertices: np.ndarray) -> None:
-    """Settles the order of coordinates, and counts what is assumed."""
+    """Settles the order of coordinates, and counts assumptions."""
     defined = city.system
     city.system = defined.as_used(vertices[len(vertices) // 2])
     if city.system != defined:
         city.faults.add(
-            "reference system with north first, but coordinates with east"
-            " first, taken so",
+            "reference system with north first, but coordinates with east "
+            "first; read as east first",
             defined.name,
         )
     if defined.heights_assumed and not defined.is_plain:
         city.faults.add(
-            "reference system without heights, taken in its other unit",
+            "reference system without heights; its horizontal unit taken for "
+            "them",
             defined.name,
         )
 
@@ -258,7 +258,7 @@ def _vertices(document: dict, transform: object, where: str) -> np.ndarray:
         )
         with np.errstate(over="ignore", invalid="ignore"):
             points = points * scale + move
-    if not (np.abs(points) <= _FARTHEST).all():  # Nor is NaN a place.
+    if not (np.abs(points) <= _FARTHEST).all():  # NaN fails, too.
         raise InputError(
             f"{where}: vertices: a coordinate beyond {_FARTHEST:g} m"
         )
@@ -273,12 +273,14 @@ def _numbers(values: Any, where: str) -> np.ndarray:
         if len(points) != len(values):
             raise ValueError
     except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"{where}: not three numbers each") from error
+        raise InputError(
+            f"{where}: every item must be three numbers"
+        ) from error
     return points
 
 
 class _Templates:
-    """Geometries that objects place somewhere."""
+    """Geometry templates, which objects place in the world."""
 
     def __init__(
         self,
@@ -339,7 +341,7 @@ def _read_geometry(
             geometry.get("semantics"), _NESTING[kind], len(boundaries)
         )
     except (LookupError, TypeError, ValueError, AttributeError):
-        faults.add("geometry that is none, left out", name)
+        faults.add("geometry that is not an object, left out", name)
         return None
     faces, told = [], []
     for boundary, one in zip(boundaries, kinds, strict=True):
@@ -375,7 +377,7 @@ def _face(boundary: Any, vertices: np.ndarray) -> Face | None:
 
 
 def _surface_kinds(semantics: Any, nesting: int, number: int) -> Sequence[str]:
-    """Returns what each face is of; "" where it is not told."""
+    """Returns the type of each face; "" if unknown."""
     unknown = [""] * number
     if not isinstance(semantics, dict):
         return unknown

@@ -1,4 +1,4 @@
-"""Routes through an imported city, and scenarios that drive them."""
+"""Writes routes through an imported city, and scenarios that follow them."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ def write_drives(
     """Writes routes, and scenarios of each through every stage.
 
     Args:
-        folder: of the map, whose name it has.
-        stages: stage -> when it is, in words that a title ends with.
+        folder: of the map, with the map's name.
+        stages: stage -> words for its time, the end of a title.
         routes: waypoints (N, 3) of at most two [m].
         cruise: speed on each [m/s].
     """
@@ -32,7 +32,8 @@ def write_drives(
         (folder / f"route_{letter}.csv").write_text(text, "utf-8")
     speeds = dict(zip("ab", cruise, strict=False))
     for number, (stage, when) in enumerate(stages.items()):
-        # The last stage asks, from another route than the others know.
+        # The query drive is in the last stage, on another route than the
+        # databases.
         letters = "ab"[: len(routes)]
         if number < len(stages) - 1:
             letters = letters[::-1]

@@ -1,8 +1,8 @@
 """Two drives through a city, which overlap in part.
 
-The first is about the longest of the shortest ways. The second shares the
-middle of it, and an arm at either end leads elsewhere. What a way consists of,
-cells between buildings or lanes of streets, is the business of a `WayGraph`.
+The first drive is about the longest of the shortest ways. The second one shares
+its middle, and leaves it by an arm at either end. A `WayGraph` defines the
+pieces of a way: cells between buildings, or lanes of streets.
 """
 
 from __future__ import annotations
@@ -22,28 +22,29 @@ from cns_drake.imports.waypoint_drives import (
     Obstacle,
 )
 
-# What the second drive has to itself at either end, at least and at most [m].
+# Least and greatest length of the second drive's own arms [m].
 _SHORTEST_ARM = 40.0
 _LONGEST_ARM = LONGEST / 3
-# On the first drive: where the second joins it, from and to, and until where
-# it has left; then the same if no way of that kind is found; and how much
-# they share at least.
+# Parts of the first drive: where the second one may join it (from, to), and
+# where it must have left; the same for the second trial; the least part they
+# share.
 _SHARED = ((0.25, 0.5, 0.75), (0.0, 0.7, 1.0))
 _LEAST_SHARED = 0.15
-# As many places to join and to leave are tried, so far apart at least [m].
+# Number of places to join and to leave that are tried, and their least distance
+# [m].
 _MOST_PLACES = 12
 _APART = 10.0
-# As many ways are tried as first drive and as second drive.
+# Number of ways that are tried as first drive, and as second drive.
 _MOST_TRIES = 30
-# As many ends of ways are looked at until one meets no place twice.
+# Number of ends of ways that are tried until a way meets no place twice.
 _MOST_ENDS = 20
-# From so many pieces ways are looked for, fewer where pieces are many.
+# Number of pieces from which ways are searched; fewer in large graphs.
 _MOST_STARTS = 200
 _MOST_REACHED = 400_000
 
 
 class WayGraph(ABC):
-    """Pieces of way, each with those that it leads into.
+    """Pieces of way, each with its successors.
 
     Attributes:
         lengths: (N,) of the pieces [m].
@@ -60,8 +61,7 @@ class WayGraph(ABC):
 
         Args:
             lengths: (N,) of the pieces [m].
-            before, after: (L,) numbers of pieces, each of which leads into the
-                other.
+            before, after: (L,) numbers of pieces; `before` leads into `after`.
             costs: (L,) from middle to middle; the length if None [m].
         """
         self.lengths = lengths
@@ -72,20 +72,20 @@ class WayGraph(ABC):
 
     @abstractmethod
     def beside(self, pieces: np.ndarray, joint: int) -> np.ndarray:
-        """Returns (N,) bool: what an arm must not use.
+        """Returns (N,) bool: the pieces that an arm must not use.
 
         Args:
-            pieces: that drives use already.
-            joint: the one of them where the arm begins.
+            pieces: the pieces in use by drives.
+            joint: the piece among them where the arm begins.
         """
 
     @abstractmethod
     def is_simple(self, way: Sequence[int]) -> bool:
-        """Returns whether a way comes to no place twice."""
+        """Returns whether a way meets no place twice."""
 
     @abstractmethod
     def drive(self, way: Sequence[int]) -> Drive | Obstacle:
-        """Returns a drive along a way, or what is in its way."""
+        """Returns a drive along a way, or the obstacle on it."""
 
     @abstractmethod
     def blocked(self, way: Sequence[int], place: np.ndarray) -> np.ndarray:
@@ -100,7 +100,7 @@ class WayGraph(ABC):
         return float(self.along(way)[-1]) if len(way) else 0.0
 
     def cut(self, way: list[int], longest: float) -> list[int]:
-        """Returns as much of a way as is no longer than that [m]."""
+        """Returns the start of a way, up to a length [m]."""
         kept = int(np.searchsorted(self.along(way), longest, "right"))
         return way[: max(1, kept)]
 
@@ -114,7 +114,7 @@ class WayGraph(ABC):
         return coo_array((costs[kept], pairs), size).tocsr()
 
     def close(self, pieces: np.ndarray) -> None:
-        """Takes pieces out that no car can drive along."""
+        """Removes pieces that no car can drive along."""
         self._is_open[pieces] = False
 
     def open_pieces(self) -> np.ndarray:
@@ -174,10 +174,10 @@ def _farthest(
 
     Args:
         graph: of all pieces.
-        links: of those that may be used; transposed, the way is one that
-            leads to the piece, told backwards.
+        links: of the usable pieces; transposed links give the way to the piece,
+            in reverse order.
         start: the piece.
-        longest: as much of the way is returned [m].
+        longest: greatest length of the returned way [m].
     """
     cost, before = dijkstra(links, indices=start, return_predecessors=True)
     cost = np.where(np.isfinite(cost), cost + graph.lengths / 2.0, -1.0)
@@ -233,7 +233,7 @@ def _nearest(values: np.ndarray, wanted: float) -> int:
 
 
 def _some(places: np.ndarray, along: np.ndarray) -> list[int]:
-    """Returns no more places than are tried, apart from each other."""
+    """Returns at most as many places as are tried, apart from each other."""
     kept: list[int] = []
     for place in places.tolist():
         if not kept or abs(along[place] - along[kept[-1]]) >= _APART:
@@ -249,8 +249,8 @@ def _arm(
     Args:
         graph: of all pieces.
         used: pieces of the drives.
-        joint: the piece of them where the way begins.
-        backwards: whether it ends there instead.
+        joint: the piece among them where the way begins. backwards: whether it
+            ends there instead.
 
     Returns:
         The way from the joint on, backwards if it ends there; empty if it is

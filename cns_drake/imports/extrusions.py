@@ -32,14 +32,14 @@ def extruded(
         polygon: the footprint.
         low, high: heights of its lowest and its highest point.
         name: of the object, for the faults.
-        faults: is told which roofs became flat.
+        faults: counts roofs that became flat.
         roof: shape: flat; pyramidal on any footprint; gabled or hipped on
             one of four corners. Others are made flat.
         roof_height: of the roof, from the eaves.
     """
     polygon = orient(polygon)
     eaves = high - roof_height
-    # What hangs above the ground is seen from below.
+    # A solid above the ground is seen from below.
     floor = np.zeros((0, 3, 3))
     if low > 0.0:
         floor = flat_surface(polygon, low, name, faults)[:, ::-1]

@@ -12,11 +12,11 @@ from shapely.validation import make_valid
 from cns_drake.city.geometry.triangulation import triangulate
 from cns_drake.imports.import_faults import ImportFaults
 
-# A face is no face if it has less area [m^2].
+# Faces of less area are dropped [m^2].
 _LEAST_AREA = 1e-5
-# A face whose corners lie farther from its plane is bent [m].
+# A face is bent if a corner is farther than this from its plane [m].
 _BENT = 0.05
-# Corners are told apart by millimetres.
+# Corners closer than this are the same [m].
 _MM = 1000.0
 
 
@@ -26,10 +26,10 @@ def face_triangles(
     """Returns a face as (M, 3, 3) triangles [m], turned as its outer ring.
 
     Args:
-        rings: (N, 3) corners of the outer ring, then of holes [m]; none is
-            told twice.
+        rings: (N, 3) corners of the outer ring, then of holes [m], without
+            repeated corners.
         name: of the object, for the faults.
-        faults: is told what is repaired or left out.
+        faults: counts repaired faces and those left out.
     """
     rings = [_cleaned(ring, name, faults) for ring in rings]
     if len(rings[0]) < 3:
@@ -56,21 +56,21 @@ def face_triangles(
 
 
 def _cleaned(ring: np.ndarray, name: str, faults: ImportFaults) -> np.ndarray:
-    """Returns a ring without corners that follow themselves."""
+    """Returns a ring without repeated corners."""
     if len(ring) == 0:
         return ring
-    # By plain numbers: most rings have four corners, too few for NumPy.
+    # Plain numbers are faster here: most rings have only four corners.
     rounded = np.rint(ring * _MM).tolist()
     kept = [k for k in range(len(ring)) if rounded[k] != rounded[k - 1]]
     if len(kept) < len(ring):
         twice = len(ring) - len(kept)
-        faults.add("corner told twice, left out", name, twice)
+        faults.add("repeated corner, left out", name, twice)
         return ring[kept]
     return ring
 
 
 def _newell(ring: np.ndarray) -> np.ndarray:
-    """Returns the normal of a ring, of twice its area's length."""
+    """Returns the normal of a ring; its length is twice the area."""
     normal = [0.0, 0.0, 0.0]
     corners = (ring - ring[0]).tolist()
     for (ax, ay, az), (bx, by, bz) in zip(
@@ -108,7 +108,7 @@ class _Plane:
         return points[..., self._axes]
 
     def lifted(self, xy: np.ndarray) -> np.ndarray:
-        """Returns points (N, 2) in space: corners where they are known."""
+        """Returns points (N, 2) in space; corners keep their exact places."""
         result = np.empty((len(xy), 3))
         keys = np.rint(xy * _MM).astype(np.int64).tolist()
         for row, key, point in zip(result, keys, xy, strict=True):
@@ -124,7 +124,7 @@ class _Plane:
 
 
 def _is_convex(ring: np.ndarray, normal: np.ndarray) -> bool:
-    """Tells whether all corners of a quadrilateral (4, 3) bulge outwards."""
+    """Returns whether a quadrilateral (4, 3) is convex."""
     halves = ring[[[3, 0, 1], [0, 1, 2], [1, 2, 3], [2, 3, 0]]]
     return all(float(_newell(corner) @ normal) > 0.0 for corner in halves)
 
@@ -151,6 +151,6 @@ def _filled(
             try:
                 parts.append(triangulate(part))
             except ValueError:
-                faults.add("part of a face that fits no plane, left out", name)
+                faults.add("part of a face that is in no plane, left out", name)
     triangles = np.concatenate(parts)
     return plane.lifted(triangles.reshape(-1, 2)).reshape(-1, 3, 3)

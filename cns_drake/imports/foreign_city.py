@@ -1,4 +1,4 @@
-"""A city of somebody else's, whatever file it was read from."""
+"""An imported city, independent of its file format."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ WATER: Rgb = (0.16, 0.34, 0.45)
 LAWN: Rgb = (0.42, 0.55, 0.30)
 
 
-# By identity: a city has thousands, with meshes that take long to compare.
+# Compared by identity: a city has thousands, and comparing meshes takes long.
 @dataclass(frozen=True, eq=False)
 class Imported:
     """A structure of an imported city.
@@ -33,12 +33,12 @@ class Imported:
     Attributes:
         structure: in the world.
         kind: type of its object, such as Building.
-        year: in which it was built, if it is told.
-        triangles: (M, 3, 3) of what a car could hit or drive over, in the
-            world [m].
+        year: in which it was built, if known.
+        triangles: (M, 3, 3) of all surfaces that a car could hit or drive over,
+            in the world [m].
         until: year in which it was demolished, if it was.
-        tags: or attributes, that the file gives it.
-        lod: level of detail; 0 if it is not known.
+        tags: its tags or attributes in the file.
+        lod: level of detail; 0 if unknown.
         original: name of the structure that it is a variant of; its own if
             empty.
         is_gone: whether it stands no more, and it is not told since when.
@@ -56,12 +56,12 @@ class Imported:
 
     @property
     def lot_name(self) -> str:
-        """The name by which lots are drawn."""
+        """The name that seeds the random draws."""
         return self.original or self.structure.name
 
     @property
     def is_ground(self) -> bool:
-        """Whether one can drive over it, if it is flat."""
+        """Whether a car can drive over it, if it is flat."""
         return self.structure.semantic_class in (
             "road",
             "parking",
@@ -75,11 +75,11 @@ class Thing:
     """A small thing of a file, such as a bench.
 
     Attributes:
-        source: name of what it was read from.
-        told: what that is, as the file has it.
+        source: name of its element in the file.
+        told: kind of that element, as the file has it.
         kind: a key of `cns_drake.city.placement.objects.OBJECTS`.
-        xy: where it stands [m].
-        yaw: where it faces, if that is told [rad].
+        xy: its place [m].
+        yaw: its heading, if known [rad].
     """
 
     source: str
@@ -91,19 +91,19 @@ class Thing:
 
 @dataclass(frozen=True)
 class ForeignCity:
-    """What a file holds.
+    """The content of a file.
 
     Attributes:
         structures: in the world of the map.
-        origin: where that lies in the file's coordinates, as metres east,
+        origin: the map's origin in the file's coordinates, as metres east,
             north and up, or latitude and longitude [deg].
         reference_system: of the origin, as the file names it.
-        faults: what was repaired or left out.
-        streets: whose lanes are known; drives are looked for in them.
-        keeps_left: whether the file says that traffic does.
-        things: small ones, which only a dressed city has; they are counted as
-            left out.
-        axes: what the file's coordinates are, unless they are metres, east,
+        faults: counts of parts that were repaired or left out.
+        streets: streets with known lanes, in which drives are searched.
+        keeps_left: whether traffic keeps left, by the file.
+        things: small things, which only a dressed city gets; until then the
+            faults count them as left out.
+        axes: the file's coordinates in words, unless they are metres east,
             north and up.
     """
 
@@ -136,11 +136,11 @@ def make_imported(
         kind: type of its object.
         surfaces: part -> its triangles (M, 3, 3) [m]; empty parts are left
             out, not all are empty.
-        colours: part -> diffuse colour; that of the class where it has none.
-        year: in which it was built, if it is told.
+        colours: part -> diffuse colour; by default that of the class.
+        year: in which it was built, if known.
         until: in which it was demolished, if it was.
-        tags: or attributes, that the file gives it.
-        lod: level of detail; 0 if it is not known.
+        tags: its tags or attributes in the file.
+        lod: level of detail; 0 if unknown.
     """
     filled = {part: some for part, some in surfaces.items() if len(some)}
     triangles = np.concatenate(list(filled.values()))

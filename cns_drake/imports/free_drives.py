@@ -17,15 +17,16 @@ from cns_drake.imports.waypoint_drives import (
     steerable_drive,
 )
 
-# A path keeps away from walls as far as this [m].
+# Paths prefer this distance from walls [m].
 _COMFORT = 6.0
-# The drive is left by so much, apart from where it is left [m].
+# An arm keeps this distance from the drive it leaves, except at the joint [m].
 _APART = 10.0
-# Cells so near an obstacle are closed [m].
+# Cells within this distance of an obstacle are closed [m].
 _OBSTRUCTED = 3.0
-# Between waypoints at most, for the height; and from corners at least [m].
+# Greatest distance of waypoints, for their heights, and least distance from
+# corners [m].
 _WAYPOINT_SPACING = 15.0
-# By how much waypoints may leave the path that was found, as tried [m].
+# Tolerances, tried in turn, of waypoints against the found path [m].
 _SIMPLIFICATIONS = (1.5, 1.0, 0.7, 2.0, 3.0)
 # Cells in a running mean, chosen by trial.
 _STRAIGHTENED = (5, 11, 17)
@@ -42,7 +43,7 @@ class CellGraph(WayGraph):
         number = np.full(wide.shape, -1)
         number[wide] = np.arange(len(row))
         clearance = space.clearance[wide]
-        # The nearer a wall, the dearer, up to four times.
+        # A cell near a wall costs up to four times as much.
         price = 1.0 + (1.0 - np.minimum(clearance / _COMFORT, 1.0)) * 3.0
         starts, ends = [], []
         for down, right in ((0, 1), (1, 0), (1, 1), (1, -1)):
@@ -87,12 +88,12 @@ def simplified_drive(
     space: FreeSpace,
     tolerances: Sequence[float] = _SIMPLIFICATIONS,
 ) -> Drive | Obstacle:
-    """Returns a drive with as few waypoints as there is room.
+    """Returns a drive with as few waypoints as the room allows.
 
     Args:
-        xy: (N, 2) places that it is to pass, about 1 m apart [m].
+        xy: (N, 2) places to pass, about 1 m apart [m].
         space: where a car has room.
-        tolerances: by how much its waypoints may leave them, as tried [m].
+        tolerances: of its waypoints against these places, tried in turn [m].
     """
     found: Drive | Obstacle = Obstacle(xy[len(xy) // 2])
     for straightened, tolerance in product(_STRAIGHTENED, tolerances):
@@ -118,7 +119,7 @@ def _densified(corners: np.ndarray) -> np.ndarray:
         length = float(np.linalg.norm(b - a))
         number = int((length - _WAYPOINT_SPACING) // _WAYPOINT_SPACING)
         if number > 0:
-            # None near the corners, whose arcs need room.
+            # No waypoints are near the corners, whose arcs need room.
             parts = np.linspace(0.0, 1.0, number + 2)[1:-1]
             points.append(a + parts[:, None] * (b - a))
         points.append(b[None])

@@ -1,4 +1,4 @@
-"""Where a car has room between the buildings of an imported city."""
+"""The room for a car between the buildings of an imported city."""
 
 from __future__ import annotations
 
@@ -20,24 +20,25 @@ from cns_drake.imports.import_ground import Ground
 from cns_drake.imports.surface_sampling import surface_samples
 
 CELL = 1.0  # [m]
-# A car passes below what hangs higher than this above the ground, and over
-# what is no higher than a kerb [m].
+# A car passes below things higher than this above the ground, and over things
+# no higher than a kerb [m].
 _HEADROOM = 3.5
 _KERB = 0.3
-# From the middle of a path to a wall, and to the edge of a road, at least [m].
+# Least distance from the middle of a path to a wall, and to the edge of a road
+# [m].
 _FROM_WALL = 2.5
 _FROM_EDGE = 1.6
-# How much of that the car that follows a path may lose [m].
+# The part of it that a car following the path may lose [m].
 _SLACK = 0.6
-# From the middle of the car to what it would hit, at least [m].
+# Least distance from the middle of the car to an obstacle [m].
 _HALF_CAR = 1.1
-# Half of the widest street; what is wider open is outside the city [m].
+# Half of the widest street; wider open ground is outside the city [m].
 _HALF_STREET = 20.0
 _SAMPLE_SPACING = 0.5
-# From the middle of a city room is looked for at most so far: no drive is
-# longer [m].
+# Room is searched within this distance of a city's middle: no drive is longer
+# [m].
 _FARTHEST = 1500.0
-# Roads are used where they hold at least so much connected room [m^2].
+# Roads are used if their connected room has at least this area [m^2].
 _LEAST_ROAD = 800.0
 
 
@@ -47,11 +48,11 @@ class FreeSpace:
 
     Attributes:
         low: (2,) where the grid begins, the corner of its first cell [m].
-        clearance: (rows along y, columns along x) from the middle of each
-            cell to what stands nearest [m]; 0 where no car may be.
+        clearance: (rows along y, columns along x) from the middle of each cell
+            to the nearest obstacle [m]; 0 where no car may be.
         on_roads: whether only roads of the file count.
         least: the clearance that a path needs [m].
-        walls: what a car could hit, seen from above.
+        walls: the obstacles, seen from above.
     """
 
     low: np.ndarray
@@ -92,10 +93,10 @@ class FreeSpace:
 def find_free_space(
     structures: Sequence[Imported], ground: Ground
 ) -> FreeSpace:
-    """Returns where a car has room, on roads if the file has any.
+    """Returns the room for a car, on roads if the file has any.
 
     Args:
-        structures: of the whole city, all that ever stand.
+        structures: of the whole city, at all stages.
         ground: below them.
     """
     low, high = _window(structures)
@@ -149,7 +150,8 @@ class _Grid:
 
         Args:
             triangles: in the window or not [m].
-            ground: above which only what a car could hit counts; all if None.
+            ground: only triangles that a car on it could hit count; all if
+                None.
         """
         found = [np.zeros((2, 0), dtype=int)]
         window = (self.low, self.high)
@@ -166,7 +168,7 @@ class _Grid:
 def _blocked(
     structures: Sequence[Imported], ground: Ground, grid: _Grid
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the cells that are blocked, and (M, 3, 3) what blocks them.
+    """Returns the blocked cells, and the triangles (M, 3, 3) that block them.
 
     The insides of buildings are blocked too.
     """
@@ -193,7 +195,7 @@ def _blocked(
 def _filled(
     row: np.ndarray, column: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns cells (N,), one or more, and those that they enclose."""
+    """Returns cells (N,), one or more, and the cells they enclose."""
     first = np.array([row.min(), column.min()])
     shape = np.array([row.max(), column.max()]) - first + 1
     walls = np.zeros(shape, dtype=bool)
@@ -204,7 +206,7 @@ def _filled(
 
 def _clearance(free: np.ndarray) -> np.ndarray:
     """Returns the distance of each cell to one that is not free [m]."""
-    # Beyond the grid there is nothing to drive on.
+    # No car can drive beyond the grid.
     return distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1] * CELL
 
 
@@ -218,13 +220,13 @@ def _between(blocked: np.ndarray) -> np.ndarray:
 
 
 def _largest(cells: np.ndarray) -> int:
-    """Returns how many cells the largest connected part has."""
+    """Returns the number of cells of the largest connected part."""
     parts, number = label(cells, np.ones((3, 3)))
     return int(np.bincount(parts.ravel())[1:].max()) if number else 0
 
 
 def _window(structures: Sequence[Imported]) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the corners (2,) of where room is looked for [m]."""
+    """Returns the corners (2,) of the window in which room is searched [m]."""
     boxes = np.array(
         [
             (s.triangles.min(axis=(0, 1)), s.triangles.max(axis=(0, 1)))

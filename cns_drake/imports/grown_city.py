@@ -1,4 +1,4 @@
-"""A first stage of a city without years, in which less is built, by lot."""
+"""Draws a first stage, with fewer buildings, for a city without years."""
 
 from __future__ import annotations
 
@@ -16,20 +16,21 @@ from cns_drake.imports.gone_buildings import with_gone
 from cns_drake.imports.lots import lot
 from cns_drake.imports.staged_city import StagedCity
 
-# Buildings so near each other are of one block [m].
+# Buildings this near to each other are of one block [m].
 _SAME_BLOCK = 4.0
-# The part of the changing buildings that is drawn block by block, and the
-# part that is lower at first, the others are not there.
+# The part of the changing buildings that is drawn block by block, and the part
+# that is lower at first; the others are missing.
 _BY_BLOCK = 0.5
 _LOWER = 1.0 / 3.0
-# Only what is so high can have been lower; it has this part of its height [m].
+# Only buildings at least this high [m] can be lower, with this part of their
+# height.
 _LEAST_HEIGHT = 7.0
 _HEIGHTS = (0.4, 0.7)
 
 
 @dataclass(frozen=True)
 class Growth:
-    """What was drawn.
+    """The drawn changes.
 
     Attributes:
         missing: buildings that are not there at the first stage.
@@ -45,8 +46,8 @@ class Growth:
 def grow(city: StagedCity, part: float, seed: int) -> tuple[StagedCity, Growth]:
     """Returns a city with a stage before its only one.
 
-    The lot is drawn by the names of buildings, so that it is the same
-    whatever else a file holds.
+    The draws depend on the names of buildings, so that the rest of a file does
+    not change them.
 
     Args:
         city: of one stage; what is gone by then stands at the first, and what
@@ -99,7 +100,7 @@ def grow(city: StagedCity, part: float, seed: int) -> tuple[StagedCity, Growth]:
 def _drawn(
     buildings: Sequence[Imported], number: int, seed: int
 ) -> list[Imported]:
-    """Returns as many buildings, about half of them block by block."""
+    """Returns a number of buildings, about half of them block by block."""
     blocks: dict[int, list[Imported]] = {}
     for block, one in zip(_blocks(buildings), buildings, strict=True):
         blocks.setdefault(block, []).append(one)
@@ -136,7 +137,7 @@ def _blocks(buildings: Sequence[Imported]) -> np.ndarray:
 
 
 def _lowered(one: Imported, share: float, taken: set[str]) -> Imported:
-    """Returns a building with a part of its height, under a new name."""
+    """Returns a building cut to a part of its height, under a new name."""
     suffix = "_lower"
     while f"{one.structure.name}{suffix}" in taken:
         suffix += "_"

@@ -1,4 +1,4 @@
-"""What is wrong in a file of somebody else's, counted by kind."""
+"""Faults of an imported file, counted by kind."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ _LONGEST = 100
 
 
 class ImportFaults:
-    """What was repaired or left out, with one example of each kind."""
+    """Counts of repaired and omitted parts, with one example of each kind."""
 
     def __init__(self) -> None:
         self._counts: Counter[str] = Counter()
@@ -18,9 +18,9 @@ class ImportFaults:
         """Counts faults.
 
         Args:
-            kind: what it is and what became of it, in words.
+            kind: the fault and its remedy, in words.
             example: name of the object that has it.
-            number: how many.
+            number: the number of faults.
         """
         kind = _printable(kind)
         self._counts[kind] += number
@@ -34,7 +34,7 @@ class ImportFaults:
             del self._counts[kind], self._examples[kind]
 
     def rows(self) -> list[tuple[str, int, str]]:
-        """Returns kind, how many, and an example, most frequent first."""
+        """Returns kind, number and example, most frequent first."""
         return [
             (kind, number, self._examples[kind])
             for kind, number in sorted(
@@ -44,6 +44,6 @@ class ImportFaults:
 
 
 def _printable(text: str) -> str:
-    """Returns a text of a file without what would upset a terminal."""
+    """Returns a text of a file without control characters."""
     shown = "".join(c if c.isprintable() else " " for c in text)
     return shown if len(shown) <= _LONGEST else f"{shown[: _LONGEST - 3]}..."

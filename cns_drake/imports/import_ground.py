@@ -24,8 +24,8 @@ CELL = 4.0
 MARGIN = 40.0
 # A larger city has larger cells.
 _MOST_CELLS = 500
-# It is smoothed over so many cells, and lies so far below what stands on it,
-# so that pavements are seen and not it [m].
+# Number of cells over which it is smoothed, and its depth below the structures,
+# so that pavements are seen in its place [m].
 _SMOOTHING = 1.5
 _DEPTH = 0.1
 # Farther from the convex hull of the feet nothing lies between them [m].
@@ -33,7 +33,7 @@ _BESIDE_HULL = 1.0
 # Length of an edge that is not parted before, and points at once.
 _MOST_STEPS = 256
 _AT_ONCE = 1_000_000
-# Each such corner of a flat thing on the ground helps to find its height.
+# Corners of flat things of these classes give the height of the ground.
 _EVERY_CORNER = 7
 
 
@@ -69,7 +69,7 @@ class Ground:
         )
 
     def below(self, points: np.ndarray) -> Ground:
-        """Returns a ground that lies nowhere above some points (N, 3) [m]."""
+        """Returns a ground that is nowhere above some points (N, 3) [m]."""
         z = self.z.copy()
         c = ((points[:, 0] - self.xs[0]) // self.cell).astype(int)
         r = ((points[:, 1] - self.ys[0]) // self.cell).astype(int)
@@ -94,7 +94,7 @@ def guess_ground(feet: np.ndarray, corners: np.ndarray) -> Ground:
 
     Args:
         feet: (N, 3) places on the ground [m], one or more.
-        corners: (M, 3) of all that stands, which it reaches beyond [m].
+        corners: (M, 3) of all structures; the ground reaches beyond them [m].
     """
     low, high = corners[:, :2].min(axis=0), corners[:, :2].max(axis=0)
     cell = CELL * np.ceil(max(1.0, (high - low).max() / CELL / _MOST_CELLS))
@@ -158,7 +158,7 @@ def bottom_of(
     name = "ground"
     while name in taken:
         name += "_"
-    # Streets and water are to be seen, and not the guess above them.
+    # The guessed ground must not cover streets and water.
     lowered = ground
     spacing = ground.cell / 2.0
     for one in structures:
@@ -174,7 +174,8 @@ def bottom_of(
 
 
 def _lattice(triangles: np.ndarray, spacing: float) -> Iterator[np.ndarray]:
-    """Yields points (N, 3) on triangles (M, 3, 3), as dense in all directions.
+    """Yields points (N, 3) on triangles (M, 3, 3), equally dense in all
+    directions.
 
     No place on a triangle is farther from all of them than the spacing.
 
@@ -196,7 +197,7 @@ def _lattice(triangles: np.ndarray, spacing: float) -> Iterator[np.ndarray]:
             for first in range(0, len(part), most):
                 some = part[first : first + most]
                 yield np.einsum("kc,mcx->mkx", weights, some).reshape(-1, 3)
-        # Large ones in four.
+        # Large triangles are divided into four.
         a, b, c = np.moveaxis(triangles[steps > _MOST_STEPS], 1, 0)
         ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
         quarters = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))

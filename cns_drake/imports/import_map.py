@@ -1,4 +1,4 @@
-"""A city of somebody else's as a map folder, with stages and drives."""
+"""Makes a map folder, with stages and drives, from an imported city."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from cns_drake.imports.street_drives import StreetGraph
 from cns_drake.imports.waypoint_drives import Drive, steerable_drive
 
 Progress = Callable[[str], None]
-# Takes the folder, and structures and triangles of stages that are counted.
+# Receives the folder, and the numbers of structures and triangles by stage.
 Finish = Callable[[Path, Mapping[str, tuple[int, int]]], None]
 
 
@@ -52,10 +52,10 @@ def import_city(
         source: CityJSON (.json, .jsonl), OpenStreetMap (.osm, .pbf) or
             OpenDRIVE (.xodr).
         output: the folder, which must not be there yet.
-        options: what is taken.
+        options: of the import.
         progress: takes one line at a time.
-        finish: adds to the folder, which has its name and all files but is
-            not yet in its place; if it fails, nothing is left.
+        finish: adds files to the folder, which has its name and all files but
+            is not yet in its place. If it fails, nothing is left.
 
     Raises:
         InputError: if the file or the options cannot be used, or the folder
@@ -110,7 +110,7 @@ def import_city(
 
 
 def _check(source: Path, output: Path, options: ImportOptions) -> None:
-    """Checks what can be checked before anything is read.
+    """Checks options before the file is read.
 
     Raises:
         InputError: naming the option.
@@ -126,13 +126,18 @@ def _check(source: Path, output: Path, options: ImportOptions) -> None:
             if value:
                 raise InputError(f"{option}: {source} is a road network, {why}")
     if options.grow is not None and options.years:
-        raise InputError("--grow: --years say already what is built when")
+        raise InputError(
+            "--grow: --years define the stages already; give one of them"
+        )
     if os.path.lexists(output):
-        raise InputError(f"{output}: is there already")
+        raise InputError(
+            f"{output}: the folder is there already; give another one"
+        )
     name = output.resolve().name
     if not re.fullmatch(r"\w+", name, re.ASCII):
         raise InputError(
-            f"--output: {name!r}: letters, digits and underscores only"
+            f"--output: {name!r}: the folder's name may have letters, digits "
+            "and underscores only"
         )
 
 
@@ -193,7 +198,7 @@ def _lifted(
 
 
 def _titles(city: StagedCity, options: ImportOptions) -> dict[str, str]:
-    """Returns stage -> when it is, in words that a title ends with."""
+    """Returns stage -> words for its time, the end of a title."""
     when = [f" in {year}" for year in options.years] or [""]
     if options.grow is not None:
         when = [", not all of it built", ""]
@@ -215,7 +220,8 @@ def _report(
 
 
 def _triangles_of(one: Imported) -> int:
-    """Returns how many triangles a structure has, if these are its own."""
+    """Returns the number of triangles of a structure; 0 if it shares its
+    meshes."""
     shapes = [part.shape for part in one.structure.model.parts]
     if not one.kind.startswith("Building"):
         return len(one.triangles)

@@ -1,4 +1,4 @@
-"""What is taken of a file, and what came of it."""
+"""Options of an import, and its result."""
 
 from __future__ import annotations
 
@@ -18,25 +18,22 @@ class DriveOn(str, Enum):
 
 @dataclass(frozen=True)
 class ImportOptions:
-    """What is taken of a file.
+    """The options of an import.
 
     Attributes:
-        years: of the stages, increasing; one stage of all if there is none.
-        year_attribute: that tells when something was built; one of the usual
+        years: of the stages, increasing; without any there is one stage.
+        year_attribute: the attribute with the year of construction; the usual
             ones if None.
-        undated: what becomes of buildings without a year.
+        undated: the first stage of buildings without a year.
         lod: level of detail; the highest of each object if None.
-        seed: of what is drawn: by `grow`, and where a file of roads has no
-            buildings.
-        along: waypoints of a drive, in place of two that are proposed.
-        grow: part of the buildings that a stage before the only one lacks, or
-            has lower, by lot; no such stage if None.
-        drive_on: side of the streets; that which the file tells, or the
-            right, if None.
-        within: how far from the drives a structure may lie; anywhere if None
-            [m].
-        dressed: whether what the file does not say of the looks of buildings
-            is drawn by lot.
+        seed: of the draws of `grow`, and of buildings along a file's roads.
+        along: waypoints of a drive, in place of the two proposed ones.
+        grow: share of the buildings that an added first stage lacks, or has
+            lower, by lot; no such stage if None.
+        drive_on: side of the streets; if None, the file's, or else the right.
+        within: greatest distance of structures from the drives [m]; no limit if
+            None.
+        dressed: whether looks that the file leaves open are drawn by lot.
     """
 
     years: tuple[int, ...] = ()
@@ -53,15 +50,15 @@ class ImportOptions:
 
 @dataclass(frozen=True)
 class ImportReport:
-    """What came of a file.
+    """The result of an import.
 
     Attributes:
-        kinds: type of object -> how many structures.
+        kinds: type of object -> number of structures.
         triangles: of all.
-        stages: stage -> how many structures stand.
+        stages: stage -> number of structures.
         undated, dated: buildings without a year, and with one.
         drives: lengths of the proposed drives [m].
-        faults: kind, how many, example.
+        faults: kind, number, example.
     """
 
     kinds: dict[str, int]

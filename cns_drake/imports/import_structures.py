@@ -26,8 +26,7 @@ from cns_drake.imports.foreign_city import (
     make_imported,
 )
 
-# Type -> class, and colour where that of the class would mislead. A type that
-# begins with one of these is of its kind.
+# Beginning of a type -> class, and a colour if the class's would mislead.
 _CLASSES: tuple[tuple[str, str, Rgb | None], ...] = (
     ("Building", "building", None),
     ("Bridge", "other-structure", None),
@@ -81,7 +80,7 @@ def import_structures(
     A building with its parts is one.
 
     Args:
-        city: what was read; its faults are added to.
+        city: the content of the file; its faults are extended.
         origin: (3,) of the world in the file's coordinates [m].
         lod: level of detail to take; the highest of each object if None.
         year_attribute: see `construction_year`.
@@ -99,7 +98,7 @@ def import_structures(
 
 
 def _families(city: CityFile) -> dict[str, list[CityObject]]:
-    """Returns the id of each topmost object -> it and all that it has."""
+    """Returns id of each topmost object -> the object and its parts."""
     groups: dict[str, list[CityObject]] = {}
     for name, one in city.objects.items():
         root, seen = name, {name}
@@ -108,7 +107,7 @@ def _families(city: CityFile) -> dict[str, list[CityObject]]:
                 p
                 for p in city.objects[root].parents
                 if p in city.objects
-                # A group is no larger whole: it may hold half a city.
+                # A group is not one structure: it may hold half a city.
                 and city.objects[p].kind != "CityObjectGroup"
             ]
             if not parents or parents[0] in seen:
@@ -191,14 +190,14 @@ def _make(
 def _geometries(
     members: list[CityObject], lod: float | None
 ) -> list[CityGeometry]:
-    """Returns what is shown of an object and its parts."""
+    """Returns the geometry to use of an object and its parts."""
     chosen = []
     for one in members:
         usable = [g for g in one.geometries if lod is None or g.lod == lod]
         if usable:
             highest = max(g.lod for g in usable)
             chosen += [g for g in usable if g.lod == highest]
-    # A footprint is no wall: it goes where anything better is there.
+    # A footprint is dropped if there is any better geometry.
     if any(g.lod >= 1.0 for g in chosen):
         chosen = [g for g in chosen if g.lod >= 1.0]
     return chosen
@@ -207,14 +206,14 @@ def _geometries(
 def _triangles(
     geometry: CityGeometry, name: str, city: CityFile, origin: np.ndarray
 ) -> list[tuple[str, np.ndarray]]:
-    """Returns what a surface is of -> its triangles in the world."""
+    """Returns type of surface -> its triangles in the world."""
     found = []
     for face, kind in zip(geometry.faces, geometry.kinds, strict=True):
         rings = [ring - origin for ring in face]
         triangles = face_triangles(rings, name, city.faults)
         found.append(("roof" if kind == "RoofSurface" else "body", triangles))
     if geometry.is_solid and _volume([t for _, t in found]) < -1e-3:
-        city.faults.add("solid turned inside out, turned back", name)
+        city.faults.add("solid turned inside out, reversed", name)
         found = [(kind, triangles[:, ::-1]) for kind, triangles in found]
     return found
 

@@ -1,4 +1,4 @@
-"""Lots that depend on a name alone, whatever else a city holds."""
+"""Random draws that depend on names only, not on the rest of a city."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import numpy as np
 
 
 def lot(seed: int, purpose: str, name: str) -> float:
-    """Returns a number from 0 to 1 that depends on these alone."""
+    """Returns a number from 0 to 1 that depends on the arguments only."""
     return _number(seed, purpose, name) / 2.0**64
 
 
 def lot_generator(seed: int, purpose: str, name: str) -> np.random.Generator:
-    """Returns a generator whose draws depend on these alone."""
+    """Returns a generator whose draws depend on the arguments only."""
     return np.random.default_rng(_number(seed, purpose, name))
 
 

@@ -30,7 +30,7 @@ _OF_BOX = 12  # triangles
 
 @contextmanager
 def map_draft(output: Path) -> Iterator[Path]:
-    """Gives a folder of the same name, which takes the place when all is well.
+    """Yields a draft folder of the same name; it takes its place at success.
 
     Raises:
         InputError: if it cannot be written.
@@ -57,14 +57,14 @@ def write_world(
     """Writes the stages, their meshes and the table of structures.
 
     Args:
-        draft: the map's folder, which has its name.
+        draft: the map's folder, with the map's name.
         source: the file that the city was read from.
         city: all structures.
         bottom: the ground below them, at all stages.
-        dressing: what was added, if the city was dressed.
+        dressing: the added details, if the city was dressed.
 
     Returns:
-        Stage -> how many structures and triangles it has.
+        Stage -> its numbers of structures and triangles.
     """
     structures = [*bottom, *(one.structure for one in city.kept)]
     table = structure_table(structures)
@@ -80,7 +80,7 @@ def write_world(
             comment=f"Imported by cns-drake from {source.name}.",
         )
         (draft / stage_name(stage)).write_text(text, "utf-8")
-    # Trees of a kind share theirs.
+    # Trees of a kind share their meshes.
     meshes = {
         name: mesh
         for structure in structures
@@ -98,7 +98,7 @@ def write_world(
 
 
 def _triangles_in(obj: str) -> int:
-    """Returns how many triangles the faces of a mesh have."""
+    """Returns the number of triangles of a mesh's faces."""
     faces = obj[obj.find("\nf ") :].split()
     return len(faces) - 3 * faces.count("f")
 
@@ -106,7 +106,7 @@ def _triangles_in(obj: str) -> int:
 def _size(
     structures: Sequence[Structure], triangles: Mapping[str, int]
 ) -> tuple[int, int]:
-    """Returns how many structures have a surface, and their triangles."""
+    """Returns the numbers of structures with a surface, and of triangles."""
     shapes = [p.shape for one in structures for p in one.model.parts]
     return sum(bool(one.model.parts) for one in structures), sum(
         triangles[shape.mesh] if isinstance(shape, MeshShape) else _OF_BOX
@@ -124,7 +124,7 @@ def write_facts(
     growth: Growth | None,
     dressing: Dressing | None = None,
 ) -> None:
-    """Writes where the map comes from, where it lies, and what was drawn."""
+    """Writes the source of the map, its place, and counts of drawn parts."""
     facts = {
         "source": source.name,
         "reference_system": city.reference_system or "not told",
@@ -152,7 +152,7 @@ def write_facts(
 
 
 def _drawn(options: ImportOptions, growth: Growth | None) -> dict:
-    """Returns what was drawn by lot, if anything was."""
+    """Returns the counts of drawn parts, if there are any."""
     if growth is None:
         return {}
     return {

@@ -1,4 +1,4 @@
-"""What stands near drives: all of a city that a LiDAR on them can see."""
+"""Structures near drives: the part of a city that a LiDAR can see."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from cns_drake.roads.waypoints import load_waypoint_path, read_waypoints
 
 
 def drive_along(path: Path) -> Drive:
-    """Returns a drive along waypoints of a file; heights are left aside.
+    """Returns a drive along waypoints of a file, without their heights.
 
     Raises:
         InputError: if the file cannot be used, or a bend is too tight.
@@ -34,8 +34,8 @@ def drive_along(path: Path) -> Drive:
     radius, (x, y) = radii.min(), driven[radii.argmin()]
     if radius < TIGHTEST_RADIUS:
         raise InputError(
-            f"{path}: a bend of {radius:.2f} m radius at {x:.1f}, {y:.1f}, "
-            f"the car turns within {TIGHTEST_RADIUS:.2f} m at the tightest"
+            f"{path}: a bend at {x:.1f}, {y:.1f} has a radius of {radius:.2f} "
+            f"m; the car needs {TIGHTEST_RADIUS:.2f} m"
         )
     return Drive(points[:, :2], control)
 
@@ -46,16 +46,16 @@ def keep_near(
     distance: float,
     faults: ImportFaults,
 ) -> list[Imported | None]:
-    """Returns the structures, and of terrain the part, near drives.
+    """Returns the structures, and the part of the terrain, near drives.
 
-    What is not near is None.
+    Other structures become None.
 
     Args:
         structures: of the city.
         drives: at least one.
-        distance: how far from them a structure's nearest corner, or the
-            bounding box of it, may lie [m].
-        faults: is told how many are left out.
+        distance: greatest distance of a structure's nearest corner, or of its
+            bounding box [m].
+        faults: counts the structures left out.
     """
     ways = MultiLineString([drive.path for drive in drives])
     shapely.prepare(ways)
@@ -76,14 +76,14 @@ def keep_near(
 def _near(
     things: np.ndarray, ways: BaseGeometry, distance: float
 ) -> np.ndarray:
-    """Tells of M things of N corners (M, N, 3) whether their boxes are near."""
+    """Returns which of M things of N corners (M, N, 3) have a box nearby."""
     low, high = things[:, :, :2].min(axis=1), things[:, :, :2].max(axis=1)
     boxes = shapely.box(*low.T, *high.T)
     return np.asarray(shapely.dwithin(boxes, ways, distance))
 
 
 def _cropped(one: Imported, ways: BaseGeometry, distance: float) -> Imported:
-    """Returns the part of a terrain that is near, as it is."""
+    """Returns the near part of a terrain, unchanged."""
     meshes = {}
     for name, mesh in one.structure.model.meshes.items():
         faces = mesh.triangles()

@@ -1,6 +1,6 @@
 """OpenStreetMap: buildings, streets, trees and land as structures.
 
-Heights above the sea are not in it: the ground is level.
+OpenStreetMap has no heights above sea level: the ground is level.
 """
 
 from __future__ import annotations
@@ -48,9 +48,9 @@ from cns_drake.imports.osm_things import make_things
 _TALLEST = 150.0
 _HEDGE = (0.8, 1.2)
 _WALL = (0.2, 1.6)
-# The sea reaches so far beyond the buildings [m].
+# How far the sea reaches beyond the buildings [m].
 _SEA = 60.0
-# A file of a whole country would not end.
+# Larger areas, such as whole countries, are refused.
 _LARGEST = 20_000.0  # [m]
 
 
@@ -79,7 +79,7 @@ def import_openstreetmap(
     ]
     buildings = list(standing_buildings(buildings, faults, dressed))
     if not buildings:
-        raise InputError(f"{path}: no building in it")
+        raise InputError(f"{path}: the file has no buildings")
     bounds = np.array([p.bounds for one in buildings for p in one.polygons])
     low, high = bounds[:, :2].min(axis=0), bounds[:, 2:].max(axis=0)
     longitude, latitude = np.round((low + high) / 2.0, 6).tolist()
@@ -124,14 +124,14 @@ def import_openstreetmap(
 def _count_unused(
     features: OsmFeatures, found: Iterable[Imported], also: AbstractSet[str]
 ) -> None:
-    """Counts what is in the file and has no place in the city, by kind.
+    """Counts things in the file without a place in the city, by kind.
 
-    Buildings that are left out are counted where that is decided.
+    Buildings that are left out are counted elsewhere.
 
     Args:
         features: all of the file.
         found: the city.
-        also: ids of what else has a place, or is counted elsewhere.
+        also: ids of other things with a place, or counted elsewhere.
     """
     used = {
         name
@@ -188,7 +188,7 @@ def _trees(
         x, y = local(np.array([place]))[0].tolist()
         needles = tags.get("leaf_type") == "needleleaved"
         model = tree(
-            # Editors give negative numbers to what is new.
+            # Editors give negative numbers to new things.
             np.random.default_rng([abs(int(name[1:]))]),
             species="spruce" if needles else "lime_tree",
             height=told(tags, "height", length, _TALLEST, (name, faults))

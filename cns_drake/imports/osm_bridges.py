@@ -21,18 +21,18 @@ from cns_drake.imports.osm_tags import (
     street_width,
 )
 
-# Of a parapet: from the edge of the street, thickness and height [m].
+# Parapets: distance from the edge of the street, thickness, height [m].
 _FROM_EDGE, _THICK, _HIGH = 0.2, 0.25, 1.0
 _SIDEWALK = 2.0
 
 
 @dataclass(frozen=True)
 class Bridges:
-    """Ids of ways for cars and people that do not lie on the ground.
+    """Ids of ways for cars and people above or below the ground.
 
     Attributes:
         over_streets: bridges over another street, or a railway.
-        level: all other bridges, which are as high as the ground beside them.
+        level: all other bridges, at the height of the ground beside them.
         tunnels: below it.
     """
 
@@ -46,7 +46,7 @@ class Bridges:
 
 
 def bridges_of(ways: Iterable[OsmWay], local: Local) -> Bridges:
-    """Returns which ways are bridges and tunnels."""
+    """Returns the ways that are bridges and tunnels."""
     used = [
         way
         for way in ways

@@ -22,15 +22,15 @@ from cns_drake.imports.osm_reading import OsmArea, Tags, is_told
 from cns_drake.imports.osm_tags import heights, why_absent
 from cns_drake.imports.told_dates import told_year
 
-# Parts that leave no more of an outline than this are all of the building.
+# If parts leave less of an outline than this, they are the whole building.
 _ALL_OF_IT = 0.9
-# What parts leave of an outline is of no account where it is so narrow [m].
+# Remainders of an outline narrower than this are dropped [m].
 _SLIVER = 0.25
 
 
 @dataclass(frozen=True)
 class _Block:
-    """A solid of a building: where, from and to which height, its roof."""
+    """A solid of a building: footprint, lowest and highest point, roof."""
 
     name: str
     tags: Tags
@@ -40,7 +40,7 @@ class _Block:
     roof: float
 
     def replaced(self, polygon: Polygon, low: float, high: float) -> _Block:
-        """Returns a block with a flat roof that is left of this one."""
+        """Returns the remainder of this block, with a flat roof."""
         plain = {k: v for k, v in self.tags.items() if k != "roof:shape"}
         return _Block(self.name, plain, polygon, low, high, 0.0)
 
@@ -48,7 +48,7 @@ class _Block:
 def standing_buildings(
     areas: Iterable[OsmArea], faults: ImportFaults, with_gone: bool = False
 ) -> Iterator[OsmArea]:
-    """Yields the buildings and parts that stand or stood above the ground.
+    """Yields present and former buildings and parts above the ground.
 
     Args:
         areas: that are meant to be buildings.
@@ -73,7 +73,7 @@ def make_buildings(
     year_attribute: str | None,
     faults: ImportFaults,
 ) -> Iterator[Imported]:
-    """Yields buildings; parts take the place of what they cover of them."""
+    """Yields buildings; parts replace the area that they cover."""
     outlines: list[_Block] = []
     parts: list[_Block] = []
     for name, tags, polygons in told:
@@ -128,7 +128,7 @@ def make_buildings(
             {"roof": RED_ROOF},
             construction_year(whole.tags, year_attribute, whole.name, faults),
             told_year(whole.tags.get("end_date", "")),
-            # Where parts look different, the looks of the first one count.
+            # If parts look different, the first one's look counts.
             tags={**blocks[0].tags, **whole.tags},
             lod=1.0,
         )
@@ -146,9 +146,9 @@ def _is_gone(tags: Tags) -> bool:
 def _with_parts(outline: _Block, parts: list[_Block]) -> list[_Block]:
     """Returns the blocks of a building.
 
-    Where parts cover an outline, they are the building. Where they leave some
-    of it, that stands as the outline says; then they are additions to it, and
-    it also stands below those of them that begin above the ground.
+    If parts cover an outline, they are the building. Otherwise the outline's
+    own solid fills the rest, and the parts are additions to it. That solid also
+    stands below parts that begin above the ground.
     """
     if not parts:
         return [outline]
@@ -159,7 +159,7 @@ def _with_parts(outline: _Block, parts: list[_Block]) -> list[_Block]:
         by_bottom = sorted(parts, key=lambda part: part.low)
         below = rest
         for part in by_bottom:
-            # What no part that begins lower covers already.
+            # The area that no lower part covers.
             shadow = part.polygon.difference(below)
             top = min(part.low, outline.high)
             if top > outline.low:

@@ -45,7 +45,7 @@ class _Look(NamedTuple):
 
 _WATER = _Look("WaterBody", "other-ground", WATER, -0.045)
 _SQUARE = _Look("Square", "other-ground", _STONES, -0.03)
-# Key, values, and how it looks; smaller things lie a little above larger ones.
+# Key, values and look; smaller things are a little above larger ones.
 _LOOKS = (
     ("natural", "water", _WATER),
     ("landuse", "basin reservoir", _WATER),
@@ -81,10 +81,10 @@ _PITCH = _Look("Pitch", "other-ground", _TARTAN, -0.035)
 _OF_GRASS = ("grass", "artificial_turf", "natural_grass")
 _SPORTS_ON_GRASS = ("soccer", "rugby", "american_football", "cricket")
 _SURFACES = {"sand": _SAND, "gravel": _GRAVEL, "fine_gravel": _GRAVEL}
-# Cars there stand below the ground, or in a building.
+# Cars there are below the ground, or in a building.
 _NO_GROUND = ("underground", "multi-storey", "rooftop")
-# A coast that ends within the city goes straight on so far [m]; on which side
-# of it an area lies is looked at so far beside it.
+# Length by which a coast that ends within the city is extended [m], and
+# distance of the probes beside it that find the sea's side.
 _BEYOND, _BESIDE = 3000.0, 0.1
 
 
@@ -100,7 +100,7 @@ def ground_areas(
         areas: of the file.
         local: brings places to metres.
         faults: counts what is repaired.
-        dressed: whether they look as what they are made of.
+        dressed: whether they get the look of their material.
     """
     for name, tags, polygons in areas:
         look = _look(tags) if dressed else _plain_look(tags)
@@ -160,7 +160,7 @@ def _pitch(tags: Tags) -> _Look:
 
 
 def coasts_of(ways: Iterable[OsmWay]) -> list[OsmWay]:
-    """Returns the coastlines, which have the land on their left."""
+    """Returns the coastlines; the land is on their left."""
     return [way for way in ways if way.tags.get("natural") == "coastline"]
 
 
@@ -204,7 +204,7 @@ def sea(
 
 
 def _prolonged(line: LineString, whole: BaseGeometry) -> LineString:
-    """Returns a line whose ends within an area go straight on."""
+    """Returns a line with its ends within an area extended straight on."""
     points = np.array(line.coords)
     if line.is_closed:
         return line
@@ -223,7 +223,7 @@ def _prolonged(line: LineString, whole: BaseGeometry) -> LineString:
 
 
 def _is_sea(area: BaseGeometry, coasts: Sequence[LineString]) -> bool:
-    """Tells whether most of an area's coast has it on its right."""
+    """Returns whether an area is on the right of most of its coast."""
     shapely.prepare(area)
     right = 0.0
     for coast in coasts:

@@ -1,4 +1,4 @@
-"""Numbers as the tags of OpenStreetMap write them.
+"""Numbers in the tags of OpenStreetMap.
 
 https://wiki.openstreetmap.org/wiki/Map_features/Units,
 https://wiki.openstreetmap.org/wiki/Key:building:levels
@@ -32,7 +32,7 @@ _LENGTH = re.compile(rf"{_NUMBER}\s*([a-z]*|'|\")")
 _FEET_AND_INCHES = re.compile(
     rf"{_NUMBER}\s*(?:'|ft|feet|foot)\s*{_NUMBER}\s*(?:\"|in|'')?"
 )
-# Several values, and from one to another.
+# Separators of lists and of ranges.
 _BETWEEN = re.compile(r"\s*;\s*|(?<=[^\s;])\s*(?:-|–|\bto\b)\s*(?=[\d.,])")
 _ABOUT = re.compile(r"^\s*(?:~|≈|ca\.?|about|approx\.?)\s*")
 _QUOTES = str.maketrans({"’": "'", "′": "'", "”": '"', "″": '"'})
@@ -60,7 +60,7 @@ def count(text: str | None) -> float | None:
 
 
 def _parts(text: str | None) -> Iterator[str]:
-    if text is None or len(text) > 255:  # As long as a value may be.
+    if text is None or len(text) > 255:  # OpenStreetMap allows no more.
         return
     plain = _ABOUT.sub("", text.translate(_QUOTES).lower())
     for part in _BETWEEN.split(plain):
@@ -80,7 +80,7 @@ def _length(text: str) -> float | None:
 
 
 def _greatest(values: list[float | None]) -> float | None:
-    """Returns the greatest; None if there is none, or one is none."""
+    """Returns the greatest value; None without any, or if one is None."""
     if not values or None in values:
         return None
     return max(value for value in values if value is not None)

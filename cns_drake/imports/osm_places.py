@@ -1,4 +1,4 @@
-"""Places of OpenStreetMap in metres, and areas that are sound."""
+"""Places of OpenStreetMap in metres, and valid areas."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def parts_of(geometry: BaseGeometry) -> Iterator[Polygon]:
 def sound_parts(
     polygon: Polygon, name: str, faults: ImportFaults
 ) -> list[Polygon]:
-    """Returns what a polygon is made of, in whole millimetres."""
+    """Returns a polygon's valid parts, in whole millimetres."""
     geometry: BaseGeometry = polygon
     if not polygon.is_valid:
         faults.add("outline that crosses itself, repaired", name)

@@ -1,4 +1,4 @@
-"""What a file of OpenStreetMap holds, as far as a city is made of it."""
+"""Reads the parts of an OpenStreetMap file that make a city."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from cns_drake.imports.import_faults import ImportFaults
 Tags = Mapping[str, str]
 
 _LETTERS = {"Node": "n", "Way": "w", "Relation": "r"}
-# Tags that say what a thing is, the more telling first
+# Tags that give the kind of a thing, the more specific first
 # (https://wiki.openstreetmap.org/wiki/Map_features).
 _TELLING = (
     "building",
@@ -57,7 +57,7 @@ _TELLING = (
     "place",
     "area:highway",
 )
-# Before the key of what is not there any more; and of that, or not yet.
+# Prefixes of keys of former things, and of former or future things.
 _GONE = ("demolished", "destroyed", "historic", "razed", "removed", "was")
 _LIFECYCLE = (
     "abandoned",
@@ -93,17 +93,17 @@ class OsmArea(NamedTuple):
 
 @dataclass
 class OsmFeatures:
-    """What a file holds, places as longitude and latitude [deg].
+    """The content of a file; places are longitude and latitude [deg].
 
     Attributes:
         areas: closed ways and multipolygons.
-        ways: with all of their places that are in the file.
+        ways: with those of their places that are in the file.
         trees: id, tags and place.
         crossings: number of the node, and tags.
         nodes: id, tags and place of all other nodes that have tags.
-        kinds: id of each thing that has tags -> what it is; nodes have `n`
-            before their number, ways `w` and relations `r`.
-        faults: what could not be read.
+        kinds: id of each thing with tags -> its kind; nodes have `n` before
+            their number, ways `w` and relations `r`.
+        faults: counts of unreadable things.
     """
 
     areas: list[OsmArea] = field(default_factory=list)
@@ -198,7 +198,7 @@ def _polygons(area: Any) -> list[Polygon]:
 
 
 def thing_kind(tags: Tags) -> str:
-    """Returns what a thing is, by its first tag that says so."""
+    """Returns the kind of a thing, by its first tag that gives one."""
     for key in _TELLING:
         if is_told(tags, key):
             return f"{key}={tags[key]}"
@@ -212,14 +212,14 @@ def thing_kind(tags: Tags) -> str:
 
 
 def is_told(tags: Tags, name: str) -> bool:
-    """Tells whether there is such a tag, and it is not `no`."""
+    """Returns whether the tag exists and is not `no`."""
     return tags.get(name, "no") != "no"
 
 
 def is_building(tags: Tags) -> bool:
-    """Tells whether a building or a part of one is meant.
+    """Returns whether tags mean a building or a part of one.
 
-    Also one that stood until a date that is told.
+    A former building with the date of its end counts, too.
     """
     return (
         is_told(tags, "building")

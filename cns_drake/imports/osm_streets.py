@@ -1,4 +1,4 @@
-"""Streets of OpenStreetMap: what they look like, and who may drive where."""
+"""Streets of OpenStreetMap: their surfaces, and lanes for cars."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from cns_drake.imports.street_lanes import Street
 _SIDEWALK = 2.0
 _KERB = 0.12
 _WHITE = (0.86, 0.86, 0.84)
-# Stripes of a zebra crossing, and the gaps between them [m].
+# Width of the stripes of a zebra crossing, and of the gaps [m].
 _STRIPE, _STRIPE_LENGTH, _STRIPE_HEIGHT = 0.5, 3.0, 0.01
 
 
@@ -95,7 +95,7 @@ def street_surfaces(
 def drivable_streets(
     ways: Iterable[OsmWay], local: Local, bridges: Bridges
 ) -> list[Street]:
-    """Returns the streets that a car may drive, and where they meet."""
+    """Returns the streets for cars, with the nodes where they meet."""
     streets = []
     for name, tags, line, nodes in ways:
         width = street_width(tags)
@@ -158,7 +158,7 @@ def crossing_stripes(
 def _stripes(
     place: np.ndarray, along: np.ndarray, width: float
 ) -> list[Polygon]:
-    """Returns the stripes across a street about a place, as they lie."""
+    """Returns the stripes across a street about a place."""
     left = np.array([-along[1], along[0]])
     count = max(1, int((width - _STRIPE) / (2 * _STRIPE)))
     middles = (np.arange(count) - (count - 1) / 2) * 2 * _STRIPE

@@ -1,4 +1,4 @@
-"""What tags of OpenStreetMap say: heights, widths, classes.
+"""Values of OpenStreetMap's tags: heights, widths, classes.
 
 https://wiki.openstreetmap.org/wiki/Map_features
 """
@@ -13,9 +13,9 @@ from cns_drake.imports.osm_lengths import count, length
 
 STOREY = 3.0  # [m]
 LANE = 3.0  # [m]
-# Two cars pass each other from this width on [m].
+# Least width for two cars to pass each other [m].
 _TWO_CARS = 5.0
-# Levels of buildings that tell neither height nor levels.
+# Levels of buildings without tags for height or levels.
 _USUAL_LEVELS = {
     "garage": 1,
     "garages": 1,
@@ -32,7 +32,7 @@ _USUAL_LEVELS = {
     "apartments": 5,
 }
 _LEVELS = 3
-# Width of streets that tell neither width nor lanes [m].
+# Width of streets without tags for width or lanes [m].
 _STREETS = {
     "motorway": 12.0,
     "trunk": 12.0,
@@ -52,13 +52,13 @@ _PATHS = {
     "cycleway": 2.5,
     "steps": 2.0,
 }
-# What no building or street exceeds: the tallest stands 828 m high.
+# Larger than any building or street: the tallest tower has 828 m.
 _TALLEST = 850.0  # [m]
 _LOWEST = 0.1  # [m]
 _MOST_LEVELS = 170
 _WIDEST = 60.0  # [m]
 _MOST_LANES = 16
-# What `building` says of one that is not there, and the keys that say so.
+# Values of `building` for buildings that are not there, and keys for it.
 _ABSENT = {
     "demolished": "demolished",
     "destroyed": "demolished",
@@ -79,16 +79,15 @@ def told(
     where: tuple[str, ImportFaults] | None,
     least: float = 0.0,
 ) -> float | None:
-    """Returns the meaning of a tag, None if it has none.
+    """Returns the value of a tag; None if it has no valid one.
 
     Args:
         tags: of a thing.
         key: of the tag.
-        read: the way in which its value is written.
-        most: nothing has more.
-        where: name of the thing, and what counts values that are not
-            understood or beyond reason; None if they are counted elsewhere.
-        least: nothing has less.
+        read: parser of its value. most: greatest plausible value.
+        where: name of the thing, and the counts for values that cannot be
+            parsed or are implausible; None if they are counted elsewhere.
+        least: least plausible value.
     """
     text = tags.get(key)
     if text is None:
@@ -98,7 +97,7 @@ def told(
         return value
     if where is not None:
         name, faults = where
-        kind = f"{key} not understood or beyond reason, the usual one taken"
+        kind = f"{key} unreadable or implausible, the usual one taken"
         faults.add(kind, name)
     return None
 
@@ -108,7 +107,7 @@ def heights(
 ) -> tuple[float, float, float]:
     """Returns lowest and highest point of a building, and its roof's height.
 
-    All from the ground [m].
+    All three are measured from the ground [m].
 
     Args:
         tags: of the building.
@@ -122,7 +121,7 @@ def heights(
         return told(tags, key, count, _MOST_LEVELS, where, least)
 
     roof_levels = number("roof:levels")
-    # No level is one where the roof has some.
+    # A building may have no levels if its roof has some.
     levels = number("building:levels", 0.0 if roof_levels else 0.5)
     roof = metres("roof:height")
     if roof is None:
@@ -150,7 +149,7 @@ def heights(
 
 
 def why_absent(tags: Mapping[str, str]) -> str | None:
-    """Returns why a building of a file does not stand; None if it does."""
+    """Returns why a building of a file is absent; None if it stands."""
     if not ("building" in tags or "building:part" in tags):
         return "demolished"
     kinds = [tags.get("building", ""), tags.get("building:part", "")]
@@ -176,7 +175,7 @@ def why_absent(tags: Mapping[str, str]) -> str | None:
 def street_width(
     tags: Mapping[str, str], where: tuple[str, ImportFaults] | None = None
 ) -> float | None:
-    """Returns the width of a street for cars; None if it is none [m].
+    """Returns the width of a street for cars [m]; None for other ways.
 
     Args:
         tags: of a way.
@@ -215,7 +214,7 @@ def driven_ways(tags: Mapping[str, str]) -> tuple[bool, bool]:
 
 
 def lanes_beside(tags: Mapping[str, str], width: float) -> float:
-    """Returns how far the outermost lane lies from a street's middle [m].
+    """Returns the distance of the outermost lane from a street's middle [m].
 
     Args:
         tags: of the street.
@@ -224,14 +223,14 @@ def lanes_beside(tags: Mapping[str, str], width: float) -> float:
     lanes = told(tags, "lanes", count, _MOST_LANES, None)
     if not lanes:
         lanes = 2.0 if all(driven_ways(tags)) else 1.0
-    # Where two cars cannot pass, both keep to the middle.
+    # If two cars cannot pass, both keep to the middle.
     if width < _TWO_CARS and all(driven_ways(tags)):
         return 0.0
     return width / 2.0 * (1.0 - 1.0 / max(lanes, 1.0))
 
 
 def is_marked(tags: Mapping[str, str]) -> bool:
-    """Tells whether a crossing has stripes."""
+    """Returns whether a crossing has stripes."""
     markings = tags.get("crossing:markings")
     if markings is not None:
         return markings.startswith("zebra") or markings == "yes"
@@ -242,7 +241,7 @@ def is_marked(tags: Mapping[str, str]) -> bool:
 
 
 def path_width(tags: Mapping[str, str]) -> float | None:
-    """Returns the width of a way for people; None if it is none [m]."""
+    """Returns the width of a way for people [m]; None for other ways."""
     usual = _PATHS.get(tags.get("highway", ""))
     if usual is None:
         return None

@@ -13,7 +13,7 @@ from cns_drake.imports.foreign_city import Thing
 from cns_drake.imports.osm_places import Local
 from cns_drake.imports.osm_reading import OsmWay, Tags, is_told
 
-# Key and value -> object; any value for an empty one.
+# Key and value -> object; an empty value stands for any.
 _OBJECTS = (
     ("highway", "street_lamp", "lamp_post"),
     ("highway", "bus_stop", "bus_shelter"),
@@ -39,7 +39,7 @@ _TREE_DISTANCE = 8.0  # [m]
 
 
 def object_of(tags: Tags) -> str | None:
-    """Returns the object that a node stands for; None if there is none."""
+    """Returns the object of a node; None without one."""
     found = [
         name
         for key, value, name in _OBJECTS
@@ -73,7 +73,7 @@ def make_things(
     Args:
         nodes: id, tags and place of each [deg].
         ways: of the file.
-        kinds: id -> what a thing is.
+        kinds: id -> kind of a thing.
         local: brings places to metres.
     """
     for name, tags, place in nodes:
@@ -97,7 +97,7 @@ def make_things(
 
 
 def _direction(tags: Tags) -> float | None:
-    """Returns the heading in which a thing faces, if it is told [rad]."""
+    """Returns the heading of a thing, if its tags have one [rad]."""
     text = tags.get("direction", "")
     if not re.fullmatch(r"\d{1,3}(\.\d+)?", text):
         return None

@@ -1,4 +1,4 @@
-"""An imported city from above, to see its streets and draw routes on."""
+"""Draws an imported city from above, as a base for routes."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ def draw_overview(
     space: FreeSpace | None,
     drives: Sequence[Drive],
 ) -> None:
-    """Draws what stands, where a car has room, and the drives [m].
+    """Draws structures, the room for a car, and the drives [m].
 
     Args:
         path: the picture to write.
         structures: of the whole city.
-        space: where a car has room, if that is to be seen.
-        drives: that were found.
+        space: the room for a car, if it is to be drawn.
+        drives: the drives that were found.
     """
     corners = np.concatenate(
         [one.triangles.reshape(-1, 3) for one in structures]
@@ -59,7 +59,7 @@ def draw_overview(
                 PolyCollection(
                     corners_xy,
                     facecolors=[colour],
-                    # Else fine lines show between triangles.
+                    # Without this, fine lines show between triangles.
                     edgecolors="face",
                     linewidths=0.3,
                 )

@@ -1,7 +1,7 @@
 """Coordinates of a file as metres, east, north and up.
 
-By the definition of the file's reference system, which pyproj looks up: the
-order and the direction of its axes, and their units.
+The definition of the file's reference system, from pyproj, gives the order and
+direction of its axes, and their units.
 https://www.cityjson.org/specs/2.0.1/#referencesystem-crs
 """
 
@@ -24,21 +24,21 @@ _ROWS = {
     "up": (2, 1.0),
     "down": (2, -1.0),
 }
-# A city lies within the area of its system, or so near it [deg].
+# A city is within its system's area of use, or at most this far outside [deg].
 _NEAR_AREA_DEG = 0.5
 _PLAIN = ("east [metre]", "north [metre]", "up [metre]")
 
 
 @dataclass(frozen=True)
 class ReferenceSystem:
-    """What the three coordinates of a file mean.
+    """The meaning of a file's three coordinates.
 
     Attributes:
         name: as the file has it; "" if it has none.
-        axes: what each coordinate is, in words.
+        axes: each coordinate in words.
         matrix: (3, 3) from coordinates to metres east, north and up.
-        heights_assumed: whether the system has no heights of its own, so that
-            theirs are taken to have the unit of the other coordinates.
+        heights_assumed: whether the system has no heights; they are then taken
+            to have the unit of the other coordinates.
     """
 
     name: str = ""
@@ -64,9 +64,9 @@ class ReferenceSystem:
     def as_used(self, point: np.ndarray) -> ReferenceSystem:
         """Returns the system as a file uses it.
 
-        Many programs write east first whatever the definition says. That is
-        so where a point lies in the area of use of the system with its first
-        two coordinates exchanged, and only then.
+        Many programs write east first against the definition. That is assumed
+        only if a point is in the system's area of use with its first two
+        coordinates exchanged, and not otherwise.
 
         Args:
             point: (3,) coordinates of the file.
@@ -101,15 +101,15 @@ class ReferenceSystem:
 
 
 def reference_system(name: str, where: str) -> ReferenceSystem:
-    """Returns what a reference system says of coordinates.
+    """Returns the axes and units of a reference system.
 
     Args:
         name: an EPSG code, or a URL or URN of one, as the file has it.
-        where: what an error begins with.
+        where: the beginning of an error's message.
 
     Raises:
-        InputError: naming the system, if it is not known, is in degrees, or
-            has axes that are not east, north and up.
+        InputError: naming the system, if it is unknown, is in degrees, or has
+            axes that are not east, north and up.
     """
     if not name:
         return ReferenceSystem()
@@ -117,8 +117,8 @@ def reference_system(name: str, where: str) -> ReferenceSystem:
         system = pyproj.CRS.from_user_input(name)
     except (CRSError, ProjError) as error:
         raise InputError(
-            f"{where}: {name} is no reference system that is known (such as"
-            " https://www.opengis.net/def/crs/EPSG/0/7415)"
+            f"{where}: {name} is not a known reference system (such as "
+            "https://www.opengis.net/def/crs/EPSG/0/7415)"
         ) from error
     parts = system.sub_crs_list or [system]
     axes = [axis for part in parts for axis in part.axis_info]

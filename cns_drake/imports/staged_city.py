@@ -1,4 +1,4 @@
-"""What of an imported city stands at which stage."""
+"""The structures of an imported city at each stage."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from cns_drake.imports.import_report import ImportOptions
 from cns_drake.imports.near_drives import keep_near
 from cns_drake.imports.waypoint_drives import Drive
 
-# From the middle of a city [m].
+# Greatest distance from the middle of a city [m].
 _FARTHEST = 10_000.0
 
 
@@ -43,18 +43,20 @@ class StagedCity:
     def near(
         self, drives: Sequence[Drive], distance: float, faults: ImportFaults
     ) -> StagedCity:
-        """Returns the city without what lies far from drives.
+        """Returns the city without structures far from drives.
 
         Args:
             drives: of the city.
             distance: see `keep_near` [m].
-            faults: counts what is left out.
+            faults: counts structures left out.
 
         Raises:
-            InputError: if nothing is near, or there is no drive.
+            InputError: if no structure is near, or there is no drive.
         """
         if not drives:
-            raise InputError("--within: no drive was found, give one: --along")
+            raise InputError(
+                "--within: no drive was found; give one with --along"
+            )
         cut = dict(
             zip(
                 self.kept,
@@ -98,15 +100,15 @@ class StagedCity:
 def stage_city(
     source: object, city: ForeignCity, options: ImportOptions
 ) -> StagedCity:
-    """Returns what stands at the stages that were asked for.
+    """Returns the structures at the wanted stages.
 
     Args:
-        source: by which errors name the file.
-        city: all of it; its faults count what stands at no stage.
-        options: the years, and what becomes of buildings without any.
+        source: the name of the file in errors.
+        city: the whole city; its faults count structures of no stage.
+        options: the years, and the stage of buildings without any.
 
     Raises:
-        InputError: if nothing ever stands, or too much.
+        InputError: if no structure, or too many, are at any stage.
     """
     found = _together(city)
     if not found:
@@ -143,7 +145,10 @@ def stage_city(
             f" count ({MAX_STRUCTURES})"
         )
     if not kept:
-        raise InputError(f"{source}: nothing stands at any stage")
+        raise InputError(
+            f"{source}: no structure stands at any stage; check --years and "
+            "--undated"
+        )
     years = [one.year for one in found if _has_years(one)]
     undated = years.count(None)
     return StagedCity(standing, kept, undated, len(years) - undated, gone)
@@ -165,7 +170,7 @@ def _stands(one: Imported, stage: int, options: ImportOptions) -> bool:
 
 
 def _together(city: ForeignCity) -> list[Imported]:
-    """Returns the structures of a city without those that lie far away."""
+    """Returns the structures of a city without those far away."""
     if not city.structures:
         return []
     boxes = np.array(
@@ -204,7 +209,7 @@ def _why_never(one: Imported, options: ImportOptions) -> str:
 def _has_years(one: Imported) -> bool:
     """Returns whether a structure may be missing at a stage.
 
-    Where no year is given, buildings alone are taken to have one.
+    Without any --years, only buildings are taken to have a year.
     """
     is_building = one.kind.startswith("Building")
     is_dated = one.year is not None or one.until is not None

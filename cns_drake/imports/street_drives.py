@@ -21,22 +21,22 @@ from cns_drake.imports.street_lanes import (
 from cns_drake.imports.waypoint_drives import LONGEST, Drive, Obstacle
 
 _SPACING = 1.0
-# How much of what they are aside cars keep where they turn: some streets are
-# so narrow, and corners so sharp, that they have to swing out.
+# Share of their lateral offset that cars keep in a turn: in narrow streets and
+# sharp corners they have to swing out.
 _AT_TURNS = (1.0, 0.6, 0.2)
-# A turn begins and ends so far from its sharpest place [m].
+# Distance of the start and end of a turn from its sharpest place [m].
 _TURN = 12.0
 _SHARP_DEG_PER_M = 4.0
-# By how much waypoints may leave the lanes, as tried [m].
+# Tolerances, tried in turn, of waypoints against the lanes [m].
 _TOLERANCES = (0.2, 0.4, 0.8, 1.2)
-# Means over so many metres make corners round, and what cars are aside.
+# Lengths of the means that round corners, and lateral offsets [m].
 _ROUND, _SMOOTH_ASIDE = 7, 15
 
 
 class StreetGraph(WayGraph):
     """Lanes of streets from junction to junction.
 
-    One-way streets are driven as they are to be, all others in the outermost
+    One-way streets are driven in their direction, all others in the outermost
     lane.
     """
 
@@ -46,11 +46,11 @@ class StreetGraph(WayGraph):
         """Makes the graph.
 
         Args:
-            streets: that meet where they have a node in common.
+            streets: they meet at common nodes.
             space: where a car has room.
             drive_on: the side.
         """
-        # A street with a place on another continent, by mistake, never ends.
+        # A street with a wrong place on another continent would never end.
         self.lanes = [
             one for one in make_lanes(streets) if one.length <= LONGEST
         ]

@@ -1,4 +1,4 @@
-"""Streets as lanes that are driven in one direction, and how they join."""
+"""Streets as lanes of one direction, and their connections."""
 
 from __future__ import annotations
 
@@ -9,23 +9,22 @@ from itertools import pairwise
 
 import numpy as np
 
-# Nobody turns more sharply from one street into another.
+# Sharpest turn from one street into another.
 _SHARPEST_TURN_DEG = 125.0
 
 
 @dataclass(frozen=True)
 class Street:
-    """A street of a map, cars go along its line, against it, or both.
+    """A street of a map; cars drive along its line, against it, or both.
 
     Attributes:
         line: (N, 2) its middle [m].
-        nodes: of each place its number; streets with a number in common meet
-            there.
+        nodes: number of each place; streets with a common number meet there.
         forward, backward: whether it is driven along its line, and against.
         aside: from its middle to that of the outermost lane [m].
-        width: of its carriageway; 0 if it is not known [m].
-        name: of what it was read from.
-        tags: that the file gives it.
+        width: of its carriageway; 0 if unknown [m].
+        name: of its element in the file.
+        tags: its tags in the file.
     """
 
     line: np.ndarray
@@ -45,8 +44,8 @@ class Lane:
     Attributes:
         line: (N, 2) the middle of its street, in driving direction [m].
         begin, end: numbers of the junctions.
-        aside: how far the lane lies to the right of that line [m].
-        way: number of the piece of street, which its other lane shares.
+        aside: offset of the lane to the right of that line [m].
+        way: number of the piece of street; its other lane has the same one.
     """
 
     line: np.ndarray
@@ -87,7 +86,7 @@ def make_lanes(streets: Sequence[Street]) -> list[Lane]:
 
 
 def lane_links(lanes: Sequence[Lane]) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the numbers of lanes, and of those that they lead into."""
+    """Returns pairs of lane numbers; the first lane leads into the second."""
     starts: defaultdict[int, list[int]] = defaultdict(list)
     for number, lane in enumerate(lanes):
         starts[lane.begin].append(number)
@@ -110,7 +109,7 @@ def _leads_on(lane: Lane, after: Lane) -> bool:
 
 
 def lane_path(lanes: Sequence[Lane], spacing: float) -> np.ndarray:
-    """Returns a line along lanes: x, y, and how far aside (N, 3) [m].
+    """Returns a line along lanes: x, y and lateral offset (N, 3) [m].
 
     Args:
         lanes: each leads into the next.

@@ -8,9 +8,9 @@ import numpy as np
 
 from cns_drake.base.compiled import compiled
 
-# What is longer is parted, so that what is far of it is left out.
-_LONGEST = 256  # Times the spacing.
-# Points at once, if no single triangle has more.
+# Longer triangles are divided, so that their far parts can be left out.
+_LONGEST = 256  # In spacings.
+# Points at a time, unless a single triangle has more.
 _AT_ONCE = 1_000_000
 
 
@@ -21,13 +21,13 @@ def surface_samples(
 ) -> Iterator[np.ndarray]:
     """Yields points (N, 3) on triangles (M, 3, 3), edges included [m].
 
-    No place on a triangle is farther from all of them than the spacing. There
-    are not more than about a million at once.
+    No place on a triangle is farther from all of them than the spacing. At most
+    about a million come at a time.
 
     Args:
         triangles: to sample.
         spacing: of the points [m].
-        window: (2,) least and greatest x and y; what is outside is left out.
+        window: (2,) least and greatest x and y; points outside are left out.
     """
     while len(triangles):
         if window is not None:
@@ -83,12 +83,12 @@ def _fill(
         points: (N, 3) to write to, for all; (0, 3) to count them only.
 
     Returns:
-        (M,) how many points each has.
+        (M,) number of points of each triangle.
     """
     counts = np.zeros(len(triangles), dtype=np.int64)
     written = 0
     for k in range(len(triangles)):
-        # The apex lies opposite of the shortest side.
+        # The apex is opposite the shortest side.
         apex, shortest, longest = 0, np.inf, 0.0
         for m in range(3):
             side = triangles[k, (m + 2) % 3] - triangles[k, (m + 1) % 3]

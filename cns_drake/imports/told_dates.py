@@ -1,4 +1,4 @@
-"""Years in dates as OpenStreetMap and city models write them.
+"""Years in the dates of OpenStreetMap and city models.
 
 https://wiki.openstreetmap.org/wiki/Key:start_date
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 from datetime import date
 import re
 
-# Where in a period "early", "mid" and "late" are, and what is told bare.
+# Position in a period of "early", "mid", "late" and of no such word.
 _PARTS = {"early": 0.2, "mid": 0.5, "late": 0.8, "": 0.5}
 _ABOUT = re.compile(r"^(?:~|ca\.?|circa|about|before|after|by|j:)\s*")
 _PERIOD = re.compile(
@@ -23,8 +23,9 @@ _DAY_ZERO = 1721425
 def told_year(text: str) -> int | None:
     """Returns the year of a date, None if it has none.
 
-    Of a period it is the middle, or where "early" and "late" lead; of a range
-    (`1914..1918`) the end; of `before 1910` or `~1855` the year that is told.
+    A period gives its middle, or an earlier or later year with "early" and
+    "late". A range (`1914..1918`) gives its end; `before 1910` and `~1855` give
+    the year they name.
     """
     text = text.strip().lower()[:255].split("..")[-1].strip()
     day = _DAY.fullmatch(text)

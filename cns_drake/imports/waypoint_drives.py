@@ -1,4 +1,4 @@
-"""A drive along waypoints that a car can steer and has room for."""
+"""Drives along waypoints, with bends and room for a car."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from cns_drake.roads.waypoints import make_waypoint_path
 # Paths of vehicles are quintic splines (`cns_drake.motion`), whose points are
 # their control points.
 _DEGREE = 5
-# A proposed drive is driven on a slope and with rounded numbers: it keeps so
-# much away from what the car can just steer.
+# A proposed drive may be on a slope, with rounded numbers: its bends are this
+# many times wider than the car's tightest.
 _MARGIN = 1.01
 # Distance of the places where bends and room are checked [m].
 _STEP = 0.25
-# No proposed drive is longer, and none shorter [m].
+# Greatest and least length of a proposed drive [m].
 LONGEST = 1500.0
 SHORTEST = 80.0
 
@@ -52,7 +52,7 @@ class Drive:
 
 @dataclass(frozen=True)
 class Obstacle:
-    """Why there is no drive.
+    """The reason why there is no drive.
 
     Attributes:
         place: (2,) where a bend is too tight or room is missing [m].
@@ -64,12 +64,12 @@ class Obstacle:
 def steerable_drive(
     waypoints: np.ndarray, room: Room | None = None, margin: float = _MARGIN
 ) -> Drive | Obstacle:
-    """Returns the drive along waypoints, or what is in its way.
+    """Returns the drive along waypoints, or the obstacle.
 
     Args:
         waypoints: (N, 2) or (N, 3), at least two [m].
-        room: looked at on the whole path.
-        margin: how many times wider than it can just be a bend is.
+        room: checked on the whole path. margin: least radius of bends, in
+            tightest radii of the car.
     """
     waypoints = np.round(waypoints, 3)
     xyz = np.zeros((len(waypoints), 3))

@@ -1,1 +1,1 @@
-"""How the vehicle moves: from a path of lanes to poses over time."""
+"""The vehicle's motion: from a path of lanes to poses over time."""

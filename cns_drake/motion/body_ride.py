@@ -1,4 +1,4 @@
-"""How a body on springs moves against the path that it follows."""
+"""The motion of a sprung body relative to its path."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ class RideMoments(NamedTuple):
 class BodyRide:
     """The motion X_FB(t) of a body B against the frame F of its path.
 
-    At rest on a level road B is F. Its heave, roll and pitch are polynomials
-    of degree 5 between even times, at which they have given values and two
-    derivatives: the accelerations have no jumps. The body turns about a point
-    on the ground, by its pitch and then by its roll.
+    At rest on a level road B is F. Its heave, roll and pitch are polynomials of
+    degree 5 between even times, where values and two derivatives are given. The
+    accelerations have no jumps. The body turns about a point on the ground, by
+    its pitch and then by its roll.
     """
 
     def __init__(
@@ -61,7 +61,8 @@ class BodyRide:
         times = step * np.arange(len(q))
         self._end = times[-1]
         v, a = dq * step, ddq * step**2 / 2
-        # What degree 2 leaves of the value and its derivatives at the end.
+        # Remainders of the value and its derivatives at the end, after degree
+        # 2.
         rest = q[1:] - q[:-1] - v[:-1] - a[:-1]
         drest = v[1:] - v[:-1] - 2 * a[:-1]
         ddrest = a[1:] - a[:-1]
@@ -107,7 +108,7 @@ def ride_motion(moments: RideMoments) -> FrameMotion:
         [ddroll * cp - turning * sp, ddpitch, -ddroll * sp - turning * cp],
         axis=1,
     )
-    # From the pivot to the origin of B.
+    # The vector from the pivot to the origin of B.
     r = -moments.pivot * R_FB[:, :, 0]
     p, v = r + np.array([moments.pivot, 0.0, 0.0]), cross(w, r)
     a = cross(alpha, r) + cross(w, v)

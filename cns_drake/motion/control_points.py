@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-# Their distance along the path [m]: the curvature then builds up over about
-# 10 m, as a driver turns the wheel, and in the tightest bends of a town the
-# path leaves the middle of the lane by less than 10 cm.
+# Distance of control points along the path [m]. The curvature then changes over
+# about 10 m, as a driver turns the wheel. In the tightest bends of a town the
+# path is less than 10 cm from the middle of the lane.
 POINT_SPACING = 2.0

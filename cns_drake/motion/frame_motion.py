@@ -1,4 +1,4 @@
-"""How a frame moves in another one, at many times."""
+"""The motion of one frame in another, at many times."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class FrameMotion(NamedTuple):
         return self.a + cross(self.alpha, r) + cross(self.w, cross(self.w, r))
 
     def of_frame(self, motion: FrameMotion) -> FrameMotion:
-        """Returns how a frame B moves in E that moves in F.
+        """Returns the motion in E of a frame B that moves in F.
 
         Args:
             motion: of B in F.

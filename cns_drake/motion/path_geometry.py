@@ -50,7 +50,7 @@ class PathJet:
     ddturn: np.ndarray
 
     def rows(self, which: slice) -> PathJet:
-        """Returns what holds at some of the parameters."""
+        """Returns the values at some of the parameters."""
         values = (getattr(self, field.name) for field in fields(self))
         return PathJet(*(value[which] for value in values))
 
@@ -170,7 +170,7 @@ class SmoothPath:
     def evaluate_with_section(
         self, u: ArrayLike
     ) -> tuple[PathJet, PathSection]:
-        """Returns the path at (N,) parameters u, and what leads up to them.
+        """Returns the path at (N,) parameters u, and the sections before them.
 
         In one evaluation, which costs little more than that of one
         parameter.

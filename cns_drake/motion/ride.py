@@ -1,4 +1,4 @@
-"""What springs and a rough road make of a drive."""
+"""Adds the motion of springs on a rough road to a drive."""
 
 from __future__ import annotations
 
@@ -11,10 +11,9 @@ from cns_drake.motion.trajectory import Trajectory
 
 # The longest step [s]: a fifteenth of a period of the wheels on their tyres.
 _STEP = 0.005
-# And the farthest that a wheel goes in a step, so that it meets the waves
-# which the profile has [m].
+# The farthest that a wheel goes in a step, to resolve the profile's waves [m].
 _STRIDE = 0.1
-# How long the body swings on at the end of the drive [s].
+# Time for the body to come to rest at the end of the drive [s].
 _AFTERWARDS = 3.0
 _GRAVITY_W = np.array([0.0, 0.0, -9.81])
 
@@ -35,11 +34,11 @@ def ride_on_springs(
     """
     masses = suspension.masses
     end = trajectory.duration + _AFTERWARDS
-    # The path's parameter is hardly longer than the path.
+    # The path's parameter and its length are nearly equal.
     _, speeds, _ = trajectory.path_parameter(np.arange(0.0, end, _STEP))
     step = min(_STEP, _STRIDE / speeds.max())
     frame = trajectory.path_motion(np.arange(0.0, end, step))
-    # For every wheel at every time.
+    # The profile at every wheel and every time.
     p_FQ_Wset = frame.R[:, :2, :2] @ masses.p_BWset.T
     p_WQset = frame.p[:, :2, None] + p_FQ_Wset
     heights = profile.heights(p_WQset.transpose(0, 2, 1).reshape(-1, 2))

@@ -1,4 +1,4 @@
-"""How rough a road is: heights over the plane, of a class of ISO 8608."""
+"""Roughness of roads: random heights of a class of ISO 8608."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ ROUGHNESS: dict[str, float] = {
 _N0 = 0.1  # [cycles/m]
 
 # The layers' lattices [m]. Their sum has the class's spectrum for wavelengths
-# from 0.35 to 90 m and no more of longer waves, which are hills, than of 90 m;
-# shorter ones a tyre swallows.
+# from 0.35 to 90 m. Longer waves, which are hills, are no stronger than 90 m; a
+# tyre smooths shorter ones.
 _SPACINGS = 0.05 * 2.0 ** np.arange(10)
-# The finest layer stands in for all that would be finer still: the sum of the
-# geometric series 1 + 1/4 + 1/16 + ...
+# The finest layer also stands for all finer ones: the sum of the geometric
+# series 1 + 1/4 + 1/16 + ...
 _FINEST_SHARE = 4.0 / 3.0
 # Nodes of a lattice in each direction, before it repeats.
 _NODES = 512
@@ -32,7 +32,7 @@ _OVER_LAYERS = 0.03611499185872766
 
 
 class RoadProfile:
-    """Heights of the road's surface, a function of place and seed alone.
+    """Heights of the road's surface, a function of place and seed only.
 
     The heights are a sum of layers. A layer is a cubic B-spline over a square
     lattice whose coefficients are independent normal numbers of variance s^2.

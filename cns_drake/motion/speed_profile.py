@@ -1,4 +1,4 @@
-"""How fast to follow a path: bounded speed, continuous acceleration."""
+"""Speed along a path: bounded speed, continuous acceleration."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cns_drake.motion.uniform_spline import REACH, make_uniform_spline
 _KNOT_PERIOD = 0.3
 # Grid on which the limits are evaluated [m].
 _STEP = 0.1
-# Covers what happens between grid points: the limits are smooth over several
+# Margin for values between grid points: the limits are smooth over several
 # metres.
 _MARGIN = 0.998
 # The smoothed drive runs ahead of the unsmoothed by less than this [m].

@@ -1,4 +1,4 @@
-"""A car on four springs: how its body and wheels answer road and drive."""
+"""A car on four springs: the response of body and wheels."""
 
 from __future__ import annotations
 
@@ -61,14 +61,14 @@ def load_suspension_rates(path: Path) -> SuspensionRates:
 
 @dataclass(frozen=True)
 class CarMasses:
-    """Where a car's masses are.
+    """The masses of a car and their places.
 
     Attributes:
-        body: mass of what the springs carry [kg].
+        body: mass on the springs [kg].
         roll_inertia: of the body about its centre of mass [kg m^2].
         pitch_inertia: of the body about its centre of mass [kg m^2].
         center: x and z of that centre in the vehicle frame B [m].
-        wheels: (W,) mass of each wheel with what moves with it [kg].
+        wheels: (W,) mass of each wheel with its moving parts [kg].
         p_BWset: (W, 2) x and y of the wheels in B [m].
     """
 
@@ -83,7 +83,7 @@ class CarMasses:
 def load_car_masses(vehicle: Path) -> CarMasses:
     """Loads the masses of an SDF model.
 
-    Its floating base is the body. What a joint along z moves is a wheel.
+    Its floating base is the body. A link on a joint along z is a wheel.
 
     Raises:
         RuntimeError: the model cannot be used.

@@ -10,7 +10,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.workers import Listener, Workers, local_workers
 from cns_drake.base.processors import num_cores
 
-# The address of a scheduler, for whoever gives none; Dask's own name for it.
+# Environment variable with the address of a scheduler; the name is Dask's.
 _ADDRESS_VARIABLE = "DASK_SCHEDULER_ADDRESS"
 
 
@@ -30,7 +30,7 @@ class Cluster:
 
     @property
     def slots(self) -> int | None:
-        """How many jobs it runs at a time, if that is known beforehand.
+        """How many jobs run at a time; None if that is not fixed beforehand.
 
         A foreign scheduler gets all jobs at once, since others may use
         it, and it may start workers for them.
@@ -54,7 +54,7 @@ class Cluster:
 
 
 def choose_cluster(num_jobs: int | None, scheduler: str | None) -> Cluster:
-    """Returns the cluster that a user asks for.
+    """Returns the cluster of a command's options.
 
     Args:
         num_jobs: `--jobs`: work on this machine, so many jobs at a time.
@@ -67,7 +67,9 @@ def choose_cluster(num_jobs: int | None, scheduler: str | None) -> Cluster:
     """
     if num_jobs is not None:
         if scheduler is not None:
-            raise InputError("--jobs and --scheduler: give one of them")
+            raise InputError(
+                "--jobs and --scheduler exclude each other; give one of them"
+            )
         if num_jobs < 1:
             raise InputError(f"--jobs: {num_jobs} is not a positive number")
         return Cluster(num_workers=num_jobs)

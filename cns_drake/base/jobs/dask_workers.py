@@ -70,17 +70,17 @@ class DaskWorkers:
             self._listener("result", name, self._error(future))
 
     def _error(self, future: Future) -> Exception | None:
-        """Returns what a job ended by, which may be nothing."""
+        """Returns the error that a job ended with, or None."""
         if future.status == "finished":
             return None
         if future.status == "lost":
-            # Done, but its worker went before that was noticed here. A second
-            # run finds it done.
+            # The job is done, but its worker was lost before its result came
+            # here. A second run finds the job done.
             return ProcessDiedError("its worker died")
         if future.status != "error":
             return LostSchedulerError(
-                f"{self._address}: the connection to the scheduler was lost;"
-                " the same command goes on from here"
+                f"{self._address}: the connection to the scheduler was lost; "
+                "run the same command again to go on"
             )
         from distributed.scheduler import KilledWorker
 
@@ -91,7 +91,7 @@ class DaskWorkers:
 
 
 class LostSchedulerError(InputError):
-    """Nothing more will be heard of any job."""
+    """Ends all jobs after the connection was lost."""
 
 
 @contextlib.contextmanager
@@ -101,15 +101,15 @@ def dask_workers(address: str, listener: Listener) -> Iterator[DaskWorkers]:
     Raises:
         InputError: if it does not answer.
     """
-    # Slow to import, and needed by nobody who asks for help.
+    # Slow to import, and not needed to print help.
     from distributed import Client
 
-    # Whoever runs the jobs reports what happens to them, in other words.
+    # The caller reports what happens to jobs, in its own words.
     for name in ("distributed", "distributed.client"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
     _check_answer(address)
     with contextlib.ExitStack() as stack:
-        with uninterrupted():  # Half of it could not be closed.
+        with uninterrupted():  # Half a client cannot be closed.
             client = stack.enter_context(
                 Client(address, timeout=_ANSWER_TIMEOUT, set_as_default=False)
             )
@@ -119,7 +119,8 @@ def dask_workers(address: str, listener: Listener) -> Iterator[DaskWorkers]:
 def _check_answer(address: str) -> None:
     """Raises InputError unless a scheduler answers in time.
 
-    A client would wait for ever for one that takes the call but is silent.
+    A client would wait for ever for a scheduler that accepts the connection and
+    never answers.
     """
     from distributed import Security
     from distributed.core import rpc
@@ -129,13 +130,13 @@ def _check_answer(address: str) -> None:
         async with rpc(address, connection_args=keys) as scheduler:
             await scheduler.identity()
 
-    fault = f"--scheduler: {address}: no answer"
+    fault = f"--scheduler: {address}: no answer; is the scheduler running?"
     try:
         asyncio.run(asyncio.wait_for(ask(), _ANSWER_TIMEOUT))
     except asyncio.TimeoutError:
         raise InputError(f"{fault} in {_ANSWER_TIMEOUT:g} s") from None
-    # Dask has all of these for an address of which it can make nothing, such
-    # as one of TLS without a certificate.
+    # Dask raises any of these for an address that it cannot use, such as TLS
+    # without a certificate.
     except (ImportError, OSError, TypeError, ValueError) as error:
         raise InputError(f"{fault} ({error})") from error
 
@@ -146,7 +147,7 @@ def work(name: str, job: bytes, topic: str) -> None:
     Args:
         name: of the job.
         job: see `run_process`.
-        topic: under which the client hears of it.
+        topic: the Dask topic of the job's messages.
 
     Raises:
         JobError: see `run_process`.
@@ -161,7 +162,8 @@ def work(name: str, job: bytes, topic: str) -> None:
         worker.log_event(topic, (kind, name, *values))
 
     def is_wanted() -> bool:
-        # A client that goes, or no longer wants it, is noticed here only.
+        # Only here is it noticed that the client has gone or has cancelled the
+        # job.
         task = worker.state.tasks.get(key)
         return (
             worker.status in (Status.running, Status.paused)

@@ -1,4 +1,4 @@
-"""What a result depends on, as a short text: its fingerprint.
+"""Fingerprints: short texts of all that a result depends on.
 
 Two results of equal fingerprints are the same. Code counts by the modules
 that are imported, directly or not, found in their sources: a change of any
@@ -19,27 +19,27 @@ from typing import NamedTuple
 from cns_drake.base.files import user_errors
 from cns_drake.base.installed_versions import installed_versions
 
-# Where the packages lie, and which these are.
+# The folder of the packages, and their names.
 _ROOT = Path(__file__).parents[3]
 _PACKAGES = ("cns_drake", "evaluation")
-# Others' packages that have a say in numbers.
+# Packages of others that influence numbers.
 _LIBRARIES = (
     "drake", "embreex", "numba", "numpy", "open3d", "open3d-cpu", "scipy",
 )  # fmt: skip
 
 
 def fingerprint(inputs: Mapping[str, object]) -> str:
-    """Returns a short text for inputs, which must be ready for JSON."""
+    """Returns a short text for inputs, which must be JSON values."""
     text = json.dumps(inputs, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
 @functools.cache
 def code_digest(*modules: str, without: tuple[str, ...] = ()) -> str:
-    """Returns a digest of modules and of all that they import of ours.
+    """Returns a digest of modules and of all modules of ours they import.
 
-    Data files count with the modules of their folder that name them, or the
-    folder beside the module that they are in. Versions of libraries count.
+    A data file counts if a module of its folder names it, or names the folder
+    beside it that holds the file. Versions of libraries count.
 
     Args:
         modules: full names; `<package>.*` stands for all modules in it.
@@ -60,8 +60,8 @@ def code_digest(*modules: str, without: tuple[str, ...] = ()) -> str:
 def script_digest(path: Path) -> str:
     """Returns a digest of a Python file and of all that it imports.
 
-    That is what lies beside it, and modules of ours, besides the versions of
-    libraries; see `code_digest`.
+    These are files beside it, modules of ours and the versions of libraries;
+    see `code_digest`.
 
     Raises:
         InputError: if a file cannot be read.
@@ -88,12 +88,12 @@ class _Module(NamedTuple):
 
 
 class _Imports(NamedTuple):
-    """What a module imports.
+    """The imports of a module.
 
     Attributes:
         names: (module, name in it or "") of each import that is run.
         offered: name -> module, of imports for type checkers alone: in a
-            package they say where the names are that it loads when asked.
+            package they give the modules of names that are imported late.
     """
 
     names: tuple[tuple[str, str], ...]
@@ -177,7 +177,7 @@ def _files(
         if module.root == _ROOT:
             for file in _data_files(path):
                 found[file.relative_to(_ROOT).as_posix()] = file
-        # Packages that it is in run, too; their data need not matter.
+        # Its parent packages run, too; their data do not count.
         for one in (module, *module.parents()):
             source = sources.file(one)
             if source is not None:
@@ -198,7 +198,7 @@ def _find_imports(text: bytes, package: str) -> _Imports:
     try:
         tree = ast.parse(text)
     except (SyntaxError, ValueError):
-        return _Imports((), {})  # Whoever runs it says what is wrong.
+        return _Imports((), {})  # Running the file reports it.
     names: list[tuple[str, str]] = []
     offered: dict[str, str] = {}
     waiting: list[ast.AST] = [tree]

@@ -1,8 +1,8 @@
 """The process in which one job runs, and its messages to its parent.
 
-A process each, with an interpreter of its own: what a job leaves in memory
-goes with it (Python systems in a Drake diagram are not freed otherwise), and
-whatever happens to one does not happen to the others.
+Each job has a process with its own interpreter. Its memory is freed with the
+process (Python systems in a Drake diagram are not freed otherwise), and a crash
+does not reach the other jobs.
 """
 
 from __future__ import annotations
@@ -31,16 +31,16 @@ from cns_drake.base.interrupts import (
 from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.libraries import missing_library
 
-# How long a process may take to close its files once it is asked to end [s].
+# How long a process may take to close its files after SIGTERM [s].
 PATIENCE = 30.0
-# Where what a job prints goes, whatever stands for it in this process.
+# The file descriptor to which a job prints, whatever replaces it in here.
 _STDERR = 2
-# How often a parent looks whether its job is still wanted [s].
+# How often a parent checks whether its job was cancelled [s].
 _LOOK_INTERVAL = 0.2
 
-# A job takes and frees the same arrays thousands of times. The C library
-# would return their memory each time, as Dask's workers ask for, or where it
-# guesses wrong; fetching it anew takes longer than filling it [bytes].
+# A job takes and frees the same arrays thousands of times. The C library would
+# return their memory each time: Dask's workers set it so, and its own guess may
+# be wrong. Fetching memory anew takes longer than filling it [bytes].
 _ALLOCATION = {
     "MALLOC_MMAP_THRESHOLD_": str(1 << 25),  # The largest that glibc takes.
     "MALLOC_TRIM_THRESHOLD_": str(1 << 28),
@@ -48,21 +48,21 @@ _ALLOCATION = {
 
 
 class JobError(Exception):
-    """A job cannot be done; the message is one line that says why."""
+    """A job cannot be done; the message gives the reason in one line."""
 
 
 class ProcessDiedError(Exception):
-    """The process of a job was killed, or crashed, or was asked to end."""
+    """The process of a job was killed, crashed or was terminated."""
 
 
 class StartedProcess(Protocol):
     """A process that has begun; `subprocess.Popen` is one."""
 
     def terminate(self) -> None:
-        """Asks it to end."""
+        """Terminates the process; it may close its files."""
 
     def kill(self) -> None:
-        """Ends it at once."""
+        """Kills the process."""
 
     def wait(self, timeout: float | None = None, /) -> int:
         """Returns its status, that of a signal as a negative number.
@@ -82,15 +82,15 @@ def start_interpreter(
     """Starts an interpreter that runs a function.
 
     Args:
-        function: of a module; takes the number of the file descriptor that
-            leads here.
+        function: a module's function; its argument is the number of the file
+            descriptor that is connected to this process.
 
     Returns:
-        What leads to it, and the process. It is in a session of its own, so
-        that no Ctrl-C reaches it: whoever is interrupted there ends its jobs
-        in good order.
+        The connection to it, and the process. The process has its own session,
+        which Ctrl-C does not reach: the interrupted parent ends its jobs in
+        good order.
     """
-    # The search path is the parent's, not what its folder makes of it.
+    # The search path is the parent's, not that of the current folder.
     code = (
         "import sys; number, *sys.path[:] = sys.argv[1:]; "
         f"from {function.__module__} import {function.__name__} as run; "
@@ -113,7 +113,7 @@ def start_interpreter(
 def start_anew(job: bytes) -> tuple[Connection, StartedProcess]:
     """Starts a job in an interpreter that imports everything anew."""
     connection, process = start_interpreter(main)
-    # Where it has died already, that shows when its end is awaited.
+    # If the process has died already, waiting for its end shows it.
     with contextlib.suppress(ConnectionError):
         connection.send_bytes(job)
     return connection, process
@@ -130,7 +130,7 @@ def run_process(
     Args:
         job: a pickled `Step`.
         on_message: takes the job's messages; see `Reporter`.
-        is_wanted: asked often; where it says no, the process is ended.
+        is_wanted: called often; the process is ended when it returns False.
         start: starts the process.
 
     Raises:
@@ -166,7 +166,7 @@ def _listen(
 
 
 def _end(process: StartedProcess) -> int:
-    """Sees that a process ends, and returns its status."""
+    """Ends a process and returns its status."""
     process.terminate()
     try:
         return process.wait(PATIENCE)
@@ -208,7 +208,7 @@ def work(connection: Connection, job: bytes) -> None:
     interrupt_on_termination(once=True)
 
     def send(*message: object) -> None:
-        # Where the parent has gone, nobody takes the message.
+        # If the parent has gone, no process reads the message.
         with contextlib.suppress(ConnectionError):
             connection.send(message)
 
@@ -235,15 +235,14 @@ def _run(job: bytes, reporter: Reporter) -> tuple[str, str]:
                     exclusive(
                         output,
                         lambda: reporter.note(
-                            f"{output}: waiting for another process that "
-                            "works on it"
+                            f"{output}: another process works on it; waiting"
                         ),
                     )
                 )
             if not nothing_left(step):
                 step.run(reporter)
     except MemoryError:
-        # Another time, or elsewhere, there may be enough.
+        # At another time, or on another machine, there may be enough memory.
         return "died", "not enough memory"
     except InputError as error:
         return "fault", str(error)
@@ -257,7 +256,7 @@ def _run(job: bytes, reporter: Reporter) -> tuple[str, str]:
 
 
 def nothing_left(step: Step) -> bool:
-    """Returns whether a step has nothing to do, as far as it can find out."""
+    """Returns whether a step has nothing to do; False if that is unclear."""
     try:
         return step.is_done()
     except InputError:
@@ -266,7 +265,7 @@ def nothing_left(step: Step) -> bool:
 
 def _end_with_parent(connection: Connection) -> None:
     """Ends this process when its parent has ended, even if killed."""
-    # Nothing more is sent: what comes is the end.
+    # The parent sends nothing more: the next read returns at its end.
     with contextlib.suppress(OSError):
         connection.poll(None)
     os.kill(os.getpid(), signal.SIGTERM)

@@ -1,4 +1,4 @@
-"""How far many jobs have come, on stderr: one display for all of them."""
+"""The progress of many jobs in one display on stderr."""
 
 from __future__ import annotations
 
@@ -15,11 +15,10 @@ from rich.progress import TaskID
 from cns_drake.base.progress import LINE_INTERVAL
 from cns_drake.base.progress_bars import print_note, show_bars
 
-# For so long costs are believed as they are given, before the measured pace
-# outweighs them [s].
+# Within this time the given costs outweigh the measured pace [s].
 _PRIOR = 10.0
-# A job that takes less than this share of its cost was done already, and
-# says nothing about the pace.
+# A job that takes less than this share of its cost was done before, and is no
+# measure of the pace.
 _REAL_SHARE = 0.05
 
 
@@ -49,8 +48,8 @@ class TimeLeft:
     def __init__(self, costs: Mapping[str, float]):
         """Takes name -> expected time on one core [s]."""
         self._works = {name: _Work(cost) for name, cost in costs.items()}
-        # Name -> time and share when the job was first heard of; the share
-        # is unknown until it reports. An earlier run may have left some.
+        # Name -> time and share at the job's first message. The share is
+        # unknown until then: an earlier run may have done a part.
         self._running: dict[str, tuple[float, float | None]] = {}
         self._most_running = 1
 
@@ -62,7 +61,7 @@ class TimeLeft:
         self._most_running = max(self._most_running, len(self._running))
 
     def progress(self, name: str, share: float, now: float) -> None:
-        """A share of a job is done; what it loads before is no work."""
+        """A share of a job is done; its loading time does not count."""
         work = self._works[name]
         work.done = share
         since, first = self._running.get(name, (now, None))
@@ -95,8 +94,8 @@ class TimeLeft:
         left = [work.cost * (1 - work.done) for work in works if work.done < 1]
         if not left:
             return 0.0
-        # As many work side by side as did so before; the longest one ends
-        # no earlier for that.
+        # As many jobs run side by side as before, and the longest job bounds
+        # the time.
         side_by_side = min(self._most_running, len(left))
         longest = max(
             (
@@ -111,13 +110,13 @@ class TimeLeft:
 class JobProgress:
     """A line for all jobs together and one for each that is running.
 
-    A context manager. Where there is no terminal, a line every few seconds.
+    A context manager. Without a terminal it prints a line every few seconds.
     """
 
     def __init__(
         self, costs: Mapping[str, float], console: Console | None = None
     ):
-        """Takes name -> expected time on one core [s], and where to show."""
+        """Takes name -> expected time on one core [s], and the console."""
         self._costs = costs
         self._left = TimeLeft(costs)
         self._stack = contextlib.ExitStack()
@@ -125,7 +124,7 @@ class JobProgress:
         self._tasks: dict[str, TaskID] = {}
         self._notes: dict[str, str] = {}
         self._num_ended = 0
-        # When the next line is due where there is no terminal.
+        # When the next line is due without a terminal.
         self._due = time.monotonic() + LINE_INTERVAL
         self._silent = True
 
@@ -144,7 +143,7 @@ class JobProgress:
         self._stack.__exit__(kind, error, trace)
 
     def __rich__(self) -> RenderableType:
-        """Returns what is shown."""
+        """Returns the display."""
         return self._bars.get_renderable()
 
     def start(self, name: str) -> None:
@@ -185,7 +184,7 @@ class JobProgress:
         print_note(self._bars, text)
 
     def refresh(self) -> None:
-        """Shows what has changed by now."""
+        """Redraws the display."""
         left = datetime.timedelta(seconds=round(self._left.seconds()))
         self._bars.update(
             self._total,

@@ -1,9 +1,9 @@
 """A process that imports what jobs need, and forks a process for each.
 
-A job of a study takes a few seconds, and an interpreter of its own one or two
-to import what the job needs. Forked, it has that already, and is a process of
-its own all the same. What is imported starts no threads but those of linear
-algebra, which come through a fork.
+A job of a study takes a few seconds, and a new interpreter takes one or two to
+import what the job needs. A forked process has the modules already. The
+imported modules start no threads but those of linear algebra, which survive a
+fork.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from cns_drake.base.jobs.job_process import (
     work,
 )
 
-# How often the end of a process is looked for [s].
+# How often the server checks whether a process has ended [s].
 _LOOK_INTERVAL = 0.01
 
 
@@ -98,7 +98,7 @@ class _Server:
 
     @contextlib.contextmanager
     def _asked(self) -> Iterator[None]:
-        """Turns the end of the server into an error that says so."""
+        """Turns the end of the server into a ProcessDiedError."""
         try:
             yield
         except (EOFError, OSError) as error:
@@ -167,7 +167,7 @@ def _serve(parent: Connection) -> tuple[Connection, bytes] | None:
                 statuses[number] = _look(number)
             if kind == "status":
                 answer = statuses[number]
-            # A number that is free again may be another's.
+            # The number of an ended process may belong to another one by now.
             elif statuses[number] is None:
                 os.kill(number, *signals)
         with contextlib.suppress(ConnectionError):
@@ -175,10 +175,10 @@ def _serve(parent: Connection) -> tuple[Connection, bytes] | None:
 
 
 def _import_for(job: bytes) -> None:
-    """Imports what a job needs; its process reports what is wrong with it."""
+    """Imports what a job needs; the job's process reports failures."""
     with contextlib.suppress(Exception):
         code_digest(type(pickle.loads(job)).__module__)
-    # No collection writes to memory that the processes share.
+    # Garbage collection would write to memory that the processes share.
     gc.freeze()
 
 

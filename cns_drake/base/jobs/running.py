@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 # How often a job is started again after its process has died.
 _RETRIES = 2
-# How often the display shows the time anew [s].
+# How often the display is redrawn [s].
 _REFRESH_INTERVAL = 0.5
 
 
@@ -42,10 +42,9 @@ class Job:
 
     Attributes:
         name: unique, for people.
-        step: the work. Whether it is done is asked before anything runs,
-            once all that the job needs is done, which saves a process; and
-            again by the process, since another copy of the job may have come
-            before.
+        step: the work. `is_done` is called here once the needed jobs are done,
+            which saves a process, and again by the process, since another copy
+            of the job may have finished first.
         needs: names of jobs that must have succeeded before.
         cost: expected time on one core [s].
     """
@@ -57,11 +56,10 @@ class Job:
 
 
 def run_jobs(jobs: Iterable[Job], cluster: Cluster) -> None:
-    """Runs jobs, those first behind which the longest work waits.
+    """Runs jobs; those with the longest chain of work behind them first.
 
     Shows progress on stderr. A job whose process or worker dies is started
-    again; one that cannot be done keeps none but those that need it from
-    being done.
+    again. A job that cannot be done stops only the jobs that need it.
 
     Raises:
         FailedJobsError: if some could not be done; all are named.
@@ -149,9 +147,9 @@ class _Run:
         self._messages = messages
         self._shown = shown
         self._waiting = dict(jobs)
-        # Those of which the result is not known.
+        # Jobs without a result.
         self._submitted: set[str] = set()
-        # Those that have a process, as far as is known here.
+        # Jobs that have reported their start and not their end.
         self._running: set[str] = set()
         self._done = set(done)
         self._deaths: Counter = Counter()
@@ -168,21 +166,22 @@ class _Run:
             raise
 
     def raise_faults(self) -> None:
-        """Raises FailedJobsError if there is anything to raise it for."""
+        """Raises FailedJobsError if a job failed."""
         if not self._faults:
             return
         parts = [f"{name}: {fault}" for name, fault in self._faults.items()]
         if self._waiting:
             parts.append(
-                f"not run, for they need these: {', '.join(self._waiting)}"
+                "not run, since they need failed jobs: "
+                f"{', '.join(self._waiting)}"
             )
         raise FailedJobsError("; ".join(parts))
 
     def _submit_ready(self) -> None:
-        """Submits what there is room for, the most urgent first."""
+        """Submits jobs while there is room, the most urgent first."""
         while (job := self._most_urgent()) is not None:
             del self._waiting[job.name]
-            # What it needs may have left nothing to do.
+            # The jobs it needs may have left it nothing to do.
             if job.needs and nothing_left(job.step):
                 self._done.add(job.name)
                 self._shown.end(job.name)
@@ -215,7 +214,7 @@ class _Run:
             self._shown.refresh()
             return
         if kind == "result":
-            # Not of those that were ended.
+            # Cancelled jobs are not reported.
             if name in self._submitted:
                 self._submitted.remove(name)
                 self._take_result(name, *values)

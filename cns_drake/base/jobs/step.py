@@ -1,7 +1,7 @@
-"""A piece of work, said once: of what it is made, what it does, what it leaves.
+"""A piece of work: its inputs, what it does and the files it leaves.
 
-A step leaves files and nothing else, so that whatever is interrupted, here or
-anywhere, goes on where it was when the same steps are run again.
+A step leaves files and nothing else. An interrupted study goes on where it was
+when the same steps are run again, on any machine.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _REPORT_INTERVAL = 0.5
 
 
 class Reporter:
-    """How a step reports on itself; without an argument nobody listens."""
+    """Reports the progress of a step; without a receiver it is silent."""
 
     def __init__(self, send: Callable[..., None] = lambda *message: None):
         """Reports a message to its receiver: a kind and its values."""
@@ -28,7 +28,7 @@ class Reporter:
         self._reported: float | None = None
 
     def progress(self, done: int, total: int) -> None:
-        """Reports that so much of so much is done, in any unit."""
+        """Reports how much of how much is done, in any unit."""
         now = time.monotonic()
         if (
             done >= total
@@ -39,7 +39,7 @@ class Reporter:
             self._send("progress", int(done), int(total))
 
     def note(self, text: str) -> None:
-        """Reports something that a user should know."""
+        """Reports a note for the user."""
         self._send("note", str(text))
 
     def track(
@@ -62,18 +62,18 @@ class Step(abc.ABC):
     @property
     @abc.abstractmethod
     def output(self) -> Path | None:
-        """The file or folder that it writes, if it must be alone there.
+        """The file or folder that only one step at a time may write, if any.
 
-        Two copies of a step, as when the connection to one is lost, never
+        A lost connection can leave two copies of a step running. They never
         work on it at the same time; see `cns_drake.base.files.exclusive`.
         """
 
     @abc.abstractmethod
     def is_done(self) -> bool:
-        """Returns whether all that it leaves is there, and up to date.
+        """Returns whether all its files are there and up to date.
 
         Raises:
-            InputError: it cannot be found out; the step then says why.
+            InputError: that cannot be found out.
         """
 
     @abc.abstractmethod

@@ -1,4 +1,4 @@
-"""What runs jobs: on this machine a thread beside the process of each."""
+"""Workers run jobs: on this machine, one thread and one process a job."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ class Workers(Protocol):
         Args:
             name: of the job.
             job: see `run_process`.
-            priority: of several that wait, the one with most comes first.
+            priority: of several jobs that wait, the one with the highest comes
+                first.
         """
 
     def stop(self) -> None:
-        """Ends all jobs; "ended" says that the files of one are closed."""
+        """Ends all jobs; the message "ended" means a job's files are closed."""
 
 
 class LocalWorkers:
     """Starts every job at once: the caller sees to it that there is room.
 
     On Linux their processes are forked from one that has imported what they
-    need; elsewhere libraries are not made for it.
+    need. On other systems the libraries do not support forks.
 
-    Nothing listens on any port, since whoever reached that could run
-    programs here.
+    No port is opened, since anyone who reached it could run programs here.
     """
 
     def __init__(self, listener: Listener):
@@ -77,7 +77,7 @@ class LocalWorkers:
                 lambda: not self._stopped.is_set(),
                 self._server.start if self._server else start_anew,
             )
-        except Exception as caught:  # Whatever it is, it is reported.
+        except Exception as caught:  # It becomes the result.
             error = caught
         self._listener("ended", name)
         self._listener("result", name, error)

@@ -1,9 +1,9 @@
 """Random access to the messages of an MCAP file.
 
-The `mcap` package reads messages in time order, or all of a span of time. A
-scan by number needs less and more: where each message of a topic lies, and
-the one chunk that holds it. Both come from the index that a complete file
-ends with, so that opening a file of gigabytes reads a few kilobytes.
+The `mcap` package reads messages in time order, or all of a span of time.
+Reading a scan by its number needs the location of each message of a topic, and
+the one chunk that holds it. Both come from the index at the end of a complete
+file, so that opening a file of gigabytes reads a few kilobytes.
 """
 
 from __future__ import annotations
@@ -43,9 +43,10 @@ _INDEX_HEADER = struct.Struct("<HI")
 _INDEX_ENTRY = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
 # The frame that is being read, and its neighbour when two of them interleave.
 _CHUNKS_KEPT = 2
-# Where a message lies: the number of its chunk in the file's index, the place
-# of its record in the uncompressed chunk [bytes]; when it was logged [ns]; the
-# channel of its topic. An array, since a long drive has millions.
+# The location of a message: the number of its chunk in the file's index, the
+# offset of its record in the uncompressed chunk [bytes], its log time [ns] and
+# the channel of its topic. Locations are an array, since a long drive has
+# millions.
 LOCATION = np.dtype(
     [
         ("chunk", "<u4"),
@@ -100,7 +101,7 @@ class McapFile:
     def topics(self) -> dict[str, list[str]]:
         """Topic -> kinds of its messages: `<type> in <encoding>`, sorted.
 
-        Of a sound recording it is one kind.
+        A sound recording has one kind for each topic.
         """
         return {
             topic: sorted({self._kind(channel) for channel in channels})
@@ -147,16 +148,16 @@ class McapFile:
         locations: np.ndarray,
         take: Callable[[int, memoryview], None],
     ) -> None:
-        """Shows many messages, unpacking each chunk once.
+        """Passes many messages to a function, unpacking each chunk once.
 
         Chunks are unpacked on all cores, which zstd leaves Python free to
         do, as far as a few megabytes of memory go.
 
         Args:
             locations: (N,) of `LOCATION`: where the messages lie.
-            take: is shown a position in `locations` and its serialised
-                message; called from several threads. What it keeps must not
-                refer to the message, or all chunks stay in memory.
+            take: called from several threads with a position in `locations` and
+                the serialised message there. It must keep no reference to the
+                message, or all chunks stay in memory.
 
         Raises:
             InputError: if a chunk is damaged, or as `take` does.
@@ -177,7 +178,7 @@ class McapFile:
             for _ in pool.map(visit_chunk, groups if len(order) else ()):
                 pass
         finally:
-            # After a fault the other chunks are of no interest.
+            # After an error the other chunks need not be read.
             pool.shutdown(cancel_futures=True)
 
     def attachment(self, name: str) -> bytes | None:
@@ -195,8 +196,8 @@ class McapFile:
                 data = read_attachment(stream).data
             if content not in (None, data):
                 raise InputError(
-                    f"{self.path}: attachment {name}: there are two, which"
-                    " differ"
+                    f"{self.path}: attachment {name}: two attachments of this "
+                    "name differ"
                 )
             content = data
         return content
@@ -209,7 +210,7 @@ class McapFile:
     def _read_locations(self, topic: str) -> np.ndarray:
         parts = [np.empty(0, LOCATION)]
         with self._reading() as stream:
-            # Many indexes in one place would be more than the file holds.
+            # Many indexes at one place could claim more than the file holds.
             left = stream.seek(0, os.SEEK_END)
             for channel in self._channels[topic]:
                 found = 0
@@ -229,7 +230,7 @@ class McapFile:
             raise InputError(
                 f"{self.path}: {topic}: the index lists a message twice"
             )
-        # Those of one time keep the file's order.
+        # Messages of equal time keep the file's order.
         return locations[np.lexsort([locations[key] for key in _ORDER[::-1]])]
 
     @staticmethod
@@ -252,7 +253,7 @@ class McapFile:
         return part
 
     def _chunk(self, number: int) -> memoryview:
-        """Returns an uncompressed chunk, of which the last are kept."""
+        """Returns an uncompressed chunk; the latest chunks are kept."""
         if number in self._chunks:
             self._chunks.move_to_end(number)
             return self._chunks[number]
@@ -281,7 +282,7 @@ class McapFile:
             if len(body) != length:
                 raise EOFError("a message ends behind its chunk")
             channel_id, _, log_time_ns, _ = _MESSAGE_HEADER.unpack_from(body)
-            # Nothing else would show that a message index is damaged.
+            # No other check detects a damaged message index.
             if (channel_id, log_time_ns) != (
                 expected_channel_id,
                 expected_time_ns,
@@ -306,12 +307,12 @@ class McapFile:
         unknown = used - self._summary.channels.keys()
         if unknown:
             raise InputError(
-                f"{self.path}: messages of channel {min(unknown)}, of which"
-                " the summary says nothing"
+                f"{self.path}: messages of channel {min(unknown)}, which the "
+                "summary does not list"
             )
 
     def _check_count(self, channel_id: int, found: int) -> None:
-        """Refuses an index that lists not all messages of a channel.
+        """Refuses an index that does not list all messages of a channel.
 
         Raises:
             ValueError: with the numbers.
@@ -359,7 +360,7 @@ class McapFile:
             struct.error,
             zstandard.ZstdError,
         ) as error:
-            # Some of them come without a word.
+            # Some of these errors have no message.
             fault = str(error) or type(error).__name__
             raise InputError(
                 f"{self.path}: damaged MCAP file ({fault})"

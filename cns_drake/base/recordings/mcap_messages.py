@@ -1,4 +1,4 @@
-"""Messages of a recording: decoded, and refused where they say too much."""
+"""Decodes messages of a recording, and refuses oversized ones."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from cns_drake.base.recordings.ros_types import (
     deserialize,
 )
 
-# More than a message of a type can need [bytes]: the rest is padding, which a
-# few kilobytes of a file can hold gigabytes of. A cloud has a chunk at most.
+# More bytes than a message of each type can need [bytes]. A few compressed
+# kilobytes can hold gigabytes of padding. A cloud fills a chunk at most.
 _LONGEST = {ODOMETRY: 1 << 12, IMU: 1 << 12, TF: 1 << 20}
 _MOST_FIELDS = 256
 _LONGEST_NAME = 1 << 10
@@ -25,11 +25,11 @@ _ENCAPSULATION_BYTES = 4
 
 @dataclass(frozen=True)
 class CloudHeader:
-    """What leads a point cloud.
+    """The header of a point cloud.
 
     Attributes:
         stamp_ns: when it was taken [ns].
-        frame_id: in which frame.
+        frame_id: the frame of its points.
     """
 
     stamp_ns: int
@@ -37,10 +37,10 @@ class CloudHeader:
 
 
 def decode(data: bytes | memoryview, message_type: str) -> Any:
-    """Returns a message of its serialised form.
+    """Returns the message of serialised bytes.
 
     Raises:
-        ValueError: if it is none, or longer than such a message can be.
+        ValueError: if the bytes are no such message, or more than one can have.
     """
     if len(data) > _LONGEST.get(message_type, len(data)):
         raise ValueError(
@@ -51,14 +51,14 @@ def decode(data: bytes | memoryview, message_type: str) -> Any:
     try:
         return deserialize(data, message_type)
     except Exception as error:
-        # rosbags raises whatever its generated code trips over.
+        # rosbags raises any error of its generated code.
         raise ValueError(
             f"a message cannot be decoded ({type(error).__name__}: {error})"
         ) from error
 
 
 def read_cloud_header(data: bytes | memoryview) -> CloudHeader:
-    """Reads what leads a serialised PointCloud2, and no more of it.
+    """Reads the header of a serialised PointCloud2 and nothing else.
 
     Raises:
         ValueError: if it is cut off, or claims more than makes sense.

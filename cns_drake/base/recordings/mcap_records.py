@@ -1,6 +1,6 @@
-"""Records of an MCAP file, read so that damage and malice are noticed.
+"""Reads records of an MCAP file; damaged or hostile ones are refused.
 
-The `mcap` package checks the checksums of chunks alone, and trusts the sizes
+The `mcap` package checks only the checksums of chunks, and trusts the sizes
 that a chunk claims.
 """
 
@@ -34,10 +34,10 @@ _FOOTER = struct.Struct("<BQQQI")
 
 
 def check_summary(stream: BinaryIO) -> None:
-    """Refuses a file whose summary is not what its checksum says.
+    """Refuses a file whose summary does not match its checksum.
 
     Raises:
-        ValueError: if so, or if the footer is none.
+        ValueError: if so, or if the footer is no footer record.
     """
     size = stream.seek(0, os.SEEK_END)
     end = stream.seek(max(size - len(MAGIC) - _FOOTER.size, 0))
@@ -103,7 +103,7 @@ def read_chunk(stream: BinaryIO, size: int) -> bytes:
 
 
 class RecordContent(ReadDataStream):
-    """The content of one record, which no read can leave.
+    """The content of one record; reads beyond its end are refused.
 
     Attributes:
         left: how much of it is still to be read [bytes].
@@ -148,7 +148,7 @@ def uncompress(chunk: Chunk) -> bytes:
     if size > CHUNK_LIMIT_BYTES:
         raise ValueError(f"a chunk of {size} bytes")
     if chunk.compression == "zstd":
-        # The library reserves what the data says of itself.
+        # The library reserves the size that the data claim.
         claimed = zstandard.frame_content_size(chunk.data)
         if claimed not in (-1, size):
             raise ValueError(f"a chunk of {claimed} instead of {size} bytes")

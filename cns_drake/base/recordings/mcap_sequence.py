@@ -44,11 +44,11 @@ class McapSequence(Sequence):
     with the sensor's place on the vehicle from `/tf_static`; nothing is
     interpolated.
 
-    What contradicts itself is refused: two poses for one stamp, two mounts of
-    a sensor, a frame that changes on the way.
+    Contradictions are refused: two poses for one stamp, two mounts of a sensor,
+    a frame that changes during the drive.
 
-    Opening reads the file's index. Stamps and poses take one pass over the
-    file when they are first asked for; a scan takes one chunk.
+    Opening reads the file's index. The first use of stamps or poses takes one
+    pass over the file; a scan takes one chunk.
     """
 
     def __init__(self, path: Path, lidar: str | None = None):
@@ -56,7 +56,8 @@ class McapSequence(Sequence):
 
         Args:
             path: the .mcap file, or the folder that holds it.
-            lidar: whose scans to read: those of the topic /<lidar>/points.
+            lidar: name of the LiDAR; its scans are on the topic
+                /<lidar>/points.
 
         Raises:
             InputError: if there is no complete recording at `path`, or no
@@ -134,7 +135,7 @@ class McapSequence(Sequence):
         scenario = self._json("scenario.json")
         if scenario is not None and not isinstance(scenario, dict):
             raise InputError(
-                f"{self._path}: attachment scenario.json: no JSON object"
+                f"{self._path}: attachment scenario.json: not a JSON object"
             )
         return scenario
 
@@ -165,7 +166,7 @@ class McapSequence(Sequence):
         """Returns the labels of a scan that has a topic for them.
 
         Raises:
-            ValueError: if they are not of that scan.
+            ValueError: if the labels are not those of that scan.
         """
         topic = self._labels_topic
         if topic is None:
@@ -330,7 +331,7 @@ class McapSequence(Sequence):
     def _check_frame(
         self, topic: str, stamp_ns: int, frame: str, first: str
     ) -> None:
-        """Refuses a message that is of another frame than the first."""
+        """Refuses a message whose frame differs from the first one's."""
         if frame != first:
             raise InputError(
                 f"{self._path}: {topic}: at {stamp_ns} ns in frame {frame!r},"

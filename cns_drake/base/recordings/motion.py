@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-# W is the world, B the vehicle on the ground, I the IMU. The pose is X_WB,
-# both velocities are those of B in W, expressed in B [m/s, rad/s].
+# W is the world, B the vehicle on the ground, I the IMU. The pose is X_WB. Both
+# velocities are those of B in W, expressed in B [m/s, rad/s].
 ODOMETRY_DTYPE = np.dtype(
     [
         ("stamp_ns", "<i8"),
@@ -16,7 +16,7 @@ ODOMETRY_DTYPE = np.dtype(
     ]
 )
 
-# The orientation is R_WI, the rest expressed in I [rad/s, m/s^2].
+# The orientation is R_WI; the other values are expressed in I [rad/s, m/s^2].
 IMU_DTYPE = np.dtype(
     [
         ("stamp_ns", "<i8"),

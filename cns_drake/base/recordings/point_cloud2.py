@@ -37,7 +37,7 @@ def to_points(message: Any) -> np.ndarray:
     """Returns the records of a cloud as they are, without copying them.
 
     Args:
-        message: a deserialised PointCloud2, of any fields and padding.
+        message: a deserialised PointCloud2, with any fields and padding.
 
     Returns:
         Structured array of shape (height * width,) under the message's field

@@ -1,9 +1,9 @@
-"""Layouts of points: our own, and those of drivers that others read.
+"""Layouts of points: our own, and those of common LiDAR drivers.
 
-`ouster` is that of the driver of Ouster's units with `ring` as uint8, which
-LIO-SAM and FAST-LIO2 ask for; `velodyne` is PointXYZIRT of the ROS 2 driver of
-Velodyne's; `autoware` is PointXYZIRCAEDT. Labels and instances have no place
-in them: they come in a message of their own.
+`ouster` is the layout of Ouster's driver with `ring` as uint8, which LIO-SAM
+and FAST-LIO2 read; `velodyne` is PointXYZIRT of Velodyne's ROS 2 driver;
+`autoware` is PointXYZIRCAEDT. These layouts have no field for labels and
+instances, which come in another message.
 """
 
 from __future__ import annotations

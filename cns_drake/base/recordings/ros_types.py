@@ -1,8 +1,8 @@
 """Types of ROS 2 messages: classes, definitions, hashes and CDR.
 
-All come from rosbags' table of ROS 2 Humble, but for those which it lacks. The
-fields of vision_msgs are those of version 4, which is Humble's; foxglove_msgs
-are those of Foxglove's schemas. A recording has the text of its types in it.
+Most come from rosbags' table of ROS 2 Humble. Types that it lacks are written
+here: vision_msgs in version 4, which is Humble's, and foxglove_msgs after
+Foxglove's schemas. A recording contains the text of its types.
 """
 
 from __future__ import annotations

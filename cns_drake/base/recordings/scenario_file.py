@@ -1,4 +1,4 @@
-"""The scenario that lies beside an exported drive."""
+"""The scenario file beside an exported drive."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ _NAME = re.compile(r"\w[\w.-]*")
 
 
 def read_scenario(folder: Path) -> Mapping | None:
-    """Returns what `scenario.yaml` in an exported drive says, if it is there.
+    """Returns the content of an exported drive's `scenario.yaml`, if any.
 
     Raises:
-        InputError: if it is no mapping in YAML.
+        InputError: if it is not a mapping in YAML.
     """
     path = folder / "scenario.yaml"
     if not path.is_file():
@@ -28,7 +28,7 @@ def read_scenario(folder: Path) -> Mapping | None:
     except ValueError as error:
         raise InputError(f"{path}: {error}") from error
     if not isinstance(scenario, dict):
-        raise InputError(f"{path}: no mapping of a scenario's fields")
+        raise InputError(f"{path}: not a mapping of a scenario's fields")
     name = scenario.get("name")
     if name is not None and not _NAME.fullmatch(str(name)):
         raise InputError(f"{path}: name: {name!r} is no name of a drive")

@@ -1,4 +1,4 @@
-"""What every recorded drive offers, whatever format it is stored in."""
+"""The interface of every recorded drive, in any format."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ class Sequence(abc.ABC):
 
     Frames: world W (shared by all sequences of a place), LiDAR S.
 
-    Scans are read when they are asked for and not kept, so a sequence may be
-    larger than memory.
+    A scan is read on each access and not kept, so a sequence may be larger than
+    memory.
 
     Attributes:
         name: short name for tables and messages, e.g. `metropolis_04`.
@@ -65,7 +65,7 @@ class Sequence(abc.ABC):
         """
 
     def __iter__(self) -> Iterator[np.ndarray]:
-        """Yields the scans in order, each read when its turn comes."""
+        """Yields the scans in order, reading one at a time."""
         for index in range(len(self)):
             yield self.scan(index)
 
@@ -81,21 +81,21 @@ class Sequence(abc.ABC):
 
     @property
     def datum(self) -> str | None:
-        """Name of the survey grid that W follows, if it follows one.
+        """Name of the survey grid (datum) of W, if any.
 
-        Two sequences with one datum but different world frames differ by
-        what their positioning was wrong, at most some ten metres.
+        Two sequences with one datum but different world frames differ by the
+        error of their positioning, at most some ten metres.
         """
         return None
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the user should know about how the recording was read."""
+        """A note for the user on how the recording was read."""
         return ()
 
     @property
     def scenario(self) -> Mapping | None:
-        """How the drive was simulated, if the recording says so.
+        """The scenario of a simulated drive, if recorded.
 
         Keys used here: `map`, `stage`, and those of `driven_way`.
         """
@@ -129,7 +129,7 @@ def index_instances(table: Any, source: str) -> dict[int, Mapping]:
 
 
 class Placed(Protocol):
-    """What is known to lie in some world; see `Sequence`."""
+    """Anything with poses in a named world frame; see `Sequence`."""
 
     @property
     def name(self) -> str: ...
@@ -143,7 +143,7 @@ class Placed(Protocol):
 
 @dataclass(frozen=True)
 class PlacedDrive:
-    """What stays known of where a drive lay when it is closed.
+    """The world frame and the map of a drive that is closed again.
 
     Attributes:
         name: of the drive.
@@ -157,7 +157,7 @@ class PlacedDrive:
 
     @classmethod
     def of(cls, sequence: Sequence) -> PlacedDrive:
-        """Returns where a drive lies."""
+        """Returns the world frame and the map of a drive."""
         scenario = sequence.scenario
         if scenario is not None:
             scenario = {k: v for k, v in scenario.items() if k == "map"}
@@ -194,7 +194,7 @@ def check_same_world(
 
 
 def check_same_map(first: Placed, second: Placed) -> None:
-    """Refuses two sequences that are known to be of different places.
+    """Refuses two sequences whose maps have different names.
 
     Raises:
         InputError: if their maps differ by name.
@@ -202,8 +202,8 @@ def check_same_map(first: Placed, second: Placed) -> None:
     maps = [_map_name(sequence) for sequence in (first, second)]
     if None not in maps and maps[0] != maps[1]:
         raise InputError(
-            f"{second.name}: a drive through {maps[1]}, {first.name} through"
-            f" {maps[0]}"
+            f"{second.name}: a drive through {maps[1]}, but {first.name} is "
+            f"one through {maps[0]}"
         )
 
 

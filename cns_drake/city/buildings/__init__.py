@@ -23,7 +23,7 @@ from cns_drake.city.geometry.structures import Model
 
 __all__ = ["ARCHETYPES", "sample"]
 
-# By their names: each draws the `Parameters` of its archetype, and builds it.
+# Name -> module, which draws the `Parameters` of its archetype and builds it.
 _MODULES = {
     module.name: import_module(f"{room.__name__}.{module.name}")
     for room in (blocks, houses, public, shops, towers)
@@ -43,17 +43,16 @@ def sample(
 
     Args:
         archetype: key of `ARCHETYPES`.
-        footprint: the ground it gets, in the building's frame S [m]. Its
-            front is the edge between its first two corners, a rectangle's
-            its edge of least y. Eaves, balconies and canopies reach out of
-            it by at most the archetype's `overhang`.
+        footprint: the ground it gets, in the building's frame S [m]. Its front
+            is the edge between its first two corners; for a rectangle, the edge
+            of least y. Eaves, balconies and canopies reach out of it by at most
+            the archetype's `overhang`.
         height: top of the building: parapet, ridge or spire; only roof
             equipment and chimneys may rise above it [m].
         rng: the only source of variation.
         name: the structure's name, which its own meshes carry.
-        blind_edges: edges that nothing may cross, counter-clockwise from
-            the front: plain walls where the archetype has them, else it
-            stands back from there.
+        blind_edges: edges that nothing may cross, counter-clockwise from the
+            front. The building has plain walls there, or keeps a distance.
 
     Raises:
         ValueError: the archetype needs a rectangle and gets none, or the

@@ -1,4 +1,4 @@
-"""What each kind of building can fill."""
+"""The range of sizes of each kind of building."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Archetype:
-    """What a kind of building can fill.
+    """The range of sizes of a kind of building.
 
     Attributes:
         heights: least and greatest sensible height [m].
@@ -32,7 +32,7 @@ class Archetype:
 GROUND_OVERHANG_M = 0.35
 HEAD_ROOM_M = 2.3
 
-# By the names of the modules that draw and build them.
+# Name of the module that builds the archetype -> its range.
 ARCHETYPES = {
     "art_deco_tower": Archetype((50, 180), (18, 60)),
     "balcony_flats": Archetype((9, 33), (11, 70), 0.35),

@@ -63,7 +63,7 @@ LANDMARKS = _folders()
 def add_landmark(out: Assembly, archetype: str, height: float) -> None:
     """Adds one of the models of a landmark, drawn by lot.
 
-    A model is stretched to the lot and the height that are asked for.
+    A model is stretched to the given lot and height.
 
     Args:
         out: the building, on a rectangle.
@@ -74,7 +74,7 @@ def add_landmark(out: Assembly, archetype: str, height: float) -> None:
     folder = pick(out.rng, LANDMARKS[archetype])
     model = _read(folder)
     lot, size = np.array((x1 - x0, y1 - y0)), np.array(model.size)
-    # What overhangs must not reach further out of a wider lot.
+    # Overhanging parts must not reach further out of a wider lot.
     reach = np.where(lot > size, 2 * np.array(model.overhang), 0.0)
     stretch = np.array([*(lot + reach) / (size + reach), height / model.height])
     middle = np.array(((x0 + x1) / 2, (y0 + y1) / 2, 0.0))

@@ -1,1 +1,1 @@
-"""What stands on streets, squares and sites, besides plants."""
+"""Objects on streets, squares and building sites, besides plants."""

@@ -1,4 +1,4 @@
-"""What stands in the middle of a square: statue, obelisk, fountain, flags."""
+"""Monuments for squares: statue, obelisk, fountain, flags."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ import numpy as np
 from cns_drake.city.geometry.object_parts import Builder, assemble, triple
 from cns_drake.city.geometry.structures import MeshShape, Model, Part
 
-# Paint colours, roughly as often as they are seen on the road.
+# Paint colours, roughly in the shares seen on the road.
 PAINTS = (
     (0.85, 0.85, 0.84),
     (0.85, 0.85, 0.84),

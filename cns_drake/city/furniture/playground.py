@@ -1,4 +1,4 @@
-"""What stands in parks and yards: swings, slides, picnic tables, hoops."""
+"""Objects in parks and yards: swings, slides, picnic tables, hoops."""
 
 from __future__ import annotations
 

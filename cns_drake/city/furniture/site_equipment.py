@@ -1,4 +1,4 @@
-"""What stands on a construction site or at roadworks."""
+"""Objects on construction sites and at roadworks."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ def tower_crane(
     """Returns a tower crane whose jib points along a drawn heading.
 
     Args:
-        rng: draws the heading and whatever is not given.
+        rng: draws the heading and each value that is not given.
         height: of the jib, made up of whole mast sections of 4 m [m].
         reach: of the jib, made up of whole sections of 4 m [m].
     """

@@ -51,7 +51,7 @@ class City:
     """A whole city.
 
     Attributes:
-        structures: the ground first, then what stands on it.
+        structures: the ground first, then the things on it.
         cars: object -> weight of its parked cars.
     """
 
@@ -68,11 +68,13 @@ class Streets:
         surface: how high they lie.
         kerb_height: of sidewalks above it [m].
         junctions: the area of all junctions in W [m].
-        margins: beside them, kept free, which buildings stand along, in W.
-        reserved: where else nothing is built or planted, in W [m].
+        margins: strips beside them that stay free; buildings stand along them,
+            in W.
+        reserved: other areas where nothing is built or planted, in W [m].
         structures: their surfaces.
-        furnish: places what belongs to them, before all else but buildings.
-        park: parks cars in them, at last.
+        furnish: places their furniture, after the buildings and before all
+            else.
+        park: parks cars in them, last of all.
     """
 
     areas: StreetAreas
@@ -127,7 +129,7 @@ def make_city(world: Path) -> City:
 
 
 def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
-    """Makes a city of a road network.
+    """Makes a city from a road network.
 
     Args:
         network: the roads.
@@ -135,7 +137,7 @@ def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
         source: the plan's file name, for messages.
 
     Raises:
-        InputError: if the plan asks for something unknown or impossible.
+        InputError: if the plan names something unknown or impossible.
     """
     streets = Streets(
         network,
@@ -156,15 +158,15 @@ def lay_out(network: RoadNetwork, plan: CityPlan, source: str) -> City:
 def build_along(streets: Streets, plan: CityPlan, source: str) -> City:
     """Makes a city along streets.
 
-    What needs most room, or has the least choice of place, comes first.
+    Things that need most room, or have the least choice of place, come first.
 
     Args:
-        streets: that are there.
+        streets: the streets of the city.
         plan: of the districts.
         source: the plan's file name, for messages.
 
     Raises:
-        InputError: if the plan asks for something unknown or impossible.
+        InputError: if the plan names something unknown or impossible.
     """
     _check_names(plan, source)
     draft = Draft(streets.areas, streets.kerb_height, plan.seed)

@@ -44,7 +44,8 @@ def render_city(
         world: folder with `stages.yaml`; gives the world its name.
         city: made from the folder's `roads.yaml` and `city.yaml`.
         progress: takes one line at a time.
-        stages_text: what `stages.yaml` is going to hold, if not what it does.
+        stages_text: the coming content of `stages.yaml`; by default the present
+            one.
 
     Raises:
         InputError: if the stages cannot be used or the city has too many
@@ -75,15 +76,15 @@ def render_stages(
     Args:
         world: the name of the world.
         city: the whole city.
-        stages: what the others lack.
+        stages: the differences between the stages.
         wanted: which stages.
         source: the file of the stages, for messages.
         progress: takes one line at a time.
-        origin: where the city comes from, one line for readers of its files.
+        origin: the source of the city, one line for readers of its files.
 
     Raises:
-        InputError: if something is to be low or under construction that
-            cannot be, or the city has too many structures.
+        InputError: if a structure cannot be lower or under construction as
+            asked, or the city has too many structures.
     """
     growing = GrowingCity(city.structures, stages, city.cars)
     if len(growing.structures) > MAX_STRUCTURES:
@@ -187,7 +188,7 @@ def generate_city(
 def _stages_text(
     world: Path, city: City, repair: bool, progress: Callable[[str], None]
 ) -> str | None:
-    """Returns what `stages.yaml` is to hold, or None if what it does.
+    """Returns the new text of `stages.yaml`, or None if it stays the same.
 
     Raises:
         InputError: see `generate_city`.
@@ -199,13 +200,14 @@ def _stages_text(
         try:
             found = find_renaming(stages, table, city.structures)
         except InputError:
-            # A faulty table is written anew; faulty stages are reported later.
+            # A faulty table will be written anew; faulty stages are reported
+            # later.
             return None
         for old, new in found.renamed.items():
             raise InputError(
                 f"{stages}: {old} is {new} now, and {len(found.renamed) - 1} "
-                "more have other names; --repair-stages puts them there "
-                f"(or remove {STRUCTURES_NAME}, if they are already)"
+                "more have other names; --repair-stages writes the new names "
+                f"(if they are there already, remove {STRUCTURES_NAME})"
             )
         return None
     found = find_renaming(stages, table, city.structures)

@@ -18,20 +18,20 @@ from cns_drake.base.files import read_bytes
 from cns_drake.base.yaml_files import read_yaml
 from cns_drake.city.geometry.structures import Structure
 
-# What is drawn anew stands elsewhere, all else where it was [m].
+# A structure that has moved farther than this is a new one [m].
 _SAME_PLACE = 0.3
 _COLUMNS = ("name", "class", "x", "y", "tags")
 
 
 @dataclass(frozen=True)
 class Renaming:
-    """What has become of the structures that a file of stages names.
+    """The new names of the structures that a file of stages names.
 
     Attributes:
-        renamed: old name -> name of today, of those that stand where they
-            stood.
-        lost: names of those that do not, whatever bears the name today.
-        unclear: patterns that stand for other structures than they did.
+        renamed: old name -> new name, of structures that have kept their place.
+        lost: names of structures that have not, even if another one has the
+            name now.
+        unclear: patterns that match other structures than before.
     """
 
     renamed: dict[str, str]
@@ -39,13 +39,13 @@ class Renaming:
     unclear: list[str]
 
     def lines(self) -> Iterator[str]:
-        """Yields a line for each of them."""
+        """Yields a line for each change."""
         for old, new in self.renamed.items():
             yield f"{old} is {new} now"
         for name in self.lost:
             yield f"{name} has no counterpart"
         for pattern in self.unclear:
-            yield f"{pattern} stands for others than before"
+            yield f"{pattern} matches other structures than before"
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class _Row:
 def find_renaming(
     stages: Path, table: Path, structures: Sequence[Structure]
 ) -> Renaming:
-    """Tells what has become of the structures that stages name.
+    """Finds the new names of the structures that stages name.
 
     Args:
         stages: a `stages.yaml`.
@@ -85,7 +85,7 @@ def find_renaming(
             if _has_changed(name, before, names, successor):
                 unclear.append(name)
         elif name not in before:
-            # A name of today, or a slip, which generating reports.
+            # A new name, or a slip, which generating reports.
             continue
         elif name not in successor:
             lost.append(name)
@@ -97,7 +97,7 @@ def find_renaming(
 def renamed_text(stages: Path, renamed: Mapping[str, str]) -> str:
     """Returns the text of a file of stages with other names in it.
 
-    Comments, order and all else stay as they are.
+    Comments and order stay as they are.
 
     Raises:
         InputError: the file cannot be read.
@@ -124,8 +124,8 @@ def _text(path: Path) -> str:
 
 def _name_nodes(path: Path) -> list[yaml.ScalarNode]:
     """Returns the scalars of a file of stages that name structures."""
-    read_yaml(path)  # Within bounds, or an error in one line.
-    # Only the slower loader says where in the text a node is.
+    read_yaml(path)  # Errors in one line.
+    # Only the slower loader has the place of a node in the text.
     root = yaml.compose(_text(path), yaml.SafeLoader)
     lists = [
         node
@@ -142,7 +142,7 @@ def _name_nodes(path: Path) -> list[yaml.ScalarNode]:
         )
     ]
     lists += [node for _, node in _items(root, "lots")]
-    # What an alias stands for is there once.
+    # The node of an alias is visited once.
     scalars = {
         id(node): node
         for group in lists
@@ -164,7 +164,7 @@ def _items(node: yaml.Node | None, key: str) -> list[tuple[str, yaml.Node]]:
 
 
 def _pairs(node: yaml.Node | None) -> list[tuple[str, yaml.Node]]:
-    """Returns the pairs of a mapping, of those it is merged of as well."""
+    """Returns the pairs of a mapping, with those merged into it."""
     if not isinstance(node, yaml.MappingNode):
         return []
     pairs = []
@@ -185,7 +185,7 @@ def _has_changed(
     today: Iterable[str],
     successor: Mapping[str, str],
 ) -> bool:
-    """Tells whether a pattern names others, but for what is new or gone."""
+    """Returns whether a pattern matches others, besides new or lost ones."""
     meant = {
         successor[name]
         for name in before
@@ -223,7 +223,7 @@ def _row_of(structure: Structure) -> _Row:
 def _successors(
     before: Sequence[_Row], today: Sequence[_Row]
 ) -> dict[str, str]:
-    """Returns the name of today of what stands where it stood."""
+    """Returns the new name of a structure that has kept its place."""
     if not before or not today:
         return {}
     tree = cKDTree([row.xy for row in today])
@@ -231,8 +231,8 @@ def _successors(
     for row in before:
         for k in tree.query_ball_point(row.xy, _SAME_PLACE):
             other = today[k]
-            # What is of one kind is one thing; two things of a kind, such
-            # as the grounds of two districts, differ by their names.
+            # At one place there is one structure of a kind. Where there are
+            # two, such as the grounds of two districts, their names decide.
             if (
                 row.stem == other.stem
                 and row.semantic_class == other.semantic_class

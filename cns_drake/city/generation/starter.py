@@ -1,7 +1,7 @@
-"""Everything that a city needs besides its roads, to begin with.
+"""First inputs of a city besides its roads.
 
 A user who has drawn `roads.yaml` gets a plan of districts, two stages and two
-sequences, as files to be changed at will.
+sequences, as files to change at will.
 """
 
 from __future__ import annotations
@@ -48,11 +48,11 @@ def start_city(
     seed: int = 0,
     progress: Callable[[str], None] = lambda line: None,
 ) -> list[Path]:
-    """Writes what is missing of a city's inputs.
+    """Writes the missing inputs of a city.
 
     `city.yaml` gets a district for each block between the roads, `stages.yaml`
-    a stage 01 without the buildings and trees in the east and a whole stage
-    02, and each stage a sequence on a route drawn by lot.
+    a stage 01 without the buildings and trees in the east and a whole stage 02.
+    Each stage gets a sequence on a route drawn by lot.
 
     Args:
         world: folder with `roads.yaml`.
@@ -60,7 +60,7 @@ def start_city(
         progress: takes a line for each file that is written.
 
     Returns:
-        The files written; what was there is left alone.
+        The files written; existing files stay as they are.
 
     Raises:
         InputError: if the roads cannot be used, or a file not be written.
@@ -83,7 +83,7 @@ def start_city(
     plan_file = MapFolder(world).plan
     write(
         plan_file.name,
-        "The districts: what stands on the ground that the roads leave.",
+        "The districts: the blocks between the roads.",
         lambda: starter_plan(network, seed),
     )
 
@@ -91,7 +91,7 @@ def start_city(
         plan: CityPlan = load_plan(plan_file)
         return starter_stages(lay_out(network, plan, str(plan_file)))
 
-    write(STAGES_NAME, "What each stage lacks, by name.", stages)
+    write(STAGES_NAME, "The structures that each stage lacks, by name.", stages)
     for k, stage in enumerate(("01", "02")):
         rng = np.random.default_rng([seed, k])
         write(
@@ -145,7 +145,7 @@ def starter_plan(areas: StreetAreas, seed: int) -> dict:
         if is_outside or piece.area < _LEAST_BLOCK:
             continue
         if not characters:
-            # Every character once, before one comes again.
+            # Every character is used once before one is used again.
             characters = list(rng.permutation(list(templates["blocks"])))
         is_square = piece.area < _SQUARE
         district = (
@@ -168,7 +168,7 @@ def starter_plan(areas: StreetAreas, seed: int) -> dict:
 
 
 def starter_stages(city: City) -> dict:
-    """Returns two stages; the first one lacks what stands in the east.
+    """Returns two stages; the first one lacks the structures in the east.
 
     Returns:
         What `Stages` validates.
@@ -189,7 +189,7 @@ def starter_stages(city: City) -> dict:
         for structure in standing:
             if structure.xyz[0] > limit:
                 absent[" ".join(structure.tags[:1])].append(structure.name)
-        story = f"What lies east of x = {limit:.0f} m is not there yet."
+        story = f"The part east of x = {limit:.0f} m is not there yet."
     else:
         story = "There is nothing that could be missing."
     return {

@@ -76,12 +76,12 @@ class Mesh:
         )
 
 
-# The line of a face by how many corners it has; fewer than three are none.
+# The line of a face, by its number of corners; fewer than three make no face.
 _FACES = ("", "", "", "f %d %d %d\n", "f %d %d %d %d\n")
 
 
 def _unique_rows(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the rows (N, 3) without those told twice, sorted; their numbers.
+    """Returns distinct rows of (N, 3), sorted, and each row's number in them.
 
     As `np.unique` along an axis, which takes several times as long.
     """

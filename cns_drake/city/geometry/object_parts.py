@@ -23,8 +23,8 @@ from cns_drake.city.geometry.structures import (
 # the ground falls away a little [m].
 ROOT_DEPTH = 0.3
 
-# What hangs above this height (crowns, signs, mast arms) does not claim the
-# ground below it [m].
+# Parts above this height (crowns, signs, mast arms) leave the ground below them
+# free [m].
 HEADROOM = 2.4
 
 _FOOTPRINT_MARGIN = 0.02
@@ -128,13 +128,13 @@ def one_mesh(
 
 
 def triple(values: Iterable[float]) -> tuple[float, float, float]:
-    """Returns three numbers, of an array for instance, as Python's."""
+    """Returns three numbers, from an array for instance, as Python floats."""
     x, y, z = values
     return float(x), float(y), float(z)
 
 
 def assemble(*parts: Part) -> Model:
-    """Returns the model of some parts, whose meshes are `object_meshes`.
+    """Returns the model of parts whose meshes are `object_meshes`.
 
     Its footprint is the convex hull of all geometry below `HEADROOM`.
     """
@@ -147,7 +147,7 @@ def assemble(*parts: Part) -> Model:
 def ground_footprint(
     parts: Sequence[Part], meshes: Mapping[str, Mesh]
 ) -> Polygon:
-    """Returns the convex hull, in S, of what lies below `HEADROOM`."""
+    """Returns the convex hull, in S, of the parts below `HEADROOM`."""
     corners: list[np.ndarray] = [np.zeros((0, 2))]
     for part in parts:
         p, triangles = part_triangles(part, meshes)
@@ -161,7 +161,7 @@ def ground_footprint(
             a, b = a[cut], b[cut]
             t = (HEADROOM - a[:, 2]) / (b[:, 2] - a[:, 2])
             corners.append(a[:, :2] + t[:, None] * (b - a)[:, :2])
-    # Millimetres: the last bits of a sine differ from machine to machine.
+    # Rounded to millimetres: the last bits of a sine differ between machines.
     hull = MultiPoint(np.round(np.concatenate(corners), 3)).convex_hull
     return hull.buffer(_FOOTPRINT_MARGIN, join_style="mitre")
 

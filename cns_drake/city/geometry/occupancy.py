@@ -35,7 +35,7 @@ class Occupancy:
         clearance: float = 0.0,
         ignore: BaseGeometry | None = None,
     ) -> bool:
-        """Tells whether a polygon keeps its distance from all taken.
+        """Returns whether a polygon keeps its distance from all taken ones.
 
         Args:
             geometry: the polygon in W [m].

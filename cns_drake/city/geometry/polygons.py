@@ -41,7 +41,7 @@ def polygons_of(geometry: BaseGeometry) -> list[Polygon]:
     """Returns the polygons of a geometry without slivers, in fixed order.
 
     The order is by the lower left corner of the bounds, so that it does not
-    depend on how the geometry came about.
+    depend on how the geometry was made.
     """
     parts = [
         part
@@ -216,7 +216,7 @@ def _counter_clockwise(ring: np.ndarray) -> np.ndarray:
 
 
 def _is_convex_quad(polygon: Polygon) -> bool:
-    """Tells a grid square: four corners, as large as its bounds."""
+    """Returns whether a polygon is a grid square: its area fills its bounds."""
     return (
         len(polygon.exterior.coords) == 5
         and not polygon.interiors
@@ -225,6 +225,6 @@ def _is_convex_quad(polygon: Polygon) -> bool:
 
 
 def _are_planes(rings: np.ndarray, height: HeightMap | float) -> np.ndarray:
-    """Tells which of (N, 4, 2) rings have their corners in one plane."""
+    """Returns which of (N, 4, 2) rings have their corners in one plane."""
     z = np.round(_heights(rings.reshape(-1, 2), height), 3).reshape(-1, 4)
     return abs(z[:, 0] - z[:, 1] + z[:, 2] - z[:, 3]) < 0.0005

@@ -65,7 +65,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Model:
-    """What a builder returns: parts, the meshes they use, a footprint.
+    """The result of a builder: parts, the meshes they use, a footprint.
 
     Attributes:
         parts: the visuals, in the structure frame S.

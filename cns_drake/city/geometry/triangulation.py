@@ -141,7 +141,7 @@ def _square_distance(a: _Point, b: _Point) -> int:
 
 
 def _opens_towards(ring: list[_Point], i: int, target: _Point) -> bool:
-    """Tells whether the inner angle at a corner of a ring has a point."""
+    """Returns whether a point is in the inner angle at a corner of a ring."""
     before, at, after = ring[i - 1], ring[i], ring[(i + 1) % len(ring)]
     is_left_of_in = _cross(before, at, target) > 0
     is_left_of_out = _cross(at, after, target) > 0
@@ -151,7 +151,7 @@ def _opens_towards(ring: list[_Point], i: int, target: _Point) -> bool:
 
 
 def _crosses(p: _Point, q: _Point, a: _Point, b: _Point) -> bool:
-    """Tells whether segment pq meets segment ab other than at p or q."""
+    """Returns whether segment pq meets segment ab other than at p or q."""
     sides = (_cross(p, q, a), _cross(p, q, b))
     others = (_cross(a, b, p), _cross(a, b, q))
     if sides[0] * sides[1] < 0 and others[0] * others[1] < 0:
@@ -163,7 +163,7 @@ def _crosses(p: _Point, q: _Point, a: _Point, b: _Point) -> bool:
 
 
 def _is_between(p: _Point, q: _Point, c: _Point) -> bool:
-    """Tells whether a point on the line pq lies on the segment."""
+    """Returns whether a point on the line pq is on the segment."""
     return all(min(p[k], q[k]) <= c[k] <= max(p[k], q[k]) for k in range(2))
 
 
@@ -274,7 +274,7 @@ def _flip(
 
 
 def _in_circle(a: _Point, b: _Point, c: _Point, d: _Point) -> bool:
-    """Tells whether d lies inside the circle through a, b and c.
+    """Returns whether d is inside the circle through a, b and c.
 
     The three are counter-clockwise. Then the quadrilateral a, d, b, c is
     convex as well, so that its diagonal can be flipped.

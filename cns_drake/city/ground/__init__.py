@@ -1,1 +1,1 @@
-"""What a city stands on: streets, markings, terrain, bridges."""
+"""The ground of a city: streets, markings, terrain, bridges."""

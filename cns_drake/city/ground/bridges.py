@@ -1,4 +1,4 @@
-"""Bridges: what lies below streets and paths that cross water."""
+"""Bridges: the structure below streets and paths that cross water."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def water_area(district: District, streets: BaseGeometry) -> BaseGeometry:
     """Returns all of a district's water, also that below bridges, in W [m].
 
     Args:
-        district: whose own ground is water.
+        district: a district whose ground is water.
         streets: the area of all streets in W [m].
     """
     if district.plan.area is None:

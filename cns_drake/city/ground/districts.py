@@ -1,4 +1,4 @@
-"""The areas of a plan's districts: what the streets leave, shared out."""
+"""Divides the ground between the streets among a plan's districts."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class District:
     """A district with its ground.
 
     Attributes:
-        plan: what it should become.
+        plan: the plan of the district.
         area: all of its ground in W [m].
         grounds: kind of ground -> area; together they are `area`.
         terraces: patches that are held level.
@@ -43,8 +43,8 @@ def share_out(
         source: the plan's file name, for messages.
 
     Raises:
-        InputError: if a block or area lies outside the city or on ground
-            that is taken, or if ground is left over.
+        InputError: if a block or area is outside the city or on ground that is
+            taken, or if ground is left over.
     """
     free = snap(box(*plan.bounds)).difference(streets)
     districts = []
@@ -55,7 +55,7 @@ def share_out(
             fault = f"block: no free ground at {district.block}"
         elif district.area is not None:
             area = _polygon(district.area, f"{field}.area").intersection(free)
-            fault = "area: lies on ground that is taken"
+            fault = "area: on ground that another district has taken"
         else:
             area, fault = free, "no ground is left for it"
         pieces = MultiPolygon(polygons_of(snap(area)))
@@ -93,7 +93,7 @@ def _polygon(corners: list[tuple[float, float]], field: str) -> Polygon:
 
 
 def _grounds(plan: DistrictPlan, area: MultiPolygon) -> dict[str, MultiPolygon]:
-    """Returns the kinds of ground; of patches that overlap the first wins."""
+    """Returns the kinds of ground; where patches overlap, the first wins."""
     pieces: dict[str, list[BaseGeometry]] = {}
     rest: BaseGeometry = area
     for patch in plan.patches:

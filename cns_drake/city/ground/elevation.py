@@ -29,8 +29,8 @@ _HELD = 1.0
 # Over this distance the field is drawn to the exact height of a street or
 # pad [m].
 _REACH = 4.0
-# The nodes' heights are rounded, so that what the last bits of a solver do
-# never shows in a file [m].
+# The nodes' heights are rounded, so that the last bits of a solver never show
+# in a file [m].
 _ROUNDING = 6
 # Nearer than this counts as touching [m].
 _TOUCHING = 1e-6
@@ -67,12 +67,12 @@ class LevelGround:
 class SlopingGround:
     """Sidewalks that follow their roads, and the field between them.
 
-    The field is harmonic: its nodes lie at the mean of their neighbours,
-    but for those on streets and pads, whose heights are given, and at the
-    rim of the city it is level across. Near a street or pad at distance d
-    the field is averaged with the exact height there, with weight
-    1/d - 1/R against 1/R of the field (Shepard's interpolation, R the
-    reach), so that it meets the edge exactly and without a step.
+    The field is harmonic: each node has the mean height of its neighbours.
+    Nodes on streets and pads have given heights, and across the rim of the city
+    the field is level. At the distance d from a street or pad the field is
+    averaged with the exact height there, with weight 1/d - 1/R against 1/R of
+    the field (Shepard's interpolation, R the reach). It meets the edge exactly
+    and without a step.
     """
 
     is_level = False
@@ -284,6 +284,6 @@ def _foot_points(p: np.ndarray, segments: np.ndarray) -> np.ndarray:
 
 
 def _gain(distance: np.ndarray) -> np.ndarray:
-    """Returns the weight of what lies at a distance [1/m]."""
+    """Returns the weight of a height at a distance [1/m]."""
     weight = 1 / np.maximum(distance, _TOUCHING) - 1 / _REACH
     return np.maximum(weight, 0.0)

@@ -29,7 +29,7 @@ _CROSSING = (0.8, 3.8)
 _STOP_LINE = (4.8, 5.2)
 # Width of a bar of a crossing, and distance from bar to bar [m].
 _BAR, _BAR_STEP = 0.5, 1.1
-# Roads need this much between their junctions to get any of it [m].
+# Roads shorter than this between their junctions get no markings [m].
 _LEAST_LENGTH = 2 * _STOP_LINE[1] + 4.0
 
 
@@ -52,7 +52,7 @@ def marking_structure(network: RoadNetwork) -> Structure:
 
 
 def _is_junction(network: RoadNetwork, road: Road, end: End) -> bool:
-    """Tells a junction from a place where one road merely goes on."""
+    """Returns whether a node is a junction, and not one road going on."""
     return len(network.junctions[getattr(road, end)].arms) > 2
 
 

@@ -27,15 +27,15 @@ from cns_drake.roads.street_areas import StreetAreas, SurfaceHeights
 
 # Marks the structures that are ground: no stage lacks them.
 GROUND_TAG = "ground"
-# The ground is cut into squares of this size, so that no part is so large
-# that its bounds say nothing about where it is [m].
+# The ground is cut into squares of this size, so that the bounds of each part
+# are small [m].
 TILE = 64.0
 # Width of the kerb stones [m].
 _KERB_WIDTH = 0.15
 # On slopes the meshes have vertices this far apart: the sharpest bend of a
 # ramp, by 10 % over 1 m, is then true to 13 mm, most of it to 2 mm [m].
 _SPACING = 1.0
-# Where chords of this length are truer than this, they do as well [m].
+# The wider spacing is used where its chords are at least this true [m].
 _WIDE_SPACING, _LEAST_SAG = 4.0, 0.004
 # On slopes sidewalks are edged by stones that reach this deep, so that no
 # slit opens towards the coarser mesh of the ground beside them [m].
@@ -70,7 +70,7 @@ class Covering:
 
 
 def parking_bays(area: BaseGeometry) -> Covering:
-    """Returns what is parked on, from its area in W [m]."""
+    """Returns the parking bays, from their area in W [m]."""
     return Covering("parking_bays", "parking", snap(area), _BAY_RGB)
 
 
@@ -94,14 +94,14 @@ def street_surfaces(
 ) -> list[Structure]:
     """Returns the ground of streets.
 
-    Kinds of ground that these streets do not have are left out.
+    Kinds of ground that are absent from these streets are left out.
 
     Args:
         areas: of the streets.
         surface: how high the carriageway lies.
         kerb: height of sidewalks and medians above it [m].
         coverings: within the carriageway.
-        kerbless: where no kerb is, as streets lead onto bridges, in W [m].
+        kerbless: area without kerbs, where streets lead onto bridges, in W [m].
     """
     road, walk = _heights(surface, kerb)
     medians = snap(areas.medians())

@@ -48,7 +48,7 @@ class _Swell:
 
     Attributes:
         area: where it acts.
-        level: lines and areas at which it has died away.
+        level: lines and areas at which the relief has faded to zero.
         amplitude: greatest height [m].
         margin: distance over which it rises from `level` [m].
         waves: rows of wave vector [rad/m] and phase [rad].
@@ -67,7 +67,7 @@ class _Swell:
         rise = u * u * (3 - 2 * u)
         phase = np.outer(x, self.waves[:, 0]) + np.outer(y, self.waves[:, 1])
         wave = np.sin(phase + self.waves[:, 2]).mean(axis=1)
-        # Everywhere above level, so that no hollow would collect water.
+        # The relief is never below level, so that no hollow collects water.
         return self.amplitude * rise * (0.65 + 0.35 * wave)
 
 
@@ -81,7 +81,7 @@ class GroundShape:
         buildings: BaseGeometry,
         rng_of: Callable[[str], np.random.Generator],
     ):
-        """Shapes the ground around what is built.
+        """Shapes the ground around buildings.
 
         Args:
             base: without relief.

@@ -1,1 +1,1 @@
-"""Younger cities: buildings that are lower yet, and lots in other use."""
+"""Younger cities: buildings that are still lower, and lots in other use."""

@@ -17,7 +17,7 @@ _CRANE_ROOM = 7.0
 # The jib clears the frame by this [m].
 _CRANE_RISE = 14.0
 _CRANE_REACH = 30.0
-# In each direction; a rectangle on a lot is chosen from them.
+# Grid lines in each direction from which a rectangle on a lot is chosen.
 _MOST_SIDES = 12
 
 
@@ -31,7 +31,7 @@ def building_site(model: Model, height: float, name: str, seed: int) -> Model:
         seed: of the frame and the crane.
 
     Returns:
-        What stands within the building's footprint, but for the jib.
+        A model within the building's footprint, except for the jib.
 
     Raises:
         ValueError: there is no room for a frame.
@@ -74,8 +74,9 @@ def _beside(part: Part, xy: tuple[float, float]) -> Part:
 def largest_rectangle(footprint: BaseGeometry) -> Polygon:
     """Returns a large rectangle along the axes that lies within a footprint.
 
-    Where all edges of the footprint run along the axes it is the largest;
-    else the largest whose sides pass through some of its corners.
+    If all edges of the footprint run along the axes, it is the largest.
+    Otherwise it is the largest whose sides pass through corners of the
+    footprint.
     """
     corners = shapely.get_coordinates(footprint.simplify(0.05))
     xs, ys = (_spread(np.unique(np.round(c, 3))) for c in corners.T)

@@ -1,4 +1,4 @@
-"""What is found on a lot before its building is built."""
+"""The use of a lot before its building is built."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def lot_objects(
     cars: Mapping[str, float],
     rng: np.random.Generator,
 ) -> Iterator[Structure]:
-    """Yields what stands on the lot of a building that is not built yet.
+    """Yields the structures on the lot of a building that is not built yet.
 
     Args:
         structure: the building.

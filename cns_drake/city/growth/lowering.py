@@ -1,8 +1,7 @@
 """A building before its upper storeys were added.
 
-What stands below the height is left as it is, to the millimetre, so that
-whoever passes in the street sees the same front; above it lies a roof of the
-building's own.
+The part below the height stays as it is, to the millimetre: the street shows
+the same front. Above it the building gets a new roof.
 """
 
 from __future__ import annotations
@@ -27,19 +26,19 @@ from cns_drake.city.geometry.polygons import (
 )
 from cns_drake.city.geometry.structures import MeshShape, Model, Part
 
-# Walls and the glass behind them count as one where they are this close [m].
+# Walls and the glass behind them count as one if they are this close [m].
 _REVEAL = 0.7
 # Pieces of walls that end at a height by chance carry no roof [m^2].
 _LEAST_ROOF = 4.0
 # Corners lie at whole millimetres; a cut between them meets none [m].
 _BETWEEN = 0.0005
-# What rises less above the height is no storey [m].
+# A part that rises less than this above the height is no storey [m].
 _STOREY = 2.5
 _PARAPET = 0.9
 _PARAPET_WIDTH = 0.3
 # The band that closes the walls starts this far below the roof [m].
 _BAND = 0.5
-# and reaches so far out of them [m].
+# and stands out of them by this [m].
 _BAND_REACH = 0.04
 _ROOF_ITEMS = ("stair_house", "ac_unit", "vents", "skylight")
 
@@ -49,8 +48,8 @@ def lowered(model: Model, height: float, name: str, seed: int) -> Model:
 
     Args:
         model: the whole building.
-        height: of the roof above the building's own ground [m]; its parapet
-            and what stands on the roof reach higher.
+        height: of the roof above the building's own ground [m]; its parapet and
+            the equipment on the roof reach higher.
         name: of the building; its new meshes are called after it.
         seed: of what stands on the roof.
 
@@ -103,7 +102,7 @@ def _top(placed: Sequence[tuple[Part, Mesh]]) -> float:
 
 
 def cut_at(mesh: Mesh, height: float) -> tuple[Mesh, np.ndarray]:
-    """Returns what of a mesh lies below a height, and the cut.
+    """Returns the part of a mesh below a height, and the cut.
 
     Args:
         mesh: with plane convex faces.
@@ -124,7 +123,8 @@ def cut_at(mesh: Mesh, height: float) -> tuple[Mesh, np.ndarray]:
             ring, crossing = _clipped(ring, height)
             if len(crossing) == 2:
                 along = np.subtract(*crossing[::-1])
-                # What a wall encloses is on the left where it faces right.
+                # The inside of a wall is on the left of an edge that faces
+                # right.
                 right = along[1] * normal[0] - along[0] * normal[1]
                 edges.append(crossing if right > 0 else crossing[::-1])
         # The lower part of a quadrilateral may have five corners.
@@ -168,7 +168,7 @@ def enclosed(edges: np.ndarray) -> MultiPolygon:
     lines = shapely.linestrings(edges)
     walls = unary_union(shapely.buffer(lines, _REVEAL, cap_style="square"))
     plan: BaseGeometry = MultiPolygon()
-    # From the outside inwards: courtyards lie within what encloses them.
+    # From the outside inwards: courtyards are inside their buildings.
     for ring in sorted(polygons_of(walls), key=_outer_area, reverse=True):
         mine = shapely.intersects(lines, ring)
         if _turns_left(edges[mine]):
@@ -199,7 +199,7 @@ def _outer_area(polygon: Polygon) -> float:
 
 
 def _turns_left(edges: np.ndarray) -> bool:
-    """Tells whether edges run counter-clockwise, taken together."""
+    """Returns whether edges, taken together, run counter-clockwise."""
     a, b = (edges - edges.mean(axis=(0, 1))).transpose(1, 0, 2)
     return float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum()) > 0
 

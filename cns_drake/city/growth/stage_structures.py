@@ -1,4 +1,4 @@
-"""What stands in a city at each of its stages."""
+"""The structures of a city at each of its stages."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class GrowingCity:
     """A city and its stages.
 
     Attributes:
-        structures: of the whole city, then what is found on lots before
-            they are built on; a structure's instance id is its place in this
-            order, counted from 1, and the same at all stages.
+        structures: of the whole city, then those on lots before they are built
+            on; a structure's instance id is its place in this order, counted
+            from 1, and the same at all stages.
     """
 
     def __init__(
@@ -35,7 +35,7 @@ class GrowingCity:
 
         Args:
             structures: of the whole city, the last stage.
-            stages: what the others lack, and what is lower there.
+            stages: the structures that the others lack or have lower.
             cars: object -> weight of cars that are parked on lots.
         """
         self._stages = stages
@@ -64,11 +64,12 @@ class GrowingCity:
         ]
 
     def at(self, stage: str) -> list[Structure]:
-        """Returns what stands at a stage, in the order of instance ids.
+        """Returns the structures of a stage, in the order of instance ids.
 
         Raises:
             KeyError: if there is no such stage.
-            ValueError: if something is to be low or built that cannot be.
+            ValueError: if a structure cannot be lower, or under construction,
+                as asked.
         """
         absent = self._stages.absent(stage)
         heights = self._stages.heights(stage)

@@ -1,1 +1,1 @@
-"""Decides what stands where."""
+"""Chooses the places of all structures."""

@@ -26,7 +26,7 @@ _PARTY_WALL = 3.1
 _YARD = 3.1
 # A house stands as high as the ground this far in front of it [m].
 _DOORSTEP = 1.0
-# Where a lot does not fit, the next trial starts this much further on [m].
+# If a lot does not fit, the next trial starts this much further on [m].
 _STEP = 1.0
 # Parts of the drawn width and depth that are tried in turn; never less than
 # the row's least.
@@ -68,8 +68,8 @@ def place_buildings(draft: Draft, district: District, source: str) -> None:
         source: the plan's file name, for messages.
 
     Raises:
-        InputError: if a single building has no room, or an archetype cannot
-            be built in the size that the plan asks for.
+        InputError: if a single building has no room, or an archetype cannot be
+            built in the size of the plan.
     """
     name = district.plan.name
     draft.open_range()
@@ -151,10 +151,13 @@ def _single_house(
     yaw = math.radians(plan.yaw_deg)
     area = placed(footprint, plan.at, yaw)
     if not district.area.contains(area):
-        raise InputError(f"{fault_at}.at: reaches out of the district")
+        raise InputError(
+            f"{fault_at}.at: the building reaches out of the district"
+        )
     if not draft.is_free(area, _YARD):
         raise InputError(
-            f"{fault_at}.at: stands closer than {_YARD} m to another building"
+            f"{fault_at}.at: the building is closer than {_YARD} m to another "
+            "one"
         )
     draft.take(area)
     return _House(plan.archetype, footprint, plan.at, yaw, plan.height, area)

@@ -1,4 +1,4 @@
-"""A city in the making: what stands where so far."""
+"""A city in the making: the structures placed so far."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Draft:
 
     Attributes:
         areas: of the streets.
-        streets: all ground that belongs to them, sidewalks included, in W.
+        streets: all ground of the streets, sidewalks included, in W.
         frontage: line along which buildings stand; the streets by default.
         base: height of sidewalks and of the ground between them in W,
             without what buildings and relief change about it.
@@ -72,9 +72,9 @@ class Draft:
     def open_range(self) -> None:
         """Starts a new range of numbers in names, for the next task.
 
-        Like house numbers, which start anew with each street: one thing
-        more or less in one task does not rename those of all later tasks,
-        which the lists of the stages refer to.
+        House numbers start anew with each street in the same way. One object
+        more or less in one task does not rename the objects of later tasks, to
+        which the lists of the stages refer.
         """
         for kind, count in self._counts.items():
             self._counts[kind] = -(-count // _RANGE) * _RANGE
@@ -90,7 +90,7 @@ class Draft:
         clearance: float = 0.0,
         ignore: BaseGeometry | None = None,
     ) -> bool:
-        """Tells whether an area in W is neither a lane's nor taken.
+        """Returns whether an area in W is free of lanes and not taken.
 
         Args:
             area: in W [m].
@@ -102,7 +102,7 @@ class Draft:
         )
 
     def take(self, area: BaseGeometry) -> None:
-        """Keeps an area in W free of what is placed later."""
+        """Keeps an area in W free of later objects."""
         self._occupancy.add(area)
 
     def add_building(self, structure: Structure) -> None:
@@ -135,7 +135,7 @@ class Draft:
             yaw: heading in W [rad].
             tags: free words.
             kind: stem of the structure's name; the object's by default.
-            clearance: to everything that stands already [m].
+            clearance: to all objects placed before [m].
             crown_part: how much of the reach of a tree's crown must be
                 clear of buildings, from 0 to 1.
             within: where given, the footprint must lie in this area.

@@ -19,8 +19,8 @@ from cns_drake.city.geometry.polygons import placed
 _CORNER = math.radians(25)
 # Round corners of parallel lines: segments per quarter turn.
 _QUAD_SEGMENTS = 16
-# The street may bend away from a lot's straight front by at most this angle
-# at either end; around a tighter curve, or into a corner, houses look askew.
+# The street may bend away from a lot's straight front by at most this angle at
+# either end; houses around a tighter curve, or into a corner, look askew.
 _BEND = math.radians(17)
 # Headings are taken over twice this length [m].
 _SHORT = 0.25
@@ -81,8 +81,8 @@ def lines_along(
         distance: from the edge of the streets [m].
 
     Returns:
-        Smooth pieces between corners, in fixed order; whoever walks along
-        a piece has the street on the right.
+        Smooth pieces between corners, in fixed order; the street is on the
+        right of each piece.
     """
     edge = streets.buffer(distance, quad_segs=_QUAD_SEGMENTS).boundary
     cut = shapely.set_precision(edge.intersection(within), 0.001)

@@ -66,7 +66,7 @@ def _furnish_arm(
 
     if road.lanes[incoming]:
         if sum(road.lanes.values()) <= _SMALL_ROAD_LANES:
-            # Facing the traffic that comes along the arm.
+            # The object faces the traffic that comes along the arm.
             place("sign_stop", 1.0, 1, 0.0)
         else:
             place("traffic_light", _LIGHT_DISTANCE, 1, -math.pi / 2)
@@ -74,5 +74,5 @@ def _furnish_arm(
         place("sign_street_name", 0.2, 1, 0.0)
     if road.lanes[outgoing] and road.length > 2 * _SIGN_DISTANCE:
         sign = _SIGNS[int(rng.integers(len(_SIGNS)))]
-        # Facing the traffic that comes out of the junction.
+        # The object faces the traffic that comes out of the junction.
         place(sign, _SIGN_DISTANCE, -1, math.pi)

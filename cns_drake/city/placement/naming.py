@@ -5,7 +5,7 @@ from __future__ import annotations
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plants.tree_species import SPECIES
 
-# Several objects of one class that a reader would call by one word.
+# Objects of one class that share one word in everyday use.
 _WORDS = {"car": "car", "truck": "truck", "traffic-sign": "sign"}
 
 

@@ -1,4 +1,4 @@
-"""What stands on a district's own ground: trees, hedges, cars, benches."""
+"""Objects on a district's own ground: trees, hedges, cars, benches."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ _CLEARANCE = 0.15
 # Trees keep their crowns off walls: distance of the trunk from any building
 # as a part of the crown's reach.
 _CROWN_PART = 0.8
-# Runs (fences, hedges) are at most this long, so that one can be missing
-# at a stage without all of them being so [m].
+# Runs (fences, hedges) are at most this long, so that a stage can lack one of
+# them without lacking all [m].
 _LONGEST_RUN = 24.0
 # On slopes each run is at most this much higher than the next one [m].
 _HIGHEST_STEP = 0.3
@@ -82,7 +82,7 @@ def _place_object(
     yaw, tags = math.radians(plan.yaw_deg), (district.plan.name,)
     placed = draft.place(plan.object, model, plan.at, yaw, tags, kind=plan.kind)
     if placed is None:
-        raise InputError(f"{field}.at: stands in something else")
+        raise InputError(f"{field}.at: the place is taken by another structure")
 
 
 def _place_line(
@@ -204,7 +204,8 @@ def _scatter(
         if chosen and _nearest(chosen, dart) < plan.spacing:
             continue
         chosen.append(dart)
-        # Drawn for every dart, so that the fill does not move the others.
+        # A number is drawn for every dart, so that the fill does not move
+        # others.
         keep, yaw = rng.uniform() < plan.fill, rng.uniform(-math.pi, math.pi)
         name = pick(plan.objects, rng)
         if keep:

@@ -1,4 +1,4 @@
-"""What stands along the streets: lamps, trees, furniture, parked cars."""
+"""Objects along the streets: lamps, trees, furniture, parked cars."""
 
 from __future__ import annotations
 
@@ -19,12 +19,11 @@ from cns_drake.city.plan.city_plan import CityPlan, StreetPlan
 from cns_drake.city.plan.weighted import pick
 from cns_drake.roads.network import RoadNetwork
 
-# How far from the kerb things stand: their nearest point, not their middle
-# [m].
+# Distance of an object's nearest point from the kerb [m].
 _FROM_KERB = {"lamp": 0.45, "tree": 0.9, "furniture": 0.6}
-# Around junctions nothing blocks the view but what belongs there [m].
+# Within this distance of a junction only its own objects may stand [m].
 _JUNCTION_CLEARANCE = {"lamp": 1.0, "tree": 5.0, "furniture": 3.0}
-# Least distance between two things, and of things to lanes [m].
+# Least distance between two objects, and of objects to lanes [m].
 _CLEARANCE = 0.4
 _CROWN_PART = 0.85
 # Length of a parking bay along the street, least and greatest [m].
@@ -45,7 +44,7 @@ def furnish_sidewalks(
     Args:
         draft: the city so far.
         plan: of its streets.
-        districts: beside these.
+        districts: along the sidewalks.
         junctions: the area of all junctions in W [m].
     """
     for task, distance in _FROM_KERB.items():
@@ -121,7 +120,7 @@ def _walk(
     keep_off: BaseGeometry,
     rng: np.random.Generator,
 ) -> None:
-    """Walks along one sidewalk and places the things of one task."""
+    """Walks along one sidewalk and places the objects of one task."""
     s = float(rng.uniform(1.0, 8.0))
     while s < line.length - 1.0:
         at = station_at(line, s)
@@ -138,7 +137,7 @@ def _walk(
 def _draw(
     street: StreetPlan, task: str, rng: np.random.Generator
 ) -> tuple[float, str | None]:
-    """Returns the distance to the next place, and what stands here."""
+    """Returns the distance to the next place, and the object at this one."""
     if task == "lamp":
         return street.lamp_spacing, street.lamp
     if task == "tree":

@@ -1,1 +1,1 @@
-"""What a user states about a city: its districts and its stages."""
+"""The inputs of a city: its districts and its stages."""

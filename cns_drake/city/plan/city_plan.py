@@ -1,4 +1,4 @@
-"""The plan of a city: what `city.yaml` says about its districts."""
+"""The plan of a city: the districts in `city.yaml`."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def _in_order(values: tuple[float, float]) -> tuple[float, float]:
     return values
 
 
-# Least and greatest value of something that is drawn.
+# Least and greatest value of a drawn number.
 Range = Annotated[
     tuple[float, float],
     AfterValidator(_in_order),
@@ -70,7 +70,7 @@ class BuildingPlan(_Model):
     @model_validator(mode="after")
     def _has_one_footprint(self) -> BuildingPlan:
         if (self.size is None) == (self.outline is None):
-            raise ValueError("give either size or outline")
+            raise ValueError("give either size or outline, not both or neither")
         return self
 
 
@@ -121,7 +121,7 @@ class PatchPlan(_Model):
     @model_validator(mode="after")
     def _has_one_shape(self) -> PatchPlan:
         if (self.area is None) == (self.line is None):
-            raise ValueError("give either area or line")
+            raise ValueError("give either area or line, not both or neither")
         return self
 
 
@@ -170,10 +170,10 @@ class LinePlan(_Model):
         objects: object -> weight.
         points: the line [m]; its right is the objects' front.
         spacing: range of the distance between two objects [m]; by default each
-            piece is as long as the line is straight, as fences and hedges are.
+            piece is as long as the line is straight, as for fences and hedges.
         yaw_deg: turn of each object against the line [deg].
         kind: stem of their names; by default the object.
-        parameters: passed on to what builds the objects.
+        parameters: arguments of the objects' builder.
     """
 
     objects: Weights = Field(min_length=1)
@@ -192,7 +192,7 @@ class ObjectPlan(_Model):
         at: `[x, y]` [m].
         yaw_deg: heading [deg].
         kind: stem of its name; by default the object.
-        parameters: passed on to what builds the object, such as `{height: 1.1}`
+        parameters: arguments of the object's builder, such as `{height: 1.1}`
             of a `garden_wall`.
     """
 
@@ -204,7 +204,7 @@ class ObjectPlan(_Model):
 
 
 class StreetPlan(_Model):
-    """What stands on the sidewalks in front of a district.
+    """The objects on the sidewalks in front of a district.
 
     Attributes:
         trees: species -> weight; a street without trees by default.
@@ -233,8 +233,8 @@ class DistrictPlan(_Model):
             district's own draws.
         block: `[x, y]` of a point in the block that the streets leave [m];
             give this, `area` or neither.
-        area: corners [m]; without both, the district is all that no other one
-            takes.
+        area: corners [m]; without both, the district is all ground that no
+            other one takes.
         ground: kind of ground.
         relief: height of the swells of its lawns [m].
         relief_margin: width of their slope at paths and buildings [m].
@@ -245,7 +245,7 @@ class DistrictPlan(_Model):
         objects: list of objects.
         lines: list of lines of objects.
         scatter: list of scattered objects.
-        street: what stands on its sidewalks.
+        street: the objects on its sidewalks.
     """
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_]*$")
@@ -278,8 +278,8 @@ class CityPlan(_Model):
         bounds: `[x0, y0, x1, y1]` of the generated world [m].
         water_level: height of the water's surface [m].
         cars: object -> weight, of parked cars.
-        street: what stands on sidewalks, unless the district says otherwise.
-        medians: what is planted between the directions, with the same fields;
+        street: the objects on sidewalks, unless the district has its own.
+        medians: plants and lamps between the directions, with the same fields;
             by default as `street`.
         districts: list of districts, in the order in which they take ground.
     """
@@ -301,7 +301,8 @@ class CityPlan(_Model):
         for side in (x1 - x0, y1 - y0):
             if not 0.0 < side <= _LARGEST_SIDE:
                 raise ValueError(
-                    f"a side of {side:g} m, not of up to {_LARGEST_SIDE:g} m"
+                    f"a side is {side:g} m long; the most is "
+                    f"{_LARGEST_SIDE:g} m"
                 )
         return bounds
 

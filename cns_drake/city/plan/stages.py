@@ -37,16 +37,16 @@ class Growth(_Model):
 
 
 class Stage(_Model):
-    """One stage, in words and by what sets it apart from the next.
+    """One stage: its story, and its differences to the next stage.
 
     Attributes:
-        story: what a visitor would notice.
+        story: the differences that a visitor would notice.
         absent: group, in words -> names of the structures that the next stage
             adds; none in the last stage.
-        lower: group, in words -> what the next stage raises; none in the last
-            stage.
-        sites: group, in words -> what is under construction at this stage only:
-            a frame of that height, scaffolds and a crane; its lot must take
+        lower: group, in words -> buildings and plants that the next stage
+            raises; none in the last stage.
+        sites: group, in words -> buildings under construction at this stage
+            only: a frame of that height, scaffolds and a crane; the lot needs
             16 m by 16 m.
     """
 
@@ -65,7 +65,7 @@ class Stages(_Model):
 
     Attributes:
         stages: stage, two digits in quotes, rising -> stage.
-        lots: use -> buildings on whose lots it is found until they are built:
+        lots: use -> buildings whose lots have this use until they are built:
             `car_park`, `market`, `garden`, `yard` or `empty`; by default a
             lot's use goes by its size.
     """
@@ -101,7 +101,8 @@ class Stages(_Model):
         return heights
 
     def sites(self, stage: str) -> dict[str, float]:
-        """Returns what is under construction at a stage, and how high [m]."""
+        """Returns the buildings under construction at a stage, and how high
+        [m]."""
         return {
             name: group.height
             for group in self.stages[stage].sites.values()
@@ -109,7 +110,7 @@ class Stages(_Model):
         }
 
     def on_its_own(self, stage: str) -> Stage:
-        """Returns a stage with all that sets it apart from the whole city.
+        """Returns a stage with all its differences to the whole city.
 
         Raises:
             KeyError: if there is no such stage.
@@ -141,7 +142,7 @@ def load_stages(
     Args:
         path: the file.
         structures: the names of all structures of the city.
-        text: what the file is going to hold, in place of what it does.
+        text: the coming content of the file; by default the present one.
 
     Returns:
         The stages, patterns replaced by the names that they stand for.
@@ -149,7 +150,7 @@ def load_stages(
     Raises:
         InputError: if the file cannot be read, has a wrong key or type, its
             stages are out of order, the last one lacks something, a name is
-            unknown or absent twice, or a pattern stands for nothing.
+            unknown or absent twice, or a pattern matches nothing.
     """
     content = read_yaml(path) if text is None else parse_yaml(text)
     try:
@@ -165,7 +166,7 @@ def load_stages(
 
 
 class _Names:
-    """The structures of a city, which patterns are looked up in."""
+    """The names of a city's structures, by which patterns are resolved."""
 
     def __init__(self, path: Path, structures: Iterable[str]):
         self._path = path
@@ -173,7 +174,7 @@ class _Names:
         self._known = set(self._all)
 
     def of(self, field: str, patterns: Iterable[str]) -> list[str]:
-        """Returns what names and patterns stand for, in their order."""
+        """Returns the structures of names and patterns, in their order."""
         found: list[str] = []
         for pattern in patterns:
             names = [pattern]

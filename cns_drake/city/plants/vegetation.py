@@ -32,7 +32,7 @@ def tree(
     """Returns one tree.
 
     Args:
-        rng: draws whatever is not given.
+        rng: draws each value that is not given.
         species: a key of `SPECIES`.
         height: of the top, within the species' range for the promised
             clearance below the crown [m].

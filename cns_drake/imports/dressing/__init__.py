@@ -1,1 +1,2 @@
-"""What is added to the bare shapes of an imported city, by tags and by lot."""
+"""Dressing: details added to an imported city's bare shapes, from tags and by
+lot."""

@@ -41,25 +41,25 @@ from cns_drake.imports.waypoint_drives import Drive
 # Walls that are farther from all drives have no windows, and roofs no
 # equipment [m].
 _WALLS_WITHIN, _ROOFS_WITHIN = 60.0, 100.0
-# So many triangles are given to openings, about, the nearest walls first.
+# About this many triangles are spent on openings, on the nearest walls first.
 _MOST_TRIANGLES = 1_100_000
 _OF_OPENING, _OF_WALL = 30, 40
-# Shops are on walls so near a street [m].
+# Shops are on walls at most this far from a street [m].
 _SHOPS_WITHIN = 16.0
 # From this level of detail on a model has its own roof, and windows.
 _OWN_ROOF, _OWN_WINDOWS = 2.2, 3.0
-# A building whose feet lie farther from the ground has been let into it [m].
+# A building whose feet are farther from the ground was sunk into it [m].
 _LET_IN = 2.0
 
 
 @dataclass(frozen=True)
 class DressedBuildings:
-    """What became of buildings.
+    """The result of dressing buildings.
 
     Attributes:
         buildings: before -> after.
-        by_lot: what was added -> how many.
-        by_file: what the file says of their looks -> of how many.
+        by_lot: kind of added detail -> its number.
+        by_file: kind of look that the file gives -> number of buildings.
     """
 
     buildings: Mapping[Imported, Imported]
@@ -91,17 +91,17 @@ def dress_buildings(
 ) -> DressedBuildings:
     """Dresses the buildings of a city.
 
-    A building looks the same in each stage and each import, since its lot is
-    drawn by its own name; only whether a wall is near enough to a drive for
-    its windows depends on the drives.
+    A building looks the same in each stage and each import, since its random
+    draws depend on its name. Only the choice of walls with windows depends on
+    the drives, whose neighbourhood gets them.
 
     Args:
-        structures: all that ever stand.
+        structures: those of all stages.
         drives: through the city; without any no wall has windows.
-        streets: of the file, which doors and shops look to.
+        streets: of the file; doors and shops face them.
         ground: below the city.
         seed: of the lot.
-        always: what stands at all stages, and so hides what is behind it; all
+        always: structures of all stages, which hide what is behind them; all
             structures if None.
     """
     buildings = [one for one in structures if one.kind.startswith("Building")]
@@ -205,7 +205,7 @@ def _plans(
     ground: Ground,
     views: DriveViews,
 ) -> tuple[dict[int, list[FacadePlan]], dict[int, list[float]]]:
-    """Returns of buildings the walls to dress, and how far drives are."""
+    """Returns the walls to dress, and their distance to the drives."""
     walls = [
         some.walls if some.one.lod < _OWN_WINDOWS else np.zeros((0, 3, 3))
         for some in bare
@@ -265,7 +265,7 @@ def _seen(
 ) -> tuple[list[Panel], np.ndarray]:
     """Returns the plane walls that drives see from near, and how near [m].
 
-    The nearest come first, as many as there are triangles for.
+    The nearest come first, within the budget of triangles.
 
     Args:
         walls: of each building, upright triangles (M, 3, 3) [m].
@@ -300,7 +300,7 @@ def _grouped(plans: Sequence[FacadePlan]) -> dict[int, list[int]]:
 def _front(
     members: Sequence[int], plans: Sequence[FacadePlan], to_way: np.ndarray
 ) -> int | None:
-    """Returns the number of the wall that the door of a building is in."""
+    """Returns the number of the wall that gets a building's door."""
     possible = [k for k in members if plans[k].street_openings.any()]
     return min(possible, key=lambda k: (to_way[k], k)) if possible else None
 

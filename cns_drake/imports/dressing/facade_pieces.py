@@ -30,18 +30,18 @@ _SILLS_WITHIN, _FRAMES_WITHIN, _RECESSES_WITHIN = 12.0, 20.0, 25.0
 # Nothing that is lower may hang over the way of a car, with so much room
 # beside the middle of it [m].
 _TALLEST_CAR, _BESIDE = 4.0, 2.5
-# Cornices of lower walls would be in the way of doors [m].
+# Cornices of lower walls would collide with doors [m].
 _LEAST_WALL = 2.5
 
 
 @dataclass
 class Faces:
-    """Faces of a building by what they are made of, and what they are.
+    """Faces of a building by material, and counts of added details.
 
     Attributes:
         quads: material -> (K, 4, 3) arrays [m].
         triangles: material -> (M, 3, 3) arrays [m].
-        counts: what was added by lot.
+        counts: kind of detail added by lot -> number.
     """
 
     quads: dict[str, list[np.ndarray]] = field(default_factory=dict)
@@ -77,7 +77,7 @@ def add_facade(
     to_drive: float,
     rng: np.random.Generator,
 ) -> None:
-    """Adds all of a wall.
+    """Adds all faces of a wall.
 
     Args:
         faces: of the building.
@@ -166,7 +166,8 @@ def _add_cornice(faces: Faces, plan: FacadePlan) -> None:
 
 
 def _between(plan: FacadePlan, top: float) -> tuple[np.ndarray, np.ndarray]:
-    """Returns begin and end of what openings below a height leave of a wall."""
+    """Returns start and end of the stretches of a wall without openings below a
+    height."""
     o = plan.openings
     low = o.z0 < top + 0.05
     order = np.argsort(o.x0[low])

@@ -1,4 +1,4 @@
-"""Where a wall has windows, and which of them are doors and shops."""
+"""Plans a wall: its windows, and which of them become doors and shops."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from cns_drake.imports.dressing.wall_panels import Panel
 
 # Between the end of a wall and its first window [m].
 _MARGIN = 0.5
-# Windows keep so much off the foot and the top of their wall, and off the
-# ground [m].
+# Windows keep this distance from the foot and the top of their wall, and from
+# the ground [m].
 _FROM_FOOT, _FROM_TOP, _FROM_GROUND = 0.3, 0.12, 0.4
-# Below a roof a window may have this part of its height.
+# Below a roof a window may shrink to this part of its height.
 _LEAST_PART = 0.7
-# Probes stand so far before a wall [m].
+# Probes are this far in front of a wall [m].
 _BEFORE = 0.4
-# One door for so much of a front [m].
+# One door for each such length of a front [m].
 _DOOR_EVERY = 16.0
 _DOOR_HEIGHT = 2.2
 _DOOR_WIDTH = 1.15
@@ -27,9 +27,9 @@ _GATE_WIDTH = 2.5
 _SILL, _THRESHOLD = 0.45, 0.04
 _SHOP_HEIGHT = 2.9
 _PIER = 0.5
-# A door lies so much deeper than a window [m].
+# A door is this much deeper than a window [m].
 _DOOR_DEEPER = 0.12
-# A wall stands on the ground if it begins no higher above it [m].
+# A wall stands on the ground if it begins at most this high above it [m].
 _ON_GROUND = 0.6
 
 
@@ -43,9 +43,9 @@ class FacadePlan:
         openings: of it.
         spacing: from one window to the next [m].
         floor: height of the lowest floor in the panel [m].
-        ground: height of the ground before the panel, in it [m].
+        ground: height of the ground in front, in the panel's coordinates [m].
         top_is_free: whether nothing is built against its upper edge.
-        shop: whether its ground floor is one.
+        shop: whether its ground floor is a shop.
     """
 
     panel: Panel
@@ -63,7 +63,7 @@ class FacadePlan:
 
     @property
     def street_openings(self) -> np.ndarray:
-        """Tells which (N,) openings are on the ground floor."""
+        """Returns which (N,) openings are on the ground floor."""
         return np.asarray(self.openings.row == 0) & self.stands_on_ground
 
     def probes(self) -> np.ndarray:
@@ -74,7 +74,7 @@ class FacadePlan:
         return panel.place(x, z, _BEFORE)
 
     def without(self, is_hidden: np.ndarray) -> FacadePlan:
-        """Returns the plan without what is hidden.
+        """Returns the plan without hidden openings.
 
         Args:
             is_hidden: (N + 1,) whether something stands at the probes.
@@ -171,7 +171,7 @@ def with_doors(plan: FacadePlan) -> FacadePlan:
     half = min(width, plan.spacing - 0.3, plan.panel.length - 0.4) / 2.0
     low = max(plan.ground + _THRESHOLD, 0.0)
     high = min(low + _DOOR_HEIGHT, plan.panel.height - 0.2)
-    # Not into the windows above.
+    # A door must not reach into the windows above.
     above = o.z0[o.row > 0]
     high = min(high, float(above.min(initial=np.inf)) - 0.2)
     if high < low + 1.8:
@@ -188,7 +188,7 @@ def with_doors(plan: FacadePlan) -> FacadePlan:
 
 
 def balcony_windows(plan: FacadePlan) -> np.ndarray:
-    """Tells which (N,) windows have a balcony: every other above ground."""
+    """Returns which (N,) windows have a balcony: every other above ground."""
     o = plan.openings
     column = np.round(((o.x0 + o.x1) / 2.0 - _MARGIN) / plan.spacing - 0.5)
     count = round((plan.panel.length - 2.0 * _MARGIN) / plan.spacing)

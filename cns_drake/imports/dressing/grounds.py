@@ -26,13 +26,14 @@ from cns_drake.imports.osm_places import parts_of
 from cns_drake.imports.street_lanes import Street
 from cns_drake.imports.waypoint_drives import Drive
 
-# Sidewalks have kerbs, and are added, so near to drives [m].
+# Within this distance of drives, sidewalks get kerbs, and missing ones are
+# added [m].
 _WITHIN = 80.0
 _KERB_HEIGHT, _KERB_DEPTH = 0.12, 0.25
 _KERB: Rgb = (0.60, 0.60, 0.58)
 _PAVED: Rgb = (0.57, 0.56, 0.53)
 _SIDEWALK = 2.0
-# A street that says nothing of its sidewalks has them if it is one of these.
+# Streets of these kinds have sidewalks if their tags give no answer.
 _WITH_SIDEWALKS = (
     "primary",
     "secondary",
@@ -40,14 +41,14 @@ _WITH_SIDEWALKS = (
     "unclassified",
     "residential",
 )
-# From this part of its area on that buildings cover, a city is paved where
-# the file does not say what is there.
+# If buildings cover at least this part of a city's area, ground of unknown kind
+# is paved.
 _DENSE = 0.12
 _MM = 1000.0
 
 
 def is_dense(structures: Sequence[Imported]) -> bool:
-    """Tells whether buildings cover much of their city."""
+    """Returns whether buildings cover much of their city."""
     outlines = [
         one.structure.model.footprint
         for one in structures
@@ -122,10 +123,10 @@ def missing_sidewalks(
     streets: Sequence[Street],
     drives: Sequence[Drive],
 ) -> Iterator[Imported]:
-    """Yields sidewalks of streets near drives that say nothing of theirs.
+    """Yields sidewalks of streets near drives whose tags do not mention any.
 
     Args:
-        structures: all that ever stand, on level ground.
+        structures: those of all stages, on level ground.
         streets: of the file.
         drives: through the city.
     """
@@ -153,7 +154,8 @@ def missing_sidewalks(
     rings = np.round(triangles[:, [0, 1, 2, 0], :2], 3)
     lanes = [line.buffer(street.width / 2.0, 4) for street, line in near]
     taken = np.concatenate([shapely.polygons(rings), lanes])
-    # Whole cities take long to unite: only what is near each street counts.
+    # The union of a whole city takes long: only polygons near each street
+    # count.
     tree = STRtree(taken)
     made: list[BaseGeometry] = []
     for street, line in lacking:

@@ -13,11 +13,11 @@ from cns_drake.imports.foreign_city import Imported, Rgb, make_imported
 from cns_drake.imports.street_lanes import Street
 from cns_drake.imports.waypoint_drives import Drive
 
-# Streets so near to drives have marks, if they are so wide [m].
+# Streets get marks if they are this near to drives, and at least this wide [m].
 _WITHIN, _LEAST_WIDTH = 80.0, 6.0
 _CLASSES = ("primary", "secondary", "tertiary")
-# A dash and its gap, its width, its height above the street, and what is left
-# free before a junction beside half of the street [m].
+# Length of a dash, of its gap, its width, its height above the street, and the
+# free length before a junction besides half the street's width [m].
 _DASH, _GAP, _WIDTH, _HEIGHT, _BEFORE = 3.0, 6.0, 0.12, 0.01, 4.0
 _WHITE: Rgb = (0.86, 0.86, 0.84)
 
@@ -46,7 +46,7 @@ def lane_marks(
             middles = np.arange(_GAP, line.length - _DASH, _DASH + _GAP)
             places = shapely.line_interpolate_point(line, middles)
             free = street.width / 2.0 + _BEFORE
-            # Where there is no junction, the distance is not a number.
+            # Without junctions the distance is NaN.
             kept = ~(shapely.distance(places, junctions) <= free)
             dashes = [_dash(line, s) for s in middles[kept].tolist()]
             if dashes:
@@ -60,7 +60,7 @@ def lane_marks(
 
 
 def _junctions(streets: Sequence[Street]) -> shapely.MultiPoint:
-    """Returns where more than two ends of streets meet."""
+    """Returns the places where more than two ends of streets meet."""
     ends: Counter[int] = Counter()
     places = {}
     for street in streets:

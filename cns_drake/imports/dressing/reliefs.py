@@ -11,8 +11,8 @@ from shapely.geometry import Polygon, box
 from cns_drake.city.geometry.triangulation import triangulate
 from cns_drake.imports.dressing.wall_panels import Panel
 
-# An opening keeps so much off the edge of a panel that is no rectangle, and
-# a frame is so wide [m].
+# Distance of openings from the edge of a panel that is no rectangle, and width
+# of a frame [m].
 _BESIDE = 0.1
 _FRAME = 0.09
 # What is not cut into a panel lies so far before it [m].
@@ -37,8 +37,7 @@ class Openings(NamedTuple):
     """Rectangles of N openings in a panel.
 
     Attributes:
-        row: (N,) its number; those of a row do not overlap rows above or
-            below.
+        row: (N,) number of its row; rows do not overlap one another.
         x0, x1, z0, z1: (N,) limits in the panel's coordinates [m].
         depth: (N,) [m].
         is_door: (N,) whether it is closed by a door, and not by glass.
@@ -53,7 +52,7 @@ class Openings(NamedTuple):
     is_door: np.ndarray
 
     def chosen(self, which: np.ndarray) -> Openings:
-        """Returns those that a mask or an order (N,) names."""
+        """Returns the openings of a mask or an index array (N,)."""
         return Openings(*(values[which] for values in self))
 
 
@@ -62,9 +61,9 @@ class OpenedWall(NamedTuple):
 
     Attributes:
         quads: (K, 4, 3) fronts and reveals of the wall [m].
-        triangles: (M, 3, 3) what else there is of it [m].
+        triangles: (M, 3, 3) the other faces of the wall [m].
         backs: (N, 4, 3) panes and doors [m].
-        openings: (N,) that were cut.
+        openings: (N,) the openings that were cut.
     """
 
     quads: np.ndarray
@@ -125,7 +124,7 @@ def _quads(
 
     Args:
         panel: the wall.
-        faces: (3, F, 4) which of the limits their corners have.
+        faces: (3, F, 4) index of the limit at each corner.
         limits: x0, x1, z0, z1 and the distance outwards, (N,) or one [m].
     """
     values = np.stack(
@@ -233,7 +232,8 @@ def _wall_between(
 def _fitting(
     panel: Panel, openings: Openings
 ) -> tuple[Openings, tuple[float, float, float, float]] | None:
-    """Returns openings whose common rectangle lies in a panel, and that."""
+    """Returns openings whose bounding rectangle is in a panel, and that
+    rectangle."""
     outline = shapely.buffer(panel.whole(), _EXACT, join_style="mitre")
     while len(openings.row):
         found = (

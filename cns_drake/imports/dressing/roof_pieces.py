@@ -1,4 +1,4 @@
-"""What is added to roofs: equipment on flat ones, chimneys on others."""
+"""Details of roofs: equipment on flat ones, chimneys on others."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from cns_drake.imports.dressing.styles import Style, Use
 from cns_drake.imports.dressing.upper_sides import UpperSides
 from cns_drake.imports.dressing.wall_panels import unit_normals
 
-# A roof is level where its unit normal is that near to upright; level parts
-# of one height differ by less [m].
+# A roof is level if the z of its unit normal is at least the first; level parts
+# of one height differ by less than the second [m].
 _LEVEL, _SAME_HEIGHT = 0.999, 0.1
 _FLAT_PART = 0.6
 _LEAST_ROOF = 40.0  # [m^2]
-# For each piece of equipment so much roof [m^2], and at most so many.
+# Roof area for each piece of equipment [m^2], and the most pieces.
 _ROOF_EACH, _MOST = 90.0, 6
 _ITEMS = {
     Use.FLATS: "stair_house vents skylight tank vents dish",
@@ -35,15 +35,15 @@ _ITEMS = {
 }
 _CHIMNEYS = (Use.HOUSE, Use.FLATS, Use.PUBLIC)
 _BRICK = (0.45, 0.27, 0.22)
-# A chimney's foot lies so far below the ridge; it is this much smaller than
-# the shared one.
+# Depth of a chimney's foot below the ridge, and its scale against the shared
+# mesh.
 _BELOW_RIDGE, _CHIMNEY_SCALE = 0.35, 0.6
-# Points of a ridge are no lower than its highest by more [m].
+# Points of a ridge are at most this much below its highest one [m].
 _RIDGE = 0.15
 
 
 def is_flat_roof(roof: np.ndarray) -> bool:
-    """Tells whether most of a roof (M, 3, 3) is level."""
+    """Returns whether most of a roof (M, 3, 3) is level."""
     a, b, c = np.moveaxis(roof, 1, 0)
     normal = np.cross(b - a, c - a)
     above = np.abs(normal[:, 2])
@@ -58,12 +58,12 @@ def roof_pieces(
     rng: np.random.Generator,
     name: str,
 ) -> Model:
-    """Returns what stands on a roof, in the world.
+    """Returns the equipment of a roof, in the world.
 
     Args:
         roof: (M, 3, 3) its upper sides [m].
         style: of the building.
-        is_flat: whether its roof is.
+        is_flat: whether its roof is flat.
         rng: of the building.
         name: of the structure.
     """

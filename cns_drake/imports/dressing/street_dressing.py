@@ -1,4 +1,4 @@
-"""Small things along streets: the file's at their place, others by lot."""
+"""Small things along streets: those of the file, and others by lot."""
 
 from __future__ import annotations
 
@@ -25,11 +25,12 @@ from cns_drake.imports.lots import lot_generator
 from cns_drake.imports.street_lanes import Street
 from cns_drake.imports.waypoint_drives import Drive
 
-# From the middle of a drive to all that stands, at least [m].
+# Least distance of all objects from the middle of a drive [m].
 _FROM_DRIVE = 1.7
-# Things and cars farther from all drives are left aside [m].
+# Things and cars farther from all drives are left out [m].
 _THINGS_WITHIN, _ROWS_WITHIN = 100.0, 70.0
-# A thing on a carriageway is moved beside it, so far from its edge [m].
+# A thing on a carriageway is moved beside it, to this distance from its edge
+# [m].
 _BESIDE = 0.6
 _FROM_WALL, _BETWEEN = 0.25, 0.2
 # Cars: distances in a row, part of the places that are taken, distance of
@@ -47,7 +48,8 @@ _FORMS = {
     "van": 2.0,
     "box_truck": 0.3,
 }
-# By lot: a lamp every so many metres, unless the file has one so near.
+# Lamps by lot: their distance, and the range in which a lamp of the file
+# replaces one [m].
 _LAMP_EVERY, _LAMP_NEAR = 27.0, 35.0
 _SMALL_EVERY = 22.0
 _SMALL = {
@@ -61,7 +63,7 @@ _SMALL = {
     "sign_round": 2.0,
     "sign_rectangular": 1.0,
 }
-# Half of a street whose width is not known: cars pass what stands there [m].
+# Half of the width of a street of unknown width [m].
 _HALF_STREET = 3.9
 _NO_PARKING = (
     "no",
@@ -83,12 +85,12 @@ _WITHOUT_CARS = ("service", "track", "motorway", "trunk", "living_street")
 
 @dataclass
 class StreetThings:
-    """What was placed.
+    """The placed things.
 
     Attributes:
         structures: in the world.
-        from_file: names of those of the file.
-        sources: of the file's things that have a place.
+        from_file: names of structures from the file.
+        sources: sources of the file's things that were placed.
         by_file, by_lot: kind -> how many.
         no_room: how many of the file's things would stand in the way of a
             drive, in a wall or in each other.
@@ -110,16 +112,14 @@ def dress_streets(
     ground: Ground,
     seed: int,
 ) -> StreetThings:
-    """Returns what stands along the streets of a city.
+    """Returns the small things along the streets of a city.
 
     Args:
-        structures: all that ever stand.
+        structures: those of all stages.
         things: of the file.
         streets: of the file.
-        drives: which nothing stands in the way of; without any nothing is
-            placed.
-        ground: below the city.
-        seed: of the lot.
+        drives: kept free of things; without any nothing is placed. ground:
+        below the city. seed: of the lot.
     """
     found = StreetThings()
     if not drives:
@@ -150,7 +150,7 @@ def _rows(
 ) -> Iterator[tuple[str, LineString, float, tuple[bool, bool]]]:
     """Yields name, middle, half width, and whether cars park, of streets.
 
-    On the right, and on the left.
+    Cars may park on the right, and on the left.
     """
     for street in streets:
         may_park = (may_park_on("right", street), may_park_on("left", street))
@@ -163,7 +163,7 @@ def _rows(
 
 
 def may_park_on(side: str, street: Street) -> bool:
-    """Tells whether cars may park on the `left` or `right` of a street.
+    """Returns whether cars may park on the `left` or `right` of a street.
 
     https://wiki.openstreetmap.org/wiki/Street_parking
     """
@@ -178,7 +178,7 @@ def may_park_on(side: str, street: Street) -> bool:
 
 
 class _Placing:
-    """Where there is room."""
+    """The room for things: what is taken, and by what."""
 
     def __init__(
         self,
@@ -214,7 +214,7 @@ class _Placing:
         self.lamps: list[tuple[float, float]] = []
 
     def is_near(self, line: np.ndarray, distance: float) -> bool:
-        """Tells whether a line (N, 2) is near a drive."""
+        """Returns whether a line (N, 2) is near a drive."""
         return bool(shapely.dwithin(LineString(line), self.paths, distance))
 
     def place(
@@ -243,7 +243,7 @@ class _Placing:
         at = np.array([[x, y]])
         z = float(self._ground.height(at)[0])
         paved = float(self._paved.heights(at)[0])
-        # What lies far from the guessed ground is a bridge, or a roof.
+        # A street far above the guessed ground is a bridge, or a roof.
         z = round(paved if abs(paved - z) < 1.0 else z, 3)
         structure = Structure(
             name, builder.semantic_class, model, (x, y, z), round(yaw, 4)
@@ -416,7 +416,7 @@ def _light(
                 for x, y in placing.lamps
             ):
                 break
-            # Its arm reaches over the street.
+            # The lamp's arm reaches over the street.
             yaw += side * np.pi / 2.0
             lamp = f"lamp_post_{name}_{int(s)}"
             if placing.place(lamp, "lamp_post", xy, yaw, rng):
@@ -432,7 +432,7 @@ def _furnish(
     half: float,
     rng: np.random.Generator,
 ) -> None:
-    """Sets small things along a street of a file that has none at all."""
+    """Sets small things along a street if the file has none at all."""
     s = float(rng.uniform(3.0, 12.0))
     while s < line.length:
         side = 1.0 if rng.random() < 0.5 else -1.0

@@ -1,4 +1,4 @@
-"""What a building looks like: by its tags, and else by lot."""
+"""The look of a building: from its tags, or else by lot."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from cns_drake.imports.osm_lengths import count
 
 
 class Use(Enum):
-    """What a building is used for."""
+    """The use of a building."""
 
     HOUSE = "house"
     FLATS = "flats"
@@ -27,7 +27,7 @@ class Use(Enum):
     SHED = "shed"
 
 
-# Words of tags and attributes -> use, the more telling first.
+# Words of tags and attributes -> use, the more specific first.
 _USES = (
     (Use.CHURCH, "church cathedral chapel mosque synagogue temple worship"),
     (Use.SHED, "garage garages carport shed hut roof service barn cabin"),
@@ -144,9 +144,9 @@ _MATERIALS: Mapping[str, Rgb] = {
     "grass": (0.38, 0.50, 0.28),
     "thatch": (0.55, 0.46, 0.32),
 }
-# Built before this year a house is of the old kind, after the other new.
+# A house is old if built before the first year, and new if after the second.
 _OLD, _NEW = 1930, 1965
-# Storeys that levels of a tag may give [m].
+# Range of storey heights that a tag's levels may lead to [m].
 _STOREYS = (2.3, 6.0)
 _LARGE_HOUSE, _HIGH_HOUSE = 260.0, 9.5  # [m^2], [m]
 _HIGH_BLOCK = 26.0  # [m]
@@ -158,7 +158,7 @@ class Style:
     """How a building is dressed; lengths in metres.
 
     Attributes:
-        use: what it is used for.
+        use: the use of the building.
         storey: height of a storey.
         pitch: distance of windows from middle to middle.
         width, sill, height: of a window; its sill from the floor.
@@ -168,7 +168,7 @@ class Style:
         balconies: whether every other window has a balcony.
         plinth: its height; 0 for none.
         cornice: its height; 0 for none.
-        by_tag: which of these the file says.
+        by_tag: the fields that come from the file.
     """
 
     use: Use
@@ -208,7 +208,7 @@ _SIZES = {
 def building_use(
     tags: Mapping[str, str], area: float, height: float
 ) -> tuple[Use, bool]:
-    """Returns what a building is used for, and whether its tags say so.
+    """Returns the use of a building, and whether it comes from its tags.
 
     Args:
         tags: of the building, or attributes.
@@ -255,16 +255,15 @@ def make_style(
     is_flat: bool,
     rng: np.random.Generator,
 ) -> Style:
-    """Draws what the tags of a building leave open.
+    """Draws the style of a building; its tags take precedence.
 
     Args:
         tags: of the building, or attributes; they win.
-        year: in which it was built, if it is known.
+        year: in which it was built, if known.
         area: of its footprint, about [m^2].
         height: of its walls [m].
         is_flat: whether its roof is.
-        rng: of the building; the same number of draws whatever the tags
-            say.
+        rng: of the building; the number of draws does not depend on the tags.
     """
     use, is_told = building_use(tags, area, height)
     by_tag = {"use"} if is_told else set()
@@ -327,7 +326,7 @@ def _cornice(use: Use, is_flat: bool, is_old: bool, chance: float) -> float:
     if use in (Use.SHED, Use.INDUSTRIAL):
         return 0.0
     if not is_flat:
-        return 0.12  # A gutter.
+        return 0.12  # It is a gutter.
     return round((0.35 if is_old else 0.18) + 0.2 * chance, 2)
 
 

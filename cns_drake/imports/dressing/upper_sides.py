@@ -1,4 +1,4 @@
-"""What of buildings is seen from above, to find what stands where."""
+"""The upper sides of buildings, to find their height at a place."""
 
 from __future__ import annotations
 
@@ -8,30 +8,30 @@ from shapely import STRtree
 
 from cns_drake.imports.dressing.wall_panels import unit_normals
 
-# Unit normals of faces that look upwards rise by more.
+# The z of a unit normal is greater than this on faces that look upwards.
 _UPWARDS = 0.05
 
 
 def looks_up(triangles: np.ndarray) -> np.ndarray:
-    """Tells which of the triangles (M, 3, 3) look upwards."""
+    """Returns which of the triangles (M, 3, 3) look upwards."""
     return np.asarray(unit_normals(triangles)[:, 2] > _UPWARDS)
 
 
 def turned_up(triangles: np.ndarray) -> np.ndarray:
-    """Returns triangles (M, 3, 3), those that look downwards turned round."""
+    """Returns triangles (M, 3, 3) with those that look downwards reversed."""
     is_down = unit_normals(triangles)[:, 2] < 0.0
     return np.where(is_down[:, None, None], triangles[:, ::-1], triangles)
 
 
 class UpperSides:
-    """The upper sides of solids, and how high they are at a place."""
+    """The upper sides of solids, with their height at any place."""
 
     def __init__(self, triangles: np.ndarray):
         """Collects the upper sides.
 
         Args:
-            triangles: (M, 3, 3) of solids; those that do not look upwards
-                are left aside [m].
+            triangles: (M, 3, 3) of solids; those that do not look upwards are
+                left out [m].
         """
         self._triangles = triangles[looks_up(triangles)]
         self._normals = unit_normals(self._triangles)
@@ -49,5 +49,5 @@ class UpperSides:
         return highest
 
     def hides(self, points: np.ndarray) -> np.ndarray:
-        """Tells which of the points (N, 3) lie below an upper side."""
+        """Returns which of the points (N, 3) are below an upper side."""
         return np.asarray(self.heights(points[:, :2]) > points[:, 2])

@@ -1,4 +1,4 @@
-"""Which walls of an imported city its drives see, and from how near."""
+"""The walls that drives through an imported city see, and their distance."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from cns_drake.imports.dressing.wall_panels import Panel
 from cns_drake.imports.import_ground import Ground
 from cns_drake.imports.waypoint_drives import Drive
 
-# Of places on drives, for what they see of a wall [m].
+# Distance of the places on drives from which walls are looked at [m].
 _SPACING = 4.0
-# Eyes are so high above the ground [m].
+# Height of the eyes above the ground [m].
 _EYES = 2.0
-# A wall is looked at from its nearest places, and from some of the others.
+# A wall is looked at from this many nearest places, and this many others.
 _NEAREST, _OTHERS = 8, 24
-# It is seen if one of these parts of its length and height is, so far before
-# it, a little below its top [m].
+# A wall is visible if a probe is: at these parts of its length and height, this
+# far in front, and a little below its top [m].
 _PARTS = np.array([(x, z) for x in (0.04, 0.5, 0.96) for z in (0.3, 1.0)])
 _BEFORE, _BELOW_TOP = 0.3, 0.3
 
@@ -41,8 +41,8 @@ class DriveViews:
         Args:
             drives: at least one.
             ground: below them.
-            solids: (M, 3, 3) triangles of what hides other things at all
-                stages [m].
+            solids: (M, 3, 3) triangles that hide other things at all stages
+                [m].
         """
         paths = [LineString(drive.path) for drive in drives]
         self._xy = shapely.get_coordinates(shapely.segmentize(paths, _SPACING))
@@ -57,7 +57,7 @@ class DriveViews:
             TriangleMesh(self._scene, (solids - self._middle).astype("f4"))
 
     def are_near(self, limits: np.ndarray, distance: float) -> np.ndarray:
-        """Tells which (N,) boxes have a place nearby.
+        """Returns which (N,) boxes have a place nearby.
 
         Args:
             limits: (N, 2, 2) least and greatest x and y [m].
@@ -68,13 +68,14 @@ class DriveViews:
         return np.asarray(self._tree.query(middles)[0] <= reach + distance)
 
     def distances(self, panels: Sequence[Panel], most: float) -> np.ndarray:
-        """Returns how far (N,) the nearest place is that sees a panel [m].
+        """Returns the distance (N,) of the nearest place that sees each panel
+        [m].
 
-        That of a panel which no place sees within a distance is infinite.
+        The distance is infinite if no place within `most` sees the panel.
 
         Args:
             panels: N walls.
-            most: the distance [m].
+            most: the greatest distance [m].
         """
         pairs = [self._looks(panel, most) for panel in panels]
         counts = [len(distance) for _, distance in pairs]
@@ -92,7 +93,8 @@ class DriveViews:
     def _looks(
         self, panel: Panel, most: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Returns places (K,) before a panel, and how far it is (K,) [m]."""
+        """Returns places (K,) in front of a panel, and their distances (K,)
+        [m]."""
         middle = panel.origin[:2] + panel.along * panel.length / 2.0
         near = self._tree.query_ball_point(middle, most + panel.length / 2.0)
         index = np.array(near, dtype=int)
@@ -108,7 +110,8 @@ class DriveViews:
         return index[usable], distance[usable]
 
     def _is_seen(self, probes: np.ndarray, eyes: np.ndarray) -> np.ndarray:
-        """Tells which (K,) sets of probes (K, P, 3) eyes (K, 3) see [m]."""
+        """Returns which (K,) sets of probes (K, P, 3) are seen from eyes (K, 3)
+        [m]."""
         if self._scene is None:
             return np.ones(len(eyes), dtype=bool)
         starts = np.repeat(eyes - self._middle, probes.shape[1], axis=0)

@@ -12,14 +12,14 @@ import shapely
 from shapely.geometry import Polygon, box
 from shapely.geometry.base import BaseGeometry
 
-# A face whose unit normal rises or falls by less is upright.
+# A face is upright if the z of its unit normal is below this.
 _UPRIGHT = 0.02
 # Triangles of one wall have normals whose product is at least this (1 deg).
 _SAME_PLANE = float(np.cos(np.radians(1.0)))
 _MM = 1000.0
-# Of a wall's area, as much may be missing from a rectangle [m^2].
+# A wall is a rectangle if at most this much of its area is missing [m^2].
 _NO_AREA = 0.01
-# A wall that bends by more is left as it is [m].
+# A wall that is farther from its plane is left as it is [m].
 _BENT = 0.05
 
 
@@ -33,8 +33,8 @@ class Panel:
         along: (2,) unit vector to the right, seen from outside.
         length, height: of its bounding rectangle [m].
         outline: polygon in x and z [m]; None if it fills the rectangle.
-        triangles: (M, 3, 3) that it was found in [m].
-        is_plane: whether these lie in one plane.
+        triangles: (M, 3, 3) its original triangles [m].
+        is_plane: whether these are in one plane.
     """
 
     building: int
@@ -84,7 +84,7 @@ def unit_normals(triangles: np.ndarray) -> np.ndarray:
 
 
 def is_upright(triangles: np.ndarray) -> np.ndarray:
-    """Tells which of the triangles (M, 3, 3) are walls."""
+    """Returns which of the triangles (M, 3, 3) are walls."""
     normals = unit_normals(triangles)
     return normals.any(axis=1) & (np.abs(normals[:, 2]) < _UPRIGHT)
 
@@ -98,8 +98,8 @@ def find_panels(
     Args:
         walls: of each building, upright triangles (M, 3, 3) that look
             outwards [m].
-        is_wanted: tells which (N,) panels are, of the least and the greatest
-            x and y of each, (N, 2, 2) [m]; all if None.
+        is_wanted: maps the least and greatest x and y of N panels, (N, 2, 2)
+            [m], to which (N,) are wanted; all if None.
     """
     triangles = np.concatenate([np.zeros((0, 3, 3)), *walls])
     building = np.repeat(np.arange(len(walls)), [len(w) for w in walls])
@@ -130,7 +130,7 @@ def find_panels(
 def _connected(
     triangles: np.ndarray, normals: np.ndarray, building: np.ndarray
 ) -> np.ndarray:
-    """Returns the number of the panel (M,) that each triangle belongs to."""
+    """Returns the number (M,) of each triangle's panel."""
     corners = np.rint(triangles * _MM).astype(np.int64).reshape(-1, 3)
     keyed = np.column_stack([np.repeat(building, 3), corners])
     _, vertex = np.unique(keyed, axis=0, return_inverse=True)
@@ -159,7 +159,7 @@ def _panel(building: int, triangles: np.ndarray, normals: np.ndarray) -> Panel:
     along = np.array([-outward[1], outward[0]])
     x = (corners[:, :2] - corners[0, :2]) @ along
     start = corners[0, :2] + x.min() * along
-    # In the middle of what is not quite plane.
+    # The plane is in the middle of triangles that are not quite plane.
     aside = (corners[:, :2] - start) @ outward
     start = start + outward * float(aside.mean())
     origin = np.array([*start, corners[:, 2].min()])

@@ -1,4 +1,4 @@
-"""An imported city, dressed, and what of it is from the file."""
+"""Dresses a whole imported city, and records the origin of each part."""
 
 from __future__ import annotations
 
@@ -28,15 +28,14 @@ from cns_drake.imports.waypoint_drives import Drive
 
 @dataclass(frozen=True)
 class Dressing:
-    """What became of a city.
+    """A dressed city.
 
     Attributes:
         city: dressed.
         origins: name of a structure -> `dressed` or `lot`; all others are as
             the file has them.
-        facts: what came from the file and what by lot, to be written.
-        is_paved: whether the ground is, where the file does not say what it
-            is.
+        facts: counts of parts from the file and by lot, to be written.
+        is_paved: whether ground of unknown kind is paved.
     """
 
     city: StagedCity
@@ -45,7 +44,7 @@ class Dressing:
     is_paved: bool
 
     def ground(self, bottom: Sequence[Structure]) -> list[Structure]:
-        """Returns the guessed ground as it looks."""
+        """Returns the guessed ground with its class and colour."""
         return [paved(one) if self.is_paved else one for one in bottom]
 
 
@@ -59,12 +58,12 @@ def dress_city(
     """Dresses buildings and streets.
 
     Args:
-        staged: what stands when.
-        city: what the file holds; its faults no longer count what has a
-            place.
+        staged: the structures of each stage.
+        city: the content of the file; things that get a place are removed from
+            its faults.
         drives: through it.
         ground: below it.
-        seed: of what is drawn by lot.
+        seed: of the random draws.
 
     Raises:
         InputError: if there are more structures than a map may have.

@@ -1,4 +1,4 @@
-"""Lanes that are carried over others, as decks that are seen from below."""
+"""Decks of bridges: lanes above other lanes, visible from below."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from cns_drake.imports.opendrive.lane_kinds import lane_class
 
 _DEPTH = np.array([0.0, 0.0, 0.8])  # [m]
 _LEAST_AREA = 1e-6
-# More than the width of a kerb [m].
+# Wider than a kerb [m].
 _END = 0.2
 
 
 def bridge_decks(bands: Sequence[LaneBand]) -> Iterator[Structure]:
-    """Yields the upper sides of bridges by class, and what is below them."""
+    """Yields the upper sides of bridges by class, and their undersides."""
     of_road: dict[tuple[str, str], list[np.ndarray]] = defaultdict(list)
     for band in bands:
-        # What carries no lane is closed all the same.
+        # Parts without a lane are closed as well.
         kind = lane_class(band.kind) or "other-ground"
         left, right = band.inner, band.outer
         if band.lane.number > 0:

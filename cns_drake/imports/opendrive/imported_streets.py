@@ -19,8 +19,8 @@ from cns_drake.imports.opendrive.lane_kinds import is_raised, lane_class
 _SEAM = 0.05
 # Vertices closer to an outline than this are dropped [m].
 _SIMPLIFY = 0.005
-# What lanes enclose beside a junction is part of it, if it is no larger [m^2];
-# larger ones are islands.
+# Ground that lanes enclose beside a junction is part of it up to this size
+# [m^2]; larger ground is an island.
 _LARGEST_GAP = 60.0
 _LEVEL = ("road", "parking", "sidewalk", "other-ground")
 _LEAST_AREA = 1e-6
@@ -29,15 +29,15 @@ _PATH_RGB = (0.52, 0.42, 0.38)
 
 
 class ImportedStreets:
-    """Areas of lanes that lie on the ground, by what they are.
+    """Areas of lanes on the ground, by kind.
 
     Where two overlap, road comes before parking, that before other ground,
     and sidewalks last.
 
     Attributes:
         junctions: the area of all junctions [m].
-        coverings: parts of the carriageway that are no road.
-        margins: lanes of nothing, to be kept free.
+        coverings: parts of the carriageway that are not road.
+        margins: lanes without a use, which stay free.
     """
 
     def __init__(self, bands: Sequence[LaneBand]):
@@ -92,11 +92,11 @@ class ImportedStreets:
         self.margins = _multi(snap(margins))
 
     def carriageway(self) -> MultiPolygon:
-        """Returns all lanes that are as high as the road."""
+        """Returns the area of all lanes at the height of the road."""
         return self._carriageway
 
     def lane_area(self) -> MultiPolygon:
-        """Returns the lanes that are road."""
+        """Returns the area of the lanes that are road."""
         return self._lanes
 
     def sidewalks(self) -> MultiPolygon:
@@ -124,8 +124,8 @@ def lane_polygon(band: LaneBand) -> BaseGeometry:
 
 
 def _gaps(lanes: BaseGeometry) -> list[Polygon]:
-    """Returns what lanes enclose and leave open, and no island is."""
-    # Lanes that only touch enclose something too.
+    """Returns the gaps that lanes enclose, without islands."""
+    # Lanes that only touch enclose ground as well.
     with np.errstate(divide="ignore", invalid="ignore"):
         grown = lanes.buffer(_SEAM, join_style="mitre")
     return [
@@ -138,7 +138,7 @@ def _gaps(lanes: BaseGeometry) -> list[Polygon]:
 
 def _closed(parts: Iterable[BaseGeometry]) -> BaseGeometry:
     """Returns a union without slits between neighbours."""
-    # GEOS divides by zero where edges fold back, which does no harm.
+    # GEOS divides by zero at edges that fold back; the result is right.
     with np.errstate(divide="ignore", invalid="ignore"):
         grown = shapely.union_all(
             [part.buffer(_SEAM, join_style="mitre") for part in parts]

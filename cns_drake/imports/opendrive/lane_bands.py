@@ -16,14 +16,15 @@ from cns_drake.imports.opendrive.road_model import (
     LaneSection,
 )
 
-# Between two places on a border at most, and how far chords of the reference
-# line, widths and heights may leave them: borders are then true to 5 mm [m].
+# Greatest distance of two places on a border, and greatest error of chords of
+# the reference line, of widths and of heights: borders are then true to 5 mm
+# [m].
 _SPACING = 2.0
 _SAG = 0.002
 _MOST_STATIONS = 200_000
-# No lane lies farther off, nor higher [m].
+# No lane is farther from the reference line, or higher [m].
 _FARTHEST, _HIGHEST = 50_000.0, 10_000.0
-# Places are told apart by so much, from the joints inwards [m].
+# Places nearer to each other than this, counted from the joints, are one [m].
 _INWARDS = 1e-6
 
 
@@ -32,11 +33,12 @@ class LaneBand:
     """A lane of a section, from end to end.
 
     Attributes:
-        road, section, lane: whose it is; section by its place in the road.
-        kind: type of the lane; "enclosed" for one of nothing that has others
-            farther outside, as where a road is closed to traffic.
-        inner, outer: (N, 3) places on its edges, in the order of the road;
-            two are the same where a step in its width is [m].
+        road, section, lane: its road, the number of its section there, its
+            lane.
+        kind: type of the lane; "enclosed" for a lane of type none with others
+            farther outside, as on a road that is closed to traffic.
+        inner, outer: (N, 3) places on its edges, in the order of the road; two
+            are the same at a step in its width [m].
         middle: (N, 3) between them.
         heading, roll, grade: (N,) of the road there [rad, rad, 1].
         s: (N,) along the road [m].
@@ -110,7 +112,7 @@ def lane_bands(road: ImportedRoad) -> Iterator[LaneBand]:
 def _check_place(road: ImportedRoad, lane: int, edge: np.ndarray) -> None:
     for reach, axes in ((_FARTHEST, edge[:, :2]), (_HIGHEST, edge[:, 2])):
         farthest = float(np.abs(axes).max())
-        # Not a number is beyond all.
+        # NaN counts as too far.
         if not farthest <= reach:
             raise ValueError(
                 f"road {road.name}: lane {lane}: {farthest:g} m off, more than"
@@ -133,9 +135,9 @@ def _kind(road: ImportedRoad, section: LaneSection, lane: Lane) -> str:
 def _stations(
     road: ImportedRoad, section: LaneSection
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns places along a section, and where their pieces begin in the file.
+    """Returns places along a section, and the starts of their pieces.
 
-    Both sides of each joint are there.
+    A joint is there twice, once for each side.
     """
     cubics: list[Cubics] = [
         road.elevation,

@@ -19,21 +19,22 @@ from cns_drake.imports.waypoint_drives import (
     steerable_drive,
 )
 
-# Lanes follow one another where the end of one is so near the beginning of
-# the other, and they point the same way [m, rad].
+# A lane follows another if its start is this near to the other's end, and its
+# heading differs by less than this [m, rad].
 _NEAR = 0.6
 _ASTRAY = np.radians(20.0)
-# A car needs so much at the ends of a lane [m].
+# Least width at the ends of a lane for a car [m].
 _LEAST_WIDTH = 1.8
 _LEAST_LENGTH = 0.05
 # Between waypoints [m].
 _SPACING = 2.0
-# Drives are straightened over so many waypoints to both sides, as tried.
+# Numbers of waypoints to both sides over which drives are smoothed, tried in
+# turn.
 _SMOOTHING = (0, 1, 2, 3)
 
 
 class BandGraph(WayGraph):
-    """Lanes of sections as they are driven, each linked to those after it."""
+    """Lanes of sections in driving direction, each with its successors."""
 
     def __init__(self, bands: Sequence[LaneBand]):
         self._bands = [band for band in bands if _is_driven(band)]
@@ -42,16 +43,16 @@ class BandGraph(WayGraph):
             np.linalg.norm(np.diff(line, axis=0), axis=1).sum()
             for line in self._lines
         ]
-        # What a drive uses up: a road, or a lane of a junction.
+        # The key that a drive may use once: a road, or a lane of a junction.
         self._roads = np.array([band.road.name for band in self._bands])
         super().__init__(np.array(lengths), *self._link())
 
     def driven(self) -> list[tuple[LaneBand, np.ndarray]]:
-        """Returns each lane with its middle (N, 3) as it is driven [m]."""
+        """Returns each lane with its middle (N, 3) in driving direction [m]."""
         return list(zip(self._bands, self._lines, strict=True))
 
     def followers(self) -> list[tuple[int, int]]:
-        """Returns numbers of lanes of which the second follows the first."""
+        """Returns pairs of lane numbers; the second lane follows the first."""
         before, after = self._link()
         return list(zip(before.tolist(), after.tolist(), strict=True))
 
@@ -143,8 +144,7 @@ def _heading(two: np.ndarray) -> float:
 
 
 def _smoothed(points: np.ndarray, window: int) -> np.ndarray:
-    """Returns the means (N, 3) over points to both sides, as many as there
-    are."""
+    """Returns the means (N, 3) over points to both sides, fewer at the ends."""
     count = len(points)
     total = np.concatenate([np.zeros((1, 3)), np.cumsum(points, axis=0)])
     at = np.arange(count)
@@ -155,7 +155,7 @@ def _smoothed(points: np.ndarray, window: int) -> np.ndarray:
 
 
 def _forwards(line: np.ndarray) -> np.ndarray:
-    """Drops points that lie behind those before them, as at rough joints."""
+    """Drops points that go backwards, as at rough joints."""
     kept = [line[0], line[1]]
     for point in line[2:]:
         step, last = (point - kept[-1])[:2], (kept[-1] - kept[-2])[:2]

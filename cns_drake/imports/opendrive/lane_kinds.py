@@ -1,4 +1,4 @@
-"""What the types of lanes are, for cars and for the eye."""
+"""Types of lanes: whether cars drive on them, and their classes."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ _LEAST_KERB = 0.03
 
 
 def lane_class(kind: str) -> str | None:
-    """Returns the semantic class of a lane, None for a lane of nothing."""
+    """Returns the semantic class of a lane, None for type none."""
     return None if kind == "none" else _CLASSES.get(kind, "road")
 
 
 def is_raised(kind: str, height: float) -> bool:
-    """Tells whether a lane stands a kerb above the road.
+    """Returns whether a lane is a kerb above the road.
 
     Args:
         kind: its type.
-        height: of its inner edge above the road, as the file tells [m].
+        height: of its inner edge above the road in the file [m].
     """
     return kind in _RAISED or height >= _LEAST_KERB

@@ -1,4 +1,4 @@
-"""What traffic follows of the lanes of an imported road network."""
+"""Lanes and sidewalks of an imported road network, for traffic."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from cns_drake.traffic.lane_graph import resampled
 from cns_drake.traffic.lane_joining import DirectedLane, join_lanes
 from cns_drake.traffic.walkways import Walkway
 
-# Where a file has no limit [m/s].
+# Speed limit of roads without one [m/s].
 _LIMIT = 13.9
 _SIDEWALKS = frozenset({"sidewalk", "walking"})
-# Walkers keep so far from the edges of a sidewalk, and are so far from its
-# middle at most [m].
+# Walkers' least distance from the edges of a sidewalk, and greatest from its
+# middle [m].
 _MARGIN, _MOST_HALF_WIDTH = 0.45, 1.05
 _LEAST_HALF_WIDTH, _SHORTEST = 0.3, 5.0
 
 
 def lanes_for_traffic(bands: Sequence[LaneBand], kerb: float) -> str | None:
-    """Returns the text of a file of lanes, None where no vehicle can go on.
+    """Returns the text of a file of lanes; None if no vehicle can drive on.
 
     Args:
         bands: lanes of the whole network.

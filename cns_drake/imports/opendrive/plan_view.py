@@ -12,11 +12,11 @@ from typing import Protocol
 
 import numpy as np
 
-# Of Gauss and Legendre's rule, exact on a panel to 1e-14 m.
+# Number of nodes of Gauss and Legendre's rule; exact on a panel to 1e-14 m.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
-# By which the heading of a spiral turns on a panel, at most [rad].
+# Greatest turn of a spiral's heading on a panel [rad].
 _TURN = 0.5
-# A road that turns more has a wrong number [rad].
+# A road that turns more is a fault of the file [rad].
 _MOST_TURN = 10_000.0
 _PANELS = 64
 _NEWTON_STEPS = 8
@@ -117,10 +117,10 @@ class Cubic:
         Args:
             u, v: four coefficients each, of p^0 first [m].
             last: p at the end.
-            length: of the curve, as told [m].
+            length: of the curve in the file [m].
             by_parameter: whether p is the distance itself.
-            stretched: whether the whole curve is as long as told, however
-                long it is; else it ends where this length is reached.
+            stretched: whether the whole curve is scaled to that length; else it
+                ends where the length is reached.
         """
         self._u, self._v = (np.polynomial.Polynomial(one) for one in (u, v))
         self._du, self._dv = self._u.deriv(), self._v.deriv()
@@ -152,7 +152,7 @@ class Cubic:
         return size / 2.0 * (self._speed(p) @ _WEIGHTS)
 
     def _parameter(self, arc: np.ndarray) -> np.ndarray:
-        """Returns where the curve is so long, by Newton's rule."""
+        """Returns the parameter at an arc length, by Newton's rule."""
         index = np.clip(
             np.searchsorted(self._reached, arc, side="right") - 1,
             0,
@@ -173,7 +173,7 @@ class Piece:
     """One element of a plan view.
 
     Attributes:
-        s: where it begins along the road [m].
+        s: its start along the road [m].
         x, y, heading: its first point in the world [m, rad].
         length: of it [m].
         shape: in the frame of that point.

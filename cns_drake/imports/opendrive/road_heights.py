@@ -1,4 +1,4 @@
-"""How high imported roads lie at any place."""
+"""The height of imported roads at any place."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from scipy.spatial import cKDTree
 
 from cns_drake.imports.opendrive.lane_bands import LaneBand
 
-# A height is the mean of planes through so many places nearby.
+# Number of nearby places whose planes give a height, as their mean.
 _NEIGHBOURS = 8
-# The places of a lane are so near to one another [m].
+# Distance of the places of a lane [m].
 _SPACING = 0.5
-# Nearer ones count more, but for this distance [m].
+# Nearer places count more; this distance bounds their weight [m].
 _CORE = 0.05
 # Places at a time.
 _BLOCK = 200_000
@@ -24,8 +24,8 @@ _LEVEL = 1e-9
 class RoadHeights:
     """The height of imported carriageways, continued to both sides.
 
-    Each place in the middle of a lane knows a plane, by the grade and the
-    roll of its road. The height is the mean of those nearby (Shepard's
+    Each place in the middle of a lane has a plane, from the grade and the roll
+    of its road. The height is the mean of those nearby (Shepard's
     interpolation): exact on one road, and without a step where roads that
     overlap in a junction differ.
     """
@@ -74,7 +74,7 @@ class RoadHeights:
 def _places(band: LaneBand) -> np.ndarray:
     """Returns (N, 6) places in the middle, heading, roll and grade there."""
     rows = np.column_stack([band.middle, band.heading, band.roll, band.grade])
-    # Both sides of a joint stay: what lies between them has no length.
+    # Both sides of a joint stay: the stretch between them has no length.
     steps = np.diff(band.s)
     counts = np.maximum(np.ceil(steps / _SPACING).astype(int), 1)
     first = np.repeat(np.arange(len(steps)), counts)

@@ -1,4 +1,4 @@
-"""Which lanes lie on the ground, and which are carried over others."""
+"""Divides lanes into those on the ground and those on bridges."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from scipy.spatial import cKDTree
 
 from cns_drake.imports.opendrive.lane_bands import LaneBand
 
-# A road that is so much higher than another below it is a bridge [m].
+# A road at least this much above another one is a bridge [m].
 _HEADROOM = 3.0
-# For places that lie above one another, and how far a bridge reaches beyond
-# what it crosses [m].
+# Cell size for finding places above one another, and length of a bridge beyond
+# the crossed road [m].
 _NEAR, _BEYOND = 2.5, 8.0
 _LEAST_WIDTH = 0.1
 
@@ -38,7 +38,7 @@ def split_levels(
 
 
 def _raised_places(bands: Sequence[LaneBand]) -> dict[str, np.ndarray]:
-    """Returns road -> where it passes over another, increasing [m]."""
+    """Returns road -> places where it passes over another, increasing [m]."""
     names = {band.road.name: k for k, band in enumerate(bands)}
     rows = []
     for band in bands:
@@ -49,7 +49,7 @@ def _raised_places(bands: Sequence[LaneBand]) -> dict[str, np.ndarray]:
     places = np.concatenate(rows) if rows else np.zeros((0, 5))
     if len(places) == 0 or np.ptp(places[:, 2]) < _HEADROOM:
         return {}
-    # A place on every square metre does: of each the highest and the lowest.
+    # One place for each square metre is enough: the highest and the lowest.
     tree = cKDTree(places[:, :2])
     found: dict[str, list[float]] = {}
     high = np.flatnonzero(places[:, 2] > places[:, 2].min() + _HEADROOM)
@@ -65,7 +65,7 @@ def _raised_places(bands: Sequence[LaneBand]) -> dict[str, np.ndarray]:
 
 
 def _runs(is_bridge: np.ndarray) -> Iterator[tuple[slice, bool]]:
-    """Yields stretches of the same level, which share the place between."""
+    """Yields stretches of the same level; neighbours share a place."""
     starts = np.flatnonzero(np.diff(is_bridge.astype(int), prepend=-1))
     for a, b in zip(starts, [*starts[1:], len(is_bridge)], strict=True):
         last = min(b + 1, len(is_bridge))

@@ -1,7 +1,7 @@
 """Links between roads, lanes and junctions that lead nowhere.
 
-The import joins lanes where they meet, whatever the links say; a link to
-something that is not in the file is a fault of the file all the same.
+The import joins lanes where they meet and does not use the links. A link to
+something that is not in the file is still reported as a fault.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ _ENDS = ("predecessor", "successor")
 
 
 def count_dangling_links(top: Element, faults: ImportFaults) -> None:
-    """Counts the links of a file that lead to nothing in it.
+    """Counts the links of a file to things that are not in it.
 
     Args:
         top: the outermost element.
@@ -48,7 +48,7 @@ def count_dangling_links(top: Element, faults: ImportFaults) -> None:
 
 
 def _linked(road: Element, end: str) -> tuple[str, str | None]:
-    """Returns the kind and the id of what follows at an end, if anything."""
+    """Returns kind and id of the link at an end of a road, if any."""
     link = road.first("link", end)
     if link is None:
         return "road", None
@@ -69,7 +69,8 @@ def _dangling_lanes(
                 kind, linked = _linked(road, end)
                 if kind != "road" or linked is None or linked not in roads:
                     continue
-                # The link says at which of its ends, which not all files do.
+                # The link names the end of the other road, which some files
+                # omit.
                 others = _sections(roads[linked])
                 beside = others[:1] + others[-1:]
             there = {

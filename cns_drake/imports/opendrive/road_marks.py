@@ -1,7 +1,7 @@
 """Lines painted on imported roads, between lanes and at their edges.
 
 ASAM OpenDRIVE 1.7, 11.9: a mark lies on the outer border of its lane, that of
-lane 0 on the middle; double lines are told from the inside out, those of the
+lane 0 on the middle; double lines are listed from the inside out, those of the
 middle from left to right.
 """
 
@@ -17,8 +17,8 @@ from cns_drake.imports.foreign_city import Rgb, make_imported
 from cns_drake.imports.opendrive.lane_bands import LaneBand
 from cns_drake.imports.opendrive.road_model import RoadMark
 
-# A dash and its gap, where the file does not tell them; from the middle of a
-# double line to each of its lines; above the road [m].
+# Default length of a dash and its gap; distance from the middle of a double
+# line to its lines; height above the road [m].
 _DASH, _GAP = 3.0, 6.0
 _ASIDE = 0.12
 _ABOVE = 0.015
@@ -55,7 +55,7 @@ def road_marks(
         section = band.road.sections[band.section]
         lines = [(band.outer, band.lane.marks, float(band.lane.number))]
         if band.lane.number == (-1 if -1 in section.lanes else 1):
-            # Of the middle, the second line is on the right.
+            # On the middle, the second line is on the right.
             lines.append((band.inner, section.middle_marks, -1.0))
         for border, marks, side in lines:
             for colour, quads in _painted(
@@ -95,7 +95,7 @@ def _painted(
         border: (N, 3) places [m].
         s, heading: (N,) of the road there [m, rad].
         marks: along it.
-        side: above zero, if outwards is to the left.
+        side: positive if outwards is to the left.
         end: of the last mark along the road [m].
     """
     left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
@@ -114,7 +114,7 @@ def _painted(
 def _stretches(
     style: str, start: float, end: float
 ) -> Iterator[tuple[float, float]]:
-    """Yields from where to where a line is painted [m]."""
+    """Yields start and end of the painted stretches of a line [m]."""
     if style == "solid":
         yield start, end
         return

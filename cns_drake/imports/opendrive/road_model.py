@@ -31,8 +31,8 @@ class Cubics:
 
         Args:
             s: where [m].
-            inside: places that tell the piece, which is what differs on
-                both sides of a joint [m].
+            inside: places that select the piece, which differ on both sides of
+                a joint [m].
         """
         return self._evaluate(s, inside, (1.0, 1.0, 1.0, 1.0), 0)
 
@@ -67,7 +67,7 @@ class Cubics:
         for power in range(less, 4):
             term = factors[power] * rows[:, 1 + power]
             value += term * ds ** (power - less)
-        # Before the first piece nothing is told.
+        # Before the first piece there is no value.
         return np.where(index < 0, 0.0, value)
 
 
@@ -99,9 +99,9 @@ class Lane:
     Attributes:
         number: counted from the middle outwards, positive on the left.
         kind: its type, such as driving.
-        width: over the distance along the road; or
-        border: how far its outer edge is from the middle.
-        height: how high its inner edge stands above the road [m].
+        width: over the distance along the road; or border: distance of its
+            outer edge from the middle.
+        height: of its inner edge above the road [m].
         marks: on its outer border, one after the other.
     """
 
@@ -140,11 +140,11 @@ class Thing:
         s, t: place along and across the road [m].
         z: above the road [m].
         heading: against that of the road [rad].
-        size: length, width, height; 0 where they are not told [m].
+        size: length, width, height; 0 where unknown [m].
         outline: (N, 3) corners about the place, or none: u, v, height; or
         road_outline: (N, 3) corners s, t, height; or none [m].
-        is_dynamic: whether it is one with changing states, such as lights.
-        faces_back: whether it is for the traffic against the road.
+        is_dynamic: whether it has changing states, as lights have. faces_back:
+            whether it is for the traffic against the road.
     """
 
     name: str
@@ -174,8 +174,8 @@ class ImportedRoad:
         superelevation: roll about it [rad].
         lane_offset: of the middle of its lanes, to the left [m].
         sections: of its lanes, one after the other.
-        keeps_left: whether its traffic does.
-        limits: pairs of where a speed limit begins, and it [m, m/s].
+        keeps_left: whether its traffic keeps left.
+        limits: pairs of start and value of a speed limit [m, m/s].
         things: beside it.
     """
 

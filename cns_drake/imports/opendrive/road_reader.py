@@ -79,23 +79,23 @@ _KNOWN = frozenset(
     )
 )
 _UNITS = {"m/s": 1.0, "km/h": 1 / 3.6, "mph": 0.44704}
-# A file of a whole country would not end [m].
+# Longer networks, such as whole countries, are refused [m].
 _LARGEST = 20_000.0
 _LONGEST_ROAD = 100_000.0
 _LONGEST_TOGETHER = 2_000_000.0
-# The world is moved to the middle of roads that lie farther off [m].
+# Roads farther from the origin are moved to it [m].
 _FAR = 10_000.0
-# Lengths that differ by less agree [m].
+# Lengths that differ by less are equal [m].
 _ROUNDING = 0.01
-# A painted line where its width is not told, or beyond reason [m].
+# Width of a painted line without a plausible one [m].
 _MARK_WIDTH, _WIDEST_MARK = 0.12, 1.0
-# No lane is wider, no curve sharper [m, 1/m].
+# Greatest width of a lane, and curvature of a curve [m, 1/m].
 _WIDEST = 100.0
 _SHARPEST = 100.0
 _SHORTEST = 1e-5
 # Banked test tracks have up to 49 deg [rad].
 _MOST_BANKED = math.radians(50.0)
-# Longest part of a name that becomes part of others.
+# Longest part of a name that is used in other names.
 _LONGEST_NAME = 60
 
 
@@ -104,7 +104,7 @@ def read_roads(path: Path, faults: ImportFaults) -> RoadMap:
 
     Raises:
         InputError: naming file, road, line and fault, if the file cannot be
-            read or holds what no road can be.
+            read or describes an impossible road.
     """
     top = read_elements(path, "OpenDRIVE", _KNOWN)
     roads: list[ImportedRoad] = []
@@ -115,7 +115,7 @@ def read_roads(path: Path, faults: ImportFaults) -> RoadMap:
         own = element.attributes.get("id", "")
         name = _plain(own, names)
         if own in ids:
-            faults.add("road with the id of another, left out", name)
+            faults.add("road with the id of another one, left out", name)
             continue
         ids.add(own)
         names.add(name)
@@ -127,12 +127,12 @@ def read_roads(path: Path, faults: ImportFaults) -> RoadMap:
             roads.append(road)
             together += road.length
     if not roads:
-        raise InputError(f"{path}: no road in it")
+        raise InputError(f"{path}: the file has no roads")
     count_dangling_links(top, faults)
     if together > _LONGEST_TOGETHER:
         raise InputError(
-            f"{path}: {together / 1000:.0f} km of roads, at most"
-            f" {_LONGEST_TOGETHER / 1000:.0f} km are read"
+            f"{path}: {together / 1000:.0f} km of roads; at most "
+            f"{_LONGEST_TOGETHER / 1000:.0f} km can be read"
         )
     ends = np.array([(p.x, p.y) for road in roads for p in road.pieces])
     low, high = ends.min(axis=0), ends.max(axis=0)
@@ -181,7 +181,7 @@ def _road(
     told = element.number("length")
     length = pieces[-1].s + pieces[-1].length
     if abs(told - length) > _ROUNDING:
-        faults.add("road of another length than its course, cut", name)
+        faults.add("road whose length differs from its course's, cut", name)
         length = min(told, length)
     if length > _LONGEST_ROAD:
         raise ValueError(f"{length:g} m are more than {_LONGEST_ROAD:g} m")
@@ -246,7 +246,7 @@ def _shape(geometry: Element, length: float) -> Shape:
     """Returns the curve of a geometry.
 
     Raises:
-        ValueError: if it has none, or one that is too sharp.
+        ValueError: if it has no curve, or one that is too sharp.
     """
     shape: Shape | None = None
     for one in geometry.children:
@@ -261,7 +261,7 @@ def _shape(geometry: Element, length: float) -> Shape:
             shape = Spiral(*ends, length)
         elif one.tag == "poly3":
             v = [one.number(k) for k in "abcd"]
-            # Where it is as long as told, u is not beyond its length.
+            # Where the curve has the file's length, u is not beyond it.
             shape = Cubic((0, 1, 0, 0), v, length, length, stretched=False)
         elif one.tag == "paramPoly3":
             u, v = ([one.number(k + c) for k in "abcd"] for c in "UV")
@@ -269,7 +269,7 @@ def _shape(geometry: Element, length: float) -> Shape:
             last = length if by_arc else 1.0
             shape = Cubic(u, v, last, length, by_parameter=by_arc)
     if shape is None:
-        raise ValueError("neither a line nor any curve that is known")
+        raise ValueError("neither a line nor a known curve")
     if shape.sharpest > _SHARPEST:
         raise ValueError(f"a curve of curvature {shape.sharpest:g} 1/m")
     return shape
@@ -308,7 +308,9 @@ def _sections(
                 if lane.number == 0:
                     continue
                 if lane.number in lanes:
-                    faults.add("lane told twice, left out", name)
+                    faults.add(
+                        "lane with the id of another one, left out", name
+                    )
                 lanes.setdefault(lane.number, lane)
         middle = [
             mark
@@ -322,7 +324,9 @@ def _sections(
 def _lane(element: Element, start: float) -> Lane:
     number = element.number("id")
     if number != int(number):
-        raise ValueError(f"line {element.line}: lane: id: {number} is no id")
+        raise ValueError(
+            f"line {element.line}: lane: id: {number} is not a valid id"
+        )
     heights = element.first("height")
     lane = Lane(
         number=int(number),
@@ -335,8 +339,8 @@ def _lane(element: Element, start: float) -> Lane:
     for one in (*element.all("width"), *element.all("border")):
         if abs(one.number("a", 0.0)) > _WIDEST:
             raise ValueError(
-                f"line {one.line}: lane {lane.number}: {one.tag}:"
-                f" {one.number('a'):g} m is beyond {_WIDEST:g} m"
+                f"line {one.line}: lane {lane.number}: {one.tag}: "
+                f"{one.number('a'):g} m is more than {_WIDEST:g} m"
             )
     return lane
 
@@ -361,7 +365,7 @@ def _marks(lane: Element, start: float) -> list[RoadMark]:
 
 
 def _limits(road: Element) -> Iterator[tuple[float, float]]:
-    """Yields where speed limits begin [m], and they [m/s]."""
+    """Yields start [m] and value [m/s] of speed limits."""
     for one in road.all("type"):
         speed = one.first("speed")
         if speed is None:

@@ -12,7 +12,7 @@ from cns_drake.imports.import_faults import ImportFaults
 from cns_drake.imports.opendrive.road_model import Thing
 
 _MOST_REPEATS = 10_000
-# What is repeated without a distance is cut into pieces so long [m].
+# An object repeated without a distance is cut into pieces of this length [m].
 _PIECE = 4.0
 _LARGEST = 1000.0  # [m]
 
@@ -20,10 +20,10 @@ _LARGEST = 1000.0  # [m]
 def read_things(
     road: Element, name: str, faults: ImportFaults
 ) -> Iterator[Thing]:
-    """Yields what stands beside a road.
+    """Yields the signals and objects beside a road.
 
     Raises:
-        ValueError: naming line and fault, if a number is none.
+        ValueError: naming line and fault, if a text is not a number.
     """
     for k, one in enumerate(road.all("signals", "signal")):
         yield Thing(
@@ -56,8 +56,8 @@ def _object(one: Element, name: str) -> Thing:
     )
     if not all(0.0 <= side <= _LARGEST for side in size):
         raise ValueError(
-            f"line {one.line}: object: a size of {size} m is none up to"
-            f" {_LARGEST:g} m"
+            f"line {one.line}: object: a size of {size} m is not in 0 to "
+            f"{_LARGEST:g} m"
         )
     outline = next(one.all("outlines", "outline"), one.first("outline"))
     corners = road_corners = None
@@ -104,7 +104,7 @@ def _repeated(
         )
         return
     for k in range(max(count, 1)):
-        # A wall is made of pieces, each about its own middle.
+        # A wall becomes pieces, each centred on its own middle.
         at = k * step if distance > 0.0 else (k + 0.5) * length / max(count, 1)
         part = min(1.0, at / length) if length > 0.0 else 0.0
 

@@ -20,8 +20,8 @@ from cns_drake.imports.foreign_city import make_imported
 from cns_drake.imports.import_faults import ImportFaults
 from cns_drake.imports.opendrive.road_model import ImportedRoad, Thing
 
-# Traffic signs of the Vienna convention, as most files number them, by the
-# beginning of their type.
+# Traffic signs of the Vienna convention, by the beginning of their type,
+# numbered as in most files.
 _SIGNS = (
     (("206", "stop"), "sign_stop"),
     (("205", "1"), "sign_triangular"),
@@ -39,7 +39,7 @@ _CLASSES = (
     (("gantry", "bridge", "tunnel"), "other-structure"),
     (("trafficisland",), "other-ground"),
 )
-# They are painted, or lie flat.
+# These are painted, or flat on the ground.
 _FLAT = ("crosswalk", "roadmark", "patch", "parkingspace", "none.flat")
 _LEAST_HEIGHT = 0.05
 _LEAST_SIDE = 0.05
@@ -50,12 +50,12 @@ _HALF_TURN = math.pi
 def thing_structures(
     road: ImportedRoad, lanes: BaseGeometry, faults: ImportFaults
 ) -> Iterator[Structure]:
-    """Yields what stands beside a road.
+    """Yields structures of the signals and objects beside a road.
 
     Args:
         road: the road.
         lanes: the area of all lanes, where no sign stands [m].
-        faults: is told what is left out.
+        faults: counts things left out.
     """
     for thing in road.things:
         if not 0.0 <= thing.s <= road.length + 1.0:
@@ -71,7 +71,7 @@ def thing_structures(
             facing = heading + thing.heading
             facing += 0.0 if thing.faces_back else _HALF_TURN
             if thing.is_dynamic:
-                # The front of lights is their left.
+                # The front of traffic lights is their left side.
                 facing -= _HALF_TURN / 2.0
             one = Structure(
                 name,
@@ -129,7 +129,7 @@ def _solid(
     place: tuple[float, float, float, float],
     faults: ImportFaults,
 ) -> Structure | None:
-    """Returns an object raised from its outline, None for one without any."""
+    """Returns an object raised from its outline; None without an outline."""
     x, y, z, heading = place
     high = thing.size[2]
     if thing.road_outline is not None:

@@ -40,14 +40,14 @@ from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.thing_structures import thing_structures
 from cns_drake.imports.waypoint_drives import Drive
 
-# Sidewalks, where the file does not say [m].
+# Height of sidewalks by default [m].
 _KERB = 0.1
 _KERBS = (0.03, 0.3)
-# The generator fills no larger ground [m^2, m].
+# Largest ground that the generator fills [m^2, m].
 _LARGEST_AREA = 8e6
 _LONGEST_SIDE = 9000.0
-# Cars in parking lanes: length of a bay, part that is taken, and the
-# least width of a lane [m].
+# Cars in parking lanes: length of a bay, share of taken bays, and least width
+# of a lane [m].
 _BAY = (5.8, 7.4)
 _FILL = 0.6
 _BAY_WIDTH = 1.9
@@ -55,18 +55,18 @@ _BAY_WIDTH = 1.9
 
 @dataclass(frozen=True)
 class Town:
-    """A town and what came of its file.
+    """A town, and the result of its import.
 
     Attributes:
         roads: of the file.
-        seed: of what was drawn.
+        seed: of the random draws.
         city: everything, in all stages.
-        stages: what stands when.
+        stages: the differences between the stages.
         streets: the areas of the roads that lie on the ground.
         drives: two, or fewer, through it.
-        lanes: the text of the file of lanes, None where traffic has none.
-        kinds: what there is -> how many.
-        faults: what was repaired or left out.
+        lanes: the text of the file of lanes; None without lanes for traffic.
+        kinds: kind of thing -> number.
+        faults: counts of repaired and omitted parts.
     """
 
     roads: RoadMap
@@ -90,7 +90,7 @@ def build_town(
 
     Args:
         source: OpenDRIVE.
-        seed: of what the generator draws.
+        seed: of the generator's draws.
         progress: takes one line at a time.
         dressed: whether the file's road marks are painted.
 
@@ -197,7 +197,7 @@ def _build(
 
 
 def _kerb(bands: Sequence[LaneBand]) -> float:
-    """Returns how high sidewalks stand above the road [m]."""
+    """Returns the height of sidewalks above the road [m]."""
     told = [
         band.lane.height
         for band in bands
@@ -209,7 +209,7 @@ def _kerb(bands: Sequence[LaneBand]) -> float:
 def _park(
     draft: Draft, bands: Sequence[LaneBand], cars: dict[str, float]
 ) -> None:
-    """Parks cars in the lanes for that, with the traffic."""
+    """Parks cars in parking lanes, facing with the traffic."""
     for band in bands:
         if band.kind != "parking" or band.width.min() < _BAY_WIDTH:
             continue

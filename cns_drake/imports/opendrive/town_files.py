@@ -24,7 +24,7 @@ _FACES_OF_A_BOX = 12
 _CROWN = 1.5  # [m]
 # Limits of the speed of a drive [m/s].
 _SPEEDS = (3.0, 12.0)
-# Classes that the picture from above shows; what is small is not seen.
+# Classes in the picture from above; small things would not show.
 _SHOWN = (
     "road",
     "parking",
@@ -44,8 +44,8 @@ def write_town(
     """Writes all files of a town.
 
     Args:
-        draft: the map's folder, which has its name and is there.
-        source: where the roads come from.
+        draft: the map's folder, with the map's name; it exists.
+        source: the file of the roads.
         town: to write.
         progress: takes one line at a time.
 
@@ -144,7 +144,7 @@ def _seen_from_above(structures: Iterable[Structure]) -> Iterable[Imported]:
             continue
         area = one.footprint_W
         if one.semantic_class == "vegetation":
-            # The crown, about.
+            # About the size of the crown.
             area = area.buffer(_CROWN)
         pieces = polygons_of(area)
         cut = shapely.constrained_delaunay_triangles(

@@ -72,7 +72,7 @@ def test_check_refuses_what_cannot_be_written(tmp_path):
     file.write_text("")
     with pytest.raises(InputError, match=r"page\.html: "):
         check_writable(file / "page.html")
-    with pytest.raises(InputError, match="there is a folder"):
+    with pytest.raises(InputError, match="a folder has this name"):
         check_writable(tmp_path)
 
 

@@ -1,4 +1,4 @@
-"""What lies where in the folder of a map."""
+"""The files in the folder of a map."""
 
 from cns_drake.base.map_folder import MapFolder, sequence_name
 

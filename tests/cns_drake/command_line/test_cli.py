@@ -188,13 +188,16 @@ def test_diagram_script(tmp_path):
         ),
         (["reproduce", "atlantis"], "unknown map 'atlantis'"),
         (["ladder", "--cause", "war"], "--cause: no cause 'war'"),
-        (["ladder", "--levels", "--quick"], "--levels: they are frozen"),
+        (["ladder", "--levels", "--quick"], "--levels: the levels are frozen"),
         (["ladder", "atlantis"], "unknown map 'atlantis'"),
         (
             ["trend", "--vary", "f", "--query", "q", "--set", "solid.x=1"],
             "solid: no parameter 'x'",
         ),
-        (["reproduce", "--quick", "--pages"], "--quick and --pages: give one"),
+        (
+            ["reproduce", "--quick", "--pages"],
+            "--quick and --pages exclude each other",
+        ),
         (["teleport"], "teleport"),
     ],
 )

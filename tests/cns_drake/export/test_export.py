@@ -293,8 +293,8 @@ def test_foreign_folders_are_left_alone(drive, tmp_path, format_name):
     )
     before = sorted(tmp_path.rglob("*"))
     for folder, fault in (
-        ("file", "holds something else"),
-        ("photos", "holds something else"),
+        ("file", "holds other files"),
+        ("photos", "holds other files"),
         ("marked", "export.yaml: not readable as YAML"),
         ("foreign", "export.yaml: not of an export"),
         ("other", "the folder holds"),
@@ -444,7 +444,7 @@ def test_names_that_lead_elsewhere_are_refused(tmp_path):
             tmp_path / "recordings" / "town_01",
             attachments={"scenario.json": {"map": place}},
         )
-        with pytest.raises(InputError, match="no name of a folder"):
+        with pytest.raises(InputError, match="cannot be the name of a folder"):
             export_sequence(drive, "cns", tmp_path / "out" / "deep")
         shutil.rmtree(tmp_path / "recordings")
     assert not (tmp_path / "out").exists()

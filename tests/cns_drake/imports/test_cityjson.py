@@ -149,7 +149,7 @@ def test_a_solid_inside_out_is_turned_back(tmp_path):
     ]
     read, found = structures(city.write(tmp_path / "city.json"))
     assert volume(found["a"]) == pytest.approx(8.0)
-    assert "turned back" in read.faults.rows()[0][0]
+    assert "reversed" in read.faults.rows()[0][0]
 
 
 def test_a_sequence_has_vertices_of_each_feature(tmp_path):
@@ -205,7 +205,7 @@ def set_in(*keys):
         ('{"type": "Feature"}', "type 'Feature' is not CityJSON"),
         (broken(set_in("version", "3.0")), "version '3.0'"),
         (broken(set_in("CityObjects", [])), "CityObjects: not an object"),
-        (broken(set_in("CityObjects", {})), "no object in it"),
+        (broken(set_in("CityObjects", {})), "the file has no objects"),
         (broken(set_in("vertices", [[1, 2]])), "vertices: not three numbers"),
         (broken(set_in("vertices", [[1e300, 0, 0]])), "beyond 1e+08 m"),
         (broken(set_in("vertices", "abc")), "vertices: not three numbers"),

@@ -94,7 +94,7 @@ def test_a_city_without_years_has_two_stages_and_two_drives(tmp_path):
     }  # fmt: skip
     plain = run("import", source, "--plain", "--output", tmp_path / "plain")
     assert plain.exit_code == 0, plain.output
-    assert "one stage: give --years or --grow" in plain.output
+    assert "one stage; give --years or --grow" in plain.output
     assert not (tmp_path / "plain" / "stage_02.sdf").exists()
     last = (tmp_path / "town" / "stage_02.sdf").read_text()
     only = (tmp_path / "plain" / "stage_01.sdf").read_text()

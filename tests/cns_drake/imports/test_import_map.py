@@ -223,7 +223,7 @@ def test_roads_are_driven_where_there_are_some(tmp_path):
 @pytest.mark.parametrize(
     ("options", "fault"),
     [
-        (["--years", "1950", "1950"], "each must be after the one before"),
+        (["--years", "1950", "1950"], "each year must be after the one before"),
         (["1950"], "give one file"),
         (["--lod", "7"], "no object has a surface"),
     ],

@@ -43,7 +43,7 @@ BOMB = """<?xml version="1.0"?>
         ("\x00\x01", "cannot be parsed"),
         ('<?xml version="1.0" encoding="klingon"?><OpenDRIVE/>', "parsed"),
         ("<osm/>", "osm is no OpenDRIVE"),
-        ("<OpenDRIVE/>", "no road in it"),
+        ("<OpenDRIVE/>", "the file has no roads"),
         (BOMB, "holds a document type"),
         ("<OpenDRIVE>" + "<road>" * 5000, "nested more than 100 deep"),
         ("<OpenDRIVE>" + "<userData>" * 5000, "nested more than 100 deep"),
@@ -131,11 +131,11 @@ def test_what_cannot_be_used_is_counted(tmp_path):
     roads, faults = faults_of(path)
     assert [one.name for one in roads.roads] == ["1", "4"]
     assert faults == {
-        "road with the id of another, left out": 1,
+        "road with the id of another one, left out": 1,
         "road without a course, left out": 1,
         "road without lanes, left out": 1,
         "geometry without length, left out": 1,
-        "road of another length than its course, cut": 1,
+        "road whose length differs from its course's, cut": 1,
     }
     assert roads.roads[1].length == 49.5
 

@@ -229,7 +229,7 @@ BOMB = """<?xml version="1.0"?>
     [
         ("", "city.osm: "),
         ("<osm", "city.osm: "),
-        ('<osm version="0.6"></osm>', "no building in it"),
+        ('<osm version="0.6"></osm>', "the file has no buildings"),
         (BOMB, "city.osm: "),
         ("\x00\x01", "city.osm: "),
     ],
@@ -329,7 +329,7 @@ def test_heights_that_cannot_be_are_the_usual_and_counted(tags):
     assert heights(tags, ("w7", faults)) == heights({})
     ((kind, number, example),) = faults.rows()
     (key,) = tags
-    assert kind.startswith(f"{key} not understood or beyond reason")
+    assert kind.startswith(f"{key} unreadable or implausible")
     assert (number, example) == (1, "w7")
 
 

@@ -93,7 +93,7 @@ def test_messages_of_a_channel_that_nobody_names(recording, monkeypatch):
         return summary
 
     monkeypatch.setattr(SeekingReader, "get_summary", forget)
-    with pytest.raises(InputError, match="of which the summary says nothing"):
+    with pytest.raises(InputError, match="which the summary does not list"):
         open_sequence(path)
 
 

@@ -135,7 +135,8 @@ def _outline(sections: list[np.ndarray]) -> tuple[np.ndarray, list[int]]:
 
 
 class _Front:
-    """The front of a section: its bays, the stair's, those with balconies."""
+    """The front of a section: its bays, the stair's bay, bays with
+    balconies."""
 
     def __init__(self, p: Parameters, plan: np.ndarray, edge: int) -> None:
         self.edge = edge
@@ -153,7 +154,7 @@ class _Front:
 
     @property
     def stair(self) -> float:
-        """Where the stair lies along the wall [m]."""
+        """The stretch of the stair along the wall [m]."""
         return sum(self.cells[self.middle]) / 2
 
 
@@ -164,7 +165,7 @@ def _window(p: Parameters, storey: float, sill: float = 0.85) -> bays.Bay:
 def _facade(
     p: Parameters, storey: float, walls: list[_Front], *, ground: bool = False
 ) -> Facade:
-    """Returns a storey; that of the ground has doors and a plinth."""
+    """Returns a storey; the ground floor has doors and a plinth."""
     window, french = _window(p, storey), _window(p, storey, 0.12)
     slit = bays.window(1.3, 0.3, storey, p.recess)
     door = bays.window(1.6, 0.0, 2.3, p.recess, mullions=1)

@@ -1,1 +1,1 @@
-"""What houses are put together of: walls, porches, dormers, shop fronts."""
+"""Parts of houses: walls, porches, dormers, shop fronts."""

@@ -13,7 +13,7 @@ from cns_drake.city.geometry.mesh import Mesh
 _THICKNESS = 0.14
 _RECESS = 0.1
 _QUAD = ((0, 1, 2, 3),)
-# What the dormer's walls and roof reach into the slope behind them [m].
+# How far a dormer's walls and roof reach into the slope behind them [m].
 _SUNK = 0.25
 
 

@@ -1,4 +1,4 @@
-"""What family houses have in common: colours, boxes of rooms, garages."""
+"""Parts that family houses share: colours, boxes of rooms, garages."""
 
 from __future__ import annotations
 
@@ -38,15 +38,15 @@ BASE: Rgb = (0.58, 0.56, 0.53)
 
 STOREY_M = 2.65
 ROOF_M = 0.2
-# Windows of the sides stand further apart than those of the front [m].
+# Windows of the sides are further apart than those of the front [m].
 _SIDE_PITCH_M = 3.8
 
 
 class Colours:
-    """What the parameters of family houses have in common: their colours."""
+    """The parameters that family houses share: their colours."""
 
     def draw_colours(self, d: Dice, walls: Sequence[Rgb] = WALLS) -> None:
-        """Draws those of the walls, of the roof and of doors and shutters."""
+        """Draws the colours of walls, roof, doors and shutters."""
         self.rgb = d.pick(walls)
         self.roof_rgb = d.pick(ROOFS)
         self.accent_rgb = d.pick(ACCENTS)

@@ -79,7 +79,7 @@ class Openings:
                 ]
 
     def put(self, edge: int, x: float, width: float, bay: bays.Bay) -> None:
-        """Puts a bay around x, in place of what it meets there."""
+        """Puts a bay around x, in place of the bays it meets there."""
         x0, x1 = x - width / 2, x + width / 2
         new = bay(x0, x1)
         if not new:
@@ -99,7 +99,7 @@ class Openings:
     def clear(
         self, edge: int, x0: float, x1: float, z0: float, z1: float
     ) -> None:
-        """Removes whatever meets a part of a wall."""
+        """Removes the reliefs that meet a part of a wall."""
         self._reliefs[edge] = [
             r
             for r in self._reliefs[edge]
@@ -107,7 +107,7 @@ class Openings:
         ]
 
     def layout(self, edge: int, length: float) -> list[Relief]:
-        """Returns all of them, for a facade.
+        """Returns all reliefs, for a facade.
 
         Bands end at arches, which need flat wall around them.
         """
@@ -125,7 +125,7 @@ class Openings:
         bands: Sequence[Band] = (),
         material: str = "walls",
     ) -> None:
-        """Adds the walls on their foundation, and their panes.
+        """Adds the walls on their foundation, with their panes.
 
         Args:
             materials: where to, the panes as `glass`.

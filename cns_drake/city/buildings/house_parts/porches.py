@@ -1,4 +1,4 @@
-"""What stands in front of houses: porches, stoops, bay windows, chimneys.
+"""Parts in front of houses: porches, stoops, bay windows, chimneys.
 
 Wall coordinates are those of `details.WallFrame`: x along the wall, y
 outwards, z up.
@@ -227,7 +227,7 @@ def casings(
     style: str,
     reach: float = 0.05,
 ) -> list[Mesh]:
-    """Returns what frames the windows of a wall, in wall coordinates.
+    """Returns the frames of a wall's windows, in wall coordinates.
 
     Args:
         reliefs: the openings of the wall.

@@ -27,8 +27,8 @@ def add_shops(
     """Adds shops side by side between two points of a wall.
 
     Args:
-        out: gets `trim` (fascias), `awning` and `sign`; its `rng` draws what
-            differs from shop to shop.
+        out: gets `trim` (fascias), `awning` and `sign`; its `rng` draws the
+            differences between shops.
         wall, openings, edge: the wall.
         start, end: the stretch [m].
         height: of the ground floor [m].

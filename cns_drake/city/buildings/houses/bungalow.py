@@ -59,7 +59,7 @@ class Parameters(family_house.Colours):
 
 @dataclass(frozen=True)
 class _Plan:
-    """Where the parts stand; `carport` is x0, y0, x1, y1 or None."""
+    """The places of the parts; `carport` is x0, y0, x1, y1 or None."""
 
     main: Wing
     fronts: tuple[Wing, ...]

@@ -64,7 +64,7 @@ _WING_ENDS = {
 
 @dataclass(frozen=True)
 class _Plan:
-    """Where the parts of a house stand.
+    """The places of the parts of a house.
 
     Attributes:
         main, wings, garage: its boxes.

@@ -97,7 +97,7 @@ def build(p: Parameters, out: Assembly) -> None:
 def _middles(p: Parameters, main: Wing) -> tuple[float, float]:
     """Returns the x of the bays in the main wall's coordinates [m]."""
     half = (main.x1 - main.x0) / 2
-    # Doors take the middle or the ends, bays what is left of each half.
+    # Doors take the middle or the ends; bays take the rest of each half.
     u = 0.6 * half if p.doors_inside else 0.36 * half
     offset = half - u if not p.doors_inside else u
     return half - offset, half + offset

@@ -1,1 +1,1 @@
-"""What all buildings are put together of: masses, facades, roofs."""
+"""Parts of all buildings: masses, facades, roofs."""

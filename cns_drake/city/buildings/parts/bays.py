@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from cns_drake.city.buildings.parts.facades import Arch, Layout, Patch, Relief
 
 Bay = Callable[[float, float], list[Relief]]
-# From where to where [m].
+# Start and end of a stretch [m].
 Span = tuple[float, float]
 
 
@@ -243,7 +243,7 @@ def rhythm(pitch: float, bays: Sequence[Bay], margin: float = 0.5) -> Layout:
 
 
 def with_middle(layout: Layout, bay: Bay, width: float) -> Layout:
-    """Puts a bay in the middle of a wall, in place of what it meets."""
+    """Puts a bay in the middle of a wall, in place of the bays it meets."""
 
     def combined(edge: int, length: float) -> list[Relief]:
         x0, x1 = (length - width) / 2, (length + width) / 2
@@ -274,5 +274,5 @@ def by_edge(layouts: dict[int, Layout], otherwise: Layout) -> Layout:
 
 
 def with_door(layout: Layout, door: Bay, width: float) -> Layout:
-    """Puts a door in the middle of the front, in place of what it meets."""
+    """Puts a door in the middle of the front, in place of bays it meets."""
     return by_edge({0: with_middle(layout, door, width)}, layout)

@@ -269,8 +269,8 @@ def _pier(
 ) -> Mesh:
     """A box in wall coordinates.
 
-    It has a back, too: piers outgrow walls, and near a corner their backs
-    come out of the recesses of the next wall.
+    It has a back, too: piers are deeper than walls, and near a corner their
+    backs show in the recesses of the next wall.
     """
     a, b = x - width / 2, x + width / 2
     plan = [(a, -depth), (b, -depth), (b, reach), (a, reach)]
@@ -303,7 +303,7 @@ def column(x: float, y: float, z0: float, z1: float, radius: float) -> Mesh:
 
 
 def beam(start: ArrayLike, end: ArrayLike, width: float) -> Mesh:
-    """A square bar between two points that lie on no common upright."""
+    """A square bar between two points that are not above one another."""
     start, end = np.asarray(start, float), np.asarray(end, float)
     length = float(np.linalg.norm(end - start))
     along = (end - start) / length

@@ -3,9 +3,9 @@
 A wall is described in its own panel coordinates: x along the wall seen from
 outside (left to right), z up, depth inwards (negative: sticks out). Patches
 painted on the panel give each rectangle a depth; the surface between them,
-with every reveal, sill and ledge, follows from the depths alone and is
-therefore closed, whatever is painted. Walls around a polygon are mitred at
-its corners, so that a ledge runs around them.
+with every reveal, sill and ledge, follows from the depths alone and is closed
+for any patches. Walls around a polygon are mitred at its corners, so that a
+ledge runs around them.
 """
 
 from __future__ import annotations
@@ -170,8 +170,8 @@ class _Panel:
         reliefs = () if is_plain else facade.layout(edge, length)
         zs = _levels(facade, reliefs)
         middles = (np.array(zs[1:]) + zs[:-1]) / 2
-        # What the neighbours do at their ends, row by row; above and below
-        # the wall everything closes back to depth 0.
+        # The depths at the ends of the neighbouring walls, row by row. Above
+        # and below the wall every cell closes back to depth 0.
         ends = np.zeros((2, len(zs) + 1))
         for end, neighbour in enumerate((before, after)):
             if neighbour not in facade.plain:

@@ -188,7 +188,7 @@ def skirt(lower: ArrayLike, upper: ArrayLike, z0: float, z1: float) -> Mesh:
 def prism(
     points: ArrayLike, z0: float, z1: float, *, bottom: bool = False
 ) -> Mesh:
-    """Returns an upright solid; its bottom is left open where none sees it."""
+    """Returns an upright solid; its hidden bottom is left open."""
     pieces = [skirt(points, points, z0, z1), flat(points, z1)]
     if bottom:
         pieces.append(flat(points, z0, up=False))

@@ -110,7 +110,7 @@ def mirrored(points: np.ndarray) -> np.ndarray:
 def edges_on(
     plan: np.ndarray, outline: np.ndarray, edges: Collection[int]
 ) -> frozenset[int]:
-    """Returns the edges of a plan that lie on some edges of an outline."""
+    """Returns the edges of a plan that are part of some edges of an outline."""
     found = set()
     ends = np.roll(plan, -1, axis=0)
     for k, (a, b) in enumerate(zip(plan, ends, strict=True)):

@@ -1,7 +1,8 @@
-"""What stands on roofs: shared meshes, and where they go.
+"""Equipment on roofs: shared meshes, and their places.
 
 These meshes have fixed names and shapes, shared by all buildings of a city;
-parts vary them by scale and heading. Each stands on z = 0, chimneys in it.
+parts vary them by scale and heading. Each stands on z = 0; chimneys reach below
+it.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from shapely.geometry import Point, Polygon
 
 from cns_drake.city.buildings.parts.site import Assembly, Rgb
 
-# Radius of the room that each takes [m].
+# Radius of the room that each piece needs [m].
 _RADIUS = {
     "ac_unit": 1.6,
     "air_handler": 3.8,

@@ -1,4 +1,4 @@
-"""What every builder of buildings takes: ground, dice, an assembly."""
+"""Inputs of every builder of buildings: ground, random draws, assembly."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ class Site:
     """The ground a building gets.
 
     Attributes:
-        footprint: simple polygon in the building's frame S [m]. Its front
-            is the edge between its first two corners, a rectangle's its
-            edge of least y; edges count counter-clockwise from there.
+        footprint: simple polygon in the building's frame S [m]. Its front is
+            the edge between its first two corners; for a rectangle, the edge of
+            least y. Edges count counter-clockwise from there.
         name: the structure's name; its own meshes are called `<name>_...`.
         blind_edges: edges built against a neighbour: plain walls.
     """
@@ -46,13 +46,14 @@ class Site:
         exterior = self.footprint.exterior
         points = np.array(exterior.coords[:-1], dtype=float)
         if not exterior.is_ccw:
-            # Turned round, the edge that was first runs from 1 to 0.
+            # After the reversal the former first edge runs from 1 to 0.
             points = np.roll(points[::-1], 2, axis=0)
         if self.is_rectangle:
             # The corner from which the edge of least y starts.
             start = int(np.lexsort((points[:, 0], points[:, 1]))[0])
             points = np.roll(points, -start, axis=0)
-            # Whole centimetres, never outside, keep the meshes' text short.
+            # Whole centimetres, never outside the footprint, keep the meshes'
+            # text short.
             low, high = points[0], points[2]
             low = np.ceil(np.round(100.0 * low, 3)) / 100.0
             high = np.floor(np.round(100.0 * high, 3)) / 100.0
@@ -88,7 +89,7 @@ class Site:
     def detached(self, gap: float) -> Site:
         """Returns the site with its blind edges moved in by `gap`.
 
-        What is built there stands free, overhangs included.
+        A building on it stands free, overhangs included.
         """
         outline = self.outline
         gaps = [gap * (k in self.blind_edges) for k in range(len(outline))]
@@ -118,7 +119,7 @@ class Site:
 
 @dataclass(frozen=True)
 class Dice:
-    """What the parameters of a building are drawn from.
+    """Draws the parameters of a building.
 
     Attributes:
         site: the ground of the building.
@@ -155,7 +156,7 @@ class Dice:
         return int(self.rng.integers(low, high))
 
     def chance(self, share: float) -> bool:
-        """Draws whether something is so, as it is in this share."""
+        """Draws True with the given probability."""
         return bool(self.rng.random() < share)
 
     def pick(self, choices: Sequence[T]) -> T:
@@ -171,9 +172,9 @@ class Dice:
 class Assembly:
     """Collects the parts and meshes of one building: a builder fills it.
 
-    Meshes make up a part of their own (`add`), or are gathered by what they
-    are made of (`paint`, `add_to`): each material becomes one part, so that
-    a small building of many small pieces stays at a handful of visuals.
+    Meshes become a part of their own (`add`), or are gathered by material
+    (`paint`, `add_to`). Each material becomes one part, so that a small
+    building of many small pieces has few visuals.
 
     Attributes:
         site: the ground it stands on.
@@ -194,7 +195,7 @@ class Assembly:
     def add(
         self, part: str, *meshes: Mesh, z: float = 0.0, rgb: Rgb | None = None
     ) -> None:
-        """Adds a mesh of this building's own, merged of these, at a height.
+        """Merges meshes into one of this building's own, at a height.
 
         Meshes without any faces (pilasters on walls too short for them) are
         left out.

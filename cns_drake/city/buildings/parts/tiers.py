@@ -20,7 +20,7 @@ from cns_drake.city.buildings.parts.facades import (
 from cns_drake.city.buildings.parts.site import Assembly, pick
 from cns_drake.city.geometry.mesh import Mesh, merge_meshes
 
-# A pane cuts this far into the reveals in front of it, lest rays slip
+# A pane cuts this far into the reveals in front of it, so that no ray passes
 # between the two [m].
 _PANE_OVERLAP = 0.004
 
@@ -89,10 +89,9 @@ def add_storeys(
 ) -> float:
     """Adds `groups` times `per_group` storeys; returns their top [m].
 
-    Where all glass lies at one depth, one pane behind the walls closes all
-    windows; nothing else may then be deeper. Glass of several depths is
-    repeated with the storeys. `extras` belong to one storey, in its own
-    height.
+    If all glass has one depth, one pane behind the walls closes all windows;
+    nothing else may then be deeper. Glass of several depths is repeated with
+    the storeys. `extras` belong to one storey, in its own height.
     """
     pieces = [facade_mesh(outline, facade.stacked(per_group))]
     for k in range(per_group):

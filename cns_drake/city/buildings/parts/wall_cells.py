@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-# Patches keep this distance from the ends of a wall: there two walls meet
-# and must have the same relief to close [m].
+# Patches keep this distance from the ends of a wall: two walls meet there, and
+# close only if their relief is the same [m].
 END_MARGIN_M = 0.01
 
 # Chords of an arch, for narrow windows and for anything wider than 2 m.
@@ -247,7 +247,7 @@ def _arch_outline(arch: Arch) -> tuple[list[float], list[float]]:
     angles = np.linspace(math.pi, 0.0, count + 1)
     x = [middle + half * math.cos(a) for a in angles]
     z = [arch.z_spring + rise * math.sin(a) for a in angles]
-    # Exactly, so that jambs and spandrels meet.
+    # The exact value, so that jambs and spandrels meet.
     x[0], x[-1] = arch.x0, arch.x1
     z[0] = z[-1] = arch.z_spring
     return x, z

@@ -84,7 +84,7 @@ class Wing:
     ) -> Wing:
         """Returns a wing with its walls on whole centimetres.
 
-        They keep the meshes' text short.
+        Whole centimetres keep the meshes' text short.
         """
         a, b, c, d, e = (round(float(v), 2) for v in (x0, y0, x1, y1, wall_top))
         return Wing(a, b, c, d, e, round(float(top), 3), roof, frozenset(blind))
@@ -127,7 +127,7 @@ class Wing:
 
     @property
     def ridge(self) -> bays.Span:
-        """Where the ridge starts and ends, along x or y [m]."""
+        """Start and end of the ridge, along x or y [m]."""
         along_y = self.roof.along_y
         return (self.y0, self.y1) if along_y else (self.x0, self.x1)
 

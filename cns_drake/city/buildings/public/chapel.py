@@ -73,7 +73,7 @@ def build(p: Parameters, out: Assembly) -> None:
         _add_all(p, out, x1 - x0, y1 - y0)
         out.turn((x0, y0, 0.0), 0.0)
     else:
-        # Built along y, then turned a quarter to the right.
+        # The chapel is built along y, then turned a quarter to the right.
         _add_all(p, out, y1 - y0, x1 - x0)
         out.turn((x0, y1, 0.0), -np.pi / 2)
 
