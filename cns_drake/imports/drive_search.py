@@ -249,8 +249,8 @@ def _arm(
     Args:
         graph: of all pieces.
         used: pieces of the drives.
-        joint: the piece among them where the way begins. backwards: whether it
-            ends there instead.
+        joint: the piece among them where the way begins.
+        backwards: whether it ends there instead.
 
     Returns:
         The way from the joint on, backwards if it ends there; empty if it is

@@ -84,7 +84,8 @@ def told(
     Args:
         tags: of a thing.
         key: of the tag.
-        read: parser of its value. most: greatest plausible value.
+        read: parser of its value.
+        most: greatest plausible value.
         where: name of the thing, and the counts for values that cannot be
             parsed or are implausible; None if they are counted elsewhere.
         least: least plausible value.

@@ -68,8 +68,8 @@ def steerable_drive(
 
     Args:
         waypoints: (N, 2) or (N, 3), at least two [m].
-        room: checked on the whole path. margin: least radius of bends, in
-            tightest radii of the car.
+        room: checked on the whole path.
+        margin: least radius of bends, in tightest radii of the car.
     """
     waypoints = np.round(waypoints, 3)
     xyz = np.zeros((len(waypoints), 3))

@@ -118,12 +118,12 @@ class Suspension:
     """The linear full-car model of vehicle dynamics.
 
     The body heaves, rolls and pitches, each wheel moves up and down between
-    its spring and its tyre. The coordinates are heave of the body, upwards,
-    its roll, pitch about x and y of B (right side down, nose down), and the
-    heights of the wheels, all against where they are at rest on a level road.
-    The body turns about the point on the ground below its centre of mass,
-    which is the roll axis at ground level that the source of the shipped
-    rates has. There is neither anti-dive nor anti-squat geometry.
+    its spring and its tyre. The coordinates are heave of the body, upwards, its
+    roll and pitch about x and y of B (right side down, nose down), and the
+    heights of the wheels. All are relative to rest on a level road. The body
+    turns about the point on the ground below its centre of mass: the source of
+    the shipped rates has its roll axis at ground level. The model has no
+    anti-dive or anti-squat geometry.
 
     With stretch g q of a spring of rate k, K is the sum of k g' g; so for C.
     """
@@ -145,7 +145,7 @@ class Suspension:
         def each(axles: AxleRates) -> np.ndarray:
             return np.where(front, axles.front, axles.rear)
 
-        # How far each spring and each tyre is stretched by the coordinates.
+        # The stretch of each spring and each tyre by the coordinates.
         tyres = np.eye(size)[NUM_COORDINATES:]
         springs = np.column_stack(
             [np.ones(count), y, center_x - x, -np.eye(count)]
@@ -164,16 +164,17 @@ class Suspension:
             (front, rates.roll_bar_rate.front),
             (~front, rates.roll_bar_rate.rear),
         ):
-            # The bar is twisted by the body's roll over the axle's.
+            # The bar is twisted by the difference of the body's and the axle's
+            # roll.
             twist = np.sign(y[axle]) @ springs[axle] / np.abs(y[axle]).sum()
             stiffness += rate * np.outer(twist, twist)
-        # A tilted body hangs over.
+        # The weight of a tilted body tilts it further.
         overhang = masses.body * _GRAVITY * height
         stiffness -= np.diag([0.0, overhang, overhang, *np.zeros(count)])
         self._stiffness = stiffness
         self._damping = springs.T * each(rates.damping_rate) @ springs
-        # What heights of the road below the wheels and the specific force in
-        # B, less its value at rest, do to the coordinates.
+        # The effect on the coordinates of the heights of the road below the
+        # wheels, and of the specific force in B less its value at rest.
         self._loads = np.zeros((size, count + 3))
         self._loads[:, :count] = tyres.T * each(rates.tyre_rate)
         self._loads[2, count] = -masses.body * height
@@ -182,13 +183,13 @@ class Suspension:
         self._loads[NUM_COORDINATES:, count + 2] = -masses.wheels
 
     def at_rest(self, inputs: np.ndarray) -> np.ndarray:
-        """Returns the coordinates under (W + 3,) inputs that do not change."""
+        """Returns the coordinates under (W + 3,) constant inputs."""
         return np.linalg.solve(self._stiffness, self._loads @ inputs)
 
     def respond(
         self, inputs: np.ndarray, step: float
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Returns how the body moves, from rest under the first inputs.
+        """Returns the motion of the body, from rest under the first inputs.
 
         The solution is exact for inputs that change linearly within a step.
 
@@ -216,7 +217,7 @@ class Suspension:
         )
         D = np.zeros((len(C), B.shape[1]))
         D[-NUM_COORDINATES:] = B[rates]
-        # Slow to import, and needed by drives with a ride alone.
+        # Slow to import, and needed only by drives with a ride.
         from scipy.signal import cont2discrete
 
         A, B, C, D, _ = cont2discrete((A, B, C, D), step, method="foh")

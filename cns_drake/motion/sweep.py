@@ -1,4 +1,4 @@
-"""Where a vehicle is while a LiDAR on it turns."""
+"""Poses of a vehicle while a LiDAR on it turns."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ class Sweep(NamedTuple):
 
 
 class VehicleSweep(LeafSystem):
-    """Tells where a vehicle is at times shortly after the present one.
+    """Gives the poses of a vehicle at times shortly after the present one.
 
-    A LiDAR turns on while a frame is made: its output at a time needs poses
-    that the SceneGraph, which has that time only, does not have.
+    A LiDAR keeps turning during a frame. Its output at a time needs poses of
+    later times, which the SceneGraph does not have.
 
     .. pydrake_system::
 
@@ -51,7 +51,7 @@ class VehicleSweep(LeafSystem):
         """Declares the port.
 
         Args:
-            trajectory: where B is at every time.
+            trajectory: of B.
             offsets: (N,) times after the present one [s].
         """
         super().__init__()

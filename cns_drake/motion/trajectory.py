@@ -1,4 +1,4 @@
-"""Where a vehicle is, how it moves and accelerates at every time."""
+"""Pose, velocity and acceleration of a vehicle at every time."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _UP = np.array([[0.0, 0.0, 1.0]])
 
 @dataclass(frozen=True)
 class JointMotion:
-    """An angle [rad] or a way [m], its rate and its acceleration."""
+    """An angle [rad] or a distance [m], its rate and its acceleration."""
 
     position: np.ndarray
     rate: np.ndarray
@@ -42,15 +42,15 @@ class JointMotion:
 
 
 class Moments(NamedTuple):
-    """The path at N times, from which everything else follows.
+    """The path at N times; all motion is computed from it.
 
     Attributes:
         u: (N,) path parameters.
         rate: (N,) their rates [1/s].
         acceleration: (N,) their accelerations [1/s^2].
         jet: the path there.
-        section: the path that leads up to them, for integrals along it.
-        ride: how the body moves against the path; None if it is rigid.
+        section: the sections of path before them, for integrals.
+        ride: the motion of the body against the path; None if it is rigid.
     """
 
     u: np.ndarray
@@ -114,12 +114,14 @@ class Trajectory:
         return Moments(u, rate, acceleration, jet, section, ride)
 
     def path_motion(self, t: ArrayLike) -> FrameMotion:
-        """Returns how the path's frame F moves in the world at (N,) times."""
+        """Returns the motion of the path's frame F in the world at (N,)
+        times."""
         u, rate, acceleration = self.path_parameter(t)
         return _path_motion(self._path.evaluate(u), rate, acceleration)
 
     def body_motion(self, t: ArrayLike) -> FrameMotion:
-        """Returns how the vehicle frame B moves in the world at (N,) times."""
+        """Returns the motion of the vehicle frame B in the world at (N,)
+        times."""
         motion = self.path_motion(t)
         if self._ride is None:
             return motion
@@ -186,14 +188,14 @@ def motion_at(
 
 def _rotations(jet: PathJet) -> np.ndarray:
     yaw_pitch = np.stack([jet.yaw, -jet.climb], axis=1)
-    # Capitals: about the axes of the vehicle, one after the other.
+    # Capital letters: about the axes of the vehicle in turn.
     return Rotation.from_euler("ZY", yaw_pitch).as_matrix()
 
 
 def _path_motion(
     jet: PathJet, rate: np.ndarray, acceleration: np.ndarray
 ) -> FrameMotion:
-    """Returns how the path's frame F moves in the world.
+    """Returns the motion of the path's frame F in the world.
 
     Args:
         jet: the path at N places.
@@ -228,10 +230,10 @@ class WheelMotion:
     (x = 0) needs no steering, and it rolls by the length of that vector
     divided by r.
 
-    While a ride moves the body, the wheel stays on the ground that is drawn:
-    it travels up in the body by as much as the body comes down there. For
-    small angles that is exact, for 3 degrees within a millimetre. Steering
-    and rolling are those without a ride.
+    While a ride moves the body, the wheel stays on the drawn ground: it travels
+    up in the body by as much as the body comes down there. That is exact for
+    small angles, and within a millimetre for 3 degrees. Steering and rolling
+    are those without a ride.
     """
 
     def __init__(self, trajectory: Trajectory, p_BC: np.ndarray):
@@ -279,7 +281,7 @@ class WheelMotion:
         )
 
     def travel(self, moments: Moments) -> JointMotion:
-        """Returns the way up in the body at (N,) times [m]."""
+        """Returns the travel upwards in the body at (N,) times [m]."""
         ride = moments.ride
         if ride is None:
             still = np.zeros_like(moments.u)

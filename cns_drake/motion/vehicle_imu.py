@@ -9,18 +9,18 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from cns_drake.motion.trajectory import Trajectory
 
-# Samples that are computed at once, and how far the time asked for may be off
-# a sample's, in samples.
+# Samples computed at a time, and greatest distance of a wanted time from a
+# sample's, in samples.
 _BLOCK = 512
 _TOLERANCE = 1e-6
 
 
 class VehicleImu(LeafSystem):
-    """Measures what an accelerometer and a gyroscope on a vehicle would.
+    """Measures like an ideal accelerometer and gyroscope on a vehicle.
 
-    It gives what Drake's sensors on a `VehicleMotion` give, to rounding, at
-    a fifteenth of their cost: it has the motion of one frame only, and
-    computes many samples at once.
+    Its values equal those of Drake's sensors on a `VehicleMotion`, up to
+    rounding, at a fifteenth of the cost: it handles one frame only, and
+    computes many samples at a time.
 
     .. pydrake_system::
 
@@ -48,7 +48,7 @@ class VehicleImu(LeafSystem):
             trajectory: of the vehicle B.
             X_BI: pose of the IMU on it.
             gravity_W: the acceleration of free fall [m/s^2].
-            rate: samples per second, for what is computed at once [1/s].
+            rate: samples per second, for computing many at a time [1/s].
         """
         super().__init__()
         self._trajectory = trajectory

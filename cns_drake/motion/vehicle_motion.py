@@ -31,7 +31,7 @@ from cns_drake.motion.trajectory import (
     motion_at,
 )
 
-# Cosine of the angle between two directions that are taken for one.
+# Two directions are equal if the cosine of their angle is at least this.
 _PARALLEL = 1 - 1e-9
 
 
@@ -46,12 +46,12 @@ class _State(NamedTuple):
 class VehicleMotion(LeafSystem):
     """Prescribes the motion of a vehicle, wheels included.
 
-    It has the kinematic output ports of a MultibodyPlant, so that the
-    sensors and the SceneGraph that a plant feeds can be fed by it; no port
-    of a plant takes a prescribed motion. The vehicle's floating base B
-    follows the trajectory; each revolute joint about B's y rolls, each about
-    B's z steers, so that no wheel slips; each prismatic joint along B's z
-    keeps its wheel on the ground. All else keeps its default position.
+    It has the kinematic output ports of a MultibodyPlant, and can feed sensors
+    and a SceneGraph in its place: a plant has no port for prescribed motion.
+    The vehicle's floating base B follows the trajectory; each revolute joint
+    about B's y rolls, each about B's z steers, so that no wheel slips; each
+    prismatic joint along B's z keeps its wheel on the ground. All other joints
+    keep their default positions.
 
     .. pydrake_system::
 
@@ -82,17 +82,17 @@ class VehicleMotion(LeafSystem):
         Args:
             plant: a finalized plant; only its model is used.
             vehicle: the model instance that moves.
-            trajectory: where its base is at every time.
+            trajectory: of its base.
 
         Raises:
-            ValueError: a joint of the vehicle is none of these.
+            ValueError: a joint of the vehicle is of another kind.
         """
         super().__init__()
         self._plant = plant
         self._trajectory = trajectory
         self._base = plant.GetUniqueFloatingBaseBodyOrThrow(vehicle)
-        # Scratch, to turn q and v into what the bodies do; every use sets
-        # all that it reads.
+        # Scratch to compute the motion of bodies from q and v; every use sets
+        # all values that it reads.
         self._plant_context = plant.CreateDefaultContext()
         self._default_q = plant.GetPositions(self._plant_context).copy()
         self._joints = [
@@ -142,7 +142,7 @@ class VehicleMotion(LeafSystem):
         Callable[[Moments], JointMotion],
         float,
     ]:
-        """Returns what sets a joint, how it moves, and its sign."""
+        """Returns the driver of a joint, its kind of motion, and its sign."""
         context = self._plant_context
         frame = joint.frame_on_child()
         X_BJ = frame.CalcPose(context, self._base.body_frame())

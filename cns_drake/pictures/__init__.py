@@ -1,1 +1,1 @@
-"""What one looks at: pictures of stages, and pages of drives."""
+"""Pictures of stages, and web pages of drives."""

@@ -1,4 +1,4 @@
-"""The drives of a map from above, each over the stage that it leads through."""
+"""The drives of a map from above, each over its stage."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import world_file
 
 _WIDTH, _HEIGHT = 800, 800
-# What is shown beyond the routes [m].
+# Margin around the routes [m].
 _MARGIN = 40.0
 # From far up, so that towers lean little [m].
 _CAMERA_HEIGHT = 1200.0
@@ -42,8 +42,8 @@ def draw_drives(scenarios: Mapping[str, Scenario], path: Path) -> None:
         path: the picture to write; its ending chooses the format.
 
     Raises:
-        InputError: a drive cannot be planned, a world not be loaded or the
-            picture not be written.
+        InputError: a drive cannot be planned, a world cannot be loaded, or the
+            picture cannot be written.
     """
     drives = {}
     for title, scenario in scenarios.items():
@@ -97,7 +97,7 @@ def _draw_route(axes: Axes, view: View, positions: np.ndarray) -> None:
     # Above the car, so that the line lies over everything that is drawn.
     pixels, _ = view.project(positions, _WIDTH, _HEIGHT)
     segments = list(np.stack([pixels[:-1], pixels[1:]], axis=1))
-    # It gets thinner, so that a street that is driven again shows both.
+    # The line gets thinner, so that a street that is driven twice shows both.
     widths = np.linspace(5.0, 2.0, len(segments))
     # A rim sets the line apart from roofs of its colour.
     axes.add_collection(

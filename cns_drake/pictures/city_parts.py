@@ -1,4 +1,4 @@
-"""What stands still in a stage, and how that differs from another stage."""
+"""The static structures of a stage, and their differences to another stage."""
 
 from __future__ import annotations
 
@@ -38,15 +38,14 @@ class Part:
 
 @dataclass(frozen=True)
 class StageDifference:
-    """A stage beside another one.
+    """A stage compared with another one.
 
     Attributes:
-        common: of this stage, what the other one has as well.
-        additional: of this stage, structures that the other one lacks, and
-            what of a structure rises above its height there.
-        absent: of the other stage, structures that this one lacks.
-        lower: of the other stage, what of a structure rises above its height
-            here.
+        common: parts of this stage that the other one has as well. additional:
+            structures of this stage that the other one lacks, and parts of
+            structures above their height there.
+        absent: structures of the other stage that this one lacks.
+        lower: parts of structures of the other stage above their height here.
     """
 
     common: list[Part] = field(default_factory=list)
@@ -56,7 +55,7 @@ class StageDifference:
 
 
 def read_parts(world: World) -> dict[str, list[Part]]:
-    """Returns what never moves, by the structure that it belongs to."""
+    """Returns structure -> its parts, of all that never moves."""
     plant = world.plant
     context = plant.CreateDefaultContext()
     geometries = read_perception_geometry(
@@ -124,7 +123,7 @@ def _top(parts: Sequence[Part]) -> float:
 def _split(
     parts: Sequence[Part], height: float
 ) -> tuple[list[Part], list[Part]]:
-    """Returns what lies below a height, and what reaches above it [m].
+    """Returns the parts below a height, and the parts above it [m].
 
     Triangles are kept whole.
     """

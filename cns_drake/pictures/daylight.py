@@ -7,7 +7,8 @@ from pydrake.geometry import Meshcat
 
 # Toward the sun: from the south-west, so that the sides in view are lit.
 _SUN_W = np.array([-0.50, -0.55, 0.67]) / np.linalg.norm([-0.50, -0.55, 0.67])
-# How far around the view shadows are cast, and of what height [m].
+# Range around the view in which shadows are cast, and height of their casters
+# [m].
 _SHADOW_MARGIN = 150.0
 _SHADOW_HEIGHT = 120.0
 _SHADOW_PIXELS = 4096.0
@@ -18,8 +19,8 @@ def set_view(meshcat: Meshcat, lower: np.ndarray, upper: np.ndarray) -> None:
 
     Args:
         meshcat: the scene.
-        lower: (3,) least coordinates of what shall be in view [m].
-        upper: (3,) greatest coordinates of what shall be in view [m].
+        lower: (3,) least coordinates of the view [m].
+        upper: (3,) greatest coordinates of the view [m].
     """
     meshcat.SetProperty("/Grid", "visible", False)
     meshcat.SetProperty("/Axes", "visible", False)
@@ -29,11 +30,11 @@ def set_view(meshcat: Meshcat, lower: np.ndarray, upper: np.ndarray) -> None:
     _set_lights(meshcat, lower, upper)
     center = (lower + upper) / 2.0
     reach = float(np.linalg.norm((upper - lower)[:2])) / 2.0
-    # The default camera sees 100 m far.
+    # The default camera sees only 100 m far.
     meshcat.SetCamera(
         Meshcat.PerspectiveCamera(fov=50.0, near=0.5, far=20.0 * reach + 500.0)
     )
-    # South of the middle, so that the middle is seen above it.
+    # The camera is south of the middle and looks north.
     target = np.array([center[0], center[1] - 0.15 * reach, lower[2]])
     meshcat.SetCameraPose(
         target + np.array([-0.35, -1.05, 0.85]) * max(reach, 10.0) * 1.5,
@@ -49,7 +50,7 @@ def _set_lights(meshcat: Meshcat, lower: np.ndarray, upper: np.ndarray) -> None:
     sun = "/Lights/FillLight/<object>"
     meshcat.SetProperty(sun, "intensity", 2.6)
     # The sun shines toward the origin and casts shadows in a box along its
-    # rays; the box has to hold what is in view.
+    # rays; the box has to hold the whole view.
     low = np.array([*(lower[:2] - _SHADOW_MARGIN), lower[2] - 10.0])
     high = np.array([*(upper[:2] + _SHADOW_MARGIN), upper[2] + _SHADOW_HEIGHT])
     corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, 8)

@@ -37,8 +37,8 @@ from cns_drake.scene.perception_geometry import (
 )
 from cns_drake.scene.world import World
 
-# What is not there is seen through, hidden by what is there in its place, and
-# casts no shadow.
+# Absent structures are translucent, hidden behind present ones, and cast no
+# shadow.
 _OPACITY = 0.45
 _UNREAL = {
     "castShadow": False,
@@ -46,14 +46,14 @@ _UNREAL = {
     "material.polygonOffsetFactor": 1.0,
     "material.polygonOffsetUnits": 4.0,
 }
-# Traffic has a pose in every so many frames, which keeps pages small: at 10 m/s
-# in the tightest turns the page is 0.1 m off between them.
+# Traffic has a pose only every few frames, which keeps pages small. In the
+# tightest turns at 10 m/s the error between them is 0.1 m.
 _TRAFFIC_INTERVAL = 5
 
 
 @dataclass(frozen=True)
 class Drive:
-    """What happened during a drive.
+    """The record of a drive.
 
     Attributes:
         period: time between frames [s].
@@ -62,12 +62,12 @@ class Drive:
         scans: frame index and (N, 3) positions in the world [m] of the
             scans to show.
         speeds: forward speed of the vehicle at each frame [m/s].
-        specific_forces_I: what the IMU measures at each frame in its frame I
+        specific_forces_I: specific force at each frame in the IMU's frame I
             [m/s^2].
         angular_velocities_I: likewise w_WI_I [rad/s].
-        limbs: for a frame F that leads others, the poses in F of all frames
-            that the page moves as one with it, F among them.
-        names: of the frames that lead, under which the page shows them.
+        limbs: leading frame F -> the poses in F of all frames that move with it
+            as one, with F itself.
+        names: leading frame -> its name in the page.
     """
 
     period: float
@@ -95,30 +95,29 @@ def make_drive_page(
 ) -> str:
     """Returns a page with the city, the drive and its scans.
 
-    The layers of the page, each to be switched in Meshcat's controls, which
-    the button "Layers" shows:
+    The button "Layers" shows Meshcat's controls, which switch the layers of the
+    page:
 
     - `/city/<class>`: the structures of the stage in their own colours,
-    - `/vehicle/<body>`, `/moving/<body>`: what moves, as it moved,
-    - `/route`: a ribbon from red (start) to blue (end),
-    - `/scans/<k>`: LiDAR points coloured by height, as soon as measured,
-    - `/stage_difference/additional/<class>`: what of the city is not in the
-      other stage, or rises above it there; not in `/city` as well,
-    - `/stage_difference/absent/<class>`: structures of the other stage that
+    - `/vehicle/<body>`, `/moving/<body>`: the moving bodies, - `/route`: a
+    ribbon from red (start) to blue (end), - `/scans/<k>`: LiDAR points coloured
+    by height, as soon as measured, - `/stage_difference/additional/<class>`:
+    parts of the city that the other stage lacks or has lower; they are not in
+    `/city`, - `/stage_difference/absent/<class>`: structures of the other stage
+    that
       this one lacks, translucent red, off when the page opens,
-    - `/stage_difference/lower/<class>`: what rises higher in the other stage
-      than here, translucent orange, off when the page opens.
+    - `/stage_difference/lower/<class>`: parts of the other stage above their
+    height here, translucent orange, off when the page opens.
 
     A panel has the title and a legend; buttons play the drive, let the camera
-    follow the car, switch points off, and switch on what changed: then the
-    additional is violet. Below the time line are plots of speed, IMU and
-    stage.
+    follow the car, switch points off, and show the change: additional parts are
+    then violet. Below the time line are plots of speed, IMU and stage.
 
     Args:
-        drive: what happened.
+        drive: the record of the drive.
         world: the stage, with the vehicle.
         other_stage: the stage to show the difference to.
-        other_name: what the page calls it.
+        other_name: its name in the page.
         stage: name of the stage, if the world is one of a map.
         stages: names of all stages of that map, the earliest first.
         title: title of the page.
@@ -159,7 +158,7 @@ def moving_frames(world: World) -> tuple[FrameId, ...]:
 def _draw_city(
     meshcat: Meshcat, world: World, other_stage: World | None
 ) -> set[str]:
-    """Draws what stands still; returns which layers of change there are."""
+    """Draws static structures; returns the layers of change that exist."""
     own = read_parts(world)
     other = own if other_stage is None else read_parts(other_stage)
     difference = compare_parts(own, other)
@@ -171,7 +170,7 @@ def _draw_city(
 
 
 def _draw_missing(meshcat: Meshcat, name: str, parts: Sequence[Part]) -> None:
-    """Draws what only the other stage has; off at first."""
+    """Draws the parts that only the other stage has; off at first."""
     if not parts:
         return
     path = f"/stage_difference/{name}"
@@ -183,7 +182,7 @@ def _draw_missing(meshcat: Meshcat, name: str, parts: Sequence[Part]) -> None:
 
 
 def _animate(meshcat: Meshcat, drive: Drive, world: World) -> None:
-    """Draws what moves and the scans, and plays them over the drive."""
+    """Draws moving bodies and scans, and animates them over the drive."""
     animation = MeshcatAnimation(frames_per_second=1.0 / drive.period)
     inspector = world.scene_graph.model_inspector()
     own = [frame for frame in drive.X_WFs if frame not in drive.limbs]
@@ -215,7 +214,7 @@ def _animate_limbs(
     drive: Drive,
     inspector: SceneGraphInspector,
 ) -> None:
-    """Draws what moves with its limbs as one."""
+    """Draws a moving frame and its limbs as one."""
     # The frame that leads each limb, and the pose of the limb in it.
     led = {
         limb: (leading, X_FL)
@@ -265,7 +264,7 @@ def _moving_paths(
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Keeps Drake from announcing a port that nobody shall open."""
+    """Keeps Drake from announcing a port that is not for users."""
     logger = logging.getLogger("drake")
     level = logger.level
     logger.setLevel(logging.WARNING)

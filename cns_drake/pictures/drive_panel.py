@@ -1,4 +1,4 @@
-"""What a page of a drive says about it, and its buttons."""
+"""Title, legend and buttons of a drive's page."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from cns_drake.pictures.meshcat_drawing import (
 
 Rgb = tuple[float, float, float]
 
-# Colours of change, and what is said of them.
+# Colours of change, and their legends.
 CHANGE_RGB: dict[str, Rgb] = {
     "absent": (0.86, 0.08, 0.20),
     "lower": (0.96, 0.50, 0.05),
@@ -47,8 +47,8 @@ def make_panel(
         title: plain text.
         X_WBs: pose of the vehicle at each frame.
         period: time between frames [s].
-        changes: which of `CHANGE_RGB` the page has.
-        other_name: what the stage that it is compared with is called.
+        changes: the keys of `CHANGE_RGB` that the page has.
+        other_name: the name of the other stage.
         plots: HTML below the time line.
     """
     p_WBset = np.array([X_WB.translation() for X_WB in X_WBs])
@@ -78,7 +78,7 @@ def make_panel(
             f' data-additional="{_hex(CHANGE_RGB["additional"])}">'
             "What changed</button>"
         )
-    # One pass: what is put in is not searched for slots.
+    # One pass: inserted text is not searched for slots.
     return _SLOT.sub(lambda m: slots[m[1]], template("panel.html"))
 
 

@@ -1,4 +1,4 @@
-"""Small plots of a drive over time: speed, what the IMU measures, stage."""
+"""Small plots of a drive over time: speed, IMU, stage."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from html import escape
 
 import numpy as np
 
-# More samples are not seen.
+# More samples would not be visible.
 _MAX_SAMPLES = 400
 # Size of a plot in units of its own; the page stretches it.
 _WIDTH, _HEIGHT = 400.0, 20.0
-# Attribute of the stage that is driven through.
+# Attribute of the current stage.
 _NOW = ' class="now"'
-# A plot of less than this range would show noise as if it were much.
+# Least range of a plot: a smaller one would magnify noise.
 _LEAST_RANGE = {"km/h": 10.0, "m/s²": 2.0, "deg/s": 10.0}
 
 
 @dataclass(frozen=True)
 class Curve:
-    """What one curve shows.
+    """One curve.
 
     Attributes:
-        name: as the page calls it.
+        name: its name in the page.
         unit: a key of `_LEAST_RANGE`.
         values: (F,) one for each frame.
     """
@@ -42,8 +42,7 @@ def motion_curves(
 
     Args:
         speeds: forward speed of the vehicle at each frame [m/s].
-        specific_forces_I: (3,) at each frame, as the IMU measures it in its
-            frame I [m/s^2].
+        specific_forces_I: (3,) at each frame, in the IMU's frame I [m/s^2].
         angular_velocities_I: likewise w_WI_I [rad/s].
     """
     forces = np.reshape(specific_forces_I, (-1, 3))
@@ -83,7 +82,7 @@ def _plot(curve: Curve) -> str:
     values = curve.values[frames]
     low, high = min(values.min(), 0.0), max(values.max(), 0.0)
     missing = max(_LEAST_RANGE[curve.unit] - (high - low), 0.0)
-    if low < 0.0:  # The curve has both signs: zero stays where it is.
+    if low < 0.0:  # Zero stays within the plot.
         low -= missing / 2.0
         missing /= 2.0
     high += missing

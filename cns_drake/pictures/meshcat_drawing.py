@@ -14,15 +14,15 @@ from cns_drake.pictures.city_parts import Part
 from cns_drake.scene.perception_geometry import PerceptionGeometry
 from cns_drake.scene.surface_merging import merge_surfaces, merge_triangles
 
-# Vertices are put on a grid of 4 mm, which nobody sees: the zeros at the end
-# of each float compress well.
+# Vertices are put on an invisible grid of 4 mm: the zeros at the end of each
+# float compress well.
 _VERTEX_GRID = 2.0**-8
 
 START_RGB = np.array([1.00, 0.10, 0.10])
 END_RGB = np.array([0.10, 0.30, 1.00])
 _ROUTE_WIDTH = 2.0
-# The ribbon rises on its way [m], so that where a route passes a second time
-# its later part lies on top.
+# Rise of the ribbon along the route [m]: where a route passes twice, its later
+# part is on top.
 _ROUTE_HEIGHTS = (0.2, 0.7)
 
 _MARKER_HEIGHT = 7.0
@@ -135,7 +135,7 @@ def draw_route(
 
 def height_rgb(z: np.ndarray) -> np.ndarray:
     """Returns the (N, 3) sRGB colours of points at heights (N,) [m]."""
-    # Only pages need colour maps, and the import takes a moment.
+    # Only pages need colour maps, whose import takes a moment.
     from matplotlib import colormaps
 
     lowest, highest = POINT_HEIGHTS
@@ -174,7 +174,7 @@ def _draw_colored(
     meshcat.SetTriangleColorMesh(
         path, vertices, triangles, _columns(_linear(rgb))
     )
-    # Drake makes it light grey, by which colours would be multiplied.
+    # Drake's default is light grey, which would darken the colours.
     meshcat.SetProperty(path, "color", _WHITE)
 
 
@@ -195,7 +195,7 @@ def _draw_merged(
 
 
 def _linear(srgb: np.ndarray) -> np.ndarray:
-    """Returns colours of vertices and points as the page wants them.
+    """Returns colours of vertices and points as the page needs them.
 
     Unlike the colour of a whole object they are taken as linear light.
     """
@@ -207,5 +207,5 @@ def _on_grid(positions: np.ndarray) -> np.ndarray:
 
 
 def _columns(rows: np.ndarray, dtype: DTypeLike = float) -> np.ndarray:
-    """Returns the (3, N) array, in Fortran's order, that Drake wants."""
+    """Returns an array as (3, N) in Fortran's order, which Drake requires."""
     return np.asfortranarray(rows.T, dtype=dtype)

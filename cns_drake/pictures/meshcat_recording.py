@@ -19,7 +19,7 @@ from cns_drake.pictures.drive_page import (
 )
 from cns_drake.scene.world import World
 
-# Together they keep a page below 25 MB, however long the drive.
+# Together they keep the page of any drive below 25 MB.
 _MAX_SCANS = 160
 _MAX_POINTS_PER_SCAN = 3000
 # One point for each cube of this size [m]: without that, nearly all points
@@ -45,9 +45,9 @@ class MeshcatRecorder(LeafSystem):
     [rad/s] are expressed in I; `<lidar>_scan` is a structured array of points
     expressed in S.
 
-    At every frame the poses of all moving frames are taken down, and the
-    scans wherever the vehicle has gone another `scan_spacing` meters; on a
-    long drive the spacing is doubled as often as needed.
+    The poses of all moving frames are recorded at every frame, and the scans
+    whenever the vehicle has gone another `scan_spacing` meters. On a long drive
+    the spacing is doubled as often as needed.
     """
 
     def __init__(
@@ -69,12 +69,12 @@ class MeshcatRecorder(LeafSystem):
             world: the stage, with the vehicle.
             X_BSs: LiDAR name -> pose of its frame S in B.
             period: time between frames [s].
-            num_frames: how many frames to take down, if not all.
+            num_frames: number of frames to record, if not all.
             other_stage: the stage to show the difference to.
             other_name: what the page calls it.
             stage: name of the stage, if the world is one of a map.
             stages: names of all stages of that map, the earliest first.
-            scan_spacing: way between two scans that are shown [m].
+            scan_spacing: distance between two shown scans [m].
         """
         super().__init__()
         self._world = world
@@ -110,11 +110,11 @@ class MeshcatRecorder(LeafSystem):
         self.DeclareForcedPublishEvent(self._publish)
 
     def show_too(self, name: str, frames: Sequence[FrameId]) -> None:
-        """Shows something else that moves, its limbs as at the first frame.
+        """Adds another moving thing; its limbs stay as at the first frame.
 
         Args:
-            name: unique, for the page.
-            frames: of its geometry; the first leads.
+            name: unique in the page.
+            frames: of its geometry; the first one leads.
         """
         leading = frames[0]
         self.drive.X_WFs[leading] = []
@@ -148,7 +148,8 @@ class MeshcatRecorder(LeafSystem):
             return EventStatus.DidNothing()
         query_object = self._geometry_query.Eval(context)
         for frame_id, X_WFs in self.drive.X_WFs.items():
-            # Copies: what the ports give may be overwritten at the next step.
+            # Copies: the values of the ports may be overwritten at the next
+            # step.
             X_WFs.append(RigidTransform(query_object.GetPoseInWorld(frame_id)))
         if not self.drive.X_WBs:
             for leading, X_FLs in self.drive.limbs.items():
@@ -199,6 +200,6 @@ def _thinned(p_WRset: np.ndarray) -> np.ndarray:
     cubes = np.floor(p_WRset / _THINNING_SIZE).astype(np.int64)
     _, first = np.unique(cubes, axis=0, return_index=True)
     count = min(len(first), _MAX_POINTS_PER_SCAN)
-    # Spread over the sorted cubes, so that all sides lose alike.
+    # Points are dropped evenly over the sorted cubes, so on all sides alike.
     kept = first[np.linspace(0, len(first) - 1, count).astype(int)]
     return p_WRset[np.sort(kept)]

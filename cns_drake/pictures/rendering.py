@@ -30,7 +30,7 @@ def look_at(p_WC: ArrayLike, p_WT: ArrayLike) -> RigidTransform:
     forward = np.asarray(p_WT, dtype=float) - np.asarray(p_WC, dtype=float)
     forward /= np.linalg.norm(forward)
     left = np.cross([0.0, 0.0, 1.0], forward)
-    if np.linalg.norm(left) < 1e-6:  # Straight down: north is up.
+    if np.linalg.norm(left) < 1e-6:  # Straight down, north is up.
         left = np.array([-1.0, 0.0, 0.0])
     left /= np.linalg.norm(left)
     up = np.cross(forward, left)
@@ -107,8 +107,8 @@ def _shade(
     facing = normal @ _SUN_W
     sun = np.broadcast_to(_SUN_W, p_W.shape)
     lit = ~np.isfinite(scene.cast_rays(p_W, sun, _FAR).ranges)
-    # Walls catch half the sky, roofs and streets all of it; surfaces low
-    # between others would need occlusion, which two short rays hint at.
+    # Walls get half of the sky's light, roofs and streets all of it. Two short
+    # rays approximate the shade between other surfaces.
     sky = 0.65 + 0.35 * normal[:, 2]
     sky *= 0.55 + 0.45 * _openness(scene, p_W, normal)
     light = (
@@ -124,7 +124,7 @@ def _shade(
 def _openness(
     scene: RayCastingScene, p_W: np.ndarray, normal: np.ndarray
 ) -> np.ndarray:
-    """Returns how far short rays around the normal get, from 0 to 1."""
+    """Returns the free share of short rays around the normal, from 0 to 1."""
     reach = 6.0
     total = np.zeros(len(p_W))
     tilts = ([0.6, 0.3, 0.4], [-0.5, 0.6, 0.5], [0.1, -0.8, 0.3])

@@ -50,7 +50,7 @@ class View(BaseModel):
     def project(
         self, p_WQset: np.ndarray, width: int, height: int
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Returns (M, 2) pixels and which (M,) points of N they belong to.
+        """Returns (M, 2) pixels and the indices (M,) of their points.
 
         Args:
             p_WQset: (N, 3) points in the world [m].

@@ -1,4 +1,4 @@
-"""A Meshcat scene as one HTML file that is small and keeps its order."""
+"""Writes a Meshcat scene as one small HTML file, commands in order."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from cns_drake.base.files import complete_part, user_errors, write_part
 _LEVEL = 6
 # The quickest, a few percent larger.
 _QUICK_LEVEL = 1
-# Bytes of a vertex or of a triangle: what a row differs from the one before
-# in is little, and compresses well.
+# Bytes of a vertex or of a triangle: rows differ little from their
+# predecessors, and their differences compress well.
 _ROW = 12
 
 # How Meshcat.StaticHtml() embeds each of its commands.
@@ -29,8 +29,8 @@ _COMMAND = re.compile(
     r"new Uint8Array\(buffer\)\)\);"
 )
 
-# Commands are chained: fetched all at once, as Drake's page does, a command
-# could overtake the larger one before it that it refers to.
+# Commands are chained. Drake's page fetches all at once, where a command could
+# overtake a larger one that it refers to.
 _QUEUE = """
     // Undoes what `filter_rows` did in Python.
     function unfilterRows(planes, length) {
@@ -62,22 +62,22 @@ def make_static_page(
 ) -> str:
     """Returns the scene as a self-contained page, without a server.
 
-    It is the page that Drake makes, with the commands in it compressed: a
-    city takes a third of the space then. Any browser of 2023 or later
-    inflates them itself.
+    It is Drake's page with compressed commands: a city takes a third of the
+    space. Browsers of 2023 or later decompress them.
 
     Args:
         meshcat: holds the scene.
         title: the title of the page, plain text.
-        body: HTML that is put before the scene, and is seen while it loads.
-        script: JavaScript module, run when the page is there; its `commands`
-            is a promise of the scene.
+        body: HTML before the scene, visible while it loads.
+        script: JavaScript module, run when the page is ready; its `commands` is
+            a promise of the scene.
     """
     html = meshcat.StaticHtml()
     first = _COMMAND.search(html)
     if first is None:
         raise RuntimeError(
-            "this version of Drake writes Meshcat pages in another form"
+            "this version of Drake writes Meshcat pages in another form; use "
+            "the version in pyproject.toml"
         )
     head = html[: first.start()]
     rest = _COMMAND.sub(_compressed, html[first.start() :])
@@ -96,7 +96,7 @@ def make_static_page(
 def save_meshcat_page(
     meshcat: Meshcat, path: Path, title: str = "Meshcat"
 ) -> None:
-    """Saves what Meshcat shows as one page that opens without a server.
+    """Saves a Meshcat scene as one page that opens without a server.
 
     Args:
         meshcat: holds the scene.
@@ -120,9 +120,9 @@ def save_meshcat_page(
 def filter_rows(data: bytes) -> bytes:
     """Returns bytes in a form that compresses better.
 
-    Each byte less the one a row before it, by its place in the row: first
-    all that come first in their row, and so on; the last row is filled up
-    with zeros.
+    Each byte becomes its difference to the byte one row before. All bytes in
+    the first place of their row come first, then all in the second, and so on.
+    The last row is filled up with zeros.
     """
     padded = np.frombuffer(data + bytes(-len(data) % _ROW), np.uint8)
     rows = padded.reshape(-1, _ROW)
@@ -133,7 +133,7 @@ def filter_rows(data: bytes) -> bytes:
 def _compressed(command: re.Match) -> str:
     raw = base64.b64decode(command[1])
     filtered = zlib.compress(filter_rows(raw), _LEVEL)
-    # A quick look at what it would take unfiltered saves most of that time.
+    # A quick compression of the unfiltered bytes saves most of that time.
     if len(zlib.compress(raw, _QUICK_LEVEL)) <= len(filtered):
         plain = zlib.compress(raw, _LEVEL)
         return f'    enqueue("{base64.b64encode(plain).decode()}");'
@@ -143,5 +143,5 @@ def _compressed(command: re.Match) -> str:
 
 def _replace(html: str, old: str, new: str) -> str:
     if html.count(old) != 1:
-        raise RuntimeError(f"Drake's Meshcat page has not one {old}")
+        raise RuntimeError(f"Drake's Meshcat page must have exactly one {old}")
     return html.replace(old, new)

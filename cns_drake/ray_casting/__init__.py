@@ -1,1 +1,1 @@
-"""Rays on SceneGraph's geometry: hierarchies and the casting on them."""
+"""Ray casting on SceneGraph's geometry."""

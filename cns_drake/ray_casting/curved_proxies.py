@@ -1,7 +1,7 @@
 """Polyhedra about curved shapes.
 
-A ray that misses the polyhedron misses the shape, unless it starts between
-the two: few rays then have to be cast on the shapes themselves.
+A ray that misses the polyhedron misses the shape, unless it starts between the
+two. Few rays then have to be cast on the shapes themselves.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ CurvedSurface = EllipsoidSurface | CylinderSurface | CapsuleSurface
 
 # Sides of a circle.
 _SIDES = 16
-# What lies between shape and polyhedron at least, beyond what single
-# precision confuses: a part of the radius, and [m].
+# Least distance between shape and polyhedron, above errors of single precision:
+# a part of the radius, and [m].
 _MARGIN = 0.005
 _GAP = 1e-3
-# How far about places shapes are looked for, so that the next places have
-# theirs found already [m].
+# Radius around places in which shapes are searched, so that the next places
+# find theirs already there [m].
 _NEARBY = 10.0
 
 
@@ -56,7 +56,7 @@ def circumscribe(surface: CurvedSurface) -> TriangleSurface:
 
 
 class NearCurvedShapes:
-    """Tells which rays start near curved shapes of groups."""
+    """Finds the rays that start near curved shapes of groups."""
 
     def __init__(self, groups: Sequence[RayGroup]):
         """Takes the curved shapes of groups."""
@@ -77,22 +77,22 @@ class NearCurvedShapes:
         X_LGset = np.reshape(X_LGs, (-1, 4, 4))
         self._p_LGs, self._X_GLs = X_LGset[:, :, 3:], np.linalg.inv(X_LGset)
         self._sizes = np.reshape(sizes, (-1, 2))
-        # How much longer an arrow of G can be in O.
+        # Greatest stretch of a vector from G to O.
         self._stretches = np.array(
             [np.linalg.norm(group.X_FL[:3, :3], 2) for group in groups]
         )
         self._near: _Sorted | None = None
-        # The box of O out of which no shape is among those that are placed.
+        # The box in O whose shapes are placed.
         self._box = (np.full(3, np.inf), np.full(3, -np.inf))
 
     def forget_places(self) -> None:
-        """Has the shapes placed anew where their groups are now."""
+        """Marks the shapes to be placed anew with their groups."""
         self._near = None
 
     def contain(self, p_OSset: np.ndarray) -> np.ndarray:
-        """Tells which of (K, 3) places lie near a shape, (K,) bool.
+        """Returns which of (K, 3) places are near a shape, (K,) bool.
 
-        That is, within what a shape's polyhedron sweeps during the turn.
+        A place is near if the shape's polyhedron sweeps it during the turn.
         """
         result = np.zeros(len(p_OSset), bool)
         if len(self._rows) and len(p_OSset):
@@ -108,7 +108,7 @@ class NearCurvedShapes:
         return result
 
     def _place(self) -> _Sorted:
-        """Returns the shapes that reach into the box, where they are."""
+        """Returns the shapes that reach into the box, at their places."""
         in_sight = np.array([group.in_sight for group in self._groups])
         seen = [k for k, group in enumerate(self._groups) if group.in_sight]
         X_OLs = np.tile(np.eye(4), (len(self._groups), 1, 1))
@@ -127,7 +127,7 @@ class NearCurvedShapes:
         )
         shapes, rows = shapes[inside], rows[inside]
         X_GOs = self._X_GLs[shapes] @ np.linalg.inv(X_OLs[rows])
-        # Bounds the largest of its singular values.
+        # This norm bounds the largest singular value.
         shrink = np.linalg.norm(X_GOs[:, :3, :3], axis=(1, 2))
         places, reaches = places[inside], reaches[inside]
         sizes, travels = self._sizes[shapes], travels[inside]
@@ -145,7 +145,8 @@ class NearCurvedShapes:
     def _travels(
         self, rows: np.ndarray, places: np.ndarray, reaches: np.ndarray
     ) -> np.ndarray:
-        """Returns how far shapes of groups go at most during a turn."""
+        """Returns the greatest distance that shapes of groups move during a
+        turn."""
         ways, angles = np.zeros((2, len(self._groups)))
         p_OFs = np.zeros((len(self._groups), 3))
         for row, group in enumerate(self._groups):
@@ -160,16 +161,16 @@ class NearCurvedShapes:
 
 
 class _Sorted(NamedTuple):
-    """M shapes where they are, by where their balls begin along x.
+    """M placed shapes, sorted by the start of their balls along x.
 
     Attributes:
         places: (M, 3) middles in O.
         reaches: (M,) radii of balls about them [m].
-        X_GOs: (M, 4, 4) from O to their own frames; not rigid for an
-            ellipsoid, which is there a ball.
+        X_GOs: (M, 4, 4) from O to their own frames; not rigid for an ellipsoid,
+            which is a ball there.
         halves: (M,) half of the length along z.
-        radii: (M,) of what is about that line.
-        begins: (M,) where their balls begin along x [m].
+        radii: (M,) around that line.
+        begins: (M,) starts of their balls along x [m].
         width: of the widest ball [m].
     """
 
@@ -184,7 +185,7 @@ class _Sorted(NamedTuple):
 
 @compiled
 def _find_near(near: _Sorted, p_OSset: np.ndarray, result: np.ndarray) -> None:
-    """Fills in which places lie near a shape; see `contain`."""
+    """Fills in the places near a shape; see `contain`."""
     p_GS = np.empty(3)
     for i in range(len(p_OSset)):
         p = p_OSset[i]
@@ -202,7 +203,7 @@ def _find_near(near: _Sorted, p_OSset: np.ndarray, result: np.ndarray) -> None:
                 p_GS[axis] = near.X_GOs[k, axis, 3]
                 for column in range(3):
                     p_GS[axis] += near.X_GOs[k, axis, column] * p[column]
-            # To the nearest place on the line.
+            # Distance to the nearest place on the line.
             p_GS[2] -= min(max(p_GS[2], -near.halves[k]), near.halves[k])
             square = p_GS[0] ** 2 + p_GS[1] ** 2 + p_GS[2] ** 2
             result[i] = square <= near.radii[k] ** 2

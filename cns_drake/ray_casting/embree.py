@@ -46,8 +46,8 @@ def load() -> ctypes.CDLL:
     folder = Path(package.origin).parent
     places = [folder, folder.parent / "embreex.libs", folder / ".dylibs"]
     files = [f for place in places for f in sorted(place.glob("*embree4*"))]
-    # The wheel keeps Embree's own dependencies beside it and finds them
-    # through its extension module, which therefore is loaded first.
+    # The wheel has Embree's dependencies beside it. Its extension module finds
+    # them, and is loaded first.
     importlib.import_module("embreex.rtcore_scene")
     embree = ctypes.CDLL(str(files[0]))
     pointer, integer, uint = ctypes.c_void_p, ctypes.c_int, ctypes.c_uint
@@ -85,7 +85,7 @@ def load() -> ctypes.CDLL:
 
 
 def address_of(function: object) -> int:
-    """Returns where a function of Embree's is, for compiled code."""
+    """Returns the address of a function of Embree, for compiled code."""
     address = ctypes.cast(function, ctypes.c_void_p).value  # type: ignore[arg-type]  # A function is a pointer.
     assert address is not None
     return address

@@ -24,12 +24,12 @@ from cns_drake.ray_casting.rays import Hits, Rays
 
 
 class _Built(NamedTuple):
-    """What was built of a group.
+    """The Embree scene of a group.
 
     Attributes:
-        scene: the RTCScene, 0 if there is nothing in it.
-        owners: `Primitives.owners` of each of its geometries; of a copy,
-            whose scene others have too, the one that all primitives have.
+        scene: the RTCScene, 0 if empty.
+        owners: `Primitives.owners` of each of its geometries. A copy, which
+            shares its scene, has one owner for all primitives.
     """
 
     scene: int
@@ -39,9 +39,9 @@ class _Built(NamedTuple):
 class EmbreeHierarchy:
     """A bounding volume hierarchy over the primitives of groups.
 
-    Rays are cast in packets that Embree takes as coherent, which is what
-    makes a LiDAR's neighbouring beams cheap, and scenes are built robust, so
-    that no ray slips through an edge that two triangles share.
+    Rays are cast in packets marked as coherent, which makes a LiDAR's
+    neighbouring beams cheap. Scenes are built robust, so that no ray passes
+    through an edge that two triangles share.
     """
 
     def __init__(
@@ -55,17 +55,18 @@ class EmbreeHierarchy:
 
         Args:
             groups: all groups, placed.
-            merge: makes primitives of what a group holds; none is allowed.
-            num_threads: how many threads share the rays of a cast.
-            previous: a hierarchy of the same primitives, from which what was
-                built of the same groups is taken over.
+            merge: makes primitives from the members of a group; it may make
+                none.
+            num_threads: number of threads that share the rays of a cast.
+            previous: a hierarchy of the same primitives, whose scenes of
+                unchanged groups are reused.
 
         Raises:
             MemoryError: Embree cannot build it.
         """
         self._groups = groups
         self._num_threads = num_threads
-        # Threads start when they are first needed.
+        # Threads start at their first use.
         self._helpers = ThreadPoolExecutor(max(1, num_threads - 1))
         self._lib = embree.load()
         if previous is None:
@@ -110,8 +111,8 @@ class EmbreeHierarchy:
         error = self._lib.rtcGetDeviceError(self._device)
         if error:
             raise MemoryError(f"Embree cannot build the scene: error {error}")
-        # Rows of groups in the order of `Tree.first_primitive`; the last
-        # entry is what a miss, -1, finds.
+        # Rows of groups in the order of `Tree.first_primitive`; the last entry
+        # serves a miss, -1.
         rows = [fixed[0] if fixed else -1, *moving]
         self._rows = np.array([*rows, -1], np.int32)
         self._arguments = embree.IntersectArguments(
@@ -132,17 +133,17 @@ class EmbreeHierarchy:
 
     @property
     def rows(self) -> list[int]:
-        """The rows of the groups of which it holds anything."""
+        """The rows of the groups with primitives in this hierarchy."""
         return [row for row, built in self._built.items() if built.scene]
 
     def _built_of(self) -> dict[int, _Built]:
-        """Returns what was built of each group, by the group's `id`."""
+        """Returns group's `id` -> its Embree scene."""
         return {
             id(self._groups[row]): built for row, built in self._built.items()
         }
 
     def _copied(self) -> dict[int, _Built]:
-        """Returns what was built of copies, by the `id` of their surface."""
+        """Returns surface's `id` -> the Embree scene of its copies."""
         return {
             id(self._groups[row].members[0][2]): built
             for row, built in self._built.items()
@@ -150,12 +151,12 @@ class EmbreeHierarchy:
         }
 
     def place(self, rows: Collection[int]) -> None:
-        """Moves groups to where their `X_OL` says, if they are in sight."""
+        """Moves groups to their `X_OL`, if they are in sight."""
         changed = [row for row in rows if row in self._instances]
         for row in changed:
             handle = self._instances[row]
             if not self._groups[row].in_sight:
-                # The fewer there are, the faster all is built and met.
+                # Fewer instances are faster to build and to cast on.
                 self._lib.rtcDisableGeometry(handle)
                 self._disabled.add(row)
             elif row in self._disabled:
@@ -181,7 +182,7 @@ class EmbreeHierarchy:
             self._lib.rtcCommitScene(self._top)
 
     def _set_motion(self, row: int, handle: int) -> None:
-        """Tells Embree of a group that moves while rays are cast."""
+        """Gives Embree the motion of a group during a cast."""
         steps = decompose_motion(self._groups[row])
         self._lib.rtcSetGeometryTimeStepCount(handle, len(steps))
         self._in_motion.add(row)
@@ -202,7 +203,7 @@ class EmbreeHierarchy:
 
         Args:
             rays: N of them.
-            mask: which geometries they hit.
+            mask: the geometries that rays can hit.
             with_normals: whether to return normals.
         """
         num_rays = len(rays.d_Sset)
@@ -250,7 +251,7 @@ class EmbreeHierarchy:
         self._lib.rtcSetGeometryInstancedScene(handle, scene)
         self._lib.rtcSetGeometryMask(handle, ALL)
         self._lib.rtcAttachGeometry(self._top, handle)
-        self._lib.rtcReleaseGeometry(handle)  # The scene keeps it.
+        self._lib.rtcReleaseGeometry(handle)  # The scene owns it.
         return handle
 
 

@@ -1,4 +1,4 @@
-"""Groups that move while rays are cast, in Embree's terms."""
+"""Groups that move during a cast, in Embree's terms."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from cns_drake.ray_casting.ray_groups import RayGroup
 
 
 def decompose_motion(group: RayGroup) -> np.ndarray:
-    """Returns where a moving group is at even times of the turn.
+    """Returns the poses of a moving group at even times of the turn.
 
-    Embree turns from one orientation to the next at a constant rate, about
-    F's origin, which goes straight on: so does a frame of constant
-    velocities.
+    Embree turns from one orientation to the next at a constant rate about F's
+    origin, which moves in a straight line. That is the motion of a frame with
+    constant velocities.
 
     Returns:
         (T, 16) float32, an RTCQuaternionDecomposition each: 3 scales, 3
@@ -23,7 +23,7 @@ def decompose_motion(group: RayGroup) -> np.ndarray:
     assert group.motion is not None
     num_steps = group.motion.num_steps
     R_OO, way_F = group.motion.at(np.linspace(0.0, 1.0, num_steps))
-    # The columns of both maps are turned axes of L, stretched.
+    # The columns of both maps are rotated and stretched axes of L.
     scale = np.linalg.norm(group.X_FL[:3, :3], axis=0)
     R_OL = group.X_OL[:, :3] / scale
     p_FL_L = (group.X_FL[:3, :3] / scale).T @ group.X_FL[:3, 3]

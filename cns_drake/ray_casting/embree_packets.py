@@ -1,7 +1,7 @@
 """Rays through Embree in packets of 16.
 
-numba supplies the loop that fills the packets, because one Python call per
-packet would cost more than its rays.
+numba compiles the loop that fills the packets: one Python call per packet would
+cost more than its rays.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ class Tree(NamedTuple):
 
     Attributes:
         intersect16: address of the C function.
-        fixed: address of the RTCScene of what never moves, or 0.
+        fixed: address of the RTCScene of static geometry, or 0.
         instances: address of the RTCScene of I instances, or 0.
         arguments: address of the RTCIntersectArguments.
-        first_primitive: (1 + I, G) int64, where in `owner_of_primitive` the
-            primitives of geometry g in the fixed scene (first row) or in
-            each instance begin.
+        first_primitive: (1 + I, G) int64, the index in `owner_of_primitive` of
+            the first primitive of geometry g in the fixed scene (first row) and
+            in each instance.
         owner_of_primitive: (P,) int32.
         steps: (1 + I,) int64, from one primitive to the next in
             `owner_of_primitive`: 1, or 0 where all have the same owner.
@@ -61,11 +61,11 @@ def _call_intersect16(
 
 
 LANES = 16
-# Embree takes what is less for positive, whatever its sign. A packet with such
-# a ray among others that really go that way loses hits.
+# Embree takes smaller components for positive, of either sign. A packet that
+# mixes such rays with truly positive ones loses hits.
 _TINY = 1e-18
-# Rays that one thread casts before it leaves as many to the others: whole
-# packets, and few enough that all meet the same mixture of geometry.
+# Rays in a block of one thread: whole packets, and few enough that all threads
+# meet the same mixture of geometry.
 BLOCK = 1024
 
 
@@ -77,11 +77,11 @@ def cast_packets(
 
     Args:
         tree: a `Tree`.
-        mask: which geometries can be hit.
+        mask: the geometries that rays can hit.
         rays: `Rays`.
-        hits: `Hits`, so far misses, to fill; the group is 0 in the fixed
+        hits: `Hits` to fill, so far all misses; the group is 0 in the fixed
             scene and otherwise 1 + the number of the instance.
-        part, num_parts: which blocks.
+        part, num_parts: select the blocks.
     """
     # A packet is an RTCRayHit16: 12 ray fields and 9 hit fields (10 with
     # room for the primitive of an instance array) of 16 lanes. It and the
@@ -109,13 +109,13 @@ def _cast_block(
 ) -> None:
     """Casts the rays from `first` to before `last`.
 
-    Directions are rotated here, in double precision and in a fixed order:
-    what a library for matrices does depends on the processor.
+    Directions are rotated here, in double precision and in a fixed order: the
+    result of a matrix library depends on the processor.
     """
     packet_id = packet.view(np.uint32)
     num_origins, num_rotations = len(rays.p_OSset), len(rays.R_OSset)
     num_ranges = len(rays.max_ranges)
-    # Counted along: remainders would cost a tenth of the casting.
+    # Indices are counted along: remainders would cost a tenth of the casting.
     origin, rotation = first % num_origins, first % num_rotations
     reach, time = first % num_ranges, first % len(rays.times)
     for begin in range(first, last, LANES):
@@ -142,8 +142,8 @@ def _cast_block(
         packet_id[9] = mask
         packet_id[10:12] = 0
         packet_id[18:20] = INVALID_ID
-        # One after the other, which is faster than one scene of two levels:
-        # the second call keeps a hit unless it finds a nearer one.
+        # Two calls are faster than one scene of two levels: the second call
+        # keeps a hit unless it finds a nearer one.
         for scene in (tree.fixed, tree.instances):
             if scene != 0:
                 _call_intersect16(

@@ -1,6 +1,6 @@
-"""Placing many instances of Embree's by compiled code.
+"""Places many of Embree's instances by compiled code.
 
-One foreign call of Python's per instance would take longer than the placing.
+One foreign call from Python per instance would take longer than the placing.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def place_instances(
     handles: np.ndarray,
     matrices: np.ndarray,
 ) -> None:
-    """Sets where instances are.
+    """Sets the poses of instances.
 
     Args:
         set_transform: address of rtcSetGeometryTransform.

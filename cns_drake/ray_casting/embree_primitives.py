@@ -22,14 +22,14 @@ from cns_drake.scene.surfaces import (
     TriangleSurface,
 )
 
-# Which rays hit a geometry: all do hit solids, some also hit proxies.
+# Masks of geometry: all rays hit solids, some also hit proxies.
 SOLID, PROXY = 1, 2
 ALL = SOLID | PROXY
 # Owns the primitives of proxies.
 PROXY_OWNER = -2
-# Longer than so many radii, cones and rounded segments lose hits to single
-# precision: one of 40 at 3000 (measured). Longer ones are cut, but for what
-# nobody needs into no more pieces than that.
+# Longest cones and rounded segments [radii]: longer ones lose hits to single
+# precision (measured at 3000: one in 40). They are cut, into at most the second
+# number of pieces.
 _SLENDEREST = 700.0
 _MOST_PIECES = 1000
 
@@ -40,8 +40,7 @@ class Primitives(NamedTuple):
     Attributes:
         kind: of its primitives.
         buffers: (slot, format, array) each.
-        owners: (P,) int32, the index of the geometry that each primitive
-            belongs to.
+        owners: (P,) int32, the index of each primitive's geometry.
         mask: `SOLID` or `PROXY`.
     """
 
@@ -52,7 +51,7 @@ class Primitives(NamedTuple):
 
 
 def merge_flat(members: Sequence[Member]) -> Iterator[Primitives]:
-    """Yields the triangles of surfaces, and those about curved ones."""
+    """Yields the triangles of surfaces, and of polyhedra about curved ones."""
     flat = [
         (index, X_LG, surface)
         for index, X_LG, surface in members
@@ -156,9 +155,9 @@ def merge_curved(members: Sequence[Member]) -> Iterator[Primitives]:
 def _cut(
     ends: Sequence[ArrayLike], surface: CylinderSurface | CapsuleSurface
 ) -> list[np.ndarray]:
-    """Returns the (2, 4) ends of pieces that are not too slender.
+    """Returns the (2, 4) ends of pieces within the allowed slenderness.
 
-    Joints show to rays from inside.
+    Rays from inside meet the joints.
     """
     slenderness = surface.length / surface.radius
     num = math.ceil(min(slenderness / _SLENDEREST, _MOST_PIECES))

@@ -2,10 +2,10 @@
 
 Curved shapes are not tessellated: Embree intersects spheres, cones, discs
 and rounded segments exactly (in float32), and an ellipsoid is an instance of
-the unit sphere. Any of them in a scene would slow down all its rays by a
-third, though (measured), also those that meet triangles only. They have a
-hierarchy of their own, therefore, and polyhedra about them in that of the
-triangles show which few rays have to be cast on it.
+the unit sphere. A curved shape in a scene slows down all its rays by a third
+(measured), even those that meet only triangles. Curved shapes therefore have
+their own hierarchy. Polyhedra about them in the hierarchy of triangles select
+the few rays to cast on it.
 """
 
 from __future__ import annotations
@@ -38,10 +38,9 @@ class EmbreeScene:
         """Builds the scene of groups that are placed.
 
         Args:
-            groups: what it holds.
-            num_threads: how many threads share the rays of a cast.
-            previous: a scene from which what was built of the same groups is
-                taken over.
+            groups: the geometry of the scene.
+            num_threads: number of threads that share the rays of a cast.
+            previous: a scene whose parts for unchanged groups are reused.
 
         Raises:
             MemoryError: Embree cannot build it.
@@ -64,7 +63,7 @@ class EmbreeScene:
         )
 
     def place(self, rows: Collection[int]) -> None:
-        """Moves groups to where their `X_OL` says."""
+        """Moves groups to their `X_OL`."""
         self._flat.place(rows)
         self._curved.place(rows)
         self._near_moving.forget_places()
@@ -84,7 +83,7 @@ class EmbreeScene:
         if len(again):
             rest = rays.select(again, rays.max_ranges_of(again))
             on_curved = self._curved.cast(rest, with_normals=with_normals)
-            # What is nearer than that can only be in the other hierarchy.
+            # Nearer hits can only be in the other hierarchy.
             reach = np.minimum(on_curved.ranges, rest.max_ranges)
             on_flat = self._flat.cast(
                 rest._replace(max_ranges=reach),

@@ -1,4 +1,4 @@
-"""Which way the surfaces face that rays have met."""
+"""Orients the normals of surfaces that rays have met."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ def face_origins(
             transpose of its X_OL's linear part.
         R_OSset: (L, 3, 3) orientations of S, taken in turn.
         d_Sset: (N, 3) directions.
-        is_outside: (N,) bool to fill: whether the ray has met the side that
-            the winding of the surface calls its outside.
+        is_outside: (N,) bool to fill: whether the ray has met the outside of
+            the surface, by its winding.
     """
     n = np.empty(3)
     for ray in range(len(normals)):

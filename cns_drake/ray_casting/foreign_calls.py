@@ -1,6 +1,6 @@
 """Calls of C functions by their address, from compiled code.
 
-An address that is a value, unlike a ctypes function, lets numba keep the
+With an address as a value, in place of a ctypes function, numba can keep the
 compiled code on disk, which saves a second at every start.
 """
 
@@ -16,11 +16,11 @@ POINTER, NUMBER = ir.IntType(8).as_pointer(), ir.IntType(32)
 
 
 def void_call(*kinds: ir.Type) -> Callable[..., Any]:
-    """Returns what generates a call for numba's `intrinsic`.
+    """Returns the generator of a call for numba's `intrinsic`.
 
     Args:
-        kinds: of the function's arguments. The compiled code gives the
-            address of the function and then integers, one for each.
+        kinds: of the function's arguments. The compiled code passes the address
+            of the function, then one integer for each argument.
     """
     function_type = ir.FunctionType(ir.VoidType(), kinds)
 

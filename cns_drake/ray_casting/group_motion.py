@@ -1,4 +1,4 @@
-"""How a group of geometry moves while rays are cast."""
+"""The motion of a group of geometry during a cast."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-# Within a step, Embree goes the shorter way from one orientation to the next.
+# Largest rotation in a step: Embree takes the shorter way between orientations.
 _LARGEST_STEP_RAD = 2.0
-# The most time steps that Embree takes.
+# The most time steps that Embree supports.
 _MOST_STEPS = 129
 
 
@@ -28,7 +28,7 @@ class Motion(NamedTuple):
 
     @property
     def num_steps(self) -> int:
-        """How many poses Embree needs, at even times.
+        """Number of poses, at even times, that Embree needs.
 
         Raises:
             ValueError: F turns too fast.
@@ -42,13 +42,13 @@ class Motion(NamedTuple):
         return steps
 
     def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns how far F has gone.
+        """Returns the motion of F since the start of the turn.
 
         Args:
             times: (N,) parts of the turn, from 0 to 1.
 
         Returns:
-            (N, 3, 3) rotations, and (N, 3) ways of F's origin.
+            (N, 3, 3) rotations, and (N, 3) displacements of F's origin.
         """
         t = (self.duration * np.asarray(times, float))[:, None]
         return Rotation.from_rotvec(t * self.w).as_matrix(), t * self.v

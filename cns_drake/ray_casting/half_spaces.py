@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Planes(NamedTuple):
-    """Planes, each with the group that it is.
+    """Planes, each with its group.
 
     Attributes:
         equations: (T, H, 4) float64; a point p_O on plane h fulfils
@@ -33,14 +33,14 @@ class Planes(NamedTuple):
 def cast_on_planes(
     groups: Mapping[int, RayGroup], rays: Rays, hits: Hits
 ) -> None:
-    """Puts into `hits` what rays meet on planes before all else.
+    """Updates `hits` where rays meet a plane first.
 
-    A plane is met from both sides, as the surface of any other shape is.
+    Rays meet a plane from both sides, like any other surface.
 
     Args:
         groups: row -> group of one half space, placed.
         rays: N of them.
-        hits: what they met so far.
+        hits: their hits so far.
     """
     times = np.zeros(1)
     if any(group.motion is not None for group in groups.values()):
@@ -72,7 +72,7 @@ def _cast(planes: Planes, rays: Rays, hits: Hits) -> None:
                 toward += n * (
                     R[axis, 0] * d[0] + R[axis, 1] * d[1] + R[axis, 2] * d[2]
                 )
-            # Along the plane, nothing is met.
+            # A ray along the plane does not meet it.
             if toward == 0.0:
                 continue
             distance = height / toward

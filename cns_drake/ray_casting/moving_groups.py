@@ -1,4 +1,4 @@
-"""Groups that move, and which of them have to be placed anew."""
+"""Groups that move, and the choice of those to place anew."""
 
 from __future__ import annotations
 
@@ -89,8 +89,8 @@ class MovingGroups:
         Args:
             calc_X_WF: gives the pose of a frame in the world.
             motions: of the frames that move during the turn.
-            known: poses of frames for which `calc_X_WF` is not asked.
-            seen: where rays can meet anything.
+            known: poses of frames, which replace calls of `calc_X_WF`. seen:
+                the ball in which rays can meet geometry.
 
         Returns:
             The rows of the groups that were placed.
@@ -150,7 +150,8 @@ def _meets(ball: Ball, places: np.ndarray, radii: np.ndarray) -> np.ndarray:
 
 
 def _radius_about_F(group: RayGroup) -> float:
-    """Returns how far from F's origin a group reaches at most [m]."""
+    """Returns the greatest distance of a group's geometry from F's origin
+    [m]."""
     stretch = float(np.linalg.norm(group.X_FL[:3, :3], 2))
     middle = float(np.linalg.norm(group.X_FL[:3, 3]))
     return middle + stretch * _radius_about_L(group.members)

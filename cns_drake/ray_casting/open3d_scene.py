@@ -1,4 +1,4 @@
-"""Groups of geometry as Open3D scenes, where Embree's own wheel is missing.
+"""Groups of geometry as Open3D scenes, for platforms without Embree's wheel.
 
 About a third as fast as `embree_scene`, and curved shapes are polyhedra:
 Open3D has triangles only.
@@ -16,7 +16,7 @@ from cns_drake.ray_casting.ray_groups import RayGroup
 from cns_drake.ray_casting.rays import Hits, Rays
 from cns_drake.scene.surface_merging import merge_triangles, tessellate
 
-# Sides of a round shape, so that it is within 0.03 % of its radius.
+# Sides of the polyhedron of a round shape, true to 0.03 % of its radius.
 _SIDES = 128
 
 
@@ -63,8 +63,8 @@ class Open3dScene:
                 continue
             X_OL = group.X_OL_at(times[: None if group.motion else 1])
             R_LO = np.linalg.inv(X_OL[:, :, :3])
-            # Not of unit length in a stretched group: then distances along
-            # the ray stay those in O.
+            # Directions are not normalised in a stretched group, so that
+            # distances along the ray stay those in O.
             rays_L = np.empty((num_rays, 6), np.float32)
             p_OLset = p_Oset - X_OL[:, :, 3]
             rays_L[:, :3] = np.einsum("nij,nj->ni", R_LO, p_OLset)

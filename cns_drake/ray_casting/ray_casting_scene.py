@@ -1,7 +1,7 @@
-"""Casting rays on geometry of a SceneGraph's.
+"""Casting rays on a SceneGraph's geometry.
 
-The only module that knows the ray-casting library: Embree, or Open3D on
-platforms for which there is no wheel of Embree's C library.
+Only this module depends on the ray-casting library: Embree, or Open3D on
+platforms without a wheel of Embree.
 """
 
 from __future__ import annotations
@@ -47,15 +47,15 @@ _AT_ONCE = np.zeros(1, np.float32)
 
 @dataclass(frozen=True)
 class RayHits:
-    """What N rays met first.
+    """The first hits of N rays.
 
     Attributes:
         ranges: (N,) float32 distance along the ray [m], inf for a miss.
         geometry: (N,) int32 index into the scene's geometries, -1 for a miss.
         normals_W: (N, 3) float32 unit normal in the world, facing the ray's
-            origin, zero for a miss; (N, 0) unless asked for.
+            origin, zero for a miss; (N, 0) unless requested.
         is_outside: (N,) whether the ray met the outside of a surface, by its
-            winding; (0,) unless normals are asked for.
+            winding; (0,) unless normals are requested.
     """
 
     ranges: np.ndarray
@@ -70,9 +70,8 @@ class RayCastingScene:
     Geometry on frames that never move is merged, in world coordinates; the
     geometry of every other frame is an instance that `set_frame_poses`
     places; half spaces are planes in closed form. Coordinates are kept
-    relative to a point O in the middle of the merged geometry, so that
-    float32 resolves 1e-5 m within 200 m of it wherever the world's origin may
-    be.
+    relative to a point O in the middle of the merged geometry, so that float32
+    resolves 1e-5 m within 200 m of it, for any origin of the world.
     """
 
     def __init__(
@@ -87,19 +86,20 @@ class RayCastingScene:
         """Builds the scene.
 
         Args:
-            geometries: what rays can hit; hits give indices into it.
+            geometries: the geometry that rays can hit; hits give indices into
+                it.
             anchored_frames: the frames that never move.
             calc_X_WF: gives the pose of a frame in the world.
-            num_threads: how many threads share the rays of a cast; hits do
-                not depend on it.
-            previous: a scene of much the same geometry, given up for this
-                one: of frames whose geometries are still the same objects,
-                nothing is built anew.
+            num_threads: number of threads that share the rays of a cast; hits
+                do not depend on it.
+            previous: a scene of similar geometry, which this one replaces:
+                frames whose geometries are still the same objects are not built
+                anew.
         """
         self._geometries = tuple(geometries)
         self._slots = _assign_slots(self._geometries, previous)
         slots = [self._slots[id(geometry)] for geometry in self._geometries]
-        # Slots -> indices; the last entry is what a miss, -1, finds.
+        # Slots -> indices; the last entry serves a miss, -1.
         self._index_of_slot = np.full(max(slots, default=-1) + 2, -1, np.int32)
         self._index_of_slot[slots] = np.arange(len(slots))
         self._p_WO, self._groups = group_geometries(
@@ -130,9 +130,9 @@ class RayCastingScene:
 
         Args:
             calc_X_WF: gives the pose of a frame in the world.
-            motions: of the frames that go on moving while rays are cast.
-            known: poses of frames for which `calc_X_WF` is not asked.
-            seen: where the rays that are cast next can meet anything.
+            motions: of the frames that move during the next casts.
+            known: poses of frames, which replace calls of `calc_X_WF`. seen:
+                the ball in which the next rays can meet geometry.
         """
         placed = self._moving.place(calc_X_WF, motions, known, seen)
         if placed:
@@ -154,7 +154,7 @@ class RayCastingScene:
             p_WSset: (3,) or (K, 3) origins in the world [m]; ray i starts at
                 origin i mod K.
             d_Sset: (N, 3) unit directions, expressed in S.
-            max_range: how far to look [m], for all rays or (M,) taken in turn
+            max_range: of the rays [m], one for all or (M,) taken in turn
                 likewise.
             R_WSset: (3, 3) or (L, 3, 3) orientations of S in the world, taken
                 in turn likewise.
@@ -226,8 +226,8 @@ def _assign_slots(
 ) -> dict[int, int]:
     """Returns a number for each geometry's `id`, the same as before.
 
-    What is built refers to geometries by these numbers, whatever their order
-    is now.
+    Built scenes refer to geometries by these numbers, which do not depend on
+    their present order.
     """
     ids = [id(geometry) for geometry in geometries]
     before = {} if previous is None else previous._slots

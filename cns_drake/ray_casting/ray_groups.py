@@ -20,11 +20,11 @@ from cns_drake.scene.surfaces import (
 )
 
 # A mesh whose copies have more triangles than this is held once. Its rays are
-# slower, since each copy has a hierarchy of its own: the many small objects of
-# a city stay merged.
+# slower, since each copy has its own hierarchy. The many small objects of a
+# city stay merged.
 MOST_COPIED_TRIANGLES = 2**18
 NO_MOTIONS: Mapping[FrameId, Motion] = {}
-# What is built into one scene: index of a geometry, its pose, its surface.
+# A member of a scene: index of a geometry, its pose, its surface.
 Member = tuple[int, RigidTransform, Surface]
 
 
@@ -36,13 +36,13 @@ class RayGroup:
         frame_id: the frame F it is fixed to; None for the world.
         X_FL: (4, 4) affine map from L to F; not rigid for an ellipsoid,
             which in L is the unit sphere.
-        members: what the group holds, posed in L. A half space is alone in
+        members: the geometry of the group, posed in L. A half space is alone in
             its group, and in L bounded by z = 0.
         is_merged_world: whether L is the world, moved to O.
         is_copy: whether its only member is a surface, in its own frame, that
-            other groups have as well.
+            other groups share.
         X_OL: (3, 4) affine map from L to the scene's origin, at the start of
-            a turn; there is none before `place`.
+            a turn; it does not exist before `place`.
         motion: of F during the turn, None if it stays.
         in_sight: whether rays can meet it; elsewhere `X_OL` and `motion` are
             those of an earlier turn.
@@ -81,7 +81,7 @@ class RayGroup:
         if self.motion is None:
             return np.broadcast_to(self.X_OL, (len(times), 3, 4))
         R_OL0, way_F = self.motion.at(times)
-        # L in axes of O about F's origin, which itself goes straight on.
+        # L in axes of O about F's origin, which moves in a straight line.
         p_FL = self.X_OL[:, :3] @ np.linalg.solve(
             self.X_FL[:3, :3], self.X_FL[:3, 3]
         )
@@ -90,7 +90,8 @@ class RayGroup:
         return X_OL
 
     def holds_the_same(self, other: RayGroup) -> bool:
-        """Tells whether another group has the same members, placed alike."""
+        """Returns whether another group has the same members with the same
+        poses."""
         return (
             self.frame_id == other.frame_id
             and self.is_merged_world == other.is_merged_world
@@ -113,7 +114,7 @@ class RayGroup:
 def _is_same(surface: Surface, other: Surface) -> bool:
     if surface is other:
         return True
-    # Whether triangles are equal is not worth a look at all of them.
+    # Comparing all triangles would take too long.
     return not isinstance(surface, TriangleSurface) and surface == other
 
 
@@ -129,12 +130,12 @@ def group_geometries(
     The world's is the first if there is one; half spaces are the last.
 
     Args:
-        geometries: what rays can hit, each with the index that its member
-            gets.
+        geometries: the geometry that rays can hit, with the indices of its
+            members.
         anchored_frames: the frames that never move.
         calc_X_WF: gives the pose of a frame in the world.
-        may_share: whether large surfaces that stand many times get groups of
-            their own, which refer to the same surface.
+        may_share: whether large surfaces with many copies get a group for each
+            copy, all with the same surface.
     """
     geometries = list(geometries)
     shared = _find_shared(geometries) if may_share else frozenset()
@@ -215,11 +216,11 @@ def _find_shared(
 
 
 def take_over(groups: list[RayGroup], previous: Iterable[RayGroup]) -> None:
-    """Replaces groups by previous ones that hold the same.
+    """Replaces groups by previous ones with the same members.
 
     Args:
         groups: to compare, in place.
-        previous: what was built before.
+        previous: the groups of an earlier scene.
     """
     known = {_key(group): group for group in previous}
     for row, group in enumerate(groups):

@@ -1,6 +1,6 @@
-"""Many rays, and what they hit, as arrays.
+"""Many rays, and their hits, as arrays.
 
-O is the frame of a ray-casting scene: world axes, at a point near by.
+O is the frame of a ray-casting scene: world axes, a nearby origin.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Rays(NamedTuple):
         )
 
     def max_ranges_of(self, rows: np.ndarray) -> np.ndarray:
-        """Returns how far the rays of some rows look."""
+        """Returns the ranges of the rays of some rows."""
         return self.max_ranges[rows % len(self.max_ranges)]
 
     def p_Oset(self) -> np.ndarray:
@@ -56,7 +56,7 @@ class Rays(NamedTuple):
 
 
 class Hits(NamedTuple):
-    """What N rays met first.
+    """The first hits of N rays.
 
     Attributes:
         ranges: (N,) float32 [m], inf for a miss.

@@ -1,6 +1,7 @@
 """Writing messages in a thread, while the next frame is computed.
 
-Compression is half of what a frame costs, and it lets other Python code run.
+Compression takes half of a frame's time, and other Python code can run
+meanwhile.
 """
 
 from __future__ import annotations
@@ -11,12 +12,11 @@ import threading
 from types import TracebackType
 from typing import Any
 
-# How many messages may wait, each with the small ones before it. They are lost
-# when the process is killed: two frames with one LiDAR; a longer queue gained
-# nothing.
+# Number of messages that may wait, each with the small ones before it. A killed
+# process loses them: two frames with one LiDAR. A longer queue is no faster.
 _WAITING = 2
-# Smaller messages wait for the next larger one, this many at most: handing
-# one over takes longer than making it.
+# Small messages wait for the next larger one, at most this many: handing one
+# over takes longer than making it.
 _SMALL_BYTES = 1024
 _MOST_HELD = 64
 
@@ -25,7 +25,7 @@ class BackgroundWriter:
     """A context manager that passes messages on, in order, in a thread.
 
     Leaving it waits until everything is written; leaving it by an exception
-    lets go of what still waits. An error of the thread is raised by the next
+    drops waiting messages. An error of the thread is raised by the next
     `write`, or on leaving.
     """
 
@@ -78,8 +78,8 @@ class BackgroundWriter:
             raise self._error
 
     def _run(self) -> None:
-        # After an error messages are still taken, so that nobody waits for
-        # room in the queue for ever.
+        # After an error messages are still taken from the queue, so that no
+        # caller waits for room for ever.
         while (messages := self._messages.get()) is not None:
             for message in messages:
                 if self._error is None and not self._dropping:

@@ -1,11 +1,11 @@
-"""Writing a rosbag2 folder with one MCAP file, so that it can be trusted.
+"""Writes a rosbag2 folder with one MCAP file that survives interruptions.
 
-The recording grows in `<folder>/<name>_0.mcap.part`. Only when it is whole
-does it get its final name, and `metadata.yaml` comes last: where that file
-is, the folder is complete and consistent.
+The recording grows in `<folder>/<name>_0.mcap.part`. It gets its final name
+when it is whole, and `metadata.yaml` is written last: a folder with that file
+is complete and consistent.
 
-What an interrupted run leaves is a part file, whose messages a later run of
-the same recording takes over by writing them again; see PartFile.
+An interrupted run leaves a part file. A later run of the same recording takes
+over its messages by writing them again; see PartFile.
 """
 
 from __future__ import annotations
@@ -44,10 +44,9 @@ from cns_drake.recording.rosbag2_metadata import (
 )
 
 _CHUNK_BYTES = 1024 * 1024
-# A chunk that is not closed is lost when the process is killed. Without a
-# LiDAR a chunk of 1 MiB lasts for many seconds, hence the flush by time. A
-# kill may cost a second; some of that is left for frames that are still on
-# their way to the file.
+# A killed process loses the open chunk. Without a LiDAR a chunk of 1 MiB lasts
+# for many seconds, hence the flush by time. A kill may cost a second, with a
+# part of it reserved for frames on their way to the file.
 _FLUSH_PERIOD_NS = 800_000_000
 
 
@@ -71,9 +70,9 @@ class BagWriter:
     """A context manager that writes one recording.
 
     Leaving the context normally completes the recording. Leaving it by an
-    exception closes what was recorded as a shorter but valid MCAP file that
-    keeps its `.part` name. The same calls give the same bytes, whatever an
-    interrupted run had left.
+    exception closes the file as a shorter but valid MCAP file under its `.part`
+    name. The same calls give the same bytes, with or without an interruption
+    before.
 
     Example:
         from cns_drake import BagWriter, recording_topics
@@ -107,15 +106,13 @@ class BagWriter:
                 the attachments [ns].
             attachments: file name -> value, put before all messages; as YAML
                 if the name ends with `.yaml`, and else as JSON.
-                They show whether an interrupted recording is of the same
-                kind, so that its messages can be taken over.
-            scenario: what `scenario.yaml` beside the MCAP shall hold.
-            beside: name of a further file beside the MCAP -> what it shall
-                hold, as YAML.
+                An interrupted recording with the same attachments is of the
+                same kind, and its messages can be taken over.
+            scenario: the content of `scenario.yaml` beside the MCAP. beside:
+                name of a further file beside the MCAP -> its content, as YAML.
             custom_data: key -> text for `ros2 bag info`.
-            fingerprint: what `fingerprint.txt` shall hold, if anything. An
-                interrupted recording with another one is of another kind,
-                too.
+            fingerprint: the content of `fingerprint.txt`, if any. An
+                interrupted recording with another one is of another kind, too.
             overwrite: whether an existing recording may be replaced. A
                 finished one is kept until the new one is complete.
 
@@ -143,17 +140,17 @@ class BagWriter:
         self._first_ns: int | None = None
         self._last_ns: int | None = None
         self._flushed_ns = start_ns
-        # False while a record is being written: if that is interrupted, the
-        # writer's index no longer describes the file and must not be used.
+        # False while a record is being written. After an interruption then, the
+        # writer's index does not describe the file and must not be used.
         self._intact = False
 
     def __enter__(self) -> BagWriter:
-        """Creates the folder, the MCAP and what precedes the messages.
+        """Creates the folder, the MCAP and the records before the messages.
 
         Raises:
             InputError: if the folder or the file cannot be written, another
-                process is writing it, or what an interrupted run left is no
-                part of this recording.
+                process is writing it, or the part file of an interrupted run is
+                not of this recording.
         """
         with user_errors(self._files.path):
             self._files.path.mkdir(parents=True, exist_ok=True)
@@ -175,11 +172,11 @@ class BagWriter:
         exception: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        """Completes the recording, or closes the part of it that exists.
+        """Completes the recording, or closes it as a part.
 
         Raises:
-            InputError: if the files cannot be completed, e.g. on a full
-                disk; nothing has got a final name then.
+            InputError: if the files cannot be completed, e.g. on a full disk;
+                no file has its final name then.
         """
         self._is_open = False
         if exception_type is not None:
@@ -194,9 +191,9 @@ class BagWriter:
             self._close_stream()
 
     def follows_interruption(self) -> bool:
-        """Tells whether an interrupted run has left anything to take over.
+        """Whether an interrupted run has left messages to take over.
 
-        It does so as long as nothing but that has been written.
+        It is True until another message is written.
         """
         return self._stream.replaying
 
@@ -232,7 +229,7 @@ class BagWriter:
     ) -> None:
         """Appends one message; messages must come in the order of time.
 
-        A latched message that is there already is left out.
+        A latched message that is already there is left out.
 
         Args:
             topic: name of one of the topics.
@@ -242,7 +239,7 @@ class BagWriter:
 
         Raises:
             InputError: if the file cannot be written, e.g. on a full disk, or
-                the message does not go on in time.
+                the message is earlier than the one before.
             RuntimeError: the recording is not open.
         """
         if not self._is_open:
@@ -266,7 +263,7 @@ class BagWriter:
         self._last_ns = stamp_ns
 
     def _open_part(self) -> PartFile:
-        """Opens the part file, empty or with what can be taken over."""
+        """Opens the part file, empty or with messages to take over."""
         preamble = io.BytesIO()
         self._begin(preamble)
         if (
@@ -274,7 +271,7 @@ class BagWriter:
             and not self._files.is_finished()
             and not self._part.exists()
         ):
-            # Interrupted between the final names of the files.
+            # The run was interrupted between the final names of the files.
             stream = PartFile(self._files.mcap)
             if self._goes_on(stream, preamble):
                 os.replace(self._files.mcap, self._part)
@@ -294,7 +291,8 @@ class BagWriter:
         return stream
 
     def _goes_on(self, stream: PartFile, preamble: io.BytesIO) -> bool:
-        """Returns whether a file as found is a beginning of this recording."""
+        """Returns whether the existing file is a beginning of this
+        recording."""
         if not stream.replaying:
             return True
         found = ""
@@ -320,7 +318,7 @@ class BagWriter:
     def _begin(
         self, stream: io.BytesIO | PartFile
     ) -> tuple[Writer, dict[str, int]]:
-        """Writes what precedes the messages.
+        """Writes the records before the messages.
 
         Returns:
             The writer, and topic -> channel id.
@@ -397,9 +395,8 @@ class BagWriter:
 
     def _close_part(self) -> None:
         """Ends an incomplete file as well as its state allows."""
-        # The exception on its way is the fault to report, not a second one
-        # that comes of it. As long as nothing new was written, the file is
-        # better than what could be written.
+        # The first exception is the one to report, not a second one that
+        # follows from it. If nothing new was written, the file stays as it is.
         with contextlib.suppress(InputError):
             if self._intact and not self._stream.replaying:
                 with self._writing():
@@ -407,8 +404,8 @@ class BagWriter:
         self._close_stream()
 
     def _close_stream(self) -> None:
-        # Whatever mattered has been flushed or has failed already; closing
-        # flushes again and, on a full disk, would only repeat the error.
+        # All data have been flushed, or that has failed already. Closing
+        # flushes again and would only repeat the error of a full disk.
         with contextlib.suppress(OSError):
             self._stream.close()
 

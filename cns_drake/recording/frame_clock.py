@@ -1,11 +1,11 @@
-"""When frames are."""
+"""Times of frames."""
 
 import math
 
-# Time between frames [s], unless a LiDAR turns slower: the paper's 20 Hz.
+# Time between frames [s], unless a LiDAR turns more slowly: the paper's 20 Hz.
 FRAME_PERIOD = 0.05
-# Stamp of frame 0 [ns]. Not zero, which tf2 takes for "latest", and not the
-# clock's time, so that the same scenario gives the same bytes.
+# Stamp of frame 0 [ns]. Zero would mean "latest" to tf2. The clock's time would
+# give other bytes at each run.
 START_NS = 1_700_000_000_000_000_000
 
 
@@ -17,7 +17,7 @@ def frame_stamp_ns(
 
 
 def frames_within(duration: float, period: float = FRAME_PERIOD) -> int:
-    """Returns how many frames a drive has.
+    """Returns the number of frames of a drive.
 
     The first frame is taken at its start.
 

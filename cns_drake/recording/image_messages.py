@@ -13,7 +13,7 @@ from cns_drake.recording.messages import make_header
 IMAGE = "sensor_msgs/msg/Image"
 CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
 
-# What a camera shows -> encoding, as ROS names them.
+# Kind of image -> its encoding in ROS.
 ENCODINGS = {"color": "rgba8", "depth": "32FC1", "label": "16SC1"}
 
 

@@ -1,4 +1,4 @@
-"""The CDR form of IMU messages, of which there are many."""
+"""The CDR form of IMU messages, made fast."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from pydrake.math import RotationMatrix
 from cns_drake.base.recordings import ros_types
 from cns_drake.recording import messages
 
-# Where the stamp is, and the numbers of orientation, angular velocity and
-# linear acceleration, each before a covariance of nine numbers. The frame's
-# name takes 8 bytes with its length, so that the numbers begin at a multiple
-# of 8 after the first four bytes.
+# Offsets of the stamp, and of orientation, angular velocity and linear
+# acceleration, each before a covariance of nine numbers. The frame's name takes
+# 8 bytes with its length, so that the numbers begin at a multiple of 8 after
+# the first four bytes.
 _STAMP = struct.Struct("<iI")
 _QUATERNION, _VECTOR = struct.Struct("<4d"), struct.Struct("<3d")
 _STAMP_AT, _ORIENTATION_AT = 4, 20
@@ -26,7 +26,7 @@ _NS_PER_S = 1_000_000_000
 class ImuPacker:
     """Fills samples into a message that was serialised once.
 
-    That takes a tenth of what it takes to make and serialise each one.
+    That takes a tenth of the time to make and serialise each message.
     """
 
     def __init__(self, variances: tuple[float, float]):

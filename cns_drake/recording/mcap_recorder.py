@@ -52,8 +52,8 @@ _BOXES = Topic("/objects/boxes", ros_types.SCENE_UPDATE)
 _MOTION = Topic("/objects/motion", ros_types.POINT_CLOUD)
 OBJECT_TOPICS = (_OBJECTS, _BOXES, _MOTION)
 
-# Events of a periodic schedule come at exact multiples of the period; only
-# the rounding of that product separates their times from a tick's, in ticks.
+# Events of a periodic schedule come at multiples of the period. Their times
+# differ from a tick's only by rounding, at most this [ticks].
 _TICK_TOLERANCE = 1e-3
 
 _IMAGES = {
@@ -64,7 +64,7 @@ _IMAGES = {
 
 
 class RecordedCamera(NamedTuple):
-    """A camera as a recording needs it.
+    """A camera of a recording.
 
     Attributes:
         info: its intrinsics.
@@ -109,15 +109,14 @@ class McapRecorder(LeafSystem):
     - `<camera>_color`, `_depth`, `_label`: images as Drake's RgbdSensor gives
       them; `<camera>_pose`: abstract, the pose of that sensor.
 
-    What is not connected is not recorded.
+    A port that is not connected is not recorded.
 
-    Tick i is at i * period of its schedule. What is
-    due then is written as the inputs show it, by a periodic publish event
-    from time zero on, or by a forced publish at such a time; a simulation that
-    starts earlier warns of it. The inputs must
-    be wired straight to continuous outputs: a publish sees the state before
-    any update at the same time, so a hold in front would make every message
-    one period old.
+    Tick i is at i * period of its schedule. A periodic publish event from time
+    zero on, or a forced publish at a tick's time, writes the messages that are
+    due from the present inputs. A simulation that starts before time zero gives
+    a warning. The inputs must be wired straight to continuous outputs: a
+    publish sees the state before any update at the same time, and a hold in
+    front would make every message one period old.
 
     Example:
         from cns_drake import McapRecorder
@@ -145,14 +144,14 @@ class McapRecorder(LeafSystem):
         """Declares the ports and the schedule.
 
         Args:
-            bag: a bag with the topics of `recording_topics`, open when the
-                first frame comes.
+            bag: a bag with the topics of `recording_topics`; it must be open at
+                the first frame.
             X_BSs: LiDAR name -> pose of its frame S in B, None if it has no
                 fixed place there.
             X_BI: pose of the imu frame I in B, None if it has none.
             cameras: camera name -> camera.
             period: time between frames [s], if all sensors have one; or
-            schedule: when each topic is due, by name.
+                schedule: the ticks of each topic, by name.
             layouts: LiDAR name -> layout of its points (see
                 `point_layouts`), `cns` unless given.
             imu_variances: of specific force [m^2/s^4] and angular velocity
@@ -162,7 +161,7 @@ class McapRecorder(LeafSystem):
             start_ns: the stamp of time zero [ns].
 
         Raises:
-            ValueError: there is neither a period nor a schedule, or both.
+            ValueError: period and schedule are both given, or neither is.
         """
         super().__init__()
         self._bag = bag
@@ -176,7 +175,7 @@ class McapRecorder(LeafSystem):
         self._start_ns = start_ns
         self._has_begun = False
         if (period is None) == (schedule is None):
-            raise ValueError("a recorder needs a period or a schedule")
+            raise ValueError("a recorder needs either a period or a schedule")
         if period is not None:
             topics = recording_topics(
                 X_BSs, camera_names=self._cameras, layouts=self._layouts
@@ -209,7 +208,7 @@ class McapRecorder(LeafSystem):
             name: self.DeclareAbstractInputPort(f"{name}_scan", Value(object()))
             for name in X_BSs
         }
-        # Frame on the map -> the port that has its pose, and from there.
+        # Frame on the map -> the port with its pose, and the pose from there.
         self._poses = {
             name: (self._declare_pose(name), RigidTransform())
             for name, X_BS in X_BSs.items()
@@ -242,8 +241,8 @@ class McapRecorder(LeafSystem):
         stamp_ns = self._start_ns + self._schedule.time_ns(tick)
         due = set(self._schedule.due(tick))
         if self._X_BCs and not self._has_begun:
-            # In the first frame, whichever that is. A bag takes latched
-            # messages once: one that goes on has this already.
+            # Written at the first frame. A bag takes latched messages once: a
+            # resumed one has this already.
             tf = messages.make_tf(messages.BASE_FRAME, self._X_BCs, stamp_ns)
             self._write(_TF_STATIC, tf, stamp_ns, 0)
         self._has_begun = True
@@ -267,7 +266,7 @@ class McapRecorder(LeafSystem):
         return EventStatus.Succeeded()
 
     def _locate(self, context: Context, stamp_ns: int) -> dict[Topic, Any]:
-        """Returns the messages that say where all is."""
+        """Returns the messages of poses: odometry and transforms."""
         outgoing = {}
         odometry = _eval(self._odometry, context)
         X_WCs = {
@@ -308,7 +307,7 @@ class McapRecorder(LeafSystem):
     def _list_objects(
         self, context: Context, stamp_ns: int
     ) -> dict[Topic, Any]:
-        """Returns the messages of what moves."""
+        """Returns the messages of moving objects."""
         objects = None
         if self._objects is not None:
             objects = _eval(self._objects, context)
@@ -389,7 +388,7 @@ def _warn_of_early_start(context: Context) -> EventStatus:
 
 
 def _eval(port: InputPort, context: Context) -> Any:
-    """Returns what an input shows, None if nothing is connected."""
+    """Returns the value of an input; None if it is not connected."""
     return port.Eval(context) if port.HasValue(context) else None
 
 
@@ -410,7 +409,7 @@ def recording_topics(
         with_imu: whether it has an IMU.
         with_odometry: whether it has odometry.
         layouts: LiDAR name -> layout of its points, if not `cns`.
-        with_objects: whether it has boxes of what moves.
+        with_objects: whether it has boxes of moving objects.
 
     Example:
         from cns_drake import recording_topics

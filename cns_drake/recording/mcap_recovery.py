@@ -1,8 +1,8 @@
-"""Reading whatever is readable of an MCAP file, whole or not.
+"""Reads the readable records of an MCAP file, whole or damaged.
 
 The readers of the `mcap` package need an intact file and trust the sizes that
-it declares. This one reads from the start without any index, checks every
-size against the file and a limit before it makes room for it, checks every
+it declares. This reader starts at the beginning without any index. It checks
+every size against the file and a limit before it reserves memory, checks every
 checksum, and finds the next intact chunk behind damage.
 """
 
@@ -38,9 +38,9 @@ from cns_drake.base.recordings.mcap_records import (
 )
 
 _LAST_OPCODE = max(Opcode)
-# What a chunk begins with: the record's opcode and length, two times, size and
-# checksum of the content, compression, length of the compressed content.
-# As lookahead, so that a false beginning hides no true one.
+# The beginning of a chunk: the record's opcode and length, two times, size and
+# checksum of the content, compression, length of the compressed content. A
+# lookahead, so that a false beginning hides no true one.
 _CHUNK_START = re.compile(
     rb"(?=\x06(?P<length>.{8}).{28}"
     rb"(?P<compression>\x04\0{3}zstd|\x03\0{3}lz4|\0{4})"
@@ -50,8 +50,8 @@ _CHUNK_START = re.compile(
 _LONGEST_CHUNK_START = 9 + 28 + 8 + 8
 _FIRST_SEARCH_BLOCK = 4096
 _LAST_SEARCH_BLOCK = 4 * 1024 * 1024
-# What is shaped like a chunk but is none, is read in vain. A file made for
-# that could keep a reader busy for days, hence a limit: so often its size.
+# Bytes that look like a chunk are read in vain. A hostile file could keep a
+# reader busy for days, hence a limit, in sizes of the file.
 _MOST_READ = 16
 _FAULTS = (
     McapError,
@@ -82,8 +82,8 @@ def read_records(stream: BinaryIO) -> Iterator[McapRecord | Fault]:
     """Yields the readable records of an MCAP file, in the file's order.
 
     Those are header, schemas, channels, messages, attachments and metadata;
-    chunks are opened, indexes left out. Where something cannot be read, also
-    where the file ends too early, comes a Fault.
+    chunks are opened, indexes left out. A Fault stands for each part that
+    cannot be read, also for a missing end.
 
     Args:
         stream: the file; it may be moved between two records.
@@ -92,7 +92,7 @@ def read_records(stream: BinaryIO) -> Iterator[McapRecord | Fault]:
     stream.seek(0)
     position: int | None = len(MAGIC)
     if stream.read(len(MAGIC)) != MAGIC:
-        yield Fault(0, "does not begin as an MCAP file")
+        yield Fault(0, "does not begin like an MCAP file")
         position = _next_chunk(stream, 0, size)
     budget = _MOST_READ * size
     while position is not None:
@@ -115,7 +115,7 @@ def read_records(stream: BinaryIO) -> Iterator[McapRecord | Fault]:
 
 
 class _DamageError(McapError):
-    """A record that cannot be one."""
+    """Bytes that cannot be a record."""
 
 
 def _read_header(stream: BinaryIO, position: int, size: int) -> tuple[int, int]:
@@ -150,7 +150,7 @@ def _begins_record(stream: BinaryIO, position: int, size: int) -> bool:
 
 
 def _next_chunk(stream: BinaryIO, start: int, size: int) -> int | None:
-    """Returns where the next thing lies that is shaped like a chunk."""
+    """Returns the position of the next bytes that look like a chunk."""
     block_size = _FIRST_SEARCH_BLOCK
     while start < size:
         stream.seek(start)

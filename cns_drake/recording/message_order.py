@@ -1,4 +1,4 @@
-"""Which messages a recording takes: those that go on in time."""
+"""Checks that the messages of a topic come in the order of time."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class MessageOrder:
         self._last_ns: dict[str, int] = {}
 
     def takes(self, topic: str, stamp_ns: int) -> bool:
-        """Tells whether the recording takes the next message.
+        """Returns whether the recording takes the next message.
 
         It does not take a latched message twice.
 

@@ -1,7 +1,6 @@
-"""Messages of which only numbers and the stamp change.
+"""Messages whose numbers and stamp alone change.
 
-Their CDR form is made once; then the numbers are put where they belong, which
-takes a hundredth of the time.
+Their CDR form is made once. Filling in numbers takes a hundredth of that time.
 """
 
 from __future__ import annotations
@@ -12,19 +11,19 @@ import numpy as np
 
 from cns_drake.base.recordings.ros_types import serialize
 
-# What stands in a message for its numbers: these and the following integers,
-# which are exact in double precision and larger than any measurement.
+# Placeholders of numbers in a message: this and the following integers, which
+# are exact in double precision and larger than any measurement.
 _FIRST_MARK = 2.0**52
-# What stands for the stamp: seconds and nanoseconds. No stamp of a drive has
+# Placeholder of the stamp: seconds and nanoseconds. No stamp of a drive has
 # more than 10^9 nanoseconds.
 _SEC_MARK, _NANOSEC_MARK = 0x5A17C0DE, 0x71B3E5A9
 STAMP_MARK_NS = (_SEC_MARK, _NANOSEC_MARK)
-# CDR says how it is encoded first; places are aligned from there on.
+# CDR begins with its encoding; alignment counts from behind it.
 _ENCAPSULATION = 4
 
 
 def number_marks(count: int) -> np.ndarray:
-    """Returns (count,) numbers to make the message of a template with."""
+    """Returns (count,) placeholder numbers for the message of a template."""
     return _FIRST_MARK + np.arange(count)
 
 

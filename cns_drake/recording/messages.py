@@ -1,4 +1,4 @@
-"""ROS 2 messages of a recording: filling in their values.
+"""ROS 2 messages of a recording, made from values.
 
 Poses go in as Drake types; stamps are whole nanoseconds, so that no rounding
 happens here. Quaternions leave in ROS order (x, y, z, w).
@@ -38,8 +38,8 @@ def make_point_cloud(points: np.ndarray, frame_id: str, stamp_ns: int) -> Any:
         stamp_ns: the time of the scan [ns].
 
     Returns:
-        An unordered (height 1) and dense cloud: there is no record for a
-        ray without a return.
+        An unordered (height 1) and dense cloud: rays without a return have no
+        record.
     """
     packed = np.zeros(len(points), dtype=points.dtype)
     point_field = message_class("sensor_msgs/msg/PointField")
@@ -79,15 +79,15 @@ def make_imu(
     Args:
         R_WI: orientation of the imu frame I in the map W.
         angular_velocity: w_WI_I, shape (3,) [rad/s].
-        specific_force: what an accelerometer feels, expressed in I, shape
-            (3,) [m/s^2]; at rest on level ground +9.81 along z.
+        specific_force: expressed in I, shape (3,) [m/s^2]; at rest on level
+            ground +9.81 along z.
         stamp_ns: the time of the measurement [ns].
         variances: of each axis of the specific force [m^2/s^4] and of the
             angular velocity [rad^2/s^2].
 
     Returns:
         The message. The orientation is exact, and its covariance zero. The
-        covariance of what is None begins with -1, as ROS has it.
+        covariance of a value that is None begins with -1, as in ROS.
     """
     zero = np.zeros(3)
     return message_class(IMU)(
@@ -127,7 +127,7 @@ def make_odometry(
         stamp_ns: the time of both [ns].
 
     Returns:
-        The message; its covariances are zero, since nothing is uncertain.
+        The message; its covariances are zero, since the values are exact.
     """
     pose = make_pose(X_WB)
     twist = message_class("geometry_msgs/msg/Twist")(

@@ -1,4 +1,5 @@
-"""ROS 2 messages of what moves: detections, boxes to look at, velocities."""
+"""ROS 2 messages of moving objects: detections, boxes for viewers,
+velocities."""
 
 from __future__ import annotations
 
@@ -42,7 +43,7 @@ _OPACITY = 0.45
 
 
 class RecordedObjects(Protocol):
-    """What a recording needs of N vehicles and walkers.
+    """The recorded values of N vehicles and walkers.
 
     Ids in points and tables (N,), classes, middles (N, 3) [m] and
     orientations (N, 4) of boxes in the map, their length, width, height
@@ -81,7 +82,7 @@ class BoxMessages:
     def __init__(
         self, make: Callable[[Sequence[tuple[int, str]], np.ndarray], Any]
     ):
-        """Takes what makes a message of marks.
+        """Takes the function that makes a message of placeholders.
 
         Args:
             make: `marked_detections` or `marked_boxes`.
@@ -94,7 +95,7 @@ class BoxMessages:
         """Returns the CDR form of the message.
 
         Args:
-            objects: all that are there.
+            objects: all present objects.
             stamp_ns: the time of all of them [ns].
         """
         who = list(
@@ -150,7 +151,7 @@ def marked_boxes(who: Sequence[tuple[int, str]], numbers: np.ndarray) -> Any:
 
 
 def motion_table(objects: RecordedObjects) -> np.ndarray:
-    """Returns (N,) records of where objects are and how they move."""
+    """Returns (N,) records of the places and velocities of objects."""
     table = np.zeros(len(objects.instance), MOTION_DTYPE)
     for names, values in (("x y z", objects.p_WO), ("vx vy vz", objects.v_WO)):
         for k, name in enumerate(names.split()):

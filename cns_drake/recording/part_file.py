@@ -1,4 +1,4 @@
-"""A growing file that survives being written again from its start."""
+"""A growing file that can be written again from its start."""
 
 from __future__ import annotations
 
@@ -13,15 +13,13 @@ from cns_drake.base.errors import InputError
 class PartFile:
     """A binary file for one writer at a time.
 
-    Whoever goes on with an interrupted file writes it again from its start.
-    Bytes that are equal to what is there stay untouched; the first that
-    differs cuts the file off, and what follows is new. Thus at no moment is
-    less in the file than what both writers had in common, no second copy
-    takes up room on the disk, and the result is the same as in an empty
-    file.
+    A process that resumes an interrupted file writes it again from its start.
+    Equal bytes stay untouched; the first different byte cuts the file off, and
+    all that follows is new. The file never holds less than the common part of
+    both runs, no second copy takes up disk space, and the result is the same as
+    in an empty file.
 
-    The file is locked until it is closed or its process ends, however that
-    comes about.
+    The file is locked until it is closed or its process ends in any way.
     """
 
     def __init__(self, path: Path):
@@ -42,13 +40,13 @@ class PartFile:
 
     @property
     def replaying(self) -> bool:
-        """Whether all that was written so far was there already."""
+        """Whether all bytes written so far were there already."""
         return self._replaying
 
     def starts_like(self, content: bytes) -> bool:
-        """Tells whether the file as found starts with this content.
+        """Returns whether the existing file starts with this content.
 
-        So does a file that ends within it.
+        A file that ends within the content counts, too.
         """
         self._stream.seek(0)
         found = self._stream.read(len(content))
@@ -62,7 +60,7 @@ class PartFile:
         self._replaying = False
 
     def tell(self) -> int:
-        """Returns where the next byte goes."""
+        """Returns the position of the next byte."""
         return self._stream.tell()
 
     def write(self, data: bytes) -> None:
@@ -81,7 +79,7 @@ class PartFile:
         self._stream.flush()
 
     def finish(self) -> None:
-        """Ends the file here and sees that it is on the disk."""
+        """Ends the file here and flushes it to the disk."""
         self._stream.truncate()
         self._stream.flush()
         os.fsync(self._stream.fileno())

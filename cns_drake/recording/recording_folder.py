@@ -1,4 +1,4 @@
-"""The folder of a recording: its files, and how far they have come."""
+"""The folder of a recording: its files, and whether it is finished."""
 
 from __future__ import annotations
 
@@ -15,11 +15,10 @@ class RecordingFolder:
     Attributes:
         path: the folder; its last part names the recording.
         mcap: the messages.
-        scenario: what was recorded.
-        fingerprint: of all that it was made of; see
-            `cns_drake.scenarios.provenance`.
-        metadata: what rosbag2 needs. It gets its name last: where it
-            is, the recording is finished.
+        scenario: the recorded scenario.
+        fingerprint: of all inputs; see `cns_drake.scenarios.provenance`.
+        metadata: for rosbag2. It gets its name last: with it, the recording is
+            finished.
     """
 
     def __init__(self, path: Path):
@@ -30,23 +29,24 @@ class RecordingFolder:
         self.metadata = self.path / "metadata.yaml"
 
     def is_finished(self) -> bool:
-        """Tells whether the folder holds a finished recording."""
+        """Whether the folder holds a finished recording."""
         return self.metadata.is_file()
 
     def check(self, overwrite: bool) -> None:
         """Refuses a folder that a recording must not go into.
 
-        Without `overwrite`, that is one with a finished recording, and one
-        that holds files but none of a recording of this name.
+        Without `overwrite`, these are a folder with a finished recording, and
+        one with files but without a recording of this name.
 
         Raises:
-            InputError: the folder must not be used, or cannot be looked at.
+            InputError: the folder must not be used, or cannot be read.
         """
         with user_errors(self.path):
             if not self.path.is_dir():
                 if self.path.exists():
                     raise InputError(
-                        f"{self.path}: there is a file of this name"
+                        f"{self.path}: a file has this name; give another "
+                        "folder"
                     )
                 return
             if overwrite:

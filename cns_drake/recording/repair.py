@@ -1,4 +1,4 @@
-"""Making a whole MCAP file of whatever is readable of a damaged one."""
+"""Repair: writes the readable part of a damaged MCAP file as a whole file."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ from cns_drake.recording.rosbag2_metadata import (
 _DEFINITIONS_LIMIT = 64 * 1024 * 1024
 _ROSBAG2 = "rosbag2"
 
-# Reports that so many bytes of so many are done.
+# Reports how many bytes of how many are done.
 BytesCallback = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
 class Repair:
-    """What came out of a repair.
+    """The result of a repair.
 
     Attributes:
         output: the new file.
@@ -73,16 +73,16 @@ def repair_mcap(
     """Writes the readable part of an MCAP file as a whole, indexed file.
 
     Messages keep their order, times, numbers and bytes; attachments and
-    metadata are kept as well. A file of ROS 2 gets a `rosbag2` record that
-    counts what is there, so that it opens without a folder around it.
+    metadata are kept as well. A file of ROS 2 gets a `rosbag2` record with its
+    counts, so that it opens without a folder around it.
 
     Args:
-        path: any MCAP file, or what is left of one; it is only read.
+        path: any MCAP file, whole or damaged; it is only read.
         output: the new file; by default `<name>_repaired.mcap` beside it.
         on_bytes: takes the progress.
 
     Raises:
-        InputError: nothing can be read, or the new file exists already or
+        InputError: nothing can be read, or the new file exists already, or
             cannot be written.
     """
     output = output or _default_output(path)
@@ -92,7 +92,10 @@ def repair_mcap(
         size = path.stat().st_size
     with user_errors(output):
         if output.exists():
-            raise InputError(f"{output}: the file already exists")
+            raise InputError(
+                f"{output}: the file already exists; remove it or give "
+                "another one"
+            )
     # Definitions may come behind messages that need them.
     definitions = _Definitions()
     for record in _read(path, lambda done: on_bytes(done, 2 * size)):
@@ -142,10 +145,10 @@ def _read(
 
 
 class _Definitions:
-    """What messages refer to.
+    """Definitions that messages refer to.
 
     Attributes:
-        header: the file's, if it is readable.
+        header: the file's header, if readable.
         schemas: by id; the first one of an id counts.
         channels: likewise, but only those whose schema is known.
     """
@@ -181,7 +184,7 @@ class _Definitions:
         ):
             self._all_channels[record.id] = record
             kept = (record.topic, *itertools.chain(*record.metadata.items()))
-        elif isinstance(record, Attachment):  # Its names go into an index.
+        elif isinstance(record, Attachment):  # Names go into an index.
             kept = (record.name, record.media_type)
         elif isinstance(record, Metadata):
             kept = (record.name,)
@@ -255,7 +258,7 @@ class _Copy:
             self._fault(str(record))
 
     def finish(self, file_name: str) -> None:
-        """Writes what follows the messages."""
+        """Writes the records behind the messages."""
         if self._profile == "ros2":
             information = make_bag_information(
                 file_name,

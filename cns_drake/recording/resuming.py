@@ -1,4 +1,4 @@
-"""Going on where an interrupted recording ended."""
+"""Resumes an interrupted recording."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ def take_over_frames(
 ) -> int:
     """Writes the complete frames of an interrupted run into its successor.
 
-    A frame has all messages that are due from one message on `frame_topic`
-    until the next; latched topics have one message, at tick 0.
+    A frame has all messages from one message on `frame_topic` until the next;
+    latched topics have one message, at tick 0.
 
     Args:
         bag: an open bag, to which nothing has been written.
         topics: the bag's topics.
-        schedule: when each of them that is not latched is due, by name.
-        frame_topic: with one message a frame.
+        schedule: ticks of the topics that are not latched, by name.
+        frame_topic: the topic with one message a frame.
 
     Returns:
-        How many frames there are, from frame 0 on.
+        The number of frames, from frame 0 on.
     """
     frames = tick = 0
     frame: list[RecordedMessage] = []
     missing = {topic.name for topic in topics if topic.latched}
     missing.update(schedule.due(0))
-    # Nothing is due after the end of all streams, if they have one.
+    # After the end of all streams, if they have one, no message is due.
     last = None
     if schedule.ends.keys() >= schedule.steps.keys():
         last = max(schedule.ends.values())

@@ -1,4 +1,4 @@
-"""What rosbag2 needs of a recording, as text in its own form.
+"""The metadata of a recording for rosbag2.
 
 Metadata version 8 is the newest that ROS 2 Humble reads. Conventions are
 those of rosbag2's own MCAP files.
@@ -35,7 +35,7 @@ class Topic:
 
 @dataclass(frozen=True)
 class TopicMetadata:
-    """What rosbag2 needs of a topic.
+    """The metadata of a topic for rosbag2.
 
     Attributes:
         name: e.g. `/lidar/points`.
@@ -120,7 +120,7 @@ def make_qos_yaml(topic: Topic) -> str:
     """Returns the publisher's quality of service.
 
     Enums are the integers of rmw's header, since ROS 2 Humble reads no
-    names. Reliable serves subscribers that ask for either reliability.
+    names. A reliable publisher serves subscribers of either reliability.
     """
     infinite = {"sec": 9223372036, "nsec": 854775807}
     profile = {

@@ -1,4 +1,4 @@
-"""When the messages of a recording are due, at rates of their own."""
+"""Times of a recording's messages; each stream has its own rate."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ _FINEST = 10**9
 
 @dataclass(frozen=True)
 class Schedule:
-    """A clock of even ticks, and at which of them each stream is due.
+    """A clock of even ticks, and the ticks of each stream.
 
     Attributes:
         tick: time between ticks [s].
         steps: name of a stream -> ticks from one of its messages to the next.
             All are due at tick 0.
-        ends: name of a stream -> the last tick at which it may be due; for
-            the others there is none.
+        ends: name of a stream -> the last tick at which it may be due; other
+            streams have no end.
     """
 
     tick: Fraction
@@ -43,7 +43,7 @@ class Schedule:
 
     def time_ns(self, tick: int) -> int:
         """Returns the time of a tick since the start [ns]."""
-        # Rounded in whole numbers: fractions take longer than a message.
+        # Integer arithmetic: fractions would take longer than a message.
         numerator, denominator = self.tick.as_integer_ratio()
         doubled = 2 * tick * numerator * _NS_PER_S + denominator
         return doubled // (2 * denominator)

@@ -1,1 +1,1 @@
-"""Road networks, and the ways along their lanes."""
+"""Road networks, and routes along their lanes."""

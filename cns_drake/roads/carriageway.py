@@ -28,11 +28,11 @@ _QUADRANT_SEGMENTS = 8
 _GRID = 0.001
 # Vertices closer to the outline than this are dropped [m].
 _SIMPLIFY = 0.01
-# Areas that meet are joined over slits up to twice this width, as they stay
-# open where roads end beside one another at a slant [m].
+# Areas are joined over slits up to twice this width; such slits stay open where
+# roads end beside one another at a slant [m].
 _SEAM = 0.25
-# Junctions are drawn so far into their roads, then cut off at the roads'
-# ends; what is left beside them is at most as thick, and dropped [m].
+# Junctions are drawn this far into their roads, then cut off at the roads'
+# ends. Remains beside them of this thickness are dropped [m].
 _OVERLAP = 0.5
 # A parking bay keeps clear of the junction at each end of its road [m].
 _BAY_CLEARANCE = 3.0
@@ -40,7 +40,7 @@ _BAY_CLEARANCE = 3.0
 
 @dataclass(frozen=True)
 class Areas:
-    """What `RoadNetwork` exposes by the same names."""
+    """The areas that `RoadNetwork` exposes by the same names."""
 
     carriageway: MultiPolygon
     lane_area: MultiPolygon
@@ -52,7 +52,8 @@ class Areas:
 def corner_setback(
     half_width: float, other_half_width: float, angle: float, kerb_radius: float
 ) -> float:
-    """Returns how far from a junction's position a road must end [m].
+    """Returns the distance from a junction's position at which a road must end
+    [m].
 
     There the kerb of the given radius between two neighbouring roads
     touches the road's edge. The edges meet at (b + a cos(angle)) /
@@ -63,10 +64,10 @@ def corner_setback(
         angle: between the two roads [rad].
         kerb_radius: r [m].
     """
-    # Roads that lie upon one another never part.
+    # Roads on top of one another never part.
     if angle < 1e-6:
         return np.inf
-    # Towards a straight angle the corner, and with it the need, vanishes.
+    # Towards a straight angle the corner, and with it the distance, vanishes.
     if angle > np.radians(150.0):
         return kerb_radius
     edge = (other_half_width + half_width * np.cos(angle)) / np.sin(angle)
@@ -204,11 +205,11 @@ def _median(road: Road) -> BaseGeometry:
 
 
 def _simplified(area: BaseGeometry) -> BaseGeometry:
-    """Returns an area without the vertices that its outline can do without.
+    """Returns an area without superfluous vertices of its outline.
 
     On an evenly sampled arc many vertices are equally dispensable. Rounding
-    before, not after, makes the choice independent of the last bits, which
-    differ from one version of the numerical libraries to the next.
+    first makes the choice independent of the last bits, which differ between
+    versions of the numerical libraries.
 
     Raises:
         ValueError: if the outline crosses itself.
@@ -234,7 +235,7 @@ def _join(parts: Iterable[BaseGeometry]) -> BaseGeometry:
 
 
 def _multi(area: BaseGeometry) -> MultiPolygon:
-    """Returns an area as a MultiPolygon, whatever shapely made of it."""
+    """Returns an area as a MultiPolygon."""
     pieces = [
         piece
         for piece in getattr(area, "geoms", [area])

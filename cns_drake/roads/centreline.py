@@ -26,8 +26,8 @@ class _Piece:
     def evaluate(self, s: np.ndarray) -> np.ndarray:
         """Returns (N, 3) x, y [m] and heading [rad] at arc lengths s."""
         heading = self.heading + self.curvature * s
-        # A chord of an arc is as long as sin(x)/x makes it and points to the
-        # mean heading; this form also holds for a line.
+        # The length of an arc's chord follows from sin(x)/x, and it points to
+        # the mean heading. This form also holds for a line.
         half = self.curvature * s / 2
         chord = s * np.sinc(half / np.pi)
         x = self.start[0] + chord * np.cos(self.heading + half)
@@ -100,8 +100,8 @@ class Centreline:
         index = np.searchsorted(self._ends, s, side="left")
         index = np.minimum(index, len(self._pieces) - 1)
         result = np.empty((len(s), 3))
-        # Sorted once: a look at all of s for each piece takes minutes where
-        # there are many of both.
+        # Sorted once: comparing all of s with each piece takes minutes if both
+        # are many.
         order = np.argsort(index, kind="stable")
         found, first = np.unique(index[order], return_index=True)
         groups = np.split(order, first[1:])
@@ -133,10 +133,10 @@ def blend(
 ) -> np.ndarray:
     """Returns a smooth curve between two directed points.
 
-    Where the straight continuations meet ahead of the start and behind the
-    end, the curve is the widest allowed arc that touches both, with lines in
-    front of and behind it: what a driver does on a turn. Otherwise (parallel
-    lanes that are offset, S-bends) it is a cubic Hermite curve.
+    If the straight continuations meet ahead of the start and behind the end,
+    the curve is the widest allowed arc that touches both, with lines in front
+    of and behind it, as a driver turns. Otherwise (parallel lanes that are
+    offset, S-bends) it is a cubic Hermite curve.
 
     Args:
         p_start, p_end: (2,) points [m].

@@ -1,4 +1,4 @@
-"""The line that a vehicle is to follow, and how fast it may go there."""
+"""The line that a vehicle follows, and its speed limits."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from cns_drake.base.errors import InputError
 
 # A path must be longer than this for a trajectory to be made of it [m].
 _MIN_LENGTH = 20.0
-# And not be longer, for planning takes time and memory by the metre [m].
+# Longest path: planning takes time and memory for each metre [m].
 _MAX_LENGTH = 100_000.0
 
 
@@ -21,8 +21,7 @@ class LanePath:
     Attributes:
         points: (N, 3) positions in the world, first and last included [m].
         spacing: distance between neighbours along the path [m].
-        speed_limits: (N,) the limits there, infinite where there is none
-            [m/s].
+        speed_limits: (N,) the limits there, infinite without one [m/s].
     """
 
     points: np.ndarray
@@ -39,17 +38,18 @@ def check_length(length: float, source: object) -> None:
     """Checks the length of a path [m].
 
     Raises:
-        InputError: beginning with `source`, if no drive can be made of it.
+        InputError: beginning with `source`, if the path is too short or too
+            long.
     """
     if length < _MIN_LENGTH:
         raise InputError(
-            f"{source}: {length:.1f} m long, at least {_MIN_LENGTH:.0f} m "
-            "are needed"
+            f"{source}: {length:.1f} m long; a drive needs at least "
+            f"{_MIN_LENGTH:.0f} m"
         )
     if length > _MAX_LENGTH:
         raise InputError(
-            f"{source}: {length:.0f} m long, at most {_MAX_LENGTH:.0f} m can "
-            "be driven"
+            f"{source}: {length:.0f} m long; a drive can have at most "
+            f"{_MAX_LENGTH:.0f} m"
         )
 
 
@@ -64,7 +64,7 @@ def sample_lane_path(
             of its two holds [m/s].
         spacing: the distance of the points, rounded so that it divides the
             length of the polyline [m].
-        source: what an error begins with.
+        source: the beginning of an error's message.
 
     Raises:
         InputError: the polyline is too short or too long for a drive.
@@ -76,7 +76,7 @@ def sample_lane_path(
     count = max(1, round(length / spacing))
     wanted = np.linspace(0.0, length, count + 1)
     xyz = [np.interp(wanted, travelled, axis) for axis in points.T]
-    # A limit holds from its first point on; of two neighbours take the lower.
+    # A limit holds from its first point on; between two points the lower one.
     after = np.searchsorted(travelled, wanted).clip(1, len(points) - 1)
     return LanePath(
         points=np.stack(xyz, axis=1),

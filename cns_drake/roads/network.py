@@ -29,7 +29,7 @@ Turn = Literal["left", "straight", "right"]
 
 # Beyond this change of heading a way through a junction is a turn.
 _STRAIGHT_LIMIT_DEG = 35.0
-# Beyond this one it is a U-turn, which is no way at all.
+# Beyond this one it is a U-turn, which is not allowed.
 _U_TURN_LIMIT_DEG = 150.0
 # Roads may touch by this much before they count as crossing [m^2].
 _CROSSING_TOLERANCE = 1.0
@@ -56,7 +56,7 @@ class Arm:
 
 @dataclass(frozen=True)
 class Junction:
-    """Where roads meet; `arms` are ordered counter-clockwise."""
+    """A junction of roads; `arms` are ordered counter-clockwise."""
 
     name: str
     position: tuple[float, float]
@@ -84,7 +84,7 @@ class Connection:
 
 
 class RoadNetwork:
-    """Roads by name, junctions by name, and what follows from them."""
+    """Roads by name, junctions by name, and their lanes and areas."""
 
     def __init__(self, roads: dict[str, Road], junctions: dict[str, Junction]):
         self.roads = roads
@@ -138,10 +138,10 @@ class RoadNetwork:
         )
 
     def _is_u_turn(self, incoming: LaneRef, outgoing: LaneRef) -> bool:
-        """Tells whether two lanes that meet lead back where one came from.
+        """Returns whether two lanes that meet are a way back.
 
-        That is so on one road, and where its directions part, for a
-        roundabout, say.
+        They are on one road, and where its directions part, e.g. for a
+        roundabout.
         """
         if incoming.road == outgoing.road:
             return incoming.direction != outgoing.direction
@@ -157,13 +157,13 @@ class RoadNetwork:
                     yield LaneRef(road.name, direction, lane)
 
     def is_legal(self, connection: Connection) -> bool:
-        """Tells whether traffic may take a way through a junction.
+        """Returns whether traffic may take a way through a junction.
 
         A left turn leads from the innermost lane to the innermost lane, a
         right turn from the outermost to the outermost; straight on, the lane
         keeps its number, counted from the middle of the road. Between
         one-way roads, those of a roundabout for example, the lane keeps its
-        number counted from the kerb on the right, whatever the turn.
+        number counted from the kerb on the right, on any turn.
         """
         incoming, outgoing = connection.incoming, connection.outgoing
         if all(self._is_one_way(lane) for lane in (incoming, outgoing)):
@@ -178,7 +178,7 @@ class RoadNetwork:
         return not all(self.roads[lane.road].lanes.values())
 
     def _from_kerb(self, lane: LaneRef) -> int:
-        """Returns how many lanes lie between a lane and its kerb."""
+        """Returns the number of lanes between a lane and its kerb."""
         return self.roads[lane.road].lanes[lane.direction] - lane.lane
 
     def connections(self, junction: str) -> list[Connection]:
@@ -209,7 +209,7 @@ class RoadNetwork:
         return self._junction_areas[junction]
 
     def carriageway(self) -> MultiPolygon:
-        """Returns what lies between the kerbs, parking bays included."""
+        """Returns the area between the kerbs, parking bays included."""
         return self._areas.carriageway
 
     def sidewalks(self) -> MultiPolygon:
@@ -225,17 +225,18 @@ class RoadNetwork:
         return self._areas.parking_bays
 
     def lane_area(self) -> MultiPolygon:
-        """Returns where vehicles drive: the carriageway without the bays."""
+        """Returns the area of lanes: the carriageway without the bays."""
         return self._areas.lane_area
 
 
 def _turn_deg(a: Sequence[float], b: Sequence[float]) -> float:
-    """Returns how far b's heading lies left of a's, both (x, y, z, heading)."""
+    """Returns the angle from a's heading to the left to b's; (x, y, z,
+    heading)."""
     return float(np.degrees(wrapped(b[3] - a[3])))
 
 
 def _classify(angle_deg: float, num_arms: int) -> Turn:
-    """Returns the kind of turn; where two roads merely join it is none."""
+    """Returns the kind of turn; None where two roads merely join."""
     if num_arms == 2 or abs(angle_deg) <= _STRAIGHT_LIMIT_DEG:
         return "straight"
     return "left" if angle_deg > 0 else "right"
@@ -245,10 +246,10 @@ def load_road_network(path: Path | str) -> RoadNetwork:
     """Reads a `roads.yaml` and checks that it is a network.
 
     Raises:
-        InputError: naming the file, the field and the fault; besides faults
-            of form these are a road to an unknown junction, a junction with
-            fewer than two roads, a road without lanes, a corner or junction
-            that does not fit, and roads that cross without a junction.
+        InputError: naming the file, the field and the fault; faults of form, a
+            road to an unknown junction, a junction with fewer than two roads, a
+            road without lanes, a corner or junction that does not fit, and
+            roads that cross without a junction.
     """
     path = Path(path)
     file = read_roads_file(path)
@@ -320,7 +321,7 @@ def _make_junction(
         wanted = "exactly 1 at a dead end" if entry.dead_end else "at least 2"
         advice = ""
         if len(ends) == 1:
-            advice = "; where traffic cannot go on, write dead_end: true"
+            advice = "; if traffic cannot go on here, write dead_end: true"
         raise InputError(
             f"{path}: junctions.{name}: {len(ends)} road(s) end here, "
             f"{wanted} must{advice}"
@@ -371,5 +372,5 @@ def _check_crossings(path: Path, network: RoadNetwork) -> None:
         ):
             raise InputError(
                 f"{path}: roads.{names[a]}: meets road {names[b]} outside a "
-                "junction"
+                "junction; add one there"
             )

@@ -1,4 +1,4 @@
-"""One road: its centreline, its lanes, and where it meets its junctions."""
+"""One road: its centreline, its lanes, and its ends at junctions."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ class LaneRef(NamedTuple):
 class Road:
     """A road between two junctions, cut back where their areas begin.
 
-    The centreline is the middle of the carriageway, also of a one-way road
-    and where one direction has more lanes than the other. Arc lengths
-    ("stations") are measured along the whole centreline, from the position
-    of the start junction; the road itself reaches from `first_station` to
-    `last_station`. Lateral offsets are positive to the left of `forward`.
+    The centreline is the middle of the carriageway, also for a one-way road or
+    with more lanes in one direction. Arc lengths ("stations") are measured
+    along the whole centreline, from the position of the start junction; the
+    road itself reaches from `first_station` to `last_station`. Lateral offsets
+    are positive to the left of `forward`.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class Road:
 
         Raises:
             ValueError: the setbacks leave nothing of the road, or its heights
-                lie outside it or out of order.
+                are outside it or out of order.
         """
         self.name = name
         self.start = entry.start
@@ -151,7 +151,7 @@ class Road:
                 f"road {self.name} has {count} lane(s) {direction}, "
                 f"no lane {lane}"
             )
-        # From the kerb inwards: forward lanes lie on the right.
+        # Lanes count from the kerb inwards: forward lanes are on the right.
         from_kerb = (count - lane + 0.5) * self.lane_width
         right = self.half_width - from_kerb
         return -right if direction == "forward" else right

@@ -1,4 +1,4 @@
-"""What a `roads.yaml` may hold, and how it is read."""
+"""The fields of a `roads.yaml`, and its reader."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from cns_drake.base.errors import (
 )
 from cns_drake.base.yaml_files import read_yaml
 
-# A town is not larger, nor anything in it wider [m].
+# Largest coordinate of a town, and greatest width in it [m].
 _LARGEST = 100_000.0
 Finite = Annotated[float, Field(ge=-_LARGEST, le=_LARGEST, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, le=_LARGEST, allow_inf_nan=False)]
@@ -29,7 +29,7 @@ class _Model(BaseModel):
 
 
 class RoadStyle(_Model):
-    """What roads of a town share; every road may override it.
+    """The common style of a town's roads; every road may override it.
 
     Attributes:
         lanes: lanes along the centreline and against it, up to 4 each; a zero
@@ -75,7 +75,7 @@ class RoadEntry(RoadStyle):
 
 
 class JunctionEntry(_Model):
-    """Where roads meet; also the joint of two different roads.
+    """A junction of roads; also the joint of two different roads.
 
     Attributes:
         position: `[x, y]` where the centrelines meet [m].

@@ -1,4 +1,4 @@
-"""How high the roads of a network lie at any place."""
+"""The height of a network's roads at any place."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from cns_drake.roads.network import RoadNetwork
 
-# Distance of the places on the centrelines that are looked up first [m].
+# Distance of the places on the centrelines that are searched first [m].
 _SPACING = 0.5
 
 
@@ -48,7 +48,7 @@ class RoadSurface:
         ahead = (xy[:, 0] - x) * np.cos(heading) + (xy[:, 1] - y) * np.sin(
             heading
         )
-        # Inside of a bend the tangent would lead past the neighbour.
+        # On the inside of a bend the tangent would lead past the neighbour.
         ahead = np.clip(ahead, -_SPACING, _SPACING)
         stations = self._stations[index] + ahead
         z = np.empty(len(xy))

@@ -15,17 +15,17 @@ from cns_drake.roads.u_turn import find_loop
 
 # Distance between the points from which the path is interpolated [m].
 _DENSE_SPACING = 0.25
-# A lane change takes this much of its road where there is as much [m]; on
-# less than the second length there is none.
+# Length of a lane change where the road has room for it, and least length for a
+# lane change [m].
 _LANE_CHANGE_LENGTH = 50.0
 MIN_LANE_CHANGE_LENGTH = 20.0
-# On its way aside a car takes this much of a road [m], and the middle of its
-# rear axle keeps so far from kerbs and medians, for its front swings out [m].
+# Length in which a car moves aside [m], and least distance of the middle of its
+# rear axle from kerbs and medians, since its front swings out [m].
 _ASIDE_LENGTH = 25.0
 CAR_ROOM = 1.4
 
-# A car that turns round at a junction does so at most so far before it, and
-# places are tried at this distance [m].
+# Greatest distance before a junction at which a car turns round, and distance
+# of the places that are tried [m].
 _TURNING_LENGTH = 30.0
 _TURNING_STEP = 0.5
 
@@ -41,10 +41,10 @@ class RouteLeg(BaseModel):
         direction: `forward` along its centreline, or `backward`.
         lane: 1 is next to the middle of the road; two numbers change from the
             first to the second.
-        start: only in the first leg: where the drive begins, from the entry of
+        start: only in the first leg: the start of the drive, from the entry of
             the road [m].
-        end: in the last leg: where it ends, measured likewise; in a leg whose
-            next one leads back: where the car turns round [m].
+        end: in the last leg: the end of the drive, measured likewise; in a leg
+            before one that leads back: the place where the car turns round [m].
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
@@ -82,7 +82,7 @@ def make_lane_path(
     *,
     aside: float = 0.0,
 ) -> LanePath:
-    """Strings the lanes of a route and the ways between them together.
+    """Joins the lanes of a route and the ways between them.
 
     Consecutive legs must meet in a junction, and the way through it must be
     legal: a left turn from the innermost lane to the innermost, a right turn
@@ -90,9 +90,9 @@ def make_lane_path(
     lane (`RoadNetwork.is_legal`). Lanes change only along a leg. Within a
     junction the lower one of the two roads' speed limits holds.
 
-    Where the next leg leads back on the same road, the car turns round in a
-    loop to the left: at the leg's end, or as near to the junction as there
-    is room.
+    If the next leg leads back on the same road, the car turns round in a loop
+    to the left: at the leg's end, or as near to the junction as the room
+    allows.
 
     Args:
         network: the roads.
@@ -100,9 +100,9 @@ def make_lane_path(
         spacing: the distance of the points, rounded so that it divides the
             length of the route [m].
         source: the file that errors name.
-        aside: how far to the right of the lanes' middle the path runs along
-            each road, from a junction to the next and as far as the road has
-            room for a car [m].
+        aside: offset of the path to the right of the lanes' middle along each
+            road, from one junction to the next, within the room of the road
+            [m].
 
     Raises:
         InputError: a leg names no lane of the network, does not follow from
@@ -145,7 +145,7 @@ def make_lane_path(
 
 
 def leads_back(leg: RouteLeg, after: RouteLeg) -> bool:
-    """Tells whether the car turns round between two legs."""
+    """Returns whether the car turns round between two legs."""
     return leg.road == after.road and leg.direction != after.direction
 
 
@@ -153,12 +153,13 @@ def _check_ends(
     network: RoadNetwork, leg: RouteLeg, is_first: bool, after: RouteLeg | None
 ) -> None:
     if leg.start is not None and not is_first:
-        raise ValueError("start is for the first leg only")
+        raise ValueError("start is allowed in the first leg only")
     if leg.road not in network.roads:
         raise ValueError(f"no road {leg.road!r}")
     if leg.end is not None and after and not leads_back(leg, after):
         raise ValueError(
-            "end is for the last leg, or where the next one leads back"
+            "end is allowed in the last leg only, or before a leg that leads "
+            "back"
         )
     length = network.roads[leg.road].length
     start = 0.0 if leg.start is None else leg.start
@@ -182,12 +183,12 @@ def _leg_points(
     Args:
         network: the roads.
         leg: the leg.
-        start, end: from where to where, from the entry of the road; beyond
-            the road where the car turns round in a junction [m].
-        aside: how far to the right of the lanes' middle [m].
+        start, end: stretch of the leg, from the entry of the road; beyond the
+            road if the car turns round in a junction [m].
+        aside: offset to the right of the lanes' middle [m].
 
     Raises:
-        ValueError: the leg does not suit its road.
+        ValueError: the leg does not fit its road.
     """
     road = network.roads[leg.road]
     offsets = [
@@ -220,11 +221,11 @@ def _turn_round(
     start: float,
     aside: float,
 ) -> tuple[np.ndarray, float]:
-    """Returns how the car turns round at the end of a leg.
+    """Returns the turn of the car at the end of a leg.
 
     Returns:
-        The (N, 3) points between the lanes, and where it leaves the first
-        of them, from the entry of the road [m].
+        The (N, 3) points between the lanes, and the place where it leaves the
+        first lane, from the entry of the road [m].
 
     Raises:
         ValueError: there is no room, or no such lane.
@@ -232,7 +233,8 @@ def _turn_round(
     road = network.roads[leg.road]
 
     def lanes_at(travelled: float) -> tuple[np.ndarray, float]:
-        """Returns the lane's pose and how far left the other one lies."""
+        """Returns the lane's pose and the distance of the other lane to its
+        left."""
         offsets = [
             _moved_right(
                 road,
@@ -255,7 +257,7 @@ def _turn_round(
     if leg.end is not None:
         centres = np.array([leg.end])
     else:
-        # From the middle of the junction back.
+        # Places are tried from the middle of the junction backwards.
         first, last = road.first_station, road.full_length - road.last_station
         beyond = last if leg.direction == "forward" else first
         farthest = road.length + beyond
@@ -309,7 +311,7 @@ def _lane_change(travelled: np.ndarray, wanted: bool) -> np.ndarray:
     available = travelled[-1] - travelled[0]
     if available < MIN_LANE_CHANGE_LENGTH:
         raise ValueError(
-            f"{available:.1f} m are too short for a lane change, it needs "
+            f"{available:.1f} m are too short for a lane change, which needs "
             f"{MIN_LANE_CHANGE_LENGTH:.0f} m"
         )
     length = min(available, _LANE_CHANGE_LENGTH)

@@ -15,7 +15,7 @@ from cns_drake.roads.route import (
     RouteLeg,
 )
 
-# How strongly roads that were driven before are avoided.
+# Strength with which roads that were driven before are avoided.
 _WEIGHT_OF_NEW = 6.0
 
 
@@ -30,12 +30,12 @@ def draw_route(
         rng: decides.
 
     Raises:
-        InputError: there is no way of going on and on over the network.
+        InputError: the network has no route of any length.
     """
     successors = _successors(network)
     if not successors:
         raise InputError(
-            "roads: every lane ends somewhere: no route of any length"
+            "roads: every lane comes to an end, so that no endless route exists"
         )
     lanes = sorted(successors)
     lane = lanes[int(rng.integers(len(lanes)))]
@@ -53,8 +53,7 @@ def draw_route(
         exit_lane, after = choices[chosen]
         legs.append((lane, exit_lane))
         lane = after
-    # Behind the last road nothing follows, so there is no reason to leave
-    # its lane.
+    # No road follows the last one, so the drive keeps its lane.
     legs[-1] = (legs[-1][0], legs[-1][0].lane)
     return Route([_leg(entry, exit_lane) for entry, exit_lane in legs])
 
@@ -67,9 +66,9 @@ def _leg(entry: LaneRef, exit_lane: int) -> RouteLeg:
 def _successors(
     network: RoadNetwork,
 ) -> dict[LaneRef, list[tuple[int, LaneRef]]]:
-    """Returns for each lane how it can go on: exit lane, lane behind it.
+    """Returns for each lane its continuations: exit lane, next lane.
 
-    Lanes from which every way ends somewhere are left out.
+    Lanes without an endless continuation are left out.
     """
     ways = defaultdict(list)
     for junction in network.junctions:

@@ -1,4 +1,4 @@
-"""What a city needs of its streets, whoever drew them."""
+"""The interface of streets to a city, for any source of streets."""
 
 from __future__ import annotations
 
@@ -13,19 +13,21 @@ class StreetAreas(Protocol):
     """The areas of streets in the world [m]."""
 
     def carriageway(self) -> MultiPolygon:
-        """Returns what vehicles drive or park on."""
+        """Returns the carriageway: the area where vehicles drive or park."""
         ...
 
     def lane_area(self) -> MultiPolygon:
-        """Returns the carriageway without what vehicles park on."""
+        """Returns the carriageway without parking bays."""
         ...
 
     def sidewalks(self) -> MultiPolygon:
-        """Returns what lies beside the carriageway, a kerb higher."""
+        """Returns the sidewalks: the area beside the carriageway, a kerb
+        higher."""
         ...
 
     def medians(self) -> MultiPolygon:
-        """Returns what lies between the directions, a kerb higher."""
+        """Returns the medians: the area between the directions, a kerb
+        higher."""
         ...
 
 

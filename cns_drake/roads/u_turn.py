@@ -1,4 +1,4 @@
-"""How a car turns round: the tightest loop that its steering allows."""
+"""U-turns: the tightest loop that a car's steering allows."""
 
 from __future__ import annotations
 
@@ -13,18 +13,19 @@ from shapely.geometry.base import BaseGeometry
 
 from cns_drake.roads.centreline import Centreline, sample_stations
 
-# From the car in worlds/vehicle.sdf: its axles' distance, from the middle to a
-# front wheel [m], and how far the inner one can be steered [rad].
+# From the car in worlds/vehicle.sdf: its wheelbase, the distance from the
+# middle to a front wheel [m], and the greatest steering of the inner one [rad].
 _WHEELBASE = 2.8
 _HALF_TRACK = 0.79
 _STEERING_LIMIT = 0.7
-# How far it reaches behind its rear axle and ahead of it, and half its width
-# with mirrors [m].
+# Its length behind the rear axle and ahead of it, and half its width with
+# mirrors [m].
 _REAR, _FRONT, _HALF_WIDTH = 1.0, 3.72, 1.03
 
-# What the middle of the rear axle can go round [m].
+# Tightest radius of the middle of the rear axle [m].
 TIGHTEST_RADIUS = float(_WHEELBASE / np.tan(_STEERING_LIMIT) + _HALF_TRACK)
-# For planned loops, whose curve is smoothed to the inside of its points [m].
+# Radius of planned loops, whose curve is smoothed to the inside of its points
+# [m].
 LOOP_RADIUS = 4.4
 # Distance of the places at which the car's outline is drawn [m].
 _STEP = 0.25
@@ -50,8 +51,8 @@ def loop_corners(
         centre: (2,) of the loop [m].
         heading_in, heading_out: of both lines [rad].
         radius: of the loop and of the bends at its ends [m].
-        aside_in, aside_out: how far the centre lies to the left of the lines,
-            at most the radius [m].
+        aside_in, aside_out: distance of the centre to the left of the lines, at
+            most the radius [m].
 
     Returns:
         (N, 2) corners [m].
@@ -62,7 +63,7 @@ def loop_corners(
     round_ = turn + swing_in + swing_out
     parts = 3
     share = round_ / parts
-    # Corners of the loop lie outside it.
+    # Corners of the loop are outside it.
     first = heading_in - swing_in - np.pi / 2 + share / 2
     angles = first + share * np.arange(parts)
     reach = radius / np.cos(share / 2)
@@ -93,12 +94,12 @@ def loop_corners(
 
 
 class Loop(NamedTuple):
-    """How a car turns round between two lanes.
+    """A car's turn between two lanes.
 
     Attributes:
-        begin: how far it has come along its lane when it leaves it [m].
-        points: (N, 2) from there to where it joins the other lane, opposite
-            [m].
+        begin: distance along its lane at which the car leaves it [m]. points:
+            (N, 2) from there to the place where it joins the other lane,
+            opposite [m].
     """
 
     begin: float
@@ -110,16 +111,16 @@ def find_loop(
     centres: np.ndarray,
     area: BaseGeometry,
 ) -> Loop:
-    """Returns the first loop for which there is room.
+    """Returns the first loop with enough room.
 
     Args:
-        lanes_at: gives, for a distance travelled [m], x, y and heading of
-            the car, and how far to its left it is to drive back [m].
-        centres: (N,) distances at which the loop's centre may lie [m].
-        area: on which all of the car has to stay.
+        lanes_at: distance travelled [m] -> x, y and heading of the car, and the
+            distance of the way back to its left [m].
+        centres: (N,) possible distances of the loop's centre [m].
+        area: the area that the whole car must keep to.
 
     Raises:
-        ValueError: there is no room; it says how much is needed.
+        ValueError: there is no room; the message gives the room it needs.
     """
     shapely.prepare(area)
     needed, widest = np.inf, 0.0
@@ -140,15 +141,15 @@ def find_loop(
         if area.covers(place):
             widest = max(widest, 2 * area.boundary.distance(place))
     raise ValueError(
-        f"no room for turning round: it takes a disc of {needed:.1f} m across, "
-        f"and as much of the lanes before it, the widest here has "
-        f"{widest:.1f} m; turn where the carriageway is wider, or in a dead "
-        f"end of kerb_radius {_DEAD_END_RADIUS:g}"
+        f"no room for turning round: the car needs a disc {needed:.1f} m "
+        "across, and as much of the lanes before it; the widest disc here "
+        f"has {widest:.1f} m; turn where the carriageway is wider, or in a "
+        f"dead end of kerb_radius {_DEAD_END_RADIUS:g}"
     )
 
 
 def _ahead(width: float) -> float:
-    """Returns how far ahead of where it begins a loop's centre lies [m]."""
+    """Returns the distance from the start of a loop to its centre [m]."""
     radius = max(LOOP_RADIUS, width / 2)
     return float(np.sqrt(4 * radius**2 - (radius + width / 2) ** 2))
 
@@ -170,7 +171,7 @@ def _loop(start: np.ndarray, heading: float, width: float) -> np.ndarray:
 
 
 def swept_area(points: ArrayLike) -> BaseGeometry:
-    """Returns what a car covers whose rear axle follows points.
+    """Returns the area that a car covers while its rear axle follows points.
 
     Args:
         points: (N, 2) of the middle of the axle, close to one another [m].

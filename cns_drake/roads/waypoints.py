@@ -1,4 +1,4 @@
-"""A drive along waypoints: for worlds that have no road network."""
+"""Drives along waypoints, for worlds without a road network."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from cns_drake.roads.lane_path import (
 )
 from cns_drake.roads.u_turn import LOOP_RADIUS, loop_corners
 
-# Corners are rounded by arcs of this radius, or what fits between the
-# neighbouring waypoints [m].
+# Radius of the arcs that round corners, if it fits between the neighbouring
+# waypoints [m].
 _CORNER_RADIUS = 8.0
 # A car does not turn on the spot.
 _SHARPEST_TURN_DEG = 150.0
@@ -38,22 +38,22 @@ def load_waypoint_path(
     """Reads waypoints and makes a path of them.
 
     The file is CSV, one waypoint a line: x, y, z or x, y of the vehicle
-    frame (on the ground, metres, in the world); without z it is 0. A first
-    line of names may give the columns another order, and may name more.
+    frame (on the ground, metres, in the world); without z it is 0. A first line
+    of names may give the columns another order, and have more columns.
 
-    The path is the line from waypoint to waypoint, with corners rounded by
-    arcs of 8 m, or of what fits into half of the shorter neighbouring
-    segment; so it leaves a right-angled corner by up to 3.3 m. The height
+    The path is the line from waypoint to waypoint, with corners rounded by arcs
+    of 8 m radius, or less if half of the shorter neighbouring segment requires
+    it. At a right angle the path is up to 3.3 m from the corner. The height
     follows a monotone cubic over the distance travelled.
 
     Args:
         path: the file.
         spacing: distance of the points of the path [m].
-        u_turns: whether the car turns round where waypoints double back, in
-            a loop as tight as it can steer, whose far end is the waypoint.
+        u_turns: whether the car turns round where waypoints double back, in its
+            tightest loop, whose far end is the waypoint.
 
     Raises:
-        InputError: naming file, line and fault, or the file is too short
+        InputError: naming file, line and fault, or that the file is too short
             for a drive.
     """
     path = Path(path)
@@ -80,14 +80,14 @@ def make_waypoint_path(
     Args:
         waypoints: (N, 3) positions of the vehicle frame [m].
         spacing: distance of the points of the path [m].
-        names: N texts by which errors name the waypoints.
-        source: by which errors name all of them.
-        u_turns: whether turns by more than 150 degrees are driven, as loops.
+        names: N names of the waypoints in errors.
+        source: their common name in errors.
+        u_turns: whether turns by more than 150 degrees are driven as loops.
 
     Raises:
-        InputError: fewer than two different waypoints, a turn by more than
-            150 degrees that is not to be driven or has no room, or too
-            little or too much to drive.
+        InputError: fewer than two different waypoints, a turn by more than 150
+            degrees without `u_turns` or room, or a path that is too short or
+            too long.
     """
     waypoints = np.asarray(waypoints, dtype=float)
     if names is None:
@@ -107,18 +107,18 @@ def make_waypoint_path(
         if not u_turns:
             raise InputError(
                 f"{names[k + 1]}: turns by {np.degrees(abs(turns[k])):.0f} "
-                f"deg, a car can turn by {_SHARPEST_TURN_DEG:.0f} deg at most; "
-                "u_turns: true has it turn round there in a loop"
+                f"deg; a car can turn by {_SHARPEST_TURN_DEG:.0f} deg at "
+                "most; with u_turns: true it turns round there in a loop"
             )
-    # What loops take of the segments before and behind them.
+    # The parts of the segments before and behind loops that these need.
     taken = np.where(is_loop, _loop_length(turns), 0.0)
     taken = np.concatenate([[0.0], taken, [0.0]])
     free = lengths - taken[:-1] - taken[1:]
     for k in np.flatnonzero((free < 0) & (lengths > 0)):
         raise InputError(
-            f"{names[k + 1]}: turning round takes {lengths[k] - free[k]:.2f} "
-            f"m between this waypoint and the one before, there are "
-            f"{lengths[k]:.2f} m"
+            f"{names[k + 1]}: turning round needs {lengths[k] - free[k]:.2f} "
+            "m between this waypoint and the one before, which are "
+            f"{lengths[k]:.2f} m apart"
         )
     usable = np.minimum(lengths / 2, free)
     room = np.minimum(usable[:-1], usable[1:])
@@ -152,7 +152,7 @@ def _rounded(
     turns = np.abs(wrapped(np.diff(headings)))
     count = int(np.ceil(curve.length / _DENSE_SPACING)) + 1
     along = np.linspace(0.0, curve.length, count)
-    # Where the curve passes each corner: the middle of its arc.
+    # The place where the curve passes each corner: the middle of its arc.
     from scipy.interpolate import PchipInterpolator
 
     saved = 2 * radii * np.tan(turns / 2) - radii * turns
@@ -167,7 +167,7 @@ def _rounded(
 
 
 def _loop_length(turns: np.ndarray) -> np.ndarray:
-    """Returns what (N,) loops take of the way to and from them [m]."""
+    """Returns the length that (N,) loops need before and behind them [m]."""
     aside = np.cos(turns / 2)
     return LOOP_RADIUS * (
         np.abs(np.sin(turns / 2)) + np.sqrt(4 - (1 + aside) ** 2)
@@ -180,7 +180,7 @@ def _loop(place: np.ndarray, heading: float, turn: float) -> np.ndarray:
     Args:
         place: (2,) the waypoint [m].
         heading: towards it [rad].
-        turn: by how much it turns there, positive to the left [rad].
+        turn: its angle there, positive to the left [rad].
     """
     if turn < 0:
         mirror = np.array([1.0, -1.0])
@@ -210,7 +210,10 @@ def read_waypoints(path: Path) -> tuple[np.ndarray, list[int]]:
             if not _is_number(cells[columns[0]]):
                 continue
         if max(columns) >= len(cells):
-            raise InputError(f"{where}: {len(cells)} column(s), too few")
+            raise InputError(
+                f"{where}: {len(cells)} column(s) are too few; give x and y, "
+                "or x, y and z"
+            )
         values = [cells[column] for column in columns]
         for value in values:
             if not _is_number(value):
@@ -223,12 +226,12 @@ def read_waypoints(path: Path) -> tuple[np.ndarray, list[int]]:
         points.append((x, y, z[0] if z else 0.0))
         lines.append(line)
     if not points:
-        raise InputError(f"{path}: no waypoint")
+        raise InputError(f"{path}: the file has no waypoints")
     return np.array(points), lines
 
 
 def _columns(cells: list[str], where: str) -> list[int]:
-    """Returns where x, y and perhaps z are, from the first line."""
+    """Returns the columns of x, y and, if given, z, from the first line."""
     names = [cell.lower() for cell in cells]
     if {"x", "y"} <= set(names):
         wanted = ["x", "y", "z"] if "z" in names else ["x", "y"]

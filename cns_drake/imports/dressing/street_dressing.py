@@ -118,8 +118,9 @@ def dress_streets(
         structures: those of all stages.
         things: of the file.
         streets: of the file.
-        drives: kept free of things; without any nothing is placed. ground:
-        below the city. seed: of the lot.
+        drives: kept free of things; without any nothing is placed.
+        ground: below the city.
+        seed: of the random draws.
     """
     found = StreetThings()
     if not drives:

@@ -45,5 +45,5 @@ def test_a_road_between_dead_ends_has_no_route(tmp_path):
         "  ab: {start: a, end: b}\n"
     )
     network = load_road_network(tmp_path / "roads.yaml")
-    with pytest.raises(InputError, match="every lane ends"):
+    with pytest.raises(InputError, match="every lane comes to an end"):
         draw_route(network, 100.0, np.random.default_rng(0))

@@ -75,7 +75,7 @@ def test_two_attachments_of_a_name_that_differ(recording):
     assert open_sequence(path).scenario["map"] == "town"
     other = type(one)(**{**vars(one), "data": b'{"map": "village"}'})
     path.write_bytes(write_messages(messages, [*attachments, other]))
-    with pytest.raises(InputError, match=r"scenario\.json: there are two"):
+    with pytest.raises(InputError, match=r"scenario\.json: two attachments"):
         _ = open_sequence(path).scenario
 
 
