@@ -303,7 +303,7 @@ def test_folder_below_a_file_is_named(tmp_path):
 @pytest.mark.parametrize("overwrite", [False, True])
 def test_file_in_place_of_the_folder_is_refused(tmp_path, overwrite):
     (tmp_path / "town_01").write_text("precious")
-    with pytest.raises(InputError, match="town_01: there is a file"):
+    with pytest.raises(InputError, match="town_01: a file has this name"):
         open_bag(tmp_path / "town_01", overwrite=overwrite)
 
 

@@ -121,7 +121,7 @@ def test_what_is_needed_is_there_and_faults_stay_alone(tmp_path, capsys):
         "refused: FILE: field: cannot be used",
         "stumbles: ZeroDivisionError: over nothing",
     ]
-    assert left_out.endswith("need these: orphan, orphan 2")
+    assert left_out.endswith("need failed jobs: orphan, orphan 2")
     assert last.read_text() == both.read_text() == "a+b"
     assert tries.read_text() == "xxx"
     assert survivor.read_text() == "at last"
