@@ -242,7 +242,7 @@ def _columns(cells: list[str], where: str) -> list[int]:
         )
     if len(cells) not in (2, 3):
         raise InputError(
-            f"{where}: {len(cells)} column(s), not x, y or x, y, z"
+            f"{where}: {len(cells)} column(s); it must be x, y or x, y, z"
         )
     return list(range(len(cells)))
 

@@ -1,1 +1,1 @@
-"""What a drive is made of: scenario files, and families of them."""
+"""Scenario files, which describe drives, and families of them."""

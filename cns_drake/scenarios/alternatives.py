@@ -1,8 +1,8 @@
-"""Fields of which one excludes, replaces or needs another.
+"""Validators of pairs of fields that exclude, replace or need each other.
 
-Each function returns a validator of the later one of two fields, which sees
-the earlier one. An earlier field that is not valid has its own error; there
-is then no second one.
+Each function returns a validator of the later one of two fields, with the value
+of the earlier one. An invalid earlier field has its own error, and the
+validator adds no second one.
 """
 
 from __future__ import annotations
@@ -42,5 +42,5 @@ def _validator(
 
 
 def _is_given(value: object) -> bool:
-    """Tells whether a value is neither None, False nor zero."""
+    """Returns whether a value is neither None, False nor zero."""
     return value is not None and value != 0

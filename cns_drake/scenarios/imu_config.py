@@ -14,7 +14,7 @@ class ImuConfig(Mount):
         rpy_deg: roll, pitch, yaw in `base_link` [deg].
         rate: samples per second, from the rate of the scans to 1000; it divides
             1,000,000,000 ns, as 100, 200, 250, 400 and 500 do.
-        kalibr: a file with the four noise densities, as Kalibr has it.
+        kalibr: a file of Kalibr's with the four noise densities.
         accelerometer_turn_on_bias: standard deviation of the accelerometer's
             bias at the start, drawn for each axis [m/s^2].
         gyroscope_turn_on_bias: likewise of the gyroscope [rad/s].

@@ -1,4 +1,4 @@
-"""From the IMU that a scenario describes to its rate and its noise."""
+"""Rate and noise of a scenario's IMU."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from cns_drake.scenarios.rates import check_rate, fastest_rate
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.sensors.imu_noise import ImuNoise
 
-# Under this name the noise travels with a recording.
+# The name of the noise's file in a recording.
 KALIBR_FILE = "imu.yaml"
 
 
 def imu_rate(scenario: Scenario) -> int:
-    """Returns how many samples per second the IMU takes.
+    """Returns the IMU's samples per second.
 
-    Without a rate of its own it takes those of Kalibr's file, or else one a
-    scan of the fastest LiDAR.
+    By default it is the rate in Kalibr's file, or else one sample a scan of the
+    fastest LiDAR.
 
     Raises:
         InputError: Kalibr's file cannot be used.
@@ -38,7 +38,7 @@ def imu_rate(scenario: Scenario) -> int:
 
 
 def make_imu_noise(scenario: Scenario) -> ImuNoise:
-    """Returns how the IMU errs.
+    """Returns the errors of the IMU; None if it is ideal.
 
     Raises:
         InputError: Kalibr's file cannot be used.

@@ -12,14 +12,14 @@ from cns_drake.scenarios.section import Section
 
 
 class KalibrImu(Section):
-    """What Kalibr's `imu.yaml` says of an IMU.
+    """The fields of Kalibr's `imu.yaml`.
 
     Attributes:
         accelerometer_noise_density: [m/s^2/sqrt(Hz)].
         accelerometer_random_walk: [m/s^3/sqrt(Hz)].
         gyroscope_noise_density: [rad/s/sqrt(Hz)].
         gyroscope_random_walk: [rad/s^2/sqrt(Hz)].
-        rostopic: where its messages come; not used.
+        rostopic: topic of its messages; not used.
         update_rate: samples per second.
     """
 
@@ -39,7 +39,7 @@ def read_kalibr(path: Path) -> KalibrImu:
     """
     values = read_yaml(path)
     if not isinstance(values, dict):
-        raise InputError(f"{path}: no mapping of Kalibr's fields of an IMU")
+        raise InputError(f"{path}: not a mapping of Kalibr's fields of an IMU")
     try:
         return KalibrImu.model_validate(values)
     except ValidationError as error:

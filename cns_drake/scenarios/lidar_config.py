@@ -30,22 +30,22 @@ class LidarConfig(Mount):
         columns: columns in a turn, in place of the preset's.
         min_range: nearest range, in place of the preset's [m].
         max_range: farthest range, in place of the preset's [m].
-        resolution: step of the coordinates, 2^-10 m; 0 records what was cast
+        resolution: step of the coordinates, 2^-10 m; 0 records exact values
             [m].
         range_noise: standard deviation of a Gaussian error along the beam; the
-            range limits hold for what is measured [m].
+            range limits apply to the measured range [m].
         dropout: each return is lost with this probability.
         faint_dropout: on top, a return of intensity I is lost with this
             probability times (1 - I).
         motion_distortion: each column is cast from the sensor's pose at
             `stamp + t` and expressed in its frame at that time, as real units
             report it.
-        returns: `calibrated` ones have the losses, errors and brightness of the
-            unit's data sheet.
-        echoes: which echoes of a beam calibrated returns report; `dual` is the
-            strongest and the last.
+        returns: `ideal`, or `calibrated` with the losses, errors and brightness
+            of the unit's data sheet.
+        echoes: the echoes of a beam that calibrated returns report; `dual` is
+            the strongest and the last.
         rate: turns per second.
-        layout: which fields a point has in the recording.
+        layout: the fields of a point in the recording.
     """
 
     xyz: Triple = (0.0, 0.0, 1.6)
@@ -53,7 +53,8 @@ class LidarConfig(Mount):
     columns: int | None = Field(default=None, ge=4, le=8192)
     min_range: float | None = Field(default=None, ge=0.0)
     max_range: float | None = Field(default=None, gt=0.0, le=1000.0)
-    # About what real units resolve; a third less to store than exact values.
+    # About the resolution of real units; needs a third less space than exact
+    # values.
     resolution: float = Field(default=2.0**-10, ge=0.0, le=1.0)
     range_noise: float = Field(default=0.0, ge=0.0, le=10.0)
     dropout: float = Field(default=0.0, ge=0.0, le=1.0)
@@ -78,7 +79,10 @@ class LidarConfig(Mount):
     def _check_returns(self) -> LidarConfig:
         if self.returns == "ideal":
             if self.echoes != Echoes.STRONGEST:
-                raise ValueError("echoes: choices need returns: calibrated")
+                raise ValueError(
+                    "echoes: only calibrated returns have a choice; add "
+                    "returns: calibrated"
+                )
             return self
         for field in ("range_noise", "dropout", "faint_dropout"):
             if getattr(self, field):
@@ -101,10 +105,10 @@ class LidarConfig(Mount):
         return self
 
     def with_preset(self, preset: str) -> LidarConfig:
-        """Returns another unit in the same place that measures alike.
+        """Returns another unit with the same place and measurement.
 
         Raises:
-            InputError: the preset is not known.
+            InputError: there is no such preset.
         """
         unit = make_lidar_config(preset)
         unit_fields = ("preset", "columns", "min_range", "max_range")
@@ -117,7 +121,7 @@ def make_lidar_config(preset: str) -> LidarConfig:
     """Returns a LiDAR of a preset.
 
     Raises:
-        InputError: the preset is not known.
+        InputError: there is no such preset.
     """
     try:
         return LidarConfig(preset=preset)

@@ -8,7 +8,8 @@ from pydantic import Field
 
 from cns_drake.scenarios.section import Section
 
-# On a vehicle nothing is farther, and rays are cast in single precision [m].
+# Greatest distance of a sensor on a vehicle [m]; rays are cast in single
+# precision.
 Place = Annotated[float, Field(ge=-1000.0, le=1000.0)]
 Triple = tuple[Place, Place, Place]
 Angle = Annotated[float, Field(ge=-3600.0, le=3600.0)]

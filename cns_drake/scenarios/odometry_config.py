@@ -6,7 +6,7 @@ from cns_drake.scenarios.section import Section
 
 
 class OdometryConfig(Section):
-    """How often the exact motion of the vehicle is recorded.
+    """The rate at which the exact motion of the vehicle is recorded.
 
     Attributes:
         rate: messages per second, at most 1000: a multiple of the fastest

@@ -1,4 +1,4 @@
-"""From a scenario to the drive that it describes."""
+"""Plans the drive of a scenario."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def plan_drive(scenario: Scenario) -> Trajectory:
 
     Raises:
         InputError: the roads, the waypoints or the vehicle's springs cannot
-            be used, the route does not suit the roads, or a bend is tighter
-            than the car can steer.
+            be used, the route does not fit the roads, or a bend is too tight
+            for the car.
 
     Example:
         from cns_drake import load_scenario, plan_drive
@@ -40,9 +40,9 @@ def plan_drive(scenario: Scenario) -> Trajectory:
             scenario.waypoints, POINT_SPACING, u_turns=scenario.u_turns
         )
         source = scenario.waypoints
-        cure = "waypoints farther apart, or fewer of them, make it wider"
+        cure = "place waypoints farther apart, or leave some out"
     else:
-        assert scenario.route is not None  # One of both is there.
+        assert scenario.route is not None  # One of both is given.
         network = load_road_network(map_folder(scenario).roads)
         path = make_lane_path(
             network,
@@ -52,7 +52,7 @@ def plan_drive(scenario: Scenario) -> Trajectory:
             aside=scenario.aside,
         )
         source = f"{scenario.source}: route"
-        cure = "a greater kerb_radius of the junction makes it wider"
+        cure = "give the junction a greater kerb_radius"
     trajectory = Trajectory(path, scenario.speeds)
     _check_steering(trajectory, source, cure)
     profile = scenario.ride.profile()
@@ -66,42 +66,42 @@ def plan_drive(scenario: Scenario) -> Trajectory:
 
 
 def _check_steering(trajectory: Trajectory, source: str, cure: str) -> None:
-    """Checks that no bend of a drive is tighter than the car can steer.
+    """Checks that no bend of a drive is too tight for the car.
 
     Raises:
-        InputError: naming the source, the place and the cure.
+        InputError: naming the source, the place and the remedy.
     """
     radius, (x, y, _) = trajectory.path.tightest_bend()
     if radius < TIGHTEST_RADIUS:
         raise InputError(
-            f"{source}: a bend of {radius:.2f} m radius at {x:.1f}, {y:.1f}, "
-            f"the car turns within {TIGHTEST_RADIUS:.2f} m at the tightest; "
-            f"{cure}"
+            f"{source}: a bend of {radius:.2f} m radius at {x:.1f}, {y:.1f} "
+            f"is too tight: the car needs {TIGHTEST_RADIUS:.2f} m; {cure}"
         )
 
 
 def count_frames(scenario: Scenario, trajectory: Trajectory) -> int:
-    """Returns how many frames a scenario's drive has.
+    """Returns the number of frames of a scenario's drive.
 
     Raises:
-        InputError: it asks for more than the drive takes.
+        InputError: `frames` is greater than the drive has.
     """
     available = frames_within(
         trajectory.duration, frame_period(scenario.lidars)
     )
     if scenario.frames is not None and scenario.frames > available:
         raise InputError(
-            f"{scenario.source}: frames: {scenario.frames} asked for, but the "
-            f"route takes only {available}"
+            f"{scenario.source}: frames: {scenario.frames} is too many: the "
+            f"drive has {available}"
         )
     return scenario.frames or available
 
 
 def shown_beside(scenario: Scenario) -> tuple[Scenario | None, str]:
-    """Returns what a page of a drive compares its stage with, and its name.
+    """Returns the stage that a drive's page compares with its own, and its
+    name.
 
-    That is the last stage, or else the first. Where structures are left out,
-    it is the same stage with them.
+    It is the last stage, or the first one if the drive is in the last. For a
+    drive without some structures it is the same stage with them.
     """
     if scenario.without:
         whole = scenario.model_copy(update={"without": ()})

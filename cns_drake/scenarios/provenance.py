@@ -1,4 +1,4 @@
-"""What a recording was made from and with, besides its scenario."""
+"""The inputs and libraries of a recording, besides its scenario."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder, world_file
 from cns_drake.scenarios.shipped import suspension_file, vehicle_file
 
-# Whatever can have a say in a message's bytes.
+# Packages that can influence a message's bytes.
 _PACKAGES = (
     "drake",
     "embreex",
@@ -31,14 +31,14 @@ _PACKAGES = (
     "zstandard",
 )
 _BLOCK_BYTES = 1 << 20
-# Where a recording's metadata keep the combined digest of its inputs.
+# The key of the inputs' combined digest in a recording's metadata.
 INPUTS_KEY = "inputs_sha256"
 
 
 def dependency_versions() -> dict[str, str]:
-    """Returns package -> version, of cns-drake and what it computes with.
+    """Returns package -> version, of cns-drake and its numerical libraries.
 
-    What is not installed is left out: not all platforms have Embree's wheel.
+    Missing packages are left out: not all platforms have Embree's wheel.
     """
     return {
         "cns-drake": __version__,
@@ -52,18 +52,18 @@ def digest_inputs(
 ) -> dict[str, str]:
     """Returns SHA-256 digests of the files that a scenario reads.
 
-    A world counts with the meshes and models that it names, and these with
-    what they name.
+    A world counts with the meshes and models that it names, and these with the
+    files they name.
 
     Args:
-        scenario: what is recorded.
-        watch: also takes down each file, before it is read.
+        scenario: of the recording.
+        watch: also notes each file, before it is read.
 
     Returns:
         `world`, `vehicle`, and `structures`, `suspension`, `roads`, `lanes`,
-        `waypoints`, `fcd` or `kalibr` where there are such -> hexadecimal
-        digest. It depends on contents and on the relative names alone, not on
-        where the files lie.
+        `waypoints`, `fcd` or `kalibr`, if used -> hexadecimal digest. It
+        depends only on contents and relative names, not on the folder of the
+        files.
 
     Raises:
         InputError: a file cannot be read.
@@ -103,12 +103,12 @@ def combined_digest(inputs: dict[str, str]) -> str:
 
 
 def recording_fingerprint(scenario: Scenario, inputs: dict[str, str]) -> str:
-    """Returns the fingerprint of what a scenario records.
+    """Returns the fingerprint of a scenario's recording.
 
-    Where its files lie does not matter, nor does how a page shows the drive.
+    The folder of its files does not count, nor do settings of the drive's page.
 
     Args:
-        scenario: what is recorded.
+        scenario: of the recording.
         inputs: its `digest_inputs`.
     """
     places: dict[str, object] = {
@@ -124,7 +124,7 @@ def recording_fingerprint(scenario: Scenario, inputs: dict[str, str]) -> str:
         places["traffic"] = scenario.traffic.model_copy(update=update)
     return fingerprint(
         {
-            # As text, since the order of LiDARs matters.
+            # LiDARs become text, since their order matters.
             "scenario": scenario.model_copy(update=places).model_dump_json(),
             "inputs": inputs,
             "code": code_digest(
@@ -140,7 +140,7 @@ def digest_file(path: Path, watch: FileWatch | None = None) -> str:
 
     Args:
         path: of the model.
-        watch: also takes down each file, before it is read.
+        watch: also notes each file, before it is read.
 
     Raises:
         InputError: a file cannot be read.
@@ -156,7 +156,8 @@ def digest_file(path: Path, watch: FileWatch | None = None) -> str:
 
 
 def _take(path: Path | str, update: Callable[[bytes], None]) -> None:
-    """Shows a file in blocks: textures and meshes may be of any size."""
+    """Updates a digest with a file, block by block: meshes may have any
+    size."""
     with user_errors(path), open(path, "rb") as stream:
         while block := stream.read(_BLOCK_BYTES):
             update(block)

@@ -1,4 +1,4 @@
-"""How often sensors measure."""
+"""Rates of sensors."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _NS_PER_S = 1_000_000_000
 
 
 def fastest_rate(lidars: Mapping[str, LidarConfig]) -> int:
-    """Returns how many turns per second the fastest LiDAR makes."""
+    """Returns the turns per second of the fastest LiDAR."""
     return max(config.rate for config in lidars.values())
 
 
@@ -21,17 +21,18 @@ def frame_period(lidars: Mapping[str, LidarConfig]) -> float:
 
 
 def check_rate(rate: float, lowest: int, *, multiple_of: int = 1) -> None:
-    """Checks that samples can be taken so often.
+    """Checks that a rate of samples is possible.
 
     Stamps are whole nanoseconds, so the rate must divide a billion.
 
     Args:
         rate: samples per second.
-        lowest: the lowest rate that is allowed; the highest is 1000.
-        multiple_of: of which the rate must be a multiple.
+        lowest: the lowest allowed rate; the highest is 1000.
+        multiple_of: the rate must be a multiple of it.
 
     Raises:
-        ValueError: it is not allowed; with the next rates that are.
+        ValueError: it is not allowed; the message has the nearest allowed
+            rates.
     """
     allowed = [
         one

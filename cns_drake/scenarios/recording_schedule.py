@@ -1,4 +1,4 @@
-"""When the sensors of a drive are recorded."""
+"""Times at which the sensors of a drive are recorded."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cns_drake.scenarios.imu_making import imu_rate
 from cns_drake.scenarios.rates import fastest_rate, frame_period
 from cns_drake.scenarios.scenario import Scenario
 
-# A time is a multiple of a period up to rounding, in periods.
+# Greatest error of a time as a multiple of a period, in periods.
 _TOLERANCE = 1e-6
 
 
@@ -33,16 +33,16 @@ def scenario_topics(scenario: Scenario) -> tuple[Topic, ...]:
 
 
 def first_points_topic(scenario: Scenario) -> str:
-    """Returns the topic whose scans number the frames."""
+    """Returns the topic whose scans are the frames."""
     return scenario_topics(scenario)[0].name
 
 
 def drive_schedule(scenario: Scenario) -> Schedule:
-    """Returns when each topic of a scenario has messages.
+    """Returns the schedule of a scenario's topics.
 
-    Where the scenario has a number of frames, LiDARs end with the last one.
-    An IMU or odometry with a rate of its own goes on until that scan is
-    complete, so that its samples enclose every scan.
+    If the scenario has a number of frames, LiDARs end with the last one. An IMU
+    or odometry with its own rate continues until that scan is complete, so that
+    its samples enclose every scan.
 
     Raises:
         InputError: Kalibr's file cannot be used.
@@ -72,7 +72,7 @@ def drive_schedule(scenario: Scenario) -> Schedule:
         until["/imu/data"] = complete
     if scenario.odometry.rate is not None:
         until["/odometry"] = until["/tf"] = complete
-    # The first sample that is not before the end.
+    # The number of the first sample at or after the end.
     return make_schedule(
         periods,
         {

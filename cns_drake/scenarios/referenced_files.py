@@ -1,4 +1,4 @@
-"""The files that a model refers to, and whether one of them changes."""
+"""Finds the files that a model refers to, and notices their changes."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from xml.parsers import expat
 from cns_drake.base.files import user_errors
 from cns_drake.scene.gazebo_models import ModelFinder
 
-# What a folder that is included as a model consists of, besides meshes.
+# Files of a model's folder, besides meshes.
 _MODEL_ENDINGS = (".sdf", ".urdf", ".config", ".xml")
-# How mesh files name others, by ending: materials, textures, buffers.
+# Ending of mesh files -> pattern of references to materials, textures, buffers.
 _NAMING = {
     ".obj": re.compile(rb"^mtllib\s+(.+)$", re.MULTILINE),
     ".mtl": re.compile(rb"^\s*map_\w+.*?(\S+)\s*$", re.MULTILINE),
@@ -23,10 +23,10 @@ _NAMING = {
 
 
 class FileWatch:
-    """Notices that one of many files changes after it was taken down.
+    """Notices a change of any of the files it was given.
 
-    Contents are not compared: a file counts as changed once its size, its
-    times or the file behind its name have changed.
+    Contents are not compared: a file counts as changed if its size, its times
+    or its inode have changed.
     """
 
     def __init__(self) -> None:
@@ -35,7 +35,7 @@ class FileWatch:
     def take_down(self, path: str) -> os.stat_result | None:
         """Returns the present status of a file; None if there is none.
 
-        The first status of each file is the one that counts.
+        Only the first status of each file counts.
         """
         status = _status(path)
         self._states.setdefault(path, _state(status))
@@ -69,11 +69,11 @@ def referenced_files(
 
     Args:
         model: a file of any kind.
-        watch: takes down the model and each of these files.
+        watch: notes the model and each of these files.
 
     Returns:
-        The path relative to the model's folder, or the URI of what is found
-        elsewhere -> file, and its size.
+        The path relative to the model's folder, or the URI of a file elsewhere
+        -> file, and its size.
 
     Raises:
         InputError: a file cannot be read.
@@ -103,7 +103,7 @@ def referenced_files(
 
 
 def _find(finder: ModelFinder, uri: str, folder: str) -> str:
-    """Returns where a URI leads; "" if that is nowhere."""
+    """Returns the file of a URI; "" if there is none."""
     with contextlib.suppress(OSError, ValueError):  # It may be no name.
         return str(finder.find(uri, Path(folder)) or "")
     return ""
@@ -112,7 +112,7 @@ def _find(finder: ModelFinder, uri: str, folder: str) -> str:
 def _files_at(
     place: str, status: os.stat_result | None, watch: FileWatch
 ) -> list[tuple[str, int]]:
-    """Returns a file, or those of a model's folder that say what it is.
+    """Returns a file, or those that define the model in a folder.
 
     Each comes with its size.
     """
@@ -127,14 +127,14 @@ def _files_at(
     found = []
     for path in inside:
         inner = status if path == place else watch.take_down(path)
-        # Only what is really a file: no device.
+        # Only regular files count, no devices.
         if inner is not None and stat.S_ISREG(inner.st_mode):
             found.append((path, inner.st_size))
     return found
 
 
 def _references(file: str) -> list[str]:
-    """Returns what a model or a mesh says of other files."""
+    """Returns the references of a model or a mesh to other files."""
     ending = os.path.splitext(file)[1].lower()
     if ending in (*_MODEL_ENDINGS, ".dae"):
         return _xml_references(_read(file))

@@ -11,11 +11,11 @@ from cns_drake.scenarios.section import Section
 
 
 class RideConfig(Section):
-    """How the body of the vehicle moves against its path.
+    """The motion of the vehicle's body against its path.
 
     Attributes:
-        roughness: class of the road after ISO 8608, from `A`, as new, to `E`,
-            very poor.
+        roughness: class of the road after ISO 8608, from `A` (new) to `E` (very
+            poor).
         seed: seed of the road's profile.
     """
 

@@ -1,4 +1,4 @@
-"""Structures of a city that are missing here and there, by lot."""
+"""Removes structures of a city at random, by class."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from cns_drake.base.errors import InputError
 
 
 def is_on_a_lot(row: Mapping[str, str]) -> bool:
-    """Whether a structure stands on a lot only until that is built on."""
+    """Returns whether a structure is on a lot only until a building is built
+    there."""
     tags = (row.get("tags") or "").split()
     return "_lot_" in row["name"] and "lot" in tags
 
@@ -20,13 +21,13 @@ def is_on_a_lot(row: Mapping[str, str]) -> bool:
 def draw_losses(
     table: Path, parts: Mapping[str, float], seed: int, source: object
 ) -> frozenset[str]:
-    """Draws which structures are missing, each class by a lot of its own.
+    """Draws the missing structures, each class independently.
 
-    A part that is greater takes all that a smaller one takes.
+    A greater part includes all structures of a smaller one.
 
     Args:
         table: of all structures.
-        parts: class -> part of its structures that is missing, 0 to 1.
+        parts: class -> missing part of its structures, 0 to 1.
         seed: of the draw.
         source: the file that errors name.
 

@@ -1,4 +1,4 @@
-"""A scenario: everything that one recorded sequence depends on."""
+"""A scenario: all settings of one recorded sequence."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from cns_drake.scenarios.transient_config import TransientConfig
 from cns_drake.scenarios.weather_config import WeatherConfig
 from cns_drake.sensors.returns.echo_choice import Echoes
 
-# A default is checked as well: a field that is missing may be needed.
+# Defaults are checked as well: another field may require one.
 _Optional = Field(default=None, validate_default=True)
 
 
@@ -47,29 +47,28 @@ class Scenario(Section):
         name: name of the sequence and its files; letters, digits and
             underscores.
         map: a shipped map, or a folder laid out like one.
-        stage: which stage of the map.
+        stage: stage of the map.
         world: any SDF file, in place of `map` and `stage`.
-        without: names of structures to leave out, as `structures.csv` lists
-            them.
+        without: names of structures to leave out, as in `structures.csv`.
         title: what the drive shows, in words.
         route: the lanes to follow, leg by leg; give this or `waypoints`.
-        waypoints: a CSV file of places to pass; a world has no roads, and needs
-            them.
+        waypoints: a CSV file of places to pass; needed with a world, which has
+            no roads.
         u_turns: whether the car turns round where waypoints double back.
-        aside: how far to the right of its lanes' middle the car keeps between
-            junctions, as far as the road has room; to the left if negative, at
+        aside: offset of the car to the right of its lanes' middle between
+            junctions, within the room of the road; to the left if negative, at
             most 3 [m].
-        speeds: how fast.
-        ride: how springs and the road move the car.
-        traffic: who else moves.
-        transient: what came and went since the stage was built.
-        lidars: name -> LiDAR; the name gives frame and topic; by default one
+        speeds: speed and acceleration.
+        ride: motion of the car by springs and the road.
+        traffic: moving vehicles and walkers.
+        transient: passing changes since the stage was built.
+        lidars: name -> LiDAR; frame and topic have this name; by default one
             named `lidar`.
         imu: the IMU.
         weather: fog, rain and snowfall for calibrated returns.
         odometry: the odometry.
-        frames: how many frames to record, which are the scans of the first
-            LiDAR; by default the whole drive.
+        frames: number of frames to record, the scans of the first LiDAR; by
+            default the whole drive.
         seed: seed of the noise of LiDARs and the IMU.
 
     Example:
@@ -81,7 +80,7 @@ class Scenario(Section):
     name: Name
     map: str | None = None
     stage: Annotated[
-        Name | None, given_with("map", "a map and its stage belong together")
+        Name | None, given_with("map", "give a map and its stage together")
     ] = _Optional
     world: Annotated[
         str | None,
@@ -100,15 +99,16 @@ class Scenario(Section):
         str | None,
         given_instead_of("route", "give either a route or waypoints"),
         never_given_with(
-            "aside", "aside is of a route, waypoints lie where they do"
+            "aside",
+            "aside is for a route only; with waypoints, move these instead",
         ),
     ] = _Optional
     u_turns: Annotated[
         bool,
         never_given_with(
             "route",
-            "is of waypoints; a route turns round where the next leg leads "
-            "back on its road",
+            "is for waypoints only; a route turns round where the next leg "
+            "leads back on its road",
         ),
     ] = False
     speeds: Speeds
@@ -126,7 +126,7 @@ class Scenario(Section):
     frames: int | None = Field(default=None, ge=1)
     seed: int = Field(default=0, ge=0)
 
-    # The file that it was read from.
+    # The file of the scenario.
     _file: Path | None = PrivateAttr(None)
 
     @field_validator("lidars")
@@ -150,7 +150,7 @@ class Scenario(Section):
         cls, odometry: OdometryConfig, info: ValidationInfo
     ) -> OdometryConfig:
         if odometry.rate is not None and "lidars" in info.data:
-            # Every scan has a pose of its own.
+            # Every scan needs its own pose.
             fastest = fastest_rate(info.data["lidars"])
             check_rate(odometry.rate, fastest, multiple_of=fastest)
         return odometry
@@ -160,20 +160,20 @@ class Scenario(Section):
         ideal = [n for n, c in self.lidars.items() if c.returns == "ideal"]
         if ideal and self.weather != WeatherConfig():
             raise ValueError(
-                "weather: ideal returns feel none; give lidars."
-                f"{ideal[0]}.returns: calibrated"
+                "weather: it has no effect on ideal returns; give "
+                f"lidars.{ideal[0]}.returns: calibrated"
             )
         return self
 
     def __eq__(self, other: object) -> bool:
-        """Tells whether two are the same, wherever they were read from."""
+        """Returns whether two scenarios are the same, read from any file."""
         if not isinstance(other, Scenario):
             return NotImplemented
         return self.__dict__ == other.__dict__
 
     @property
     def source(self) -> str:
-        """What errors begin with: its file, or else its name."""
+        """The beginning of errors: the scenario's file, or else its name."""
         return str(self._file or self.name)
 
     def with_returns(
@@ -184,8 +184,8 @@ class Scenario(Section):
         """Returns the scenario with other returns of every LiDAR.
 
         Args:
-            returns: see `LidarConfig`. Noise and losses of ideal returns go
-                where they are calibrated, weather where they are ideal.
+            returns: see `LidarConfig`. Calibrated returns drop the noise and
+                losses of ideal ones; ideal returns drop the weather.
             weather: in place of the scenario's.
         """
         if returns == "ideal":
@@ -233,10 +233,10 @@ class Scenario(Section):
     def with_lidar_preset(self, preset: str) -> Scenario:
         """Returns the scenario with the unit of every LiDAR replaced.
 
-        Their places, and how they measure, stay as they are.
+        Their places and settings of measurement stay as they are.
 
         Raises:
-            InputError: the preset is not known.
+            InputError: there is no such preset.
         """
         lidars = {
             name: config.with_preset(preset)

@@ -15,11 +15,11 @@ from cns_drake.scenarios.shipped import shipped_maps
 def map_folder(scenario: Scenario) -> MapFolder:
     """Returns the folder of a scenario's map.
 
-    For a scenario of a world it is the folder where the world's file lies.
+    For a scenario of a world it is the folder of the world's file.
     """
     if scenario.world is not None:
         return MapFolder(Path(scenario.world).parent)
-    assert scenario.map is not None  # It has a world or a map.
+    assert scenario.map is not None  # One of both is given.
     return MapFolder(shipped_maps().get(scenario.map, Path(scenario.map)))
 
 
@@ -36,11 +36,11 @@ def check_files(scenario: Scenario, source: object = None) -> None:
     With traffic the map needs roads.
 
     Args:
-        scenario: what names them.
-        source: the file that errors begin with; by default the scenario's.
+        scenario: it names the files.
+        source: the file at the beginning of errors; by default the scenario's.
 
     Raises:
-        InputError: they do not.
+        InputError: one of them does not exist.
     """
     source = source or scenario.source
     for field in ("world", "waypoints"):
@@ -86,14 +86,14 @@ def check_files(scenario: Scenario, source: object = None) -> None:
 def describe_scenario(scenario: Scenario, folder: Path | None = None) -> dict:
     """Returns the fields of a scenario that are given, ready for JSON.
 
-    Where a map, world or waypoints lie is no part of what is driven; their
-    content has a digest (see `provenance`). The noise of an IMU lies in a
-    file of a fixed name beside the scenario.
+    The folders of map, world and waypoints are no part of the drive; their
+    content has a digest (see `provenance`). The noise of an IMU is in a file of
+    a fixed name beside the scenario.
 
     Args:
-        scenario: what to describe.
-        folder: from which files are named by relative paths; without it,
-            they are named without their folders.
+        scenario: the scenario to describe.
+        folder: paths of files are relative to it; without it, they are file
+            names only.
     """
     values = scenario.model_dump(mode="json", exclude_none=True)
     for field in ("map", "world", "waypoints"):

@@ -54,11 +54,11 @@ def load_scenario(name_or_file: str | Path) -> Scenario:
     """
     shipped = shipped_sequences()
     path = shipped.get(str(name_or_file), Path(name_or_file))
-    # Unlike pathlib, os.path takes names that no file can have.
+    # Unlike pathlib, os.path accepts names that no file can have.
     if not os.path.isfile(path):
         if re.fullmatch(r"\w+", str(name_or_file)):
             raise InputError(
-                f"unknown sequence '{name_or_file}'; known: "
+                f"unknown sequence '{name_or_file}'; there are: "
                 f"{', '.join(shipped)}; or give a scenario file"
             )
         raise InputError(f"{path}: no such scenario file")
@@ -68,7 +68,7 @@ def load_scenario(name_or_file: str | Path) -> Scenario:
 
 
 def read_scenario_file(path: Path) -> Scenario:
-    """Reads a scenario whose map, world and waypoints may not be there.
+    """Reads a scenario whose map, world and waypoints may be missing.
 
     Raises:
         InputError: the file is not a usable scenario.
@@ -80,7 +80,7 @@ def read_scenario_file(path: Path) -> Scenario:
     for field in ("map", "world", "waypoints"):
         place = values.get(field)
         if isinstance(place, str) and place not in shipped_maps():
-            # Relative to the file, independent of where it is read from.
+            # Paths are relative to the file, not to the current folder.
             try:
                 values[field] = str((path.parent / place).resolve())
             except ValueError as error:
@@ -92,11 +92,11 @@ def read_scenario_file(path: Path) -> Scenario:
 
 
 def find_files(values: dict, path: Path) -> None:
-    """Makes paths in sections ones that hold everywhere.
+    """Makes the paths in sections absolute.
 
     Args:
         values: fields of a scenario or a family, to change.
-        path: the file that they are from; the paths are relative to it.
+        path: the file of these fields; paths are relative to it.
     """
     for section, field in (("imu", "kalibr"), ("traffic", "fcd")):
         fields = values.get(section)

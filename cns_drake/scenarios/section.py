@@ -1,4 +1,4 @@
-"""What every section of a scenario has in common."""
+"""The base of all sections of a scenario."""
 
 from __future__ import annotations
 
@@ -10,16 +10,15 @@ Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_]*$")]
 
 
 class Section(BaseModel):
-    """A section of a scenario file: known fields, finite, never changed."""
+    """A section of a scenario file: known fields, finite values, immutable."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 def field_off_by_default(default: Any, **constraints: Any) -> Any:
-    """Returns a field that is written only where it is not the default.
+    """Returns a field that is written only if it differs from the default.
 
-    A scenario that does not use it is then written as it was before there was
-    such a field.
+    Adding such a field does not change the text of scenarios without it.
 
     Args:
         default: the value without effect.

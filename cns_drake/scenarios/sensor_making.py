@@ -1,4 +1,4 @@
-"""From the sensors that a scenario describes to what simulates them."""
+"""Makes the models of a scenario's sensors."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ def make_pattern(config: LidarConfig) -> BeamPattern:
 def make_returns(
     config: LidarConfig, weather: WeatherConfig, name: str, seed: int
 ) -> CalibratedReturns | None:
-    """Returns how a LiDAR measures like a real unit; None for ideal returns.
+    """Returns the model of a LiDAR's calibrated returns; None for ideal ones.
 
     Args:
         config: the LiDAR.
-        weather: in which it measures.
+        weather: of the drive.
         name: its name.
         seed: of the scenario.
     """
@@ -57,7 +57,7 @@ def make_returns(
 def make_measurement(
     config: LidarConfig, name: str, seed: int
 ) -> MeasurementModel:
-    """Returns what a LiDAR makes of true ranges.
+    """Returns the model of a LiDAR's measurement of true ranges.
 
     Args:
         config: the LiDAR.

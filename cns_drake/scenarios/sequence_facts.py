@@ -1,4 +1,4 @@
-"""How long a sequence is, without recording it."""
+"""Length, time and frames of a sequence, without recording it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class SequenceFacts:
     Attributes:
         length: of the path [m].
         duration: from rest to rest [s].
-        frames: recorded at most: one at the start and one after each frame
+        frames: number of frames: one at the start and one after each frame
             period, up to the end of the drive or to `scenario.frames`.
     """
 

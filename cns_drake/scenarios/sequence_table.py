@@ -1,8 +1,8 @@
 """The figures of a folder's sequences, kept beside them in a table.
 
 Planning a drive and reading a stage take seconds; a listing should not. Each
-row of `sequences.csv` therefore carries a checksum of the files that it was
-measured from, and is measured anew when they have changed.
+row of `sequences.csv` therefore has a checksum of its input files, and is
+measured anew when they have changed.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ class SequenceRow:
         sequence: its name.
         map: the map's name.
         stage: the city's stage.
-        title: what it shows, in a few words.
-        checksum: of the files that the figures were measured from.
+        title: of the drive.
+        checksum: of the files that the figures depend on.
         length: of the path [m].
         duration: of the drive [s].
-        frames: how many are recorded.
+        frames: number of recorded frames.
         structures: in the stage.
         triangles: in the stage.
     """
@@ -70,17 +70,17 @@ def sequence_rows(
     Args:
         folder: of the map, with `sequence_NN.yaml` and `stage_NN.sdf`.
         progress: takes a line for each row that has to be measured.
-        sizes: stage -> its structures and triangles; those that are not told
-            are counted in the world, which takes long to load.
+        sizes: stage -> its structures and triangles; for other stages they are
+            counted in the world, which takes long to load.
 
     Raises:
-        InputError: if a sequence cannot be read or planned, or its stage not
+        InputError: if a sequence cannot be read or planned, or its stage cannot
             be parsed.
     """
     its = MapFolder(folder)
     known = {row.checksum: row for row in _read(its.sequence_table)}
-    # Names and sizes stand for the meshes: to read them all would take longer
-    # than a listing may.
+    # Names and sizes stand for the meshes: reading them all would take too long
+    # for a listing.
     meshes = "".join(
         f"{mesh.name} {mesh.stat().st_size}"
         for mesh in sorted(its.meshes.glob("*"))
@@ -91,7 +91,7 @@ def sequence_rows(
         world = world_file(scenario)
         if not world.is_file():
             continue
-        # A map whose drives are told by waypoints has no roads.
+        # A map whose drives follow waypoints has no roads.
         roads = [p for p in (its.roads,) if p.is_file()]
         checksum = _checksum((path, *roads, world), meshes)
         row = known.get(checksum)
@@ -110,7 +110,7 @@ def write_table(
 ) -> None:
     """Brings the table of a folder up to date.
 
-    A folder without sequences gets none. Arguments as of `sequence_rows`.
+    A folder without sequences gets no table. Arguments as of `sequence_rows`.
 
     Raises:
         InputError: as `sequence_rows`, or if the table cannot be written.
@@ -128,7 +128,7 @@ def write_table(
 
 
 def _checksum(paths: Iterable[Path], more: bytes) -> str:
-    """Returns the checksum of what files hold, and of more."""
+    """Returns the checksum of the contents of files, and of more values."""
     total = 0
     for path in paths:
         with user_errors(path):
@@ -137,9 +137,9 @@ def _checksum(paths: Iterable[Path], more: bytes) -> str:
 
 
 def _read(path: Path) -> list[SequenceRow]:
-    """Returns the rows of a table; of one that cannot be used, none.
+    """Returns the rows of a table; none if it cannot be used.
 
-    Nothing is lost: its rows are measured anew.
+    The rows of a bad table are measured anew.
     """
     names = [field.name for field in fields(SequenceRow)]
     try:
@@ -186,7 +186,7 @@ def _measure(
 
 
 def _size(scenario: Scenario) -> tuple[int, int]:
-    """Returns how many structures and triangles a stage has."""
+    """Returns the numbers of structures and triangles of a stage."""
     from cns_drake.scene.perception_geometry import read_perception_geometry
     from cns_drake.scene.surfaces import TriangleSurface
     from cns_drake.scene.world import load_world

@@ -1,4 +1,4 @@
-"""Where the shipped worlds are."""
+"""The places of the shipped worlds."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from cns_drake.scenarios.worlds_archive import unpacked
 def worlds_folder() -> Path:
     """Returns the folder of shipped maps.
 
-    In a checkout it lies beside the package. A wheel has an archive of it,
-    which is unpacked to the user's cache.
+    In a checkout it is beside the package. A wheel has an archive of it, which
+    is unpacked to the user's cache.
 
     Raises:
         InputError: if the cache cannot be written.

@@ -6,7 +6,7 @@ from pydantic import Field, model_validator
 
 from cns_drake.scenarios.section import Section, field_off_by_default
 
-# No map holds more.
+# More than any map can hold.
 _MOST = 2000
 
 
@@ -14,12 +14,12 @@ class TrafficConfig(Section):
     """Vehicles and walkers that move while a drive is recorded.
 
     Attributes:
-        vehicles: how many cars, vans, trucks, buses, motorcycles and bicycles
-            drive along the map's roads.
-        walkers: how many people walk on its sidewalks and crossings.
+        vehicles: number of cars, vans, trucks, buses, motorcycles and bicycles
+            that drive along the map's roads.
+        walkers: number of people that walk on its sidewalks and crossings.
         seed: seed of their kinds, starts and ways.
-        fcd: a trace of SUMO (floating-car data) to play instead; then there
-            is nobody else.
+        fcd: a trace of SUMO (floating-car data) to play instead; then nothing
+            else moves.
     """
 
     vehicles: int = Field(default=0, ge=0, le=_MOST)
@@ -31,12 +31,12 @@ class TrafficConfig(Section):
     def _check_fcd(self) -> TrafficConfig:
         if self.fcd is not None and (self.vehicles or self.walkers):
             raise ValueError(
-                "fcd: the trace says who is there; leave out vehicles and "
-                "walkers"
+                "fcd: the trace replaces other traffic; leave out vehicles "
+                "and walkers"
             )
         return self
 
     @property
     def is_off(self) -> bool:
-        """Whether nobody moves."""
+        """Whether there is no traffic."""
         return self.fcd is None and self.vehicles == self.walkers == 0

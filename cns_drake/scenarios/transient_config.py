@@ -1,4 +1,4 @@
-"""What comes and goes between two drives through one stage."""
+"""Passing changes between two drives through one stage."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from cns_drake.scenarios.section import Section
 class TransientConfig(Section):
     """Changes of a city that no building plan lists.
 
-    Each switch changes the stage as a function of the seed and of the names
-    of its structures, whatever the other switches are.
+    The effect of each switch depends on the seed and on the names of
+    structures, not on the other switches.
 
     Attributes:
         seed: seed of all draws.
@@ -20,8 +20,8 @@ class TransientConfig(Section):
             place.
         leaves: part of the leaves that is left on crowns, needles included;
             wood stays; a shrub without wood keeps a tenth, as twigs.
-        snow: depth of the snow on what faces the sky within 120 m of the drive;
-            roads are cleared, and banks lie along their kerbs [m].
+        snow: depth of the snow on surfaces that face the sky within 120 m of
+            the drive; roads are cleared, with banks along their kerbs [m].
         scaffolds: part of the fronts within 30 m of the drive that stand behind
             a scaffold, four in ten of them with a net.
         works: part of the stretches of kerb within 30 m of the drive with

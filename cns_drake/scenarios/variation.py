@@ -1,11 +1,12 @@
-"""Families of scenarios that one small file describes.
+"""Families of scenarios, described by one small file.
 
-A city that decays from a place outwards: each member of a family lacks the
-buildings and plants nearest to that place, a given part of them all; or of
-what an earlier stage lacks, which makes stages between the two. Members with
-more missing lack all that those with less lack. Besides, structures of chosen
-classes may be missing here and there. Other draws of the city, routes by lot
-and other LiDARs multiply the family. Every member is a scenario of its own.
+The city of a family decays from a place outwards: each member lacks a given
+part of the buildings and plants, those nearest to that place. The part may also
+be taken of the structures that an earlier stage lacks, which gives stages
+between the two. A member with a greater missing part lacks everything that one
+with a smaller part lacks. Besides, structures of chosen classes may be missing
+at random. Other draws of the city, random routes and other LiDARs multiply the
+family. Every member is a scenario.
 """
 
 from __future__ import annotations
@@ -55,14 +56,14 @@ from cns_drake.scenarios.scenario_loading import find_files, load_scenario
 from cns_drake.scenarios.shipped import shipped_sequences
 from cns_drake.scene.world import load_world, structures_in
 
-# What can be missing; streets, ground and street furniture stay.
+# Tags of structures that can be missing; streets, ground and furniture stay.
 _REMOVABLE = ("building", "vegetation")
-# No city reaches farther [m].
+# Farther than any city reaches [m].
 _FARTHEST = 1e6
 
 _Part = Annotated[float, Field(ge=0.0, le=1.0)]
 _Seed = Annotated[int, Field(ge=0)]
-# Draws the city of a map anew: the map's folder, what to call the stage, which
+# Draws the city of a map anew: the map's folder, the name of the stage, which
 # is the whole city, and seeds -> seed -> map folder of that city.
 Redraw = Callable[[Path, str, Sequence[int]], Mapping[int, Path]]
 
@@ -83,7 +84,7 @@ def _spread(value: Any) -> Any:
 def _without_doubles(seeds: tuple[int, ...]) -> tuple[int, ...]:
     for seed in seeds:
         if seeds.count(seed) > 1:
-            raise ValueError(f"{seed} is there twice")
+            raise ValueError(f"the seed {seed} is there twice")
     return seeds
 
 
@@ -94,7 +95,7 @@ class _Steps(_Model):
 
 
 class DrawnRoutes(_Model):
-    """Routes by lot.
+    """Random routes.
 
     Attributes:
         count: number of routes.
@@ -108,23 +109,23 @@ class DrawnRoutes(_Model):
 
 
 class Family(_Model):
-    """What a family of scenarios has in common, and what varies.
+    """The base of a family of scenarios, and its variations.
 
     Attributes:
         base: sequence or scenario file that gives map, route, speeds and
             sensors.
-        stage: stage that something is missing from; by default the map's last
-            one.
-        towards: another stage: only what it lacks can be missing; what is lower
-            there stays high.
-        missing: parts that are missing, each from 0 to 1; or `{from: 0, to:
-            0.6, count: 20}` for evenly spread ones.
+        stage: stage from which structures are missing; by default the map's
+            last one.
+        towards: another stage; only structures that it lacks can be missing,
+            and lower ones stay high.
+        missing: missing parts, each from 0 to 1; or `{from: 0, to: 0.6, count:
+            20}` for evenly spread ones.
         scattered: class of structures, such as `pole` -> part of them that is
-            missing besides, by lot.
-        seeds: for each, another place from which the city decays, and another
-            lot.
-        city_seeds: for each, another draw of the city along the same streets.
-        routes: routes by lot, in place of the base's.
+            missing at random as well.
+        seeds: each gives another place from which the city decays, and other
+            random draws.
+        city_seeds: each draws another city along the same streets.
+        routes: random routes, in place of the base's.
         lidars: presets in place of the base's LiDARs, such as `[cns, os1-64]`.
         ride: the ride of all members, in place of the base's.
         imu: the IMU of all members, in place of the base's.
@@ -150,16 +151,15 @@ class Family(_Model):
 def load_family(path: Path, redraw: Redraw | None = None) -> list[Scenario]:
     """Reads a family's file and returns its members.
 
-    A member's name tells what it is: base, seed of the city where that
-    varies, part missing in per mille, seed, and where they vary route and
-    LiDAR.
+    A member's name consists of base, seed of the city if that varies, missing
+    part in per mille, seed, and route and LiDAR if they vary.
 
     Args:
         path: the file.
         redraw: see `vary`.
 
     Raises:
-        InputError: the file or what it refers to cannot be used.
+        InputError: the file, or one that it names, cannot be used.
     """
     values = read_yaml(path)
     if isinstance(values, dict):
@@ -182,19 +182,22 @@ def vary(
     """Returns the members of a family.
 
     Args:
-        base: what they all start from.
-        family: what varies.
+        base: the common scenario.
+        family: the variations.
         source: the file that errors name.
         redraw: draws cities; only a family with `city_seeds` needs it. It is
-            called once nothing else can be wrong with the family.
+            called last, when all else is checked.
 
     Raises:
-        InputError: the base has no map, or something the family asks for is
-            not there.
+        InputError: the base has no map, or a stage, class or LiDAR of the
+            family does not exist.
         ValueError: it has `city_seeds`, and there is no `redraw`.
     """
     if base.map is None:
-        raise InputError(f"{source}: base: {base.name} has no map to vary")
+        raise InputError(
+            f"{source}: base: {base.name} has no map to vary; give a scenario "
+            "with a map"
+        )
     sections = {"ride": family.ride, "imu": family.imu}
     base = base.model_copy(
         update={name: value for name, value in sections.items() if value}
@@ -249,7 +252,7 @@ def vary(
         labels += [label for label in (route_label, preset) if label]
         title = f"{100 * part:.1f} % of {what} missing"
         if family.scattered:
-            title += f", others by lot {seed}"
+            title += f", others at random with seed {seed}"
         if city_seed is not None:
             labels.insert(1, f"c{city_seed}")
             title += f", in the city as seed {city_seed} draws it"
@@ -275,11 +278,11 @@ def vary(
 def write_scenarios(scenarios: Sequence[Scenario], folder: Path) -> list[Path]:
     """Writes scenarios as `<folder>/<name>.yaml`.
 
-    A map that lies where the folder does is told by its way from there, so
-    that both can be moved together.
+    A map beside the folder gets a relative path, so that both can be moved
+    together.
 
     Raises:
-        InputError: if that fails.
+        InputError: if a file cannot be written.
     """
     with user_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
@@ -303,7 +306,7 @@ def _check_redrawable(
 
     Args:
         base: of the family.
-        family: what varies.
+        family: the variations.
         last: the map's last stage.
         source: the file that errors name.
 
@@ -311,8 +314,8 @@ def _check_redrawable(
         InputError: it cannot.
     """
     why = (
-        f"not with city_seeds: what stages before the last one, {last}, lack "
-        "has names that another draw of the city need not have"
+        f"not with city_seeds: stages before the last one, {last}, are lists "
+        "of names that another draw of the city need not have"
     )
     if family.towards is not None:
         raise InputError(f"{source}: towards: {why}")
@@ -371,17 +374,16 @@ def _difference(
 def _decay_order(
     table: Path, seed: int, removable: Set[str] | None
 ) -> list[str]:
-    """Returns what can be missing, what goes first at the head.
+    """Returns the structures that can be missing, the first to go first.
 
     Args:
         table: of all structures.
         seed: of the place from which the city decays.
-        removable: names of what can be missing; all buildings and plants if
-            None.
+        removable: names of structures that can be missing; all buildings and
+            plants if None.
 
     Raises:
-        InputError: the table cannot be read or does not say where things
-            are.
+        InputError: the table cannot be read, or lacks places of structures.
     """
     rows = [
         row
@@ -393,14 +395,14 @@ def _decay_order(
         )
     ]
     if not rows:
-        raise InputError(f"{table}: nothing in it that could be missing")
+        raise InputError(f"{table}: none of its structures can be missing")
     try:
         xy = np.array([(float(row["x"]), float(row["y"])) for row in rows])
         if not (np.abs(xy) <= _FARTHEST).all():  # Nor is NaN a place.
             raise ValueError
     except (KeyError, ValueError):
         raise InputError(
-            f"{table}: x, y: not the place of every structure"
+            f"{table}: x, y: every structure needs finite numbers"
         ) from None
     rng = np.random.default_rng(seed)
     low, high = xy.min(axis=0), xy.max(axis=0)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class WeatherConfig(Section):
-    """The weather, which all LiDARs with calibrated returns feel.
+    """The weather, which affects all LiDARs with calibrated returns.
 
     Attributes:
         visibility: meteorological visibility in fog [m]; no fog by default.
@@ -26,7 +26,7 @@ class WeatherConfig(Section):
     snowfall: float = Field(default=0.0, ge=0.0, le=300.0)
 
     def weather(self) -> Weather:
-        """Returns what a LiDAR feels."""
+        """Returns the weather as the model of a LiDAR."""
         # Slow to import, and not needed to describe a scenario.
         from cns_drake.sensors.returns.weather import Weather
 

@@ -1,4 +1,4 @@
-"""Unpacking of the shipped worlds, which a wheel holds as one archive."""
+"""Unpacks the shipped worlds, which a wheel contains as one archive."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from cns_drake.base.errors import InputError
 def unpacked(archive: Path) -> Path:
     """Returns a folder with the files of an archive; it is unpacked once.
 
-    The folder is in the user's cache, and its name has a digest of the
-    archive: each release has its own. Processes may call this side by side.
+    The folder is in the user's cache. Its name has a digest of the archive, so
+    that each release has its own. Processes may call this side by side.
 
     Args:
         archive: a tar file, compressed in any way.

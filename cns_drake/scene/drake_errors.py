@@ -6,9 +6,9 @@ from collections.abc import Iterator
 import contextlib
 import logging
 
-# Besides Drake's own, exceptions of the C++ library come through: of numbers
-# that are none or too large, of what is too long. Where a condition fails,
-# Drake asks Python to end.
+# Besides Drake's own errors there are those of the C++ library, for invalid or
+# too large numbers and too long texts. A failed condition in Drake raises
+# SystemExit.
 PARSER_ERRORS = (
     RuntimeError,
     ValueError,
@@ -20,10 +20,10 @@ PARSER_ERRORS = (
 
 @contextlib.contextmanager
 def told_by_drake() -> Iterator[list[str]]:
-    """Collects what Drake logs as errors, which else would be printed.
+    """Collects errors that Drake logs, which would otherwise be printed.
 
-    Warnings are passed on at the end if nothing was raised meanwhile: beside
-    an error they would be a second line.
+    Warnings are passed on at the end, unless an exception was raised: beside an
+    error they would be a second line.
     """
     errors: list[str] = []
     records: list[logging.LogRecord] = []

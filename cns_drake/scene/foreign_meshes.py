@@ -1,8 +1,8 @@
 """Meshes in formats that Drake does not read, read by Open3D.
 
-Some of Open3D's parsers crash on damaged files and print what they think of
-them. Therefore they work in a process of their own, which costs its start
-only where a world has such meshes.
+Some of Open3D's parsers crash on damaged files, and print messages. They
+therefore run in a separate process, which is started only for worlds with such
+meshes.
 """
 
 from __future__ import annotations
@@ -69,8 +69,8 @@ class ForeignMeshes:
 
 
 def _serve() -> None:
-    """Reads the meshes that are asked for, until there are no more."""
-    # What a parser prints must not come between the answers.
+    """Reads the requested meshes until the requests end."""
+    # Messages of a parser must not mix with the answers.
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     try:
@@ -84,7 +84,7 @@ def _serve() -> None:
         except EOFError:
             return
         if path.lower().endswith(".dae"):
-            # Only its reader of models has the format.
+            # Only Open3D's reader of models supports the format.
             parts = open3d.io.read_triangle_model(path).meshes
             mesh = open3d.geometry.TriangleMesh()
             for part in parts:

@@ -1,4 +1,4 @@
-"""Finding what Gazebo's worlds refer to."""
+"""Finds the models and files that Gazebo's worlds refer to."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
 from cns_drake.scene.model_check import check_model
 
-# Where Gazebo and libsdformat, old and new, look for models.
+# Environment variables with folders of models, of old and new Gazebo and
+# libsdformat.
 _VARIABLES = (
     "GZ_SIM_RESOURCE_PATH",
     "SDF_PATH",
@@ -26,12 +27,12 @@ class ModelFinder:
     """Finds files by the URIs of a world."""
 
     def __init__(self, world: Path, model_paths: Iterable[Path] = ()):
-        """Takes the places to look at, the first of which wins.
+        """Takes the folders to search; the first one wins.
 
         Args:
-            world: its folder, the one above, and `models` in both are the
-                last places.
-            model_paths: the first; then come those of the environment.
+            world: its folder, the one above, and `models` in both are searched
+                last.
+            model_paths: searched first; then come those of the environment.
         """
         folder = world.absolute().parent
         named = [
@@ -49,7 +50,7 @@ class ModelFinder:
 
         Args:
             uri: absolute, `model://<name>/...`, or relative.
-            folder: what it is relative to.
+            folder: base of a relative URI.
         """
         rest = uri
         for scheme in _SCHEMES:
@@ -63,7 +64,7 @@ class ModelFinder:
             path = place / rest
             if path.exists():
                 return path.resolve()
-            # A model may lie in its own folder, or be that.
+            # A model may be in its own folder, or be that folder.
             name, _, within = rest.partition("/")
             if place.name == name and (place / within).exists():
                 return (place / within).resolve()
@@ -71,7 +72,8 @@ class ModelFinder:
 
 
 def model_file(path: Path) -> Path:
-    """Returns the SDF file of a model: itself, or what its folder names.
+    """Returns the SDF file of a model: the path itself, or the one its folder
+    names.
 
     Raises:
         InputError: the folder has none.
@@ -99,11 +101,11 @@ def read_xml(path: Path) -> ElementTree.Element:
     """Reads a file.
 
     Raises:
-        InputError: it cannot be read, or is no XML that a model may be.
+        InputError: it cannot be read, or is not the XML of a model.
     """
     check_model(path)
     builder = ElementTree.TreeBuilder()
-    # Not ElementTree's own parser, which wants prefixes to be declared.
+    # ElementTree's own parser would require declared prefixes.
     parser = expat.ParserCreate("utf-8")
     parser.StartElementHandler = builder.start
     parser.EndElementHandler = builder.end

@@ -1,8 +1,8 @@
-"""Gazebo's worlds as what a LiDAR sees of them, in SDF that Drake reads.
+"""Reduces Gazebo's worlds to their visuals, in SDF that Drake reads.
 
-Drake refuses much of what such worlds hold, and an endless collision plane
-among many others makes it crash. What stays is the visuals, where they are at
-the start: nothing in such a world moves here.
+Drake refuses many elements of such worlds, and crashes on an endless collision
+plane among many others. Only the visuals are kept, at their places at the
+start: nothing in such a world moves here.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from xml.etree import ElementTree
 from cns_drake.base.errors import InputError
 from cns_drake.scene.gazebo_models import ModelFinder, model_file, read_xml
 
-# In a world, any of these makes it one for Gazebo.
+# Elements that mark a world for Gazebo.
 _SIGNS = (
     "include", "light", "plugin", "actor", "scene", "gui", "state", "sensor",
     "road", "population", "submesh",
 )  # fmt: skip
 _ENDLESS_COLLISION = ".//collision/geometry/plane"
-# What is left out with a note, and what of it is said.
+# Elements that are left out -> words for them in a note.
 _SKIPPED = {
     "light": "lights",
     "plugin": "plugins",
@@ -46,7 +46,7 @@ _DEEPEST = 20
 
 
 def is_gazebo_world(root: ElementTree.Element) -> bool:
-    """Tells whether a world holds what is Gazebo's, and not ours."""
+    """Returns whether a world has elements of Gazebo's."""
     world = root.find("world")
     return world is not None and (
         world.find(_ENDLESS_COLLISION) is not None
@@ -61,11 +61,11 @@ def simplify_world(
 
     Args:
         path: of the world.
-        root: what it holds.
-        model_paths: where to look for models first.
+        root: its root element.
+        model_paths: folders to search first.
 
     Raises:
-        InputError: a model that is there cannot be read.
+        InputError: a model that was found cannot be read.
     """
     simplifier = _Simplifier(path, model_paths)
     world = root.find("world")
@@ -79,7 +79,7 @@ def simplify_world(
 
 
 class _Simplifier:
-    """One pass over a world and all that it includes."""
+    """One pass over a world and all included models."""
 
     def __init__(self, path: Path, model_paths: Iterable[Path]):
         self._path = path
@@ -91,7 +91,7 @@ class _Simplifier:
         }
 
     def notes(self) -> tuple[str, ...]:
-        """Returns one line for each kind of what was left out."""
+        """Returns one line for each kind of omitted element."""
         notes = [
             f"{self._path}: {count} {what} ignored"
             for what, count in sorted(self._skipped.items())
@@ -114,7 +114,7 @@ class _Simplifier:
         folder: Path,
         depth: int,
     ) -> None:
-        """Adds the models in a world or a model, included ones, too."""
+        """Adds the models in a world or a model, and included ones."""
         if depth > _DEEPEST:
             raise InputError(f"{self._path}: models include each other")
         for element in source:
@@ -190,7 +190,7 @@ class _Simplifier:
                 self._skipped[_SKIPPED[element.tag]] += 1
             elif element.tag == "visual":
                 self._add_visual(element, made, folder)
-        # One that others are placed by stays, though nothing is seen of it.
+        # An invisible element stays if others are placed relative to it.
         target.append(made)
 
     def _add_visual(
@@ -213,7 +213,7 @@ class _Simplifier:
                 self._missing["meshes"][uri] += 1
                 return
             mesh = ElementTree.Element("mesh")
-            # Drake takes such a URI as it is, percent signs and all.
+            # Drake does not decode percent signs in such a URI.
             ElementTree.SubElement(mesh, "uri").text = f"file://{place}"
             scale = shape.find("scale")
             if scale is not None:
@@ -248,7 +248,7 @@ class _Simplifier:
 
 
 def _local_uri(uri: str) -> str:
-    """Returns the name under which a model of a server's is at hand."""
+    """Returns the local name of a model on a server."""
     if not uri.startswith(("http://", "https://")):
         return uri
     _, _, name = uri.rpartition("/models/")
@@ -266,7 +266,7 @@ def _copy_pose(
 
 
 def _name(element: ElementTree.Element, target: ElementTree.Element) -> str:
-    """Returns an element's name, or one like it that is still free."""
+    """Returns an element's name, or a similar one that is still free."""
     wanted = _legal(element.get("name", element.tag))
     taken = {sibling.get("name") for sibling in target}
     name, count = wanted, 1
@@ -277,7 +277,7 @@ def _name(element: ElementTree.Element, target: ElementTree.Element) -> str:
 
 
 def _legal(name: str) -> str:
-    """Returns a name without what SDF has reserved."""
+    """Returns a name without parts that SDF reserves."""
     legal = name.replace("::", "_").strip() or "unnamed"
     if legal.startswith("__") or legal == "world":
         legal = f"model_{legal.strip('_')}"

@@ -1,4 +1,4 @@
-"""Noticing that a SceneGraph's geometry has changed."""
+"""Notices changes of a SceneGraph's geometry."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ _revisions = itertools.count(1)
 def geometry_revision_port(scene_graph: SceneGraph) -> OutputPort:
     """Returns a port whose value changes when geometry does, and only then.
 
-    SceneGraph's own `geometry_version` shows of perception geometry only what
-    a render engine accepted, and to compare all geometries takes longer than
-    a scan. But a Context keeps the geometry as a parameter, which Drake's
-    cache tracks: a port that depends on nothing else is computed anew when
+    SceneGraph's own `geometry_version` covers only perception geometry that a
+    render engine accepted, and comparing all geometries takes longer than a
+    scan. A Context holds the geometry as a parameter, which Drake's cache
+    tracks. A port that depends on this parameter alone is computed anew when
     geometry was added, removed, replaced, reshaped, renamed or given another
-    role, however that came about. The SceneGraph gets the port at the first
-    call, so before a Diagram is built of it.
+    role, in any way. The first call adds the port to the SceneGraph, and must
+    come before a Diagram is built from it.
 
     Returns:
         An abstract port; its value is an int that no other geometry, also of

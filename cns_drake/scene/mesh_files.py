@@ -26,7 +26,7 @@ _Y_UP = (".gltf", ".glb", ".dae")
 
 
 class MeshFiles:
-    """Reads meshes, each once however many geometries refer to it.
+    """Reads meshes, each only once for all its geometries.
 
     Of one mesh at one scale there is one surface.
     """
@@ -41,7 +41,7 @@ class MeshFiles:
 
         Args:
             name: of the geometry.
-            shape: a mesh, or what has the convex hull of one.
+            shape: a mesh, or the convex hull of one.
 
         Raises:
             InputError: the mesh is missing, cannot be read, or is too large;
@@ -52,7 +52,7 @@ class MeshFiles:
         if key in self._surfaces:
             return self._surfaces[key]
         try:
-            with told_by_drake():  # Beside an error, no warning.
+            with told_by_drake():  # The error is enough.
                 surface = _check_size(
                     _read_hull(shape)
                     if isinstance(shape, Convex)
@@ -72,7 +72,7 @@ class MeshFiles:
             surface = self._unscaled[key] = self._read_source(source)
         triangles = surface.triangles
         scale = shape.scale3()
-        if np.prod(scale) < 0.0:  # A reflection turns the faces inside out.
+        if np.prod(scale) < 0.0:  # Mirroring turns faces inside out.
             triangles = triangles[:, ::-1]
         with np.errstate(over="ignore", invalid="ignore"):
             return TriangleSurface(surface.p_GVset * scale, triangles)
@@ -80,7 +80,7 @@ class MeshFiles:
     def _read_source(self, source: MeshSource) -> TriangleSurface:
         if source.is_path():
             return self._read_file(Path(source.path()))
-        # Readers want files.
+        # Readers need files.
         mesh = source.in_memory()
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder, f"mesh{source.extension()}")
@@ -88,7 +88,10 @@ class MeshFiles:
             for uri, file in mesh.supporting_files.items():
                 target = Path(folder, uri)
                 if not target.resolve().is_relative_to(Path(folder).resolve()):
-                    raise ValueError(f"'{uri}' is not beside the mesh")
+                    raise ValueError(
+                        f"the file '{uri}', which it names, is not beside the "
+                        "mesh"
+                    )
                 target.parent.mkdir(parents=True, exist_ok=True)
                 target.write_bytes(
                     file.read_bytes()
@@ -105,7 +108,7 @@ class MeshFiles:
         p_GVset, triangles = read(path)
         if len(triangles) == 0:
             raise ValueError("holds no triangles")
-        # Drake warns of it and goes on; a ray caster reads foreign memory.
+        # Drake only warns; a ray caster would read foreign memory.
         if not 0 <= triangles.min() <= triangles.max() < len(p_GVset):
             raise ValueError("a face has a vertex that is not there")
         if ending in _Y_UP:
@@ -115,12 +118,12 @@ class MeshFiles:
 
 
 def mesh_shape_key(shape: Mesh | Convex) -> tuple:
-    """Returns what only equal meshes and hulls have in common."""
+    """Returns a key that is equal only for equal meshes and hulls."""
     return type(shape), _source_key(shape.source()), tuple(shape.scale3())
 
 
 def _source_key(source: MeshSource) -> object:
-    """Returns what two sources have in common if they are the same mesh."""
+    """Returns a key that is equal for sources of the same mesh."""
     if source.is_path():
         return str(source.path())
     mesh = source.in_memory()
@@ -137,14 +140,14 @@ def _describe(name: str, source: MeshSource) -> str:
 
 
 def _check_size(surface: TriangleSurface) -> TriangleSurface:
-    # False for NaN.
+    # The comparison is False for NaN.
     if not np.abs(surface.p_GVset).max() <= LARGEST_SIZE:
         raise ValueError(f"larger than {LARGEST_SIZE:g} m")
     return surface
 
 
 def _read_hull(shape: Convex) -> TriangleSurface:
-    """Returns Drake's own convex hull, which has the scale in it."""
+    """Returns Drake's own convex hull, with the scale applied."""
     hull = shape.GetConvexHull()
     vertices = [hull.vertex(k) for k in range(hull.num_vertices())]
     triangles = []

@@ -1,7 +1,7 @@
-"""Models, checked before Drake's parser gets them.
+"""Checks models before Drake parses them.
 
-Where a number is none, or no size, libsdformat reads what it can or puts 1 in
-its place, and Drake ends the program. Long names end the process.
+For text that is not a number or a valid size, libsdformat uses a part of it or
+1, or Drake ends the program. Long names end the process.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from cns_drake.scene.surfaces import LARGEST_SIZE
 
 _MODELS = (".sdf", ".urdf")
 _LONGEST_NAME = 1000
-# As far as the parser of libsdformat goes.
+# The limit of libsdformat's parser.
 _DEEPEST = 100
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
-# Shape -> what gives its size, and how many numbers each of these has.
+# Shape -> elements of its size, and the numbers in each.
 _SIZES = {
     "box": {"size": 3},
     "sphere": {"radius": 1},
@@ -50,10 +50,10 @@ class _Element:
 
     Attributes:
         name: its tag.
-        line: where it begins.
+        line: its first line.
         values: attributes and children without children of their own.
-        text: what stands in it.
-        children: tag -> how many.
+        text: its text.
+        children: tag -> number of children.
     """
 
     name: str
@@ -67,9 +67,9 @@ def check_model(path: Path) -> None:
     """Checks an SDF or URDF file, and the SDF files that it includes.
 
     Raises:
-        InputError: it cannot be read, is no XML, or holds a number that is
-            none, a size that no shape can have, two values for one, or a
-            name that is too long; of a collision's mesh, a face that is none.
+        InputError: it cannot be read, is not XML, or has an invalid number, an
+            impossible size, two values for one element, a name that is too
+            long, or an invalid face in a collision's mesh.
     """
     seen: set[Path] = set()
     waiting = [path]
@@ -153,13 +153,15 @@ class _ModelCheck:
             if name not in shape.values:
                 self._refuse(f"no {name}")
             if shape.children[name] > 1:
-                self._refuse(f"{shape.children[name]} times {name}")
+                self._refuse(f"{name} is there {shape.children[name]} times")
             text = shape.values[name]
             numbers = self._numbers(text, name)
             if len(numbers) != count:
                 self._refuse(f"{name}: {len(numbers)} numbers, not {count}")
             if not all(number > 0.0 for number in numbers):
-                self._refuse(f"{name}: {' '.join(text.split())} is no size")
+                self._refuse(
+                    f"{name}: {' '.join(text.split())} is not a valid size"
+                )
 
     def _numbers(self, text: str, name: str = "") -> list[float]:
         """Returns the numbers in a text, all of which are finite."""
@@ -176,7 +178,7 @@ class _ModelCheck:
         place = self._path.parent / uri
         if parents[-1:] == ["include"]:
             self.included += place.glob("*.sdf") if place.is_dir() else [place]
-        # Those that are seen are checked when they are read.
+        # Visible meshes are checked when they are read.
         elif "collision" in parents and place.suffix.lower() == ".obj":
             try:
                 if place.is_file():

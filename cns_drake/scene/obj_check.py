@@ -1,7 +1,7 @@
-"""Faces of OBJ files, checked before Drake's reader gets them.
+"""Checks the faces of OBJ files before Drake reads them.
 
-It reads memory of others, and may end the process, where a face names a
-vertex that is not there.
+For a face with a missing vertex, Drake's reader reads foreign memory, and may
+end the process.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ _NO_INDICES = re.compile(rb"[^-\d\s]|\d-|\d{10}")
 
 
 def check_obj(path: Path) -> None:
-    """Refuses an OBJ file with a face that has not the vertices it names.
+    """Refuses an OBJ file with a face that names missing vertices.
 
     Args:
         path: an existing file.
 
     Raises:
-        ValueError: that names the line.
+        ValueError: if so; it names the line.
         InputError: if it cannot be read.
     """
     # Drake ends a line at either.
@@ -50,7 +50,7 @@ def check_obj(path: Path) -> None:
 
 
 def _are_indices(text: bytes, num_vertices: int) -> bool:
-    """Returns whether a text is of numbers of vertices, from 1 or from -1."""
+    """Returns whether a text has valid vertex numbers, from 1 or from -1."""
     if not text.strip():
         return True
     if _NO_INDICES.search(text):

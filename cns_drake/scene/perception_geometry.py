@@ -1,4 +1,4 @@
-"""What a LiDAR can see: the geometry of one role that a SceneGraph holds."""
+"""The geometry of one role in a SceneGraph, as seen by a LiDAR."""
 
 from __future__ import annotations
 
@@ -63,9 +63,9 @@ class PerceptionGeometry:
         frame_id: the frame F on which it is fixed.
         X_FG: its pose in F.
         surface: its shape in G.
-        rgb: diffuse colour, None where the model gives none.
+        rgb: diffuse colour; None if the model has none.
         reflectivity: the property ("lidar", "reflectivity"), 0 to 1; None
-            where there is none.
+            without it.
     """
 
     geometry_id: GeometryId
@@ -82,7 +82,7 @@ class PerceptionGeometry:
 
 
 def structure_name(geometry_name: str) -> str:
-    """Returns the name of the structure that a geometry belongs to.
+    """Returns the name of a geometry's structure.
 
     A visual named `tower_017/storey_03` belongs to `tower_017`; a visual
     without a slash belongs to the model that it is in.
@@ -95,14 +95,14 @@ def structure_name(geometry_name: str) -> str:
 
 
 def check_shape(name: str, shape: Shape) -> None:
-    """Checks the size of a shape; that of a mesh is in its file.
+    """Checks the size of a shape; a mesh has its size in its file.
 
     Args:
         name: of the geometry.
         shape: its shape.
 
     Raises:
-        InputError: it is not; the geometry is named.
+        InputError: it is too large; the message names the geometry.
     """
     if isinstance(shape, Mesh | Convex | HalfSpace):
         return
@@ -145,10 +145,10 @@ class _Record(NamedTuple):
 
 
 class GeometryReader:
-    """Reads the geometry of a role, and again what changed of it."""
+    """Reads the geometry of a role, and later only its changes."""
 
     def __init__(self, role: Role):
-        """Nothing is read yet.
+        """Reads nothing yet.
 
         Args:
             role: of the geometry to read.
@@ -164,12 +164,13 @@ class GeometryReader:
         """Reads every geometry of the role that is not hidden.
 
         The order is that of `GetAllGeometryIds`, which Drake documents as
-        stable; the result depends on nothing but the SceneGraph. What is as
-        it was when it was last read is the same object.
+        stable; the result depends only on the SceneGraph. Geometry that has not
+        changed since the last call is the same object.
 
         Raises:
             InputError: a geometry is deformable, a mesh file is missing or
-                cannot be read, or a size is not sane; the geometry is named.
+                cannot be read, or a size is too large; the message names the
+                geometry.
         """
         known, self._known = self._known, {}
         with ForeignMeshes() as foreign:
@@ -219,7 +220,7 @@ class GeometryReader:
     def _appearance(
         self, name: str, inspector: SceneGraphInspector, geometry_id: GeometryId
     ) -> tuple[tuple[float, float, float] | None, float | None]:
-        """Returns colour and reflectivity, None where the model has none."""
+        """Returns colour and reflectivity; None if the model has none."""
         properties = inspector.GetProperties(geometry_id, self._role)
         reflectivity = None
         if properties.HasProperty("lidar", "reflectivity"):
@@ -244,7 +245,7 @@ def _diffuse_rgb(
 
 
 def _shape_key(shape: Shape) -> tuple:
-    """Returns what only equal shapes have in common."""
+    """Returns a key that is equal only for equal shapes."""
     if isinstance(shape, Mesh | Convex):
         return mesh_shape_key(shape)
     if isinstance(shape, HalfSpace):
@@ -253,7 +254,7 @@ def _shape_key(shape: Shape) -> tuple:
 
 
 def _dimensions(shape: Shape) -> Sequence[float]:
-    """Returns what the size of a shape is given by."""
+    """Returns the numbers that define the size of a shape."""
     if isinstance(shape, Box):
         return shape.size()
     if isinstance(shape, Sphere):
@@ -285,7 +286,7 @@ def _surface(name: str, shape: Shape, meshes: MeshFiles) -> Surface:
 
 
 def _cone(shape: MeshcatCone) -> TriangleSurface:
-    """Returns a pyramid for a cone, whose point is the origin."""
+    """Returns a pyramid for a cone; its apex is the origin."""
     angle = 2.0 * np.pi * np.arange(_CONE_SIDES) / _CONE_SIDES
     corners = np.zeros((2 + _CONE_SIDES, 3))
     corners[1:, 2] = shape.height()

@@ -1,7 +1,7 @@
 """Semantic classes of structures, with SemanticKITTI's names and ids."""
 
-# Name -> id as in SemanticKITTI's published label table, so that tools and
-# trained networks of that dataset understand our labels unchanged.
+# Name -> id of SemanticKITTI's published label table, so that tools and
+# networks for that dataset can use our labels unchanged.
 CLASS_IDS = {
     "unlabeled": 0,
     "outlier": 1,
@@ -29,8 +29,8 @@ CLASS_IDS = {
     "other-object": 99,
 }
 
-# SemanticKITTI's ids of what moves, by our class; all that it has no moving
-# kind of goes with its "moving-other-vehicle".
+# SemanticKITTI's ids of moving objects, by our class; a class without a moving
+# kind gets its "moving-other-vehicle".
 MOVING_IDS = {
     "car": 252,
     "bicyclist": 253,

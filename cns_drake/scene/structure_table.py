@@ -1,4 +1,4 @@
-"""Which class and instance id each structure of a world has."""
+"""Classes and instance ids of a world's structures."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class StructureEntry:
         instance: id from 1 to 65535; 0 stands for no structure.
         name: the structure's name.
         semantic_class: a key of `CLASS_IDS`.
-        reflectivity: of its surfaces near 900 nm, 0 to 1; None where its
-            class and colours say it.
-        causes: why it is not as it is in the stage's file: switches of a
+        reflectivity: of its surfaces near 900 nm, 0 to 1; None if it follows
+            from class and colours.
+        causes: reasons for its differences to the stage's file: switches of a
             scenario's `transient`.
     """
 
@@ -42,9 +42,9 @@ class StructureEntry:
 class StructureTable:
     """Structures by name.
 
-    Names that the table does not list get the ids that are still free, in
-    alphabetical order, and the class `unlabeled`; so a world without a table
-    still has its structures kept apart.
+    Names that the table lacks get the free ids, in alphabetical order, and the
+    class `unlabeled`. A world without a table therefore still has distinct
+    structures.
     """
 
     def __init__(self, entries: Iterable[StructureEntry]):
@@ -64,7 +64,7 @@ class StructureTable:
         return max((entry.instance for entry in self), default=0)
 
     def joined(self, other: StructureTable) -> StructureTable:
-        """Returns the table with the entries of another besides."""
+        """Returns the table with the entries of another one added."""
         return StructureTable([*self, *other])
 
     def completed(self, names: Iterable[str]) -> StructureTable:

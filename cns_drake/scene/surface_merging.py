@@ -20,7 +20,7 @@ from cns_drake.scene.surfaces import (
 
 # Sides of a round shape in pictures; lamp posts are many and thin.
 _SIDES = 12
-# What is shown of a plane, which has no end.
+# The shown part of an endless plane.
 _PLANE_CORNERS = np.array(
     [(-100.0, -100.0, 0.0), (100.0, -100.0, 0.0),
      (100.0, 100.0, 0.0), (-100.0, 100.0, 0.0)]
@@ -36,8 +36,8 @@ def merge_surfaces(
 
     Args:
         geometries: what to merge; curved shapes are tessellated.
-        calc_X_TF: gives the pose of a geometry's frame F in the frame T
-            that the merged surface shall be expressed in.
+        calc_X_TF: gives the pose of a geometry's frame F in the frame T of the
+            merged surface.
     """
     members = [
         (
@@ -53,7 +53,7 @@ def merge_surfaces(
 def merge_triangles(
     members: Sequence[tuple[int, RigidTransform, TriangleSurface]],
 ) -> tuple[TriangleSurface, np.ndarray]:
-    """Returns triangles in one frame T, and whose they are.
+    """Returns triangles in one frame T, and their owners.
 
     Args:
         members: index, pose X_TG and surface of each.

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# Rays are cast in single precision: beyond this they part no metre from the
-# next [m].
+# Rays are cast in single precision, which cannot resolve a metre beyond this
+# [m].
 LARGEST_SIZE = 1e7
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from pydrake.geometry import MeshSource, RefineVolumeMeshIntoVtkFileContents
 
-# The faces of a tetrahedron, counter-clockwise seen from outside, where its
-# fourth vertex lies on the side that the first three turn about.
+# The faces of a tetrahedron, counter-clockwise seen from outside, if the first
+# three vertices are counter-clockwise seen from the fourth.
 _FACES = np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)])
 
 
@@ -23,7 +23,7 @@ def read_vtk(path: Path) -> tuple[np.ndarray, np.ndarray]:
     Raises:
         RuntimeError: Drake cannot read the file.
     """
-    # Drake's own reader, and what it writes: one dialect of many.
+    # Drake's reader converts all dialects of VTK to the one that it writes.
     text = RefineVolumeMeshIntoVtkFileContents(MeshSource(path))
     words = text.split()
     vertices = _block(words, "POINTS", 3, 3).astype(float)

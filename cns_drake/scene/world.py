@@ -33,10 +33,10 @@ class World:
     Attributes:
         scene_graph: holds the geometry; add it to a DiagramBuilder.
         plant: owns bodies and frames; finalized, not meant for a Diagram.
-        vehicle: the vehicle's model instance, None where there is none.
+        vehicle: the vehicle's model instance; None without a vehicle.
         structures: class and instance id of every structure in the world,
-            also of those that no table lists.
-        notes: what a user should know about them.
+            listed in a table or not.
+        notes: for the user.
 
     Example:
         from cns_drake import load_world
@@ -70,8 +70,8 @@ def load_world(
 ) -> World:
     """Parses a world and, in it, a vehicle.
 
-    Of a world for Gazebo, what is seen of it stays, where it is at the start;
-    the notes say what was left out.
+    A world for Gazebo keeps its visuals, at their places at the start; the
+    notes list the omitted parts.
 
     Args:
         sdf: the world or model file.
@@ -83,8 +83,8 @@ def load_world(
             GZ_SIM_RESOURCE_PATH and SDF_PATH.
 
     Raises:
-        InputError: a file is missing or cannot be parsed, a structure to
-            leave out is not there, or the world has nothing to see.
+        InputError: a file is missing or cannot be parsed, a structure to leave
+            out does not exist, or the world has no visuals.
 
     Example:
         from pathlib import Path
@@ -107,7 +107,7 @@ def load_world(
     inspector = scene_graph.model_inspector()
     if not inspector.GetAllGeometryIds(Role.kPerception):
         raise InputError(
-            f"{sdf}: no visual: the world has no perception geometry that a "
+            f"{sdf}: the world has no visuals, and so no geometry that a "
             "LiDAR can see"
         )
     names = []
@@ -139,9 +139,10 @@ def load_world(
 def _mismatches(
     table: Path, listed: set[str], found: set[str]
 ) -> tuple[str, ...]:
-    """Returns a note if structures are not in the table that others are in.
+    """Returns a note if a table has rows for some structures and not for
+    others.
 
-    Rows alone may well be of structures that stand in another stage.
+    Rows without structures are normal: another stage may have these.
     """
     unlabelled, unused = sorted(found - listed), sorted(listed - found)
     if not (unlabelled and unused):
@@ -165,7 +166,7 @@ def _check_names(scene_graph: SceneGraph, sdf: Path) -> None:
 
 
 def structures_in(world: World) -> set[str]:
-    """Returns the names of the structures that stand in a world."""
+    """Returns the names of the structures of a world."""
     inspector = world.scene_graph.model_inspector()
     return {
         structure_name(inspector.GetName(geometry_id))
@@ -192,7 +193,7 @@ def _remove(
 def _parse_world(
     parser: Parser, path: Path, model_paths: Collection[Path]
 ) -> tuple[str, ...]:
-    """Parses a world, and returns notes of what was left out."""
+    """Parses a world, and returns notes on omitted parts."""
     _check_file(path)
     root = None if path.suffix.lower() == ".urdf" else read_xml(path)
     if root is None or not is_gazebo_world(root):
@@ -227,7 +228,7 @@ def _parse(parser: Parser, path: Path) -> list[ModelInstanceIndex]:
 def _check_file(path: Path) -> None:
     if not path.is_file():
         raise InputError(f"{path}: no such file")
-    # Drake itself stumbles over what it would quote of it.
+    # Drake fails on quoting other text.
     content = read_bytes(path)
     try:
         content.decode("utf-8")

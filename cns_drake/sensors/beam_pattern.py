@@ -1,4 +1,4 @@
-"""Where the beams of a LiDAR point, and when each one fires."""
+"""Directions and firing times of the beams of a LiDAR."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
-# One return, in the sensor frame. C alignment, so that every field starts at
-# a multiple of its size for readers that map structs onto the bytes.
+# One return, in the sensor frame. Fields have C alignment, for readers that map
+# structs onto the bytes.
 POINT_DTYPE = np.dtype(
     [
         ("x", "<f4"),
@@ -36,13 +36,13 @@ class Beams:
     Attributes:
         d_Sset: (N, 3) float64 unit directions, expressed in the sensor frame
             S (x forward, y left, z up).
-        ring: (N,) uint16, which emitter each one comes from.
-        column: (N,) int, at which of the firing times it fires.
+        ring: (N,) uint16, number of the emitter.
+        column: (N,) int, index of its firing time.
         column_t_ns: (C,) uint32 firing times since the start of the turn,
             rising.
-        packet_order: (N,) beams in the order in which to cast them:
-            neighbours in it point nearly the same way and meet the same
-            geometry, which packets of rays profit from.
+        packet_order: (N,) beams in the order of casting: neighbours point
+            nearly the same way and meet the same geometry, which makes packets
+            of rays fast.
     """
 
     d_Sset: np.ndarray
@@ -58,7 +58,7 @@ class Beams:
 
     @cached_property
     def cast_columns(self) -> np.ndarray | None:
-        """(N,) columns in packet order, None if they go round and round."""
+        """(N,) columns in packet order; None if they simply repeat."""
         columns = self.column[self.packet_order]
         turns, rest = divmod(len(columns), max(len(self.column_t_ns), 1))
         once = np.arange(len(self.column_t_ns))
@@ -73,7 +73,7 @@ def make_beams(d_Sset: np.ndarray, ring: np.ndarray, t_ns: np.ndarray) -> Beams:
     Args:
         d_Sset: (N, 3) unit directions, in the order of firing.
         ring: (N,).
-        t_ns: (N,) firing times, none before the one before it.
+        t_ns: (N,) firing times, not decreasing.
     """
     elevation = np.arcsin(np.clip(d_Sset[:, 2], -1.0, 1.0))
     azimuth = np.arctan2(d_Sset[:, 1], d_Sset[:, 0])
@@ -91,12 +91,12 @@ def make_beams(d_Sset: np.ndarray, ring: np.ndarray, t_ns: np.ndarray) -> Beams:
 class BeamPattern(ABC):
     """The beams of a LiDAR, turn by turn.
 
-    What a turn is depends on the unit; it is what one scan holds. When beams
-    fire is the same in all turns, where they point need not be.
+    A turn is the time of one scan, and depends on the unit. Firing times are
+    the same in all turns; directions may differ.
 
     Attributes:
-        min_range: nearest range that is measured [m].
-        max_range: farthest range that is measured [m].
+        min_range: nearest measured range [m].
+        max_range: farthest measured range [m].
         period: duration of one turn [s].
         repeats: whether all turns are alike.
 
@@ -137,8 +137,8 @@ class BeamPattern(ABC):
         """Returns the pattern without the beams outside a field of view.
 
         Args:
-            azimuths_deg: the limits, the first of which may be greater: then
-                the rear is in sight.
+            azimuths_deg: the limits; if the first one is greater, the rear is
+                in sight.
             elevations_deg: the limits.
 
         Raises:
@@ -148,7 +148,7 @@ class BeamPattern(ABC):
 
 
 class LimitedPattern(BeamPattern):
-    """A pattern of which only the beams in a field of view fire."""
+    """A pattern limited to the beams in a field of view."""
 
     def __init__(
         self,
@@ -179,7 +179,7 @@ class LimitedPattern(BeamPattern):
         x, y, z = beams.d_Sset.T
         azimuth = np.rad2deg(np.arctan2(y, x))
         elevation = np.rad2deg(np.arcsin(np.clip(z, -1.0, 1.0)))
-        # What lies on a limit is in, whichever way it was rounded.
+        # Beams on a limit are inside, with either rounding.
         low, high = self._azimuths_deg[0] - 1e-9, self._azimuths_deg[1] + 1e-9
         if low <= high:
             kept = (azimuth >= low) & (azimuth <= high)
@@ -189,7 +189,7 @@ class LimitedPattern(BeamPattern):
         kept &= elevation <= self._elevations_deg[1] + 1e-9
         place = np.cumsum(kept) - 1
         order = beams.packet_order[kept[beams.packet_order]]
-        # All firing times stay, so that they are those of every turn.
+        # All firing times stay, so that all turns have the same.
         return Beams(
             beams.d_Sset[kept],
             beams.ring[kept],

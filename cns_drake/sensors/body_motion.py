@@ -34,7 +34,7 @@ def connect_motion(
         motion: a system with the kinematic output ports of a MultibodyPlant;
             None for the body's plant itself.
         body: of the plant.
-        inputs: name of an output port -> the input that it feeds.
+        inputs: name of an output port -> the input to connect.
     """
     source = body.GetParentPlant() if motion is None else motion
     for name, port in inputs.items():

@@ -1,4 +1,4 @@
-"""Beams in any directions, and grids of them that flash at once."""
+"""Beams in any directions, and flashing grids of beams."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from cns_drake.sensors.beam_pattern import BeamPattern, Beams, make_beams
 
 
 class DirectionPattern(BeamPattern):
-    """Beams in directions of one's own, the same in every turn.
+    """Beams in chosen directions, the same in every turn.
 
     Example:
         from cns_drake import DirectionPattern
@@ -40,12 +40,11 @@ class DirectionPattern(BeamPattern):
             period: duration of one turn [s].
             times: (N,) when each beam fires, from the start of the turn [s];
                 by default all at once.
-            rings: (N,) which emitter each comes from; by default one does
-                all.
+            rings: (N,) number of each beam's emitter; by default there is one.
 
         Raises:
-            ValueError: there is no beam, a direction is zero or none, a time
-                is not within the turn, or the numbers of beams differ.
+            ValueError: there is no beam, a direction is zero or not a number, a
+                time is not within the turn, or the numbers of beams differ.
         """
         d_Sset = np.array(directions, dtype=float).reshape(-1, 3)
         num_beams = len(d_Sset)
@@ -53,12 +52,12 @@ class DirectionPattern(BeamPattern):
         ring = np.zeros(num_beams) if rings is None else np.array(rings)
         if num_beams == 0 or t.shape != (num_beams,) or ring.shape != t.shape:
             raise ValueError(
-                f"{num_beams} directions, {t.size} times and {ring.size} rings "
-                "are no beams; give as many of each, and at least one"
+                f"{num_beams} directions, {t.size} times and {ring.size} "
+                "rings do not match; give as many of each, and at least one"
             )
         length = np.linalg.norm(d_Sset, axis=1, keepdims=True)
         if not (np.isfinite(length) & (length > 0.0)).all():
-            raise ValueError("a direction is zero, or no number")
+            raise ValueError("a direction is zero or not a number")
         if not ((t >= 0.0) & (t < period)).all():
             raise ValueError(f"a time is not within the turn of {period} s")
         self.min_range, self.max_range = min_range, max_range
@@ -82,8 +81,8 @@ def make_flash_pattern(
 ) -> DirectionPattern:
     """Returns a solid-state LiDAR that lights a grid of pixels at once.
 
-    Pixels are even in azimuth and elevation, their middles half a pixel
-    within the field of view. Ring 0 is the uppermost row.
+    Pixels are evenly spaced in azimuth and elevation; the outer ones have their
+    middles half a pixel within the field of view. Ring 0 is the uppermost row.
 
     Args:
         width: pixels in a row.

@@ -1,4 +1,4 @@
-"""An IMU: Drake's accelerometer and gyroscope, wired, with errors if any."""
+"""An IMU: Drake's accelerometer and gyroscope, with optional errors."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Imu:
             +9.81 along the upward axis [m/s^2], without errors.
         gyroscope: its `measurement` is the angular velocity w_WI_I [rad/s],
             without errors.
-        rate: samples per second, None if it has no rate of its own.
+        rate: samples per second; None without its own rate.
         noise: its errors, None if it is ideal.
         noisy: the system that adds them, None if it is ideal.
 
@@ -49,7 +49,7 @@ class Imu:
         yield self.gyroscope
 
     def ports(self) -> dict[str, OutputPort]:
-        """Returns `specific_force` and `angular_velocity`, as measured."""
+        """Returns the measured `specific_force` and `angular_velocity`."""
         names = ("specific_force", "angular_velocity")
         if self.noisy is not None:
             return {name: self.noisy.GetOutputPort(name) for name in names}
@@ -74,16 +74,16 @@ def add_imu(
         body: P, the body that carries the IMU, or a frame fixed on it, of a
             finalized plant.
         X_PI: pose of the IMU in P.
-        rate: how many samples per second a recorder takes; by default as many
-            as it takes frames [1/s].
+        rate: samples per second of a recorder; by default its rate of frames
+            [1/s].
         noise: its errors, which need a rate.
-        motion: the source of body poses, velocities and accelerations, if
-            that is not the plant itself.
+        motion: the source of body poses, velocities and accelerations, if not
+            the plant itself.
         name: the systems are named `<name>_accelerometer`,
             `<name>_gyroscope` and `<name>_noise`.
 
     Raises:
-        ValueError: there is noise without a rate, or the rate is none.
+        ValueError: there is noise without a rate, or the rate is not positive.
 
     Example:
         from cns_drake import add_imu
@@ -91,11 +91,13 @@ def add_imu(
         accelerometer, gyroscope = add_imu(builder, body, X_BI)
     """
     if rate is not None and not 0.0 < rate < math.inf:
-        raise ValueError(f"an IMU of {rate} samples a second")
+        raise ValueError(
+            f"rate: {rate} is not a positive number of samples a second"
+        )
     if noise is not None and rate is None:
-        raise ValueError("noise of an IMU needs its rate")
+        raise ValueError("noise: it needs a rate; give rate as well")
     body, X_BI = body_and_pose(body, X_PI)
-    # The accelerometer assumes no gravity unless it is told.
+    # The accelerometer's default is no gravity.
     gravity = body.GetParentPlant().gravity_field().gravity_vector()
     accelerometer = builder.AddNamedSystem(
         f"{name}_accelerometer", Accelerometer(body, X_BI, gravity)

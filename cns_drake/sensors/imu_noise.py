@@ -8,25 +8,24 @@ import numpy as np
 
 from cns_drake.sensors.noise_draws import noise_generator
 
-# What random numbers are for. The names of an IMU and a LiDAR of a user's own
-# diagram may be equal, so these differ from a LiDAR's purposes.
+# Purposes of random numbers. They differ from a LiDAR's purposes, since an IMU
+# and a LiDAR in a user's diagram may have the same name.
 _TURN_ON, _WHITE, _WALK_AT_BLOCK, _WALK_STEPS = range(16, 20)
-# Samples that are drawn at once.
+# Number of samples that are drawn at a time.
 _BLOCK = 1024
-# The random walk is drawn for so many blocks: a century at 1,000 samples a
-# second.
+# Number of blocks of the random walk: a century at 1,000 samples a second.
 _MOST_BLOCKS = 1 << 32
 
 
 @dataclass(frozen=True)
 class ImuNoise:
-    """How an IMU errs; ideal unless a field says otherwise.
+    """The errors of an IMU; by default it is ideal.
 
     The model is Kalibr's: a measurement is w + b + n with white noise n and
-    a bias b that walks at random. For samples dt apart, n has the standard
+    a bias b that is a random walk. For samples dt apart, n has the standard
     deviation density / sqrt(dt) and b grows by one of random_walk * sqrt(dt)
-    (Kalibr, "IMU noise model"). All three axes of a sensor err alike and
-    independently.
+    (Kalibr, "IMU noise model"). The errors of a sensor's three axes are
+    independent and equally large.
 
     Attributes:
         accelerometer_noise_density: of its white noise [m/s^2/sqrt(Hz)].
@@ -38,8 +37,8 @@ class ImuNoise:
         gyroscope_turn_on_bias: likewise [rad/s].
         accelerometer_range: no axis measures more, either way [m/s^2].
         gyroscope_range: likewise [rad/s].
-        seed: of all that is random.
-        sensor_name: makes the errors of one IMU differ from another's.
+        seed: of all random numbers.
+        sensor_name: distinguishes the errors of several IMUs.
 
     Example:
         from cns_drake import ImuNoise
@@ -75,12 +74,12 @@ class ImuNoise:
 
 
 class ImuErrors:
-    """What an IMU's noise adds to its samples.
+    """The errors in an IMU's samples.
 
-    The error of a sample depends on its number, and on nothing that was
-    asked for before: the random walk is a Brownian motion that is known at
-    time zero and at one far away, and drawn in between by halving intervals
-    (Levy's construction), so that no sample needs those before it.
+    The error of a sample depends only on its number, not on earlier calls. The
+    random walk is a Brownian motion with given values at time zero and far
+    away; values in between are drawn by halving intervals (Levy's
+    construction), so that no sample needs those before it.
     """
 
     def __init__(self, noise: ImuNoise, rate: float):
@@ -105,10 +104,10 @@ class ImuErrors:
         self._block = np.empty((_BLOCK, 6))
 
     def measure(self, sample: int, exact: np.ndarray) -> np.ndarray:
-        """Returns what is measured of exact values.
+        """Returns exact values with the errors of a sample.
 
         Args:
-            sample: number of the sample, that at time zero is 0.
+            sample: number of the sample; 0 at time zero.
             exact: (6,) specific force [m/s^2] and angular velocity [rad/s].
         """
         measured = exact + self.at(sample)
@@ -144,13 +143,13 @@ class ImuErrors:
         end = self._walk_at_block(number + 1)
         steps = self._draw(_WALK_STEPS, number, _BLOCK)
         free = np.vstack([np.zeros(6), np.cumsum(steps, axis=0)])
-        # A walk that is known at both ends: a straight line takes out what a
-        # free one misses there.
+        # The walk is fixed at both ends: a straight line removes the error of a
+        # free walk at its end.
         part = np.arange(_BLOCK)[:, None] / _BLOCK
         return start + free[:-1] + part * (end - start - free[-1])
 
     def _walk_at_block(self, number: int) -> np.ndarray:
-        """Returns the walk (6,) where a block begins."""
+        """Returns the walk (6,) at the start of a block."""
         low, high = 0, _MOST_BLOCKS if number > 0 else -_MOST_BLOCKS
         at_low = np.zeros(6)
         at_high = np.sqrt(_BLOCK * _MOST_BLOCKS) * self._node(high)

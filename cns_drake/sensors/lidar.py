@@ -1,4 +1,4 @@
-"""A LiDAR on the geometry that a SceneGraph holds."""
+"""A LiDAR that scans the geometry of a SceneGraph."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from cns_drake.sensors.seen_geometry import SeenGeometry, Sight
 
 
 class Lidar(LeafSystem):
-    """A LiDAR that sees every geometry of a role but its own body's.
+    """A LiDAR that sees all geometry of a role except its own body's.
 
     .. pydrake_system::
 
@@ -57,28 +57,28 @@ class Lidar(LeafSystem):
     the pose of S at that time, by the pose of P in the SceneGraph (a deskewed
     scan). With the port `sweep`, poses come from there instead (a `Sweep` of
     P): one for the whole turn; or with motion distortion one for each column,
-    at its own firing time. Its points are then expressed in S at that time,
-    as a real unit reports them: X_WS(time + t) takes them to where they lie
-    in the world. Other geometry that moves stays for the turn where it is at
-    its start.
+    at its own firing time. Its points are then expressed in S at that time, as
+    a real unit reports them: X_WS(time + t) takes them to their places in the
+    world. Other moving geometry stays, for the turn, at its place at the start.
 
     With the port `body_spatial_velocities` (a list over a plant's bodies of
     V_WB, expressed in the world, as a MultibodyPlant gives it), P and all
-    other bodies of that plant keep their velocities for the turn: each beam
-    is cast at its own firing time, from where S is then, on what is where
-    then. Points are expressed in S at that time, too.
+    other bodies of that plant keep their velocities for the turn: each beam is
+    cast at its own firing time, from the place of S then, on the geometry at
+    its place then. Points are expressed in S at that time, too.
 
-    `moving_instances` (abstract, the instance ids of structures) says what
-    moves: its points have the label of the moving class.
+    `moving_instances` (abstract, the instance ids of structures) lists the
+    moving structures: their points have the label of the moving class.
 
     `frame_poses` (abstract, an (M, 4, 4) array) has poses X_WF that the
     SceneGraph has as well; a LiDAR takes many of them from an array faster.
 
     Drake cannot cast rays, so the system reads shapes and poses from the
-    QueryObject and casts on a hierarchy of its own, in which what changed is
-    built anew. `geometry_revision` (from `geometry_revision_port`) tells when
-    to look for that; without it the LiDAR does so at every scan, which in a
-    world of thousands of geometries takes longer than the scan.
+    QueryObject and casts on its own hierarchy, whose changed parts are built
+    anew. `geometry_revision` (from `geometry_revision_port`) shows when
+    geometry has changed; without it the LiDAR compares all geometry at every
+    scan, which in a world of thousands of geometries takes longer than the
+    scan.
 
     Example:
         from cns_drake import Lidar, make_beam_pattern
@@ -109,22 +109,22 @@ class Lidar(LeafSystem):
             parent_frame_id: the frame P that carries the sensor.
             X_PS: pose of the sensor in P.
             pattern: the beams.
-            measurement: what it makes of true ranges.
-            returns: how it measures like a real unit; then `measurement`
-                gives the resolution alone. None for ideal returns.
-            with_sweep: whether the port `sweep` tells its poses.
-            moving_bodies: frame -> index of the body of it in the port
-                `body_spatial_velocities`, which there is if this is given.
+            measurement: the model of noise, losses and rounding.
+            returns: the model of a real unit; then `measurement` gives only the
+                resolution. None for ideal returns.
+            with_sweep: whether to declare the port `sweep` for its poses.
+            moving_bodies: frame -> index of its body in the port
+                `body_spatial_velocities`, which is declared if this is given.
             posed_frames: frame -> row of its pose in the port `frame_poses`,
-                which there is if this is given.
+                which is declared if this is given.
             role: of the geometry that it sees.
             unseen: frames and geometries that it does not see; by default
                 P, unless that is the world's frame.
             structures: gives labels and instance ids to returns.
-            anchored_frames: frames that never move, besides the world's;
-                their geometry is cheaper to cast on. If one moves after all,
-                everything that stands is built anew.
-            num_threads: how many threads share its rays; what it measures
+            anchored_frames: frames that never move, besides the world's; their
+                geometry is cheaper to cast on. If one moves after all, all
+                static geometry is built anew.
+            num_threads: number of threads that share its rays; the measurement
                 does not depend on it.
         """
         super().__init__()
@@ -175,10 +175,10 @@ class Lidar(LeafSystem):
             self._frame_poses = self.DeclareAbstractInputPort(
                 "frame_poses", Value(np.zeros((0, 4, 4)))
             )
-            # What is out of sight is not moved.
+            # Geometry out of sight is not moved.
             motion_tickets.add(self._frame_poses.ticket())
             motion_tickets |= self._pose_prerequisites()
-        # Kept as long as nothing changes in the SceneGraph.
+        # Kept until the SceneGraph changes.
         self._seen = self.DeclareCacheEntry(
             description="ray-casting scene",
             value_producer=ValueProducer(
@@ -253,13 +253,13 @@ class Lidar(LeafSystem):
             seen.update(query_object, revision, motions, known, ball)
 
     def _calc_ball(self, context: Context) -> Ball:
-        """Returns the ball in which beams can meet anything."""
+        """Returns the ball in which beams can meet geometry."""
         model = self._returns or self._measurement
         reach = model.reach(self._pattern.max_range)
         p_WSset, _ = self._calc_poses(context)
         middle = p_WSset.mean(axis=0)
         way = np.linalg.norm(p_WSset - middle, axis=1).max()
-        # A metre more than what rounding and fused beams could reach.
+        # A metre of margin for rounding and merged beams.
         return Ball(middle, float(reach + way) + 1.0)
 
     def _calc_motions(self, context: Context) -> dict[FrameId, Motion]:
@@ -318,7 +318,7 @@ class Lidar(LeafSystem):
         times: np.ndarray,
         frame: int,
     ) -> tuple[np.ndarray, Returns]:
-        """Returns what each return has met, and the returns."""
+        """Returns the hit geometry of each return, and the returns."""
         assert seen.scene is not None
         if self._returns is not None:
             reported = self._returns.measure(
@@ -348,7 +348,7 @@ class Lidar(LeafSystem):
         return hits.geometry[turn.table.place[returns.beams]], returns
 
     def _labels(self, context: Context, seen: SeenGeometry) -> np.ndarray:
-        """Returns the class of each geometry, as what moves has it."""
+        """Returns the class of each geometry, moving classes included."""
         if not self._moving.HasValue(context):
             return seen.label
         moves = np.zeros(MAX_INSTANCE + 1, bool)
@@ -359,7 +359,7 @@ class Lidar(LeafSystem):
         return round(context.get_time() / self._pattern.period)
 
     def _get_turn(self, frame: int) -> _Turn:
-        """Returns what a frame's beams are; the last one's are kept."""
+        """Returns the beams of a frame; the latest are kept."""
         if self._pattern.repeats:
             return self._first
         if self._turn.frame != frame:
@@ -422,7 +422,7 @@ class Lidar(LeafSystem):
     ) -> None:
         scan = self._scan.Eval(context)
         p_WSset, R_WSset = self._calc_poses(context)
-        # One for each column, or one for all.
+        # One pose for each column, or one for all.
         column = np.searchsorted(self._first.beams.column_t_ns, scan["t"])
         p_SRset = np.stack([scan["x"], scan["y"], scan["z"]], axis=1)
         p_WRset = p_WSset[column % len(p_WSset)] + np.einsum(

@@ -45,27 +45,27 @@ def add_lidar(
 
     Args:
         builder: of the diagram that holds `scene_graph`.
-        scene_graph: what the LiDAR sees.
+        scene_graph: the SceneGraph to scan.
         body: P, a body or a frame fixed on one, of a finalized plant that is
-            registered with `scene_graph`; or a frame that any other source
-            has registered there.
+            registered with `scene_graph`; or a frame that any other source has
+            registered there.
         X_PS: pose of the sensor S in P.
-        pattern: the beams, or the name of a preset, which then turns as its
-            data sheet has it.
+        pattern: the beams, or the name of a preset, which then turns at the
+            rate of its data sheet.
         name: of the system.
-        unseen: what the LiDAR does not see; by default the body that it is
-            fixed to and what is welded to that, but for the world.
+        unseen: frames and geometries that the LiDAR does not see; by default
+            its body and all bodies welded to it, without the world.
         motion_distortion: whether the LiDAR and all other bodies of the plant
-            go on moving while it turns (see `Lidar`).
-        motion: the source of the bodies' velocities then, if that is not the
-            plant itself.
+            keep moving during a turn (see `Lidar`).
+        motion: the source of the bodies' velocities then, if not the plant
+            itself.
         range_noise: standard deviation of the ranges [m].
         dropout: probability that a return is lost.
-        seed: of both, and of calibrated returns. What is measured depends on
-            it, on the name and on the number of the frame. `measurement` of
-            `Lidar` takes the place of these three.
+        seed: of both, and of calibrated returns. The noise depends on it, on
+            the name and on the number of the frame. `measurement` of `Lidar`
+            replaces these three.
         returns: `ideal`, `calibrated` by the data sheet of a preset, or a
-            model of one's own.
+            `CalibratedReturns`.
         options: further arguments of `Lidar`.
 
     Returns:
@@ -75,13 +75,13 @@ def add_lidar(
     Raises:
         KeyError: there is no preset of that name.
         RuntimeError: the body is not registered with a SceneGraph.
-        TypeError: an argument is not what it should be.
-        ValueError: the diagram has a system of that name, the noise cannot
-            be, motion distortion is wanted of what is no body, or calibrated
-            returns of what is no preset.
+        TypeError: an argument is of the wrong type.
+        ValueError: the diagram has a system of that name, the noise is out of
+            range, motion distortion needs a body, or calibrated returns need a
+            preset.
 
     Warns:
-        UserWarning: the SceneGraph holds nothing that the LiDAR could see.
+        UserWarning: the SceneGraph has no geometry that the LiDAR could see.
 
     Example:
         from cns_drake import add_lidar
@@ -137,7 +137,7 @@ def _choose_measuring(
     dropout: float,
     seed: int,
 ) -> None:
-    """Sets the options of `Lidar` that say how it measures."""
+    """Sets the options of `Lidar` for its measurement."""
     if returns == "calibrated" and isinstance(pattern, str):
         returns = CalibratedReturns.of_preset(
             pattern, seed=seed, sensor_name=name
@@ -145,7 +145,8 @@ def _choose_measuring(
     if isinstance(returns, CalibratedReturns):
         if range_noise or dropout:
             raise ValueError(
-                "range_noise, dropout: calibrated returns have their own"
+                "range_noise, dropout: calibrated returns have their own; "
+                "leave these out"
             )
         options["returns"] = returns
     elif returns != "ideal":
@@ -169,7 +170,7 @@ def _choose_measuring(
 def connect_lidar(
     builder: DiagramBuilder, scene_graph: SceneGraph, lidar: Lidar
 ) -> None:
-    """Connects what a LiDAR wants to know of a SceneGraph."""
+    """Connects a LiDAR's inputs to a SceneGraph."""
     for source, target in (
         (scene_graph.get_query_output_port(), "geometry_query"),
         (geometry_revision_port(scene_graph), "geometry_revision"),
@@ -178,7 +179,7 @@ def connect_lidar(
 
 
 def _welded_to(body: RigidBody) -> list[RigidBody]:
-    """Returns a body and what is welded to it, but not by way of the world."""
+    """Returns a body and all bodies welded to it, not through the world."""
     plant = body.GetParentPlant()
     world = plant.world_body().index()
     neighbours: dict[int, list[RigidBody]] = {}
@@ -205,7 +206,7 @@ def _anchored_frames(plant: MultibodyPlant) -> list[FrameId]:
 
 
 def _moving_bodies(plant: MultibodyPlant) -> dict[FrameId, int]:
-    """Returns the index of each body that a frame belongs to."""
+    """Returns frame -> index of its body."""
     frames = {
         k: plant.GetBodyFrameIdIfExists(BodyIndex(k))
         for k in range(plant.num_bodies())

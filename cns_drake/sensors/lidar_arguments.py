@@ -1,4 +1,4 @@
-"""Checks of what a LiDAR is added with: a slip is found at the call."""
+"""Checks of the arguments of `add_lidar`: a slip is found at the call."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ def check_lidar_arguments(
     X_PS: object,
     pattern: object,
 ) -> None:
-    """Checks what `add_lidar` is called with.
+    """Checks the arguments of `add_lidar`.
 
     Raises:
-        TypeError: the SceneGraph, the body, the pose or the pattern is
-            something else.
+        TypeError: the SceneGraph, the body, the pose or the pattern has the
+            wrong type.
         ValueError: the diagram has a system of that name.
     """
     if not isinstance(scene_graph, SceneGraph):
         raise TypeError(
-            f"scene_graph: {type(scene_graph).__name__} is no SceneGraph; "
+            f"scene_graph: {type(scene_graph).__name__} is not a SceneGraph; "
             "AddMultibodyPlantSceneGraph returns one beside the plant"
         )
     if not isinstance(body, RigidBody | Frame | FrameId):
@@ -37,13 +37,14 @@ def check_lidar_arguments(
         if isinstance(body, str):
             cure = f"; plant.GetBodyByName({body!r}) finds the body of a name"
         raise TypeError(
-            f"body: {body!r} is no RigidBody, Frame or FrameId{cure}"
+            f"body: {body!r} is not a RigidBody, Frame or FrameId{cure}"
         )
     if not isinstance(X_PS, RigidTransform):
-        raise TypeError(f"X_PS: {X_PS!r} is no RigidTransform")
+        raise TypeError(f"X_PS: {X_PS!r} is not a RigidTransform")
     if not isinstance(pattern, BeamPattern | str):
         raise TypeError(
-            f"pattern: {pattern!r} is no BeamPattern and no name of a preset"
+            f"pattern: {pattern!r} is neither a BeamPattern nor the name of a "
+            "preset"
         )
     if builder.HasSubsystemNamed(name):
         raise ValueError(
@@ -53,7 +54,7 @@ def check_lidar_arguments(
 
 
 def warn_of_nothing_to_see(scene_graph: SceneGraph, role: Role) -> None:
-    """Warns if nothing that is registered so far has a role."""
+    """Warns if no registered geometry has the role yet."""
     if scene_graph.model_inspector().NumGeometriesWithRole(role) == 0:
         warnings.warn(
             f"the SceneGraph holds no geometry of {role}: so far the LiDAR "

@@ -1,4 +1,4 @@
-"""Beam patterns of units that one can buy, by their data sheets."""
+"""Beam patterns of commercial units, from their data sheets."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ class LidarPreset:
 
     Attributes:
         num_rings: its emitters.
-        num_columns: how often they fire in a turn; None if that goes by the
-            turn's duration.
+        num_columns: firings in a turn; None if it follows from the turn's
+            duration.
         min_range: nearest range that is measured [m].
         max_range: farthest range that is measured [m].
-        period: duration of a turn, unless told otherwise [s].
-        source: where this is from.
+        period: default duration of a turn [s].
+        source: of these numbers.
         make: makes the pattern, from columns, ranges and period.
     """
 
@@ -220,7 +220,7 @@ LIDAR_PRESETS: dict[str, LidarPreset] = {
         70.0,
         0.1,
         "Livox Mid-360 user manual: 4 lines, 360 deg, -7 to 52 deg, 200,000 "
-        "points/s, 0.1 m to 70 m at 80 %; its way as in `NoddingPattern`",
+        "points/s, 0.1 m to 70 m at 80 %; its motion as in `NoddingPattern`",
         _make_mid_360,
     ),
 }
@@ -234,11 +234,10 @@ def make_beam_pattern(
     min_range: float | None = None,
     max_range: float | None = None,
 ) -> BeamPattern:
-    """Returns the pattern of a preset, with values of one's own if given.
+    """Returns the pattern of a preset, with other values if given.
 
     Args:
-        preset: a key of `LIDAR_PRESETS`; `source` there tells where its
-            numbers are from.
+        preset: a key of `LIDAR_PRESETS`; `source` there names its data sheet.
         period: duration of a turn [s].
         num_columns: columns in a turn.
         min_range: nearest range that is measured [m].
@@ -255,7 +254,7 @@ def make_beam_pattern(
     """
     if preset not in LIDAR_PRESETS:
         raise KeyError(
-            f"no LiDAR preset '{preset}'; known: {', '.join(LIDAR_PRESETS)}"
+            f"no LiDAR preset '{preset}'; there are: {', '.join(LIDAR_PRESETS)}"
         )
     base = LIDAR_PRESETS[preset]
     if num_columns is not None and base.num_columns is None:

@@ -19,14 +19,13 @@ def add_lidar_view(
     color: Rgba = _COLOR,
     point_size: float = 0.05,
 ) -> MeshcatPointCloudVisualizer:
-    """Adds what shows the scans of a LiDAR in Meshcat, where they lie.
+    """Adds a live view of a LiDAR's scans, at their places in Meshcat.
 
     Args:
         builder: of the diagram that holds the LiDAR.
-        lidar: its points are shown at the path of its system's name.
-        meshcat: where to show them.
-        period: time between two scans that are shown [s]; by default that of
-            a turn.
+        lidar: its points are shown at the path of its system's name. meshcat:
+            the view.
+        period: time between two shown scans [s]; by default that of a turn.
         color: of the points.
         point_size: their size [m].
 

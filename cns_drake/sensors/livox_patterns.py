@@ -1,9 +1,8 @@
 """Patterns that do not repeat, after Livox's units.
 
-Livox gives fields of view, rates and numbers of lines. How exactly a beam
-runs is not published as a formula: what is assumed is said of each class. All
-of it depends on the time only, so that a frame is the same whenever it is
-computed.
+Livox gives fields of view, rates and numbers of lines. The exact motion of a
+beam is not published as a formula; each class states its assumptions.
+Directions depend only on the time, so that a frame is always the same.
 """
 
 from __future__ import annotations
@@ -14,15 +13,15 @@ import numpy as np
 
 from cns_drake.sensors.beam_pattern import BeamPattern, Beams, make_beams
 
-# Turns per second of the two wedge prisms of the Mid series: 7294 and -4664
-# per minute, the defaults of HELIOS++ for such optics. Together they take
-# 30 s to come back.
+# Turns per second of the two wedge prisms of the Mid series: 7294 and -4664 per
+# minute, the defaults of HELIOS++ for such optics. Together they repeat after
+# 30 s.
 _PRISMS_HZ = (7294.0 / 60.0, -4664.0 / 60.0)
 # Turns per second about z of a Mid-360's beams: each of four lines ten times
 # in 0.1 s, where the user manual speaks of 40 lines.
 _TURNS_HZ = 100.0
-# How often they go up and down a second: no part of that, so that the pattern
-# takes long to come back.
+# Ups and downs per second: not a simple fraction of the turns, so that the
+# pattern repeats only after a long time.
 _NODS_HZ = 5.0 * (np.sqrt(5.0) - 1.0)
 
 
@@ -47,7 +46,7 @@ class _TimedPattern(BeamPattern):
     def beams(self, frame: int) -> Beams:
         firing = np.arange(self.num_firings)
         step = self.period / self.num_firings
-        # A float takes any frame, whatever the clock says.
+        # A float can hold the number of any frame.
         first = float(frame * self.num_firings)
         d_Sset = self._directions((first + firing) * step)
         return make_beams(
@@ -130,7 +129,7 @@ class RosettePattern(_TimedPattern):
 
 
 class NoddingPattern(_TimedPattern):
-    """Lines that go round and, slowly, up and down, each in its own band.
+    """Lines that rotate and, slowly, move up and down, each in its own band.
 
     Bands of equal height fill the field of view. The turns about z, 100 a
     second, and the ups and downs, 6.18 a second, are of no simple ratio, so

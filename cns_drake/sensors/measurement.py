@@ -1,4 +1,4 @@
-"""What a LiDAR makes of true ranges: noise, losses, rounding."""
+"""The measurement of true ranges: noise, losses, rounding."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from cns_drake.sensors.noise_draws import noise_generator
 _ATTENUATION_PER_M = 0.004
 # Step of the intensities of a LiDAR with finite resolution: 12 bits.
 _INTENSITY_STEP = 2.0**-12
-# Beams look this many standard deviations farther than the maximum range,
-# since noise can bring a surface there into reach. A million frames of noise
-# hold no such draw.
+# Beams reach this many standard deviations beyond the maximum range, since
+# noise can bring a surface there into range. A million frames of noise have no
+# larger draw.
 _FARTHEST_NOISE = 8.0
-# What random numbers are for; each purpose has a stream of its own, so that
-# turning one option on or off leaves the other's draws as they were.
+# Purposes of random numbers. Each purpose has its own stream, so that switching
+# one option does not change the draws of the others.
 _RANGE_NOISE, _DROPOUT = range(2)
 
 
 class Returns(NamedTuple):
-    """What N of the beams return, in firing order.
+    """The returns of N beams, in firing order.
 
     Attributes:
         beams: (N,) int index of each beam.
@@ -41,11 +41,11 @@ class Returns(NamedTuple):
 
 @dataclass(frozen=True)
 class MeasurementModel:
-    """How a LiDAR measures; ideal unless a field says otherwise.
+    """The measurement model of a LiDAR; by default it is ideal.
 
-    Random numbers depend on `seed`, `sensor_name` and the number of the
-    frame alone, and are drawn for every beam, whatever it meets: neither
-    what was computed before nor other geometry changes a beam's noise.
+    Random numbers depend only on `seed`, `sensor_name` and the number of the
+    frame, and are drawn for every beam, hit or miss. Neither earlier calls nor
+    other geometry change a beam's noise.
 
     Attributes:
         resolution: coordinates are rounded to multiples of this [m], and
@@ -58,7 +58,7 @@ class MeasurementModel:
             top of that. It falls linearly with intensity, to none for a
             return of full intensity.
         seed: of the noise.
-        sensor_name: makes the noise of one LiDAR differ from another's.
+        sensor_name: distinguishes the noise of several LiDARs.
 
     Example:
         from cns_drake import MeasurementModel
@@ -77,20 +77,20 @@ class MeasurementModel:
         """Checks the values.
 
         Raises:
-            ValueError: one of them cannot be.
+            ValueError: a value is out of range.
         """
         for name in ("resolution", "range_noise"):
             value = getattr(self, name)
             real = isinstance(value, numbers.Real)
             if not (real and math.isfinite(value) and value >= 0.0):
-                raise ValueError(f"{name}: {value!r} is no length")
+                raise ValueError(f"{name}: {value!r} is not a length")
         for name in ("dropout", "faint_dropout"):
             value = getattr(self, name)
             real = isinstance(value, numbers.Real)
             if not (real and 0.0 <= value <= 1.0):
-                raise ValueError(f"{name}: {value!r} is no probability")
+                raise ValueError(f"{name}: {value!r} is not a probability")
         if not isinstance(self.seed, numbers.Integral) or self.seed < 0:
-            raise ValueError(f"seed: {self.seed!r} is no integer from 0 on")
+            raise ValueError(f"seed: {self.seed!r} is not an integer from 0 on")
 
     @property
     def is_random(self) -> bool:
@@ -98,10 +98,10 @@ class MeasurementModel:
         return max(self.range_noise, self.dropout, self.faint_dropout) > 0.0
 
     def reach(self, max_range: float) -> float:
-        """Returns how far to look for what may be measured [m].
+        """Returns the range of rays for all that may be measured [m].
 
-        Beyond the maximum by a hair even without noise, so that the limit
-        itself is decided by `measure` and not by a ray caster's rounding.
+        It is a little beyond the maximum even without noise, so that `measure`
+        decides on the limit and not a ray caster's rounding.
         """
         return max_range * (1.0 + 1e-5) + _FARTHEST_NOISE * self.range_noise
 
@@ -112,13 +112,13 @@ class MeasurementModel:
         max_range: float,
         frame: int,
     ) -> Returns:
-        """Returns what is measured of true ranges.
+        """Returns the measured returns of true ranges.
 
         Args:
             true_ranges: (num_beams,) float32 distance to the nearest surface
                 along each beam in firing order [m], inf if there is none.
             min_range: a nearer measured range is no return [m].
-            max_range: nor is a farther one [m].
+            max_range: a farther measured range is no return [m].
             frame: number of the frame.
         """
         ranges = true_ranges
@@ -129,7 +129,7 @@ class MeasurementModel:
             )
             ranges = ranges + np.float32(self.range_noise) * error
         beams = np.flatnonzero((ranges >= min_range) & (ranges <= max_range))
-        # How bright a surface appears depends on where it is.
+        # The brightness of a surface depends on its true distance.
         intensity = np.exp(-_ATTENUATION_PER_M * true_ranges[beams])
         if self.dropout > 0.0 or self.faint_dropout > 0.0:
             draw = self._generator(_DROPOUT, frame).random(num_beams)[beams]
@@ -147,5 +147,5 @@ class MeasurementModel:
         return noise_generator(self.seed, self.sensor_name, purpose, frame)
 
 
-# Measures exactly.
+# An ideal LiDAR measures exactly.
 IDEAL = MeasurementModel()

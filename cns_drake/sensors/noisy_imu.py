@@ -1,4 +1,4 @@
-"""A system that adds the errors of an IMU to what an ideal one measures."""
+"""A system that adds an IMU's errors to exact values."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pydrake.systems.framework import (
 
 from cns_drake.sensors.imu_noise import ImuErrors, ImuNoise
 
-# A sample's time is a multiple of the period up to rounding.
+# Rounding error of a sample's time, in periods.
 _SAMPLE_TOLERANCE = 1e-6
 
 
@@ -33,8 +33,8 @@ class NoisyImu(LeafSystem):
         - angular_velocity
 
     All ports are vectors of size 3, expressed in the IMU's frame [m/s^2,
-    rad/s]. Sample k is that at k / rate; between samples, the error of the
-    last one holds.
+    rad/s]. Sample k is at k / rate; between samples the error of the last one
+    holds.
     """
 
     def __init__(self, noise: ImuNoise, rate: float):
@@ -49,7 +49,7 @@ class NoisyImu(LeafSystem):
         self._rate = rate
         names = ("specific_force", "angular_velocity")
         self._inputs = [self.DeclareVectorInputPort(name, 3) for name in names]
-        # Both ports share a sample.
+        # Both ports use the same sample.
         measured = self.DeclareCacheEntry(
             "measured",
             ValueProducer(

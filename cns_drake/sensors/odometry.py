@@ -20,7 +20,7 @@ from cns_drake.sensors.body_motion import body_and_pose, connect_motion
 
 @dataclass(frozen=True)
 class Odometry:
-    """Where a body is and how it moves.
+    """Pose and velocity of a body.
 
     Attributes:
         X_WB: its pose in the world.
@@ -55,10 +55,10 @@ class OdometrySensor(LeafSystem):
     """
 
     def __init__(self, body: RigidBody, X_PB: RigidTransform | None = None):
-        """Makes a sensor.
+        """Makes the sensor.
 
         Args:
-            body: P, what moves.
+            body: P, the moving body.
             X_PB: pose of the place B on it; by default it is P itself.
         """
         super().__init__()
@@ -86,7 +86,7 @@ class OdometrySensor(LeafSystem):
     def place_of(
         self, body: BodyIndex, X_PC: RigidTransform
     ) -> RigidTransform | None:
-        """Returns X_BC of a place C on a body P, None if it is another."""
+        """Returns X_BC of a place C on the body P; None for another body."""
         return self.X_PB.inverse() @ X_PC if body == self._body else None
 
     def _calc_odometry(self, context: Context, output: AbstractValue) -> None:
@@ -115,8 +115,8 @@ def add_odometry(
         builder: of the diagram that holds the plant, or `motion`.
         body: the body to observe, or a frame fixed on it, of a finalized
             plant.
-        motion: the source of body poses and velocities, if that is not the
-            plant itself.
+        motion: the source of body poses and velocities, if not the plant
+            itself.
         name: name of the system.
 
     Example:

@@ -1,6 +1,6 @@
-"""The points of a scan, from what its beams measured.
+"""Assembles the points of a scan from its measurements.
 
-Compiled: a dozen passes of numpy over all points take four times as long.
+The loop is compiled: a dozen passes of numpy take four times as long.
 """
 
 from __future__ import annotations
@@ -12,18 +12,18 @@ import numpy as np
 from cns_drake.base.compiled import compiled
 from cns_drake.scene.semantics import CLASS_IDS
 
-# The class of points that no structure has sent back.
+# The class of points without a structure.
 SCATTERED_LABEL = CLASS_IDS["outlier"]
 
 
 class BeamTable(NamedTuple):
-    """What is the same in every scan, for all beams in firing order.
+    """Constants of all scans, for all beams in firing order.
 
     Attributes:
         d_Sset: (num_beams, 3) float32 unit directions, expressed in S.
         ring: (num_beams,) uint16.
         t_ns: (num_beams,) uint32 firing time since the start of the turn.
-        place: (num_beams,) where each beam is in the order of casting.
+        place: (num_beams,) position of each beam in the order of casting.
     """
 
     d_Sset: np.ndarray
@@ -49,15 +49,14 @@ def assemble_points(
     Args:
         scan: (N,) `POINT_DTYPE` to fill.
         table: a `BeamTable`.
-        beams: (N,) the beams that returned something.
+        beams: (N,) the beams with a return.
         ranges: (N,) float32 measured along them [m].
         intensity: (N,) float32.
-        met: (N,) int32 what sent each return, negative for the weather, or
-            an index into
-        label: uint16 classes, and
+        met: (N,) int32 index of the hit geometry in `label` and `instance`;
+            negative for the weather.
+        label: uint16 classes.
         instance: uint16 structures.
-        step: coordinates are rounded to multiples of it [m]; not
-            rounded if 0.
+        step: coordinates are rounded to multiples of it [m]; not rounded if 0.
     """
     for k in range(len(beams)):
         beam = beams[k]

@@ -1,4 +1,5 @@
-"""What a LiDAR sees of a SceneGraph, ready for casting rays."""
+"""The geometry of a SceneGraph that a LiDAR sees, with its ray-casting
+scene."""
 
 from __future__ import annotations
 
@@ -35,7 +36,7 @@ from cns_drake.sensors.returns.materials import Materials, find_materials
 
 
 class Sight(NamedTuple):
-    """What a LiDAR sees, whatever is there.
+    """The choice of geometry that a LiDAR sees.
 
     Attributes:
         role: of the geometry that it sees.
@@ -43,9 +44,9 @@ class Sight(NamedTuple):
         unseen: frames and geometries of it that it does not see; None for
             the frame that carries it, unless that is the world's.
         structures: gives labels and instance ids.
-        anchored_frames: frames that never move, besides the world's; that
-            is worth knowing, but not relied on.
-        num_threads: how many threads share the rays of a cast.
+        anchored_frames: frames that never move, besides the world's; a hint for
+            speed.
+        num_threads: number of threads that share the rays of a cast.
     """
 
     role: Role
@@ -57,9 +58,9 @@ class Sight(NamedTuple):
 
 
 class SeenGeometry:
-    """What a LiDAR sees in a Context, kept as long as nothing changes.
+    """The geometry that a LiDAR sees in a Context, kept until it changes.
 
-    Of a cloned Context it is empty at first: a scene in which something moves
+    In a cloned Context it is empty at first: a scene with moving geometry
     cannot be shared.
 
     Attributes:
@@ -91,15 +92,15 @@ class SeenGeometry:
         known: KnownPoses = NOTHING_KNOWN,
         seen: Ball = EVERYWHERE,
     ) -> None:
-        """Moves what moves, and builds anew what changed.
+        """Moves moving geometry, and builds changed geometry anew.
 
         Args:
             query_object: of the Context.
-            revision: of the geometry (`geometry_revision_port`), None if it
-                is not known. Then all geometries are looked at.
+            revision: of the geometry (`geometry_revision_port`), None if
+                unknown; all geometries are then compared.
             motions: of the frames that move during the turn.
-            known: poses of frames for which `query_object` is not asked.
-            seen: where beams can meet anything.
+            known: poses of frames, which replace calls of `query_object`. seen:
+                the ball in which beams can meet geometry.
 
         Raises:
             InputError: see `GeometryReader.read`.

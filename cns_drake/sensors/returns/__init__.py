@@ -1,1 +1,1 @@
-"""What a real unit makes of the light that comes back."""
+"""Calibrated returns: the measurement of returning light by real units."""

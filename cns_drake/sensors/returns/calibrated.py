@@ -1,4 +1,4 @@
-"""A LiDAR that measures like the unit of its data sheet, in any weather."""
+"""Returns of a LiDAR after its data sheet, in any weather."""
 
 from __future__ import annotations
 
@@ -39,17 +39,17 @@ CLEAR = Weather()
 
 @dataclass(frozen=True)
 class CalibratedReturns:
-    """Makes returns by the data sheet of a unit.
+    """Makes returns after the data sheet of a unit.
 
-    Random numbers depend on the seed, the name of the sensor, the frame and
-    the beam alone.
+    Random numbers depend only on the seed, the name of the sensor, the frame
+    and the beam.
 
     Attributes:
         sheet: of the unit.
-        echoes: which echoes of a beam it reports.
-        weather: in which it measures.
-        seed: of what is random.
-        sensor_name: makes one LiDAR differ from another.
+        echoes: the reported echoes of a beam.
+        weather: of the drive.
+        seed: of random numbers.
+        sensor_name: distinguishes several LiDARs.
 
     Example:
         from cns_drake import CalibratedReturns
@@ -77,7 +77,7 @@ class CalibratedReturns:
 
         Args:
             preset: a key of `LIDAR_PRESETS`.
-            echoes: see the class, like those that follow.
+            echoes: see the class.
             weather: fog, rain and snowfall.
             seed: of the random draws.
             sensor_name: the name of the LiDAR.
@@ -96,10 +96,10 @@ class CalibratedReturns:
         return self.weather.rain > 0.0
 
     def reach(self, max_range: float) -> float:
-        """Returns how far rays are cast [m].
+        """Returns the range of rays [m].
 
-        Farther than what is reported, since the range noise can bring a
-        surface there into reach.
+        It exceeds the reported range, since range noise can bring a farther
+        surface into range.
         """
         return max_range + 8.0 * self.sheet.range_noise
 
@@ -112,7 +112,7 @@ class CalibratedReturns:
         return {}
 
     def _receiver(self, pattern: BeamPattern) -> Receiver:
-        """Returns the receiver of a pattern; those made before are kept."""
+        """Returns the receiver of a pattern; earlier ones are kept."""
         limits = pattern.min_range, pattern.max_range
         if limits not in self._receivers:
             sheet = self.sheet
@@ -147,7 +147,7 @@ class CalibratedReturns:
         times: np.ndarray,
         frame: int,
     ) -> Reported:
-        """Returns what the unit reports of a turn.
+        """Returns the reported points of a turn.
 
         Args:
             scene: casts rays.
@@ -185,7 +185,7 @@ class CalibratedReturns:
 
         divergence = self.sheet.divergence
         sides = find_sides(key, turn.beam, turn.orders, met, divergence, reach)
-        # From one place, where they have one, which is faster.
+        # A single place for all is faster.
         rows = sides.ray
         origins = p_WSset[rows % len(p_WSset)] if len(p_WSset) > 1 else p_WSset
         times = np.asarray(times, np.float32)
@@ -222,8 +222,8 @@ class CalibratedTurn:
     Attributes:
         d_Sset: (N, 3) directions in the order of casting.
         beam: (N,) number of each beam, in firing order.
-        orders: (2, N) orders of the rays in which neighbours follow each
-            other: that of casting, and that of firing.
+        orders: (2, N) two orders in which neighbours follow each other: of
+            casting, and of firing.
     """
 
     def __init__(self, beams: Beams):

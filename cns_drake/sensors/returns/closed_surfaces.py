@@ -14,8 +14,8 @@ from cns_drake.scene.surfaces import (
 def is_closed(surface: Surface) -> bool:
     """Returns whether a surface encloses a volume.
 
-    Triangles do where each of their edges, by the places of its ends, belongs
-    to an even number of them.
+    Triangles do if each edge, by the places of its ends, belongs to an even
+    number of them.
     """
     if isinstance(surface, HalfSpaceSurface):
         return False

@@ -1,7 +1,7 @@
-"""Random numbers by what they are for, without a stream that runs on.
+"""Counter-based random numbers, without a running stream.
 
-A number depends on a key, a beam and the number of the draw alone. Neither
-the other beams nor the order of the work changes it.
+A number depends only on a key, a beam and the number of the draw. Neither other
+beams nor the order of work change it.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def frame_key(seed: int, sensor_name: str, frame: int) -> np.uint64:
 def uniform(key: np.uint64, beam: int, draw: int) -> float:
     """Returns a number that is uniform over [0, 1).
 
-    SplitMix64 (Steele, Lea and Flood, OOPSLA 2014), asked for its n-th number.
+    It is the n-th number of SplitMix64 (Steele, Lea and Flood, OOPSLA 2014).
 
     Args:
         key: see `frame_key`.
@@ -64,7 +64,7 @@ def normal(key: np.uint64, beam: int, draw: int) -> float:
         above = ((59.109374720 * r + 159.29113202) * r + 50.434271938) * r
         below = ((67.187563600 * r + 78.757757664) * r + 17.895169469) * r
         return q * (above + 3.3871327179) / (below + 1.0)
-    # Never 0: what lies below the smallest step counts as half of it.
+    # Never 0: a value below the smallest step counts as half a step.
     r = np.sqrt(-np.log(max(min(u, 1.0 - u), 0.5 * _UNIT)))
     if r <= 5.0:
         r -= 1.6

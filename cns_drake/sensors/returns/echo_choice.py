@@ -1,10 +1,10 @@
-"""Which of the echoes of a beam a unit reports."""
+"""The choice of echoes that a unit reports."""
 
 from enum import Enum
 
 
 class Echoes(str, Enum):
-    """Which echoes of a beam a unit reports."""
+    """The echoes of a beam that a unit reports."""
 
     FIRST = "first"
     STRONGEST = "strongest"

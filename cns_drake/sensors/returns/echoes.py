@@ -1,4 +1,4 @@
-"""From the light that comes back along each beam to what a unit reports."""
+"""Makes a unit's reported points from the returning light of each beam."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from cns_drake.sensors.returns.link_budget import (
 )
 from cns_drake.sensors.returns.weather import Scattering
 
-# What stands for the weather in place of a geometry.
+# The index of the weather, in place of a geometry's.
 SCATTERED = -2
-# Draws of a beam: those below serve the sub-rays and the leaves.
+# Numbers of a beam's draws; lower ones serve the sub-rays and the leaves.
 _FIRST_ECHO_DRAW = 128
 _DRAWS_PER_ECHO = 4
 _FIRST_DROP_DRAW = 200
-# The most echoes and drops of a beam that are looked at.
+# The most echoes and drops of a beam that are processed.
 _MOST_ECHOES = 12
 _MOST_DROPS = 8
 # Energy of a retro-reflector that makes the intensity full: 10,000 times that
@@ -41,16 +41,16 @@ _FIRST, _STRONGEST, _LAST, _DUAL = range(4)
 
 
 class Receiver(NamedTuple):
-    """How a unit receives.
+    """The receiver of a unit.
 
     Attributes:
         budget: its `LinkBudget`.
         extinction: of the weather [1/m].
-        resolution: echoes that are less apart are one [m].
-        min_range, max_range: limits of what is reported [m].
+        resolution: echoes nearer to each other are one [m]. min_range,
+            max_range: limits of reported ranges [m].
         retro_from: see `UnitSheet`.
         choice: index of one of `Echoes`.
-        scattering: by the weather; without any distance in clear air.
+        scattering: by the weather; empty in clear air.
     """
 
     budget: LinkBudget
@@ -70,8 +70,8 @@ class Reported(NamedTuple):
         beam: (M,) int64.
         distance: (M,) float32 measured [m].
         intensity: (M,) float32, whole numbers from 0 to 255.
-        geometry: (M,) int32 what sent back most of it; `SCATTERED` for the
-            weather.
+        geometry: (M,) int32 index of the geometry with most of the light;
+            `SCATTERED` for the weather.
     """
 
     beam: np.ndarray
@@ -81,7 +81,7 @@ class Reported(NamedTuple):
 
 
 def choice_of(echoes: Echoes) -> int:
-    """Returns the number that stands for a choice in compiled code."""
+    """Returns the number of a choice in compiled code."""
     return _CHOICE[echoes]
 
 
@@ -91,7 +91,7 @@ def report_echoes(
     key: np.uint64,
     num_beams: int,
 ) -> Reported:
-    """Returns what a unit reports of the light.
+    """Returns the reported points of the light.
 
     Light less than a pulse apart is one echo, whose distance is the mean by
     energy. An echo is detected by the probability of its SNR, and its distance
@@ -122,7 +122,7 @@ def _report(
     num_beams: int,
     reported: Reported,
 ) -> int:
-    """Fills in what is reported; returns its number."""
+    """Fills in the reported points; returns their number."""
     echo = np.zeros((_MOST_ECHOES + _MOST_DROPS + 1, 3))
     source = np.zeros(len(echo), np.int32)
     budget, extinction = receiver.budget, receiver.extinction
@@ -136,11 +136,11 @@ def _report(
             part += 1
         is_alone = is_clear
         if not is_clear and not is_fog:
-            # Not even on the longest way does the first drop arrive.
+            # The first drop is beyond the farthest end of a beam.
             arrived = -np.log(1.0 - uniform(key, beam, _FIRST_DROP_DRAW))
             is_alone = arrived >= table.counts[-1]
         if is_alone and part - first <= 1:
-            # Most beams: a single echo at most.
+            # Most beams have at most a single echo.
             if part == first:
                 continue
             distance = light.distance[first]
@@ -171,7 +171,7 @@ def _report(
         size = _scatter(receiver, key, beam, echo, source, size)
         size = _detect(receiver, key, beam, echo, source, size)
         if size == 0:
-            # A unit takes an echo as broad as that of fog for nothing better.
+            # A unit reports the broad echo of fog only without any other.
             size = _add_fog(light, first, part, receiver, key, beam, echo)
             source[0] = SCATTERED
             size = _detect(receiver, key, beam, echo, source, size)
@@ -193,7 +193,8 @@ def _report(
             receiver, beam, echo[best], source[best], reported, count
         )
         if receiver.choice == _DUAL and size > 1:
-            # The last one as well, or the second strongest if that is it.
+            # The last one as well, or the second strongest if the last is the
+            # strongest.
             other = farthest
             if other == best:
                 other = 0 if best != 0 else 1
@@ -228,7 +229,7 @@ def _merge(
             size += 1
             begin, most = distance, 0.0
             echo[size, 0] = echo[size, 1] = echo[size, 2] = 0.0
-        # Weighted by the SNR; divided by it below.
+        # A sum weighted by the SNR, divided by it below.
         echo[size, 0] += snr * distance
         echo[size, 1] += snr
         if snr > most:
@@ -249,11 +250,11 @@ def _scatter(
     source: np.ndarray,
     size: int,
 ) -> int:
-    """Adds echoes of the weather; returns how many echoes there are."""
+    """Adds echoes of the weather; returns the number of echoes."""
     table = receiver.scattering
     if len(table.distances) == 0:
         return size
-    # No farther than where the beam ends.
+    # No drop is beyond the end of the beam.
     end = receiver.max_range
     for i in range(size):
         end = min(end, echo[i, 0])
@@ -271,7 +272,7 @@ def _scatter(
             row -= 1
         column = int(uniform(key, beam, draw + 1) * table.energies.shape[1])
         echo[size, 0] = distance
-        # What the table holds is detected already.
+        # Drops in the table are detected already.
         echo[size, 1] = target_snr(
             receiver.budget,
             receiver.extinction,
@@ -295,7 +296,7 @@ def _add_fog(
     beam: int,
     echo: np.ndarray,
 ) -> int:
-    """Fills in the echo of fog, if there is any; returns how many."""
+    """Fills in the echo of fog, if any; returns the number of echoes."""
     table = receiver.scattering
     if len(table.distances) == 0 or table.fog_energies[-1] == 0.0:
         return 0
@@ -343,7 +344,7 @@ def _detect(
         echo[i, 2] = 0.0
         if not is_sure and not _is_detected(key, beam, draw, snr):
             continue
-        # Where a surface lies decides; an error of its range does not.
+        # The true range decides, not the one with error.
         if not receiver.min_range <= echo[i, 0] <= receiver.max_range:
             continue
         distance = _measured(
@@ -356,7 +357,7 @@ def _detect(
             echo[i, 0],
             snr,
         )
-        # The unit corrects for the true distance; the error is too small.
+        # Intensity is corrected by the true distance; the error is negligible.
         energy = echo_energy(receiver.budget, snr, echo[i, 0])
         echo[kept, 0], echo[kept, 1] = distance, snr
         echo[kept, 2] = energy
@@ -410,7 +411,7 @@ def _write(
 def _intensity(retro_from: float, energy: float) -> float:
     """Returns the calibrated reflectivity in the scale of the unit.
 
-    A whole number: linear up to a reflectivity of 1, by the logarithm above.
+    It is a whole number: linear up to a reflectivity of 1, logarithmic above.
     """
     if energy <= 1.0:
         return np.rint(retro_from * energy)

@@ -1,10 +1,10 @@
-"""The width of a beam: where it matters, and the rays that stand for it.
+"""The width of a beam: rays in its parts beside an edge.
 
 A beam's irradiance falls as exp(-2 r^2 / w^2) with the distance r from its
-axis; w is its radius at 1 / e^2. Where the neighbour of a beam meets another
-surface, a ray at a random place of the beam's half on that side stands for
-the half. What it meets has that part of the light, so that the mean over
-beams is that of the whole profile.
+axis; w is its radius at 1 / e^2. If the neighbour of a beam meets another
+surface, a ray at a random place of the beam's half on that side represents the
+half. The surface that it meets gets that part of the light. The mean over beams
+is then that of the whole profile.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from cns_drake.base.compiled import compiled
 from cns_drake.sensors.returns.counter_random import uniform
 from cns_drake.sensors.returns.met import Met
 
-# Draws of a beam that the rays at its sides take, two each.
+# Numbers of a beam's draws for the rays at its sides, two each.
 _SIDE_DRAW = 0
-# Surfaces are apart where ranges differ from those on one's own plane by this
-# much [m], and by this part of the range.
+# Surfaces are apart if ranges differ from those on the own plane by this much
+# [m], and by this part of the range.
 _JUMP, _JUMP_PART = 0.1, 0.01
-# Beams are neighbours if they are this many times the divergence apart at
-# most. Between beams that are farther apart, hardly any edge lies in either.
+# Beams are neighbours if their angle is at most this many divergences. An edge
+# between beams farther apart is hardly ever within either.
 _NEIGHBOURS = 10.0
 
 
@@ -33,7 +33,7 @@ class Sides(NamedTuple):
     Attributes:
         ray: (P,) row of the beam.
         neighbour: (P,) row of the beam beyond the edge.
-        number: (P,) which side of the beam it is: 0 and 1 in the first order
+        number: (P,) number of the side of the beam: 0 and 1 in the first order
             of beams, 2 and 3 in the second one.
         share: (P,) part of the beam's light.
         d_Wset: (P, 3) directions.
@@ -58,9 +58,9 @@ def find_sides(
 ) -> Sides:
     """Returns rays to cast where neighbours meet different surfaces.
 
-    Two neighbours meet one surface, or two that touch, where one lies on the
-    plane of the other, or both planes meet in between. Otherwise an edge
-    lies between them: within one of their beams, or in the gap.
+    Two neighbours meet one surface, or two that touch, if one place is on the
+    plane of the other, or both planes meet in between. Otherwise an edge is
+    between them: within one of their beams, or in the gap.
 
     Args:
         key: of the frame; see `frame_key`.
@@ -68,7 +68,7 @@ def find_sides(
         orders: (2, N) orders of the rays in which neighbours follow.
         met: by the axes of the beams.
         divergence: half angle of a beam [rad].
-        max_range: how far to look [m].
+        max_range: of the rays [m].
     """
     ray = np.empty(2 * orders.size, np.int64)
     neighbour, number = np.empty_like(ray), np.empty_like(ray)
@@ -103,7 +103,7 @@ def _find_jumps(
     neighbour: np.ndarray,
     number: np.ndarray,
 ) -> int:
-    """Fills in the first fields of `Sides`; returns how many there are."""
+    """Fills in the first fields of `Sides`; returns the number of sides."""
     # Chord and angle are the same at this size.
     farthest = (_NEIGHBOURS * divergence) ** 2
     count = 0
@@ -127,7 +127,7 @@ def _find_jumps(
 
 @compiled
 def _face_neighbours(met: Met, sides: Sides) -> None:
-    """Has directions be unit vectors across the beams, to the neighbours."""
+    """Sets directions to unit vectors across the beams, to the neighbours."""
     for side in range(len(sides.ray)):
         d = met.d_Wset[sides.ray[side]]
         d_j = met.d_Wset[sides.neighbour[side]]
@@ -143,9 +143,9 @@ def _face_neighbours(met: Met, sides: Sides) -> None:
 
 @compiled
 def _share(side_of: np.ndarray, sides: Sides) -> None:
-    """Fills in the parts of the light, by what `_face_neighbours` has made.
+    """Fills in the parts of the light, after `_face_neighbours`.
 
-    A half of the beam, or a quarter if there are edges at its other sides,
+    A side has half of the beam, or a quarter if there are edges at other sides,
     too. A second neighbour on the same side has no part.
     """
     for side in range(len(sides.ray)):
@@ -199,16 +199,16 @@ def _aim(
 
 @compiled
 def meet_sides(sides: Sides, side_met: Met, met: Met, rest: np.ndarray) -> None:
-    """Takes from beams what other surfaces at their sides have of the light.
+    """Subtracts from beams the light of other surfaces at their sides.
 
-    A ray that goes beyond the nearer of two surfaces has met the farther one,
-    where its plane is.
+    A ray that passes the nearer of two surfaces has met the farther one, on its
+    plane.
 
     Args:
         sides: see `find_sides`.
-        side_met: by their rays within their reach. Those that meet what their
-            beam meets are made misses, those that go beyond the nearer
-            surface hits.
+        side_met: by their rays within their reach. Rays that meet the surface
+            of their beam become misses, those that pass the nearer surface
+            become hits.
         met: by the axes of the beams.
         rest: (N,) part of each beam's light, to lessen.
     """
@@ -237,15 +237,16 @@ def meet_sides(sides: Sides, side_met: Met, met: Met, rest: np.ndarray) -> None:
 
 @compiled
 def _limit(distance: float) -> float:
-    """Returns by how much ranges on one surface differ at most [m]."""
+    """Returns the greatest difference of ranges on one surface [m]."""
     return _JUMP + _JUMP_PART * distance
 
 
 @compiled
 def _range_on(met: Met, i: int, d_W: np.ndarray) -> float:
-    """Returns where a ray meets the plane that the i-th one has met [m].
+    """Returns the range at which a ray meets the plane of the i-th ray's hit
+    [m].
 
-    It is inf where it meets the plane nowhere, or the i-th ray met none.
+    It is inf if the ray does not meet the plane, or the i-th ray is a miss.
     """
     along = 0.0
     for axis in range(3):
@@ -257,10 +258,10 @@ def _range_on(met: Met, i: int, d_W: np.ndarray) -> float:
 
 @compiled
 def _touch(a: Met, i: int, b: Met, j: int) -> bool:
-    """Tells whether the planes of two places are one, or meet in between.
+    """Returns whether the planes of two places are one, or meet in between.
 
     Args:
-        a, i: a place: what the i-th of these rays has met.
+        a, i: a place: the hit of the i-th of these rays.
         b, j: another place.
     """
     if a.geometry[i] < 0 or b.geometry[j] < 0:
@@ -276,6 +277,6 @@ def _touch(a: Met, i: int, b: Met, j: int) -> bool:
     before = jj * range_j - ji * range_i
     if min(abs(after), abs(before)) <= _limit(min(range_i, range_j)):
         return True
-    # The inverse of the distance to a plane is linear from i to j. Which
-    # plane is nearer changes in between if there is a corner.
+    # The inverse of the distance to a plane is linear from i to j. At a corner,
+    # the nearer plane changes in between.
     return ii * jj > 0.0 and before * after <= 0.0

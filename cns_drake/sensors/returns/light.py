@@ -11,14 +11,14 @@ from cns_drake.base.compiled import compiled
 
 
 class Light(NamedTuple):
-    """N parts of the light that comes back, sorted by beam and distance.
+    """N parts of the returning light, sorted by beam and distance.
 
     Attributes:
         beam: (N,) int32.
-        distance: (N,) float64, as the unit sees it by the time of flight [m].
-        energy: (N,) float64: reflectivity, cosine of incidence, and the part
-            of the beam that got there and back.
-        geometry: (N,) int32 what sent it back.
+        distance: (N,) float64, from the time of flight [m].
+        energy: (N,) float64: reflectivity, cosine of incidence, and the part of
+            the beam that got there and back.
+        geometry: (N,) int32 index of the reflecting geometry.
     """
 
     beam: np.ndarray
@@ -62,7 +62,7 @@ def _sort(beam: np.ndarray, distance: np.ndarray, order: np.ndarray) -> None:
     begin = np.cumsum(begin)
     size = np.zeros(len(begin), np.int64)
     for i in range(len(beam)):
-        # The few of a beam, by insertion.
+        # The few parts of a beam are sorted by insertion.
         place = begin[beam[i]] + size[beam[i]]
         size[beam[i]] += 1
         while (

@@ -1,14 +1,14 @@
-"""How strong an echo is, and what a unit makes of it.
+"""The strength of an echo, its detection and its error.
 
-One equation for all that returns light, the LiDAR equation of an extended
-target (Wagner et al., ISPRS Journal 60, 2006):
+One equation holds for all surfaces, the LiDAR equation of an extended target
+(Wagner et al., ISPRS Journal 60, 2006):
 
     SNR(e, r) = S e exp(-2 (alpha + alpha_0) r) / r^2
 
 `e` is the target's reflectivity times the cosine of incidence, alpha the
 extinction of the weather. S and alpha_0 are the unit's own. They follow from
 the two rows of its data sheet, the ranges at 80 % and 10 % reflectivity.
-alpha_0 stands for everything by which the two rows differ from 1 / r^2.
+alpha_0 covers all differences of the two rows from 1 / r^2.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ class SheetRow:
 
     Attributes:
         reflectivity: of the Lambertian target that faces the unit, 0 to 1.
-        range: at which it is detected [m],
-        probability: in this part of all cases.
+        range: at which it is detected [m].
+        probability: of its detection there.
     """
 
     reflectivity: float
@@ -53,13 +53,13 @@ class SheetRow:
 
 
 class LinkBudget(NamedTuple):
-    """What makes an SNR of a target, and a measurement of an SNR.
+    """The parameters of SNR and range noise.
 
     Attributes:
         scale: S of the equation above [m^2].
         own_extinction: alpha_0 [1/m].
         range_noise: standard deviation of a range at an SNR of 1 [m].
-        range_floor: standard deviation that no SNR falls below [m].
+        range_floor: least standard deviation, at any SNR [m].
     """
 
     scale: float
@@ -71,7 +71,7 @@ class LinkBudget(NamedTuple):
 def fit_link_budget(
     rows: tuple[SheetRow, ...], range_noise: float, range_floor: float
 ) -> LinkBudget:
-    """Returns the budget that gives one or two rows of a sheet exactly.
+    """Returns the budget that fits one or two rows of a sheet exactly.
 
     Args:
         rows: one row, or two of different ranges.
@@ -122,14 +122,14 @@ def detection_probability(snr: float) -> float:
 def range_deviation(budget: LinkBudget, snr: float) -> float:
     """Returns the standard deviation of a range [m].
 
-    It falls with the root of the SNR (Wagner et al., 2006), down to what the
-    clock of the unit and the shape of its pulses allow.
+    It falls with the root of the SNR (Wagner et al., 2006), down to a limit by
+    the unit's clock and the shape of its pulses.
     """
     return max(budget.range_noise / np.sqrt(snr), budget.range_floor)
 
 
 @compiled
 def echo_energy(budget: LinkBudget, snr: float, distance: float) -> float:
-    """Returns the energy that a unit takes an echo for in clear air."""
+    """Returns the energy of an echo as the unit infers it for clear air."""
     gain = np.exp(2.0 * budget.own_extinction * distance)
     return snr * distance * distance * gain / budget.scale

@@ -1,11 +1,11 @@
-"""What surfaces do with light near 900 nm.
+"""Reflection of surfaces near 900 nm.
 
-A structure's class says what it is made of, the name of its part where that
-differs, its colour how bright it is. Reflectivities of diffuse materials are
-those of the ECOSTRESS spectral library (Meerdink et al., 2019) near 0.9 um,
-rounded; of markings, signs and plates they follow from the minimum
-coefficients of EN 1436 (R_L 150 mcd/m2/lx at 30 m) and EN 12899-1 (class RA1,
-70 cd/lx/m2), times pi.
+A structure's material follows from its class, or from the name of a part of
+another material; its brightness follows from its colour. Reflectivities of
+diffuse materials are those of the ECOSTRESS spectral library (Meerdink et al.,
+2019) near 0.9 um, rounded; those of markings, signs and plates follow from the
+minimum coefficients of EN 1436 (R_L 150 mcd/m2/lx at 30 m) and EN 12899-1
+(class RA1, 70 cd/lx/m2), times pi.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from cns_drake.sensors.returns.closed_surfaces import is_closed
 # Kinds of materials.
 LAMBERT, RETRO, GLASS, LEAVES, BEADS = range(5)
 
-# Class -> reflectivity of a dark and of a bright colour; equal where the
-# colour says nothing near 900 nm.
+# Class -> reflectivity of a dark and of a bright colour; equal if the colour
+# has no influence near 900 nm.
 _BY_CLASS = {
     "unlabeled": (0.15, 0.65),
     "outlier": (0.15, 0.65),
@@ -60,20 +60,20 @@ _PLATE = 160.0
 # Leaf area in a volume of leaves [1/m]: crowns and hedges of cities (Hosoi
 # and Omasa, 2006, found 0.5 to 2.5 in crowns).
 _LEAF_AREA_DENSITY = 1.5
-# How wet ground reflects: a film of n = 1.33 sends light back that a rough
-# surface has scattered once (Angstrom, 1925).
+# Reflection of wet ground: a film of n = 1.33 reflects scattered light back to
+# the rough surface (Angstrom, 1925).
 _FILM_INNER = 1.0 - (1.0 - 0.066) / 1.33**2
 _WET_CLASSES = {"road", "parking", "sidewalk", "other-ground"}
 
 
 class Materials(NamedTuple):
-    """What each of G geometries is made of.
+    """The materials of G geometries.
 
     Attributes:
-        kind: (G,) uint8, `LAMBERT`, `RETRO`, `GLASS`, `LEAVES` (of what is
-            a volume of leaves, and not of single leaves) or `BEADS`, the
-            retro-reflector of road markings, which works at any angle:
-            EN 1436 measures it 1.24 deg above the road.
+        kind: (G,) uint8, `LAMBERT`, `RETRO`, `GLASS`, `LEAVES` (for volumes of
+            leaves, not for single leaves) or `BEADS`, the retro-reflector of
+            road markings, which works at any angle: EN 1436 measures it 1.24
+            deg above the road.
         reflectivity: (G,) float32, of a retro-reflector in units of a
             Lambertian target of reflectivity 1 that faces the beam.
         leaf_area_density: (G,) float32 [1/m].
@@ -96,9 +96,9 @@ def find_materials(
     `reflectivity` of a table of structures, and that over class and colour.
 
     Args:
-        geometries: what is seen.
-        structures: has all of them.
-        is_wet: whether water lies on what is ground.
+        geometries: of the scene.
+        structures: of all geometries.
+        is_wet: whether the ground is wet.
     """
     table = [_material(geometry, structures) for geometry in geometries]
     if is_wet:
@@ -150,14 +150,14 @@ def _material(
 
 
 def _brightness(rgb: tuple[float, float, float] | None) -> float:
-    """Returns the part of white light that a colour reflects, 0 to 1."""
+    """Returns the reflected part of white light of a colour, 0 to 1."""
     if rgb is None:
         return 0.5
     return float(np.clip(np.dot(rgb, (0.2126, 0.7152, 0.0722)), 0.0, 1.0))
 
 
 def _wet(reflectivity: float) -> float:
-    """Returns the reflectivity of what is covered with a film of water."""
+    """Returns the reflectivity of a surface under a film of water."""
     return (
         reflectivity * (1.0 - _FILM_INNER) / (1.0 - _FILM_INNER * reflectivity)
     )

@@ -1,4 +1,4 @@
-"""What rays have met, ready for compiled code."""
+"""Hits of rays, for compiled code."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cns_drake.ray_casting.ray_casting_scene import RayHits
 
 
 class Met(NamedTuple):
-    """What N rays have met.
+    """The hits of N rays.
 
     Attributes:
         d_Wset: (N, 3) float64 directions.
@@ -99,7 +99,7 @@ def _fill_cosines(met: Met) -> None:
 
 @compiled
 def copy_hit(source: Met, row: int, target: Met, to: int) -> None:
-    """Copies what one ray has met."""
+    """Copies the hit of one ray."""
     target.ranges[to] = source.ranges[row]
     target.geometry[to] = source.geometry[row]
     target.is_outside[to] = source.is_outside[row]

@@ -1,12 +1,12 @@
-"""The ways of light through leaves and panes.
+"""Light through leaves and panes.
 
-Leaves are a medium: a ray gets through a way s with the probability
-exp(-G LAD s), where LAD is the leaf area in a volume and G = 1/2 the part of
-it that leaves of all directions turn to a ray.
+Leaves are a medium: a ray passes a distance s with the probability exp(-G LAD
+s). LAD is the leaf area in a volume, and G = 1/2 the part of it that faces a
+ray, for leaves of all directions.
 
 A pane reflects R of the light like a mirror and lets T through, by Fresnel's
-equations for both of its faces. What dust on it scatters comes back directly,
-as does the mirrored light where the beam meets the pane at right angles.
+equations for both of its faces. Light scattered by dust on it comes back
+directly, and so does mirrored light if the beam meets the pane at right angles.
 """
 
 from __future__ import annotations
@@ -34,19 +34,19 @@ from cns_drake.sensors.returns.met import Met
 _GLASS_INDEX = 1.52
 # G of leaves of all directions.
 _LEAF_PROJECTION = 0.5
-# How often a ray goes on at most.
+# Greatest number of continuations of a ray.
 _MOST_STEPS = 6
-# A ray that goes on begins this far behind what it met [m].
+# A continued ray begins this far behind the surface [m].
 _SKIN = 1e-3
-# Light is not followed where a white target right behind would send back less
-# than this SNR.
+# Light is not followed if a white target right behind would give less than this
+# SNR.
 _FAINT_SNR = 3.0
 # The sheeting of signs and plates works up to this angle of incidence.
 _RETRO_COSINE = np.cos(np.deg2rad(60.0))
 # Panes are flat to this angle: within it and the beam's own they send the
 # mirrored light back to the unit [rad].
 _FLATNESS = 2e-3
-# Draws of a beam that leaves take, one for each of its rays.
+# Numbers of a beam's draws for leaves, one for each of its rays.
 _LEAF_DRAW = 8
 
 _Numbers = TypeVar("_Numbers", float, np.ndarray)
@@ -61,15 +61,15 @@ class Ways(NamedTuple):
     Attributes:
         beam: (N,) number of the beam of each.
         sub: (N,) number of the ray among those of its beam; 0 for its axis.
-        p_Wset: (N, 3) where each begins now.
-        d_Wset: (N, 3) where it goes.
+        p_Wset: (N, 3) present origins.
+        d_Wset: (N, 3) directions.
         time: (N,) part of the turn at which it was sent.
-        length: (N,) how far light has come before [m].
-        energy: (N,) part of the beam that is sent, and that gets back.
-        depth: (N,) leaf area that is still in its way; inf before the first
+        length: (N,) distance of the light so far [m].
+        energy: (N,) part of the beam that gets here and back.
+        depth: (N,) leaf area that is still to pass; inf before the first
             leaves.
         inside: (N,) geometry in which it begins, -1 for none.
-        reach: (N,) float32: how far it matters what the ray meets [m].
+        reach: (N,) float32: greatest useful range of the ray [m].
     """
 
     beam: np.ndarray
@@ -106,7 +106,7 @@ class Ways(NamedTuple):
 
 @compiled
 def pane_shares(cosine: _Numbers) -> tuple[_Numbers, _Numbers]:
-    """Returns what a pane reflects, and what it lets through.
+    """Returns the reflected and the transmitted part of light at a pane.
 
     Args:
         cosine: of the angle of incidence, one or many.
@@ -116,7 +116,8 @@ def pane_shares(cosine: _Numbers) -> tuple[_Numbers, _Numbers]:
     inner = np.sqrt(1.0 - sine**2)
     across = ((cosine - n * inner) / (cosine + n * inner)) ** 2
     along = ((inner - n * cosine) / (inner + n * cosine)) ** 2
-    # Light goes to and fro between the faces; both polarisations.
+    # Light is reflected between the faces many times; mean of both
+    # polarisations.
     reflected = across / (1.0 + across) + along / (1.0 + along)
     return reflected, 1.0 - reflected
 
@@ -136,12 +137,12 @@ def follow(
     Args:
         key: of the frame; see `frame_key`.
         ways: the rays of the beams.
-        met: what they meet.
+        met: their hits.
         materials: of all geometries.
         budget: of the unit.
         divergence: half angle of a beam [rad].
-        max_range: how far light is followed [m].
-        cast: casts the rays that go on.
+        max_range: greatest distance of followed light [m].
+        cast: casts the continued rays.
     """
     found: list[Light] = []
     for step in range(_MOST_STEPS):
@@ -179,16 +180,16 @@ def _step(
     light: Light,
     next_ways: Ways,
 ) -> tuple[int, int]:
-    """Takes each ray to what it meets.
+    """Takes each ray to its hit.
 
     Args:
         key, ways, met, materials, divergence, max_range: see `follow`.
         scale: of the budget.
-        light: to fill with what comes back.
-        next_ways: to fill with the rays that go on.
+        light: to fill with returning light.
+        next_ways: to fill with continued rays.
 
     Returns:
-        How many parts of light there are, and how many rays.
+        The numbers of parts of light, and of rays.
     """
     flat = _FLATNESS + divergence
     num_parts, num_ways = 0, 0
@@ -280,7 +281,7 @@ def add_light(
     cosine: float,
     share: float,
 ) -> None:
-    """Fills in what a surface sends back of a part of a beam's light."""
+    """Fills in the light that a surface reflects of a part of a beam."""
     light.beam[part] = beam
     light.distance[part] = distance
     energy = share * materials.reflectivity[geometry]
@@ -303,7 +304,7 @@ def _go_on(
     next_ways: Ways,
     row: int,
 ) -> None:
-    """Lets a ray begin anew behind what it met, in a new direction."""
+    """Continues a ray behind the surface, in a new direction."""
     next_ways.beam[row] = ways.beam[i]
     next_ways.sub[row] = ways.sub[i]
     next_ways.time[row] = ways.time[i]

@@ -1,4 +1,4 @@
-"""What beams meet first: light that comes back, and rays that go on."""
+"""First hits of beams: returning light, and continued rays."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ def start_ways(
     side_met: Met,
     materials: Materials,
 ) -> tuple[Light, Ways, Met]:
-    """Returns what opaque surfaces send back, and the rays that meet others.
+    """Returns the light of opaque surfaces, and the rays that meet others.
 
     Args:
         beam: (N,) number of each beam.
         p_WSset: (K, 3) positions of S, taken in turn.
         times: (T,) parts of the turn, taken in turn.
-        rest: (N,) part of the light that its axis stands for.
+        rest: (N,) part of the light that its axis represents.
         met: by the axes of the beams.
         sides: rays at the sides of beams.
         side_met: by those; misses do not count.
         materials: of all geometries.
 
     Returns:
-        The light, the rays that meet panes or leaves, and what they meet.
+        The light, the rays that meet panes or leaves, and their hits.
     """
     is_open = np.isin(materials.kind, (GLASS, LEAVES))
     light = Light.room_for(len(beam) + len(sides.ray))
@@ -87,7 +87,7 @@ def _start_ways(
     ways: Ways,
     ways_met: Met,
 ) -> tuple[int, int]:
-    """Fills in what comes back and what goes on; returns how many."""
+    """Fills in returning light and continued rays; returns their numbers."""
     num_parts, num_ways = 0, 0
     for row in range(len(beam)):
         geometry = met.geometry[row]
@@ -145,7 +145,7 @@ def _start(
     times: np.ndarray,
     share: float,
 ) -> None:
-    """Fills in a ray that begins at the unit, but for its direction."""
+    """Fills in a ray from the unit, without its direction."""
     ways.beam[way] = beam[row]
     ways.sub[way] = sub
     ways.time[way] = times[row % len(times)]

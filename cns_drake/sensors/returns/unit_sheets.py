@@ -1,7 +1,7 @@
-"""What data sheets state about how the units of the presets measure.
+"""Values from the data sheets of the presets' units.
 
-Where a sheet says nothing, the value of a similar unit stands in, and
-`unknown` names the field.
+If a sheet lacks a value, a similar unit's is used, and `unknown` names the
+field.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ _LIGHT = 299_792_458.0
 
 @dataclass(frozen=True)
 class UnitSheet:
-    """How a unit measures.
+    """The data sheet of a unit.
 
     Attributes:
         rows: ranges at stated reflectivities, at most two.
         range_noise: standard deviation of a range at an SNR of 1 [m].
-        range_floor: the best accuracy or precision that is stated, as the
-            standard deviation of a range at any SNR [m].
+        range_floor: the best stated accuracy or precision, as the standard
+            deviation of a range at any SNR [m].
         divergence_deg: full angle of the beam at 1 / e^2 of its peak [deg].
         pulse_ns: width of its pulse at half of the peak [ns].
         retro_from: the intensity at which retro-reflectors begin; diffuse
             targets have 0 to this for reflectivities of 0 to 1.
         unknown: fields that the sheet does not state.
-        source: where the numbers are from.
+        source: of the numbers.
     """
 
     rows: tuple[SheetRow, ...]

@@ -1,4 +1,4 @@
-"""Fog, rain and snowfall: what they take from a beam and send back.
+"""Fog, rain and snowfall: extinction of a beam, and back-scatter.
 
 Rain and snow are drops of random size and place. Their number in a volume
 follows Marshall and Palmer (1948) and Sekhon and Srivastava (1970),
@@ -8,9 +8,9 @@ follows Marshall and Palmer (1948) and Sekhon and Srivastava (1970),
 with N_0 = 8000 and L = 4.1 R^-0.21 for rain, N_0 = 2500 R^-0.94 and
 L = 2.29 R^-0.45 for snow; D in mm, of a flake once it has melted; the rate R in
 mm/h of water. Extinction is that of geometric optics, with twice the area of
-each drop. What a drop of rain sends back is that of LISA (Kilic et al., 2021);
-a flake sends back what the lidar ratio of ice crystals has it, 25 sr (Young
-and Vaughan, 2009).
+each drop. The back-scatter of a raindrop is that of LISA (Kilic et al., 2021).
+The back-scatter of a flake follows from the lidar ratio of ice crystals, 25 sr
+(Young and Vaughan, 2009).
 
 Fog is a medium: alpha = ln 20 / V by the meteorological visibility V, and a
 back-scatter coefficient of 0.046 / V [1/(m sr)] (Rasshofer et al., 2011).
@@ -31,25 +31,24 @@ from cns_drake.sensors.returns.link_budget import (
     target_snr,
 )
 
-# Diameters of drops that matter: smaller ones send back nothing that a unit
-# could detect [mm].
+# Diameters of drops; smaller ones are not detectable [mm].
 _DIAMETERS_MM = np.geomspace(0.05, 12.0, 120)
 _WATER_INDEX = 1.328
-# A flake has twice its area as extinction, and a Lambertian target rho / pi of
-# its area as back-scatter: rho = 2 pi / 25 sr.
+# The extinction of a flake is twice its area. The back-scatter of a Lambertian
+# target is rho / pi times its area: rho = 2 pi / 25 sr.
 _FLAKE_REFLECTIVITY = 2.0 * np.pi / 25.0
 # Distances at which scattering is tabulated [m].
 _DISTANCES = np.geomspace(0.3, 60.0, 96)
-# The aperture of a unit: the radius of a beam where it begins [m].
+# The aperture of a unit: the radius of a beam at its start [m].
 _APERTURE = 0.004
-# The receiver sees nothing of the beam before the first distance, and all of
-# it behind the second one [m]. Surfaces are bright enough all the same.
+# The receiver sees none of the beam before the first distance, and all of it
+# behind the second one [m]. Surfaces are bright enough in any case.
 _OVERLAP = (1.0, 3.0)
 
 
 @dataclass(frozen=True)
 class Weather:
-    """The weather of a drive; the air is clear unless a field says otherwise.
+    """The weather of a drive; by default the air is clear.
 
     Attributes:
         visibility: meteorological visibility in fog, None without fog [m].
@@ -57,7 +56,7 @@ class Weather:
         snowfall: rate as water [mm/h].
 
     Raises:
-        ValueError: if a value makes no sense.
+        ValueError: if a value is out of range.
 
     Example:
         from cns_drake import Weather
@@ -94,7 +93,8 @@ class Weather:
         )
 
     def drops(self, diameters_mm: np.ndarray) -> list[tuple[np.ndarray, float]]:
-        """Returns each kind of drops: N(D) [1/(m3 mm)], and reflectivity.
+        """Returns for each kind of drops N(D) [1/(m3 mm)], and the
+        reflectivity.
 
         Args:
             diameters_mm: D.
@@ -130,10 +130,9 @@ class Scattering(NamedTuple):
             than each distance.
         energies: (R, Q) quantiles of the energy of such an echo, at each
             distance.
-        fog_energies: (R,) energy of the echo of fog, by where it is; 0
-            without fog.
-        fog_counts: (R,) part of the fog's light that comes from nearer than
-            each distance.
+        fog_energies: (R,) energy of the echo of fog at each distance; 0 without
+            fog.
+        fog_counts: (R,) part of the fog's light from nearer than each distance.
     """
 
     distances: np.ndarray
@@ -153,17 +152,17 @@ def tabulate_scattering(
     resolution: float,
     min_range: float,
 ) -> Scattering:
-    """Returns what a unit detects of the weather itself.
+    """Returns the detected echoes of the weather.
 
     Drops are a Poisson process in distance and diameter. Each is detected by
     the probability of its own SNR, which thins it to another such process.
 
     Args:
-        weather: which.
+        weather: the weather.
         budget: of the unit.
         divergence: half angle of a beam [rad].
         resolution: length of a pulse, there and back [m].
-        min_range: nothing nearer is measured [m].
+        min_range: nearest measured range [m].
     """
     distances = _DISTANCES[min_range < _DISTANCES]
     distances = np.concatenate([[min_range], distances])

@@ -255,8 +255,8 @@ def test_command(drive, tmp_path):
     assert again.returncode == 2
     assert again.stdout == ""
     assert again.stderr.splitlines()[-1] == (
-        f"cns-drake: error: {tmp_path / 'out/sequences/07'}: this drive is there"
-        " already; remove it or give another folder"
+        f"cns-drake: error: {tmp_path / 'out/sequences/07'}: this drive is"
+        " there already; remove it or give another folder"
     )
 
 
@@ -275,7 +275,9 @@ def test_several_drives_share_a_folder(drive, tmp_path):
 def test_a_drive_is_not_replaced(drive, tmp_path):
     drive_folder = export_sequence(drive, "kitti", tmp_path / "output")
     (drive_folder / "times.txt").write_text("mine")
-    with pytest.raises(InputError, match="sequences/07: this drive is there already"):
+    with pytest.raises(
+        InputError, match="sequences/07: this drive is there already"
+    ):
         export_sequence(drive, "kitti", tmp_path / "output")
     assert (drive_folder / "times.txt").read_text() == "mine"
 

@@ -206,7 +206,10 @@ def set_in(*keys):
         (broken(set_in("version", "3.0")), "version '3.0'"),
         (broken(set_in("CityObjects", [])), "CityObjects: not an object"),
         (broken(set_in("CityObjects", {})), "the file has no objects"),
-        (broken(set_in("vertices", [[1, 2]])), "vertices: must be three numbers"),
+        (
+            broken(set_in("vertices", [[1, 2]])),
+            "vertices: must be three numbers",
+        ),
         (broken(set_in("vertices", [[1e300, 0, 0]])), "beyond 1e+08 m"),
         (broken(set_in("vertices", "abc")), "vertices: must be three numbers"),
         (

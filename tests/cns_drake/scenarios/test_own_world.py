@@ -120,9 +120,9 @@ def test_the_drive_keeps_to_waypoints_and_speeds(yard):
             {"world": None},
             r"world: give either a map and its stage, or a world",
         ),
-        ({"stage": "04"}, r"stage: a map and its stage belong together"),
+        ({"stage": "04"}, r"stage: give a map and its stage together"),
         ({"waypoints": None}, r"waypoints: give either a route or waypoints"),
-        ({"aside": 0.5}, r"waypoints: aside is of a route"),
+        ({"aside": 0.5}, r"waypoints: aside is for a route"),
         (
             {"route": [{"road": "a", "direction": "forward", "lane": 1}]},
             r"route: a world has no roads, give waypoints instead",

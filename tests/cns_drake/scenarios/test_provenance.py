@@ -1,4 +1,4 @@
-"""What a recording was made from and with."""
+"""The inputs and libraries of a recording."""
 
 import hashlib
 import importlib.metadata

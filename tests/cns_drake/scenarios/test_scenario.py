@@ -123,7 +123,7 @@ def test_returns_and_weather_are_replaced(small_map):
         ({"lidars": {"a": {"faint_dropout": -1}}}, r"a.faint_dropout: "),
         ({"lidars": {"a": {"motion_distortion": "x"}}}, r"motion_distortion"),
         ({"lidars": {"a": {"returns": "real"}}}, r"a.returns: .*'calibrated'"),
-        ({"lidars": {"a": {"echoes": "dual"}}}, r"echoes: choices need ret"),
+        ({"lidars": {"a": {"echoes": "dual"}}}, r"echoes: only calibrated"),
         (
             {"lidars": {"a": {"returns": "calibrated", "dropout": 0.1}}},
             r"lidars.a: dropout: calibrated returns have their own",

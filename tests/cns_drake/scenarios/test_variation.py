@@ -164,10 +164,10 @@ def test_a_member_is_a_scenario_file_of_its_own(tmp_path):
         ({"city_seeds": []}, r"city_seeds: "),
         ({"city_seeds": [1, -1]}, r"city_seeds\.1: "),
         ({"city_seeds": [1.5]}, r"city_seeds\.0: "),
-        ({"city_seeds": [4, 1, 4]}, r"city_seeds: 4 is there twice"),
+        ({"city_seeds": [4, 1, 4]}, r"city_seeds: the seed 4 is there twice"),
         (
             {"city_seeds": [1], "stage": "04", "towards": "02"},
-            r"family\.yaml: towards: not with city_seeds: what stages ",
+            r"family\.yaml: towards: not with city_seeds: stages ",
         ),
         (
             {"city_seeds": [1], "stage": "02"},

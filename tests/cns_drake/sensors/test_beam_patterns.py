@@ -66,7 +66,9 @@ def test_presets_make_usable_patterns(preset):
 
 
 def test_no_preset_of_that_name():
-    with pytest.raises(KeyError, match="no LiDAR preset 'os1-65'; known: cns"):
+    with pytest.raises(
+        KeyError, match="no LiDAR preset 'os1-65'; there are: cns"
+    ):
         make_beam_pattern("os1-65")
     with pytest.raises(ValueError, match="'avia' has no columns"):
         make_beam_pattern("avia", num_columns=100)
@@ -186,7 +188,7 @@ def test_beams_in_any_directions():
         ([], {}, "0 directions"),
         ([[1, 0, 0]], {"times": [0, 1]}, "1 directions, 2 times"),
         ([[0, 0, 0]], {}, "zero"),
-        ([[np.nan, 0, 0]], {}, "zero, or no number"),
+        ([[np.nan, 0, 0]], {}, "zero or not a number"),
         ([[1, 0, 0]], {"times": [0.1]}, "not within the turn of 0.1 s"),
     ],
 )

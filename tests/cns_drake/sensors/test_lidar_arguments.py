@@ -58,17 +58,25 @@ class Site:
     ("options", "error", "fault"),
     [
         ({"body": "wall"}, TypeError, r"plant.GetBodyByName\('wall'\)"),
-        ({"body": 3}, TypeError, "body: 3 is no RigidBody"),
-        ({"pose": [0, 0, 1]}, TypeError, "X_PS: .* is no RigidTransform"),
-        ({"pattern": 16}, TypeError, "pattern: 16 is no BeamPattern"),
+        ({"body": 3}, TypeError, "body: 3 is not a RigidBody"),
+        ({"pose": [0, 0, 1]}, TypeError, "X_PS: .* is not a RigidTransform"),
+        ({"pattern": 16}, TypeError, "pattern: 16 is neither a BeamPattern"),
         ({"pattern": "vlp-61"}, KeyError, "no LiDAR preset 'vlp-61'"),
-        ({"range_noise": -0.1}, ValueError, "range_noise: -0.1 is no length"),
-        ({"range_noise": np.nan}, ValueError, "range_noise: nan is no length"),
-        ({"range_noise": "x"}, ValueError, "range_noise: 'x' is no length"),
-        ({"dropout": "a"}, ValueError, "dropout: 'a' is no probability"),
-        ({"dropout": 1.5}, ValueError, "dropout: 1.5 is no probability"),
-        ({"seed": -1}, ValueError, "seed: -1 is no integer"),
-        ({"seed": 0.5}, ValueError, "seed: 0.5 is no integer"),
+        (
+            {"range_noise": -0.1},
+            ValueError,
+            "range_noise: -0.1 is not a length",
+        ),
+        (
+            {"range_noise": np.nan},
+            ValueError,
+            "range_noise: nan is not a length",
+        ),
+        ({"range_noise": "x"}, ValueError, "range_noise: 'x' is not a length"),
+        ({"dropout": "a"}, ValueError, "dropout: 'a' is not a probability"),
+        ({"dropout": 1.5}, ValueError, "dropout: 1.5 is not a probability"),
+        ({"seed": -1}, ValueError, "seed: -1 is not an integer"),
+        ({"seed": 0.5}, ValueError, "seed: 0.5 is not an integer"),
         (
             {"range_noise": 0.1, "measurement": MeasurementModel()},
             ValueError,
@@ -85,7 +93,7 @@ def test_a_slip_is_found_at_once(options, error, fault):
 def test_a_plant_is_no_scene_graph():
     site = Site()
     site.scene_graph = site.plant
-    with pytest.raises(TypeError, match="MultibodyPlant is no SceneGraph"):
+    with pytest.raises(TypeError, match="MultibodyPlant is not a SceneGraph"):
         site.add()
 
 

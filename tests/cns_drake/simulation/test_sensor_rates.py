@@ -246,7 +246,7 @@ def test_rates_that_cannot_be(tmp_path, changes, fault):
     ("values", "fault"),
     [
         (None, r"imu\.kalibr: .*adis\.yaml: no such file"),
-        ([1], r"adis\.yaml: no mapping"),
+        ([1], r"adis\.yaml: not a mapping"),
         (KALIBR | {"update_rate": 333.0}, r"adis\.yaml: update_rate: 333 "),
         (KALIBR | {"noise": 1.0}, r"adis\.yaml: noise: "),
         (

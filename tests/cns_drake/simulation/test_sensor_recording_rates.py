@@ -132,7 +132,7 @@ def test_between_samples_an_error_holds():
 
 def test_what_makes_no_sense_is_refused(tmp_path):
     falling = Falling()
-    with pytest.raises(ValueError, match="needs its rate"):
+    with pytest.raises(ValueError, match="needs a rate"):
         falling.add_imu(noise=NOISE)
     with pytest.raises(ValueError, match="an IMU of 0 samples"):
         falling.add_imu(rate=0)

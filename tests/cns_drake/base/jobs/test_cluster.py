@@ -79,7 +79,7 @@ def test_a_job_that_cannot_be_done_and_the_address_in_the_environment(
     status, results = run.end()
     assert (status, results) == (1, []), run.told
     assert run.told[-1].startswith("cns-drake: error: endless: ")
-    assert "frames: 1000000 asked for" in run.told[-1]
+    assert "frames: 1000000 is too many" in run.told[-1]
     assert not [line for line in run.told if "Traceback" in line]
     assert (output / "first" / "metadata.yaml").is_file()
 
