@@ -46,10 +46,10 @@ def main(page: Path = Path("drone.html"), duration: float = 6.0) -> None:
         frames.append(cloud.xyzs().copy())
     points = np.concatenate(frames, axis=1)
     cloud = PointCloud((shown := points[:, ::5]).shape[1], _FIELDS)
-    cloud.mutable_xyzs()[:] = shown  # A fifth, for a small page.
+    cloud.mutable_xyzs()[:] = shown  # Fewer, for a small page.
     cloud.mutable_rgbs()[:] = turbo(shown[2] / 30.0, bytes=True)[:, :3].T
     meshcat.SetObject("cloud", cloud, point_size=0.12)
-    X_WE = body.EvalPoseInWorld(of_plant)  # Where the flight ends.
+    X_WE = body.EvalPoseInWorld(of_plant)  # End of the flight.
     meshcat.SetCameraPose(X_WE @ [-5, -3, 2.5], X_WE.translation())
     print(f"{points.shape[1]} returns")
     save_meshcat_page(meshcat, page)

@@ -32,7 +32,7 @@ def main(page: Path = Path("warehouse.html"), duration: float = 6.0) -> None:
     base, mast = (plant.GetBodyByName(name) for name in ("base", "mast"))
     plant.SetDefaultFloatingBaseBodyPose(base, RigidTransform([-6, 0, 0.001]))
 
-    # No angles count with p = 0; wheel speeds, left and right [rad/s].
+    # With p = 0 angles do not count; wheel speeds, left and right [rad/s].
     wheels = builder.AddSystem(ConstantVectorSource([0.0, 0.0, 9.0, 9.0]))
     target = plant.get_desired_state_input_port(robot)
     builder.Connect(wheels.get_output_port(), target)

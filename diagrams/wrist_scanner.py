@@ -33,7 +33,7 @@ def main(page: Path = Path("wrist.html"), duration: float = 4.0) -> None:
     goal = builder.AddSystem(ConstantVectorSource([*END, *4 * [0.0]]))
     target = plant.get_desired_state_input_port(arm)
     builder.Connect(goal.get_output_port(), target)
-    # x of the sensor is z of the wrist; its row lies across the sweep.
+    # x of the sensor is z of the wrist; its row of beams is across the sweep.
     wrist = plant.GetBodyByName("pitch")
     X_PS = RigidTransform(RotationMatrix(np.eye(3)[:, [2, 0, 1]]), [0, 0, 0.17])
     lidar = add_lidar(builder, scene_graph, wrist, X_PS, "hokuyo-ust-20lx")

@@ -1,10 +1,10 @@
 """Structural change and place recognition on LiDAR sequences.
 
-Independent of the simulator: nothing in here imports Drake, nor anything of
-`cns_drake` but `cns_drake.base`.
+Independent of the simulator: this package imports neither Drake nor any part of
+`cns_drake` except `cns_drake.base`.
 
-What is public is in `__all__`; each name loads what it needs when it is first
-asked for. `evaluation.sequences` and `evaluation.methods` are public as well.
+The public names are in `__all__`; a name is imported when it is first used.
+`evaluation.sequences` and `evaluation.methods` are public as well.
 """
 
 import importlib
@@ -56,7 +56,7 @@ __all__ = [
     "voxelise",
 ]
 
-# Module -> what it gives.
+# Module -> the public names it defines.
 _HOMES = {
     "cns_drake.base.errors": ("InputError",),
     "evaluation.change.tcr": ("TemporalChange", "covered", "temporal_change"),
@@ -79,8 +79,8 @@ _HOMES = {
     "evaluation.sequences": ("Sequence", "open_sequence"),
 }
 
-# Python prefers a package to a folder without `__init__`. One of the user's
-# that is called the same stays importable, behind ours.
+# Python prefers a package to a folder without `__init__`. A user's folder of
+# the same name stays importable behind ours.
 __path__ = extend_path(__path__, __name__)
 
 

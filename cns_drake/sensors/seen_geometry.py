@@ -123,7 +123,7 @@ class SeenGeometry:
         """Returns the materials of the geometries of `scene`.
 
         Args:
-            is_wet: whether water lies on the ground; the same at each call.
+            is_wet: whether the ground is wet; the same at each call.
         """
         if self._materials is None:
             self._materials = find_materials(
@@ -145,7 +145,7 @@ class SeenGeometry:
         self._geometries = self._reader.read(inspector, hidden)
 
     def _is_built(self, query_object: QueryObject) -> bool:
-        """Tells whether the scene is of what there is."""
+        """Returns whether the scene is up to date."""
         if self._built is not self._geometries and (
             len(self._built) != len(self._geometries)
             or not all(map(is_, self._built, self._geometries))
@@ -167,7 +167,7 @@ class SeenGeometry:
         self.instance = np.array([table[n].instance for n in names], np.uint16)
         world = query_object.inspector().world_frame_id()
         anchored = self._sight.anchored_frames | {world}
-        # Copies: Drake gives references to what goes on changing.
+        # Copies: Drake's references go on changing.
         self._X_WAs = {
             frame_id: RigidTransform(query_object.GetPoseInWorld(frame_id))
             for frame_id in {g.frame_id for g in self._geometries}

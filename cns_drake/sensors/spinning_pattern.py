@@ -1,4 +1,4 @@
-"""LiDARs that turn, and rows of beams with them."""
+"""Beam patterns of spinning LiDARs, with one ring or many."""
 
 from __future__ import annotations
 
@@ -17,10 +17,9 @@ class SpinningPattern(BeamPattern):
     In the sensor frame S (x forward, y left, z up) the turn starts at the
     rear and goes clockwise seen from above, as Ouster's and Velodyne's units
     turn: column k of n points at azimuth pi - 2 pi k / n. With azimuth limits
-    it goes from the first to the last of them, columns at both included, and
-    fires for that part of the turn only. Ring 0 is the highest beam. Beams
-    are ordered as they fire: column by column, and from ring 0 downwards in
-    each.
+    it goes from the first to the last one, both included, and fires only in
+    that part of the turn. Ring 0 is the highest beam. Beams are ordered as they
+    fire: column by column, and from ring 0 downwards in each.
 
     Attributes:
         elevations_rad: elevation of each ring, descending [rad].
@@ -88,11 +87,11 @@ class SpinningPattern(BeamPattern):
 
     @cached_property
     def packet_order(self) -> np.ndarray:
-        """(num_beams,) beams in the order in which to cast them.
+        """(num_beams,) beams in the order of casting.
 
-        Ring by ring: neighbours in this order point nearly the same way
-        and meet the same geometry, which a packet of rays profits from (by
-        1.6 over the firing order, in Metropolis).
+        The order is ring by ring: neighbours point nearly the same way and meet
+        the same geometry, which makes packets of rays faster (by 1.6 against
+        the firing order, in Metropolis).
         """
         beams = np.arange(self.num_beams)
         return beams.reshape(self.num_columns, self.num_rings).T.ravel()

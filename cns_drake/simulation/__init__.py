@@ -1,1 +1,1 @@
-"""A scenario as a Drake Diagram, and what runs it."""
+"""A scenario as a Drake Diagram, and its simulation."""

@@ -14,13 +14,13 @@ from cns_drake.simulation.planned_sequence import PlannedSequence
 
 
 class DriveInProgress(PlannedSequence):
-    """The scans of the first LiDAR, just as they are recorded.
+    """The scans of the first LiDAR, at the time of their recording.
 
-    The simulation advances to the frame of the scan that is asked for.
+    Reading a scan advances the simulation to its frame.
     """
 
     def __init__(self, drive: LoadedDrive, simulator: Simulator):
-        """Takes the station of a drive, whose first frame is still to come."""
+        """Takes the station of a drive before its first frame."""
         super().__init__(drive.scenario, drive.trajectory, drive.num_frames)
         self._simulator = simulator
         self._lidar = next(iter(drive.scenario.lidars))
@@ -30,7 +30,8 @@ class DriveInProgress(PlannedSequence):
         self._fault: BaseException | None = None
 
     def raise_fault(self) -> None:
-        """Raises what the simulation raised, whatever its reader made of it."""
+        """Raises an exception of the simulation, even if the reader caught
+        it."""
         if self._fault is not None:
             raise self._fault
 
@@ -39,7 +40,7 @@ class DriveInProgress(PlannedSequence):
 
         Raises:
             ValueError: the simulation is beyond the frame, or the vehicle is
-                not where it was planned to be.
+                not at its planned place.
         """
         simulator = self._simulator
         try:
@@ -50,5 +51,7 @@ class DriveInProgress(PlannedSequence):
         context, diagram = simulator.get_context(), simulator.get_system()
         X_WB = diagram.GetOutputPort("odometry").Eval(context).X_WB
         if not X_WB.IsExactlyEqualTo(self.X_WBs[index]):
-            raise ValueError(f"frame {index}: not where it was planned")
+            raise ValueError(
+                f"frame {index}: the vehicle is not at its planned place"
+            )
         return diagram.GetOutputPort(f"{self._lidar}_scan").Eval(context)

@@ -1,4 +1,4 @@
-"""The recording of a drive: what it says of itself, and how it is resumed."""
+"""The recording of a drive: its metadata, and how it is resumed."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def make_bag(
     """Makes the recording of a drive, so far without messages.
 
     Args:
-        drive: what is going to be recorded.
+        drive: the drive to record.
         folder: to write.
         overwrite: whether it may replace an existing recording.
     """
@@ -57,7 +57,7 @@ def make_bag(
             },
             **imu_files,
         },
-        # It can be simulated again, as long as all lies as it does.
+        # The drive can be simulated again while its files stay in place.
         scenario=describe_scenario(scenario, folder),
         beside=imu_files,
         custom_data={
@@ -80,7 +80,7 @@ def resume_recording(
     on_frame: ProgressCallback,
     on_note: NoteCallback,
 ) -> int:
-    """Keeps what an interrupted run has recorded; returns how many frames."""
+    """Keeps the frames of an interrupted run; returns their number."""
     if not bag.follows_interruption():
         return 0
     name, num_frames = drive.scenario.name, drive.num_frames
@@ -92,8 +92,8 @@ def resume_recording(
         first_points_topic(drive.scenario),
     )
     on_note(
-        f"{name}: {frames} of {num_frames} frames are there, going on with "
-        "the next"
+        f"{name}: {frames} of {num_frames} frames are there; going on with "
+        "the next one"
     )
     if frames > 0:
         on_frame(frames, num_frames)

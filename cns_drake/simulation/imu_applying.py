@@ -27,7 +27,7 @@ def apply_imu_config(
         scenario: with the IMU.
         builder: of the Diagram.
         base: the vehicle's body that carries it.
-        trajectory: how that body moves.
+        trajectory: of that body.
         motion: the source of the bodies' motion.
 
     Returns:

@@ -1,4 +1,4 @@
-"""From the configuration of a LiDAR to its systems in a Diagram."""
+"""Adds a scenario's LiDAR to a Diagram."""
 
 from __future__ import annotations
 
@@ -45,17 +45,17 @@ def apply_lidar_config(
         world: the stage with the vehicle.
         trajectory: of the vehicle.
         name: of the LiDAR.
-        weather: in which it measures.
-        traffic: what else moves there.
+        weather: of the drive.
+        traffic: other moving objects.
         seed: of its noise.
-        num_threads: how many threads cast its rays.
+        num_threads: number of threads that cast its rays.
     """
     plant = world.plant
     pattern = make_pattern(config)
     distorts = config.motion_distortion
     moving = None
     if traffic is not None and distorts:
-        # They go on moving while it turns.
+        # They keep moving during a turn.
         moving = traffic.moving_frames
     lidar = add_lidar(
         builder,

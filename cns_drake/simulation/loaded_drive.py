@@ -1,4 +1,4 @@
-"""A scenario with everything that it takes to simulate it."""
+"""A scenario, loaded and ready for simulation."""
 
 from __future__ import annotations
 
@@ -32,16 +32,16 @@ from cns_drake.traffic.traffic_plan import TrafficPlan
 
 @dataclass(frozen=True)
 class LoadedDrive:
-    """A scenario with what it takes to run it.
+    """A scenario with all inputs of its simulation.
 
     Attributes:
         scenario: with `frames` given.
-        inputs: digests of what it was read from.
+        inputs: digests of its files.
         fingerprint: of the recording, for `fingerprint.txt`.
         trajectory: of the vehicle.
         world: the stage.
-        num_frames: how many it takes.
-        traffic: what else moves, if anything does.
+        num_frames: number of frames.
+        traffic: other moving objects, if any.
     """
 
     scenario: Scenario
@@ -80,7 +80,7 @@ def load_drive(scenario: Scenario) -> LoadedDrive:
     changed = watch.changed()
     if changed is not None:
         raise InputError(f"{changed}: changed while it was being read")
-    # The whole drive is the same by whichever name it is asked for.
+    # `frames` is set for the whole drive as well, so that both are the same.
     whole = num_frames == frames_within(
         trajectory.duration, frame_period(scenario.lidars)
     )

@@ -1,4 +1,4 @@
-"""A drive that is planned, and simulated while it is read."""
+"""A planned drive, without its scans."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from cns_drake.scenarios.sensor_making import sensor_pose
 
 
 class PlannedSequence(Sequence):
-    """All of a recording of a scenario but its scans, as it would hold it.
+    """The contents of a scenario's recording, except its scans.
 
     Attributes:
         trajectory: of the vehicle.
@@ -65,8 +65,8 @@ class PlannedSequence(Sequence):
         times = self.period * np.arange(len(self))
         moments = self.trajectory.at(times)
         found = [pose_at(moments, frame) for frame in range(len(self))]
-        # By way of quaternions, as a plant and a recording have it: to the
-        # last bit, on which a voxel or a plane may depend.
+        # Rotations pass through quaternions, as in a plant and a recording: the
+        # last bit can decide on a voxel or a plane.
         return [
             RigidTransform(
                 RotationMatrix(X_WB.rotation().ToQuaternion()),

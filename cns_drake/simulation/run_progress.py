@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import math
 from pathlib import Path
 
-# Reports that so many frames of so many are done.
+# Reports how many frames of how many are done.
 ProgressCallback = Callable[[int, int], None]
 # Receives a message for the user.
 NoteCallback = Callable[[str], None]
@@ -15,16 +15,16 @@ NoteCallback = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Run:
-    """What a simulation did.
+    """The result of a simulation.
 
     Attributes:
         name: of the sequence.
         folder: the recording.
         num_frames: frames in the recording.
-        resumed_frames: how many of them an interrupted run had recorded.
+        resumed_frames: number of them that an interrupted run had recorded.
         simulated_s: simulated time from the first frame simulated to the
             last [s].
-        wall_s: time that took, without loading [s].
+        wall_s: wall time of the simulation, without loading [s].
         loading_s: time to load the stage and plan the drive [s].
 
     Example:

@@ -32,13 +32,13 @@ def scan_world(
     pattern: BeamPattern,
     returns: CalibratedReturns | None = None,
 ) -> np.ndarray:
-    """Returns one scan, taken with the world's models as they start.
+    """Returns one scan of the world's models in their initial state.
 
     Args:
-        world: what to scan.
+        world: the world to scan.
         X_WS: the sensor's pose in the world.
         pattern: the beams.
-        returns: how a real unit measures; None for ideal returns.
+        returns: the model of a real unit; None for ideal returns.
 
     Returns:
         Structured array of `POINT_DTYPE`, in the sensor frame.
@@ -63,7 +63,7 @@ def check_ending(path: Path) -> None:
     """
     if path.suffix not in _ENCODERS:
         raise InputError(
-            f"{path}: unknown ending '{path.suffix}'; known: "
+            f"{path}: unknown ending '{path.suffix}'; use one of "
             f"{', '.join(_ENCODERS)}"
         )
 

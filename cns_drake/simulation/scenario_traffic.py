@@ -1,4 +1,4 @@
-"""The traffic that a scenario asks for."""
+"""The traffic of a scenario."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ def plan_scenario_traffic(
         trajectory: of its vehicle.
 
     Raises:
-        InputError: the map has no roads or sidewalks, or they do not hold so
-            many; or the trace cannot be played here.
+        InputError: the map has no roads or sidewalks, or no room for that many;
+            or the trace cannot be played here.
 
     Example:
         from cns_drake import load_scenario, plan_drive, plan_scenario_traffic
@@ -85,7 +85,7 @@ def plan_scenario_traffic(
         vehicles=wanted.vehicles,
         walkers=wanted.walkers,
         seed=wanted.seed,
-        # For the whole drive; the frames are a part of it.
+        # Traffic is planned for the whole drive, not only for its frames.
         duration=trajectory.duration + FRAME_PERIOD,
         ego=ego,
         ego_box=EGO_BOX,
@@ -96,7 +96,7 @@ def plan_scenario_traffic(
 
 
 def _load_ways(folder: MapFolder) -> tuple[LaneGraph, list[Walkway]]:
-    """Returns what vehicles and walkers follow on a map."""
+    """Returns lanes and walkways of a map."""
     if not folder.roads.is_file():
         return read_lanes(folder.lanes)
     network = load_road_network(folder.roads)
@@ -110,7 +110,7 @@ def _check_room(
     graph: LaneGraph,
     walkways: Sequence[Walkway],
 ) -> None:
-    """Checks that roads and sidewalks hold so many.
+    """Checks that roads and sidewalks have room for the traffic.
 
     Raises:
         InputError: they do not.
@@ -118,21 +118,23 @@ def _check_room(
     room = room_for_vehicles(graph)
     if wanted.vehicles > room:
         raise InputError(
-            f"{where}: vehicles: {wanted.vehicles} asked for, the roads hold "
-            f"{room}"
+            f"{where}: vehicles: {wanted.vehicles} are too many; the roads "
+            f"hold {room}"
         )
     room = room_for_walkers(walkways)
     if wanted.walkers and not room:
-        raise InputError(f"{where}: walkers: the map has no sidewalks")
+        raise InputError(
+            f"{where}: walkers: the map has no sidewalks; leave walkers out"
+        )
     if wanted.walkers > room:
         raise InputError(
-            f"{where}: walkers: {wanted.walkers} asked for, the sidewalks hold "
-            f"{room}"
+            f"{where}: walkers: {wanted.walkers} are too many; the sidewalks "
+            f"hold {room}"
         )
 
 
 def with_traffic(world: World, plan: TrafficPlan) -> World:
-    """Returns a world whose table and notes tell of traffic, too.
+    """Returns a world with the traffic in its table and notes.
 
     Raises:
         InputError: there are more structures than ids.

@@ -42,11 +42,11 @@ def add_mcap_recorder(
 
     Every LiDAR has a topic `/<name of the system>/points`; every camera
     `/<name>/color`, `depth`, `label` and `camera_info`; an IMU `/imu/data`,
-    odometry `/odometry`. Sensors on the body of the odometry have their place
-    there in `/tf_static`, all others where they are in `/tf`.
+    odometry `/odometry`. Sensors on the body of the odometry have their pose on
+    it in `/tf_static`; all others have their pose in `/tf`.
 
-    Sensors may be recorded at rates of their own: those that `rates` names,
-    an IMU that has a rate, and, without a period, each LiDAR once a turn.
+    A sensor may have its own rate: sensors in `rates`, an IMU with a rate, and,
+    without a period, each LiDAR with one scan a turn.
 
     Args:
         builder: of the diagram that holds the sensors.
@@ -55,7 +55,7 @@ def add_mcap_recorder(
             turn of the first LiDAR.
         rates: name of a LiDAR or a camera, `imu` or `odometry` -> messages
             per second.
-        lidars: to record; each has a name of its own.
+        lidars: to record; each needs a different name.
         cameras: name -> camera.
         imu: to record, if any.
         odometry: to record, if any.
@@ -69,7 +69,7 @@ def add_mcap_recorder(
 
     Raises:
         InputError: the folder must not be used.
-        ValueError: a rate is of no sensor, or there is no period.
+        ValueError: a rate names no sensor, or there is no period.
 
     Example:
         from cns_drake import add_mcap_recorder
@@ -144,11 +144,11 @@ def _periods(
     """Returns name of a sensor -> time between its messages [s].
 
     Raises:
-        ValueError: a rate is of no sensor, or there is no period.
+        ValueError: a rate names no sensor, or there is no period.
     """
     turns = {lidar.get_name(): lidar.pattern.period for lidar in lidars}
     if period is None and not turns:
-        raise ValueError("a recording without a LiDAR needs a period")
+        raise ValueError("period: a recording without a LiDAR needs one")
     usual = period or next(iter(turns.values()))
     periods = dict.fromkeys((*turns, *cameras, "imu", "odometry"), usual)
     if period is None:
@@ -161,7 +161,10 @@ def _periods(
                 f"rates: no sensor '{name}'; there are: {', '.join(periods)}"
             )
         if not 0.0 < rate < math.inf:
-            raise ValueError(f"rates: {name}: {rate} a second")
+            raise ValueError(
+                f"rates: {name}: {rate} is not a positive number of messages "
+                "a second"
+            )
         periods[name] = 1.0 / rate
     return periods
 
@@ -169,13 +172,13 @@ def _periods(
 def _make_schedule(
     topics: Collection[Topic], periods: Mapping[str, float]
 ) -> Schedule:
-    """Returns when each topic is due, of sensors with periods [s]."""
+    """Returns the schedule of the topics of sensors with periods [s]."""
     by_topic = {}
     for topic in topics:
         if topic.latched:
             continue
         sensor = topic.name.split("/")[1]
-        # All frames that move, as often as any of them is recorded.
+        # `/tf` has all moving frames, at the highest rate of any of them.
         moving = [one for name, one in periods.items() if name != "imu"]
         by_topic[topic.name] = periods.get(sensor, min(moving))
     return make_schedule(by_topic)

@@ -1,7 +1,7 @@
-"""Drives for the evaluation that are simulated while it reads them.
+"""Drives that are simulated while the evaluation reads them.
 
-Nothing is written: what would be recorded goes straight into maps and
-descriptions, in about half the time.
+Nothing is written: scans go straight into maps and descriptions, in about half
+the time.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class SimulatedDrive:
     """Opens a scenario's drive, as seen by its first LiDAR.
 
     Attributes:
-        scenario: what to simulate.
+        scenario: the scenario to simulate.
     """
 
     scenario: Scenario
@@ -52,7 +52,8 @@ class SimulatedDrive:
         return SimulatedSequence(self.scenario)
 
     def identity(self) -> dict:
-        """Returns scenario, and digests of all its files and of the code."""
+        """Returns the scenario, and digests of all its files and of the
+        code."""
         return {
             "simulated": self.scenario.model_dump(mode="json"),
             "inputs": digest_inputs(self.scenario),
@@ -61,9 +62,9 @@ class SimulatedDrive:
 
 
 class SimulatedSequence(PlannedSequence):
-    """The scans that a recording of a scenario would hold.
+    """The scans of a scenario, as in its recording.
 
-    A scan is simulated whenever it is asked for.
+    A scan is simulated on each access.
     """
 
     def __init__(self, scenario: Scenario):
@@ -124,14 +125,14 @@ class SimulatedSequence(PlannedSequence):
     def scan(self, index: int) -> np.ndarray:
         context = self._lidar.GetMyMutableContextFromRoot(self._context)
         if self._is_random or self._has_traffic:
-            # Only noise and traffic depend on the time as such; at a new one,
-            # the SceneGraph computes everything anew.
+            # The time is set only for noise and traffic, which depend on it:
+            # the SceneGraph computes everything anew at a new time.
             self._context.SetTime(index * self.period)
         self._lidar.GetInputPort("sweep").FixValue(context, self._sweep(index))
         return self._lidar.GetOutputPort("scan").Eval(context)
 
     def _sweep(self, index: int) -> Sweep:
-        """Returns where the sensor is during a frame."""
+        """Returns the poses of the sensor during a frame."""
         if self._column_t is not None:
             times = index * self.period + self._column_t
             return Sweep(*self.trajectory.poses(times)).of_frame(self.X_BS)

@@ -62,24 +62,24 @@ def simulate(
     the result is the same. For a page of the drive all frames are simulated.
 
     Args:
-        scenario: what to run.
+        scenario: the scenario to run.
         output: the folder of recordings.
         page_file: where to save a web page of the drive, if anywhere.
         graphviz_file: where to save the Diagram as Graphviz text, if
             anywhere.
         overwrite: replace an existing recording of that name.
-        num_threads: how many threads cast the rays of a LiDAR; the recording
-            does not depend on it.
+        num_threads: number of threads that cast the rays of a LiDAR; the
+            recording does not depend on it.
         reader: reads the drive while it is recorded, each scan of the first
-            LiDAR once and in order, and raises nothing; what it leaves is
-            simulated all the same. It is called for a recording that begins
-            with the first frame only.
-        on_frame: is told about progress.
-        on_note: is told what was found of an interrupted run, and of the
-            world's table of structures.
+            LiDAR once and in order, and must not raise. Scans that it does not
+            read are simulated all the same. It is called only for a recording
+            that begins with the first frame.
+        on_frame: receives the progress.
+        on_note: receives notes on an interrupted run, and on the world's table
+            of structures.
 
     Raises:
-        InputError: the scenario cannot be run or its output not be written.
+        InputError: the scenario cannot be run, or its output cannot be written.
 
     Example:
         from pathlib import Path
@@ -90,9 +90,9 @@ def simulate(
     """
     start = time.perf_counter()
     folder = output / scenario.name
-    # Interrupts come up where `strike` is called, and nowhere else.
+    # Interrupts are raised only where `strike` is called.
     with interrupts_wait() as strike:
-        # What can be found wrong at once is found before anything slow.
+        # Quick checks come before all slow work.
         _check_output(folder, (page_file, graphviz_file), overwrite)
         if not scenario.traffic.is_off:
             on_note(f"{scenario.name}: planning the traffic")
@@ -184,14 +184,15 @@ def _advance(
     on_frame: Callable[[int], None],
     reader: Callable[[Sequence], None] | None,
 ) -> float:
-    """Simulates frames and lets what they record be written.
+    """Simulates frames and writes their messages.
 
     Args:
         diagram: the station.
         writer: of its recording.
-        drive: what is simulated, up to its last frame.
+        drive: the drive, simulated up to its last frame.
         first: the first frame to simulate.
-        on_frame: takes how many frames of the drive are done, after each.
+        on_frame: receives the number of finished frames of the drive, after
+            each.
         reader: see `simulate`.
 
     Returns:
@@ -209,8 +210,8 @@ def _advance(
 
     simulator = Simulator(diagram)
     simulator.set_monitor(monitor)
-    # All is recorded at ticks; ending with the last one's time, no rounding
-    # can add or drop a message.
+    # Messages come at ticks. The simulation ends at the last tick's time, so
+    # that rounding cannot add or drop a message.
     begin = first * schedule.steps[first_points_topic(scenario)]
     end = max(schedule.ends.values())
     simulator.get_mutable_context().SetTime(begin * schedule.period)

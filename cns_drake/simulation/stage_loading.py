@@ -1,4 +1,4 @@
-"""The stage of a scenario, with what came and went since it was built."""
+"""The stage of a scenario, with its passing changes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from cns_drake.scenarios.shipped import vehicle_file
 from cns_drake.scene.world import World, load_world
 from cns_drake.transient.changing import change_world
 
-# From its middle line to either side of the car, with a margin [m].
+# Distance from the car's middle line to its sides, with a margin [m].
 _HALF_WIDTH = 1.3
 
 
@@ -28,7 +28,7 @@ def load_stage(
     """Loads the stage of a scenario, with the vehicle in it.
 
     Args:
-        scenario: what names it, and says what came and went.
+        scenario: names the stage and the passing changes.
         with_vehicle: whether the vehicle is there.
         trajectory: the drive, if already planned.
 
@@ -51,7 +51,7 @@ def load_stage(
 
 
 def _driven(scenario: Scenario, drive: shapely.LineString) -> BaseGeometry:
-    """Returns where vehicles drive, seen from above [m]."""
+    """Returns the area where vehicles drive, seen from above [m]."""
     driven = drive.buffer(_HALF_WIDTH)
     roads = map_folder(scenario).roads
     if scenario.map is None or not roads.is_file():

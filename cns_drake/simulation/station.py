@@ -49,27 +49,27 @@ def make_station(
     """Makes the Diagram of a scenario.
 
     Systems: `scene_graph` holds the stage and the vehicle, `vehicle_motion`
-    prescribes where the vehicle is, `geometry_pose` passes that on to the
-    SceneGraph; `traffic` moves all else; a `Lidar` for each entry of
+    prescribes the vehicle's pose, `geometry_pose` passes it on to the
+    SceneGraph; `traffic` moves other objects; a `Lidar` for each entry of
     `scenario.lidars` under its name (with a `<lidar>_sweep` if it moves while
     it turns), an accelerometer and a gyroscope (or `imu` and `imu_noise`, if
     the IMU has a rate or errors of its own), and `odometry` measure;
-    `mcap_recorder` and `meshcat_recorder` take down what they measure.
+    `mcap_recorder` and `meshcat_recorder` record the measurements.
 
     Exported output ports: `<lidar>_scan`, `specific_force`,
     `angular_velocity`, `odometry`, `geometry_query`; `R_WI` of such an
     IMU; and with traffic `objects`.
 
     Args:
-        scenario: what to build.
+        scenario: the scenario to build.
         world: the stage with the vehicle, if already loaded; its SceneGraph
             passes to the Diagram.
         trajectory: the drive, if already planned.
         traffic: of the scenario, if already planned; the world's structures
-            then have it, too (see `with_traffic`).
+            then include it (see `with_traffic`).
         bag: an open recording of the scenario's topics.
         page: a recorder of the same world for a web page.
-        num_threads: how many threads cast the rays of a LiDAR.
+        num_threads: number of threads that cast the rays of a LiDAR.
 
     Raises:
         InputError: the scenario's files cannot be used.
@@ -115,7 +115,7 @@ def make_station(
             structures=world.structures,
             turn=frame_period(scenario.lidars),
         )
-    # What is measured, by name: also the names of the exported ports.
+    # Measurements by name, which is also the name of the exported port.
     measured = {"geometry_query": scene_graph.get_query_output_port()}
     for name, config in scenario.lidars.items():
         lidar = apply_lidar_config(

@@ -1,4 +1,4 @@
-"""A LiDAR in a world in which nothing moves but the LiDAR and traffic."""
+"""A LiDAR in a world where only the LiDAR and traffic move."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ def make_still_world(
     lidar: Lidar,
     traffic: TrafficMotion | None = None,
 ) -> Diagram:
-    """Makes the Diagram of a world whose models stay as they start.
+    """Makes the Diagram of a world whose models keep their initial state.
 
-    What does not move need not be computed anew for every scan: for the
-    SceneGraph, thousands of visuals of a city's models are no fixed ones.
+    Static geometry need not be computed anew for every scan. To the SceneGraph,
+    the thousands of visuals of a city's models are not fixed.
 
     Args:
         world: the stage; its SceneGraph passes to the Diagram.
-        lidar: in it; what is not connected of it can be fixed.
-        traffic: what moves nevertheless, with its geometry in the world.
+        lidar: in it; inputs that are not connected can be fixed.
+        traffic: other moving objects, with their geometry in the world.
     """
     plant = world.plant
     builder = DiagramBuilder()

@@ -1,4 +1,4 @@
-"""Drives through other cities, whose places distract from the right one."""
+"""Distractors: drives through other cities, whose places are all wrong."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from cns_drake.scenarios.shipped import shipped_maps
 from cns_drake.studies.redrawing import redraw_cities
 from evaluation.sequences.sampling import sample_frames
 
-# Name of the only stage of a city that is drawn anew.
+# Name of the only stage of a redrawn city.
 _STAGE = "01"
 
 
@@ -41,7 +41,7 @@ def distracting_drives(
             these; its LiDARs measure the others, too.
         number: of places.
         spacing: between two places [m].
-        output: folder for cities that are drawn anew.
+        output: folder for redrawn cities.
         cluster: where these are drawn.
 
     Raises:
@@ -69,7 +69,7 @@ def _num_places(scenario: Scenario, spacing: float) -> int:
 def _drives(
     asking: Scenario, output: Path, cluster: Cluster
 ) -> Iterator[Scenario]:
-    """Yields drives without end."""
+    """Yields an endless series of drives."""
     maps = {name: MapFolder(path) for name, path in shipped_maps().items()}
     sequences = {
         name: [load_scenario(path) for path in folder.recordable_sequences()]

@@ -1,8 +1,8 @@
-"""What makes two drives through a city as different as they are.
+"""The effect of each knob on the difference of two drives.
 
-A city's change has three knobs: how far the drives pass each other, what is
-absent at the earlier stage, and what is lower there. Each is taken back in
-turn, and the drives are simulated anew.
+A city's change has three knobs: the offset of the drives, the structures that
+are absent at the earlier stage, and those that are lower there. Each is taken
+back in turn, and the drives are simulated anew.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from evaluation.study.trend_databases import Asked, measure_drives
 from evaluation.study.trend_points import TrendPoint
 
 _AS_IT_IS = "as_it_is"
-# Variant of the earlier stage -> what a reader is told.
+# Variant of the earlier stage -> its title.
 _TITLES = {
     _AS_IT_IS: "as it is",
     "no_aside": "the earlier drive in the middle of its lanes",
@@ -42,7 +42,7 @@ class Effect:
     """A pair of drives with one of the knobs taken back.
 
     Attributes:
-        title: which one, in words.
+        title: of the variant.
         points: a point for each method.
     """
 
@@ -57,7 +57,7 @@ def knob_effects(
 
     Args:
         earlier: a sequence; the database.
-        later: a sequence of the same map at a later stage; it asks.
+        later: a sequence of the same map at a later stage; the query.
         cluster: where the work is done.
 
     Raises:
@@ -90,11 +90,11 @@ def knob_effects(
 def _variants(
     earlier: Scenario, later: Scenario, folder: Path
 ) -> dict[str, Scenario]:
-    """Builds the stages that are needed; returns the drives through them."""
+    """Builds the required stages; returns the drives through them."""
     source = map_folder(earlier)
     first, last = earlier.stage, later.stage
     if first is None or last is None or map_folder(later) != source:
-        raise InputError(f"{later.name}: map: not that of {earlier.name}")
+        raise InputError(f"{later.name}: map: it is not that of {earlier.name}")
     city = make_city(source.path)
     names = [structure.name for structure in city.structures]
     stages = load_stages(source.stage_plan, names)
@@ -108,7 +108,7 @@ def _variants(
     for variant, plan in plans.items():
         if variant != _AS_IT_IS and plan == as_it_is:
             continue
-        # Drives are of one world where their maps have one name.
+        # Drives share a world if their maps have the same name.
         path = folder / variant / source.path.resolve().name
         _write_map(path, city, stages, first, plan, source)
         drives[variant] = earlier.model_copy(update={"map": str(path)})

@@ -1,7 +1,7 @@
-"""The ladder: what each cause of change costs each method.
+"""The ladder: the cost of each cause of change for each method.
 
-A drive asks a database that has the same route through the same city, with
-one cause of change between the two at a time. Nothing is recorded.
+A drive queries a database with the same route through the same city, with one
+cause of change between the two at a time. Nothing is recorded.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ from evaluation.study.parts import read_part
 from evaluation.study.rungs import MeasureRung, RungDrive
 from evaluation.study.study_layout import StudyFiles, SurveyFiles
 
-# With --quick only the strongest level of each cause is climbed, on every
+# With --quick only the strongest level of each cause is measured, on every
 # other query.
 QUICK_EXTENT = Extent(levels=(4,), most_places=300)
 QUICK_PROTOCOL = replace(PAPER_PROTOCOL, query_spacing=20.0)
@@ -65,23 +65,23 @@ def climb_ladder(
     """Measures all rungs of maps; writes tables, figure and findings.
 
     `<output>/ladder.csv` and `queries.csv` are the tables, `ladder.png` (and
-    PDF, SVG) the figure, `findings.txt` what they say. What is done already
-    is not done again.
+    PDF, SVG) the figure, `findings.txt` the findings. Finished work is not
+    repeated.
 
     Args:
-        maps: which maps, by name or folder; all shipped ones if empty.
+        maps: by name or folder; all shipped ones if empty.
         output: the folder for everything.
         cluster: where the work is done.
-        methods: that answer.
-        extent: how much of the ladder is climbed.
+        methods: the methods to measure.
+        extent: the part of the ladder.
         protocol: of place recognition; its gate does not matter.
-        on_note: is told of what a map lacks.
+        on_note: receives notes on things that a map lacks.
 
     Returns:
         The path of `ladder.csv`, and the findings.
 
     Raises:
-        InputError: a map is not known, the folder cannot be made, or a step
+        InputError: a map is unknown, the folder cannot be made, or a step
             failed.
     """
     asking = _asking_drives(maps or shipped_maps())
@@ -125,7 +125,7 @@ def _asking_drives(maps: Iterable[str]) -> list[Scenario]:
     """Returns the last drive of each map.
 
     Raises:
-        InputError: a map is not known, or two have drives of one name.
+        InputError: a map is unknown, or two have drives of one name.
     """
     drives: dict[str, Scenario] = {}
     for folder in dict.fromkeys(recordable_map(name) for name in maps):
@@ -160,7 +160,7 @@ class _Plan:
         self._distractors = list(drives)
 
     def add_rung(self, rung: Rung) -> Path:
-        """Adds the jobs of a rung; returns the part that they write."""
+        """Adds the jobs of a rung; returns the file that they write."""
         needs: list[str] = []
         others = self._distractors if rung.drives.num_distractors else ()
         name = f"{self._asking.name} {rung.cause} {rung.level} {rung.seed}"
@@ -214,7 +214,7 @@ class _Plan:
 
 
 def _labelled(asking: Scenario, rung: Rung) -> LadderRung:
-    # The database has the route of the query, whatever its stage.
+    # The database has the route of the query, at any stage.
     route = str(asking.stage)
     return LadderRung(
         map_folder(asking).name,

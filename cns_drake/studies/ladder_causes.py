@@ -1,9 +1,9 @@
-"""What changes between two drives, one cause at a time, and how strongly.
+"""Causes of change between two drives, and their strengths.
 
-Each cause changes one of the two drives. What a city is like when it is
-mapped, how it is mapped and from where, changes the drive of the database;
-what a later visitor meets, and measures with, changes the drive of the query,
-but never where it asks.
+Each cause changes one of the two drives. The city at the time of mapping, the
+ride and the place of the mapping LiDAR change the drive of the database.
+Conditions and sensor of the later visit change the drive of the query, but
+never its route.
 """
 
 from __future__ import annotations
@@ -44,19 +44,19 @@ CAUSES = (
     "size",
     ALL,
 )
-# Those that another seed draws anew.
+# Causes that another seed draws anew.
 RANDOM_CAUSES = frozenset(
     {*_TRANSIENT, "traffic", "weather", "returns", "ride", ALL}
 )
 
-# No driver keeps to a line: the LiDAR of the database is so far ahead of that
-# of the query, and so far to its left [m].
+# No driver keeps exactly to a line: the LiDAR of the database is this far ahead
+# of the query's, and to its left [m].
 _AHEAD = 1.25
 _LEFT = 0.5
 
 # Cause -> level -> strength. The levels of construction are the map's stages.
 STRENGTHS: Mapping[str, Mapping[int, Any]] = {
-    # Parts, or a depth [m]; see the scenario.
+    # Shares, or a depth [m]; see the scenario's `transient`.
     "parked_cars": {1: 0.25, 2: 0.5, 3: 0.75, 4: 1.0},
     "leaves": {1: 0.75, 2: 0.5, 3: 0.25, 4: 0.0},
     "snow": {1: 0.05, 2: 0.1, 3: 0.2, 4: 0.4},
@@ -72,8 +72,8 @@ STRENGTHS: Mapping[str, Mapping[int, Any]] = {
     "ride": {1: "A", 2: "B", 3: "C", 4: "D"},
     # Preset.
     "sensor": {1: "os1-64", 2: "hdl-64e", 3: "vlp-16", 4: "avia"},
-    # Offset to the left [m], and heading [deg]. Beyond the radius of a match
-    # no place would be right.
+    # Offset to the left [m], and heading [deg]. An offset beyond the radius of
+    # a match would leave no right place.
     "viewpoint": {1: (2.0, 0), 2: (4.0, 0), 3: (6.0, 0), 4: (6.0, 180)},
     # Number of places of other cities.
     "size": {1: 300, 2: 1000, 3: 3000, 4: 10000},
@@ -99,11 +99,11 @@ _WORDS = {
 
 @dataclass(frozen=True)
 class RungDrives:
-    """What is simulated for a rung of a ladder.
+    """The drives of a rung of a ladder.
 
     Attributes:
-        database: drive whose places are known.
-        query: drive that asks.
+        database: drive of the mapped places.
+        query: drive of the queries.
         num_distractors: places of other cities in the database.
     """
 
@@ -128,12 +128,12 @@ def changed_drives(
     """Returns drives with causes of change between them.
 
     Args:
-        plain: without.
+        plain: drives without a change.
         strengths: cause -> its strength.
-        seed: of what is random.
+        seed: of random draws.
     """
     drives = plain
-    # In one order, since returns are those of the sensor.
+    # The order is fixed, since returns depend on the sensor.
     for cause, change in _CHANGES.items():
         if cause in strengths:
             drives = change(drives, strengths[cause], seed)
@@ -217,7 +217,7 @@ def _asked(drives: RungDrives, **update: Any) -> RungDrives:
 def _mapped_from(
     scenario: Scenario, ahead: float, left: float, heading_deg: float
 ) -> Scenario:
-    """Returns a scenario with its LiDARs elsewhere on the vehicle."""
+    """Returns a scenario with its LiDARs moved on the vehicle."""
     lidars = {
         name: config.model_copy(
             update={

@@ -1,4 +1,4 @@
-"""The rungs of a ladder on a map: which causes, at which levels."""
+"""The rungs of a ladder on a map: causes and levels."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from cns_drake.studies.ladder_causes import (
 from cns_drake.traffic.road_lanes import make_lane_graph
 from cns_drake.traffic.starting_places import room_for_vehicles
 
-# Part of the room on the roads that traffic takes at most: the car needs some.
+# Greatest share of the roads' room for traffic: the car needs some, too.
 _MOST_ROOM = 0.5
 
 
@@ -36,9 +36,9 @@ class Rung:
     Attributes:
         cause: one of `CAUSES`.
         level: from 1 to 4; 0 for `none`.
-        seed: of what is random.
+        seed: of random draws.
         strength: in words.
-        drives: what is simulated.
+        drives: to simulate.
     """
 
     cause: str
@@ -48,7 +48,7 @@ class Rung:
     drives: RungDrives
 
     def fingerprint(self) -> str:
-        """Returns what tells the drives from all others."""
+        """Returns a fingerprint of the drives."""
         return fingerprint(
             {
                 "database": self.drives.database.model_dump(mode="json"),
@@ -60,13 +60,13 @@ class Rung:
 
 @dataclass(frozen=True)
 class Extent:
-    """How much of the ladder is climbed.
+    """The measured part of the ladder.
 
     Attributes:
         causes: some of `CAUSES`, without `none`, which is always there.
-        levels: from 1 to 4. A cause that lacks one has its nearest lower
-            level in its place.
-        seeds: of the draws of what is random.
+        levels: from 1 to 4. A cause that lacks one gets its nearest lower
+            level.
+        seeds: of random draws.
         most_places: most places of other cities.
         strengths: cause -> level -> strength; construction's are the map's
             stages.
@@ -84,7 +84,7 @@ class Extent:
 def plan_rungs(
     scenario: Scenario, extent: Extent
 ) -> tuple[list[Rung], list[str]]:
-    """Returns the rungs of a ladder, `none` first, and what a map lacks.
+    """Returns the rungs of a ladder, `none` first, and notes on missing ones.
 
     Args:
         scenario: of the query, through a stage of a map.
@@ -124,7 +124,7 @@ def _rung(
     strengths: Mapping[str, Any],
 ) -> Rung:
     drives = changed_drives(plain, strengths, seed)
-    # What differs from the plain drive has a name of its own.
+    # A drive that differs from the plain one needs another name.
     ending = f"{cause}_{level}_{seed}"
     for role in ("database", "query"):
         drive = getattr(drives, role)
@@ -138,7 +138,7 @@ def _rung(
 def _known_strengths(
     scenario: Scenario, extent: Extent
 ) -> tuple[dict[str, dict[int, Any]], list[str]]:
-    """Returns the strengths that a map has, and what it lacks."""
+    """Returns the strengths that a map allows, and notes on the others."""
     folder = map_folder(scenario)
     known = {cause: dict(levels) for cause, levels in extent.strengths.items()}
     notes = []
@@ -176,7 +176,7 @@ def _stage_levels(stages: Sequence[str]) -> dict[int, Any]:
 def _levels(
     known: Mapping[int, Any] | None, wanted: Sequence[int]
 ) -> list[int]:
-    """Returns levels in order; None has all."""
+    """Returns levels in order; all of them for None."""
     if known is None:
         return sorted(wanted)
     nearest = {max((k for k in known if k <= w), default=0) for w in wanted}

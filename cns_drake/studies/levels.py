@@ -1,8 +1,7 @@
 """Levels: frozen rungs of the ladder, and the results of methods on them.
 
 Level 0 is the world without a change; levels 1 to 4 have all causes together.
-Their drives are frozen: `worlds/levels.csv` holds what tells them from all
-others.
+Their drives are frozen: `worlds/levels.csv` holds their fingerprints.
 """
 
 from __future__ import annotations
@@ -24,7 +23,8 @@ from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.report.method_titles import in_table_order, title
 from evaluation.report.tables import Table
 
-# All causes together leave nothing to measure at the ladder's strengths.
+# All causes together, at the ladder's strengths, would leave nothing to
+# measure.
 LEVEL_STRENGTHS = {
     **STRENGTHS,
     "weather": {1: 400.0, 2: 200.0, 3: 100.0, 4: 50.0},
@@ -36,11 +36,12 @@ LEVELS_EXTENT = Extent(causes=(ALL,), seeds=(7208,), strengths=LEVEL_STRENGTHS)
 LEVELS_PROTOCOL = replace(PAPER_PROTOCOL, query_spacing=20.0)
 # A level is solved when the interval of the best method begins above this.
 _SOLVED = 0.98
-# Machines differ in the last digits of scores, and ties fall either way.
+# Scores differ in their last digits between machines, and ties break either
+# way.
 _EQUAL = 1e-3
 _NUMBERS = ("auc", "auc_low", "auc_high")
 
-# (Map, level) -> what tells its drives from all others.
+# (Map, level) -> fingerprint of its drives.
 Levels = Mapping[tuple[str, int], str]
 
 
@@ -52,7 +53,7 @@ class LevelResult:
         map_name: of the city.
         level: from 0 to 4.
         method: its name.
-        radius_told: whether it was gated by the radius.
+        radius_told: whether the gate was used (the method had the radius).
         auc, low, high: with its 95 % interval.
     """
 
@@ -66,7 +67,7 @@ class LevelResult:
 
 
 def planned_levels() -> dict[tuple[str, int], str]:
-    """Returns the levels as this version of the program drives them."""
+    """Returns the levels as this version of the program simulates them."""
     found = {}
     for name, folder in shipped_maps().items():
         asking = load_scenario(MapFolder(folder).recordable_sequences()[-1])
@@ -89,13 +90,13 @@ def read_results(files: Iterable[Path], levels: Levels) -> list[LevelResult]:
     """Returns the results of several tables, checked.
 
     Args:
-        files: tables like `ladder.csv`, of one method or of several each.
-            Rungs that are no level do not matter.
-        levels: which there are.
+        files: tables like `ladder.csv`, of one or several methods. Other rungs
+            than levels are ignored.
+        levels: of the benchmark.
 
     Raises:
-        InputError: a table cannot be read; a method lacks a level of a map,
-            was asked by other drives, or has numbers that cannot be or that
+        InputError: a table cannot be read; a method lacks a level of a map, was
+            run on other drives, or has impossible numbers or numbers that
             differ between two tables.
     """
     kept: dict[tuple[str, str], tuple[Path, list[LevelResult]]] = {}
@@ -138,12 +139,15 @@ def _read_file(file: Path, levels: Levels) -> Iterable[LevelResult]:
             raise InputError(f"{where}: not a number") from None
         if levels.get((row["map"], level)) != row["drives"]:
             raise InputError(
-                f"{where}: drives: not those of level {level} of {row['map']}"
+                f"{where}: drives: they are not those of level {level} of "
+                f"{row['map']}; run ladder --levels again"
             )
-        # Means of samples may miss the value itself by rounding.
+        # Rounding may put the value just outside its interval.
         is_ordered = low - 1e-9 <= high and low >= -1e-9 and high <= 1 + 1e-9
         if not (is_ordered and 0.0 <= auc <= 1.0):
-            raise InputError(f"{where}: auc, auc_low, auc_high: cannot be")
+            raise InputError(
+                f"{where}: auc, auc_low, auc_high: impossible values"
+            )
         yield LevelResult(
             row["map"], level, row["method"], bool(told), auc, low, high
         )
@@ -170,8 +174,8 @@ def _check_complete(
 def level_table(results: Iterable[LevelResult]) -> Table:
     """Returns the table of all methods: AUC on each level of each map.
 
-    The last row of a map says which levels are solved: the interval of the
-    best method begins above 0.98.
+    The last row of a map shows the solved levels: the interval of the best
+    method begins above 0.98.
     """
     results = list(results)
     numbers = sorted({one.level for one in results})

@@ -55,7 +55,7 @@ class _Picture(PartStep):
     Attributes:
         folder: of the map.
         picture: to write.
-        part: says of what it was drawn.
+        part: a file with the fingerprint of the picture.
     """
 
     folder: Path

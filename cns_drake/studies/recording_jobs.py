@@ -1,4 +1,4 @@
-"""Recordings as jobs, side by side, each in a process of its own."""
+"""Recordings as jobs, side by side, one process each."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from cns_drake.recording.recording_folder import RecordingFolder
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.studies.recording_step import Record
 
-# Expected time to load a stage, and to simulate a frame with the default
-# LiDAR [s]; how many frames a drive has that does not say.
+# Expected time to load a stage, and to simulate a frame with the default LiDAR
+# [s]; assumed frames of a drive without a number.
 _LOADING = 3.0
 _FRAME = 0.014
 _USUAL_FRAMES = 3000
@@ -31,18 +31,18 @@ def record_all(
 ) -> None:
     """Records scenarios as `<output>/<name>/`, with progress on stderr.
 
-    A finished recording of the very same scenario and world is left as it
-    is, an interrupted one goes on.
+    A finished recording of the same scenario and world is kept; an interrupted
+    one goes on.
 
     Args:
-        scenarios: what to record.
+        scenarios: to record.
         output: the folder of recordings.
-        cluster: where.
-        overwrite: replace whatever else has one of the names.
+        cluster: where the work is done.
+        overwrite: replace other recordings of these names.
 
     Raises:
-        InputError: some could not be recorded; all are named. Or the folder
-            cannot be made.
+        InputError: some could not be recorded, all of which are named, or the
+            folder cannot be made.
     """
     jobs = plan_recordings(scenarios, output, overwrite=overwrite)
     make_folder(output)
@@ -56,16 +56,17 @@ def plan_recordings(
     overwrite: bool = True,
     pages: Mapping[str, Path] | None = None,
 ) -> list[Job]:
-    """Returns a job for each recording that is not finished; says which are.
+    """Returns a job for each recording that is not finished; notes the finished
+    ones.
 
     The job has the recording's name.
 
     Args:
-        scenarios: what to record.
+        scenarios: to record.
         output: the folder of recordings.
-        overwrite: replace whatever else has one of the names.
-        pages: name -> where to save a web page of the drive. Without it
-            such a recording counts as not finished.
+        overwrite: replace other recordings of these names.
+        pages: name -> web page of the drive. A recording without its page
+            counts as not finished.
 
     Raises:
         InputError: two have one name, or a folder must not be used.
@@ -81,10 +82,10 @@ def plan_recordings(
             page = page.absolute()
         step = Record(scenario, output, overwrite, page)
         if step.is_done():
-            print(f"{scenario.name}: finished already", file=sys.stderr)
+            print(f"{scenario.name}: already finished", file=sys.stderr)
         else:
             waiting.append(step)
-    # What can be found wrong at once is found before anything slow.
+    # Quick checks come before all slow work.
     folders = [RecordingFolder(step.output) for step in waiting]
     others = [files.path.name for files in folders if files.is_finished()]
     if others and not overwrite:

@@ -1,4 +1,4 @@
-"""Recording a drive: what it takes, and whether it is there already."""
+"""The step that records a drive, and the check whether it is done."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ class Record(Step):
     """Records a scenario, and saves a web page of the drive.
 
     Attributes:
-        scenario: what to record.
+        scenario: to record.
         folder: the folder of recordings.
         overwrite: replace another recording of that name.
-        page: where to save the page, if anywhere.
-        survey: of the recording, which is found while it is made; or, where
-            an interrupted recording is taken over, by whoever needs it.
+        page: file of the page, if any.
+        survey: of the recording, made during the simulation. After an
+            interruption, the step that needs the survey makes it.
     """
 
     scenario: Scenario
@@ -66,7 +66,7 @@ class Record(Step):
         def read(drive: Sequence) -> None:
             assert survey is not None
             methods = survey.methods if survey.roles else ()
-            # What is wrong comes up again in the survey's own job.
+            # The survey's own job reports the error again.
             with contextlib.suppress(Exception):
                 found.append(survey.find(drive, methods, Reporter()))
 
@@ -87,13 +87,13 @@ class Record(Step):
             write_part(self._page_part, shown, None)
 
     def _is_first_read(self) -> bool:
-        """Returns whether it is the first LiDAR's scans that are surveyed."""
+        """Returns whether the first LiDAR's scans are surveyed."""
         first, *others = self.scenario.lidars
         return first == "lidar" or not others
 
     @contextlib.contextmanager
     def _place(self, is_new: bool) -> Iterator[tuple[Path, bool]]:
-        """Yields the folder to record into, and whether to overwrite there.
+        """Yields the folder for the recording, and whether to overwrite there.
 
         A recording that is up to date stays as it is when its page is made
         anew.
@@ -110,7 +110,7 @@ class Record(Step):
 
     @property
     def _page_part(self) -> Path:
-        """Says of what the page was made."""
+        """Writes the fingerprint of the page."""
         assert self.page is not None
         return self.page.parent / "parts" / f"{self.page.stem}.data"
 
@@ -120,7 +120,7 @@ class Record(Step):
         )
 
     def _shown(self) -> dict[str, object]:
-        """Returns all that the page depends on."""
+        """Returns all inputs of the page."""
         beside, _ = shown_beside(self.scenario)
         return self.made_of(
             {
@@ -133,13 +133,12 @@ class Record(Step):
 
 
 def is_recorded(scenario: Scenario, folder: Path) -> bool:
-    """Returns whether a finished recording of just this scenario exists.
+    """Returns whether a finished recording of exactly this scenario exists.
 
-    That is, of this scenario in the world and on the roads as they are now,
-    by the program as it is now.
+    It must be of the present world, roads and program.
 
     Args:
-        scenario: what is recorded.
+        scenario: of the recording.
         folder: the folder of recordings.
 
     Raises:
@@ -149,7 +148,7 @@ def is_recorded(scenario: Scenario, folder: Path) -> bool:
     if not files.is_finished() or not files.mcap.is_file():
         return False
     try:
-        # Damaged by whatever came later, they are of no use.
+        # Recordings that were damaged later do not count.
         read_yaml(files.scenario)
         read_yaml(files.metadata)["rosbag2_bagfile_information"]
         with user_errors(files.fingerprint):

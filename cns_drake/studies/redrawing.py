@@ -1,7 +1,7 @@
-"""A map's city drawn anew: the same streets, another draw of all the rest.
+"""Redraws a map's city: the same streets, another draw of all the rest.
 
-Roads and plan stay, only the plan's seed is another one: buildings, plants,
-cars and furniture are drawn anew. Each such city is a map folder of its own.
+Roads and plan stay, and only the plan's seed changes: buildings, plants, cars
+and furniture are drawn anew. Each such city is a map folder.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from cns_drake.base.yaml_files import read_yaml
 from cns_drake.city.plan.city_plan import load_plan
 from evaluation.study.parts import is_current, write_part
 
-# How each input that is written here begins.
+# The first line of each input that is written here.
 _MARK = b"# Of a city drawn anew by cns-drake"
-# Says in its folder of what a city was drawn.
+# The file in its folder with the fingerprint of a city.
 _PART = "drawn.data"
 # Expected time to draw a city [s].
 _COST = 7.0
@@ -44,12 +44,11 @@ def redraw_cities(
 ) -> dict[int, Path]:
     """Draws the city of a map anew, with progress on stderr.
 
-    A city that is there already, of the same inputs and by the same program,
-    is left as it is.
+    An existing city of the same inputs and program is kept.
 
     Args:
         map_folder: the map, with `roads.yaml` and `city.yaml`.
-        stage: what to call the only stage, the whole city.
+        stage: name of the only stage, the whole city.
         seeds: of the cities.
         output: the folder of cities; created if need be.
         cluster: where.
@@ -58,12 +57,12 @@ def redraw_cities(
         Seed -> map folder of that city, `<output>/<map>_c<seed>`, absolute.
 
     Raises:
-        InputError: the map cannot be used, something else has the name of
-            a city, or some could not be drawn; all are named.
+        InputError: the map cannot be used, another file or folder has the name
+            of a city, or some could not be drawn; all are named.
     """
     map_folder, output = map_folder.resolve(), output.resolve()
     folders = {seed: output / f"{map_folder.name}_c{seed}" for seed in seeds}
-    # What can be found wrong at once is found before anything slow.
+    # Quick checks come before all slow work.
     load_plan(MapFolder(map_folder).plan)
     for folder in folders.values():
         _is_replaced(folder)
@@ -88,8 +87,8 @@ class RedrawCity(Step):
         map_folder: the map, with `roads.yaml` and `city.yaml`.
         stage: what to call the only stage, the whole city.
         seed: of the city.
-        folder: the map folder to write; an older city drawn anew that has
-            this name is replaced, anything else refused.
+        folder: the map folder to write; an older redrawn city of this name is
+            replaced, anything else is refused.
     """
 
     map_folder: Path
@@ -112,11 +111,12 @@ class RedrawCity(Step):
         folder, made_of = self.folder, self._made_of()
         inputs = redrawn_inputs(self.map_folder, self.stage, self.seed)
         part = part_path(folder)
-        # It has its final name already, since its files hold that.
+        # The folder inside has its final name already, since its files contain
+        # it.
         draft = part / folder.name
         try:
             with user_errors(folder):
-                # What a run left that was killed.
+                # Left behind by a run that was killed.
                 shutil.rmtree(part, ignore_errors=True)
                 draft.mkdir(parents=True)
                 for name, content in inputs.items():
@@ -130,7 +130,9 @@ class RedrawCity(Step):
                 ) from error
             write_part(draft / _PART, made_of, None)
             if _is_replaced(folder):
-                reporter.note(f"{folder}: replaced, as it was of other inputs")
+                reporter.note(
+                    f"{folder}: replaced, since its inputs have changed"
+                )
             with user_errors(folder):
                 if os.path.lexists(folder):
                     os.replace(folder, part / "replaced")
@@ -190,10 +192,10 @@ def _to_yaml(what: str, values: dict) -> bytes:
 
 
 def _is_replaced(folder: Path) -> bool:
-    """Tells whether there is an older city drawn anew of this name.
+    """Returns whether an older redrawn city has this name.
 
     Raises:
-        InputError: something else has the name.
+        InputError: another file or folder has the name.
     """
     plan = MapFolder(folder).plan
     with user_errors(folder):
@@ -201,6 +203,7 @@ def _is_replaced(folder: Path) -> bool:
             return False
         if not (plan.is_file() and plan.read_bytes().startswith(_MARK)):
             raise InputError(
-                f"{folder}: is there already, and no city that was drawn anew"
+                f"{folder}: this folder is there already and is not a redrawn "
+                "city; remove it or give another output"
             )
     return True

@@ -49,26 +49,26 @@ def reproduce_maps(
     `<output>/<name>/` gets each recording, `<output>/pages/<name>.html` a
     web page of each sequence's drive, `<output>/pictures` the drives of each
     map from above and a street in its first and last stage,
-    `<output>/report` the tables and figures. What is done already is not
-    done again.
+    `<output>/report` the tables and figures. Finished work is not repeated.
 
     Args:
-        maps: which maps, by name or folder; all shipped ones if empty.
+        maps: by name or folder; all shipped ones if empty.
         output: the folder for everything.
         cluster: where the work is done.
         with_pages: whether the web pages are made.
-        quick: make the report alone, of the same frames: what is not
-            recorded yet is evaluated while it is simulated, and not recorded.
+        quick: make only the report, of the same frames: drives that are not
+            recorded yet are evaluated while they are simulated, and not
+            recorded.
         protocol: of place recognition.
         settings: see `choose_methods`.
-        with_costs: measure what the methods cost, too.
-        on_note: is told of which cities there is nothing to compare.
+        with_costs: measure the costs of methods, too.
+        on_note: receives notes on cities without drives to compare.
 
     Returns:
         The path of the report's page.
 
     Raises:
-        InputError: a map is not known, the folder cannot be made, or a step
+        InputError: a map is unknown, the folder cannot be made, or a step
             failed.
     """
     methods = choose_methods(settings=settings)
@@ -100,7 +100,7 @@ def reproduce_maps(
                 (*sequences, *controls), recordings, strict=True
             )
         ]
-    # In the order in which `cns-eval report` finds them.
+    # The order is that of `cns-eval report`.
     recordings.sort(key=lambda recording: recording.name)
     report = output / "report"
     make_folder(output)
@@ -133,7 +133,7 @@ def reproduce_maps(
 
 
 def _surveyed(recording: Job, study: Sequence[Job]) -> Job:
-    """Returns the job of a recording that finds its survey on the way."""
+    """Returns the job of a recording, which makes the survey as well."""
     for job in study:
         if recording.name in job.needs and isinstance(job.step, Survey):
             assert isinstance(recording.step, Record)
@@ -149,7 +149,7 @@ def _sequences(folder: Path) -> list[Scenario]:
     for sequence in sequences:
         if sequence.map is None:
             raise InputError(
-                f"{sequence.source}: map: needed to compare stages"
+                f"{sequence.source}: map: missing, and needed to compare stages"
             )
     return sequences
 
@@ -158,8 +158,8 @@ def control_drives(sequences: Sequence[Scenario]) -> list[Scenario]:
     """Returns the control drives of a map's sequences.
 
     A control drive is the route of an earlier stage through the last one:
-    compared with the last stage's own sequence, whatever it shows as change
-    is due to the routes and not to the city.
+    compared with the last stage's own sequence, all of its apparent change is
+    due to the routes and not to the city.
     """
     last = max(sequences, key=lambda sequence: sequence.stage or "")
     return [
@@ -184,9 +184,9 @@ def recording_info(
     Args:
         scenario: of a map.
         output: the folder of recordings.
-        is_waiting: whether the job of its name has to be done first.
+        is_waiting: whether the recording's job has to be done first.
     """
-    assert scenario.stage is not None  # It belongs to a map.
+    assert scenario.stage is not None  # It has a map.
     return RecordingInfo(
         name=scenario.name,
         path=output.absolute() / scenario.name,
@@ -215,7 +215,7 @@ def recordable_map(name: str) -> Path:
     if not folder.is_dir():
         known = ", ".join(_recordable_maps())
         raise InputError(
-            f"unknown map '{name}'; known: {known}; or give a folder"
+            f"unknown map '{name}'; there are: {known}; or give a folder"
         )
     if not MapFolder(folder).recordable_sequences():
         raise InputError(

@@ -1,4 +1,4 @@
-"""What vehicles and walkers look like: bodies of simple shapes and meshes."""
+"""Bodies of vehicles and walkers, made of simple shapes and meshes."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ class BodyShape(NamedTuple):
     Attributes:
         name: of the shape.
         kind: "mesh", "box", "capsule" or "cylinder".
-        size: of a box; of capsules and cylinders radius and length of their
-            straight part; of meshes nothing [m].
+        size: of a box; for capsules and cylinders radius and length of their
+            straight part; empty for meshes [m].
         mesh: name of one of the city's meshes.
-        start, end: ends of the axis of a capsule or cylinder, the middle of
-            all else is at the first [m].
+        start, end: ends of the axis of a capsule or cylinder; other shapes have
+            their middle at the first [m].
         rgb: its colour.
     """
 
@@ -51,9 +51,9 @@ class Limb(NamedTuple):
     Attributes:
         name: of the limb.
         joint: its origin in the body's frame [m].
-        swing: how far it swings at a walk, negative where it begins
-            backwards [rad].
-        shapes: what it looks like.
+        swing: amplitude of its swing at a walk, negative if it begins backwards
+            [rad].
+        shapes: its parts.
     """
 
     name: str
@@ -176,8 +176,8 @@ def _two_wheeler(
 def walker_limbs(rng: np.random.Generator) -> tuple[Limb, ...]:
     """Returns the five limbs of a walker, of ten capsules together.
 
-    The body's frame is on the ground, x where the walker looks. An arm
-    swings with the leg of the other side.
+    The body's frame is on the ground, x in the walker's heading. An arm swings
+    with the leg of the other side.
 
     Args:
         rng: draws size and colours.

@@ -1,4 +1,4 @@
-"""Where the limbs of all bodies are at a time."""
+"""The poses of the limbs of all bodies at a time."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 from cns_drake.traffic.body_shapes import Limb
 from cns_drake.traffic.traffic_plan import TrafficPlan
 
-# At this speed limbs swing as far as they do [m/s].
+# Speed of the full swing of limbs [m/s].
 _FULL_SWING = 1.2
-# Where those are who are not there now [m].
+# Place of bodies that are absent now [m].
 _AWAY = (0.0, 0.0, -10_000.0)
 
 
@@ -25,7 +25,7 @@ class BodyStates(NamedTuple):
         yaw, pitch: (N,) [rad].
         yaw_rate: (N,) [rad/s].
         present: (N,) whether it is there.
-        swing: (N,) from -1 to 1, where in its gait a walker is.
+        swing: (N,) from -1 to 1, position of a walker in its gait.
     """
 
     p_WB: np.ndarray
@@ -53,7 +53,7 @@ class BodyStates(NamedTuple):
 
 
 def bodies_at(plan: TrafficPlan, t: float) -> BodyStates:
-    """Returns where everybody is at a time [s]."""
+    """Returns the bodies at a time [s]."""
     vehicles, vehicle_rates = plan.vehicles.at(t)
     walkers, walker_rates = plan.walkers.at(t)
     both = np.concatenate([vehicles[:, :4], walkers[:, :4]])
@@ -99,7 +99,7 @@ class LimbTable:
     def _angles(self, states: BodyStates) -> tuple[np.ndarray, np.ndarray]:
         """Returns yaw and pitch of all limbs [rad]."""
         swing = self._swing * states.swing[self.body]
-        # Forwards is about -y.
+        # A forward swing turns about -y.
         return states.yaw[self.body], states.pitch[self.body] - swing
 
 
@@ -114,6 +114,6 @@ def _matrices(yaw: np.ndarray, pitch: np.ndarray) -> np.ndarray:
 
 
 def _quaternions(yaw: np.ndarray, pitch: np.ndarray) -> np.ndarray:
-    """Returns what `_matrices` does as (N, 4) quaternions, x y z w."""
+    """Returns the rotations of `_matrices` as (N, 4) quaternions, x y z w."""
     (cy, sy), (cp, sp) = ((np.cos(a / 2), np.sin(a / 2)) for a in (yaw, pitch))
     return np.column_stack([-sy * sp, cy * sp, sy * cp, cy * cp])

@@ -1,12 +1,12 @@
-"""How hard a vehicle accelerates behind another: Treiber's IDM."""
+"""The acceleration of a vehicle behind another one: Treiber's IDM."""
 
 from __future__ import annotations
 
 from cns_drake.base.compiled import compiled
 
-# No brake does more [m/s^2].
+# Greatest braking [m/s^2].
 HARDEST_BRAKING = 8.0
-# A gap that is as good as none [m].
+# Smaller gaps count as this one [m].
 _NO_GAP = 0.05
 
 
@@ -36,14 +36,14 @@ def interaction(
     s0: float,
     T: float,
 ) -> float:
-    """Returns what a vehicle ahead takes off the acceleration [m/s^2].
+    """Returns the loss of acceleration behind a vehicle [m/s^2].
 
     That is a (s* / gap)^2 with s* = s0 + max(0, v T + v dv / (2 sqrt(a b))).
 
     Args:
         v: speed [m/s].
         gap: from bumper to bumper [m].
-        approach: dv, by how much faster it is than the one ahead [m/s].
+        approach: dv, its speed minus that of the vehicle ahead [m/s].
         a, b: greatest acceleration and comfortable braking [m/s^2].
         s0: gap at standstill [m].
         T: headway [s].

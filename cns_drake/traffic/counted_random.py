@@ -9,7 +9,7 @@ from cns_drake.base.compiled import compiled
 
 @compiled
 def uniform(seed: int, who: int, draw: int) -> float:
-    """Returns the draw-th random number of somebody, from 0 to 1.
+    """Returns the draw-th random number of a road user, from 0 to 1.
 
     SplitMix64's finalizer (Steele, Lea, Flood, OOPSLA 2014) of the three.
     """

@@ -1,4 +1,4 @@
-"""Floating-car data of SUMO: who was where, at even times.
+"""Floating-car data of SUMO: places of road users at even times.
 
 Format: https://sumo.dlr.de/docs/Simulation/Output/FCDOutput.html
 """
@@ -14,7 +14,7 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.xml_elements import Element, read_elements
 
 _TAGS = ("fcd-export", "timestep", "vehicle", "person")
-# Times are even but for how they are rounded in the file [s].
+# Greatest deviation from even times, by rounding in the file [s].
 _TIME_TOLERANCE = 2e-3
 
 
@@ -25,8 +25,8 @@ class TracedObject:
     Attributes:
         name: its id.
         type_name: of its type, "" if it has none.
-        steps: (M,) numbers of the times at which it is there, ascending.
-        xy: (M, 2) of its front, of a person of its middle [m].
+        steps: (M,) numbers of the times at which it is there, ascending. xy:
+            (M, 2) of a vehicle's front, or of a person's middle [m].
         yaw: (M,) heading, from x towards y [rad].
         slope: (M,) of the road, upwards positive [rad].
     """
@@ -66,8 +66,8 @@ def read_fcd(path: Path) -> FcdTrace:
     """Reads a trace.
 
     Raises:
-        InputError: the file cannot be read or is no trace, its times are not
-            even, or it holds nobody.
+        InputError: the file cannot be read or is not a trace, its times are not
+            even, or it is empty.
     """
     root = read_elements(path, "fcd-export", _TAGS)
     steps = list(root.all("timestep"))
@@ -79,7 +79,9 @@ def read_fcd(path: Path) -> FcdTrace:
     except ValueError as error:
         raise InputError(f"{path}: {error}") from None
     if not vehicles and not persons:
-        raise InputError(f"{path}: no vehicle and no person in any timestep")
+        raise InputError(
+            f"{path}: the trace has no vehicle and no person in any timestep"
+        )
     return FcdTrace(begin, dt, len(times), vehicles, persons)
 
 
@@ -90,7 +92,10 @@ def _even(path: Path, times: np.ndarray) -> tuple[float, float]:
         InputError: they are not even.
     """
     if len(times) < 2:
-        raise InputError(f"{path}: {len(times)} timesteps; two are the least")
+        raise InputError(
+            f"{path}: {len(times)} timesteps are too few; at least two are "
+            "needed"
+        )
     dt = (times[-1] - times[0]) / (len(times) - 1)
     expected = times[0] + dt * np.arange(len(times))
     wrong = np.abs(times - expected) > _TIME_TOLERANCE

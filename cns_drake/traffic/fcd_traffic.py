@@ -55,26 +55,27 @@ def play_trace(
 ) -> TrafficPlan:
     """Returns the traffic of a trace, whose first time is that of the drive.
 
-    Who would meet the ego car, whom SUMO has not seen, is left out.
+    Road users that would collide with the ego car, which is not part of SUMO's
+    simulation, are left out.
 
     Args:
-        trace: what to play.
+        trace: to play.
         path: its file, for errors.
-        graph: lanes of the map; heights are theirs.
+        graph: lanes of the map, which give heights.
         walkways: of the map; likewise.
-        seed: of what kinds of cars there are.
+        seed: of the kinds of cars.
         duration: of the drive [s].
-        ego: where the ego car is.
-        ego_box: what it covers.
+        ego: place of the ego car.
+        ego_box: its size.
 
     Raises:
         InputError: the trace is shorter than the drive, or is of another map.
     """
     if trace.duration < duration - 1e-6:
         raise InputError(
-            f"{path}: the trace has {trace.duration:g} s from "
-            f"{trace.begin:g} s on, the drive takes {duration:.2f} s: record "
-            "more, or lower frames"
+            f"{path}: the trace has {trace.duration:g} s from {trace.begin:g} "
+            f"s on, but the drive takes {duration:.2f} s: record more, or "
+            "lower frames"
         )
     lanes = np.concatenate([piece.points for piece in graph.pieces])
     _check_place(trace, path, lanes)
@@ -120,9 +121,9 @@ def _check_place(trace: FcdTrace, path: Path, lanes: np.ndarray) -> None:
     off_road = _OFF_ROAD if trace.vehicles else 10.0 * _OFF_ROAD
     if np.median(distances) > off_road:
         raise InputError(
-            f"{path}: half of it is more than {off_road:g} m from the map's "
-            f"lanes: it lies at {_extent(places)}, they at "
-            f"{_extent(lanes)}; give a trace of this map, without an offset"
+            f"{path}: half of the trace is more than {off_road:g} m from the "
+            f"map's lanes: the trace is at {_extent(places)}, the lanes are "
+            f"at {_extent(lanes)}; give a trace of this map, without an offset"
         )
 
 
@@ -140,7 +141,7 @@ class _Heights:
         self._z = points[:, 2]
 
     def at(self, xy: np.ndarray) -> np.ndarray:
-        """Returns those of the nearest points, weighted by distance."""
+        """Returns the heights of the nearest points, weighted by distance."""
         distance, near = self._tree.query(xy, k=min(4, len(self._z)))
         distance, near = (
             np.reshape(values, (len(xy), -1)) for values in (distance, near)
@@ -150,7 +151,7 @@ class _Heights:
 
 
 def _kind(one: TracedObject, seed: int) -> VehicleKind:
-    """Returns what a vehicle is: by its type, and else some car."""
+    """Returns the kind of a vehicle: by its type, or else a random car."""
     text = one.type_name.lower().replace("default_biketype", "bicycle")
     for word, name in _KINDS_BY_WORD:
         if word in text:
@@ -168,7 +169,7 @@ def _vehicle_rows(
     """Returns the (M, 5) coordinates of a vehicle; see `TrafficPlan`."""
     ahead = np.column_stack([np.cos(one.yaw), np.sin(one.yaw)])
     xy = one.xy - kind.size[0] / 2 * ahead
-    # Upwards is about -y.
+    # An upward slope turns about -y.
     return np.column_stack([xy, heights.at(xy), one.yaw, -one.slope])
 
 
@@ -191,7 +192,7 @@ def _make_tracks(
     present = np.zeros((trace.num_steps, len(traced)), bool)
     times = np.arange(trace.num_steps)
     for k, (one, own) in enumerate(zip(traced, rows, strict=True)):
-        # While it is not there, it stays where it was, or will be.
+        # While absent, it keeps its last or next place.
         last = np.searchsorted(one.steps, times, side="right") - 1
         values[:, k] = own[np.maximum(last, 0)]
         present[one.steps, k] = True
@@ -206,7 +207,7 @@ def _meet_ego(
 ) -> np.ndarray:
     """Returns (N,) whether each ever overlaps the ego car."""
     num = len(half)
-    # Often enough to see whoever crosses the car's way.
+    # Steps are short enough to notice all that cross the car's way.
     times = np.arange(0.0, tracks.duration, min(tracks.dt, 0.1))
     poses = np.full((len(times), 1 + num, 3), np.nan)
     xy, yaw = ego(times)

@@ -26,7 +26,7 @@ from cns_drake.traffic.walker_steps import (
     step_walkers,
 )
 
-# A driver thinks of changing lanes at every so manieth step.
+# A driver considers a change of lane only at every such step.
 _THINKS = 10
 
 
@@ -44,18 +44,18 @@ def run_steps(
     vehicle_poses: np.ndarray,
     walker_poses: np.ndarray,
 ) -> None:
-    """Lets everybody move for K steps, and writes down where they are.
+    """Moves all road users for K steps, and stores their poses.
 
     Args:
-        lanes: what vehicles follow.
-        vehicles: all of them, as they begin.
+        lanes: of the vehicles.
+        vehicles: all of them, at the start.
         occupants: room for their entries.
         presence: of the ego car at K times.
-        permits: who uses what; nobody so far.
-        ways: where walkers walk.
-        walkers: all of them, as they begin.
+        permits: the users of ways and crossings; none so far.
+        ways: of the walkers.
+        walkers: all of them, at the start.
         dt: the step [s].
-        seed: of what is drawn on the way.
+        seed: of draws during the motion.
         vehicle_poses: (K, N, 5) takes x, y, z [m], yaw, pitch [rad].
         walker_poses: (K, M, 5) takes x, y, z [m], yaw, phase [rad].
     """

@@ -1,4 +1,4 @@
-"""Which ways and crossings cannot be used at once."""
+"""Conflicts: ways and crossings that cannot be used at the same time."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from shapely.geometry.base import BaseGeometry
 from cns_drake.traffic.lane_graph import LaneGraph, Piece
 from cns_drake.traffic.vehicle_kinds import LARGEST, SMALL_SIZE
 
-# Distance of the places at which a vehicle's outline is drawn, and what it
-# keeps free around it [m].
+# Distance of the places at which a vehicle's outline is drawn, and free space
+# around it [m].
 _STEP = 1.0
 _CLEARANCE = 0.25
 
@@ -18,7 +18,7 @@ _CLEARANCE = 0.25
 def find_conflicts(graph: LaneGraph) -> tuple[np.ndarray, np.ndarray]:
     """Returns which pieces and crossings exclude each other.
 
-    Two ways do so whose swept areas meet, unless they are the same; lanes
+    Two different ways exclude each other if their swept areas meet; lanes
     exclude nothing.
 
     Returns:
@@ -51,7 +51,7 @@ def find_conflicts(graph: LaneGraph) -> tuple[np.ndarray, np.ndarray]:
 def swept_area(
     piece: Piece, size: tuple[float, float], axles: tuple[float, float]
 ) -> BaseGeometry:
-    """Returns what a vehicle covers of a way, from its front to its rear.
+    """Returns the area that a vehicle sweeps on a way.
 
     Args:
         piece: the way.
@@ -64,7 +64,7 @@ def swept_area(
     length = along[-1]
 
     def at(s: np.ndarray) -> np.ndarray:
-        """Returns places on the way, and straight on beyond its ends."""
+        """Returns places on the way, continued straight beyond its ends."""
         inside = np.clip(s, 0.0, length)
         xy = np.column_stack([np.interp(inside, along, x) for x in line.T])
         first = (line[1] - line[0]) / steps[0]

@@ -10,12 +10,12 @@ from cns_drake.base.compiled import compiled
 from cns_drake.traffic.junction_conflicts import find_conflicts
 from cns_drake.traffic.lane_graph import LaneGraph, Piece
 
-# In bends [m/s^2], and what a driver brakes before them [m/s^2].
+# Greatest acceleration in bends, and braking before them [m/s^2].
 _LATERAL = 2.2
 _BEFORE_BENDS = 1.5
-# Nobody crawls more slowly round a bend [m/s].
+# Least speed in a bend [m/s].
 _SLOWEST = 2.5
-# Curvature is that of chords over so many points to both sides.
+# Number of points to both sides whose chords give the curvature.
 _CHORD = 4
 
 
@@ -27,15 +27,14 @@ class LaneArrays(NamedTuple):
         step: (P,) distance of its points [m].
         length: (P,) [m].
         points: (M, 3) [m].
-        speed: (M,) what may be driven there, which allows for bends [m/s].
+        speed: (M,) allowed speed there, with regard to bends [m/s].
         is_way: (P,) bool.
         after_first, after_count: (P,) rows in `after`, and their number.
         after: numbers of pieces.
         left, right: (P,) lanes beside it, -1 for none.
-        junction, phase: (P,) of ways; -1 where there is no signal.
-        phases: (J,) how many phases the signals of a junction have.
-        small, large: (P + C, P + C) what excludes what, see
-            `find_conflicts`.
+        junction, phase: (P,) of ways; -1 without a signal.
+        phases: (J,) number of phases of a junction's signals.
+        small, large: (P + C, P + C) exclusions, see `find_conflicts`.
     """
 
     first: np.ndarray
@@ -86,7 +85,7 @@ def make_lane_arrays(graph: LaneGraph) -> LaneArrays:
 
 
 def _speeds(piece: Piece) -> np.ndarray:
-    """Returns what may be driven at each point of a piece [m/s]."""
+    """Returns the allowed speed at each point of a piece [m/s]."""
     xy = piece.points[:, :2]
     speed = np.full(len(xy), piece.limit)
     step = piece.length / (len(xy) - 1)
@@ -128,7 +127,7 @@ def place_on(lanes: LaneArrays, piece: int, s: float) -> np.ndarray:
 
 @compiled
 def speed_on(lanes: LaneArrays, piece: int, s: float) -> float:
-    """Returns what may be driven at a distance along a piece [m/s]."""
+    """Returns the allowed speed at a distance along a piece [m/s]."""
     k = int(s / lanes.step[piece])
     k = min(max(k, 0), lanes.num_points[piece] - 1)
     return lanes.speed[lanes.first[piece] + k]

@@ -1,7 +1,7 @@
 """Changes of lane: MOBIL, by Kesting, Treiber, Helbing (2007).
 
-A driver changes where that gains more acceleration than it costs the others,
-and nobody has to brake hard for it.
+A driver changes lane if that gains more acceleration than it costs others, and
+no other vehicle has to brake hard.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from cns_drake.traffic.vehicle_state import (
 
 # Politeness, least gain, and the most that others brake [m/s^2].
 _POLITENESS, _GAIN, _OTHERS_BRAKE = 0.2, 0.25, 2.5
-# How long a change takes [s], how long it is at least, and what is left of
-# the lane behind it [m].
+# Duration of a change [s], its least length, and least rest of the lane behind
+# it [m].
 _DURATION, _LEAST_LENGTH, _BEYOND = 4.0, 20.0, 30.0
-# Nobody changes more slowly [m/s], nor with a gap below [m].
+# Least speed of a change [m/s], and least gap [m].
 _SLOWEST, _GAP = 3.0, 4.0
 
 
@@ -49,7 +49,7 @@ def change_lanes(
         occupants: where they are.
         presence: of the ego car.
         k: number of the time.
-        every: each vehicle thinks of it at every so manieth time.
+        every: number of times between a vehicle's considerations.
     """
     for i in range(len(vehicles.s)):
         lane = vehicles.path[i, CURRENT]
@@ -78,7 +78,7 @@ def change_lanes(
                 vehicles.path[i, CURRENT + 2] = -1
                 vehicles.since[i] = np.inf
                 vehicles.left_lane[i] = lane
-                # The front axle begins it.
+                # The change begins with the front axle.
                 vehicles.change_start[i] = vehicles.s[i]
                 vehicles.change_length[i] = length
                 return
@@ -109,7 +109,7 @@ def _is_better(
     behind, _, who = find_behind(occupants, target, rear, i)
     if gap < _GAP or behind < _GAP or who == EGO:
         return False
-    # Beside it nobody may be: who is neither ahead nor behind.
+    # No vehicle may be beside it, neither ahead nor behind.
     entry = occupants.head[target]
     while entry >= 0:
         if (

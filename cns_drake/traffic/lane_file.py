@@ -1,4 +1,4 @@
-"""Files of lanes and walkways, for maps whose roads are no `roads.yaml`."""
+"""Files of lanes and walkways, for maps without a `roads.yaml`."""
 
 from __future__ import annotations
 
@@ -79,10 +79,10 @@ def lane_text(graph: LaneGraph, walkways: Sequence[Walkway]) -> str:
 
 
 def read_lanes(path: Path) -> tuple[LaneGraph, list[Walkway]]:
-    """Returns what `lane_text` has written.
+    """Reads a text of `lane_text`.
 
     Raises:
-        InputError: the file cannot be read or is no file of lanes.
+        InputError: the file cannot be read or is not a file of lanes.
     """
     try:
         found = _File.model_validate(parse_json(read_bytes(path)))
@@ -91,7 +91,7 @@ def read_lanes(path: Path) -> tuple[LaneGraph, list[Walkway]]:
             describe_validation_error(path, error, _File)
         ) from None
     except ValueError as error:
-        raise InputError(f"{path}: no JSON: {error}") from None
+        raise InputError(f"{path}: not JSON: {error}") from None
     for k, lane in enumerate(found.lanes):
         wrong = [one for one in lane.after if one >= len(found.lanes)]
         if wrong or not lane.after:

@@ -1,4 +1,4 @@
-"""Lanes that vehicles follow, the ways between them, and what crosses what."""
+"""Lanes of vehicles, the ways between them, and crossings."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ SPACING = 0.5
 
 @dataclass(frozen=True)
 class Piece:
-    """A part of what a vehicle follows: of a lane, or a way through a junction.
+    """A piece of a vehicle's path: part of a lane, or a way through a junction.
 
-    A vehicle enters a way only as a whole: it waits in the lane before it
-    until nothing that crosses the way is in it.
+    A vehicle enters a way only as a whole: it waits in the lane before it until
+    all crossing ways are free.
 
     Attributes:
         points: (N, 3) its middle in driving direction, evenly spaced [m].
@@ -26,9 +26,9 @@ class Piece:
         after: numbers of the pieces that follow it.
         left, right: numbers of the lanes beside it, in the same direction;
             -1 for none.
-        junction: number of the junction of a way, of a lane the one that it
+        junction: number of the junction of a way; for a lane, of the one it
             leads to.
-        phase: of a way, when its signal is green; -1 without a signal.
+        phase: of a way: the phase with a green signal; -1 without a signal.
     """
 
     points: np.ndarray
@@ -48,11 +48,11 @@ class Piece:
 
 @dataclass(frozen=True)
 class Crossing:
-    """Where walkers cross the lanes of one road end.
+    """A walkers' crossing of the lanes at one road end.
 
     Attributes:
         line: (2, 3) from kerb to kerb [m].
-        area: what walkers on it may cover [m].
+        area: of walkers on it [m].
     """
 
     line: np.ndarray
@@ -65,9 +65,8 @@ class LaneGraph:
 
     Attributes:
         pieces: all of them.
-        crossings: where walkers cross.
-        phases: of each junction, how many phases its signals have; 1 without
-            signals.
+        crossings: of walkers.
+        phases: number of phases of each junction's signals; 1 without signals.
     """
 
     pieces: tuple[Piece, ...]
@@ -104,10 +103,10 @@ def resampled(points: np.ndarray, spacing: float = SPACING) -> np.ndarray:
 
 
 def without_dead_ends(pieces: Sequence[Piece]) -> list[Piece]:
-    """Returns pieces on which a vehicle can go on for ever.
+    """Returns pieces on which a vehicle can drive for ever.
 
-    Lanes that lead nowhere go, and so does what leads to them alone, and
-    lanes to which nothing leads.
+    Lanes that lead nowhere are removed, with the pieces that lead only to them,
+    and lanes that nothing leads to.
     """
     alive = set(range(len(pieces)))
     while True:

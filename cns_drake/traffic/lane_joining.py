@@ -1,4 +1,4 @@
-"""Lanes of somebody else's map as traffic follows them."""
+"""Makes a lane graph for traffic from the lanes of an imported map."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from cns_drake.traffic.lane_graph import (
 # A lane must have room for any vehicle; a shorter one is part of the ways
 # that lead over it [m].
 _SHORTEST_LANE = 14.0
-# Vehicles stop so far before the end of a lane, in steps of `SPACING`.
+# Distance of stop lines from the end of a lane, in steps of `SPACING`.
 _STOP_STEPS = 2
-# Nobody follows more short lanes at once, and from no lane lead more ways.
+# Greatest number of short lanes in a way, and of ways from a lane.
 _MOST_SHORT, _MOST_WAYS = 8, 12
 
 
@@ -44,12 +44,12 @@ def join_lanes(
     """Returns lanes with ways between them.
 
     Args:
-        lanes: as a map has them, cut wherever it cuts them.
-        links: numbers of lanes of which the second follows the first.
+        lanes: of a map, cut at its own places.
+        links: pairs of lane numbers; the second lane follows the first.
 
     Returns:
-        A graph without signals, crossings and changes of lanes. It may be
-        empty, if vehicles cannot go on for ever anywhere.
+        A graph without signals, crossings and changes of lanes. It is empty if
+        vehicles cannot drive for ever anywhere.
     """
     merged, after = _merge(lanes, links)
     points = [resampled(lane.points) for lane in merged]
@@ -111,7 +111,8 @@ def join_lanes(
 def _merge(
     lanes: Sequence[DirectedLane], links: Iterable[tuple[int, int]]
 ) -> tuple[list[DirectedLane], list[list[int]]]:
-    """Returns lanes that go on alone as one, and what follows each."""
+    """Returns lanes, with single continuations joined, and the successors of
+    each."""
     after: list[list[int]] = [[] for _ in lanes]
     before: list[list[int]] = [[] for _ in lanes]
     for first, second in links:
@@ -136,7 +137,7 @@ def _merge(
         for k in range(len(lanes))
         if len(before[k]) != 1 or not goes_on(before[k][0])
     ]
-    # After the heads come rings, which begin anywhere.
+    # Only rings are left after the heads, and begin anywhere.
     for head in (*heads, *range(len(lanes))):
         if head in placed:
             continue
@@ -184,7 +185,7 @@ class _Clusters:
         self._parent: dict[tuple[int, str], tuple[int, str]] = {}
 
     def of(self, key: tuple[int, str]) -> tuple[int, str]:
-        """Returns the one that stands for all of a place's cluster."""
+        """Returns the representative of a place's cluster."""
         while (parent := self._parent.get(key, key)) != key:
             key = parent
         return key

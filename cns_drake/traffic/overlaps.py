@@ -1,4 +1,4 @@
-"""Whose boxes overlap, and who is left out so that none do."""
+"""Finds overlapping boxes, and the bodies to leave out so that none overlap."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cns_drake.base.compiled import compiled
 def way_out(
     a: np.ndarray, b: np.ndarray, half_a: np.ndarray, half_b: np.ndarray
 ) -> tuple[float, float]:
-    """Returns the shortest way by which b leaves a, (0, 0) if it is outside.
+    """Returns the shortest move of b out of a; (0, 0) if it is outside.
 
     Args:
         a, b: (3,) x, y of the middle [m] and heading [rad].
@@ -45,10 +45,10 @@ def way_out(
 def boxes_overlap(
     a: np.ndarray, b: np.ndarray, half_a: np.ndarray, half_b: np.ndarray
 ) -> bool:
-    """Tells whether two rectangles overlap; see `way_out`."""
+    """Returns whether two rectangles overlap; see `way_out`."""
     dx, dy = b[0] - a[0], b[1] - a[1]
     square = (half_a[0] + half_b[0]) ** 2 + (half_a[1] + half_b[1]) ** 2
-    # Half the diagonals together are at most sqrt(2) times as long.
+    # The half diagonals together are at most sqrt(2) times as long.
     if dx**2 + dy**2 > 2.0 * square:
         return False
     x, y = way_out(a, b, half_a, half_b)
@@ -59,12 +59,12 @@ def boxes_overlap(
 def find_overlaps(
     poses: np.ndarray, half: np.ndarray, found: np.ndarray
 ) -> None:
-    """Finds who ever overlaps whom.
+    """Finds the pairs of bodies that ever overlap.
 
     Args:
-        poses: (K, N, 3) x, y [m], heading [rad]; NaN while there is nobody.
+        poses: (K, N, 3) x, y [m], heading [rad]; NaN while a body is absent.
         half: (N, 2) half length and half width [m].
-        found: (N, N) bool, takes the answers.
+        found: (N, N) bool to fill.
     """
     reach = np.sqrt(half[:, 0] ** 2 + half[:, 1] ** 2)
     for k in range(len(poses)):
@@ -73,7 +73,7 @@ def find_overlaps(
             for j in range(i):
                 dx, dy = poses[k, j, 0] - x, poses[k, j, 1] - y
                 far = reach[i] + reach[j]
-                # Not where one of them is NaN, either.
+                # The comparison is False for NaN as well.
                 if (
                     dx * dx + dy * dy < far * far
                     and not found[i, j]
@@ -85,11 +85,11 @@ def find_overlaps(
 
 
 def whom_to_leave_out(overlaps: np.ndarray, kept: int) -> list[int]:
-    """Returns who has to go until nobody overlaps, the most involved first.
+    """Returns the bodies to remove until none overlap, the most involved first.
 
     Args:
         overlaps: (N, N) symmetric bool.
-        kept: so many at the beginning always stay.
+        kept: number of first bodies that always stay.
     """
     overlaps = overlaps.copy()
     out: list[int] = []

@@ -1,4 +1,4 @@
-"""When the ego car is on which lane, way or crossing."""
+"""Times at which the ego car is on each lane, way and crossing."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import shapely
 
 from cns_drake.traffic.lane_graph import LaneGraph
 
-# Half the width of what a vehicle takes of its lane, with what it keeps from
-# the ego car [m].
+# Half the width of a vehicle's strip of its lane, with its distance from the
+# ego car [m].
 _HALF_LANE = 1.45
 
 
@@ -47,13 +47,13 @@ class EgoBox(NamedTuple):
 
 
 class Presence(NamedTuple):
-    """Where the ego car is at K times, over P pieces and C crossings.
+    """The ego car's presence at K times on P pieces and C crossings.
 
     Attributes:
-        until: (K, P + C) float32 time until it is there, 0 while it is, inf
-            if it never will be [s].
-        rear, front: (K, P) float32 how far along a piece its ends are while
-            it is there [m].
+        until: (K, P + C) float32 time until it is there, 0 while it is, inf if
+            it never will be [s].
+        rear, front: (K, P) float32 distance of its ends along a piece while it
+            is there [m].
         speed: (K, P) float32 along the piece, negative against it [m/s].
     """
 
@@ -70,7 +70,7 @@ def find_presence(
     yaw: np.ndarray,
     dt: float,
 ) -> Presence:
-    """Returns where the ego car is.
+    """Returns the presence of the ego car.
 
     Args:
         graph: lanes and ways.

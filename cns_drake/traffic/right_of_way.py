@@ -1,8 +1,8 @@
 """The right to enter a junction: one after the other, by arrival.
 
-A vehicle is let into its way as a whole, once nothing that crosses the way is
-let in or comes, once there is room for it behind the way, and while its
-signal is green. Nobody stops on a way, so that nobody waits for ever.
+A vehicle may enter its whole way under three conditions: no crossing way is in
+use or about to be used, there is room for it behind the way, and its signal is
+green. Vehicles never stop on a way, so that none waits for ever.
 """
 
 from __future__ import annotations
@@ -17,28 +17,31 @@ from cns_drake.traffic.lane_arrays import LaneArrays
 from cns_drake.traffic.presence import Presence
 from cns_drake.traffic.vehicle_state import CURRENT, Occupants, Vehicles
 
-# Signals: how long a phase is green, and all are red after it [s].
+# Signals: duration of a green phase, and of red for all after it [s].
 _GREEN, _RED = 14.0, 4.0
-# Traffic where the ego car comes this soon goes first, without a wait
-# for signals [s].
+# Traffic ahead of the ego car, if it comes within this time, goes first and
+# does not wait for signals [s].
 _EGO_IS_NEAR = 45.0
 _GOES_FIRST = 1e6
-# Nobody enters a way on which the ego car will be so soon after [s].
+# No vehicle enters a way if the ego car will be there within this time [s].
 _EGO_MARGIN = 3.0
-# A lane that the ego car enters has to be empty by then: drivers count on
-# this part of the speed limit, and on waiting at its end for as long; who
-# goes first waits less [s].
+# A lane must be empty when the ego car enters it. Drivers assume this part of
+# the speed limit, and this wait at its end; a driver who goes first waits less
+# [s].
 _SLOW_PART, _WAIT, _SHORT_WAIT = 0.6, 20.0, 5.0
-# Between two who stand [m], and how hard the last one brakes at most [m/s^2].
+# Gap between standing vehicles [m], and greatest braking of the last one
+# [m/s^2].
 _ROOM, _LAST_BRAKES = 2.5, 4.0
-# Drivers ask from here on [m], or so many times their braking distance away.
+# Drivers request their way from this distance [m], or from this multiple of
+# their braking distance.
 _ASKED_FROM, _ASKED_BRAKING = 10.0, 1.4
-# Without room for so long, a driver takes another way [s].
+# After this time without room, a driver takes another way [s].
 _PATIENCE = 3.0
-# A group begins to walk together [s], slowly [m/s], and may dawdle [s].
+# Time for a group of walkers to start [s], their assumed speed [m/s], and
+# reserve [s].
 WALK_GROUP = 3.0
 _WALKING, _DAWDLING = 1.0, 3.0
-# For so long after a group, a crossing is the vehicles' [s].
+# Time for vehicles after a group has left a crossing [s].
 _REST = 12.0
 
 
@@ -46,11 +49,12 @@ class Permits(NamedTuple):
     """The users of the P pieces and C crossings.
 
     Attributes:
-        small, large: (P + C,) how many small and large vehicles were let into
-            a way; walkers are small.
-        waits: (C,) since when walkers wait at a crossing, inf for none [s].
-        opened: (C,) when a crossing was opened [s].
-        closed: (C,) when it was last left [s].
+        small, large: (P + C,) number of small and large vehicles with a permit
+            for a way; walkers are small.
+        waits: (C,) time since which walkers wait at a crossing, inf for none
+            [s].
+        opened: (C,) time at which a crossing was opened [s].
+        closed: (C,) time at which it was last left [s].
         lengths: (C,) of the crossings [m].
     """
 
@@ -78,13 +82,13 @@ def choose_way(
 
 @compiled
 def is_green(lanes: LaneArrays, way: int, t: float) -> bool:
-    """Tells whether the signal of a way is green, or there is none."""
+    """Returns whether the signal of a way is green, or absent."""
     phase = lanes.phase[way]
     if phase < 0:
         return True
     count = lanes.phases[lanes.junction[way]]
     cycle = (_GREEN + _RED) * count
-    # Junctions do not switch all at once.
+    # Junctions switch at different times.
     at = (t + 7.0 * lanes.junction[way]) % cycle
     return phase * (_GREEN + _RED) <= at < phase * (_GREEN + _RED) + _GREEN
 
@@ -98,19 +102,19 @@ def is_ego_far(
     s: float,
     wait: float = _WAIT,
 ) -> bool:
-    """Tells whether a vehicle can leave a lane before the ego car is there.
+    """Returns whether a vehicle can leave a lane before the ego car is there.
 
     Args:
         lanes: all of them.
         presence: of the ego car.
         k: number of the time.
         lane: the lane.
-        s: how far along it the vehicle is [m].
-        wait: how long it may have to wait at the lane's end [s].
+        s: distance of the vehicle along it [m].
+        wait: its possible wait at the lane's end [s].
     """
     until = presence.until[k, lane]
     if until == 0.0:
-        # Behind it, one may follow.
+        # A vehicle may follow behind the ego car.
         return presence.speed[k, lane] >= 0.0 and (
             presence.rear[k, lane] > s + 2.0
         )
@@ -155,7 +159,7 @@ def room_beyond(
 def is_taken(
     lanes: LaneArrays, permits: Permits, place: int, is_large: bool
 ) -> bool:
-    """Tells whether anything that excludes a way or crossing is in use."""
+    """Returns whether a conflicting way or crossing is in use."""
     for other in range(len(permits.small)):
         small, large = permits.small[other], permits.large[other]
         if small == 0 and large == 0:
@@ -177,7 +181,7 @@ def grant_ways(
     dt: float,
     seed: int,
 ) -> None:
-    """Lets in who may go, in the order in which they came."""
+    """Gives permits in the order of arrival."""
     t = k * dt
     num_vehicles, num_pieces = len(vehicles.s), len(lanes.first)
     num_crossings = len(permits.waits)
@@ -242,11 +246,11 @@ def _open_crossing(
     if presence.until[k, place] < needed or blocked[place]:
         return
     if is_taken(lanes, permits, place, False):
-        # Those that came later must not always go first.
+        # Later arrivals must not always go first.
         for other in range(len(blocked)):
             blocked[other] |= lanes.small[place, other]
         return
-    # Somebody is let in who is nobody, until the group has begun to walk.
+    # A placeholder holds the permit until the group has begun to walk.
     permits.small[place] += 1
     permits.opened[c] = t
 

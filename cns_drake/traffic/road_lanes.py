@@ -1,4 +1,4 @@
-"""The lanes of a road network as traffic follows them."""
+"""Makes a lane graph for traffic from a road network."""
 
 from __future__ import annotations
 
@@ -18,9 +18,8 @@ from cns_drake.traffic.lane_graph import (
     without_dead_ends,
 )
 
-# Vehicles stop so far before the end of their road, where walkers cross and
-# where none do; a crossing has its middle so far from the end, and is so wide
-# [m].
+# Distance of stop lines from the end of a road with and without a crossing;
+# distance of a crossing's middle from the end, and its width [m].
 _STOP_LINE = 4.5
 _STOP_LINE_ALONE = 1.0
 CROSSING_PLACE = 1.7
@@ -28,9 +27,9 @@ CROSSING_WIDTH = 2.4
 # Between its stop lines a lane must have room for any vehicle; a shorter one
 # is part of the ways through the junctions at its ends [m].
 _SHORTEST_LANE = 14.0
-# Nobody passes more junctions at once.
+# Greatest number of junctions in one way.
 _MOST_JUNCTIONS = 4
-# Wider roads have signals where they meet, as the city generator has it.
+# Wider roads have signals at their junctions, as in the city generator.
 _LANES_WITHOUT_SIGNAL = 2
 
 
@@ -124,7 +123,7 @@ def make_lane_graph(network: RoadNetwork) -> LaneGraph:
 
 
 def _stop_line(network: RoadNetwork, road: Road, end: End) -> float:
-    """Returns how far before the end of a road its vehicles stop [m]."""
+    """Returns the distance of the stop line from the end of a road [m]."""
     junction = network.junctions[road.start if end == "start" else road.end]
     crosses = len(junction.arms) >= 3 and road.length >= 2 * _STOP_LINE
     return _STOP_LINE if crosses else _STOP_LINE_ALONE
@@ -133,7 +132,7 @@ def _stop_line(network: RoadNetwork, road: Road, end: End) -> float:
 def _trims_of(
     ref: LaneRef, trims: dict[tuple[str, End], float]
 ) -> tuple[float, float]:
-    """Returns what is cut off a lane's entry and exit [m]."""
+    """Returns the lengths cut off a lane's entry and exit [m]."""
     start, end = trims[ref.road, "start"], trims[ref.road, "end"]
     return (start, end) if ref.direction == "forward" else (end, start)
 
@@ -143,7 +142,7 @@ def _length(line: np.ndarray) -> float:
 
 
 def _cut(line: np.ndarray, start: float, end: float) -> np.ndarray:
-    """Returns a line (N, 3) without so much of its beginning and end [m]."""
+    """Returns a line (N, 3) shortened at both ends [m]."""
     steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
     along = np.concatenate([[0.0], np.cumsum(steps)])
     low, high = start, along[-1] - end
@@ -153,7 +152,8 @@ def _cut(line: np.ndarray, start: float, end: float) -> np.ndarray:
 
 
 def _clusters(network: RoadNetwork, long: set[str]) -> dict[str, int]:
-    """Returns numbers of junctions, one for those that short roads join."""
+    """Returns numbers of junctions; junctions joined by short roads share
+    one."""
     group = {name: {name} for name in network.junctions}
     for road in network.roads.values():
         if road.name not in long:

@@ -1,4 +1,4 @@
-"""Where vehicles and walkers are when a drive begins."""
+"""Places of vehicles and walkers at the start of a drive."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from cns_drake.traffic.walker_steps import (
 )
 from cns_drake.traffic.walkways import Walkway
 
-# What a vehicle needs of a lane besides its length [m].
+# Length of lane that a vehicle needs besides its own [m].
 _SPACE = 9.0
-# Vehicles begin with this part of what may be driven.
+# Vehicles begin with this part of the allowed speed.
 _PART_OF_SPEED = 0.5
 # Length of sidewalk for one walker [m].
 _WALKER_SPACE = 3.0
-# As many places are drawn before a vehicle is given up.
+# Number of places that are drawn before a vehicle is given up.
 _TRIES = 200
 
 
 def room_for_vehicles(graph: LaneGraph) -> int:
-    """Returns how many vehicles lanes hold so that all can move."""
+    """Returns the number of vehicles for which lanes have room to move."""
     mean = sum(kind.share * kind.size[0] for kind in KINDS)
     mean /= sum(kind.share for kind in KINDS)
     return int(
@@ -41,7 +41,7 @@ def room_for_vehicles(graph: LaneGraph) -> int:
 
 
 def room_for_walkers(walkways: Sequence[Walkway]) -> int:
-    """Returns how many walkers sidewalks hold so that all can walk."""
+    """Returns the number of walkers for whom sidewalks have room."""
     length = sum(
         np.linalg.norm(np.diff(way.points, axis=0), axis=1).sum()
         for way in walkways
@@ -57,7 +57,7 @@ def place_vehicles(
     presence: Presence,
     rng: np.random.Generator,
 ) -> tuple[Vehicles, list[int]]:
-    """Puts vehicles into lanes, where the ego car is not soon.
+    """Puts vehicles into lanes, away from the ego car's first places.
 
     Args:
         kinds: of the N vehicles.
@@ -106,7 +106,7 @@ def place_vehicles(
     factor = factor * rng.uniform(0.9, 1.1, count)
     left = lanes.length[path[:, CURRENT]] - front
     v = _PART_OF_SPEED * np.minimum(top, factor * lanes.speed[row])
-    # They can stop before the stop line, or behind the one ahead.
+    # Vehicles can stop before the stop line, or behind the one ahead.
     v = np.minimum(v, np.sqrt(1.5 * np.minimum(left, _SPACE / 2)))
     return Vehicles(
         length=np.array([kind.size[0] for kind in chosen], float),
@@ -163,10 +163,10 @@ def place_walkers(
     walkways: Sequence[Walkway],
     rng: np.random.Generator,
 ) -> Walkers:
-    """Puts walkers onto walkways that are no crossings.
+    """Puts walkers onto walkways, except crossings.
 
     Returns:
-        The walkers, fewer than asked for if there is no room for all.
+        The walkers, fewer than wanted if there is no room for all.
     """
     free = [k for k, way in enumerate(walkways) if way.crossing < 0]
     sizes = np.array([len(walkways[k].points) for k in free], float)
@@ -203,7 +203,7 @@ def place_walkers(
 
 
 def make_permits(graph: LaneGraph) -> Permits:
-    """Returns permits of which nobody has one yet."""
+    """Returns permits without any holder."""
     count = len(graph.crossings)
     places = len(graph.pieces) + count
     lengths = [

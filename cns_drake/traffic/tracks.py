@@ -13,13 +13,13 @@ class Tracks:
 
     Between two of these times every coordinate is a cubic polynomial, whose
     rate is continuous (Catmull and Rom's spline); before the first and after
-    the last it keeps its value.
+    the last time it keeps its value.
 
     Attributes:
         dt: distance of the times [s].
         values: (K, N, D), angles without jumps.
-        present: (K, N) whether a body is there; None if all always are. It
-            is there between two times at both of which it is.
+        present: (K, N) whether a body is there; None if all always are. A body
+            is there between two times if it is there at both.
     """
 
     dt: float
@@ -40,11 +40,11 @@ class Tracks:
         p0, p1 = self.values[k], self.values[k + 1]
         before = self.values[max(k - 1, 0)]
         after = self.values[min(k + 2, last)]
-        # At both ends of the whole it is at rest.
+        # At both ends of the track a body is at rest.
         m0 = (p1 - before) / 2 if k > 0 else np.zeros_like(p0)
         m1 = (after - p0) / 2 if k + 2 <= last else np.zeros_like(p0)
         if self.present is not None:
-            # Nobody comes from, or goes to, where he is not.
+            # A place at which a body is absent does not count.
             here = self.present
             alone = ~here[max(k - 1, 0)][:, None]
             m0 = np.where(alone, p1 - p0, m0)

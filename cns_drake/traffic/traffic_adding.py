@@ -45,14 +45,14 @@ _UNIT_MASS = SpatialInertia.SolidSphereWithMass(1.0, 1.0)
 
 
 def traffic_structures(plan: TrafficPlan, first: int = 1) -> StructureTable:
-    """Returns a name, an instance id and a class for everybody in a plan.
+    """Returns name, instance id and class of all bodies in a plan.
 
     Args:
-        plan: who there is.
+        plan: of the traffic.
         first: the lowest id.
 
     Raises:
-        InputError: there are not as many ids.
+        InputError: there are not enough ids.
     """
     names = [
         (f"traffic_{kind.name}_{k:03d}", kind.semantic_class)
@@ -80,21 +80,22 @@ def make_traffic(
     turn: float = 0.05,
     name: str = "traffic",
 ) -> TrafficMotion:
-    """Gives a SceneGraph vehicles and walkers, and returns what moves them.
+    """Adds vehicles and walkers to a SceneGraph, and returns the system that
+    moves them.
 
     Args:
         scene_graph: takes their geometry, on frames of a source of its own.
-        plan: who is where.
+        plan: of the traffic.
         seed: of colours and sizes.
-        structures: gives everybody an instance id, among others; by default
+        structures: has an instance id for each body; by default
             `traffic_structures` of the plan.
-        turn: how long the turn of a LiDAR takes that sees them move [s].
+        turn: duration of a LiDAR's turn with motion distortion [s].
         name: of the source.
     """
     if structures is None:
         structures = traffic_structures(plan)
     entries = [structures[entry.name] for entry in traffic_structures(plan)]
-    # A free body for each limb, so that Drake computes where frames are.
+    # Each limb is a free body, so that Drake computes the poses of frames.
     plant = MultibodyPlant(time_step=0.0)
     plant.set_name(name)
     source = plant.RegisterAsSourceForSceneGraph(scene_graph)
@@ -128,7 +129,7 @@ def add_traffic(
     Args:
         builder: of the diagram that holds `scene_graph`.
         scene_graph: takes their geometry.
-        plan: who is where.
+        plan: of the traffic.
         name: of the system, and of the source of geometry.
         options: further arguments of `make_traffic`.
 
@@ -151,7 +152,7 @@ def place_traffic(
     traffic: TrafficMotion,
     name: str = "traffic",
 ) -> None:
-    """Adds what `make_traffic` returned to the diagram of its SceneGraph."""
+    """Adds the system of `make_traffic` to the diagram of its SceneGraph."""
     builder.AddNamedSystem(name, traffic)
     builder.Connect(
         traffic.GetOutputPort("geometry_pose"),
@@ -169,11 +170,11 @@ def connect_traffic(
 
     Args:
         builder: of the diagram.
-        traffic: what moves.
-        lidar: labels what moves as moving; made with the `moving_frames` of
+        traffic: the traffic.
+        lidar: labels moving bodies as moving; made with the `moving_frames` of
             `traffic` as `posed_frames`.
-        goes_on: whether it sees traffic go on while it turns; then it was
-            made with them as `moving_bodies`, too.
+        goes_on: whether traffic moves during its turn; then it was made with
+            them as `moving_bodies`, too.
     """
     wanted = ["moving_instances"]
     wanted += ["frame_poses"] if lidar.HasInputPort("frame_poses") else []
@@ -191,7 +192,7 @@ def _register(
 ) -> tuple[FrameId, ...]:
     frames = []
     for limb in limbs:
-        # Nothing depends on the mass.
+        # The mass has no effect.
         body = plant.AddRigidBody(f"{name}_{limb.name}", _UNIT_MASS)
         frame = plant.GetBodyFrameIdOrThrow(body.index())
         frames.append(frame)

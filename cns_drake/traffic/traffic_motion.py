@@ -1,4 +1,4 @@
-"""A system that moves vehicles and walkers as they were planned."""
+"""A system that moves vehicles and walkers along their planned tracks."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from cns_drake.traffic.body_shapes import Limb
 from cns_drake.traffic.body_states import BodyStates, LimbTable, bodies_at
 from cns_drake.traffic.traffic_plan import WALKER_SIZE, TrafficPlan
 
-# What is faster is labelled as moving, what is slower as standing [m/s].
+# Faster bodies are labelled as moving, slower ones as standing [m/s].
 MOVING_SPEED = 0.5
 
 
@@ -48,13 +48,13 @@ class TrafficObjects(NamedTuple):
 
 
 class TrafficBody(NamedTuple):
-    """What a vehicle or a walker is.
+    """A vehicle or a walker.
 
     Attributes:
         instance: its id in points and tables.
         name: of its structure.
         semantic_class: a key of `CLASS_IDS`.
-        limbs: what moves as one.
+        limbs: its rigid parts.
         frames: of the limbs.
     """
 
@@ -81,11 +81,10 @@ class TrafficMotion(LeafSystem):
     `geometry_pose` is for the SceneGraph with which the bodies are
     registered. `frame_poses` is abstract, the same poses as one (M, 4, 4)
     array over all limbs: X_WL. `body_spatial_velocities` is abstract, a list
-    over all limbs of V_WL, expressed in the world: those that take a limb
-    from where it is to where it is a turn later, as a LiDAR wants them that
-    goes on turning meanwhile. `moving_instances` is abstract, the (N,)
-    instance ids of who is faster than `MOVING_SPEED`; `objects` the
-    `TrafficObjects`. All depend on time alone.
+    over all limbs of V_WL, expressed in the world: they take a limb to its
+    place a turn later, for a LiDAR that keeps turning meanwhile.
+    `moving_instances` is abstract, the (N,) instance ids of bodies faster than
+    `MOVING_SPEED`; `objects` the `TrafficObjects`. All depend only on time.
     """
 
     def __init__(
@@ -98,11 +97,11 @@ class TrafficMotion(LeafSystem):
         """Prepares the motion.
 
         Args:
-            plan: who is where.
+            plan: of the traffic.
             bodies: of the vehicles, then of the walkers of the plan.
             plant: has a free body for each limb, in the same order, and is
                 the source of their geometry.
-            turn: how long a LiDAR's turn takes [s].
+            turn: duration of a LiDAR's turn [s].
         """
         super().__init__()
         self.source_id = plant.get_source_id()
@@ -110,8 +109,8 @@ class TrafficMotion(LeafSystem):
         self._bodies = tuple(bodies)
         self._limbs = LimbTable([body.limbs for body in bodies])
         self._frames = [frame for body in bodies for frame in body.frames]
-        # Drake's own kinematics fill a FramePoseVector ten times as fast as
-        # calls from Python do, one for each frame.
+        # Drake's own kinematics fill a FramePoseVector ten times as fast as one
+        # call from Python for each frame.
         self._plant = plant
         self._plant_context = plant.CreateDefaultContext()
         self._turn = turn

@@ -1,4 +1,4 @@
-"""Planning traffic: everybody's motion, before a drive."""
+"""Plans the motion of all traffic before a drive."""
 
 from __future__ import annotations
 
@@ -29,26 +29,26 @@ from cns_drake.traffic.walkways import Walkway
 STEP = 0.1
 # A walker's box, with limbs that swing [m].
 WALKER_SIZE = (WALKER_LENGTH, WALKER_WIDTH, 1.8)
-# Boxes are kept apart by this much, for they are looked at now and then [m].
+# Boxes keep this distance, since they are compared only now and then [m].
 _APART = 0.1
-# How many more vehicles and walkers are planned than asked for, as part, for
-# some are left out; and so many times it is tried.
+# Share of vehicles and walkers that are planned in excess, since some are left
+# out; and number of trials.
 _SPARE, _TRIES = 0.06, 4
 
-# Where the ego car is: (K,) times -> (K, 2) places [m], (K,) headings [rad].
+# The ego car's motion: (K,) times -> (K, 2) places [m], (K,) headings [rad].
 EgoPath = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True)
 class TrafficPlan:
-    """What moves, and how.
+    """The planned motion of vehicles and walkers.
 
     Attributes:
         kinds: of the N vehicles.
         vehicles: x, y, z of the middle of each box on the ground [m], yaw and
             pitch [rad].
         walkers: x, y, z on the ground [m], yaw and phase of the gait [rad].
-        left_out: how many could not be had without meeting somebody.
+        left_out: number of wanted bodies left out because they would collide.
     """
 
     kinds: tuple[VehicleKind, ...]
@@ -71,17 +71,16 @@ def plan_traffic(
     """Plans traffic for a drive; equal arguments give an equal plan.
 
     Args:
-        graph: what vehicles follow.
-        walkways: where walkers walk.
-        vehicles, walkers: how many are wanted.
-        seed: of all that is drawn.
+        graph: lanes of the vehicles.
+        walkways: of the walkers.
+        vehicles, walkers: wanted numbers.
+        seed: of all draws.
         duration: of the drive [s].
-        ego: where the ego car is.
-        ego_box: what it covers.
+        ego: the ego car's motion.
+        ego_box: its size.
 
     Returns:
-        The plan, in which nobody ever meets anybody. It may have fewer than
-        are wanted.
+        The plan, without any collisions. It may have fewer bodies than wanted.
     """
     num_steps = int(np.ceil(duration / STEP)) + 2
     xy, yaw = ego(STEP * np.arange(num_steps))
@@ -164,13 +163,13 @@ def _without_overlaps(
     vehicles: int,
     walkers: int,
 ) -> TrafficPlan:
-    """Returns a plan without those who would meet somebody, or are too many.
+    """Returns a plan without bodies that would collide, or exceed the number.
 
     Args:
-        plan: to be looked at.
+        plan: to thin out.
         ego_track: (2 K - 1, 3) of the ego car, at half steps.
         ego_box: its size.
-        vehicles, walkers: how many are wanted.
+        vehicles, walkers: wanted numbers.
     """
     num = len(plan.kinds)
     num_walkers = plan.walkers.values.shape[1]

@@ -1,4 +1,4 @@
-"""Kinds of vehicles in traffic: sizes, shares, and how they are driven."""
+"""Kinds of vehicles in traffic: sizes, shares and driving parameters."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ class VehicleKind:
     and microscopic simulations", Phys. Rev. E 62 (2000).
 
     Attributes:
-        name: of the kind; of those with a body, its meshes begin with it.
+        name: of the kind; the names of its meshes begin with it.
         semantic_class: a key of `cns_drake.scene.semantics.CLASS_IDS`.
         share: of all vehicles, relative to the other kinds.
         size: length, width, height of the box about the vehicle, mirrors and
             rider included [m].
         axles: x of the rear and front axle from the middle of the box [m].
         speed_factor: speed on a free road, as a part of the limit.
-        top_speed: that it never exceeds [m/s].
+        top_speed: its greatest speed [m/s].
         acceleration: a_max of the model [m/s^2].
         deceleration: b of the model, the comfortable one [m/s^2].
         headway: T of the model [s].
@@ -97,7 +97,7 @@ KINDS = (
     ),
 )
 LARGEST = max(KINDS, key=lambda kind: kind.size[0])
-# What every small vehicle fits into [m].
+# Box that contains every small vehicle [m].
 SMALL_SIZE = (5.6, 2.26)
 
 

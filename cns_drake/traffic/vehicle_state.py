@@ -1,4 +1,4 @@
-"""The state of all vehicles while traffic is planned, and who is where."""
+"""The state of all vehicles during planning, and the occupants of pieces."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from cns_drake.base.compiled import compiled
 from cns_drake.traffic.lane_arrays import LaneArrays
 from cns_drake.traffic.presence import Presence
 
-# Columns of `path`: the piece on which the front bumper is, with as many
-# before it, which the rear may still be on, and after it.
+# Columns of `path`: the piece of the front bumper, with as many pieces before
+# it, for the rear, and after it.
 CURRENT = 5
 NUM_PIECES = 8
 # Stands for the ego car.
 EGO = -1
-# As many pieces at most does a vehicle lie on.
+# Greatest number of pieces under a vehicle.
 _MOST_ENTRIES = 8
 
 
 class Vehicles(NamedTuple):
-    """N vehicles; what they are, and where they are now.
+    """N vehicles: their constants, and their present state.
 
     Attributes:
         length: [m].
         rear_axle, front_axle: x from the middle [m].
-        factor, top: wanted part of what may be driven, and the most [m/s].
+        factor, top: wanted part of the allowed speed, and greatest speed [m/s].
         a, b, headway: of the car-following model.
         large: whether it sweeps more than its lane in turns.
         path: (N, NUM_PIECES) pieces, -1 for none.
@@ -34,11 +34,11 @@ class Vehicles(NamedTuple):
         v: speed [m/s].
         granted: whether it may leave its lane.
         held: the way that is kept free for it, -1 for none.
-        since: when it began to wait for its way, inf if it does not [s].
-        refused: for how long it has had no room beyond its way [s].
+        since: start of its wait for its way, inf without a wait [s]. refused:
+            time without room beyond its way [s].
         left_lane: the lane that it is changing from, -1 for none.
         change_start, change_length: of the lane change, along the lane [m].
-        draws: how many random numbers each has drawn.
+        draws: number of random numbers that each has drawn.
     """
 
     length: np.ndarray
@@ -103,7 +103,7 @@ def find_occupants(
     presence: Presence,
     k: int,
 ) -> None:
-    """Notes where everybody is at the k-th time."""
+    """Notes the places of all vehicles at the k-th time."""
     occupants.head[:] = -1
     free = 0
     for i in range(len(vehicles.s)):
@@ -174,9 +174,9 @@ def find_ahead(
 
     Args:
         occupants: of all pieces.
-        piece: where to look.
-        s: where the front bumper is [m].
-        who: the vehicle that looks.
+        piece: to search.
+        s: place of the front bumper [m].
+        who: the vehicle.
     """
     gap, speed = np.inf, 0.0
     entry = occupants.head[piece]
@@ -200,9 +200,9 @@ def find_behind(
 
     Args:
         occupants: of all pieces.
-        piece: where to look.
-        s: where the rear bumper is [m].
-        who: the vehicle that looks.
+        piece: to search.
+        s: place of the rear bumper [m].
+        who: the vehicle.
     """
     gap, speed, found = np.inf, 0.0, -2
     entry = occupants.head[piece]

@@ -21,11 +21,11 @@ from cns_drake.traffic.vehicle_state import (
     find_ahead,
 )
 
-# Before the stop line [m].
+# Distance kept from the stop line [m].
 _BEFORE_LINE = 0.5
-# Nobody looks farther ahead [m].
+# Greatest distance that drivers look ahead [m].
 _SIGHT = 120.0
-# The least gap that a step leaves, whatever the model says [m].
+# The least gap that a step leaves, independent of the model [m].
 _LEAST_GAP = 0.5
 
 
@@ -46,7 +46,7 @@ def accelerations(
         wanted = free_acceleration(v, v0, a, b)
         goes_on = lanes.is_way[lane] or vehicles.granted[i]
         if not goes_on:
-            # As if somebody stood behind the stop line.
+            # The driver brakes as for a vehicle behind the stop line.
             gap = left + STANDSTILL_GAP - _BEFORE_LINE
             wanted -= interaction(v, gap, v, a, b, STANDSTILL_GAP, T)
         gap, speed = find_ahead(occupants, lane, s, i)
@@ -93,11 +93,11 @@ def advance(
     Args:
         lanes: all of them.
         vehicles: all of them.
-        permits: who uses what.
+        permits: of ways and crossings.
         accelerations: (N,) [m/s^2].
         gaps: (N,) to the next ahead [m].
         dt: the step [s].
-        seed: of the ways that are drawn.
+        seed: of the drawn ways.
     """
     for i in range(len(vehicles.s)):
         v = vehicles.v[i]
@@ -127,7 +127,7 @@ def advance(
         rear = s - vehicles.length[i]
         if vehicles.held[i] >= 0 and not lanes.is_way[piece] and rear >= 0.0:
             way = vehicles.held[i]
-            # Not while it waits before the way, which was granted just now.
+            # A vehicle still before its way keeps the permit it has just got.
             if way != vehicles.path[i, CURRENT + 1] or not vehicles.granted[i]:
                 if vehicles.large[i]:
                     permits.large[way] -= 1
@@ -149,8 +149,8 @@ def place_of(
     Args:
         lanes: all of them.
         vehicles: all of them.
-        i: which vehicle.
-        back: how far behind its front bumper [m].
+        i: number of the vehicle.
+        back: distance behind its front bumper [m].
     """
     s, column = vehicles.s[i] - back, CURRENT
     while s < 0.0 and column > 0 and vehicles.path[i, column - 1] >= 0:
@@ -173,7 +173,7 @@ def place_of(
 def write_poses(
     lanes: LaneArrays, vehicles: Vehicles, poses: np.ndarray
 ) -> None:
-    """Writes where all vehicles are.
+    """Writes the poses of all vehicles.
 
     Both axles are on the path; the vehicle is straight between them.
 

@@ -1,8 +1,8 @@
 """One step of time for all walkers: the social force model.
 
 Helbing, Molnar, "Social force model for pedestrian dynamics", Phys. Rev. E 51
-(1995): walkers relax to the speed that they want, and keep away from each
-other and from the edges of their walkway.
+(1995): walkers relax to their wanted speed, and keep away from each other and
+from the edges of their walkway.
 """
 
 from __future__ import annotations
@@ -17,34 +17,35 @@ from cns_drake.traffic.lane_graph import SPACING
 from cns_drake.traffic.overlaps import boxes_overlap
 from cns_drake.traffic.right_of_way import WALK_GROUP, Permits
 
-# The model's speed that is wanted, and its spread [m/s]; relaxation [s];
-# strength [m/s^2] and reach [m] of what keeps walkers, and edges, away.
+# The model's wanted speed, and its spread [m/s]; relaxation [s]; strength
+# [m/s^2] and reach [m] of the repulsion by walkers, and by edges.
 SPEED, SPREAD = 1.34, 0.26
 _RELAXATION = 0.5
 _STRENGTH, _REACH = 7.0, 0.3
 _EDGE_STRENGTH, _EDGE_REACH = 10.0, 0.2
-# Nobody goes faster than so many times what is wanted.
+# Greatest speed, as a multiple of the wanted speed.
 _HURRY = 1.3
-# The least distance of two walkers' middles [m], and who is near.
+# The least distance of two walkers' middles, and the radius of neighbours [m].
 APART = 0.95
 _NEAR = 4.0
-# Boxes about walkers whose limbs swing [m], and what stays between them [m].
+# Boxes of walkers with swinging limbs [m], and least space between them [m].
 WALKER_LENGTH, WALKER_WIDTH, _GAP = 0.84, 0.6, 0.15
-# One steps aside for whom one has ahead, as hard as this [m/s^2], if the other
-# is not as far to the side [m].
+# A walker steps aside for one ahead with this acceleration [m/s^2], unless the
+# other is at least this far to the side [m].
 _ASIDE, _PASSING = 4.0, 0.85
 _TO_THE_RIGHT = 0.3
-# How far ahead one looks where to go [m].
+# Distance ahead of a walker's aim [m].
 _AHEAD = 2.0
-# A walker turns to where it goes this fast [rad/s], if it goes this fast [m/s].
+# A walker turns to its direction of motion at this rate [rad/s], if it is at
+# least this fast [m/s].
 _TURN_RATE, _GOING = 2.5, 0.2
-# One stands so near to the crossing that one waits for [m].
+# Distance of a waiting walker from the crossing [m].
 _AT_NODE = 1.0
-# Walkers that may cross or go on cross this often, for each that goes on.
+# Walkers that cross, for each one that goes straight on, if both are possible.
 _CROSSES = 0.25
-# Whoever has left a walkway goes back to it no faster [m/s].
+# Greatest speed of the return to a walkway [m/s].
 _BACK = 0.6
-# One turns back when somebody has been in the way for so long [s].
+# A walker turns back after being blocked for this time [s].
 _PATIENCE = 4.0
 
 
@@ -78,18 +79,16 @@ class Walkers(NamedTuple):
 
     Attributes:
         xy, velocity: (N, 2) [m, m/s].
-        yaw: where they look [rad].
+        yaw: of their heading [rad].
         phase: of their gait [rad].
-        way: the walkway that they are on.
+        way: their walkway.
         forward: whether they go from its start to its end.
-        at: row of the walkway's points that they have come to, from its
-            start.
-        speed: that they want [m/s].
-        aside: how far to the right of the middle they keep, as a part of the
-            half width.
-        next_way: the walkway that comes next, -1 if it is not drawn yet.
-        stuck: for how long somebody has been in the way [s].
-        draws: how many random numbers each has drawn.
+        at: row of the walkway's points that they have reached, from its start.
+        speed: wanted [m/s].
+        aside: offset to the right of the middle, as a part of the half width.
+        next_way: the next walkway, -1 if not drawn yet.
+        stuck: time for which they have been blocked [s].
+        draws: number of random numbers that each has drawn.
     """
 
     xy: np.ndarray
@@ -128,7 +127,7 @@ def _tangent(
 def _draw_next(
     ways: WalkwayArrays, walkers: Walkers, i: int, seed: int
 ) -> None:
-    """Draws the next walkway; back it goes only where nothing else is."""
+    """Draws the next walkway; the same one back only if there is no other."""
     way = walkers.way[i]
     node = ways.end[way] if walkers.forward[i] else ways.start[way]
     first, count = ways.node_first[node], ways.node_count[node]
@@ -150,7 +149,7 @@ def _draw_next(
 
 @compiled
 def _liking(ways: WalkwayArrays, way: int, last: int) -> float:
-    """Returns how much walkers like a way: few cross, none goes back."""
+    """Returns the weight of a way: few walkers cross, none goes back."""
     if way == last:
         return 0.0
     return 1.0 if ways.crossing[way] < 0 else _CROSSES
@@ -165,7 +164,7 @@ def _may_begin(
     way: int,
     t: float,
 ) -> bool:
-    """Tells whether one may begin a walkway; if not, one waits for it."""
+    """Returns whether a walker may begin a walkway, or has to wait."""
     c = ways.crossing[way]
     if c < 0:
         return True
@@ -189,9 +188,9 @@ def step_walkers(
     """Moves all walkers on.
 
     Args:
-        ways: where they walk.
+        ways: of the walkers.
         walkers: all of them.
-        permits: who uses the crossings.
+        permits: of the crossings.
         num_pieces: rows of `permits` before the crossings.
         t, dt: time and step [s].
         seed: of the ways that are drawn.
@@ -199,7 +198,7 @@ def step_walkers(
     count = len(walkers.speed)
     for c in range(len(permits.waits)):
         if permits.opened[c] + WALK_GROUP <= t and permits.opened[c] >= 0.0:
-            # Nobody's permit ends with the group's beginning.
+            # The placeholder's permit ends when the group begins to walk.
             permits.small[num_pieces + c] -= 1
             permits.opened[c] = -np.inf
             permits.closed[c] = t
@@ -208,7 +207,7 @@ def step_walkers(
     is_waiting = np.zeros(count, np.bool_)
     for i in range(count):
         way, forward = walkers.way[i], walkers.forward[i]
-        # How far it has come along its walkway.
+        # The walker's progress along its walkway.
         while walkers.at[i] < ways.num_points[way] - 2:
             tangent = _tangent(ways, way, forward, walkers.at[i])
             here = ways.points[_row(ways, way, forward, walkers.at[i]), :2]
@@ -267,7 +266,8 @@ def step_walkers(
             if square < _NEAR**2:
                 distance = max(np.sqrt(square), 1e-3)
                 push = _STRENGTH * np.exp(-max(distance - APART, 0.0) / _REACH)
-                # A little to the right, or two who meet head on would stand.
+                # A little to the right, or two walkers who meet head on would
+                # stop.
                 push_x = push * (x - _TO_THE_RIGHT * y) / distance
                 push_y = push * (y + _TO_THE_RIGHT * x) / distance
                 force[i, 0] += push_x
@@ -304,13 +304,13 @@ def _step_aside(
     y: float,
     distance: float,
 ) -> None:
-    """Pushes a walker aside whom another one is in the way of.
+    """Pushes a walker aside from another one in its way.
 
     Args:
         walkers: all of them.
         force: (N, 2) to add to [m/s^2].
-        i: which one.
-        x, y: where the other is from there [m].
+        i: number of the walker.
+        x, y: place of the other relative to it [m].
         distance: of both [m].
     """
     c, s = np.cos(walkers.yaw[i]), np.sin(walkers.yaw[i])
@@ -318,7 +318,7 @@ def _step_aside(
     if ahead <= 0.0 or abs(aside) >= _PASSING:
         return
     push = _ASIDE * (1.0 - distance / _NEAR) * (1.0 - abs(aside) / _PASSING)
-    # Away from the other; to the right of who is straight ahead.
+    # Away from the other one; to the right if it is straight ahead.
     side = -1.0 if aside >= -0.05 else 1.0
     force[i, 0] -= side * push * s
     force[i, 1] += side * push * c
@@ -326,7 +326,7 @@ def _step_aside(
 
 @compiled
 def gait_rate(speed: float) -> float:
-    """Returns how fast the phase of a gait goes on [rad/s].
+    """Returns the rate of a gait's phase [rad/s].
 
     A stride, of two steps, is as long as 0.7 s of a walk at that speed and
     0.4 m more.
@@ -336,7 +336,7 @@ def gait_rate(speed: float) -> float:
 
 @compiled
 def height_of(ways: WalkwayArrays, walkers: Walkers, i: int) -> float:
-    """Returns how high the walkway is where a walker is [m]."""
+    """Returns the height of the walkway at a walker [m]."""
     way, forward, at = walkers.way[i], walkers.forward[i], walkers.at[i]
     at = min(at, ways.num_points[way] - 2)
     a = ways.points[_row(ways, way, forward, at)]
@@ -374,7 +374,7 @@ def _begin(
 
 @compiled
 def _is_free(walkers: Walkers, i: int, x: float, y: float, yaw: float) -> bool:
-    """Tells whether a walker's box would overlap nobody's at a place."""
+    """Returns whether a walker's box would be free at a place."""
     half = np.array([WALKER_LENGTH / 2 + _GAP / 2, WALKER_WIDTH / 2 + _GAP / 2])
     reach = 4.0 * (half[0] ** 2 + half[1] ** 2)
     a, b = np.array([x, y, yaw]), np.zeros(3)
@@ -396,9 +396,9 @@ def _move(
     velocity: np.ndarray,
     dt: float,
 ) -> None:
-    """Moves a walker as far as nobody is in the way.
+    """Moves a walker as far as its way is free.
 
-    All begin apart, and nobody makes a step by which two overlap.
+    All begin apart, and no step makes two overlap.
     """
     x, y = walkers.xy[i, 0], walkers.xy[i, 1]
     speed = np.sqrt(np.sum(velocity**2))
@@ -417,7 +417,7 @@ def _move(
     elif _is_free(walkers, i, new_x, new_y, walkers.yaw[i]):
         pass
     else:
-        # Aside alone, else not at all.
+        # Try the lateral part of the step only, or stay.
         c, s = np.cos(walkers.yaw[i]), np.sin(walkers.yaw[i])
         aside = (new_y - y) * c - (new_x - x) * s
         new_x, new_y = x - aside * s, y + aside * c
@@ -432,7 +432,7 @@ def _move(
 def _keep_on_way(
     ways: WalkwayArrays, walkers: Walkers, i: int, most: float
 ) -> None:
-    """Moves a walker back who has left its walkway, by so much at most [m]."""
+    """Moves a walker back to its walkway, by at most a distance [m]."""
     way, forward = walkers.way[i], walkers.forward[i]
     half = ways.half_width[way]
     best, nearest = np.inf, 0

@@ -1,4 +1,4 @@
-"""Where walkers walk: sidewalks, round corners, and over crossings."""
+"""Walkways: along sidewalks, round corners, and over crossings."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from cns_drake.roads.road import ENDS, End, Road
 from cns_drake.traffic.lane_graph import LaneGraph, resampled
 from cns_drake.traffic.road_lanes import CROSSING_PLACE, crossing_line
 
-# Walkers keep so far from kerbs and walls, and from the edges of a crossing
+# Distance of walkers from kerbs and walls, and from the edges of a crossing
 # [m].
 _MARGIN = 0.45
 _CROSSING_HALF_WIDTH = 0.8
 _LEAST_HALF_WIDTH = 0.3
-# A sidewalk is walked on this close to the kerb, however wide it is; what
-# stands on it stands beside the kerb or the houses [m].
+# Distance of the walked strip from the kerb on any sidewalk; furniture is
+# beside the kerb or the houses [m].
 _WIDEST = 3.0
 _SHORTEST = 1.0
 
@@ -31,7 +31,7 @@ class Walkway:
 
     Attributes:
         points: (N, 3) its middle, evenly spaced [m].
-        half_width: how far from the middle a walker may be [m].
+        half_width: greatest distance of a walker from the middle [m].
         start, end: numbers of the places at its ends.
         crossing: number of the crossing that it leads over, -1 for none.
     """
@@ -96,7 +96,7 @@ def make_walkways(network: RoadNetwork, graph: LaneGraph) -> list[Walkway]:
                         resampled(line), _CROSSING_HALF_WIDTH, left, right, k
                     )
                 )
-    # Where roads meet in odd ways, not every corner has a sidewalk round it.
+    # At unusual junctions, not every corner has a sidewalk.
     lanes = network.lane_area()
     shapely.prepare(lanes)
     return [
@@ -126,9 +126,9 @@ def _walked_width(road: Road) -> float:
 
 
 def _offset(road: Road) -> float:
-    """Returns how far from the centreline the sidewalk's strip lies [m].
+    """Returns the distance of the sidewalk's strip from the centreline [m].
 
-    The strip is the far side, away from what stands along the kerb.
+    The strip is on the far side, away from objects along the kerb.
     """
     return (
         road.half_width + road.sidewalk - min(_walked_width(road), _WIDEST) / 2

@@ -1,4 +1,4 @@
-"""What comes and goes between drives: parked cars, leaves, snow, roadworks.
+"""Passing changes between drives: parked cars, leaves, snow, roadworks.
 
-A world that is loaded is changed before it becomes a part of a diagram.
+A loaded world is changed before it becomes part of a diagram.
 """

@@ -23,21 +23,21 @@ from cns_drake.transient.standing import (
 
 CAUSE = "parked_cars"
 CLASSES = frozenset({"car", "truck", "bus"})
-# Of the bays that change: the car is gone; it is the same one, elsewhere. In
-# all others there is another.
+# Shares of changed bays: the car is gone; the car has moved. The rest have
+# another car.
 _GONE = 0.3
 _MOVED = 0.2
-# A bay has at most so much room before and behind a car, and beside it [m].
+# Greatest room of a bay before and behind a car, and beside it [m].
 _LENGTHWISE = 0.5
 _SIDEWAYS = 0.25
-# Cars are turned against their bay by at most [rad].
+# Greatest turn of a car against its bay [rad].
 _SKEW = 0.03
-# Cars stand this far from all else [m].
+# Distance of cars from all other things [m].
 _GAP = 0.05
-# A car that moved lies at least this far from where it was [m].
+# Least distance of a moved car from its old place [m].
 _LEAST_MOVE = 0.1
 _TRIES = 12
-# What may park: shares, relative to each other.
+# Kinds of parked vehicles, with relative shares.
 _FORMS = {
     "city_car": 3,
     "hatchback": 4,
@@ -50,19 +50,19 @@ _FORMS = {
 
 
 class Bay:
-    """The room that a parked car has, none of which another's bay has.
+    """The room of a parked car, which overlaps no other bay.
 
     Attributes:
         middle: (2,) of the car [m].
         yaw: of its long axis [rad].
-        front, back, left, right: how far the bay reaches from there [m].
+        front, back, left, right: reach of the bay from there [m].
     """
 
     def __init__(self, car: Standing):
         """A bay as large as the car.
 
         Args:
-            car: that stands in it.
+            car: in the bay.
         """
         hull = shapely.MultiPoint(car.p_WPs[:, :2])
         corners = shapely.get_coordinates(hull.minimum_rotated_rectangle)[:4]
@@ -75,7 +75,7 @@ class Bay:
         self.left = self.right = float(lengths.min()) / 2
 
     def box(self, beyond: np.ndarray | float = 0.0) -> Polygon:
-        """Returns the bay seen from above, reaching so much further [m].
+        """Returns the bay, extended, seen from above [m].
 
         Args:
             beyond: of front, back, left and right.
@@ -89,12 +89,13 @@ class Bay:
         return Polygon(corners @ np.array([[c, s], [-s, c]]) + self.middle)
 
     def grow(self, car: Standing, cars: Obstacles, others: Obstacles) -> None:
-        """Grows towards what is around it, half the way towards other cars.
+        """Grows towards surrounding things, and half the way towards other
+        cars.
 
         Args:
-            car: that stands in it.
+            car: in the bay.
             cars: all cars.
-            others: what else a car must not touch.
+            others: other things that a car must not touch.
         """
         own = (car.name,)
         box = self.box()
@@ -117,11 +118,11 @@ class Bay:
     def place(
         self, half_size: np.ndarray, rng: np.random.Generator
     ) -> tuple[np.ndarray, float] | None:
-        """Returns middle and yaw of a car in the bay, None where it is too big.
+        """Returns middle and yaw of a car in the bay; None if it is too big.
 
         Args:
             half_size: (2,) half its length and width [m].
-            rng: draws where.
+            rng: draws the place.
         """
         skew = float(rng.uniform(-_SKEW, _SKEW))
         across, turned = rng.uniform(size=2), rng.uniform() < 0.5
@@ -148,8 +149,8 @@ def make_bays(
     """Returns the bays of all parked cars, by the cars' names.
 
     Args:
-        things: all that stands.
-        kept_free: where no bay may grow to, seen from above [m].
+        things: all structures.
+        kept_free: area into which no bay may grow, seen from above [m].
     """
     cars = {n: t for n, t in things.items() if t.semantic_class in CLASSES}
     bays = {name: Bay(car) for name, car in cars.items()}
@@ -165,7 +166,7 @@ def make_bays(
     for name, car in cars.items():
         grown[name] = Bay(car)
         grown[name].grow(car, standing, others)
-    # Of two that meet at a corner, both stay as they are.
+    # Two bays that meet at a corner both stay as they are.
     boxes = [bay.box() for bay in grown.values()]
     names = list(grown)
     first, second = shapely.STRtree(boxes).query(boxes, "intersects")
@@ -186,10 +187,10 @@ def change_parked_cars(
 
     Args:
         editing: of the world.
-        things: all that stands.
-        bays: of its cars.
-        part: how many of them, from 0 to 1.
-        seed: of what is drawn.
+        things: all structures.
+        bays: of the cars.
+        part: share of them, from 0 to 1.
+        seed: of the draws.
     """
     if not bays:
         editing.note("parked_cars: the world has no car, truck or bus")
@@ -211,10 +212,10 @@ def _new_name(name: str) -> str:
 
 
 def _moved(bay: Bay, car: Standing, rng: np.random.Generator) -> RigidTransform:
-    """Returns where the points of a car go that stands elsewhere by now."""
+    """Returns the transformation of a moved car's points."""
     own = Bay(car)
     half_size = np.array([own.front, own.left])
-    middle, yaw = own.middle, own.yaw + np.pi  # At least the other way round.
+    middle, yaw = own.middle, own.yaw + np.pi  # At least turned round.
     for _ in range(_TRIES):
         found = bay.place(half_size, rng)
         if (
@@ -243,7 +244,7 @@ def _replace(
             continue
         middle, yaw = found
         R = RollPitchYaw(0, 0, yaw)
-        # The middle of the car is not quite the origin of its model.
+        # The origin of the model is not exactly in the middle of the car.
         offset = R.ToRotationMatrix() @ [*((low + high) / 2), 0.0]
         X_WS = RigidTransform(R, [*middle, car.bottom] - offset)
         editing.remove(car, CAUSE)

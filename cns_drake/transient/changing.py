@@ -1,4 +1,4 @@
-"""All that comes and goes, put into a world."""
+"""Applies all passing changes to a world."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from cns_drake.transient.scene_editing import SceneEditing
 from cns_drake.transient.snow_cover import lay_snow
 from cns_drake.transient.standing import read_standing
 
-# Farther from the drive, no LiDAR sees much of snow [m].
+# Snow farther from the drive would be hardly visible to a LiDAR [m].
 _NEAR = 120.0
 
 
@@ -30,10 +30,10 @@ def change_world(
 
     Args:
         world: not yet a part of a diagram; its SceneGraph is changed.
-        config: what came and went.
+        config: the changes.
         drive: the way of the vehicle, seen from above [m].
-        kept_free: where vehicles drive, seen from above [m]; nothing new
-            stands there.
+        kept_free: area where vehicles drive, seen from above [m]; it stays free
+            of new things.
 
     Raises:
         InputError: a mesh cannot be read, or there are more structures than
@@ -61,7 +61,7 @@ def change_world(
         if part > 0.0:
             put_up(editing, things, drive, kept_free, ground, part, seed)
     if config.snow > 0.0:
-        # It lies on what is new as well.
+        # Snow comes last, so that it covers new things as well.
         world = editing.finish()
         editing = SceneEditing(world)
         lay_snow(

@@ -10,7 +10,7 @@ import numpy as np
 def draws(seed: int, cause: str, name: str) -> np.random.Generator:
     """Returns the random numbers of one structure for one cause.
 
-    They depend on nothing else, such as other structures or other causes.
+    They do not depend on other structures or other causes.
 
     Args:
         seed: of the scenario's section.

@@ -15,7 +15,7 @@ from cns_drake.transient.standing import GROUND_CLASSES, Obstacles, Standing
 
 CAUSE = "furniture"
 CLASSES = frozenset({"pole", "traffic-sign"})
-# How far they go [m].
+# Greatest move [m].
 _NEAREST, _FARTHEST = 0.3, 2.0
 _TURN = 0.15  # [rad]
 _TRIES = 24
@@ -30,14 +30,14 @@ def move_furniture(
 ) -> None:
     """Replaces a part of poles, lamps and signs within 2 m.
 
-    Where there is no room all around, one stays.
+    An object without room around it stays.
 
     Args:
         editing: of the world.
-        things: all that stands.
-        kept_free: where nothing may stand, seen from above [m].
-        part: how many of them, from 0 to 1.
-        seed: of what is drawn.
+        things: all structures.
+        kept_free: area that stays free, seen from above [m].
+        part: share of them, from 0 to 1.
+        seed: of the draws.
     """
     wanted = [t for t in things.values() if t.semantic_class in CLASSES]
     if not wanted:

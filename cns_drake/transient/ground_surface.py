@@ -1,4 +1,4 @@
-"""The ground near a drive, the carriageway in it, and the kerbs along that."""
+"""The ground near a drive, with its carriageway and kerbs."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from cns_drake.city.geometry.polygons import polygons_of
 from cns_drake.scene.surfaces import TriangleSurface
 from cns_drake.transient.standing import GROUND_CLASSES, Standing, StandingPart
 
-# Steeper surfaces are no ground: sine of their slope against the vertical.
+# Steeper surfaces are not ground: sine of their slope against the vertical.
 _LEAST_UP = 0.3
 # Slits between triangles are closed up to twice this width [m].
 _SEAM = 0.05
@@ -36,18 +36,18 @@ class Kerb(NamedTuple):
 
 
 class GroundSurface:
-    """What things stand on near a drive.
+    """The ground below things near a drive.
 
     Attributes:
-        near: the area that is looked at [m].
+        near: its area [m].
     """
 
     def __init__(self, things: Mapping[str, Standing], near: BaseGeometry):
         """Collects it.
 
         Args:
-            things: all that stands.
-            near: the area to look at [m].
+            things: all structures.
+            near: the area to collect [m].
         """
         shapely.prepare(near)
         self.near = near
@@ -73,13 +73,13 @@ class GroundSurface:
 
     @cached_property
     def carriageway(self) -> BaseGeometry:
-        """What has the class `road`, seen from above [m]."""
+        """The area of class `road`, seen from above [m]."""
         roads = from_above(self._corners[self._is_road])
         joined = shapely.unary_union(roads, grid_size=0.001)
         return joined.buffer(_SEAM).buffer(-_SEAM)
 
     def heights(self, xy: np.ndarray, *, of_road: bool) -> np.ndarray:
-        """Returns the height of the ground at places, NaN where there is none.
+        """Returns the height of the ground at places; NaN without ground.
 
         Args:
             xy: (N, 2) places [m].
@@ -102,7 +102,7 @@ class GroundSurface:
         Args:
             spacing: of their points, at most [m].
         """
-        inner = self.near.buffer(-1.0)  # Its own edge is none of a road.
+        inner = self.near.buffer(-1.0)  # The edge of `near` is no kerb.
         shapely.prepare(inner)
         for polygon in polygons_of(self.carriageway):
             turned = orient(polygon)
@@ -114,7 +114,7 @@ class GroundSurface:
 
 
 def _runs(xy: np.ndarray, inside: np.ndarray) -> Iterator[Kerb]:
-    """Yields what lies inside of a ring with the area on its left."""
+    """Yields rings of an area, with the area on their left."""
     along = np.roll(xy, -1, axis=0) - np.roll(xy, 1, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     outwards = np.column_stack([along[:, 1], -along[:, 0]])
@@ -143,7 +143,7 @@ def triangle_corners(part: StandingPart) -> np.ndarray:
 
 
 def faced_up(corners: np.ndarray) -> np.ndarray:
-    """Returns triangles of ground, whichever way round they are in a file."""
+    """Returns triangles of ground, with either winding in the file."""
     down = upwardness(corners) < 0.0
     return np.where(down[:, None, None], corners[:, ::-1], corners)
 

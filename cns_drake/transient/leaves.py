@@ -13,7 +13,7 @@ from cns_drake.transient.standing import Standing, StandingPart
 
 CAUSE = "leaves"
 _LEAVES = ("crown", "lea", "foliage", "canopy", "plants", "hedge")
-# Of a shrub without wood of its own, twigs stay: so much of its surface.
+# Share of the surface of a shrub without separate wood that stays, as twigs.
 _TWIGS = 0.1
 
 
@@ -28,9 +28,9 @@ def thin_leaves(
 
     Args:
         editing: of the world.
-        things: all that stands.
-        part: of the leaves that stay, from 0 to 1.
-        seed: of which.
+        things: all structures.
+        part: share of leaves that stay, from 0 to 1.
+        seed: of their choice.
     """
     plants = [t for t in things.values() if t.semantic_class == "vegetation"]
     changed = False
@@ -57,13 +57,14 @@ def _thin(
     surface = part.geometry.surface
     assert isinstance(surface, TriangleSurface)
     count = len(surface.triangles)
-    # By its size and not by its file, whose place does not matter.
+    # The key is the mesh's size, not its file, whose place must not matter.
     order = draws(seed, CAUSE, str(count)).permutation(count)
     editing.replace_triangles(part, np.sort(order[: round(left * count)]))
 
 
 def _is_leafy(part: StandingPart) -> bool:
-    """Tells leaves from wood, by their names or else by their colour."""
+    """Returns whether a part is leaves and not wood, by name or else by
+    colour."""
     if not isinstance(part.geometry.surface, TriangleSurface):
         return False
     name = part.name.lower()

@@ -19,22 +19,22 @@ from cns_drake.transient.scene_editing import SceneEditing
 from cns_drake.transient.standing import GROUND_CLASSES, Obstacles, Standing
 
 CAUSE = "works"
-# Stretches of kerb lie in cells of a grid of the world, at most so far from
-# the drive [m].
+# Cell size of the world's grid of kerb stretches, and their greatest distance
+# from the drive [m].
 _CELL = 20.0
 _FARTHEST = 30.0
 _SPACING = 1.0
-# A stretch that bends is none: its length by that of its chord.
+# Greatest ratio of a stretch's length to its chord: a bent one is not used.
 _MOST_BENT = 1.05
 _LENGTHS = (6.0, 14.0)
 _TRIES = 6
-# Sites reach from here to one of these from the kerb [m].
+# Sites reach from this distance from the kerb to one of these [m].
 _INNER = 0.4
 _WIDTHS = (4.6, 2.7)
-# New kerb stones narrow the carriageway by so much [m].
+# New kerb stones narrow the carriageway by this [m].
 _KERB_WIDTH, _KERB_HEIGHT = 0.3, 0.13
 _KERB_RGB = (0.8, 0.8, 0.78)
-# What stands on a site with so much room for it [m], relative shares.
+# Things on a site, with the room they need [m] and relative shares.
 _WIDE = {"excavator": 3, "skip": 2, "soil_heap": 1, "brick_pallets": 1}
 _NARROW = {"skip": 3, "brick_pallets": 2, "portable_toilet": 1}
 _OPEN = frozenset({"pole", "traffic-sign", "vegetation"}) | GROUND_CLASSES
@@ -83,16 +83,16 @@ def put_up_works(
 ) -> None:
     """Puts roadworks along a part of the kerbs near a drive.
 
-    Where there is no room beside a kerb, there are none.
+    Kerbs without room beside them get none.
 
     Args:
         editing: of the world.
-        things: all that stands.
+        things: all structures.
         drive: the way of the vehicle, seen from above [m].
-        kept_free: where nothing may stand [m].
+        kept_free: area that stays free [m].
         ground: near the drive.
-        part: of the stretches of kerb, from 0 to 1.
-        seed: of what is drawn.
+        part: share of the stretches of kerb, from 0 to 1.
+        seed: of the draws.
     """
     stretches = [
         stretch
@@ -132,7 +132,7 @@ def put_up_works(
 
 
 class _Site:
-    """One site, while it is put up."""
+    """One site under construction."""
 
     def __init__(
         self,
@@ -152,8 +152,8 @@ class _Site:
         """Puts up fences, machines, and new kerb stones.
 
         Args:
-            every: what machines must not stand in.
-            drive: that kerb stones keep clear of [m].
+            every: obstacles of machines.
+            drive: area that kerb stones keep clear of [m].
         """
         x, length, width = self._x, self._length, self._width
         middle, across = (_INNER + width) / 2, width - _INNER
@@ -221,9 +221,9 @@ class _Site:
         turn: float,
         length: float,
     ) -> None:
-        """Adds a thing that lies on the ground at both of its ends.
+        """Adds a thing whose two ends are on the ground.
 
-        Where there is no ground, the thing is left out.
+        Without ground the thing is left out.
         """
         yaw = self._stretch.yaw + turn
         middle = self._stretch.place(x, y)
@@ -231,10 +231,10 @@ class _Site:
         ends = np.array([middle, middle - along, middle + along])
         z = self._ground.heights(ends, of_road=y < 0.0)
         at = float(z[0])
-        if not np.isfinite(at):  # Beside the road is nothing.
+        if not np.isfinite(at):  # No ground beside the road.
             edge = self._stretch.place(x, -0.1)[None]
             at = float(self._ground.heights(edge, of_road=True)[0])
-        if not np.isfinite(at):  # Both places are slits of the ground.
+        if not np.isfinite(at):  # Both are in slits of the ground.
             return
         pitch = 0.0
         if length > 0.0 and np.isfinite(z).all():

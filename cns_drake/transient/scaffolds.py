@@ -17,11 +17,11 @@ from cns_drake.transient.scene_editing import SceneEditing
 from cns_drake.transient.standing import Obstacles, Standing
 
 CAUSE = "scaffolds"
-# Fronts stand at most so far from the drive [m].
+# Greatest distance of fronts from the drive [m].
 _FARTHEST = 30.0
 # A scaffold's inner and outer row of standards, from the front [m].
 _INNER, _OUTER = 0.25, 1.15
-# Lifts, bays and what a scaffold is at most [m].
+# Height of lifts, length of bays, and greatest size of a scaffold [m].
 _LIFT, _BAY = 2.0, 2.5
 _LONGEST, _HIGHEST = 25.0, 16.0
 _LEAST_LENGTH, _LEAST_HEIGHT = 4.0, 3.5
@@ -44,16 +44,16 @@ def put_up_scaffolds(
 ) -> None:
     """Puts scaffolds before a part of the fronts along a drive.
 
-    Where there is no room before a front, there is none.
+    A front without room before it gets none.
 
     Args:
         editing: of the world.
-        things: all that stands.
+        things: all structures.
         drive: the way of the vehicle, seen from above [m].
-        kept_free: where nothing may stand [m].
+        kept_free: area that stays free [m].
         ground: near the drive.
-        part: of the fronts, from 0 to 1.
-        seed: of what is drawn.
+        part: share of the fronts, from 0 to 1.
+        seed: of the draws.
     """
     fronts = [
         thing

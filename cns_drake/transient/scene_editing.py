@@ -1,4 +1,4 @@
-"""Changing a loaded world, and keeping account of why."""
+"""Edits a loaded world, and records the cause of each change."""
 
 from __future__ import annotations
 
@@ -45,11 +45,12 @@ from cns_drake.transient.standing import Standing, StandingPart
 
 
 class Look(NamedTuple):
-    """What new surfaces look like.
+    """The look of new surfaces.
 
     Attributes:
         rgb: diffuse colour.
-        reflectivity: near 900 nm, 0 to 1; None where class and colour say it.
+        reflectivity: near 900 nm, 0 to 1; None if it follows from class and
+            colour.
     """
 
     rgb: tuple[float, float, float]
@@ -57,10 +58,10 @@ class Look(NamedTuple):
 
 
 class SceneEditing:
-    """Takes things out of a world and puts others into it."""
+    """Removes things from a world and adds others."""
 
     def __init__(self, world: World):
-        """Begins with a world as it is.
+        """Begins with an unchanged world.
 
         Args:
             world: not yet a part of a diagram; its SceneGraph is changed.
@@ -73,22 +74,22 @@ class SceneEditing:
         self._notes: list[str] = []
 
     def note(self, text: str) -> None:
-        """Keeps what a user should know of the changes."""
+        """Keeps a note for the user on the changes."""
         self._notes.append(f"transient: {text}")
 
     def blame(self, structure: str, cause: str) -> None:
-        """Keeps by which switch a structure changed."""
+        """Keeps the switch that changed a structure."""
         if cause not in self._causes[structure]:
             self._causes[structure].append(cause)
 
     def remove(self, thing: Standing, cause: str) -> None:
-        """Takes a structure away."""
+        """Removes a structure."""
         for part in thing.parts:
             self.remove_part(part)
         self.blame(thing.name, cause)
 
     def remove_part(self, part: StandingPart) -> None:
-        """Takes a part of a structure away."""
+        """Removes a part of a structure."""
         self._world.scene_graph.RemoveGeometry(
             self._source, part.geometry.geometry_id
         )
@@ -96,12 +97,12 @@ class SceneEditing:
     def move(
         self, thing: Standing, X_new: RigidTransform, name: str, cause: str
     ) -> None:
-        """Puts a structure elsewhere, as another one of a new name.
+        """Moves a structure, and gives it a new name.
 
         Args:
-            thing: that is taken away.
-            X_new: where its points go in the world.
-            name: of what stands there.
+            thing: to move.
+            X_new: transformation of its points in the world.
+            name: the new name.
             cause: the switch.
         """
         for part in thing.parts:
@@ -117,9 +118,9 @@ class SceneEditing:
         """Moves a part of a structure and paints it.
 
         Args:
-            part: which.
-            p_W: (3,) by how much, in the world [m].
-            look: of it from now on.
+            part: to change.
+            p_W: (3,) displacement in the world [m].
+            look: its new look.
         """
         inspector = self._world.scene_graph.model_inspector()
         self._register(
@@ -138,12 +139,12 @@ class SceneEditing:
         X_WS: RigidTransform,
         cause: str,
     ) -> None:
-        """Puts up something new.
+        """Adds a new structure.
 
         Args:
-            name: of the structure, which no other has.
+            name: of the structure; unique.
             semantic_class: a key of `CLASS_IDS`.
-            model: what it looks like, of the city generator's meshes.
+            model: of the city generator's meshes.
             X_WS: its pose in the world.
             cause: the switch.
         """
@@ -158,17 +159,17 @@ class SceneEditing:
         self.blame(name, cause)
 
     def replace_triangles(self, part: StandingPart, kept: np.ndarray) -> None:
-        """Leaves some of the triangles of a part.
+        """Keeps only some of the triangles of a part.
 
         Args:
-            part: whose surface is of triangles.
-            kept: indices of those that stay.
+            part: with a surface of triangles.
+            kept: indices of triangles that stay.
         """
         surface = part.geometry.surface
         assert isinstance(surface, TriangleSurface)
         triangles = surface.triangles[kept]
         if len(triangles):
-            # Unscaled, parts of one mesh have one mesh again.
+            # The mesh is unscaled, so that parts of one mesh share one again.
             scale = self._scale(part)
             if np.prod(scale) < 0.0:
                 triangles = triangles[:, ::-1]
@@ -191,7 +192,7 @@ class SceneEditing:
         """Adds a surface to the structure of a part.
 
         Args:
-            part: whose structure it joins, in the frame of its geometry.
+            part: of the structure that it joins, in the frame of its geometry.
             name: of the new part.
             vertices: (N, 3) in the world [m].
             triangles: (M, 3) vertex indices.
@@ -276,7 +277,7 @@ class SceneEditing:
     def _scale(self, part: StandingPart) -> np.ndarray:
         inspector = self._world.scene_graph.model_inspector()
         shape = inspector.GetShape(part.geometry.geometry_id)
-        # Of all shapes that become triangles, boxes and cones have none.
+        # Boxes and cones are the only such shapes without triangles.
         if not isinstance(shape, Mesh | Convex):
             return np.ones(3)
         return np.array(shape.scale3())
@@ -312,7 +313,7 @@ def memory_mesh(
     triangles: np.ndarray,
     scale: np.ndarray | None = None,
 ) -> Mesh:
-    """Returns a mesh that lies in no file; equal ones are one to readers.
+    """Returns a mesh in memory; readers treat equal ones as the same.
 
     Args:
         vertices: (N, 3) before they are scaled [m].

@@ -1,4 +1,4 @@
-"""Snow on what faces the sky, and banks of it along kerbs."""
+"""Snow on surfaces that face the sky, and banks along kerbs."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from cns_drake.transient.standing import GROUND_CLASSES, Standing, StandingPart
 CAUSE = "snow"
 # Snow near 900 nm: Warren, "Optical properties of snow", 1982.
 _LOOK = Look((0.93, 0.95, 0.97), 0.9)
-# Snow slides from what is steeper: cosine of 45 degrees.
+# Snow slides from steeper surfaces: cosine of 45 degrees.
 _LEAST_UP = 0.707
-# What is smaller bears none [m^2].
+# Smaller surfaces bear no snow [m^2].
 _LEAST_AREA = 0.3
 _BARE = frozenset(
     {"vegetation", "trunk", "pole", "traffic-sign", "fence", "bicycle", "road"}
 )
-# Of triangles at the edge of a cleared road, the longest side [m].
+# Longest side of triangles at the edge of a cleared road [m].
 _FINE = 0.7
-# A bank along a kerb: how far it reaches to both sides, by its height where
-# it is highest, in depths of snow, and at most [m].
+# A bank along a kerb: its reach to both sides as a multiple of its height, its
+# greatest height in depths of snow, and in [m].
 _INSIDE, _CREST, _OUTSIDE = 0.3, 0.3, 1.1
 _HIGHEST, _MOST_HEIGHT = 2.5, 0.9
 _SPACING = 1.5
@@ -50,13 +50,13 @@ def lay_snow(
     depth: float,
     seed: int,
 ) -> None:
-    """Lays snow on all near a drive but roads, plants and thin things.
+    """Lays snow near a drive, except on roads, plants and thin things.
 
     Ground is raised. Roads are cleared, with banks along their kerbs.
 
     Args:
         editing: of the world.
-        things: all that stands, with what was changed.
+        things: all structures, with earlier changes.
         drive: the way of the vehicle, seen from above [m].
         ground: near the drive.
         depth: of the snow [m].
@@ -87,7 +87,7 @@ def lay_snow(
 
 
 def _lies_below_road(part: StandingPart, ground: GroundSurface) -> bool:
-    """Tells whether ground goes on below a carriageway."""
+    """Returns whether ground continues below a carriageway."""
     corners = faced_up(triangle_corners(part))
     corners = corners[upwardness(corners) > 0.0]
     inner = ground.carriageway.buffer(-0.5)
@@ -182,7 +182,7 @@ def _merged(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _is_large(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Tells which triangles belong to a connected area that bears snow."""
+    """Returns the triangles of connected areas that bear snow."""
     edges = triangles[:, [0, 1, 1, 2]].reshape(-1, 2)
     graph = coo_matrix(
         (np.ones(len(edges)), (edges[:, 0], edges[:, 1])),

@@ -1,4 +1,4 @@
-"""What stands in a loaded world, structure by structure."""
+"""The structures of a loaded world, and their footprints."""
 
 from __future__ import annotations
 
@@ -27,11 +27,12 @@ from cns_drake.scene.surfaces import (
 )
 from cns_drake.scene.world import World
 
-# Classes of what other things stand on.
+# Classes of the ground below other things.
 GROUND_CLASSES = frozenset(
     {"road", "parking", "sidewalk", "other-ground", "terrain"}
 )
-# What is higher above a thing's foot lets a car or a passer-by below it [m].
+# Cars and walkers can pass below parts higher than this above a thing's foot
+# [m].
 _HEADROOM = 2.2
 # Corners of the box about a round shape of size one.
 _BOX = np.array(
@@ -44,7 +45,7 @@ class StandingPart:
     """One geometry of a structure.
 
     Attributes:
-        geometry: what a LiDAR sees.
+        geometry: visible to a LiDAR.
         X_WG: its pose in the world.
     """
 
@@ -79,7 +80,7 @@ class StandingPart:
 
 @dataclass(frozen=True)
 class Standing:
-    """A structure that stands in the world.
+    """A structure in the world.
 
     Attributes:
         name: of the structure.
@@ -108,7 +109,7 @@ class Standing:
 
     @cached_property
     def footprint(self) -> BaseGeometry:
-        """The convex hull of what is near its foot, seen from above [m]."""
+        """The convex hull of the parts near its foot, seen from above [m]."""
         p_WPs = self.p_WPs
         low = p_WPs[p_WPs[:, 2] <= self.bottom + _HEADROOM]
         return shapely.MultiPoint(low[:, :2]).convex_hull
@@ -117,11 +118,11 @@ class Standing:
 def read_standing(
     world: World, wanted: Callable[[str], bool] = lambda name: True
 ) -> dict[str, Standing]:
-    """Reads the structures that can never move.
+    """Reads the static structures of a world.
 
     Args:
-        world: that holds them; not yet a part of a diagram.
-        wanted: tells by a name whether to read a structure.
+        world: not yet a part of a diagram.
+        wanted: name -> whether to read the structure.
 
     Returns:
         Structure name -> structure, in alphabetical order.
@@ -156,7 +157,7 @@ def read_standing(
 
 
 class Obstacles:
-    """What is in the way of things that are put up, seen from above."""
+    """Obstacles of new things, seen from above."""
 
     def __init__(self, areas: Iterable[tuple[str, BaseGeometry]]):
         """Collects them.
@@ -176,8 +177,8 @@ class Obstacles:
         """Collects footprints, and an area without a name.
 
         Args:
-            kept_free: where nothing may stand, seen from above [m].
-            things: whose footprints are in the way.
+            kept_free: area that stays free, seen from above [m]. things:
+                structures whose footprints are obstacles.
         """
         feet = ((thing.name, thing.footprint) for thing in things)
         return cls([("", kept_free), *feet])
@@ -185,7 +186,7 @@ class Obstacles:
     def is_free(
         self, area: BaseGeometry, ignored: Collection[str] = ()
     ) -> bool:
-        """Tells whether an area meets none of them.
+        """Returns whether an area meets no obstacle.
 
         Args:
             area: in the world [m].
@@ -196,11 +197,11 @@ class Obstacles:
     def distance(
         self, area: BaseGeometry, within: BaseGeometry, ignored: Collection[str]
     ) -> float:
-        """Returns how far the nearest is from an area [m].
+        """Returns the distance of the nearest obstacle from an area [m].
 
         Args:
             area: in the world [m].
-            within: where to look.
+            within: area to search.
             ignored: names of obstacles that do not count.
 
         Returns:

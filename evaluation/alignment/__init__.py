@@ -1,4 +1,4 @@
-"""Alignment of drives whose poses are given in different worlds."""
+"""Alignment of drives with poses in different worlds."""
 
 from evaluation.alignment.align import (
     Alignment,

@@ -1,16 +1,16 @@
-"""Puts two drives of one place into one world.
+"""Brings two drives of one place into one world.
 
 As LT-SLAM does it (Kim and Kim, "LT-mapper", ICRA 2022), made robust:
 
 1. Each drive is checked against itself where it passes a place again, and
    straightened if it has drifted.
-2. A first guess: the same coordinates if both name the same datum or frame,
-   else, or if that does not hold, places that look alike.
-3. From where the guess holds, submaps are registered along the source's
-   path, each with what its neighbour taught; so drift does not add up.
-4. One rigid pose for the source if the loops agree on one, else a pose
+2. A first guess: the same coordinates if both name the same datum or frame.
+Otherwise, or if that fails, places that look alike. 3. From where the guess
+holds, submaps are registered along the source's path, each from its neighbour's
+result, so that drift does not add up. 4. One rigid pose for the source if the
+loops agree on one, else a pose
    graph that bends it. The target is held.
-5. Heights start at the target's ground, since the grid of the TCR does.
+5. Heights start at the target's ground, like the grid of the TCR.
 """
 
 from __future__ import annotations
@@ -52,11 +52,11 @@ When = Literal["auto", "always", "never"]
 
 # Keyframes that try a guess; a guess holds if half of them fit.
 _NUM_PROBES = 8
-# Loops that must agree: at least, and of the keyframes that were tried. Under
-# a wrong guess in a city of equal blocks 15 % fitted somehow.
+# Loops that must agree: least number, and share of the tried keyframes. Under a
+# wrong guess in a city of equal blocks 15 % fitted.
 _FEWEST_LOOPS = 4
 _LEAST_YIELD = 0.25
-# How often keyframes without a loop are tried again.
+# Number of times that keyframes without a loop are tried again.
 _ROUNDS = 3
 # The source has drifted if a quarter of its loops are off by more under the
 # best rigid pose [m].
@@ -70,9 +70,9 @@ class Alignment:
     """Two drives in one world.
 
     Attributes:
-        first: the one, and
-        second: the other, in the order given; either may have been moved.
-        report: how.
+        first, second: the drives in the given order; either may have been
+            moved.
+        report: on the alignment.
     """
 
     first: Sequence
@@ -100,10 +100,10 @@ def in_one_world(
         across_maps: they may be of maps of different names.
 
     Returns:
-        None if the two are left as they are.
+        None if the two stay as they are.
 
     Raises:
-        InputError: if they are to be aligned and cannot be.
+        InputError: if they should be aligned and cannot be.
     """
     if not across_maps:
         check_same_map(first, second)
@@ -127,8 +127,8 @@ def align(
             other.
         second: another one.
         track: reports progress.
-        hold_first: hold the first one even then, and leave it wholly as it
-            is, since others are aligned to it already.
+        hold_first: hold the first one in any case, without any change, since
+            others are aligned to it already.
 
     Raises:
         InputError: if the two have too little in common, or a scan cannot
@@ -157,9 +157,9 @@ def align(
     )
     if is_inlier.sum() < needed:
         raise InputError(
-            f"{source.name}: cannot be aligned to {target.name}:"
-            f" {len(search.tried)} places tried, {len(loops)} fit, and only"
-            f" {is_inlier.sum()} of these agree"
+            f"{source.name}: cannot be aligned to {target.name}: of "
+            f"{len(search.tried)} tried places {len(loops)} fit, and only "
+            f"{is_inlier.sum()} of these agree"
         )
     distances, angles = loop_errors(loops, target.X_WK, X_TK)
     ground = 0.0 if hold_first else target.ground_height()
@@ -168,7 +168,7 @@ def align(
     X_TS = source.bend(X_TK)
     frame = target.sequence.world_frame
     if ground != 0.0 or held.off > 0.0:
-        # No longer the world of others that name it.
+        # The result is no longer in the world that the name stands for.
         frame = f"{frame}, corrected by {target.name}"
     held_drive = _lowered(target.sequence, target.X_WS, ground, frame, target)
     moved_drive = _lowered(source.sequence, X_TS, ground, frame, target)
@@ -201,11 +201,11 @@ def _start(
     """Finds first loops.
 
     Returns:
-        A search with some loops; what said where to look; the number of
+        A search with some loops; the source of the guess; the number of
         candidates if places had to be recognised.
 
     Raises:
-        InputError: if nothing fits.
+        InputError: if no guess fits.
     """
     a, b = source.sequence, target.sequence
     known = None
@@ -230,8 +230,8 @@ def _start(
             break
     if len(best.loops) < 2:
         raise InputError(
-            f"{source.name}: cannot be aligned to {target.name}: no place of"
-            " the one was found in the other"
+            f"{source.name}: cannot be aligned to {target.name}: no place of "
+            "either drive was found in the other"
         )
     return best, "places that look alike", len(candidates.turn)
 
@@ -244,7 +244,7 @@ def _same_coordinates(source: Submaps, target: Submaps) -> np.ndarray:
     near = away.min(axis=0) <= SAME_PLACE
     height = 0.0
     if near.any():
-        # The LiDARs are about as high above the ground.
+        # The LiDARs have about the same height above the ground.
         height = float(np.median(offsets[place, np.arange(len(near)), 2][near]))
     return upright(0.0, np.array([0.0, 0.0, height]))
 
@@ -304,7 +304,7 @@ def _lowered(
 
 
 def _motion(X_WS: np.ndarray, X_TS: np.ndarray) -> dict:
-    """Returns the fields of the report that say how a drive was moved."""
+    """Returns the fields of the report on a drive's move."""
     moves = X_TS @ poses.inverse(X_WS)
     middle = moves[len(moves) // 2]
     rigid = middle @ X_WS

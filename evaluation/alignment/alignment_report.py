@@ -7,14 +7,14 @@ from dataclasses import asdict, dataclass
 
 @dataclass(frozen=True)
 class AlignmentReport:
-    """How two drives were put into one world.
+    """The alignment of two drives.
 
     Attributes:
         held: name of the drive that gives the world.
         moved: name of the other.
-        frames: names of the worlds that the two came in.
-        guess: where the first guess came from.
-        candidates: pairs of places that look alike; None if not asked for.
+        frames: names of the original worlds of both.
+        guess: source of the first guess.
+        candidates: pairs of places that look alike; None if not needed.
         attempts: registrations tried.
         loops: registrations that fit.
         inliers: loops that agree with the result.
@@ -24,11 +24,11 @@ class AlignmentReport:
         model: "anchor" for one rigid pose, "pose graph" for a bent drive.
         move: of the source's middle frame, along x, y, z [m].
         turn_deg: of that frame about the vertical.
-        bend: how far another frame was moved unlike the middle one, at most
+        bend: greatest difference of another frame's move from the middle one's
             [m].
-        straightened: by how much the two disagreed with themselves before
-            they were straightened: upper quartile over their loops [m]; 0 if
-            there was no need.
+        straightened: disagreement of the drives with themselves before they
+            were straightened: upper quartile over their loops [m]; 0 if not
+            needed.
         ground: height that was subtracted from both [m].
     """
 

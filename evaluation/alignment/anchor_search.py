@@ -1,4 +1,4 @@
-"""Guesses of how the worlds of two drives lie to each other.
+"""Guesses of the transformation between the worlds of two drives.
 
 Without common coordinates, places that look alike show it: Scan Context
 proposes pairs of keyframes with the turn between them, and a consensus of
@@ -18,11 +18,11 @@ from evaluation.alignment.submaps import Submaps
 from evaluation.methods.scan_context import ScanContext
 from evaluation.sequences.sampling import gather
 
-# Candidates a query. LT-mapper takes 3, if they score 0.7 at least; here they
-# need not score, since in a changed city right ones score 0.3 to 0.5, and
+# Candidates for each query. LT-mapper takes 3 with a score of at least 0.7.
+# Here there is no limit: in a changed city right ones score 0.3 to 0.5, and
 # wrong ones are outvoted.
 _CANDIDATES = 5
-# Off by how much a pair may be under a guess: half a lane and the spacing of
+# Greatest error of a pair under a guess: half a lane and the spacing of
 # keyframes, drift; sectors of six degrees [m, rad].
 _NEAR = 8.0
 _TURN = np.radians(12.0)
@@ -91,7 +91,7 @@ def find_candidates(
             if not np.isfinite(scores[place]):
                 break
             X_PQ = method.relative_pose(query, database, int(place))
-            assert X_PQ is not None  # There is a score.
+            assert X_PQ is not None  # It has a score.
             turn = (
                 _heading(target.X_WK[place])
                 + _heading(X_PQ)
@@ -110,10 +110,10 @@ def find_candidates(
 
 
 def find_guesses(candidates: Candidates) -> list[Guess]:
-    """Returns the guesses that most candidates agree with, best first.
+    """Returns the guesses with the most agreeing candidates, best first.
 
-    Each is the consensus of two pairs, refined with all that agree; what
-    agreed with a better guess does not vote for the next one.
+    Each is the consensus of two pairs, refined with all agreeing pairs. A pair
+    that agreed with a better guess does not vote for the next one.
     """
     trials = _trials(candidates)
     is_left = np.ones(len(candidates.turn), dtype=bool)
@@ -122,7 +122,7 @@ def find_guesses(candidates: Candidates) -> list[Guess]:
         agreement = np.stack(
             [_agrees(candidates, turn, move) for turn, move in trials]
         )
-        # A place that is proposed three times votes once.
+        # A place that is proposed three times has one vote.
         votes = np.array(
             [
                 len(np.unique(candidates.source[row & is_left]))

@@ -2,8 +2,8 @@
 
 LT-SLAM (Kim and Kim, "LT-mapper", ICRA 2022) ties two drives by loops and
 gives one an anchor: the unknown pose of its world in the other's. Here the
-target's poses are held, so that the anchor is the one unknown, or, where the
-source has drifted, the poses of its keyframes are.
+target's poses are held. The unknown is the anchor, or, if the source has
+drifted, the poses of its keyframes.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from evaluation.alignment.submaps import Submaps
 
 # Loops that agree with an anchor [m, rad].
 AGREEMENT = (1.0, np.radians(2.0))
-# By how much a drive may have bent on a metre of its path: grows with the
-# square root of the distance, 0.15 degrees and 0.05 m.
+# Expected bend of a drive on a metre of its path, 0.15 degrees and 0.05 m; it
+# grows with the square root of the distance.
 _BEND = np.diag([np.radians(0.15) ** 2] * 3 + [0.05**2] * 3)
 # Deviation of keyframes at one place; it keeps the ties regular [m].
 _LEAST_STEP = 0.1
@@ -28,7 +28,7 @@ _TIGHT = 1e-8 * np.eye(6)
 def fit_anchor(
     loops: list[Loop], X_TL: np.ndarray, X_SK: np.ndarray
 ) -> np.ndarray:
-    """Returns the one pose X_TS (4, 4) that most loops agree with.
+    """Returns the pose X_TS (4, 4) with the most agreeing loops.
 
     Args:
         loops: M >= 1 from a source to a target.
@@ -126,7 +126,7 @@ def _loop_ties(
 
 
 def _drive_ties(drive: Submaps) -> Ties:
-    """Returns what the drive's own poses say about neighbouring keyframes."""
+    """Returns the ties of neighbouring keyframes by the drive's own poses."""
     number = len(drive) - 1
     eye = np.tile(np.eye(4), (number, 1, 1))
     step = np.maximum(np.diff(drive.path), _LEAST_STEP)

@@ -11,11 +11,11 @@ from cns_drake.base.progress import Track
 from evaluation.alignment.loops import Loop, close
 from evaluation.alignment.submaps import Submaps
 
-# Keyframes that see the same are this close, seen from above [m].
+# Greatest distance of keyframes with a common view, seen from above [m].
 SAME_PLACE = 10.0
-# A drive passes a place again if there is so much path between [m].
+# Least path between two passes of a place [m].
 _DETOUR = 50.0
-# A guess this far from the last one may lead elsewhere [m].
+# A guess is new if it is this far from the last one [m].
 _ANOTHER_GUESS = 1.0
 
 
@@ -24,8 +24,8 @@ class LoopSearch:
     """Loops between two drives, as they are found.
 
     Attributes:
-        source: whose keyframes K are registered.
-        target: to whose keyframes L.
+        source: drive of the keyframes K to register.
+        target: drive of the keyframes L.
         loops: by keyframe of the source, one each.
         tried: guess X_TK from which each keyframe was registered last.
         num_attempts: registrations tried.
@@ -38,14 +38,15 @@ class LoopSearch:
     num_attempts: int = 0
 
     def near(self, X_TK: np.ndarray) -> np.ndarray:
-        """Returns the keyframes (M,) that guesses (K, 4, 4) put near some."""
+        """Returns the keyframes (M,) that have a neighbour under guesses (K, 4,
+        4)."""
         return np.flatnonzero([self._place(X) is not None for X in X_TK])
 
     def attempt(self, k: int, X_TK: np.ndarray) -> bool:
         """Registers keyframe k, guessed to be at X_TK (4, 4).
 
         Returns:
-            Whether that made a loop.
+            Whether a loop was found.
         """
         place = self._place(X_TK)
         if place is None:
@@ -62,7 +63,7 @@ class LoopSearch:
     def grow(self, track: Track) -> None:
         """Tries all keyframes, outwards along the path from known loops.
 
-        Each is guessed to be moved like the nearest one that has a loop.
+        The guess for each is the move of the nearest one with a loop.
         """
         path = self.source.path
         away = np.full(len(path), np.inf)
@@ -93,7 +94,7 @@ class LoopSearch:
             X_TK: (K, 4, 4) guesses for all.
 
         Returns:
-            How many loops that made.
+            The number of new loops.
         """
         made = 0
         for k in keyframes:
@@ -125,7 +126,7 @@ def find_self_loops(drive: Submaps, most: int, track: Track) -> list[Loop]:
 
     Args:
         drive: a drive.
-        most: how many are tried, evenly along the drive.
+        most: greatest number of tries, evenly along the drive.
         track: reports progress.
     """
     pairs = []
@@ -146,7 +147,7 @@ def find_self_loops(drive: Submaps, most: int, track: Track) -> list[Loop]:
 
 
 def evenly(number: int, most: int) -> np.ndarray:
-    """Returns at most so many of `number` indices, evenly spread."""
+    """Returns at most `most` of `number` indices, evenly spread."""
     if number <= most:
         return np.arange(number)
     return np.linspace(0, number - 1, most).astype(np.int64)

@@ -11,13 +11,13 @@ from cns_drake.base import poses
 from evaluation.alignment.registration import register
 from evaluation.alignment.submaps import Submaps
 
-# What of two submaps must have a counterpart, over all and of upright things.
-# In a simulated city that lost three quarters of its buildings, trees and
-# poles, right pairs reach at least 0.71 and 0.69; of pairs that slid along a
-# street or are of other places, 95 % stay under 0.64 and 0.45.
+# Least share of two submaps with a counterpart, of all points and of upright
+# things. In a simulated city that lost three quarters of its buildings, trees
+# and poles, right pairs reach at least 0.71 and 0.69; 95 % of pairs that slid
+# along a street, or are of other places, stay below 0.64 and 0.45.
 _LEAST_FITNESS = 0.55
 _LEAST_STRUCTURE = 0.55
-# Registration does not find back from farther off [m].
+# Greatest error of a guess that registration can correct [m].
 _BASIN = 12.0
 # Errors that ICP does not estimate: 0.2 degrees, 0.1 m.
 _FLOOR = np.diag([np.radians(0.2) ** 2] * 3 + [0.1**2] * 3)
@@ -50,7 +50,7 @@ def close(
         target: another one, or the same.
         k: keyframe of the source.
         place: keyframe of the target.
-        X_LK: (4, 4) guess of where k is in the frame of the place.
+        X_LK: (4, 4) guess of k's pose in the frame of the place.
 
     Returns:
         The loop; None if the two do not fit together.
@@ -72,7 +72,7 @@ def close(
 def loop_errors(
     loops: list[Loop], X_WL: np.ndarray, X_WK: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns by how much poses disagree with loops.
+    """Returns the disagreement of poses with loops.
 
     Args:
         loops: M of them.

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from cns_drake.base import poses
 
-# A pose that is not varied.
+# Index of a held pose.
 FIXED = -1
 # Factors on the width of the kernel, and steps at each.
 _WIDTHS = (100.0, 30.0, 10.0, 3.0, 1.0)

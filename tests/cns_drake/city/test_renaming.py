@@ -133,7 +133,7 @@ def test_patterns_that_mean_others_are_told(grown):
     (grown / "stages.yaml").write_text(text)
     lines = []
     generate_city(grown, lines.append, repair_stages=True)
-    assert "office_00? stands for others than before" in lines
+    assert "office_00? matches other structures than before" in lines
     assert "office_00?" in (grown / "stages.yaml").read_text()
 
 

@@ -103,7 +103,7 @@ def geometry_with(**changed):
                 ' dV="0"/>',
             ), LANES, "a curve without length",
         ),
-        (LINE, section(0.0, lane(-1, "driving", 1e6)), "1e+06 m is beyond"),
+        (LINE, section(0.0, lane(-1, "driving", 1e6)), "1e+06 m is more than"),
         (LINE, section("x", *TWO_LANES), "laneSection: s: 'x'"),
         (
             LINE, LANES.replace('id="-1"', 'id="1.5"'), "lane: id: 1.5 is no",

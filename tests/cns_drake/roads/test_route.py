@@ -151,7 +151,7 @@ FAULTS = {
             leg("inner_street_west", end=20),
             leg("inner_street_west", "backward"),
         ],
-        r"route\.0 .*no room for turning round: it takes a disc of 13\.2 m",
+        r"route\.0 .*no room for turning round: the car needs a disc 13\.2 m",
     ),
     "left from the right lane": (
         [
@@ -170,7 +170,7 @@ FAULTS = {
     ),
     "no room for a lane change": (
         [leg("ring_east", lane=[1, 2])],
-        r"route\.0 .*too short for a lane change, it needs 20 m",
+        r"route\.0 .*too short for a lane change, which needs 20 m",
     ),
     "beyond the end": (
         [leg("ring_east", start=3, end=40)],
@@ -182,15 +182,15 @@ FAULTS = {
     ),
     "start in the middle": (
         [leg("ring_east"), leg("ring_south_east", start=3)],
-        r"route\.1 .*start is for the first leg only",
+        r"route\.1 .*start is allowed in the first leg only",
     ),
     "end in the middle": (
         [leg("ring_east", end=3), leg("ring_south_east")],
-        r"route\.0 .*end is for the last leg, or where",
+        r"route\.0 .*end is allowed in the last leg only, or",
     ),
     "too short": (
         [leg("ring_south_east", start=10, end=29)],
-        r"route: 1\d\.\d m long, at least 20 m",
+        r"route: 1\d\.\d m long; a drive needs at least 20 m",
     ),
 }
 

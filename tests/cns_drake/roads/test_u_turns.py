@@ -206,7 +206,7 @@ def test_a_dead_end_has_room_from_its_radius_on(tmp_path):
             {},
             [leg("in", end=50), leg("in", "backward")],
             r"route\.0 \(in forward\): no room for turning round: .* a disc "
-            r"of 13\.2 m.* widest here has 7\.0 m; turn where .*wider",
+            r"13\.2 m.* widest disc here has 7\.0 m; turn where .*wider",
         ),
         (
             {"lanes": [2, 2], "median": 2.0},
@@ -221,7 +221,7 @@ def test_a_dead_end_has_room_from_its_radius_on(tmp_path):
         (
             {"lanes": [2, 2]},
             [leg("in", end=50), leg("in", "backward", start=3)],
-            r"route\.1 .*start is for the first leg only",
+            r"route\.1 .*start is allowed in the first leg only",
         ),
         (
             {"lanes": [2, 0]},
@@ -271,7 +271,7 @@ def test_doubling_back_has_to_be_asked_for_and_needs_room():
         if fits:
             make_waypoint_path(back, 2.0, u_turns=True)
             continue
-        with pytest.raises(InputError, match=r"1: .* takes 12\.02 m .* 12\.01"):
+        with pytest.raises(InputError, match=r"1: .* needs 12\.02 m .* 12\.01"):
             make_waypoint_path(back, 2.0, u_turns=True)
 
 

@@ -77,11 +77,11 @@ def test_too_many_and_as_many_as_possible(town, who, where):
     """What the line says there is room for is really accepted."""
     text = fault(scenario_of(town), **{who: 2000})
     found = re.fullmatch(
-        rf"tiny_01: traffic: {who}: 2000 asked for, the {where} hold (\d+)",
+        rf"tiny_01: traffic: {who}: 2000 are too many; the {where} hold (\d+)",
         text,
     )
     room = int(found[1])
-    assert f" {room + 1} asked for" in fault(
+    assert f" {room + 1} are too many" in fault(
         scenario_of(town), **{who: room + 1}
     )
     scenario = scenario_of(town, **{who: room})

@@ -85,7 +85,7 @@ def test_what_is_finished_and_what_is_another(scenarios, tmp_path, capsys):
     folder = simulate(short, tmp_path).folder
     before = contents(folder)
     record_all([short], tmp_path, ONE, overwrite=False)
-    assert "short: finished already" in capsys.readouterr().err
+    assert "short: already finished" in capsys.readouterr().err
     for other in (
         short.model_copy(update={"frames": FRAMES - 1}),
         short.model_copy(update={"frames": None}),

@@ -199,7 +199,7 @@ def test_what_was_drawn_of_something_else_is_replaced(
     assert not step.is_done()
     notes = []
     step.run(Reporter(lambda kind, text: notes.append(text)))
-    assert notes == [f"{folder}: replaced, as it was of other inputs"]
+    assert notes == [f"{folder}: replaced, since its inputs have changed"]
     assert step.is_done()
     fresh = redraw_here(town, [4], tmp_path / "fresh")[4]
     assert contents(folder) == contents(fresh)
@@ -218,10 +218,14 @@ def test_anything_else_of_that_name_is_left_alone(town, tmp_path, other):
     else:
         folder.symlink_to(tmp_path / "nowhere")
     before = contents(tmp_path)
-    with pytest.raises(InputError, match=r"town_c4: is there already, and no"):
+    with pytest.raises(
+        InputError, match=r"town_c4: this folder is there already"
+    ):
         redraw_here(town, [5, 4], folder.parent)
     # Nor does the job take it, if it comes up meanwhile.
-    with pytest.raises(InputError, match=r"town_c4: is there already, and no"):
+    with pytest.raises(
+        InputError, match=r"town_c4: this folder is there already"
+    ):
         RedrawCity(town, "02", 4, folder).run(Reporter())
     assert contents(tmp_path) == before
     assert [p.name for p in folder.parent.iterdir()] == ["town_c4"]

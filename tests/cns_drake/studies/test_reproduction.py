@@ -116,7 +116,7 @@ def test_everything_is_planned_before_anything_runs(
     assert planned[1]["survey town_01"].needs == ()
     reproduction.reproduce_maps(*arguments, with_pages=False)
     assert names & planned[2].keys() == set()
-    assert "town_04: finished already" in capsys.readouterr().err
+    assert "town_04: already finished" in capsys.readouterr().err
 
 
 def test_a_world_is_no_stage(tmp_path):

@@ -179,7 +179,7 @@ def test_a_trace_of_another_map(tmp_path):
 
     path = write_trace(tmp_path / "moved.xml", change=move)
     assert re.fullmatch(
-        r"half of it is more than 5 m from the map's lanes: it lies at "
+        r"half of the trace is more than 5 m from the map's lanes: it lies at "
         r"x 8\d\d to 9\d\d, .* m, they at x -30 to 30, y -30 to 30 m; give "
         r"a trace of this map, without an offset",
         fault(path),
