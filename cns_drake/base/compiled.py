@@ -18,11 +18,11 @@ _Function = TypeVar("_Function", bound=Callable)
 def compiled(function: _Function) -> _Function:
     """Compiles a function of arrays to machine code, on its first call.
 
-    The code is kept between runs in the user's folder for such things, where
-    uninstalling need not find it; where none can be written, each process
-    compiles anew. Numba looks only at the file of the function itself for
-    changes: a function may call compiled ones of its own folder besides, of
-    which any change has all of the folder compiled anew.
+    The machine code is kept between runs in the user's cache folder. If that
+    folder cannot be written, each process compiles anew. Numba notices a change
+    only in the file of the function itself. A compiled function may therefore
+    call compiled functions of its own folder and no others: a change in that
+    folder recompiles all of them.
 
     An array is best written number by number: where it is assigned to a part
     of another one, numba compiles a message about shapes, for seconds.

@@ -197,7 +197,7 @@ def _ears(points: np.ndarray) -> tuple[np.ndarray, bool]:
                 count -= 1
                 for i in range(k, count):
                     left[i] = left[i + 1]
-                # Going on behind the ear avoids fans of thin triangles.
+                # Continuing behind the ear avoids fans of thin triangles.
                 start = k
                 is_cut = True
                 break

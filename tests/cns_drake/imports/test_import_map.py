@@ -279,8 +279,8 @@ def test_years_that_are_none_or_to_come_are_counted(tmp_path):
         )
         assert report.undated == 3
         assert set(report.faults) == {
-            ("9999 in place of a year, taken as none", 1, "house_0"),
-            ("1005 in place of a year, taken as none", 1, "house_1"),
+            ("9999 in place of a year, taken as no year", 1, "house_0"),
+            ("1005 in place of a year, taken as no year", 1, "house_1"),
             ("year after today", 1, "house_2"),
             ("building built after the last stage, left out", 1, "house_2"),
             *more,

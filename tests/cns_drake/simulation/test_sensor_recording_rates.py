@@ -134,7 +134,7 @@ def test_what_makes_no_sense_is_refused(tmp_path):
     falling = Falling()
     with pytest.raises(ValueError, match="needs a rate"):
         falling.add_imu(noise=NOISE)
-    with pytest.raises(ValueError, match="an IMU of 0 samples"):
+    with pytest.raises(ValueError, match="is not a positive samples"):
         falling.add_imu(rate=0)
     with pytest.raises(ValueError, match=r"no sensor 'gps'; .*slow, fast, imu"):
         falling.record(tmp_path / "one", 0.1, rates={"gps": 1.0})
