@@ -208,10 +208,13 @@ def set_in(*keys):
         (broken(set_in("CityObjects", {})), "the file has no objects"),
         (
             broken(set_in("vertices", [[1, 2]])),
-            "vertices: must be three numbers",
+            "vertices: every item must be three numbers",
         ),
         (broken(set_in("vertices", [[1e300, 0, 0]])), "beyond 1e+08 m"),
-        (broken(set_in("vertices", "abc")), "vertices: must be three numbers"),
+        (
+            broken(set_in("vertices", "abc")),
+            "vertices: every item must be three numbers",
+        ),
         (
             broken(set_in("transform", "scale", [1e300] * 3)),
             "beyond 1e+08 m",

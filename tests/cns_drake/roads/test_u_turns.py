@@ -195,7 +195,7 @@ def test_a_dead_end_has_room_from_its_radius_on(tmp_path):
         if fits:
             drive(network, *legs)
             continue
-        with pytest.raises(InputError, match=r"disc of 13\.2 m across.*13\.1"):
+        with pytest.raises(InputError, match=r"disc 13\.2 m across.*13\.1"):
             drive(network, *legs)
 
 

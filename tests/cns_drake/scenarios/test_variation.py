@@ -171,7 +171,7 @@ def test_a_member_is_a_scenario_file_of_its_own(tmp_path):
         ),
         (
             {"city_seeds": [1], "stage": "02"},
-            r"family\.yaml: stage: not with city_seeds: .* one, 04, lack",
+            r"family\.yaml: stage: not with city_seeds: .* one, 04, are",
         ),
         ({"city_seeds": [1], "lidars": ["sonar"]}, r"unknown preset 'sonar'"),
     ],
@@ -203,7 +203,7 @@ def test_a_city_needs_a_table_with_places(tmp_path):
         "name,class,x,y\nhut,building,1,1e300\n",
     ):
         table.write_text(text)
-        with pytest.raises(InputError, match=r"s\.csv: x, y: not the"):
+        with pytest.raises(InputError, match=r"s\.csv: x, y: every structure"):
             family(tmp_path, base="town/sequence_04.yaml")
 
 

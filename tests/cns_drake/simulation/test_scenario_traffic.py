@@ -66,7 +66,7 @@ def test_a_map_without_sidewalks(town):
         ROADS.replace("sidewalk: 3.0", "sidewalk: 0.5")
     )
     assert fault(scenario_of(town), walkers=1) == (
-        "tiny_01: traffic: walkers: the map has no sidewalks"
+        "tiny_01: traffic: walkers: the map has no sidewalks; leave walkers out"
     )
 
 
