@@ -33,8 +33,8 @@ class Growth:
     """The drawn changes.
 
     Attributes:
-        missing: buildings that are not there at the first stage.
-        lower: building -> the part of its height that it has there.
+        missing: buildings that the first stage lacks.
+        lower: building -> its height there as a part of the whole.
         gone: buildings of the file that stood there and stand no more.
     """
 
@@ -52,7 +52,7 @@ def grow(city: StagedCity, part: float, seed: int) -> tuple[StagedCity, Growth]:
     Args:
         city: of one stage; what is gone by then stands at the first, and what
             has its place today does not.
-        part: of its buildings that are not there at first, or lower.
+        part: share of its buildings that are missing or lower at first.
         seed: of the lot.
     """
     (last,) = city.standing.values()

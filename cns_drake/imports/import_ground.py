@@ -30,7 +30,7 @@ _SMOOTHING = 1.5
 _DEPTH = 0.1
 # Farther from the convex hull of the feet nothing lies between them [m].
 _BESIDE_HULL = 1.0
-# Length of an edge that is not parted before, and points at once.
+# Longest edge that is not divided first, and points at a time.
 _MOST_STEPS = 256
 _AT_ONCE = 1_000_000
 # Corners of flat things of these classes give the height of the ground.

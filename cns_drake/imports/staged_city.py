@@ -27,9 +27,9 @@ class StagedCity:
 
     Attributes:
         standing: stage -> its structures.
-        kept: those that stand at some stage.
-        undated: how many buildings have no year.
-        dated: how many have one.
+        kept: the structures of any stage.
+        undated: number of buildings without a year.
+        dated: number of buildings with a year.
         gone: buildings that stand no more, if there is but one stage, that
             of today.
     """

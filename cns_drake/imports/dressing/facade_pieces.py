@@ -27,8 +27,8 @@ _SILL_HEIGHT, _SILL_BESIDE, _SILL_REACH = 0.08, 0.08, 0.07
 # Windows farther from drives have no sills, or no frames, or lie on their wall
 # and not in recesses, and walls have no plinths [m].
 _SILLS_WITHIN, _FRAMES_WITHIN, _RECESSES_WITHIN = 12.0, 20.0, 25.0
-# Nothing that is lower may hang over the way of a car, with so much room
-# beside the middle of it [m].
+# Nothing lower than this may hang over a car's path, within this distance of
+# its middle [m].
 _TALLEST_CAR, _BESIDE = 4.0, 2.5
 # Cornices of lower walls would collide with doors [m].
 _LEAST_WALL = 2.5
