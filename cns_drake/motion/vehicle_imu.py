@@ -1,18 +1,25 @@
-"""An ideal IMU on a vehicle whose motion is prescribed."""
+"""An IMU on a vehicle whose motion is prescribed."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+import math
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
+from cns_drake.base.recordings.motion import ImuSamples
 from cns_drake.motion.trajectory import Trajectory
 
 # Samples computed at a time, and greatest distance of a wanted time from a
 # sample's, in samples.
 _BLOCK = 512
 _TOLERANCE = 1e-6
+# Samples on the port: enough for one frame at 1,000 samples and 5 frames a
+# second.
+_REMEMBERED = 256
 
 
 class VehicleImu(LeafSystem):
@@ -28,11 +35,12 @@ class VehicleImu(LeafSystem):
         output_ports:
         - specific_force
         - angular_velocity
-        - R_WI
+        - samples
 
     `specific_force` [m/s^2] and `angular_velocity` w_WI [rad/s] are vectors
-    of size 3, expressed in the IMU's frame I; `R_WI` is abstract, a
-    RotationMatrix. They depend on time only.
+    of size 3, expressed in the IMU's frame I; between samples, the error of
+    the last one holds. `samples` is abstract, `ImuSamples`: the last 256 up
+    to the time of the context. All depend on time only.
     """
 
     def __init__(
@@ -41,6 +49,7 @@ class VehicleImu(LeafSystem):
         X_BI: RigidTransform,
         gravity_W: np.ndarray,
         rate: float,
+        measure: Callable[[int, np.ndarray], np.ndarray] | None = None,
     ):
         """Declares the ports.
 
@@ -48,56 +57,80 @@ class VehicleImu(LeafSystem):
             trajectory: of the vehicle B.
             X_BI: pose of the IMU on it.
             gravity_W: the acceleration of free fall [m/s^2].
-            rate: samples per second, for computing many at a time [1/s].
+            rate: samples per second [1/s].
+            measure: adds errors. It takes the number of the first sample and
+                (N, 6) exact specific forces and angular velocities, and
+                returns the measured ones. By default there are no errors.
         """
         super().__init__()
         self._trajectory = trajectory
         self._X_BI = X_BI
         self._gravity_W = np.array(gravity_W)
         self._rate = rate
-        self._block: int | None = None
-        self._samples: tuple[np.ndarray, ...] = ()
-        for place, name in enumerate(("specific_force", "angular_velocity")):
+        self._add_errors = measure or (lambda first, exact: exact)
+        # Number of a block -> its samples; the last two are kept.
+        self._blocks: dict[int, ImuSamples] = {}
+        for name in ("specific_force", "angular_velocity"):
             self.DeclareVectorOutputPort(
                 name,
                 3,
-                lambda context, output, place=place: self._calc_vector(
-                    place, context, output
+                lambda context, output, name=name: self._calc_vector(
+                    name, context, output
                 ),
                 {self.time_ticket()},
             )
         self.DeclareAbstractOutputPort(
-            "R_WI",
-            lambda: Value(RotationMatrix()),
-            self._calc_rotation,
+            "samples",
+            lambda: Value(object()),
+            self._calc_samples,
             {self.time_ticket()},
         )
 
     def _calc_vector(
-        self, place: int, context: Context, output: BasicVector
+        self, name: str, context: Context, output: BasicVector
     ) -> None:
-        output.SetFromVector(self._sample(context.get_time())[place])
+        time = context.get_time()
+        number = self._last_sample(time)
+        if abs(time * self._rate - number) > _TOLERANCE:
+            sample = self._measure(number, np.array([time]))
+        else:
+            sample = self._some(number, number + 1)
+        output.SetFromVector(getattr(sample, name)[0])
 
-    def _calc_rotation(self, context: Context, output: AbstractValue) -> None:
-        output.set_value(RotationMatrix(self._sample(context.get_time())[2]))
+    def _calc_samples(self, context: Context, output: AbstractValue) -> None:
+        end = self._last_sample(context.get_time()) + 1
+        output.set_value(self._some(end - _REMEMBERED, end))
 
-    def _sample(self, time: float) -> tuple[np.ndarray, ...]:
-        """Returns specific force, angular velocity and R_WI at a time."""
-        sample = round(time * self._rate)
-        if abs(time * self._rate - sample) > _TOLERANCE:
-            return tuple(one[0] for one in self._measure(np.array([time])))
-        block, row = divmod(sample, _BLOCK)
-        if block != self._block:
-            numbers = block * _BLOCK + np.arange(_BLOCK)
-            self._samples = self._measure(numbers / self._rate)
-            self._block = block
-        return tuple(one[row] for one in self._samples)
+    def _last_sample(self, time: float) -> int:
+        return math.floor(time * self._rate + _TOLERANCE)
 
-    def _measure(self, times: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Returns specific forces (N, 3), w_WI (N, 3) and R_WI (N, 3, 3)."""
+    def _some(self, first: int, end: int) -> ImuSamples:
+        """Returns the samples of numbers from `first` to before `end`."""
+        parts = []
+        for number in range(first // _BLOCK, (end - 1) // _BLOCK + 1):
+            start = number * _BLOCK
+            if number not in self._blocks:
+                times = (start + np.arange(_BLOCK)) / self._rate
+                self._blocks[number] = self._measure(start, times)
+                if len(self._blocks) > 2:
+                    del self._blocks[next(iter(self._blocks))]
+            rows = slice(max(first - start, 0), end - start)
+            parts.append([one[rows] for one in self._blocks[number][1:]])
+        return ImuSamples(first, *map(np.concatenate, zip(*parts, strict=True)))
+
+    def _measure(self, first: int, times: np.ndarray) -> ImuSamples:
+        """Returns samples at (N,) times with the errors from `first` on."""
         # Before the start the vehicle rests, as after the end.
         motion = self._trajectory.body_motion(np.maximum(times, 0.0))
         R_WI = motion.R @ self._X_BI.rotation().matrix()
         a_WI = motion.acceleration_at(self._X_BI.translation())
         force = np.einsum("nji,nj->ni", R_WI, a_WI - self._gravity_W)
-        return force, np.einsum("nji,nj->ni", R_WI, motion.w), R_WI
+        turn = np.einsum("nji,nj->ni", R_WI, motion.w)
+        measured = self._add_errors(first, np.hstack([force, turn]))
+        quat_wxyz = [RotationMatrix(R).ToQuaternion().wxyz() for R in R_WI]
+        return ImuSamples(
+            first,
+            np.roll(quat_wxyz, -1, axis=1),
+            measured[:, 3:],
+            measured[:, :3],
+        )

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+import math
 from typing import Any, NamedTuple
 import warnings
 
+import numpy as np
 from pydrake.common.value import Value
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform
 from pydrake.systems.framework import (
     Context,
     EventStatus,
@@ -33,7 +35,7 @@ from cns_drake.recording.image_messages import (
     make_camera_info,
     make_image,
 )
-from cns_drake.recording.imu_packing import ImuPacker
+from cns_drake.recording.imu_messages import ImuMessages
 from cns_drake.recording.object_messages import (
     BoxMessages,
     marked_boxes,
@@ -86,7 +88,7 @@ class McapRecorder(LeafSystem):
         - odometry
         - specific_force
         - angular_velocity
-        - R_WI (if it is declared)
+        - imu_samples (in place of these two)
         - objects (if it is declared)
         - <lidar>_scan (one for each LiDAR)
         - <lidar>_pose (for each LiDAR without a fixed place)
@@ -101,8 +103,8 @@ class McapRecorder(LeafSystem):
       `V_WB_B` (SpatialVelocity expressed in B).
     - `specific_force`: of I, expressed in I, vector of size 3 [m/s^2].
     - `angular_velocity`: w_WI_I, vector of size 3 [rad/s].
-    - `R_WI`: abstract, a RotationMatrix; without this port the orientation of
-      I is that of the odometry.
+    - `imu_samples`: abstract, `ImuSamples`, the last ones up to now; without
+      this port the orientation of I is that of the odometry.
     - `objects`: abstract, `RecordedObjects`.
     - `<lidar>_scan`: abstract, structured array of points expressed in S.
     - `<lidar>_pose`: abstract, X_WS.
@@ -113,10 +115,11 @@ class McapRecorder(LeafSystem):
 
     Tick i is at i * period of its schedule. A periodic publish event from time
     zero on, or a forced publish at a tick's time, writes the messages that are
-    due from the present inputs. A simulation that starts before time zero gives
-    a warning. The inputs must be wired straight to continuous outputs: a
-    publish sees the state before any update at the same time, and a hold in
-    front would make every message one period old.
+    due from the present inputs. A port `imu_samples` needs no event of its
+    own: the next event writes its samples of several ticks. A simulation that
+    starts before time zero gives a warning. The inputs must be wired straight
+    to continuous outputs: a publish sees the state before any update at the
+    same time, and a hold in front would make every message one period old.
 
     Example:
         from cns_drake import McapRecorder
@@ -137,7 +140,7 @@ class McapRecorder(LeafSystem):
         schedule: Schedule | None = None,
         layouts: Mapping[str, str] | None = None,
         imu_variances: tuple[float, float] = (0.0, 0.0),
-        with_orientation: bool = False,
+        with_imu_samples: bool = False,
         with_objects: bool = False,
         start_ns: int = 0,
     ):
@@ -156,7 +159,7 @@ class McapRecorder(LeafSystem):
                 `point_layouts`), `cns` unless given.
             imu_variances: of specific force [m^2/s^4] and angular velocity
                 [rad^2/s^2].
-            with_orientation: whether there is a port `R_WI`.
+            with_imu_samples: whether there is a port `imu_samples`.
             with_objects: whether there is a port `objects`.
             start_ns: the stamp of time zero [ns].
 
@@ -171,9 +174,10 @@ class McapRecorder(LeafSystem):
         self._X_BI = X_BI
         self._cameras = dict(cameras or {})
         self._layouts = dict(layouts or {})
-        self._imu_packer = ImuPacker(imu_variances)
+        self._imu_messages = ImuMessages(imu_variances)
         self._start_ns = start_ns
-        self._has_begun = False
+        # The tick of the last event; there was none so far.
+        self._last_tick: int | None = None
         if (period is None) == (schedule is None):
             raise ValueError("a recorder needs either a period or a schedule")
         if period is not None:
@@ -188,14 +192,17 @@ class McapRecorder(LeafSystem):
         self._odometry = self.DeclareAbstractInputPort(
             "odometry", Value(object())
         )
-        self._specific_force = self.DeclareVectorInputPort("specific_force", 3)
-        self._angular_velocity = self.DeclareVectorInputPort(
-            "angular_velocity", 3
-        )
-        self._R_WI = None
-        if with_orientation:
-            self._R_WI = self.DeclareAbstractInputPort(
-                "R_WI", Value(RotationMatrix())
+        self._samples = self._specific_force = self._angular_velocity = None
+        if with_imu_samples:
+            self._samples = self.DeclareAbstractInputPort(
+                "imu_samples", Value(object())
+            )
+        else:
+            self._specific_force = self.DeclareVectorInputPort(
+                "specific_force", 3
+            )
+            self._angular_velocity = self.DeclareVectorInputPort(
+                "angular_velocity", 3
             )
         self._objects = None
         if with_objects:
@@ -224,12 +231,31 @@ class McapRecorder(LeafSystem):
             }
             self._poses[name] = (self._declare_pose(name), camera.X_BC)
         self.DeclareInitializationPublishEvent(publish=_warn_of_early_start)
+        self._declare_events()
+        self.DeclareForcedPublishEvent(self._publish)
+
+    def _declare_events(self) -> None:
+        """Declares an event for each tick that needs one."""
+        waits = {_IMU.name} if self._samples is not None else set()
+        steps = [
+            step
+            for name, step in self._schedule.steps.items()
+            if name not in waits
+        ]
+        step = math.gcd(*steps)
         self.DeclarePeriodicPublishEvent(
-            period_sec=self._period,
+            period_sec=float(self._schedule.tick * step),
             offset_sec=0.0,
             publish=self._publish,
         )
-        self.DeclareForcedPublishEvent(self._publish)
+        end = self._schedule.ends.get(_IMU.name, 0)
+        if waits and end % step:
+            # The last samples come after all else.
+            self.DeclarePeriodicPublishEvent(
+                period_sec=end * self._period,
+                offset_sec=end * self._period,
+                publish=self._publish,
+            )
 
     def _declare_pose(self, name: str) -> InputPort:
         return self.DeclareAbstractInputPort(
@@ -240,17 +266,20 @@ class McapRecorder(LeafSystem):
         tick = self._tick(context.get_time())
         stamp_ns = self._start_ns + self._schedule.time_ns(tick)
         due = set(self._schedule.due(tick))
-        if self._X_BCs and not self._has_begun:
+        if self._X_BCs and self._last_tick is None:
             # Written at the first frame. A bag takes latched messages once: a
             # resumed one has this already.
             tf = messages.make_tf(messages.BASE_FRAME, self._X_BCs, stamp_ns)
             self._write(_TF_STATIC, tf, stamp_ns, 0)
-        self._has_begun = True
         outgoing: dict[Topic, Any] = {}
         if _TF.name in due or _ODOMETRY.name in due:
             outgoing |= self._locate(context, stamp_ns)
-        if _IMU.name in due:
+        if self._samples is not None:
+            since = tick - 1 if self._last_tick is None else self._last_tick
+            outgoing |= self._take_samples(context, since, tick)
+        elif _IMU.name in due:
             outgoing |= self._feel(context, stamp_ns)
+        self._last_tick = tick
         if _OBJECTS.name in due:
             outgoing |= self._list_objects(context, stamp_ns)
         for name in self._scans:
@@ -292,25 +321,69 @@ class McapRecorder(LeafSystem):
         specific_force = _eval(self._specific_force, context)
         if angular_velocity is None and specific_force is None:
             return {}
-        R_WI = None
-        if self._R_WI is not None:
-            R_WI = _eval(self._R_WI, context)
-        elif self._X_BI is not None:
-            odometry = _eval(self._odometry, context)
-            if odometry is not None:
-                R_WI = odometry.X_WB.rotation() @ self._X_BI.rotation()
-        packed = self._imu_packer.pack(
-            R_WI, angular_velocity, specific_force, stamp_ns
+        quat_xyzw = None
+        odometry = _eval(self._odometry, context)
+        if odometry is not None and self._X_BI is not None:
+            R_WI = odometry.X_WB.rotation() @ self._X_BI.rotation()
+            quat_xyzw = messages.to_quat_xyzw(R_WI)
+        values = (quat_xyzw, angular_velocity, specific_force)
+        quats, turns, forces = (
+            None if value is None else np.array([value]) for value in values
         )
-        return {_IMU: packed}
+        (message,) = self._imu_messages.encode(quats, turns, forces, [stamp_ns])
+        return {_IMU: message}
+
+    def _take_samples(
+        self, context: Context, since: int, tick: int
+    ) -> dict[Topic, Any]:
+        """Writes the IMU's samples of earlier ticks.
+
+        Args:
+            context: of the event.
+            since: the last tick whose sample is written.
+            tick: that of the event.
+
+        Returns:
+            The message of this tick, if it has one.
+
+        Raises:
+            ValueError: the port shows too few samples.
+        """
+        step = self._schedule.steps[_IMU.name]
+        last = min(tick, self._schedule.ends.get(_IMU.name, tick))
+        numbers = range(since // step + 1, last // step + 1)
+        samples = _eval(self._samples, context)
+        if samples is None or not numbers:
+            return {}
+        first = numbers[0] - samples.first
+        if first < 0:
+            raise ValueError("imu_samples: the oldest samples are missing")
+        rows = slice(first, first + len(numbers))
+        stamps_ns = [
+            self._start_ns + self._schedule.time_ns(number * step)
+            for number in numbers
+        ]
+        packed = self._imu_messages.encode(
+            samples.quat_xyzw[rows],
+            samples.angular_velocity[rows],
+            samples.specific_force[rows],
+            stamps_ns,
+        )
+        outgoing = {}
+        for number, stamp_ns, message in zip(
+            numbers, stamps_ns, packed, strict=True
+        ):
+            if number * step == tick:
+                outgoing[_IMU] = message
+            else:
+                self._write(_IMU, message, stamp_ns, number)
+        return outgoing
 
     def _list_objects(
         self, context: Context, stamp_ns: int
     ) -> dict[Topic, Any]:
         """Returns the messages of moving objects."""
-        objects = None
-        if self._objects is not None:
-            objects = _eval(self._objects, context)
+        objects = _eval(self._objects, context)
         if objects is None:
             return {}
         return {
@@ -387,9 +460,11 @@ def _warn_of_early_start(context: Context) -> EventStatus:
     return EventStatus.Succeeded()
 
 
-def _eval(port: InputPort, context: Context) -> Any:
+def _eval(port: InputPort | None, context: Context) -> Any:
     """Returns the value of an input; None if it is not connected."""
-    return port.Eval(context) if port.HasValue(context) else None
+    if port is None or not port.HasValue(context):
+        return None
+    return port.Eval(context)
 
 
 def recording_topics(

@@ -5,6 +5,7 @@ Their CDR form is made once. Filling in numbers takes a hundredth of that time.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ _SEC_MARK, _NANOSEC_MARK = 0x5A17C0DE, 0x71B3E5A9
 STAMP_MARK_NS = (_SEC_MARK, _NANOSEC_MARK)
 # CDR begins with its encoding; alignment counts from behind it.
 _ENCAPSULATION = 4
+_NS_PER_S = 1_000_000_000
 
 
 def number_marks(count: int) -> np.ndarray:
@@ -57,19 +59,35 @@ class MessageTemplate:
 
     @staticmethod
     def _views(data: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns all that can be a float64, and all that can be a uint32."""
-        body = data[_ENCAPSULATION:]
+        """Returns all that can be a float64, and all that can be a uint32.
+
+        Args:
+            data: (..., L) bytes of messages.
+        """
+        body = data[..., _ENCAPSULATION:]
+        size = body.shape[-1]
         return (
-            body[: len(body) // 8 * 8].view("<f8"),
-            body[: len(body) // 4 * 4].view("<u4"),
+            body[..., : size // 8 * 8].view("<f8"),
+            body[..., : size // 4 * 4].view("<u4"),
         )
 
     def fill(self, numbers: np.ndarray, stamp_ns: int) -> bytes:
         """Returns the CDR form of the message with N numbers and a stamp."""
-        data = self._data.copy()
+        return self.fill_all(numbers[None], [stamp_ns])[0]
+
+    def fill_all(
+        self, numbers: np.ndarray, stamps_ns: Sequence[int]
+    ) -> list[bytes]:
+        """Returns the CDR form of many messages.
+
+        Args:
+            numbers: (K, N), a row for each message.
+            stamps_ns: of each message [ns].
+        """
+        data = np.tile(self._data, (len(numbers), 1))
         floats, words = self._views(data)
-        floats[self._places] = numbers[self._which]
-        words[self._stamps], words[self._stamps + 1] = divmod(
-            stamp_ns, 1_000_000_000
-        )
-        return data.tobytes()
+        floats[:, self._places] = numbers[:, self._which]
+        times = np.array([divmod(one, _NS_PER_S) for one in stamps_ns])
+        words[:, self._stamps] = times[:, :1]
+        words[:, self._stamps + 1] = times[:, 1:]
+        return [row.tobytes() for row in data]

@@ -6,6 +6,7 @@ happens here. Quaternions leave in ROS order (x, y, z, w).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -68,7 +69,7 @@ def make_point_cloud(points: np.ndarray, frame_id: str, stamp_ns: int) -> Any:
 
 
 def make_imu(
-    R_WI: RotationMatrix | None,
+    quat_xyzw: Sequence[float] | np.ndarray | None,
     angular_velocity: np.ndarray | None,
     specific_force: np.ndarray | None,
     stamp_ns: int,
@@ -77,7 +78,7 @@ def make_imu(
     """Returns an Imu message.
 
     Args:
-        R_WI: orientation of the imu frame I in the map W.
+        quat_xyzw: orientation R_WI of the imu frame I in the map W.
         angular_velocity: w_WI_I, shape (3,) [rad/s].
         specific_force: expressed in I, shape (3,) [m/s^2]; at rest on level
             ground +9.81 along z.
@@ -90,10 +91,13 @@ def make_imu(
         covariance of a value that is None begins with -1, as in ROS.
     """
     zero = np.zeros(3)
+    x, y, z, w = (0.0, 0.0, 0.0, 1.0) if quat_xyzw is None else quat_xyzw
     return message_class(IMU)(
         header=make_header(IMU_FRAME, stamp_ns),
-        orientation=_make_quaternion(R_WI or RotationMatrix()),
-        orientation_covariance=_covariance(R_WI, 0.0),
+        orientation=message_class("geometry_msgs/msg/Quaternion")(
+            x=x, y=y, z=z, w=w
+        ),
+        orientation_covariance=_covariance(quat_xyzw, 0.0),
         angular_velocity=make_vector(
             zero if angular_velocity is None else angular_velocity
         ),

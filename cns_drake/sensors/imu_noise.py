@@ -103,23 +103,30 @@ class ImuErrors:
         self._block_number: int | None = None
         self._block = np.empty((_BLOCK, 6))
 
-    def measure(self, sample: int, exact: np.ndarray) -> np.ndarray:
-        """Returns exact values with the errors of a sample.
+    def measure(self, first: int, exact: np.ndarray) -> np.ndarray:
+        """Returns exact values with the errors of their samples.
 
         Args:
-            sample: number of the sample; 0 at time zero.
-            exact: (6,) specific force [m/s^2] and angular velocity [rad/s].
+            first: number of the first sample; 0 at time zero.
+            exact: (N, 6) specific force [m/s^2] and angular velocity [rad/s].
         """
-        measured = exact + self.at(sample)
+        measured = exact + self._of_samples(first, len(exact))
         return np.minimum(np.maximum(measured, -self._range), self._range)
 
     def at(self, sample: int) -> np.ndarray:
-        """Returns the error of a sample, (6,) as in `measure`."""
-        number, place = divmod(sample, _BLOCK)
-        if number != self._block_number:
-            self._block = self.of_block(number)
-            self._block_number = number
-        return self._block[place]
+        """Returns the error of a sample, a row as in `measure`."""
+        return self._of_samples(sample, 1)[0]
+
+    def _of_samples(self, first: int, count: int) -> np.ndarray:
+        """Returns the (count, 6) errors of samples that follow each other."""
+        parts = []
+        for number in range(first // _BLOCK, (first + count - 1) // _BLOCK + 1):
+            if number != self._block_number:
+                self._block = self.of_block(number)
+                self._block_number = number
+            start = first - number * _BLOCK
+            parts.append(self._block[max(start, 0) : start + count])
+        return np.concatenate(parts)
 
     def of_block(self, number: int) -> np.ndarray:
         """Returns the errors of many samples.

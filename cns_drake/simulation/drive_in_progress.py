@@ -25,8 +25,8 @@ class DriveInProgress(PlannedSequence):
         self._simulator = simulator
         self._lidar = next(iter(drive.scenario.lidars))
         schedule = drive_schedule(drive.scenario)
-        self._steps = schedule.steps[first_points_topic(drive.scenario)]
-        self._tick = schedule.period
+        steps = schedule.steps[first_points_topic(drive.scenario)]
+        self._frame_period = float(schedule.tick * steps)
         self._fault: BaseException | None = None
 
     def raise_fault(self) -> None:
@@ -44,7 +44,7 @@ class DriveInProgress(PlannedSequence):
         """
         simulator = self._simulator
         try:
-            simulator.AdvanceTo(index * self._steps * self._tick)
+            simulator.AdvanceTo(index * self._frame_period)
         except BaseException as error:
             self._fault = error
             raise

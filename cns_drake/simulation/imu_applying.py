@@ -11,7 +11,7 @@ from cns_drake.scenarios.imu_making import imu_rate, make_imu_noise
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.sensor_making import sensor_pose
 from cns_drake.sensors.imu import add_imu
-from cns_drake.sensors.noisy_imu import NoisyImu
+from cns_drake.sensors.imu_noise import ImuErrors
 
 
 def apply_imu_config(
@@ -31,8 +31,8 @@ def apply_imu_config(
         motion: the source of the bodies' motion.
 
     Returns:
-        The ports `specific_force` and `angular_velocity`; and `R_WI` of an
-        IMU with a rate or errors of its own.
+        The ports `specific_force` and `angular_velocity`; and `imu_samples`
+        of an IMU with a rate or errors of its own.
 
     Raises:
         InputError: Kalibr's file cannot be used.
@@ -42,14 +42,10 @@ def apply_imu_config(
         return add_imu(builder, base, X_BI, motion=motion).ports()
     rate = imu_rate(scenario)
     gravity = base.GetParentPlant().gravity_field().gravity_vector()
+    errors = ImuErrors(make_imu_noise(scenario), rate)
     imu = builder.AddNamedSystem(
-        "imu", VehicleImu(trajectory, X_BI, gravity, rate)
+        "imu", VehicleImu(trajectory, X_BI, gravity, rate, errors.measure)
     )
-    noisy = builder.AddNamedSystem(
-        "imu_noise", NoisyImu(make_imu_noise(scenario), rate)
-    )
-    ports = {"R_WI": imu.GetOutputPort("R_WI")}
-    for name in ("specific_force", "angular_velocity"):
-        builder.Connect(imu.GetOutputPort(name), noisy.GetInputPort(name))
-        ports[name] = noisy.GetOutputPort(name)
-    return ports
+    names = ("specific_force", "angular_velocity")
+    ports = {name: imu.GetOutputPort(name) for name in names}
+    return ports | {"imu_samples": imu.GetOutputPort("samples")}

@@ -210,15 +210,16 @@ def _advance(
 
     simulator = Simulator(diagram)
     simulator.set_monitor(monitor)
-    # Messages come at ticks. The simulation ends at the last tick's time, so
-    # that rounding cannot add or drop a message.
+    # Messages come at ticks. The simulation begins and ends between two ticks,
+    # so that rounding cannot add or drop a message.
     begin = first * schedule.steps[first_points_topic(scenario)]
     end = max(schedule.ends.values())
-    simulator.get_mutable_context().SetTime(begin * schedule.period)
+    start = max(begin - 0.5, 0.0) * schedule.period
+    simulator.get_mutable_context().SetTime(start)
     with writer:
         if reader is not None and first == 0:
             in_progress = DriveInProgress(drive, simulator)
             reader(in_progress)
             in_progress.raise_fault()
-        simulator.AdvanceTo(end * schedule.period)
+        simulator.AdvanceTo((end + 0.5) * schedule.period)
     return (end - begin) * schedule.period

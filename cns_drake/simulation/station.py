@@ -52,13 +52,13 @@ def make_station(
     prescribes the vehicle's pose, `geometry_pose` passes it on to the
     SceneGraph; `traffic` moves other objects; a `Lidar` for each entry of
     `scenario.lidars` under its name (with a `<lidar>_sweep` if it moves while
-    it turns), an accelerometer and a gyroscope (or `imu` and `imu_noise`, if
-    the IMU has a rate or errors of its own), and `odometry` measure;
-    `mcap_recorder` and `meshcat_recorder` record the measurements.
+    it turns), an accelerometer and a gyroscope (or `imu`, if the IMU has a
+    rate or errors of its own), and `odometry` measure; `mcap_recorder` and
+    `meshcat_recorder` record the measurements.
 
     Exported output ports: `<lidar>_scan`, `specific_force`,
-    `angular_velocity`, `odometry`, `geometry_query`; `R_WI` of such an
-    IMU; and with traffic `objects`.
+    `angular_velocity`, `odometry`, `geometry_query`; `imu_samples` of such
+    an IMU; and with traffic `objects`.
 
     Args:
         scenario: the scenario to build.
@@ -152,7 +152,7 @@ def make_station(
                 imu_rate(scenario)
             ),
             with_objects=moving is not None,
-            with_orientation="R_WI" in measured,
+            with_imu_samples="imu_samples" in measured,
             start_ns=START_NS,
         )
     for name, recorder in recorders.items():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 # W is the world, B the vehicle on the ground, I the IMU. The pose is X_WB. Both
@@ -25,3 +27,19 @@ IMU_DTYPE = np.dtype(
         ("specific_force", "<f8", 3),
     ]
 )
+
+
+class ImuSamples(NamedTuple):
+    """Samples of an IMU that follow each other at an even rate.
+
+    Attributes:
+        first: number of the first one; that at time zero is 0.
+        quat_xyzw: (N, 4) R_WI.
+        angular_velocity: (N, 3) w_WI, expressed in I [rad/s].
+        specific_force: (N, 3) expressed in I [m/s^2].
+    """
+
+    first: int
+    quat_xyzw: np.ndarray
+    angular_velocity: np.ndarray
+    specific_force: np.ndarray

@@ -10,6 +10,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 import pytest
+from scipy.spatial.transform import Rotation
 
 from cns_drake.motion.ride import ride_on_springs
 from cns_drake.motion.road_profile import RoadProfile
@@ -23,6 +24,7 @@ from cns_drake.motion.vehicle_imu import VehicleImu
 from cns_drake.motion.vehicle_motion import VehicleMotion
 from cns_drake.scenarios.shipped import suspension_file, vehicle_file
 from cns_drake.sensors.imu import add_imu
+from cns_drake.sensors.imu_noise import ImuErrors, ImuNoise
 
 X_BI = RigidTransform(RollPitchYaw(0.3, -0.2, 1.1), [-1.0, 0.4, 1.6])
 GRAVITY_W = np.array([0.0, 0.0, -9.81])
@@ -44,14 +46,16 @@ def drive(riding):
 class Measured:
     """A system's ports, to be read at any time."""
 
-    def __init__(self, trajectory, rate):
-        self._system = VehicleImu(trajectory, X_BI, GRAVITY_W, rate)
+    def __init__(self, trajectory, rate, noise=None):
+        errors = ImuErrors(noise or ImuNoise(), rate)
+        self._system = VehicleImu(
+            trajectory, X_BI, GRAVITY_W, rate, errors.measure
+        )
         self._context = self._system.CreateDefaultContext()
 
     def read(self, time, name):
         self._context.SetTime(time)
-        value = self._system.GetOutputPort(name).Eval(self._context)
-        return value.matrix() if name == "R_WI" else value
+        return self._system.GetOutputPort(name).Eval(self._context)
 
 
 @pytest.mark.parametrize("riding", [False, True])
@@ -79,13 +83,39 @@ def test_it_measures_as_drakes_sensors_do(riding):
                 rtol=0,
                 atol=1e-9,
             )
-        X_WI = trajectory.pose(time) @ X_BI
-        np.testing.assert_allclose(
-            ours.read(time, "R_WI"),
-            X_WI.rotation().matrix(),
-            rtol=0,
-            atol=1e-12,
-        )
+
+
+@pytest.mark.parametrize("riding", [False, True])
+def test_samples_have_the_orientation(riding):
+    trajectory = drive(riding)
+    # Past the end of the first block.
+    samples = Measured(trajectory, 400.0).read(1.5, "samples")
+    assert samples.first + len(samples.quat_xyzw) == 601
+    times = (samples.first + np.arange(256)) / 400.0
+    R_WB, _ = trajectory.poses(times)
+    np.testing.assert_allclose(
+        Rotation.from_quat(samples.quat_xyzw).as_matrix(),
+        R_WB @ X_BI.rotation().matrix(),
+        rtol=0,
+        atol=1e-12,
+    )
+
+
+def test_a_sample_is_the_same_however_it_is_asked_for():
+    noise = ImuNoise(
+        accelerometer_noise_density=0.01,
+        gyroscope_noise_density=0.005,
+        accelerometer_random_walk=1e-3,
+        gyroscope_range=0.2,
+    )
+    numbers = np.arange(385, 641)
+    samples = Measured(drive(True), 400.0, noise).read(640 / 400.0, "samples")
+    assert samples.first == numbers[0]
+    ours = Measured(drive(True), 400.0, noise)
+    for name in NAMES:
+        # Backwards: what was asked for before plays no part.
+        singles = [ours.read(k / 400.0, name) for k in numbers[::-1]]
+        np.testing.assert_array_equal(getattr(samples, name), singles[::-1])
 
 
 def error_of_integration(trajectory, rate):

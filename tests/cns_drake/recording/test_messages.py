@@ -105,7 +105,7 @@ def test_imu_puts_each_vector_in_its_place():
     R_WI = random_pose(1).rotation()
     imu = decode(
         messages.make_imu(
-            R_WI,
+            messages.to_quat_xyzw(R_WI),
             angular_velocity=np.array([0.1, 0.2, 0.3]),
             specific_force=np.array([1.0, 2.0, 9.81]),
             stamp_ns=STAMP_NS,

@@ -118,9 +118,9 @@ def test_turn_on_bias_stays_and_differs_between_runs():
 def test_what_is_measured_ends_at_the_range():
     noise = ImuNoise(accelerometer_range=20.0, gyroscope_range=0.5)
     exact = np.array([19.999, 20.001, -25.0, 0.499, -0.501, 3.0])
-    measured = ImuErrors(noise, RATE).measure(5, exact)
+    measured = ImuErrors(noise, RATE).measure(5, exact[None])
     np.testing.assert_array_equal(
-        measured, [19.999, 20.0, -20.0, 0.499, -0.5, 0.5]
+        measured, [[19.999, 20.0, -20.0, 0.499, -0.5, 0.5]]
     )
 
 
