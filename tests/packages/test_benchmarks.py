@@ -25,6 +25,7 @@ BY_HAND = {
     "evaluation_of_recordings.py",
     "growth.py",
     "kills.py",
+    "lidar_odometry.py",
     "memory.py",
     "peers.py",
     "real_scans.py",
