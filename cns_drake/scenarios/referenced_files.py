@@ -150,7 +150,7 @@ def _xml_references(content: bytes) -> list[str]:
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         texts.clear()
-        if "filename" in attributes:  # Of URDF.
+        if "filename" in attributes:  # A mesh of URDF.
             found.append(attributes["filename"])
 
     def end(tag: str) -> None:

@@ -28,7 +28,7 @@ _Y_UP = (".gltf", ".glb", ".dae")
 class MeshFiles:
     """Reads meshes, each only once for all its geometries.
 
-    Of one mesh at one scale there is one surface.
+    One mesh at one scale has one surface.
     """
 
     def __init__(self, foreign: ForeignMeshes):

@@ -64,8 +64,8 @@ class ImuNoise:
             rate: samples per second [1/s].
 
         Returns:
-            Of the specific force [m^2/s^4] and the angular velocity
-            [rad^2/s^2], for each axis.
+            Variances of the specific force [m^2/s^4] and of the angular
+            velocity [rad^2/s^2], for each axis.
         """
         return (
             self.accelerometer_noise_density**2 * rate,

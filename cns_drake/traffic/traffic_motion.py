@@ -172,7 +172,7 @@ class TrafficMotion(LeafSystem):
 
     def _calc_pose(self, context: Context, output: AbstractValue) -> None:
         X_WLs = self._poses.Eval(context)
-        # Of each free body, quaternion (real part first) and position.
+        # Each free body has a quaternion (real part first) and a position.
         q = np.empty((len(X_WLs), 7))
         quat_xyzw = self._limbs.quat_xyzw(self._states.Eval(context))
         q[:, :4] = quat_xyzw[:, [3, 0, 1, 2]]

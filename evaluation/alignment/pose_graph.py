@@ -33,8 +33,8 @@ _STILL = 1e-6
 class Ties:
     """M measured relative poses between poses of N variables V.
 
-    What is measured is Z = inverse(V_i A) V_j B; for i == FIXED the first
-    pose is A itself.
+    A measurement is Z = inverse(V_i A) V_j B; for i == FIXED the first pose is
+    A itself.
 
     Attributes:
         i: (M,) first variable, or FIXED.
@@ -56,7 +56,7 @@ class Ties:
     is_doubtful: bool
 
     def errors(self, V: np.ndarray) -> np.ndarray:
-        """Returns turn and move (M, 6) by which they are not kept."""
+        """Returns the errors (M, 6) of the ties: turn and move."""
         first = np.where(
             (self.i == FIXED)[:, None, None], self.A, V[self.i] @ self.A
         )
@@ -66,11 +66,11 @@ class Ties:
 
 
 def optimise(V: np.ndarray, all_ties: list[Ties]) -> np.ndarray:
-    """Returns the variables that keep the ties best.
+    """Returns the variables that fit the ties best.
 
     Args:
         V: (N, 4, 4) start.
-        all_ties: what ties them; together they must hold every variable.
+        all_ties: the ties; together they must hold every variable.
     """
     information = [np.linalg.inv(ties.covariance) for ties in all_ties]
     for width in _WIDTHS:

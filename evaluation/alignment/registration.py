@@ -1,9 +1,9 @@
-"""Registration of one cloud to another, from a rough guess on.
+"""Registration of one cloud to another, from a rough guess.
 
 Point-to-plane ICP (Chen and Medioni 1991): each point is paired with the
-nearest one of the other cloud and drawn to its plane, under a distance limit
-that shrinks from stage to stage, so that far guesses are drawn in and near
-ones not disturbed by what changed.
+nearest one of the other cloud and drawn to its plane. The distance limit
+shrinks from stage to stage: far guesses are drawn in, and later pairs are not
+disturbed by changes.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from evaluation.geometry.neighbours import nearest_neighbours
 
 # Neighbours, the point among them, that a normal is fitted to.
 NUM_NEIGHBOURS = 10
-# A normal this close to the horizontal belongs to something that stands up.
+# A normal this close to the horizontal is that of an upright surface.
 _UPRIGHT = 0.5
 # Farthest pairs of each stage [m], and the points that it uses: more add
 # time, not accuracy.
@@ -31,14 +31,14 @@ _MAX_ITERATIONS = 15
 _STILL = (0.005, 2e-4)
 # Distances beyond this part of the limit lose their weight.
 _SCALE = 0.25
-# Normals of a pair that differ by more than this cosine are of two surfaces.
+# The normals of a pair on one surface have at least this cosine.
 _PARALLEL = 0.7
 _FEWEST_PAIRS = 20
 # Powers of up to 2^6 part spreads that differ by a tenth.
 _SQUARINGS = 6
 _SEED = 7
-# How well a point is known to lie on its plane [m]; of so many neighbouring
-# points, which share their errors, only one counts.
+# Error of a point off its plane [m]; number of neighbouring points with a
+# common error, of which only one counts.
 _SIGMA = 0.1
 _CORRELATED = 50.0
 
@@ -58,7 +58,7 @@ class Surface:
     tree: cKDTree
 
     def sample(self, number: int = _NUM_SAMPLES) -> Surface:
-        """Returns so many of the points, with the tree of all."""
+        """Returns a number of the points, with the tree of all."""
         if len(self.points) <= number:
             return self
         rng = np.random.default_rng(_SEED)
@@ -73,15 +73,15 @@ class Surface:
 
 @dataclass(frozen=True)
 class Registration:
-    """Where a cloud S lies on a cloud T, and how well it fits there.
+    """The pose of a cloud S on a cloud T, and its fit.
 
     Attributes:
         X_TS: (4, 4).
         fitness: part of the points that have a counterpart, of S or of T,
-            whichever is more: one of them may show much that the other one
-            lacks, because it was built or torn down in between.
-        structure: the same of the upright points alone, since flat ground
-            fits nearly everywhere.
+            the greater of both: one cloud may show many things that were built
+            or torn down in between.
+        structure: the same of upright points only, since flat ground fits
+            nearly everywhere.
         covariance: (6, 6) of a small motion of S in T: turn [rad], move [m].
     """
 
@@ -140,7 +140,7 @@ def _step(
     r, J = _linearise(p_T[is_paired], target, nearest[is_paired])
     weights = (1.0 + (r / (_SCALE * limit)) ** 2) ** -2
     H = J.T @ (weights[:, None] * J)
-    # Directions that no surface holds stay as they are.
+    # Directions without a constraint stay as they are.
     damping = 1e-6 * np.trace(H) * np.eye(6)
     xi = -np.linalg.solve(H + damping, J.T @ (weights * r))
     return poses.make_pose(Rotation.from_rotvec(xi[:3]).as_matrix(), xi[3:])
@@ -152,8 +152,8 @@ def _pair(
     """Pairs points with the nearest ones of the target.
 
     Returns:
-        (N,) bool, which points have a partner; (N, 3) where they are in T;
-        (N,) index of the partner.
+        (N,) bool, which points have a partner; (N, 3) their places in T; (N,)
+        index of the partner.
     """
     p_T = poses.transform(X_TS, sample.points)
     distances, nearest = target.tree.query(p_T, distance_upper_bound=limit)
@@ -190,7 +190,7 @@ def _judge(source: Surface, target: Surface, X_TS: np.ndarray) -> Registration:
             _part(is_paired, sample.is_upright),
             _part(is_found, reverse.is_upright),
         ),
-        # Where nothing holds, a metre and a few degrees are left open.
+        # Without constraints, a metre and a few degrees remain uncertain.
         covariance=np.linalg.inv(H + np.eye(6)),
     )
 

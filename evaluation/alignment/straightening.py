@@ -1,7 +1,7 @@
-"""Drives that have drifted, made to agree with themselves.
+"""Corrects drives that have drifted, by their own loops.
 
-Positions of one drive that are off show where it passes a place again: the
-scans show where it is, and the poses say something else.
+Drift shows where a drive passes a place again: its scans and its poses then
+disagree.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from evaluation.alignment.loops import loop_errors
 from evaluation.alignment.submaps import Submaps
 from evaluation.sequences.moved import MovedSequence
 
-# Pairs that are tried; how many must fit, so that no chance one bends a drive;
-# and how often, if the drive has drifted.
+# Number of tried pairs; number that must fit, so that a chance fit bends no
+# drive; and number of rounds, if the drive has drifted.
 _NUM_LOOPS = 30
 _FEWEST_LOOPS = 3
 _ROUNDS = 3
-# It has if a quarter of the loops are off by more [m].
+# A drive has drifted if a quarter of the loops are off by more [m].
 _DRIFT = 0.3
 
 
@@ -32,8 +32,8 @@ class Straightened:
     """A drive that agrees with itself.
 
     Attributes:
-        drive: with new poses where it did not.
-        off: by how much it did not, see `AlignmentReport`.
+        drive: with new poses, if it had drifted.
+        off: its disagreement before, see `AlignmentReport`.
     """
 
     drive: Submaps
@@ -41,7 +41,7 @@ class Straightened:
 
 
 def make_consistent(sequence: Sequence, track: Track) -> Straightened:
-    """Makes a drive agree with itself, where it can be checked.
+    """Makes a drive agree with itself, if it passes a place again.
 
     It can where it passes a place again.
 
@@ -50,7 +50,7 @@ def make_consistent(sequence: Sequence, track: Track) -> Straightened:
     """
     drive = Submaps(sequence)
     worst = 0.0
-    # Near places first: what they show brings others within reach.
+    # Near places come first: their loops bring others within reach.
     for _ in range(_ROUNDS):
         loops = find_self_loops(drive, _NUM_LOOPS, track)
         if len(loops) < _FEWEST_LOOPS:

@@ -24,17 +24,17 @@ _SCAN_SPACING = 2.5
 _RANGE = 60.0
 _VOXEL_SIZE = 0.7
 _FEWEST_POINTS = 500
-# The ground is looked for within this distance of so many keyframes [m], where
-# normals are so close to the vertical.
+# The ground is searched within this distance [m] of this number of keyframes,
+# among normals this close to the vertical.
 _GROUND_RANGE = 8.0
 _GROUND_KEYFRAMES = 20
 _LEVEL = 0.95
-# Surfaces kept in memory; neighbours are asked for one after the other.
+# Number of surfaces kept in memory; neighbours are used in sequence.
 _NUM_KEPT = 48
 
 
 class Submaps:
-    """Keyframes K of a drive, and what surrounds them.
+    """Keyframes K of a drive, and their surroundings.
 
     Attributes:
         sequence: the drive.
@@ -76,7 +76,7 @@ class Submaps:
 
     @property
     def path(self) -> np.ndarray:
-        """(K,) where along the path the keyframes are [m]."""
+        """(K,) distances of the keyframes along the path [m]."""
         return self.travelled[self.frames]
 
     def bend(self, X_VK: np.ndarray) -> np.ndarray:
@@ -86,8 +86,8 @@ class Submaps:
             X_VK: (K, 4, 4).
 
         Returns:
-            (N, 4, 4); between keyframes, what the two would do to a frame is
-            blended along the path.
+            (N, 4, 4); between keyframes, the moves of both are blended along
+            the path.
         """
         moves = X_VK @ poses.inverse(self.X_WK)
         frames = np.arange(len(self.X_WS))
@@ -120,7 +120,7 @@ class Submaps:
     def _make_surface(self, index: int) -> Surface | None:
         """Returns the submap around a keyframe, in the frame of its LiDAR.
 
-        None if there is next to nothing to see.
+        None if it has too few points.
         """
         frame = self.frames[index]
         off = np.abs(self.travelled[self._scans] - self.travelled[frame])

@@ -1,8 +1,8 @@
-"""The structural change between two drives, with what puts it in context.
+"""The structural change between two drives, with its context.
 
 A published TCR_sym needs company: the part of it that comes from the two
-routes alone (the control), and the value where both routes saw the city
-(the coverage-masked one).
+routes alone (the control), and its value where both routes saw the city (the
+coverage-masked one).
 """
 
 from __future__ import annotations
@@ -47,13 +47,13 @@ _SAME_ROUTE = 1.0
 
 @dataclass(frozen=True)
 class Surveyed:
-    """A map with what is known about the drive that made it.
+    """A map, with the drive that made it.
 
     Attributes:
         name: of the sequence or file.
         voxels: the map on the grid of the TCR.
         positions: (N, 3) of the sensor [m]; None for a map file.
-        sequence: the drive, or where it lay; None for a map file.
+        sequence: the drive, or its world frame and map; None for a map file.
     """
 
     name: str
@@ -70,13 +70,12 @@ class ChangeReport:
         source: name of A.
         target: name of B.
         change: over the whole maps.
-        masked: over what both drives passed within the coverage radius;
-            None if a map comes without its drive.
+        masked: over the parts that both drives passed within the coverage
+            radius; None if a map has no drive.
         control: between two drives on the two routes in one stage; None if
             none was given.
         control_names: the two that `control` compares.
-        alignment: how the two were put into one world; None if they came
-            in one.
+        alignment: of the two; None if they were in one world.
     """
 
     source: str
@@ -88,7 +87,7 @@ class ChangeReport:
     alignment: AlignmentReport | None = None
 
     def to_json(self) -> dict:
-        """Returns all numbers; NaN becomes None, with a reason beside."""
+        """Returns all numbers; NaN becomes None, with a reason."""
         change = self.change
         values = {
             "source": self.source,
@@ -132,7 +131,7 @@ class ChangeReport:
 
 
 def survey(path: Path, track: Track = silent) -> Surveyed:
-    """Maps what lies at a path: a sequence, or a map file.
+    """Maps a sequence, or reads a map file.
 
     Raises:
         InputError: if it cannot be read as either.
@@ -146,20 +145,19 @@ def survey_in_one_world(
     track: Track = silent,
     lidar: str | None = None,
 ) -> tuple[list[Surveyed], list[AlignmentReport]]:
-    """Maps what lies at some paths, all in one world.
+    """Maps sequences, or reads map files, all in one world.
 
     Args:
-        paths: of sequences or map files; what is not a sequence is in that
-            world already.
+        paths: of sequences or map files; map files are in that world already.
         when: whether later sequences are aligned with the first.
         track: reports progress.
-        lidar: whose scans to read, of recordings with several.
+        lidar: name of the LiDAR, for recordings with several.
 
     Returns:
-        The maps, in the order of the paths; what was aligned, and how.
+        The maps, in the order of the paths, and reports on alignments.
 
     Raises:
-        InputError: if something cannot be read, or not be aligned.
+        InputError: if a path cannot be read, or a sequence cannot be aligned.
     """
     opened = [_open(path, lidar) for path in paths]
     drives = {
@@ -169,7 +167,7 @@ def survey_in_one_world(
         raise InputError("--align always: a map file cannot be aligned")
     reports = []
     if len(drives) > 1:
-        # Imported here: slow to load, and maps as files do without it.
+        # Imported here: it is slow to load, and not needed for map files.
         from evaluation.alignment import in_one_world
 
         first, *others = drives
@@ -206,10 +204,10 @@ def compare(
         source: A.
         target: B.
         control: a drive on A's route in B's stage, or on B's route in A's
-            stage. Which of them it is shows in its route. It is compared
-            with the one whose stage it shares, so that the same two routes
-            are compared as in A and B, but one stage.
-        alignment: how the two were put into one world, for the report.
+            stage. Its route shows which of them it is. It is compared with the
+            drive of its own stage: the two routes are those of A and B, in one
+            stage.
+        alignment: of the two, for the report.
 
     Raises:
         InputError: if the three are not of one world, or the control is on
@@ -266,7 +264,7 @@ def _survey(source: Sequence | Path, track: Track) -> Surveyed:
 def _same_stage_partner(
     source: Surveyed, target: Surveyed, control: Surveyed
 ) -> Surveyed:
-    """Returns the one whose route the control does not share."""
+    """Returns the drive whose route differs from the control's."""
     if (
         source.sequence is None
         or control.sequence is None

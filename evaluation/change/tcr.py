@@ -1,15 +1,14 @@
 """Temporal change ratio (TCR) of two maps, directed and symmetric.
 
-Source: "The City that Never Settles", equations 1 to 3. What the paper leaves
-open is fixed as follows.
+Source: "The City that Never Settles", equations 1 to 3. The following choices
+are open in the paper.
 
 - X is the map of a whole sequence in world coordinates, as the centroids of
   the voxels of a grid that is fixed in the world (see `evaluation.maps`).
 - O, the unchanged points, is counted inside H, the points in the other map's
   convex hull; otherwise the ratio could become negative.
-- The two sets that are united belong to different clouds. The union is a
-  concatenation, so TCR_sym is the mean of the directed ratios, weighted by
-  the sizes of H.
+- The two united sets are of different clouds. The union is a concatenation:
+TCR_sym is the mean of the directed ratios, weighted by the sizes of H.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ COVERAGE_RADIUS = 40.0
 
 @dataclass(frozen=True)
 class DirectedChange:
-    """What of one map (the source) is not found in another (the target).
+    """The part of one map (the source) that is missing in another (the target).
 
     Attributes:
         in_hull: (N,) bool, the set H: source points in the target's hull.
@@ -93,12 +92,12 @@ class TemporalChange:
 
     @property
     def symmetric(self) -> float:
-        """TCR_sym, equation 1; NaN if nothing lies in the hulls."""
+        """TCR_sym, equation 1; NaN if the hulls contain no points."""
         return _ratio(self.num_unchanged, self.num_in_hull)
 
     @property
     def undefined_because(self) -> str | None:
-        """Why TCR_sym is NaN; None where it is a number."""
+        """Why TCR_sym is NaN; None if it is a number."""
         if self.num_in_hull:
             return None
         sides = (self.source_to_target, self.target_to_source)
@@ -112,7 +111,7 @@ class TemporalChange:
         """Returns the change with only some of the points counted.
 
         Hulls and nearest neighbours stay those of the whole maps: a mask
-        says which points are judged, not what there is to see.
+        selects the points to judge.
 
         Args:
             source_kept: (N,) bool.
@@ -137,7 +136,7 @@ def temporal_change(
         source: (N, 3) float64 voxel centroids, in the frame of both [m].
         target: (M, 3) float64.
         tau: distance up to which a point is unchanged, inclusive [m].
-        restrict_to_hull: whether O is counted inside H. Off is the literal
+        restrict_to_hull: whether O is counted inside H. False is the literal
             equation 2, under which values may be negative.
 
     Returns:
@@ -167,8 +166,8 @@ def covered(
 ) -> np.ndarray:
     """Returns which points lie near every one of some trajectories.
 
-    Two routes see different parts of a city even if nothing changed. Where
-    both passed near, most of that difference is gone.
+    Two routes see different parts of a city even without a change. Near both
+    routes, most of that difference is gone.
 
     Args:
         points: (N, 3) [m].

@@ -18,12 +18,12 @@ from evaluation.clouds.pcd import read_pcd
 from evaluation.clouds.ply import read_ply
 from evaluation.clouds.record_blocks import check_size, read_binary
 
-# Takes a file and how many points to yield at once.
+# Reads a file; the second argument is the number of points in a block.
 _Reader = Callable[[Path, int], Iterator[np.ndarray]]
 _BIN = np.dtype([(name, "<f4") for name in ("x", "y", "z", "intensity")])
-# Points of a map that are read at once.
+# Number of points of a map that are read at a time.
 _BLOCK = 1 << 18
-# No LiDAR fills that in a turn [bytes].
+# More than a LiDAR's turn can fill [bytes].
 SCAN_LIMIT_BYTES = 1 << 27
 
 
@@ -38,12 +38,12 @@ def read_cloud(path: Path) -> np.ndarray:
         path: an existing file, of a scan rather than a map.
 
     Returns:
-        Structured array of shape (N,) with fields `x`, `y`, `z` of floating
-        point and whatever else the file holds.
+        Structured array of shape (N,) with floating-point fields `x`, `y`, `z`
+        and all other fields of the file.
 
     Raises:
-        InputError: if there is no such file, it is not what its name says,
-            or it is too large for a scan.
+        InputError: if there is no such file, its content does not match its
+            ending, or it is too large for a scan.
     """
     path = Path(path)
     _find_reader(path)
@@ -67,7 +67,7 @@ def read_blocks(path: Path, block: int = _BLOCK) -> Iterator[np.ndarray]:
         At least one part, maybe empty.
 
     Raises:
-        InputError: as `read_cloud`; also late, as if the file is cut off
+        InputError: as `read_cloud`; also later, e.g. if the file is cut off
             meanwhile.
     """
     path = Path(path)
@@ -90,7 +90,8 @@ def _find_reader(path: Path) -> _Reader:
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
         raise InputError(
-            f"{path}: unknown kind of point cloud (known: {' '.join(_READERS)})"
+            f"{path}: unknown kind of point cloud (there are: "
+            f"{' '.join(_READERS)})"
         )
     return reader
 
@@ -118,7 +119,7 @@ def _read_npy(path: Path, block: int) -> Iterator[np.ndarray]:
     if len(shape) != 2 or shape[1] not in (3, 4):
         raise ValueError(f"an array of shape {shape} instead of N x 3 or N x 4")
     if dtype.kind not in "fiu":
-        raise ValueError(f"{dtype} is no type of coordinates")
+        raise ValueError(f"{dtype} is not a type of coordinates")
     if by_column:
         return _read_columns(path, dtype, shape, offset, block)
     rows = np.dtype((dtype, shape[1:]))
@@ -137,14 +138,14 @@ def _read_npy_header(
     except OSError:
         raise
     except Exception as error:
-        # NumPy evaluates the header as Python, and fails in as many ways.
+        # NumPy evaluates the header as Python, and can raise any error.
         raise ValueError(
-            f"no NumPy array ({type(error).__name__}: {error})"
+            f"not a NumPy array ({type(error).__name__}: {error})"
         ) from error
     if not isinstance(values, np.memmap):
         values.close()
         raise ValueError("an archive instead of one array")
-    # Mapped, but never looked at: that could end the process.
+    # The file is mapped but never read: reading could end the process.
     by_column = not values.flags.c_contiguous
     return values.dtype, values.shape, by_column, values.offset
 
@@ -173,7 +174,7 @@ def _read_bin(path: Path, block: int) -> Iterator[np.ndarray]:
     size = path.stat().st_size
     if size % _BIN.itemsize:
         raise ValueError(
-            f"{size} bytes is no whole number of points of four float32"
+            f"{size} bytes is not a whole number of points of four float32"
         )
     return read_binary(path, _BIN, 0, size // _BIN.itemsize, block)
 

@@ -14,8 +14,8 @@ from evaluation.clouds.record_blocks import check_size, read_binary, read_text
 _KINDS = {"F": "f", "I": "i", "U": "u"}
 # A header is some hundred bytes; a file without one is not searched further.
 _HEADER_LIMIT_BYTES = 1 << 16
-# LZF makes 264 bytes of three at most. Whole files of it are unpacked in
-# memory; larger ones had better not be compressed.
+# LZF makes 264 bytes of three at most. Compressed files are unpacked in memory;
+# larger ones must not be compressed.
 _LZF_RATIO = 88
 _UNPACKED_LIMIT_BYTES = 1 << 27
 
@@ -25,7 +25,7 @@ def read_pcd(path: Path, block: int) -> Iterator[np.ndarray]:
 
     Args:
         path: the file.
-        block: how many points to yield at once.
+        block: number of points in a block.
 
     Yields:
         Structured arrays of shape (N,) under the file's field names, at least
@@ -53,7 +53,7 @@ def read_pcd(path: Path, block: int) -> Iterator[np.ndarray]:
 
 
 def _read_header(path: Path) -> tuple[dict[str, list[str]], int]:
-    """Returns keyword -> values, and where the points begin [bytes]."""
+    """Returns keyword -> values, and the offset of the points [bytes]."""
     header = {}
     with open(path, "rb") as stream:
         while stream.tell() < _HEADER_LIMIT_BYTES:
@@ -88,7 +88,7 @@ def _describe(header: dict[str, list[str]]) -> tuple[np.dtype, int]:
         )
     fields = []
     for position, name in enumerate(names):
-        # PCL calls all padding `_`; a NumPy type needs one name for each.
+        # PCL names all padding `_`; a NumPy type needs different names.
         unique = f"_{position}" if name == "_" else name
         scalar = f"<{kinds[position]}{sizes[position]}"
         shape = () if counts[position] == 1 else (counts[position],)
@@ -173,7 +173,7 @@ def _interleaved(
 
 
 def _width(dtype: np.dtype, name: str) -> int:
-    """Returns how many numbers a field holds."""
+    """Returns the number of values in a field."""
     return int(np.prod(dtype[name].shape))
 
 
@@ -213,7 +213,7 @@ def _decompress_lzf(packed: np.ndarray, plain: np.ndarray) -> bool:
         length += 2
         if distance > target or target + length > len(plain):
             return False
-        # One by one: a copy may overlap what it writes.
+        # Bytes are copied one by one: source and target may overlap.
         for _ in range(length):
             plain[target] = plain[target - distance]
             target += 1

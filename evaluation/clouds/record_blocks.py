@@ -1,7 +1,7 @@
 """Records of a file, read block by block into memory of our own.
 
-Mapping a file instead would end the process without a word (SIGBUS) when
-somebody cuts the file meanwhile.
+A mapped file would end the process without a message (SIGBUS) if another
+program cuts it meanwhile.
 """
 
 from __future__ import annotations
@@ -86,12 +86,12 @@ def read_text(
 
 
 def check_size(path: Path, needed: int, exactly: bool) -> None:
-    """Refuses a file that cannot hold what its header says.
+    """Refuses a file whose size does not match its header.
 
     Args:
         path: the file.
-        needed: how long it is [bytes].
-        exactly: or else, how long at the very least.
+        needed: its size [bytes].
+        exactly: whether that is the exact size; else it is the least.
 
     Raises:
         ValueError: if it is not.

@@ -1,7 +1,6 @@
 """The command line `cns-eval`.
 
-What takes time to import is imported inside the commands, so that the help
-comes at once.
+Slow modules are imported inside the commands, so that the help comes at once.
 """
 
 from __future__ import annotations
@@ -42,14 +41,14 @@ app = terminal.make_program(
 
 
 class ModeName(str, Enum):
-    """Which queries a precision-recall curve counts."""
+    """The queries of a precision-recall curve."""
 
     ALL = "all"
     FILTERED = "filtered"
 
 
 class AlignName(str, Enum):
-    """When sequences are put into one world."""
+    """When sequences are aligned to one world."""
 
     AUTO = "auto"
     ALWAYS = "always"
@@ -87,31 +86,31 @@ _LidarName = Annotated[
     typer.Option(
         "--lidar",
         metavar="NAME",
-        help="Whose scans to read, of recordings with several LiDARs: those of"
-        " the topic /NAME/points.",
+        help="LiDAR to read, of recordings with several: its topic is "
+        "/NAME/points.",
     ),
 ]
 _OwnMethods = Annotated[
     list[Path] | None,
     typer.Option(
-        help="Python file that registers a method, or map-closures, to run"
-        " besides the shipped ones; may be repeated."
+        help="Method to run besides the shipped ones: a Python file that "
+        "registers it, or map-closures; may be repeated."
     ),
 ]
 _Jobs = Annotated[
     int | None,
     typer.Option(
         metavar="N",
-        help="Processes that work at the same time; as many as there are"
-        " cores if left out.",
+        help="Number of processes that work side by side; by default one for "
+        "each core.",
     ),
 ]
 _Scheduler = Annotated[
     str | None,
     typer.Option(
         metavar="ADDRESS",
-        help="Scheduler of a Dask cluster that shares the file system, such"
-        " as tcp://10.0.0.1:8786. Also DASK_SCHEDULER_ADDRESS.",
+        help="Scheduler of a Dask cluster with a shared file system, such as "
+        "tcp://10.0.0.1:8786; by default DASK_SCHEDULER_ADDRESS, if set.",
     ),
 ]
 
@@ -126,8 +125,8 @@ def tcr(
         Path | None,
         typer.Option(
             metavar="C",
-            help="A recording of A's route in B's stage, or of B's route in"
-            " A's stage: what TCR_sym the routes alone cause.",
+            help="A recording of A's route in B's stage, or of B's route in "
+            "A's stage. It gives the TCR_sym that the routes alone cause.",
         ),
     ] = None,
     align: _Align = AlignName.AUTO,
@@ -138,7 +137,7 @@ def tcr(
 
     A and B are recorded sequences (MCAP, MulRan, HeLiPR, KITTI odometry,
     CNS) or maps (.pcd .ply .npy .bin). A is the source and B the target of
-    the directed ratios. Sequences of different world frames are aligned.
+    the directed ratios. Sequences in different world frames are aligned.
     """
     from evaluation.change import drive_change as change
     from evaluation.sequences import Sequence
@@ -158,7 +157,9 @@ def tcr(
             _tell_notes(one.sequence)
         ignored = one.voxels.num_ignored
         if ignored:
-            terminal.note(f"{one.name}: {ignored} points not finite")
+            terminal.note(
+                f"{one.name}: {ignored} points are not finite, and left out"
+            )
     for alignment in alignments:
         terminal.note(alignment.to_text())
     if json:
@@ -190,16 +191,16 @@ def pr(
         bool,
         typer.Option(
             "--across-maps",
-            help="The drives may be of maps of different names, such as"
-            " another draw of a city along the same streets.",
+            help="Allow drives of maps with different names, such as another "
+            "draw of a city along the same streets.",
         ),
     ] = False,
     truth: Annotated[
         str,
         typer.Option(
             metavar="radius|overlap:PART",
-            help="What a match is: a place within the radius, or one whose"
-            " scan shows at least this part of what the query's shows.",
+            help="Definition of a match: a place within the radius, or one "
+            "whose scan shows at least this part of the query's scan.",
         ),
     ] = "radius",
     overlaps: Annotated[
@@ -215,8 +216,8 @@ def pr(
 ) -> None:
     """Place recognition of one drive in another.
 
-    How well the scans of QUERY find their place in DATABASE. Both are
-    recorded sequences (MCAP, MulRan, HeLiPR, KITTI odometry, CNS). Those of
+    Measures how well the scans of QUERY find their place in DATABASE. Both are
+    recorded sequences (MCAP, MulRan, HeLiPR, KITTI odometry, CNS). Sequences in
     different world frames are aligned.
     """
     from cns_drake.base.errors import InputError
@@ -226,12 +227,12 @@ def pr(
 
     protocol = replace(protocol, overlap=overlap_of(truth))
     if overlaps is not None and protocol.overlap is None:
-        raise InputError("--overlaps: needs --truth overlap:PART")
+        raise InputError("--overlaps: add --truth overlap:PART")
     is_itself = database.resolve() == query.resolve()
     if protocol.exclude_recent is not None and not is_itself:
         raise InputError(
-            f"--exclude-recent: {query} is not {database} (it is for a drive"
-            " against itself)"
+            f"--exclude-recent: it is for a drive against itself, but {query} "
+            f"is not {database}"
         )
     chosen = _make_method(method, parameter, sensor_height)
     places, asking = (open_sequence(path, lidar) for path in (database, query))
@@ -261,8 +262,8 @@ def pr(
         terminal.note(f"wrote {overlaps}")
     if protocol.exclude_recent is None and is_itself:
         terminal.note(
-            f"{query}: every scan finds itself (--exclude-recent leaves out"
-            " what was just passed)"
+            f"{query}: every scan finds itself (--exclude-recent leaves out "
+            "recent places)"
         )
     if json:
         terminal.print_json(result.to_json())
@@ -289,9 +290,9 @@ def scores(
 ) -> None:
     """Scores of all pairs of scans of two folders.
 
-    Scans are .bin, .pcd, .npy or .ply files. Every query is compared with
-    every place; a search that only saves time is left out. An empty score
-    means that there is no candidate.
+    Scans are .bin, .pcd, .npy or .ply files. Every query is compared with every
+    place; searches that only save time are left out. An empty score means that
+    the place is no candidate.
     """
     from evaluation.recognition import scan_folders
 
@@ -306,7 +307,7 @@ def scores(
         gate_radius=protocol.gate_radius,
     )
     if num_ignored:
-        terminal.note(f"{num_ignored} points not finite")
+        terminal.note(f"{num_ignored} points are not finite, and left out")
     terminal.note(f"wrote {output}")
 
 
@@ -326,8 +327,8 @@ def report(
 ) -> None:
     """Report on all recordings in a folder.
 
-    Writes tables, figures and report.html. Interrupted, the same command
-    goes on where it was.
+    Writes tables, figures and report.html. After an interruption the same
+    command goes on where it was.
     """
     from cns_drake.base.jobs.cluster import choose_cluster
     from evaluation.paper import reference_for
@@ -363,8 +364,9 @@ def trend(
     control: Annotated[
         list[Path] | None,
         typer.Option(
-            help="A drive on the route of databases through the stage of the"
-            " query: what is kept is drawn too; may be repeated."
+            help="A drive on the route of databases through the stage of the "
+            "query, to plot the kept share of AUC as well; may be "
+            "repeated."
         ),
     ] = None,
     method: _OwnMethods = None,
@@ -377,8 +379,9 @@ def trend(
 ) -> None:
     """AUC over TCR_sym, of many databases.
 
-    One drive asks them all, by every method. Writes trend.csv and a figure
-    with 95 % bands. Interrupted, the same command goes on where it was.
+    One drive queries them all, by every method. Writes trend.csv and a figure
+    with 95 % bands. After an interruption the same command goes on where it
+    was.
     """
     from cns_drake.base.jobs.cluster import choose_cluster
     from evaluation.study.trend import write_trend

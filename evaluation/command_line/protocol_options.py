@@ -1,4 +1,4 @@
-"""The options of the protocol, the same for every command that asks drives."""
+"""The options of the protocol, the same for all commands."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ Gate = Annotated[
     bool,
     typer.Option(
         "--gate",
-        help="Among the best places of a query, reject those that the"
-        " method's own pose puts beyond the radius; for every method that"
-        " estimates poses.",
+        help="Reject, among the best places of a query, those that are beyond "
+        "the radius by the method's own pose; for methods that estimate "
+        "poses.",
     ),
 ]
 _OPTIONS: dict[str, tuple[object, object]] = {
@@ -36,20 +36,28 @@ _OPTIONS: dict[str, tuple[object, object]] = {
     ),
     "query_spacing": (
         Annotated[
-            float, typer.Option(help="Between two queries, along the path [m].")
+            float,
+            typer.Option(
+                help="Distance between two queries along the path [m]."
+            ),
         ],
         PAPER_PROTOCOL.query_spacing,
     ),
     "place_spacing": (
         Annotated[
             float,
-            typer.Option(help="Between two places of the database [m]."),
+            typer.Option(
+                help="Distance between two places of the database [m]."
+            ),
         ],
         PAPER_PROTOCOL.place_spacing,
     ),
     "max_range": (
         Annotated[
-            float, typer.Option(help="Points farther along an axis go [m].")
+            float,
+            typer.Option(
+                help="Leave out points farther than this along an axis [m]."
+            ),
         ],
         PAPER_PROTOCOL.max_range,
     ),
@@ -58,8 +66,8 @@ _OPTIONS: dict[str, tuple[object, object]] = {
             int | None,
             typer.Option(
                 metavar="N",
-                help="Merge N scans for every method; each has its own number"
-                " if left out.",
+                help="Merge N scans for every method; by default each method "
+                "has its own number.",
             ),
         ],
         None,
@@ -69,8 +77,8 @@ _OPTIONS: dict[str, tuple[object, object]] = {
             float | None,
             typer.Option(
                 metavar="S",
-                help="Loop closure: a drive is also its own database, with"
-                " the places that it passed at least S seconds before.",
+                help="Loop closure: each drive is also its own database, with "
+                "places it passed at least S seconds before.",
             ),
         ],
         None,
@@ -92,8 +100,8 @@ Costs = Annotated[
     bool,
     typer.Option(
         "--costs/--no-costs",
-        help="Also measure what the methods cost, in time and room: all that"
-        " differs from run to run.",
+        help="Also measure the costs of methods in time and memory, which "
+        "differ from run to run.",
     ),
 ]
 
@@ -126,8 +134,8 @@ def with_protocol(command: Callable[..., None]) -> Callable[..., None]:
     """Gives a command the options of the protocol.
 
     Args:
-        command: has a keyword `protocol`, a `RetrievalProtocol`, in place of
-            which the options stand on the command line.
+        command: has a keyword `protocol`, a `RetrievalProtocol`, which the
+            options replace on the command line.
     """
 
     @functools.wraps(command)

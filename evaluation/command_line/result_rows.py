@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def change_rows(report: ChangeReport) -> Iterator[tuple[str, str]]:
-    """Yields names and values of what `tcr` found."""
+    """Yields names and values of the results of `tcr`."""
     change = report.change
     pair = f"{report.source} <-> {report.target}"
     yield "pair", pair
@@ -45,7 +45,7 @@ def change_rows(report: ChangeReport) -> Iterator[tuple[str, str]]:
 
 
 def recognition_rows(result: PlaceRecognition) -> Iterator[tuple[str, str]]:
-    """Yields names and values of what `pr` found."""
+    """Yields names and values of the results of `pr`."""
     from evaluation.recognition.pose_errors import (
         SUCCESS_ROTATION_DEG,
         SUCCESS_TRANSLATION,

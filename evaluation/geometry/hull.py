@@ -1,12 +1,12 @@
-"""Which points lie in the convex hull of others, however flat these are."""
+"""Points in the convex hull of others, for flat clouds as well."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-# Relative to the extent of the cloud: what counts as on the boundary, and as
-# flat. It must not be zero, or rounding puts the hull's own corners outside.
+# Tolerance of the boundary and of flatness, relative to the extent of the
+# cloud. Without it, rounding would put the hull's own corners outside.
 _TOLERANCE = 1e-9
 _CHUNK = 1 << 12
 
@@ -14,9 +14,9 @@ _CHUNK = 1 << 12
 def in_convex_hull(points: np.ndarray, vertices: np.ndarray) -> np.ndarray:
     """Returns which points lie in the convex hull, boundary included.
 
-    Clouds that span no volume have a hull all the same: a polygon in its
-    plane, a segment, a point. Coordinates are centred first, so that large
-    offsets (UTM) do not cost precision.
+    Clouds without volume have a hull as well: a polygon in its plane, a
+    segment, a point. Coordinates are centred first, so that large offsets (UTM)
+    do not cost precision.
 
     Args:
         points: (N, 3) float64.
@@ -40,7 +40,7 @@ def in_convex_hull(points: np.ndarray, vertices: np.ndarray) -> np.ndarray:
         try:
             facets = ConvexHull(hull @ axes[:rank].T).equations
         except QhullError:
-            # As flat as rounding, for Qhull.
+            # Flat up to rounding, for Qhull.
             rank -= 1
             continue
         return _in_half_spaces(inside @ axes[:rank].T, facets, tolerance) & (
@@ -72,7 +72,7 @@ def _is_flat(
     normals: np.ndarray,
     tolerance: float,
 ) -> np.ndarray:
-    """Returns which points lie in the flat that the hull spans."""
+    """Returns the points in the plane or line that the hull spans."""
     heights = hull @ normals.T
     out = points @ normals.T
     return (

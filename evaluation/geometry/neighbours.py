@@ -1,11 +1,11 @@
 """The nearest neighbours of every point of a cloud within the cloud.
 
-Faster than to ask a tree for each point anew, because points that lie
-together share the search. The cloud is cut into groups of nearby points, and
-a group finds once which others can hold neighbours of its points. And if the
-k nearest of a point lie within r, then the k nearest of another one at
-distance d lie within r + d: points taken in order of their place have the
-size of their neighbourhood before they look.
+This is faster than a tree query for each point, because nearby points share the
+search. The cloud is cut into groups of nearby points, and a group determines
+once which other groups can hold neighbours of its points. If the k nearest of a
+point are within r, then the k nearest of another one at distance d are within r
++ d. Points in order of place therefore have a bound of their neighbourhood
+before the search.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ import numpy as np
 
 from cns_drake.base.compiled import compiled
 
-# A group has so many points or more, but less than twice as many.
+# Least number of points in a group; it has less than twice as many.
 _GROUP_SIZE = 16
-# How many earlier points bound the neighbourhood of the next one.
+# Number of earlier points that bound the next one's neighbourhood.
 _MEMORY = 32
 # Bounds are widened by this factor, against rounding.
 _MARGIN = 1.0 + 1e-9
@@ -30,14 +30,17 @@ def nearest_neighbours(points: np.ndarray, k: int) -> np.ndarray:
         k: how many, at least 1.
 
     Returns:
-        (N, k) int32 indices in no particular order. Which of equally far
-        ones are taken is left open, but always the same for the same cloud.
+        (N, k) int32 indices in no particular order. The choice among equally
+        far points is not defined, but constant for a cloud.
 
     Raises:
         ValueError: if there are fewer than k points.
     """
     if len(points) < k:
-        raise ValueError(f"{k} neighbours wanted of {len(points)} points")
+        raise ValueError(
+            f"{k} neighbours are wanted, but there are only {len(points)} "
+            "points"
+        )
     cloud = np.ascontiguousarray(points.T, dtype=np.float64)
     order, starts = _group(cloud, _GROUP_SIZE)
     return _search(np.ascontiguousarray(cloud[:, order]), order, starts, k)
@@ -49,9 +52,9 @@ def _select(
 ) -> None:
     """Rearranges [start, stop) so that its k smallest keys come first.
 
-    Items move with their keys. Parts around a pivot as quicksort does, but
-    goes on with one part only; without branches that depend on the keys,
-    since they would be predicted wrongly half of the time.
+    Items move with their keys. It partitions around a pivot like quicksort, and
+    continues with one part only. It has no branches that depend on keys: half
+    of them would be mispredicted.
     """
     target = start + k - 1
     low, high = start, stop - 1
@@ -151,7 +154,7 @@ def _search(
     Returns:
         (N, k) in the caller's order and indices.
     """
-    # Apart from each other, they are indexed faster than as one array.
+    # Separate arrays are indexed faster than one array.
     x, y, z = cloud[0], cloud[1], cloud[2]
     num_points = len(x)
     num_groups = len(starts) - 1
@@ -160,7 +163,7 @@ def _search(
     # Distance of each point's k-th neighbour.
     radius = np.empty(num_points)
     near = np.empty(num_groups, np.int64)
-    # One more than the points: see how they are filled.
+    # One slot more than points, for writes that are not kept.
     squared = np.empty(num_points + 1)
     found = np.empty(num_points + 1, np.int32)
     for group in range(num_groups):
@@ -244,7 +247,8 @@ def _farthest(
 def _near_groups(
     boxes: np.ndarray, group: int, reach: float, near: np.ndarray
 ) -> int:
-    """Enters in `near` which boxes are within reach of a group's; how many."""
+    """Writes to `near` the boxes within reach of a group's; returns their
+    number."""
     count = 0
     for other in range(len(boxes)):
         gap = 0.0

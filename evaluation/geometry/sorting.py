@@ -1,4 +1,4 @@
-"""Orders of many whole numbers, found faster than by comparing them."""
+"""Fast orders of many whole numbers, without comparisons."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from cns_drake.base.compiled import compiled
 
-# Counts of so many bits stay in the cache.
+# Number of bits whose counts fit into the cache.
 _BITS = 11
 _LARGEST_NUMBER = 2**62
 

@@ -1,4 +1,4 @@
-"""A drive that is mapped while its scans are read for another purpose."""
+"""Maps a drive while its scans are read for another purpose."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from evaluation.maps.voxel_maps import (
 )
 from evaluation.sequences.sequence_view import SequenceView
 
-# Parts of a voxel's side in pictures, which show a point in each 0.5 m.
+# Divisions of a voxel's side for pictures, with a point in each 0.5 m.
 PICTURE_DIVISIONS = 10
 
 
 class MappedSequence(SequenceView):
     """A sequence whose scans enter a map as they are read for the first time.
 
-    Reading and unpacking scans takes longer than mapping them. In
-    increasing order, give or take a few, each scan is read once.
+    Reading and unpacking scans takes longer than mapping them. In nearly
+    increasing order, each scan is read only once.
     """
 
     def __init__(self, sequence: Sequence, kept: int):
@@ -31,8 +31,7 @@ class MappedSequence(SequenceView):
 
         Args:
             sequence: the drive.
-            kept: how many of the last scans stay in memory; older ones are
-                read again.
+            kept: number of latest scans in memory; older ones are read again.
         """
         super().__init__(sequence)
         self._accumulator = VoxelAccumulator(VOXEL_SIZE, PICTURE_DIVISIONS)
@@ -52,7 +51,7 @@ class MappedSequence(SequenceView):
         return self._sequence.scan(index)
 
     def finish(self, track: Track = silent) -> tuple[VoxelMap, np.ndarray]:
-        """Reads what nobody asked for.
+        """Reads the scans that have not been read yet.
 
         Args:
             track: reports progress.

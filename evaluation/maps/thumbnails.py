@@ -1,4 +1,4 @@
-"""Scans reduced to what a small picture from above shows of them."""
+"""Scans reduced to small pictures from above."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import numpy as np
 # Side of a cell [m]; 256 of them across, so that a byte counts them.
 CELL = 0.5
 _HALF_CELLS = 128
-# Height above the ground from which on points are kept [m]; below is road.
+# Least height above the ground of kept points [m]; lower ones are road.
 _LOWEST = 0.4
 # Step of the stored heights above the ground [m].
 HEIGHT_STEP = 0.1
-# Points that are kept of a scan.
+# Greatest number of kept points of a scan.
 MAX_POINTS = 2000
 
 
@@ -28,8 +28,8 @@ def thumbnail(
     Returns:
         (M, 3) uint8, M <= 2000: cells along x and along y, of which 128 is
         the first one forward or left of the sensor, and height above the
-        ground in steps of 0.1 m, at most 25.5 m. In random order, so that a
-        part from the front shows the whole scan thinner.
+        ground in steps of 0.1 m, at most 25.5 m. The order is random, so that
+        the first points show the whole scan thinned.
     """
     cells = np.floor(points[:, :2] / CELL).astype(np.int64) + _HALF_CELLS
     heights = points[:, 2] + sensor_height

@@ -1,9 +1,9 @@
 """Maps of whole sequences: the points of all scans, thinned to voxels.
 
-Voxels lie on a grid that is fixed in the world, since the place of the grid
-changes what a coarse voxel map shows: multiples of the voxel size in x and
-y, and in z from -2.5 m on, so that ground at z = 0 lies in the middle of a
-5 m voxel. A voxel is represented by the centroid of its points.
+Voxels are on a grid that is fixed in the world, since its place influences a
+coarse voxel map. The grid has multiples of the voxel size in x and y, and
+starts at z = -2.5 m, so that ground at z = 0 is in the middle of a 5 m voxel. A
+voxel is represented by the centroid of its points.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ VOXEL_SIZE = 5.0
 Z_ORIGIN = -2.5
 
 # One slot of the hash table of voxels: the number of a voxel, how many points
-# it has (0: the slot is free), and their sum relative to its corner [m]. All
-# in one record, since the time goes into fetching slots from memory.
+# it has (0: the slot is free), and their sum relative to its corner [m]. A slot
+# is one record, since most time goes into fetching slots from memory.
 _SLOT = np.dtype(
     [
         ("ix", "i4"),
@@ -36,7 +36,7 @@ _SLOT = np.dtype(
     ],
     align=True,
 )
-# Points that enter the table at once; it grows between such batches.
+# Number of points in a batch; the table grows between batches.
 _BATCH = 1 << 15
 # A table is at most this full, as a fraction (numerator, denominator).
 _LOAD = (3, 5)
@@ -51,7 +51,7 @@ class VoxelMap:
         centroids_W: (V, 3) float64 mean of each voxel's points [m].
         counts: (V,) int64 points in each voxel.
         voxel_size: length of a voxel's side [m].
-        num_ignored: points that were left out as not finite.
+        num_ignored: number of points left out as not finite.
 
     Example:
         from evaluation import map_sequence, open_sequence
@@ -75,7 +75,7 @@ class VoxelMap:
         return _corners(self.indices, self.voxel_size) + 0.5 * self.voxel_size
 
     def find(self, points_W: np.ndarray) -> np.ndarray:
-        """Returns in which voxels points (N, 3) lie [m].
+        """Returns the voxels of points (N, 3) [m].
 
         Returns:
             (N,) index into the map, -1 where its voxel is not occupied.
@@ -84,7 +84,7 @@ class VoxelMap:
             return np.full(len(points_W), -1)
         lifted = points_W - np.array([0.0, 0.0, Z_ORIGIN])
         wanted = np.floor(lifted / self.voxel_size).astype(np.int64)
-        # Both as numbers that sort like the rows of indices do.
+        # Both become numbers that sort like rows of indices.
         low, high = self.indices.min(axis=0), self.indices.max(axis=0)
         spans = (high - low).astype(np.int64) + 1
         weights = np.array([spans[1] * spans[2], spans[2], 1])
@@ -96,7 +96,7 @@ class VoxelMap:
 
 
 class VoxelAccumulator:
-    """Sums points into voxels as they come, in memory of the voxels' order.
+    """Sums points into voxels; its memory grows with the number of voxels.
 
     Sums are kept relative to each voxel's corner, so that coordinates far
     from the origin (UTM) lose nothing. The result depends only on the points
@@ -118,7 +118,7 @@ class VoxelAccumulator:
         self._divisions = divisions
         self._table = np.zeros(2 * _BATCH, dtype=_SLOT)
         self._size = 0
-        # A bit for each part of a slot's voxel: whether it has a sample.
+        # One bit for each part of a slot's voxel: whether it has a sample.
         num_bytes = (divisions**3 + 7) // 8
         self._sampled = np.zeros((len(self._table), num_bytes), dtype=np.uint8)
         self._samples = np.empty((0, 3))
@@ -185,10 +185,10 @@ class VoxelAccumulator:
         return self._samples[: self._num_samples] + lift
 
     def _reserve(self, number: int) -> None:
-        """Makes room for so many new voxels, and samples if there are any."""
+        """Makes room for new voxels, and for samples if used."""
         slots = len(self._table)
         while _LOAD[1] * (self._size + number) > _LOAD[0] * slots:
-            # Powers of two, because slots are found by masking.
+            # Sizes are powers of two, because slots are found by masking.
             slots *= 2
         if slots > len(self._table):
             table = np.zeros(slots, dtype=_SLOT)
@@ -224,7 +224,7 @@ def thin(points: np.ndarray, voxel_size: float) -> np.ndarray:
     """Returns the voxel centroids of a cloud in the frame of a sensor.
 
     Args:
-        points: (N, 3) [m]; what is not finite is left out.
+        points: (N, 3) [m]; points that are not finite are left out.
         voxel_size: length of a voxel's side [m].
 
     Returns:
@@ -270,7 +270,7 @@ def _corners(indices: np.ndarray, voxel_size: float) -> np.ndarray:
 def _find(
     table: np.ndarray, ix: np.int32, iy: np.int32, iz: np.int32
 ) -> np.int64:
-    """Returns the slot of a voxel, or the free one where it belongs."""
+    """Returns the slot of a voxel, or its free slot."""
     mask = len(table) - 1
     # Large odd factors spread neighbouring voxels; products wrap around.
     mixed = (
@@ -363,7 +363,7 @@ def _add_points(
 
 @compiled
 def _part(place: float, divisions: int) -> int:
-    """Returns in which part of a voxel's side a place is.
+    """Returns the part of a voxel's side at a place.
 
     Rounding may put a point on an end just outside: -0.1 becomes 0 as well.
     """

@@ -1,22 +1,22 @@
 """BTC, the binary and triangle combined descriptor (Yuan et al., T-RO 2024).
 
-Places that stand out from the ground (walls, trunks, posts) are keypoints;
-what heights they have points at is a binary descriptor. Triangles of nearby
+Places that stand out from the ground (walls, trunks, posts) are keypoints; the
+occupied heights above them are a binary descriptor. Triangles of nearby
 keypoints do not change when the sensor moves: clouds that share enough
-triangles, by their sides and the descriptors of their vertices, are
-candidates. A candidate counts if its triangles agree on a motion; its score
-is how well the planes of both clouds then fit together.
+triangles, by their sides and the descriptors of their vertices, are candidates.
+A candidate counts if its triangles agree on a motion; its score is the fit of
+both clouds' planes under that motion.
 
 The clouds are several consecutive scans, in the frame of the first. (The
 method's authors describe them in a common world frame, which favours it:
 the grids on which planes and keypoints are found then coincide.)
 
 Scores are those of the public program (equal for 243 single scans of two
-LiDARs and 163 submaps, each against 308 places). Two things are taken from it
-for that, which the method leaves open: the order in which planes are compared
-(`btc_voxel_order`), so that the order of a cloud's points matters; and a lean
-of keypoints where the ground leans sideways, which lowers scores there and
-which `image_axes: orthogonal` corrects.
+LiDARs and 163 submaps, each against 308 places). Two details that the method
+leaves open follow the program. One is the order in which planes are compared
+(`btc_voxel_order`), by which the order of a cloud's points matters. The other
+is a lean of keypoints on ground that leans sideways, which lowers scores there;
+`image_axes: orthogonal` corrects it.
 
 The steps are one module each: `btc_planes`, `btc_keypoints`,
 `btc_triangles` and `btc_verification`.
@@ -146,7 +146,7 @@ class BtcConfig(MethodConfig):
 
 @dataclass(frozen=True)
 class BtcDescription:
-    """What is kept of a cloud.
+    """The description of a cloud.
 
     Attributes:
         planes: patches, one a voxel.
@@ -177,8 +177,8 @@ class Btc(Method[BtcDescription, BtcDatabase]):
     """BTC; the score of a pair is the part of planes that fit.
 
     A place has no score if too few triangles match, or too few of these
-    agree on a motion, or no plane fits. The limit on the score above which
-    the public program reports a loop is left to who reads the scores.
+    agree on a motion, or no plane fits. The public program's limit on the score
+    of a loop is not applied.
     """
 
     Config = BtcConfig
@@ -187,7 +187,7 @@ class Btc(Method[BtcDescription, BtcDatabase]):
 
     def describe(self, points: np.ndarray) -> BtcDescription:
         config = self.config
-        # Compiled code is made anew for arrays in another order.
+        # Arrays in another memory order would be compiled for anew.
         points = np.ascontiguousarray(points)
         planes = voxel_planes(
             points, config.voxel_size, config.max_sparse_points, config.flatness
@@ -257,7 +257,7 @@ class Btc(Method[BtcDescription, BtcDatabase]):
     def relative_pose(
         self, query: BtcDescription, database: BtcDatabase, place: int
     ) -> np.ndarray | None:
-        """Returns the motion that the triangles agree on.
+        """Returns the common motion of the triangles.
 
         None if too few match or agree.
         """
@@ -279,7 +279,7 @@ class Btc(Method[BtcDescription, BtcDatabase]):
         database: BtcDatabase,
         max_candidates: int | None,
     ) -> Iterator[tuple[int, np.ndarray]]:
-        """Yields candidates with the motion X_PQ that their triangles say.
+        """Yields candidates with the motion X_PQ of their triangles.
 
         Args:
             max_candidates: only so many with most matches; all if None.

@@ -1,9 +1,9 @@
-"""Keypoints of a cloud: places that stand out from a plane, and how.
+"""Keypoints of a cloud: places that stand out from a plane.
 
 Part of BTC (see `evaluation.methods.btc`). Seen along the normal of the
-plane, the cloud is an image; each of its cells has bits that say at which
-heights above the plane there are points. Cells with many heights (walls,
-trunks, posts) are the keypoints, if they are not part of a line of such.
+plane, the cloud is an image; each of its cells has bits for the heights above
+the plane that have points. Cells with many heights (walls, trunks, posts) are
+the keypoints, if they are not part of a line of such.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ def height_image(
     if len(near) < _MIN_POINTS:
         empty = np.zeros((_SEGMENT, _SEGMENT), dtype=np.int64)
         return HeightImage(empty, np.full((_SEGMENT, _SEGMENT, 2), np.nan))
-    # By column: NumPy is slow in reducing along the longer axis.
+    # Column by column: NumPy reduces slowly along the longer axis.
     low = np.array([near[:, axis].min() for axis in range(2)])
     high = np.array([near[:, axis].max() for axis in range(2)])
     last = ((high - low) / resolution).astype(np.int64)
@@ -195,12 +195,12 @@ def find_keypoints(
 def suppress(keypoints: Keypoints, radius: float, max_number: int) -> Keypoints:
     """Returns keypoints with more heights than any other nearby.
 
-    Of equal ones, none stays.
+    If two are equal, neither stays.
 
     Args:
         keypoints: all.
-        radius: what is nearby [m].
-        max_number: of those, at most so many with most heights.
+        radius: of the neighbourhood [m].
+        max_number: greatest number of kept ones, those with most heights.
     """
     tree = cKDTree(keypoints.positions)
     pairs = tree.query_pairs(radius, output_type="ndarray")
@@ -218,7 +218,7 @@ def suppress(keypoints: Keypoints, radius: float, max_number: int) -> Keypoints:
 
 @compiled
 def count_bits(words: _Words) -> _Words:
-    """Returns how many bits are set in numbers from 0 to 2^62 - 1.
+    """Returns the number of set bits in numbers from 0 to 2^62 - 1.
 
     Args:
         words: an int64 or an array of them.

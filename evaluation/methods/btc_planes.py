@@ -1,4 +1,4 @@
-"""Planes in a cloud: one a voxel, and the one that lies under it all.
+"""Planes in a cloud: one a voxel, and the ground plane.
 
 Part of BTC (see `evaluation.methods.btc`).
 """
@@ -48,13 +48,13 @@ def voxel_planes(
 ) -> Planes:
     """Returns the voxels whose points lie on a plane.
 
-    They come in the order of the public program, which the order of the
-    points decides; see `evaluation.methods.btc_voxel_order`.
+    They come in the order of the public program, which depends on the order of
+    the points; see `evaluation.methods.btc_voxel_order`.
 
     Args:
         points: (N, 3) [m].
         voxel_size: side of a voxel [m].
-        max_points: a voxel with more than these is looked at.
+        max_points: only voxels with more points are used.
         flatness: upper limit of the variance along the normal [m^2].
     """
     index, numbers = _voxels(points, voxel_size)
@@ -107,8 +107,7 @@ def merge(
     """Returns the planes that alike patches form together.
 
     Args:
-        planes: of which some are alike. Which of them come together depends
-            on their order.
+        planes: some of them alike. The groups depend on their order.
         normal_limit: see `base_plane`.
         distance_limit: see `base_plane`.
         keep_single: keep also patches that are like no other.

@@ -14,16 +14,16 @@ from scipy.spatial import cKDTree
 from cns_drake.base.compiled import compiled
 from evaluation.methods.btc_keypoints import Keypoints, count_bits
 
-# Fixed in the public program: how much longer the two short sides must be
-# than the long one [m], the sides' difference at which two triangles of one
-# cloud are the same [m], and how far from a cell's center a query may be to
-# look into it [cells].
+# Fixed in the public program: how much longer the two short sides must be than
+# the long one [m], the sides' difference at which two triangles of one cloud
+# are the same [m], and the greatest distance of a query from the center of a
+# cell that is searched [cells].
 _MIN_DETOUR = 0.2
 _SAME = 0.001
 _REACH = 1.5
 
-# A similarity of exactly the limit counts, whichever way it was rounded: the
-# public program holds the limit in single precision, where 0.7 is 1e-8 less.
+# A similarity of exactly the limit counts, with either rounding: the public
+# program holds the limit in single precision, where 0.7 is 1e-8 less.
 _ROUNDING = 1e-8
 
 # Three cell numbers of 20 bits make one key.
@@ -67,7 +67,7 @@ class TriangleTable:
     Attributes:
         keys: (T,) int64, non-decreasing; the three numbers of the cell.
         triangles: T of them.
-        clouds: (T,) which cloud the triangle is of.
+        clouds: (T,) number of each triangle's cloud.
         resolution: of the sides [m].
     """
 
@@ -170,13 +170,13 @@ def match(
 
     Similar are triangles whose sides differ by little, relative to their
     length (Euclidean norms of the three), and whose vertices have about the
-    same heights: Dice similarity, mean of the three. Only cells near those
-    of the query are looked into, so that large triangles must be more alike
-    than the tolerance says.
+    same heights: Dice similarity, mean of the three. Only cells near those of
+    the query are searched, so that large triangles must be more alike than the
+    tolerance requires.
 
     Args:
         query: from one cloud.
-        table: where its triangles are looked up.
+        table: to search for its triangles.
         side_tolerance: upper limit of the sides' relative difference.
         min_similarity: lower limit of the similarity.
 

@@ -1,4 +1,4 @@
-"""Whether two clouds fit together, given triangles that they may share.
+"""Verifies that two clouds fit together, from common triangles.
 
 Part of BTC (see `evaluation.methods.btc`).
 """
@@ -47,13 +47,13 @@ def align(query: np.ndarray, place: np.ndarray) -> np.ndarray:
 
 
 def find_motion(query: np.ndarray, place: np.ndarray) -> np.ndarray | None:
-    """Returns the motion that most pairs of triangles agree on.
+    """Returns the motion with the most agreeing pairs of triangles.
 
     Every pair, or every n-th of many, proposes the motion that aligns it.
 
     Args:
         query: (M, 3, 3) vertices, M > 0.
-        place: (M, 3, 3) those of the triangles they may be.
+        place: (M, 3, 3) vertices of their partners.
 
     Returns:
         X_PQ (4, 4), the first of equally good ones; None where too few

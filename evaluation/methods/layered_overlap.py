@@ -2,12 +2,12 @@
 
 A scan becomes maps from above: one for each layer of height, one for poles
 and one for kerbs. Two scans are compared at the pose at which most of their
-filled cells coincide. What has vanished or is new only lowers this number;
-what has stayed adds up at one pose.
+filled cells coincide. Things that are gone or new only lower this number;
+unchanged things add up at one pose.
 
 The idea of a matched filter for places is that of Joseph, Fischer and
-Milford (arXiv 2409.03998), which uses one map of occupied cells; that of
-layers, poles and kerbs, and of bits instead of a Fourier transform, is ours.
+Milford (arXiv 2409.03998), which uses one map of occupied cells; layers, poles
+and kerbs, and bits instead of a Fourier transform, are our ideas.
 """
 
 from __future__ import annotations
@@ -78,13 +78,13 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
     """Layered overlap, in four searches from coarse to fine.
 
     The first three take the pose at which most bits coincide, and rank places
-    by how many standard deviations this is more than chance would have. The
-    last one climbs from there, cell by cell. The score is the weighted number
-    of the query's cells that meet one of the place or a neighbour of one,
-    over the geometric mean of how many either has.
+    by the number of standard deviations above chance. The last one climbs from
+    there, cell by cell. The score is the weighted number of the query's cells
+    that meet one of the place or a neighbour of one, over the geometric mean of
+    both scans' numbers.
 
-    What two equal counts decide, the first of them wins. All counts are
-    integers, so that scores are the same on every processor.
+    The first of equal counts wins. All counts are integers, so that scores are
+    the same on every processor.
     """
 
     Config = LayeredOverlapConfig
@@ -143,7 +143,7 @@ class LayeredOverlap(Method[LayeredScan, LayeredDatabase]):
         poses: list[np.ndarray | None] = [None] * len(scans)
         if len(query.cells) == 0 or len(scans) == 0:
             return poses
-        # Every place with every heading, as if each were alone.
+        # Every place with every heading is refined.
         every = len(scans) * NUM_HEADINGS
         some = self.build_database(scans)
         for start in self._search(query, some, every, every):

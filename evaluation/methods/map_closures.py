@@ -26,9 +26,9 @@ from cns_drake.base.errors import InputError
 from evaluation.maps.voxel_maps import thin
 from evaluation.methods.method import Method, MethodConfig, register
 
-# More than there are local maps; and the number of the first query. Those of
-# the next ones fall and stay far above those of places, since the package
-# leaves out the maps numbered just below.
+# Larger than any number of local maps, and the number of the first query. The
+# numbers of later queries fall, and stay far above those of places, since the
+# package leaves out the maps numbered just below.
 _ALL = 1 << 17
 
 
@@ -58,7 +58,7 @@ class MapClosuresDatabase:
     Attributes:
         num_places: local maps that queries may find.
         program: of the package, which keeps all of them.
-        num_queries: that have joined them.
+        num_queries: number of queries that have joined them.
         query: the last one.
         found: place -> inliers and pose X_PQ (4, 4) of the last one.
     """
@@ -94,8 +94,8 @@ class MapClosures(Method[np.ndarray, MapClosuresDatabase]):
             from map_closures import map_closures
         except ImportError as error:
             raise InputError(
-                "map-closures: not installed; pip install"
-                " 'cns-drake[map-closures]' (NumPy below 2.3) gets it"
+                "map-closures: not installed; run pip install "
+                "'cns-drake[map-closures]' (NumPy below 2.3)"
             ) from error
         settings = self.config.model_dump(exclude={"sensor_height"})
         values = package_config.MapClosuresConfig(**settings)

@@ -1,4 +1,4 @@
-"""What every place-recognition method offers, and how it is registered."""
+"""The interface of place-recognition methods, and their registry."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Database = TypeVar("Database")
 
 
 class MethodConfig(BaseModel):
-    """Parameters of a method; each default states where it comes from.
+    """Parameters of a method; each default has its source.
 
     Attributes:
         sensor_height: of the LiDAR above the ground [m]. Default: the mount
@@ -41,12 +41,12 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     Attributes:
         name: as on the command line.
         Config: type of its parameters.
-        scans_per_place: how many consecutive scans are merged, in the frame
-            of the first, into the cloud that is described.
-        point_fields: further fields of points that it wants, such as
-            intensity, ring, t or label.
-        batch_size: how many clouds `describe_batch` is handed at once.
-        rerank_best: how many of the best places a second stage, `rerank`,
+        scans_per_place: number of consecutive scans that are merged, in the
+            frame of the first, into the described cloud.
+        point_fields: further fields of points that it needs, such as intensity,
+            ring, t or label.
+        batch_size: number of clouds for a call of `describe_batch`.
+        rerank_best: number of best places that a second stage, `rerank`,
             compares by their points; 0 without one.
         config: the parameters in use.
 
@@ -78,7 +78,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         """Describes the cloud of a query."""
 
     def describe_place(self, points: np.ndarray) -> Descriptor:
-        """Describes a cloud of the database, where that differs."""
+        """Describes a cloud of the database; by default like a query."""
         return self.describe(points)
 
     def describe_batch(
@@ -100,7 +100,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
 
     @abc.abstractmethod
     def build_database(self, places: Sequence[Descriptor]) -> Database:
-        """Returns what a query is compared with: all places, indexed."""
+        """Returns the database: all places, indexed."""
 
     @abc.abstractmethod
     def score(
@@ -111,8 +111,8 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         Args:
             query: made by `describe`.
             database: of D places.
-            exhaustive: compare also with places that a search which only
-                saves time would pass over.
+            exhaustive: compare also with places that a search would skip only
+                to save time.
 
         Returns:
             (D,) float64, higher is more similar; NaN for a place that is no
@@ -129,12 +129,12 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         """Compares the last of some queries, for methods that match sequences.
 
         Args:
-            queries: of a drive, from its first to the one that asks.
+            queries: of a drive, from its first to the present one.
             database: see `score`.
             exhaustive: see `score`.
 
         Returns:
-            What `score` returns.
+            As `score`.
         """
         return self.score(queries[-1], database, exhaustive=exhaustive)
 
@@ -151,7 +151,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
         Args:
             query: cloud of the query.
             places: clouds of K places, K at most `rerank_best`.
-            scores: (K,) what `score` gave them, decreasing.
+            scores: (K,) their results of `score`, decreasing.
 
         Returns:
             (K,) float64, higher is more similar; NaN for no candidate.
@@ -180,15 +180,15 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
 
 
 _METHODS: dict[str, type[Method]] = {}
-# Methods that need a package of their own: name -> module. They are run when
-# they are named, and never by default.
+# Methods that need another package: name -> module. They run only if they are
+# named.
 _OPTIONAL = {"map-closures": "evaluation.methods.map_closures"}
 
 _MethodClass = TypeVar("_MethodClass", bound=type[Method])
 
 
 def register(name: str) -> Callable[[_MethodClass], _MethodClass]:
-    """Decorates a Method: makes it known by a name.
+    """Decorates a Method: registers it under a name.
 
     Raises:
         ValueError: if another method has that name.
@@ -203,7 +203,7 @@ def register(name: str) -> Callable[[_MethodClass], _MethodClass]:
 
     def enter(method: _MethodClass) -> _MethodClass:
         other = _METHODS.get(name, method)
-        # The same class may be defined anew, when its file is run again.
+        # The same class may be registered again, when its file runs again.
         if (other.__module__, other.__qualname__) != (
             method.__module__,
             method.__qualname__,
@@ -228,12 +228,12 @@ def known_methods() -> tuple[str, ...]:
 
 
 def optional_methods() -> tuple[str, ...]:
-    """Returns the names of those that need a package of their own."""
+    """Returns the names of the methods that need another package."""
     return tuple(sorted(_OPTIONAL))
 
 
 def shipped_methods() -> tuple[str, ...]:
-    """Returns the names of those of this package that run by default."""
+    """Returns the names of the methods that run by default."""
     package = __name__.rpartition(".")[0]
     return tuple(
         name
@@ -244,11 +244,11 @@ def shipped_methods() -> tuple[str, ...]:
 
 
 def make_method(name: str, parameters: Mapping[str, Any]) -> Method:
-    """Returns a method with these parameters, others as by default.
+    """Returns a method with these parameters; others have their defaults.
 
     Raises:
-        InputError: if the method or a parameter is not known, or a value
-            does not fit.
+        InputError: if the method or a parameter is unknown, or a value does not
+            fit.
 
     Example:
         from evaluation import make_method

@@ -19,7 +19,7 @@ from evaluation.methods.overlap_layers import GRID, NUM_LAYERS
 
 # Bits of a word.
 WORD = 64
-# One, in the unit of sines and cosines, is 2 to this power.
+# The unit of sines and cosines is 2 to minus this power.
 UNIT_BITS = 14
 
 

@@ -31,7 +31,7 @@ _FIRST_WEIGHTS = 2 ** np.array(FIRST_POWERS)
 NUM_HEADINGS = 24
 _FIRST_TURNS = turns(NUM_HEADINGS)
 _FIRST_REACH = 2
-# All within reach but the corners, which lie too far away to be a match.
+# All shifts within reach, except corners, which are too far for a match.
 _FIRST_SHIFTS = np.array(
     [
         (right, up)
@@ -115,11 +115,11 @@ def search_coarse(
     """Searches for the places and poses at which coarse maps overlap most.
 
     Args:
-        query: that asks.
+        query: the query.
         database: of the places.
-        number: of places with a heading that the second search looks at.
-        refined: of these, that the third looks at.
-        exhaustive: look at each place to the last, with its best heading.
+        number: of places with a heading in the second search.
+        refined: number of these in the third search.
+        exhaustive: keep each place to the last search, with its best heading.
 
     Returns:
         (N, 4) int64 place, heading in steps of 2.5 deg, and shifts along rows
@@ -152,7 +152,7 @@ def _search_first(
 ) -> np.ndarray:
     """Returns (N, 4) place, heading and shifts to begin the second with.
 
-    Either the best of all, or the best of each place.
+    These are the best of all, or the best of each place.
     """
     bits = _first_bits(query, _FIRST_TURNS)
     counts, shifts = best_overlaps(
@@ -171,8 +171,8 @@ def _search_first(
         of_places @ (weights**2 * of_query),
         (GRID >> _FIRST_HALVINGS) ** 2,
     )
-    # What all headings have is no sign of a place: both scans are full near
-    # their sensors. Half of it, by trials.
+    # Overlap at all headings is no sign of a place, since both scans are full
+    # near their sensors. Half of it is subtracted, by trials.
     surprise -= 0.5 * surprise.mean(axis=1, keepdims=True)
     if exhaustive:
         heading = surprise.argmax(axis=1)
@@ -239,7 +239,7 @@ def _count_halves(bits: np.ndarray) -> np.ndarray:
 def _surprise(
     counts: np.ndarray, product: np.ndarray, square: np.ndarray, cells: int
 ) -> np.ndarray:
-    """Returns how many standard deviations counts are more than by chance.
+    """Returns the number of standard deviations of counts above chance.
 
     Args:
         counts: weighted common bits.
@@ -247,14 +247,14 @@ def _surprise(
         square: likewise with weights squared.
         cells: of a map.
     """
-    # Beside a variance of one, for maps without bits.
+    # The variance is at least one, for maps without bits.
     return (counts - product / cells) / np.sqrt(square / cells + 1.0)
 
 
 def _greatest(values: np.ndarray, number: int) -> np.ndarray:
-    """Returns where some of the greatest values (N,) are, decreasing.
+    """Returns the indices of the greatest values (N,), decreasing.
 
-    Of equal ones the first: a partial sort leaves that to the processor.
+    The first of equal ones counts: a partial sort leaves that to the processor.
     """
     some = np.arange(len(values))
     if number < len(values):

@@ -1,11 +1,11 @@
-"""How many bits maps have in common, for compiled functions.
+"""Counts of common bits of maps, for compiled functions.
 
-All time of the coarse searches is spent here. Words stand in lanes, eight side
-by side, as processors take them, and are not counted one by one: adders of
-single bits first sum them up, lane by lane and column by column (Harley and
-Seal's method, in H. S. Warren, Hacker's Delight, section 5-1), which leaves a
-sixth of the counts. A compiler finds neither by itself, so that both are given
-to it in its own language.
+All time of the coarse searches is spent here. Words are in lanes, eight side by
+side, as processors take them, and are not counted one by one: adders of single
+bits first sum them up, lane by lane and column by column (Harley and Seal's
+method, in H. S. Warren, Hacker's Delight, section 5-1), which leaves a sixth of
+the counts. A compiler finds neither by itself, so that both are given to it in
+its own language.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Layers of a scan from above: which cells hold something, at what height.
+"""Layers of a scan from above: filled cells by height.
 
-Only sums, products, quotients and square roots decide in which cell a point
-counts, all of which IEEE 754 defines to the last bit: the same cells on every
-processor.
+The cell of a point follows from sums, products, quotients and square roots
+only. IEEE 754 defines these to the last bit, so that cells are the same on
+every processor.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ GRID = 256
 NUM_LAYERS = 5
 LOW, MIDDLE, HIGH, POLES, KERBS = range(NUM_LAYERS)
 
-# Above the ground: what is lower is ground, and where layers end [m].
+# Heights above the ground: limit of the ground, and ends of the layers [m].
 _LOWEST = 0.35
 _LOW_TOP = 1.5
 _MIDDLE_TOP = 4.0
-# What stands at least so high may be a pole [m].
+# Least height of a pole [m].
 _POLE_TOP = 2.0
-# Cells that a pole fills at most, of 3 x 3; around them, 7 x 7 are free.
+# Greatest number of cells of a pole, of 3 x 3; around them, 7 x 7 are free.
 _POLE_CELLS = 4
-# How far the ground may rise within a cell that has a kerb [m].
+# Range of the ground's rise within a cell with a kerb [m].
 _KERB_STEP = (0.08, 0.30)
 
 # The ground is followed outwards in so many sectors, in steps of [m].
 _SECTORS = 90
 _RING = 2.0
-# From one step to the next it rises or falls at most so much [m, 1].
+# Greatest rise or fall from one step to the next [m, 1].
 _GROUND_STEP = 0.15
 _GROUND_SLOPE = 0.2
 
@@ -158,7 +158,7 @@ def _collect(
 
 @compiled
 def _is_pole(top: np.ndarray, number: int) -> bool:
-    """Tells whether what is tall at a cell stands alone."""
+    """Returns whether a tall cell stands alone."""
     row, column = number // GRID, number % GRID
     near = 0
     for i in range(max(row - 3, 0), min(row + 4, GRID)):

@@ -145,8 +145,8 @@ def climb(
 ) -> np.ndarray:
     """Climbs to the pose at which a query overlaps a place most.
 
-    Of a pose and its 26 neighbours the best becomes the next one, until none
-    is better; then steps get smaller.
+    The best of a pose and its 26 neighbours becomes the next one, until none is
+    better; then steps get smaller.
 
     Args:
         cells: (M,) uint16 of the query.

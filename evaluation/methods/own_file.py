@@ -1,4 +1,4 @@
-"""Methods of one's own, from a Python file anywhere."""
+"""Loads a user's method from a Python file."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from typing import Any
 from cns_drake.base.errors import InputError
 from evaluation.methods.method import Method
 
-# What others call of a method, and its author may have written.
+# The methods of the interface, which the author may have written.
 _CALLED = (
     *("__init__", "describe", "describe_place", "describe_batch"),
     *("build_database", "score", "score_in_sequence", "rerank"),
@@ -26,7 +26,7 @@ _CALLED = (
 def load_method(path: Path) -> type[Method]:
     """Runs a Python file and returns the method that it defines.
 
-    Whatever is raised in it, then and later, is one line for its author.
+    Exceptions in it, then and later, become one line for its author.
 
     Args:
         path: a file with one subclass of Method of its own, registered.
@@ -92,7 +92,7 @@ def _faults(path: Path) -> Iterator[None]:
         yield
     except InputError:
         raise
-    # A file that ends the program would end it as if all were well.
+    # A SystemExit in the file would end the program without an error.
     except (Exception, SystemExit) as error:
         lines = [
             frame.lineno

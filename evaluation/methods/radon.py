@@ -21,9 +21,9 @@ def radon(image: np.ndarray, angles: np.ndarray) -> np.ndarray:
     sum counts times the distance between samples; outside of the image
     everything is zero.
 
-    So seen from a pixel at distance d from a ray, it contributes
-    hat(d / w) / w with w = max(|cos t|, |sin t|) and hat(x) = max(1 - |x|, 0).
-    Only pixels that are not zero are visited.
+    A pixel at distance d from a ray contributes hat(d / w) / w with w =
+    max(|cos t|, |sin t|) and hat(x) = max(1 - |x|, 0). Only pixels that are not
+    zero are visited.
 
     Args:
         image: (n, n, C) rows, columns, channels.

@@ -30,21 +30,21 @@ from evaluation.methods.local_features import (
 from evaluation.methods.method import Method, MethodConfig, register
 from evaluation.methods.radon import radon
 
-# Keeps the spectrum of a channel that hardly varies from being blown up when
-# it is normalised: the default of PyTorch's InstanceNorm2d, with which the
-# authors' program normalises. It takes a third of the power of the variance
-# of z, so that it is part of the method.
+# Bounds the normalised spectrum of a channel that hardly varies. It is the
+# default of PyTorch's InstanceNorm2d, which the authors' program uses. It
+# removes a third of the power of the variance of z, and is therefore part of
+# the method.
 _NORM_EPSILON = 1e-5
 # The authors' scale of the correlation, chosen to make distances of 0 to 1.
 _CORRELATION_SCALE = 0.15
-# Places that are compared with a query at once: what fits into a cache.
+# Number of places compared with a query at a time, to fit into a cache.
 _PLACES_AT_ONCE = 8
 
 
 class RingPlusPlusConfig(MethodConfig):
     """Parameters of RING++.
 
-    Source of all: the authors' program, with what it has for KITTI.
+    Source of all: the authors' program, with its settings for KITTI.
 
     Attributes:
         half_width: half the side of the square map from above [m]; 70. The
@@ -52,8 +52,8 @@ class RingPlusPlusConfig(MethodConfig):
         min_height: height above the ground from which points count [m]; 0.73
             (z > -1.0 m from a LiDAR at 1.73 m).
         max_height: height up to which they count [m]; 11.73 (z < 10 m).
-        height_unit: what a height is divided by when shape is described,
-            horizontal coordinates being divided by `half_width` [m]; 10.
+        height_unit: divisor of heights in the description of shape; horizontal
+            coordinates are divided by `half_width` [m]; 10.
         neighbours: points, itself included, that describe the shape at a
             point; 30.
         cells: rows and columns of the map from above, and angles and rays of
@@ -105,7 +105,7 @@ class RingDatabase:
     Attributes:
         places: the D descriptors.
         conjugates: (D, 6 F, F) complex64 conjugates of their spectra.
-        is_empty: (D,) bool, which of them show nothing.
+        is_empty: (D,) bool, whether a place shows nothing.
     """
 
     places: Sequence[Ring]
@@ -167,8 +167,8 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
             return np.full(num_places, np.nan)
         scores = np.empty(num_places)
         weighted = self._weigh(query)
-        # One for all: where the C library returns freed memory at once,
-        # fetching it anew would take longer than the transforms.
+        # One buffer for all: fetching freed memory anew can take longer than
+        # the transforms.
         product = np.empty((_PLACES_AT_ONCE, *weighted.shape), np.complex64)
         for start in range(0, num_places, _PLACES_AT_ONCE):
             some = slice(start, start + _PLACES_AT_ONCE)
@@ -260,7 +260,7 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
             & (np.abs(y) < config.half_width)
             & (z > ground + config.min_height)
             & (z < ground + config.max_height)
-            # What some drivers report for beams that did not return.
+            # Some drivers report this for beams without a return.
             & points.any(axis=1)
         ]
         within = _without_duplicates(within)
@@ -277,15 +277,15 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         )
         features = local_features(scaled, neighbours)
         cells = ((scaled[:, :2] + 1.0) * (0.5 * config.cells)).astype(np.int64)
-        # A limit is also reached by what rounding puts there.
+        # Rounding can put a value on the limit.
         _keep_greatest(image, np.minimum(cells, config.cells - 1), features)
         return image
 
     def _weigh(self, query: Ring) -> np.ndarray:
         """Returns the spectrum (6 F, F) whose product is correlated.
 
-        Of a sum over all frequencies, only half is stored. The scale is that
-        of the program, where the transforms are unitary.
+        Only half of a sum over all frequencies is stored. The scale is that of
+        the program, whose transforms are unitary.
         """
         n = self.config.cells
         scale = _CORRELATION_SCALE * NUM_FEATURES * n * n * math.sqrt(n)

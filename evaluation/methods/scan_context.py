@@ -2,9 +2,9 @@
 
 A scan becomes a small image of heights around the sensor: over range and
 azimuth (polar context) or along and across the road (cart context). Two
-means of the image index it: one that turning (or lane offset) leaves alone
-finds candidates in a KD-tree, the other finds by how much to shift the
-columns before two images are compared.
+means of the image index it: one is invariant to turning (or lane offset) and
+finds candidates in a KD-tree; the other gives the shift of the columns before
+two images are compared.
 
 The polar context looks different from the next lane. Its augmented form
 stores each place of the database three times: as seen, and from 2 m to
@@ -17,9 +17,9 @@ code for), and so are those of their C++ program with `variant: polar`,
 heights). Deliberate differences:
 
 - Voxels of the thinning are counted from the sensor. The T-RO program leaves
-  that to MATLAB, the C++ program to who calls it.
-- The sensor's height is a parameter, 1.6 m for CNS, instead of 1.9 or 2 m.
-- One T-RO function adds up the shifts that it tries; its corrected twin is
+that to MATLAB, the C++ program to its caller. - The sensor's height is a
+parameter, 1.6 m for CNS, instead of 1.9 or 2 m. - One T-RO function adds up the
+shifts that it tries; its corrected twin is
   followed.
 - A cell may hold more than 500 points.
 - Two scans without a column in common have no score.
@@ -58,8 +58,8 @@ class ScanContextConfig(MethodConfig):
         rings: rings of the polar context; [T], [C] 20.
         sectors: sectors of the polar context; [T], [C] 60.
         max_range: farthest range of the polar context [m]; [T], [C] 80.
-        far_points: what becomes of points farther away: they count in the
-            last ring, as in [T] (default), or are dropped, as in [C].
+        far_points: treatment of points farther away: they count in the last
+            ring, as in [T] (default), or are dropped, as in [C].
         min_points: points that a cell of the polar context needs; [T] 5,
             [C] 1.
         cart_cell: length and width of a cell of the cart context [m];
@@ -100,7 +100,7 @@ class Contexts:
 
     @property
     def retrieval_keys(self) -> np.ndarray:
-        """(K, rows) means that a shift of the columns leaves alone."""
+        """(K, rows) means that do not depend on a shift of the columns."""
         return self.images.mean(axis=2)
 
     @property
@@ -150,7 +150,7 @@ class ScanContext(Method[Contexts, ContextDatabase]):
             ):
                 images.append(self._image(prepared - [0.0, shift, 0.0]))
         if self.config.variant == "augmented-cart":
-            # As seen by a car that drives the other way.
+            # The view of a car in the opposite direction.
             images.append(self._image(prepared * [-1.0, -1.0, 1.0]))
         return Contexts(np.stack(images))
 

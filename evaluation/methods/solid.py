@@ -1,9 +1,8 @@
 """SOLiD (Kim, Choi, Sim, Kim, Park: RA-L 2024), for narrow fields of view.
 
 Points are counted over range and elevation, and over azimuth and elevation.
-Elevations weigh the more the more points they have: the weighted counts over
-range part places whichever way the sensor is turned, those over azimuth
-show how it is turned.
+An elevation's weight grows with its number of points. The weighted counts over
+range distinguish places at any heading; those over azimuth give the heading.
 """
 
 from __future__ import annotations
@@ -30,9 +29,9 @@ class SolidConfig(MethodConfig):
     Attributes:
         voxel_size: cell of the thinning before [m]; [P] 1.0. ([C] has 0.4,
             but only [P] lists LiDARs of this field of view.)
-        min_range: what is not farther is left out [m]; [P] 3.
-        max_range: what is not nearer is left out [m]; [P] 80, for a LiDAR
-            of this field of view.
+        min_range: points must be farther [m]; [P] 3.
+        max_range: points must be nearer [m]; [P] 80, for a LiDAR of this field
+            of view.
         ranges: cells of equal length up to `max_range`; [P], [C] 40.
         azimuths: cells of equal angle; [P], [C] 60.
         elevations: cells of equal angle over the field of view; [P], [C]
@@ -108,7 +107,7 @@ class SolidMethod(Method[Solid, SolidDatabase]):
         config = self.config
         x, y, z = self._prepare(points).T
         r = np.hypot(x, y)
-        # A limit is also reached by what rounding puts there.
+        # Rounding can put a value on the limit.
         range_cell = np.minimum(
             (r * (config.ranges / config.max_range)).astype(np.int64),
             config.ranges - 1,

@@ -1,8 +1,8 @@
 """The paper "The City that Never Settles" beside the cities made after it.
 
-Its values, which drives ask which, its claims, and how near the shipped cities
-come to it. Commands hand `reference_for` their maps; nothing else of the
-evaluation needs this package.
+It has the paper's values, pairs of drives and claims, and judges the shipped
+cities by them. Commands pass their maps to `reference_for`; the rest of the
+evaluation does not need this package.
 """
 
 from evaluation.paper.paper_reference import reference_for

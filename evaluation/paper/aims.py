@@ -1,7 +1,7 @@
-"""How near the numbers come to the paper's, beside what was aimed at.
+"""Compares our numbers with the paper's, by the aims.
 
-The aims are those that the shipped cities were fitted and judged by. Fitted
-to the paper were TCR_sym and SOLiD's AUC; the rest was held out.
+The shipped cities were fitted and judged by these aims. TCR_sym and SOLiD's AUC
+were fitted to the paper; the rest was held out.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _WHY_DIFFERENT = (
 def aims(
     results: Sequence[RecognitionResult], changes: Sequence[ChangeResult]
 ) -> list[Finding]:
-    """Judges each aim; none unless all pairs of the paper are there.
+    """Judges each aim, if all pairs of the paper are there.
 
     RING++ is counted on queries with a match, the others on all, as the paper
     seems to have done.

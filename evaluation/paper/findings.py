@@ -1,4 +1,4 @@
-"""Which of the paper's findings our numbers bear out."""
+"""Judges the paper's findings by our numbers."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ UNDECIDED = "cannot be judged"
 
 @dataclass(frozen=True)
 class Trend:
-    """How AUC goes with TCR_sym over some pairs.
+    """The trend of AUC over TCR_sym of some pairs.
 
     Attributes:
         rho: Spearman's rank correlation; NaN if either does not vary.
@@ -54,7 +54,7 @@ class Trend:
 def findings(
     results: Sequence[RecognitionResult], changes: Sequence[ChangeResult]
 ) -> list[Finding]:
-    """Judges the paper's findings; those of which nothing is known left out.
+    """Judges the paper's findings; findings without data are left out.
 
     Only the paper's maps and methods are judged by them, and only by its
     protocol.
@@ -81,7 +81,7 @@ def findings(
 
 
 def trend(change: Sequence[float], auc: Sequence[float]) -> Trend:
-    """Returns how AUC goes with TCR_sym; three pairs or more."""
+    """Returns the trend of AUC over TCR_sym, of three pairs or more."""
     x, y = np.asarray(change), np.asarray(auc)
     spread = float(np.ptp(y))
     if np.ptp(x) == 0.0 or spread == 0.0:
@@ -178,7 +178,7 @@ def _falls(
         " says it does not)."
     )
     trends = _trends(results, tcr, methods)
-    # One way to say it for all; BTC is excepted by the paper itself.
+    # One wording for all; the paper itself makes an exception of BTC.
     judged = {m: t for m, t in trends.items() if m != "btc"}
     if not judged:
         return Finding(claim, UNDECIDED, _too_few(results))

@@ -1,4 +1,4 @@
-"""The paper as what a report stands beside."""
+"""The paper as the reference of a report."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from evaluation.report.reference import (
 
 
 def reference_for(map_names: Iterable[str]) -> Reference:
-    """Returns the paper if one of the maps is of it, else no reference."""
+    """Returns the paper if one of the maps is from it, else no reference."""
     if printed.city_names().isdisjoint(map_names):
         return NO_REFERENCE
     return PaperReference()
 
 
 class PaperReference(Reference):
-    """What the paper prints, and what it claims."""
+    """The paper's values and claims."""
 
     title = "the paper “The City that Never Settles”"
     counting = (

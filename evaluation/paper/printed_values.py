@@ -2,9 +2,9 @@
 
 Two misprints are corrected, each with a note in its row: Table I gives
 Downtown 01-04 the value of 02-04, and one R@1 of RING++ on Riverside 02->01
-contradicts the F1 beside it. Which mode of `recognition.metrics` a method was
-evaluated in is not said; it is inferred from the relation between R@1, F1 and
-AUC in all its rows.
+contradicts the F1 beside it. The paper does not state the mode of
+`recognition.metrics` of a method. The mode is inferred from the relation
+between R@1, F1 and AUC in all its rows.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def is_protocol(method: str, protocol: RetrievalProtocol) -> bool:
 
     Args:
         method: its name.
-        protocol: that it ran by, its number of scans included.
+        protocol: of the run, its number of scans included.
     """
     scans = 10 if method == "btc" else 1
     asked = replace(protocol, exclude_recent=None)

@@ -1,1 +1,1 @@
-"""Place recognition: queries, places, scores and what is counted."""
+"""Place recognition: queries, places, scores and metrics."""

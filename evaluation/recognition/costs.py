@@ -1,4 +1,4 @@
-"""What a method costs: time to describe and to ask, and room for a place."""
+"""Costs of a method: time to describe and to query, and memory for a place."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ class Cost:
 
     Attributes:
         method: its name.
-        scans_per_place: how many scans were merged into a cloud.
-        points: in a cloud, in the mean.
+        scans_per_place: number of scans merged into a cloud.
+        points: mean number in a cloud.
         describe_ms: to describe a cloud, as a query [ms].
         query_ms: to compare a query with all places, a second stage, the gate
             and the pose of the best place included [ms].
-        places: how many these are.
+        places: their number.
         place_bytes: of a place's description, pickled, in the mean.
     """
 
@@ -54,11 +54,11 @@ def measure_cost(
 
     Args:
         method: to measure.
-        clouds: to describe, two or more; the first is not counted, since
-            what runs for the first time is loaded or compiled.
-        scans_per_place: that were merged into each.
+        clouds: to describe, two or more; the first is not counted, since it
+            includes loading and compiling.
+        scans_per_place: number of merged scans.
         database: with places.
-        query: with queries, of which as many are asked as there are clouds.
+        query: with queries, of which as many are used as there are clouds.
         gate_radius: see `score_places`.
     """
     describing = [_cpu_ms(method.describe, cloud) for cloud in clouds]
@@ -95,7 +95,7 @@ def measure_cost(
 
 
 def _cpu_ms(function: Callable[[Any], object], argument: object) -> float:
-    """Returns the time of the processor that a call takes [ms]."""
+    """Returns the processor time of a call [ms]."""
     start = process_time_ns()
     function(argument)
     return (process_time_ns() - start) * 1e-6

@@ -1,4 +1,4 @@
-"""What methods keep of a drive: descriptions of its places and queries."""
+"""Descriptions of a drive's places and queries, by methods."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from evaluation.recognition.protocol import (
 )
 from evaluation.sequences.sampling import gather, sample_frames
 
-# What a drive is described for.
+# The role of a drive.
 Role = Literal["places", "queries"]
 
 
 @dataclass(frozen=True)
 class DescribedScans:
-    """Where a drive has places, or asks, and what a method keeps of these.
+    """Places or queries of a drive, with a method's descriptions.
 
     Attributes:
         frames: (K,) of the drive.
         stamps_ns: (K,) int64.
         X_WS: (K, 4, 4) poses of the sensor.
-        descriptors: K; none if the drive does not serve as this.
+        descriptors: K; none if the drive does not have this role.
         clouds: K clouds that were described, for methods with a second
             stage; else none.
     """
@@ -49,12 +49,12 @@ class DescribedScans:
 
 @dataclass(frozen=True)
 class DescribedDrive:
-    """What a method keeps of a drive.
+    """A method's descriptions of a drive.
 
     Attributes:
         name: of the drive.
         places: for queries to find.
-        queries: that ask.
+        queries: of the drive.
     """
 
     name: str
@@ -72,31 +72,31 @@ def describe_drive(
 ) -> list[DescribedDrive]:
     """Describes the places and queries of a drive, each cloud once.
 
-    Where a frame is both, a method that describes both alike does so once.
-    Clouds are shared between methods.
+    If a frame is both, a method that describes both alike does so once. Clouds
+    are shared between methods.
 
     Args:
         sequence: the drive.
-        methods: that describe it.
-        roles: what it serves as.
-        protocol: where it has places and queries, and what their clouds are.
+        methods: to run.
+        roles: of the drive.
+        protocol: for the frames of places and queries, and their clouds.
         track: reports progress.
-        visit: is also shown each described frame and its single scan (N, 3),
+        visit: also receives each described frame and its single scan (N, 3),
             cropped, in the frame of the sensor.
 
     Returns:
-        What each method made of it.
+        The descriptions by each method.
 
     Raises:
         InputError: if the sequence cannot be read, it lacks a field that a
-            method wants, or no described cloud has a point within range.
+            method needs, or no described cloud has a point within range.
     """
     describing = [
         _Describing(method, sequence, roles, protocol) for method in methods
     ]
     frames = {role: _frames(sequence, role, protocol) for role in roles}
     wanted = np.unique(np.concatenate([*frames.values()])).tolist()
-    # How many scans a cloud merges, and fields of its points.
+    # Number of merged scans of a cloud, and fields of its points.
     kinds = {one.kind for one in describing}
     single: tuple[int, tuple[str, ...]] = (1, ())
     if visit is not None:

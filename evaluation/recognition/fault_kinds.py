@@ -1,4 +1,4 @@
-"""Why the best place of a query is wrong, from what both drives saw there."""
+"""Reasons for a wrong best place, from the scans of both drives."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from evaluation.recognition.recognition_result import RecognitionResult
 
-# In the order in which they are asked; each wrong answer has the first.
+# The kinds in order of precedence; each wrong answer has the first that fits.
 FAULT_KINDS = (
     "no_place",
     "no_candidate",
@@ -20,34 +20,32 @@ FAULT_KINDS = (
     "twin",
     "elsewhere",
 )
-# Up to so many radii a place is just too far away, and not another one.
+# Up to this number of radii, a place is only too far away, and not elsewhere.
 NEARLY = 2.0
-# A scan shows enough of another one, as truth by overlap has it.
+# Least overlap of two scans, as in truth by overlap.
 _ENOUGH = 0.5
-# Part of what stands around that has come or gone.
+# Part of the surroundings that has come or gone.
 MUCH_CHANGED = 0.25
 
 
 @dataclass(frozen=True)
 class PairEvidence:
-    """What the scans of Q queries and of places say about each other.
+    """Comparisons of the scans of Q queries and of places.
 
     The right place of a query is the match that shows most of its scan.
 
     Attributes:
         overlaps: (Q,) part of the query's scan that the right place shows;
             NaN without a match.
-        hidden: (Q,) part of it that lies behind what the right place's
-            sensor sees; likewise.
-        changed: (Q,) part of the standing points of both scans that lie on
-            a structure of which the other one shows nothing, although
-            nothing hides them; NaN also where a recording does not name its
-            structures.
-        changed_classes: Q classes that most of these points have; "" where
-            there are none.
-        right_fits: (Q,) part of the standing points of the query and its
-            right place that coincide when the two scans are laid on each
-            other as well as can be; NaN where no method is wrong.
+        hidden: (Q,) part of it that is hidden from the right place's sensor;
+            likewise.
+        changed: (Q,) part of the standing points of both scans on a structure
+            that the other scan lacks without being hidden; NaN also if a
+            recording does not name its structures.
+        changed_classes: Q classes of most of these points; "" without any.
+        right_fits: (Q,) part of the standing points of the query and its right
+            place that coincide at the best alignment of the two scans; NaN if
+            no method is wrong.
         fits: method -> (Q,) the same of the query and the wrong best place;
             NaN where that is right or just too far.
     """
@@ -61,7 +59,7 @@ class PairEvidence:
 
 
 def fault_kinds(result: RecognitionResult, evidence: PairEvidence) -> list[str]:
-    """Returns what is wrong with the best place of each query.
+    """Returns the reason for each query's wrong best place.
 
     Args:
         result: of a method on a pair.
@@ -71,11 +69,10 @@ def fault_kinds(result: RecognitionResult, evidence: PairEvidence) -> list[str]:
         Q of: "" if it is right; `no_place` if the query has no match;
         `no_candidate` if the method has no place, or rejects all; `too_far`
         if it is within two radii; `hidden` if less than half of the query's
-        scan is seen from the right place, and most of the rest is behind
-        something there; `no_overlap` if it is less than half for another
-        reason; `changed` if a quarter of what stands around has come or gone;
-        `twin` if it fits on the query as well as the right place does;
-        `elsewhere`.
+        scan is visible from the right place, and most of the rest is hidden
+        there; `no_overlap` if it is less than half for another reason;
+        `changed` if a quarter of the surroundings has come or gone; `twin` if
+        it fits the query as well as the right place does; else `elsewhere`.
     """
     outcome = result.outcome
     retrieval = outcome.retrieval

@@ -1,13 +1,13 @@
 """The gate of the protocol: places that a method's own pose puts too far away.
 
-A method that estimates how the query lies to a place thereby says how far
-apart the two are. With the gate, that distance is compared with the radius of
-a match. The same rule serves every method; no method uses the radius.
+A method that estimates the query's pose relative to a place also gives their
+distance. The gate compares that distance with the radius of a match. The same
+rule serves every method; no method uses the radius.
 
 The gate looks at the `NUM_GATED` places with the best scores. A score counts
 in full up to a distance of `1 - SOFTNESS` radii, falls linearly, and the place
-is rejected from `1 + SOFTNESS` radii on. Poses are wrong by some decimetres,
-so that a hard limit would accept and reject by chance.
+is rejected from `1 + SOFTNESS` radii on. Poses have errors of some decimetres,
+and a hard limit would accept and reject by chance.
 """
 
 from __future__ import annotations
@@ -54,14 +54,14 @@ def gated(
     score, and a negative score falls likewise.
 
     Args:
-        method: that made the scores.
+        method: of the scores.
         query: its description of the query.
-        database: that it built of the D places.
+        database: its database of the D places.
         scores: (D,) of the method; NaN for a place that is no candidate.
         radius: of a match [m].
 
     Raises:
-        InputError: if the method returns what are no poses.
+        InputError: if the method returns something other than poses.
     """
     num_candidates = int((~np.isnan(scores)).sum())
     order = ranking(scores)

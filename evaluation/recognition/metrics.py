@@ -33,7 +33,7 @@ _CONFIDENCE = 0.95
 
 @dataclass(frozen=True)
 class QueryOutcomes:
-    """What became of each of Q queries.
+    """The outcomes of Q queries.
 
     Attributes:
         best_scores: (Q,) score of the best place; NaN without a candidate.
@@ -82,7 +82,8 @@ class QueryOutcomes:
 
     @property
     def match_auroc(self) -> float:
-        """How well the best score separates queries with a match from others.
+        """The power of the best score to separate queries with a match from
+        others.
 
         The area under the receiver operating characteristic: the chance that
         a query with a match has a higher best score than one without; equal
@@ -129,14 +130,14 @@ class PrCurve:
 
     @property
     def precision(self) -> np.ndarray:
-        """(K,); something is accepted at every threshold."""
+        """(K,); every threshold accepts at least one query."""
         return self.true_positives / (
             self.true_positives + self.false_positives
         )
 
     @property
     def recall(self) -> np.ndarray:
-        """(K,); 0 where nothing is left to be recalled."""
+        """(K,); 0 if there is nothing to recall."""
         return _recall(self.true_positives, self.false_negatives)
 
     @property
@@ -160,7 +161,7 @@ class PrCurve:
 
     @property
     def recall_at_full_precision(self) -> float:
-        """Greatest recall at which nothing accepted is false; 0 if none."""
+        """Greatest recall without a false positive; 0 if none."""
         return float(self.recall[self.false_positives == 0].max(initial=0.0))
 
 
@@ -177,7 +178,7 @@ class PlaceRecognitionMetrics:
     """The numbers of one pair of drives and one method.
 
     Attributes:
-        mode: which queries the curve counts.
+        mode: the queries that the curve counts.
         curve: the exact precision-recall curve.
         auc: area under it.
         f1_max: greatest F1 on it; 0 if nothing is accepted.
@@ -216,18 +217,17 @@ class PlaceRecognitionMetrics:
 
 
 def judge(scores: np.ndarray, matches: np.ndarray) -> QueryOutcomes:
-    """Reduces the scores of all pairs to what became of each query.
+    """Reduces the scores of all pairs to the outcome of each query.
 
-    Of two places with equal scores the one that comes first in the database
-    is the better.
+    If two places have equal scores, the first one in the database is better.
 
     Args:
         scores: (Q, D), higher is more similar; NaN is no candidate.
         matches: (Q, D) bool, the truth.
 
     Raises:
-        ValueError: scores are complex or masked, or no numbers, or the shapes
-            of the two differ.
+        ValueError: scores are complex, masked or not numbers, or the two shapes
+            differ.
 
     Example:
         from evaluation import judge, retrieve
@@ -249,7 +249,8 @@ def judge(scores: np.ndarray, matches: np.ndarray) -> QueryOutcomes:
     num_queries, num_places = scores.shape
     first_right = np.full(num_queries, np.inf)
     best_scores = np.full(num_queries, np.nan)
-    # Row by row: of long drives, one array more of all pairs fills a memory.
+    # Row by row: another array of all pairs of long drives could fill the
+    # memory.
     for query, (row, is_match) in enumerate(zip(scores, matches, strict=True)):
         candidates = np.flatnonzero(~np.isnan(row))
         if len(candidates) == 0:
@@ -278,7 +279,7 @@ def evaluate(
 
     Args:
         outcomes: of the queries.
-        mode: which of them the precision-recall curve counts.
+        mode: selects the queries of the precision-recall curve.
         seed: of the bootstrap.
 
     Example:
@@ -380,8 +381,8 @@ def resampled_metrics(
         weights: (B, Q) how often each does in each sample.
     """
     _, tp, fp, fn = _curves(outcomes, weights)
-    # Before the first query that a sample holds, nothing is accepted; there
-    # the curve keeps the precision of its first point.
+    # Nothing is accepted before a sample's first query; there the curve keeps
+    # the precision of its first point.
     with np.errstate(invalid="ignore"):
         precision = tp / (tp + fp)
     areas = _area(_filled_from_right(precision), _recall(tp, fn))
@@ -393,7 +394,7 @@ def resampled_metrics(
 
 
 def percentile_interval(samples: np.ndarray) -> Interval:
-    """Returns what holds 95 % of samples; those that are NaN do not count."""
+    """Returns the interval of 95 % of the samples; NaN do not count."""
     known = samples[~np.isnan(samples)]
     if len(known) == 0:
         return Interval(math.nan, math.nan)
@@ -423,7 +424,7 @@ def _area(precision: np.ndarray, recall: np.ndarray) -> np.ndarray:
 
 
 def _recall(tp: np.ndarray, fn: np.ndarray) -> np.ndarray:
-    """Returns TP / (TP + FN), 0 where nothing is left to be recalled."""
+    """Returns TP / (TP + FN), 0 if there is nothing to recall."""
     return tp / np.maximum(tp + fn, 1)
 
 

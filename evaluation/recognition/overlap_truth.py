@@ -1,9 +1,9 @@
-"""Truth by overlap: what a place's scan shows of what a query's shows.
+"""Truth by overlap: the part of a query's scan that a place's scan shows.
 
 Poses are exact. A point of the query's scan is shown by the place's scan if it
 lies on a surface that the latter shows, see `seen_surfaces`. The overlap is
-the part of the query's points that are shown. What the place's sensor cannot
-see, and what is not there when it passes, does not count.
+the part of the query's points that are shown. Parts that are hidden from the
+place's sensor, or absent when it passes, do not count.
 
 The idea is that of OverlapNet (Chen et al., RSS 2020), which compares range
 images pixel by pixel.
@@ -21,7 +21,7 @@ from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.seen_surfaces import TOLERANCE, SeenSurfaces
 from evaluation.sequences.sampling import gather, sample_frames
 
-# Of the points of a query's scan so many are looked up.
+# Number of points of a query's scan that are looked up.
 _NUM_POINTS = 8192
 
 
@@ -33,13 +33,13 @@ def overlap_matrix(
 ) -> np.ndarray:
     """Returns the overlap of every query with every place, (Q, D) float64.
 
-    Of single scans, whatever number of them methods merge. NaN for a query
+    Single scans are compared, even if methods merge several. NaN for a query
     without a point.
 
     Args:
-        database: the drive whose places are known.
-        query: the drive that asks, in the same world frame.
-        protocol: says where queries and places are.
+        database: the drive of the places.
+        query: the drive of the queries, in the same world frame.
+        protocol: for the frames of queries and places.
         track: reports progress.
 
     Raises:
@@ -68,7 +68,7 @@ def overlap_matrix(
         reach = np.linalg.norm(points, axis=1).max()
         apart = np.linalg.norm(X_WPs[:, :3, 3] - X_WQ[:3, 3], axis=1)
         p_W = sampled(points) @ X_WQ[:3, :3].T + X_WQ[:3, 3]
-        # Farther apart, no point of one is within reach of the other.
+        # Scans farther apart have no common points.
         for place in np.flatnonzero(apart <= reach + reaches + TOLERANCE):
             X_WP = X_WPs[place]
             p_P = (p_W - X_WP[:3, 3]) @ X_WP[:3, :3]
@@ -83,7 +83,7 @@ def best_overlaps(
     X_WQs: np.ndarray,
     matches: np.ndarray,
 ) -> np.ndarray:
-    """Returns how much of each query the best of its matches shows, (Q,).
+    """Returns the part of each query's scan that its best match shows, (Q,).
 
     Args:
         place_scans: D scans (N, 3), each in the frame of its sensor.

@@ -28,7 +28,7 @@ from evaluation.recognition.protocol import (
 )
 from evaluation.recognition.retrieval import Retrieval, retrieve
 
-# At which AUC is given besides that of the protocol [m].
+# Radii of a match for further values of AUC [m].
 RADII = (2.5, 5.0, 7.5, 10.0, 15.0, 20.0, 25.0)
 
 
@@ -38,14 +38,14 @@ class PlaceRecognition:
 
     Attributes:
         method: its name.
-        parameters: all that it ran with.
-        database: name of the drive whose places are known.
-        query: name of the drive that asks.
+        parameters: all its parameters.
+        database: name of the drive of the places.
+        query: name of the drive of the queries.
         retrieval: scores and truth of all pairs.
-        outcomes: what became of each query.
+        outcomes: of the queries.
         metrics: the numbers.
-        pose: how good the poses are that come with the places.
-        protocol: that it ran by; nothing in it is left to the method.
+        pose: errors of the estimated poses.
+        protocol: of the run, without open choices.
     """
 
     method: str
@@ -63,7 +63,7 @@ class PlaceRecognition:
         return replace(self, metrics=evaluate(self.outcomes, mode))
 
     def auc_over_radius(self) -> dict[float, float]:
-        """Returns radius of a match [m] -> AUC (mode all) if it were that.
+        """Returns radius of a match [m] -> AUC (mode all) with that radius.
 
         NaN where no query has a match.
         """
@@ -186,7 +186,7 @@ def judge_retrieval(
     protocol: RetrievalProtocol,
     mode: Mode = "all",
 ) -> PlaceRecognition:
-    """Returns the numbers of what a method retrieved.
+    """Returns the numbers of a method's retrieval.
 
     Args:
         method: that made the scores.

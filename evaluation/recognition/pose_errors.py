@@ -1,4 +1,4 @@
-"""How wrong the relative poses are that a method finds with a place."""
+"""Errors of the relative poses that a method estimates with a place."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from evaluation.recognition.metrics import (
     QueryOutcomes,
 )
 
-# A query is localised if its pose is no more wrong than this.
+# Greatest errors of a localised query's pose.
 SUCCESS_TRANSLATION = 2.0
 SUCCESS_ROTATION_DEG = 5.0
 
@@ -35,26 +35,26 @@ class PoseErrors:
 
     @classmethod
     def unknown(cls, num_queries: int) -> PoseErrors:
-        """Returns those of a method that estimates no pose."""
+        """Returns the errors for a method that estimates no pose."""
         return cls(np.full(num_queries, np.nan), np.full(num_queries, np.nan))
 
 
 @dataclass(frozen=True)
 class PoseMetrics:
-    """How good the poses of one method on one pair of drives are.
+    """Quality of the poses of one method on one pair of drives.
 
     The errors are those of the accepted matches: queries whose best place is
     a match, and whose score reaches the threshold of the greatest F1 (mode
     all).
 
     Attributes:
-        num_accepted: how many these are.
+        num_accepted: number of accepted matches.
         translation_median, translation_90: median and 90 % quantile [m]; NaN
             without an accepted match that has a pose.
         rotation_median_deg, rotation_90_deg: likewise [deg].
-        success: part of the queries with a match whose pose in the world is
-            wrong by at most 2 m and 5 deg, whatever the score; NaN if the
-            method estimates no pose or no query has a match.
+        success: part of the queries with a match whose pose in the world has
+            errors of at most 2 m and 5 deg, at any score; NaN if the method
+            estimates no pose or no query has a match.
     """
 
     num_accepted: int
@@ -68,7 +68,7 @@ class PoseMetrics:
 def pose_error(
     X_PQ: np.ndarray, X_WP: np.ndarray, X_WQ: np.ndarray
 ) -> tuple[float, float]:
-    """Returns how wrong a pose is, in metres and in degrees.
+    """Returns the errors of a pose, in metres and in degrees.
 
     Args:
         X_PQ: (4, 4) the query's sensor in that of the place, as estimated.
@@ -84,7 +84,7 @@ def pose_error(
 
 
 def checked_pose(method: Method, X_PQ: object) -> np.ndarray | None:
-    """Returns what `relative_pose` returned, if it is a pose or None.
+    """Checks that a result of `relative_pose` is a pose or None.
 
     Raises:
         InputError: if it is not.
@@ -109,7 +109,7 @@ def pose_metrics(
     outcomes: QueryOutcomes,
     metrics: PlaceRecognitionMetrics,
 ) -> PoseMetrics:
-    """Sums errors up.
+    """Summarises errors.
 
     Args:
         errors: of the queries.
@@ -123,7 +123,7 @@ def pose_metrics(
         accepted = outcomes.is_right & (outcomes.best_scores >= least)
     known = ~np.isnan(errors.translation)
     success = math.nan
-    # A method that finds no place at all localises nothing.
+    # A method without any places localises no query.
     estimates = known.any() or np.isnan(outcomes.best_scores).all()
     if estimates and outcomes.has_match.any():
         is_near = (errors.translation <= SUCCESS_TRANSLATION) & (

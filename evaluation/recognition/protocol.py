@@ -1,4 +1,4 @@
-"""What is asked of place recognition, and what counts as found."""
+"""The protocol of place recognition: queries, places and matches."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RetrievalProtocol:
-    """How a drive asks another; by default as the paper has it.
+    """The protocol of a comparison of two drives; by default the paper's.
 
     Attributes:
         radius: within which a place is a match of a query, limit included
@@ -23,11 +23,10 @@ class RetrievalProtocol:
         place_spacing: likewise between two places of the database [m].
         max_range: points farther along x, y or z of the sensor's frame are
             left out [m].
-        scans_per_place: how many consecutive scans are merged into the cloud
-            that is described; None for what each method asks for.
-        exclude_recent: of a drive that is asked about itself: only places
-            that it passed at least so long before are known [s]. None for
-            drives that ask others.
+        scans_per_place: number of consecutive scans that are merged into the
+            described cloud; None for each method's own number.
+        exclude_recent: for a drive against itself: only places that it passed
+            at least this long before count [s]. None for two drives.
         overlap: a place is a match, wherever it is, whose scan shows at least
             this part of what the query's shows (see `overlap_truth`), up to
             1; None for matches by the radius.
@@ -62,7 +61,7 @@ class RetrievalProtocol:
                 raise InputError(f"--{option}: {value} is not positive")
 
     def scans(self, method: Method) -> int:
-        """Returns how many scans a place of a method consists of."""
+        """Returns the number of scans of a method's place."""
         if self.scans_per_place is not None:
             return self.scans_per_place
         return method.scans_per_place
@@ -73,11 +72,11 @@ class RetrievalProtocol:
         return self.radius if self.gate else None
 
     def of(self, method: Method) -> RetrievalProtocol:
-        """Returns what a method runs with: nothing is left to it."""
+        """Returns the protocol of a method's run, without open choices."""
         return replace(self, scans_per_place=self.scans(method))
 
     def described(self) -> dict[str, float | int | None]:
-        """Returns what the descriptions of a drive depend on."""
+        """Returns the options that the descriptions of a drive depend on."""
         values = asdict(self)
         for name in ("radius", "exclude_recent", "overlap", "gate"):
             del values[name]
@@ -111,7 +110,7 @@ class RetrievalProtocol:
         return text
 
 
-# What the gate does, for those who read a table.
+# The gate in words, for readers of a table.
 GATE_TEXT = (
     "With the gate: each method's own pose says how far a place is from the"
     " query, and places beyond the radius are rejected."
@@ -120,8 +119,8 @@ GATE_TEXT = (
 # The defaults, which are the paper's.
 PAPER_PROTOCOL = RetrievalProtocol()
 
-# Columns of a table of results: the options that they were found with. No
-# table is of matches by overlap.
+# Columns of a table of results: the options of the protocol. No table has
+# matches by overlap.
 PROTOCOL_COLUMNS = tuple(
     one.name for one in fields(RetrievalProtocol) if one.name != "overlap"
 )

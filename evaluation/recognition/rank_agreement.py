@@ -1,4 +1,5 @@
-"""Whether methods rank alike on two sets of drives, such as simulated and real.
+"""Agreement of the ranking of methods on two sets of drives, such as simulated
+and real ones.
 
 The measure is Kendall's tau-b (Kendall, Biometrika 33, 1945): 1 if every two
 methods are in the same order on both, -1 if in the opposite one.
@@ -27,16 +28,16 @@ from evaluation.recognition.metrics import (
 )
 
 _NEEDED = ("map", "db", "query", "method", "correct", "has_match", "score")
-# Those of a table of queries that name what a method is run on.
+# Columns of a table of queries that name the pair of drives.
 _KEYS = ("map", "db", "query", "cause", "level", "radius_told", "seed", "gate")
 
-# Pair of drives -> method -> what became of its queries.
+# Pair of drives -> method -> outcomes of its queries.
 Answers = Mapping[tuple[str, ...], Mapping[str, QueryOutcomes]]
 
 
 @dataclass(frozen=True)
 class RankAgreement:
-    """How alike methods rank.
+    """The agreement of two rankings of methods.
 
     Attributes:
         methods: M that answered on all pairs of both sets.
@@ -88,7 +89,7 @@ def rank_agreement(first: Path, second: Path, seed: int = 0) -> RankAgreement:
             f"{first}, {second}: fewer than two methods answered on all pairs"
             f" of both ({', '.join(methods) or 'none'})"
         )
-    # What is drawn of one pair does not depend on what is drawn of others.
+    # The draws of one pair do not depend on those of other pairs.
     rng = np.random.default_rng(seed)
     one, one_samples = _areas(answers[0], methods, rng)
     other, other_samples = _areas(answers[1], methods, rng)
@@ -105,14 +106,13 @@ def rank_agreement(first: Path, second: Path, seed: int = 0) -> RankAgreement:
 
 
 def read_answers(path: Path) -> Answers:
-    """Returns what became of each query, by pair of drives and method.
+    """Returns the outcome of each query, by pair of drives and method.
 
     Args:
         path: `queries.csv`, or the folder that holds it.
 
     Raises:
-        InputError: it cannot be read, has no query, or a value is not what it
-            should be.
+        InputError: it cannot be read, has no query, or has an invalid value.
     """
     file = path / "queries.csv" if path.is_dir() else path
     groups: dict[tuple[str, ...], dict[str, list[tuple[float, ...]]]] = {}

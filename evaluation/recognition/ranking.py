@@ -8,9 +8,9 @@ import numpy as np
 def ranking(scores: np.ndarray) -> np.ndarray:
     """Returns places from the best to the worst.
 
-    Of places with equal scores the one that comes first in the database is
-    the better. Places that are no candidates come last, behind those with a
-    score of minus infinity.
+    If places have equal scores, the first one in the database is better. Places
+    that are no candidates come last, behind those with a score of minus
+    infinity.
 
     Args:
         scores: (..., D), higher is more similar; NaN is no candidate.

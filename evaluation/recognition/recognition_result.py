@@ -1,4 +1,4 @@
-"""What a method made of a pair of stages, as a study keeps it."""
+"""The result of a method on a pair of stages, as a study keeps it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Place recognition between two drives: what is asked, and what is right.
+"""Place recognition between two drives: scores and truth.
 
 Distances between query and database are between the positions of the sensor,
 in three dimensions.
@@ -43,11 +43,11 @@ class Retrieval:
         scores: (Q, D) float64, higher is more similar, NaN for a place that
             the method does not consider.
         distances: (Q, D) float64 between the sensor positions [m].
-        matches: (Q, D) bool, which place is a true match of which query.
+        matches: (Q, D) bool, whether a place is a true match of a query.
         pose_errors: of the best place of each query.
-        is_known: (Q, D) bool, which places a query may find.
-        overlaps: (Q, D) float64, see `overlap_truth`; None where they are not
-            the truth.
+        is_known: (Q, D) bool, whether a query may find a place.
+        overlaps: (Q, D) float64, see `overlap_truth`; None if truth is by
+            radius.
 
     Example:
         from evaluation import retrieve
@@ -82,19 +82,19 @@ def retrieve(
     *,
     across_maps: bool = False,
 ) -> Retrieval:
-    """Asks for every query which places of the database look like it.
+    """Scores every query of a drive against all places of the database.
 
     Args:
-        database: the drive whose places are known.
-        query: the drive that asks; in the same world frame.
-        method: describes and compares.
-        protocol: what is asked.
+        database: the drive of the places.
+        query: the drive of the queries, in the same world frame. method:
+            describes and compares.
+        protocol: of the comparison.
         track: reports progress.
         across_maps: the two may be of maps of different names.
 
     Raises:
         InputError: if a sequence cannot be read, the two are not of the same
-            world, or the method returns what it must not.
+            world, or the method returns an invalid result.
 
     Example:
         from evaluation import make_method, open_sequence, retrieve

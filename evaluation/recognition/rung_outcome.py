@@ -1,4 +1,4 @@
-"""What a method answered on a rung of a ladder, query by query."""
+"""The outcome of a method on a rung of a ladder, query by query."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from evaluation.recognition.metrics import QueryOutcomes, judge
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.retrieval import Retrieval
 
-# How a best place can be wrong, in the order in which it is asked.
+# Kinds of wrong best places, in order of precedence.
 FAULTS = ("no_place", "no_candidate", "other_city", "too_far", "elsewhere")
-# Up to so many radii a place is just too far away, and not another one.
+# Up to this number of radii, a place is only too far away, and not elsewhere.
 _NEARLY = 2.0
 _HALF = 0.5
 
 
 @dataclass(frozen=True)
 class RungOutcome:
-    """What a method answered on a rung.
+    """The outcome of a method on a rung.
 
     Attributes:
         method: its name.
-        radius_told: whether it was gated by the radius.
-        outcomes: what became of each of Q queries.
+        radius_told: whether the gate was used.
+        outcomes: of Q queries.
         query_frames: (Q,) of the query drive.
         stamps_ns: (Q,) int64.
         p_WQs: (Q, 3) where the sensor was [m].
@@ -62,7 +62,7 @@ class RungOutcome:
         drives: Sequence[str],
         overlaps: np.ndarray,
     ) -> RungOutcome:
-        """Reduces the scores of all pairs to what became of each query.
+        """Reduces the scores of all pairs to the outcome of each query.
 
         Args:
             method: that made the scores.
@@ -97,7 +97,7 @@ class RungOutcome:
 
     @property
     def num_hidden(self) -> int:
-        """How many wrong answers are to queries of which little is seen.
+        """Number of wrong answers to queries with little overlap.
 
         Their best match shows less than half of them.
         """
@@ -105,7 +105,7 @@ class RungOutcome:
         return int((is_hidden & ~self.outcomes.is_right).sum())
 
     def faults(self, radius: float) -> list[str]:
-        """Returns what is wrong with the best place of each query.
+        """Returns the reason for each query's wrong best place.
 
         Args:
             radius: of a match [m].

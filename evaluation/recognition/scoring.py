@@ -1,4 +1,4 @@
-"""Scores as a method returns them, checked: no other can reach a table."""
+"""Checks the scores of a method before they reach a table."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def score_places(
     gate_radius: float | None = None,
     exhaustive: bool = False,
 ) -> np.ndarray:
-    """Returns what a method scores the last of some queries, (D,) float64.
+    """Returns a method's scores for the last of some queries, (D,) float64.
 
     Its second stage, if it has one, and the gate are included.
 

@@ -19,15 +19,15 @@ import numpy as np
 
 from cns_drake.base.compiled import compiled
 
-# How far from a surface a point may lie that counts as shown [m].
+# Greatest distance of a shown point from a surface [m].
 TOLERANCE = 0.2
-# A return this near to a direction stands for it by itself [deg]: edges of
-# roofs, and of the field of view, have returns on one side only.
+# A return this near to a direction is enough by itself [deg]: edges of roofs,
+# and of the field of view, have returns on one side only.
 _NEAR_DEG = 0.75
-# Returns around a direction of which one is this many times as far away as
-# another are of two surfaces.
+# If one return around a direction is this many times as far as another, they
+# are on two surfaces.
 _FARTHEST = 3.0
-# Directions are sought in cells of 1 deg, so many up and down, and sideways.
+# Numbers of the cells of 1 deg in elevation and in azimuth.
 _UP, _SIDE = 2, 1
 _ROWS, _COLUMNS = 180, 360
 _UNKNOWN, _SHOWN, _BEHIND = range(3)
@@ -52,7 +52,7 @@ class SeenSurfaces:
 
     @classmethod
     def of(cls, points: np.ndarray) -> SeenSurfaces:
-        """Returns what a scan (N, 3), in its sensor's frame, shows."""
+        """Returns the surfaces of a scan (N, 3), in its sensor's frame."""
         x, y, z = points.T.astype(np.float64)
         elevation = np.degrees(np.arctan2(z, np.hypot(x, y))) + 90.0
         azimuth = np.degrees(np.arctan2(y, x)) + 180.0

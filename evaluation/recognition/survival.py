@@ -1,9 +1,8 @@
-"""What structural change leaves of a method: the same routes without it.
+"""The part of a method's performance that survives structural change.
 
 The control of a pair of drives takes the place of one of them: the same
-route, driven through the other's stage of the city. What a method loses from
-the control to the pair is then due to the change alone, and not to where the
-routes lead.
+route, driven through the other's stage of the city. The loss of a method from
+the control to the pair is then due to the change alone, and not to the routes.
 """
 
 from __future__ import annotations
@@ -129,7 +128,8 @@ def paired_intervals(
         seed: of the bootstrap.
 
     Returns:
-        Of AUC, of R@1; NaN if the numbers of queries differ or are zero.
+        Intervals of AUC and of R@1; NaN if the numbers of queries differ or are
+        zero.
     """
     if len(unchanged) != len(changed) or len(changed) == 0:
         unknown = Interval(math.nan, math.nan)

@@ -1,4 +1,4 @@
-"""The table of what methods cost."""
+"""The table of the costs of methods."""
 
 from __future__ import annotations
 

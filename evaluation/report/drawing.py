@@ -1,4 +1,4 @@
-"""What all figures share: colours, sizes, and how they are written."""
+"""The common part of all figures: colours, sizes and files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The tables of why best places are wrong."""
+"""The tables of reasons for wrong best places."""
 
 from __future__ import annotations
 

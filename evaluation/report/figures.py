@@ -1,4 +1,4 @@
-"""Pictures of the maps: where the routes lead, and what changed."""
+"""Pictures of the maps: the routes, and the change."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from evaluation.report.point_rendering import (
 _UNCHANGED = (214, 214, 214)
 _CHANGED = (196, 18, 24)
 _ABSENT_OUTSIDE = (240, 170, 160)
-# Sets O and H: blue and vermilion differ for everybody.
+# Sets O and H: blue and vermilion differ for all kinds of colour vision.
 _IN_O = (120, 170, 215)
 _ONLY_IN_H = (213, 94, 0)
 _OUTSIDE_H = (228, 228, 228)
@@ -62,7 +62,7 @@ _PANEL_INCHES = 4.2
 
 @dataclass(frozen=True)
 class Stage:
-    """What is drawn of one drive.
+    """The drawn data of one drive.
 
     Attributes:
         name: of the stage, e.g. `04`.
@@ -95,7 +95,7 @@ class SeenRoute:
 def judge_points(
     points: np.ndarray, other: np.ndarray, tau: float = TAU
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Asks the two questions of the TCR of the points of a finer map.
+    """Applies the two tests of the TCR to the points of a finer map.
 
     Args:
         points: (N, 3) of one map, on any grid [m].

@@ -1,4 +1,4 @@
-"""The numbers of a ladder: what each cause of change leaves of each method."""
+"""The numbers of a ladder: each method under each cause of change."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from evaluation.recognition.survival import Kept
 
 @dataclass(frozen=True)
 class LadderRung:
-    """Which change there is between two drives.
+    """The change between two drives.
 
     Attributes:
         map_name: of the city.
@@ -43,13 +43,14 @@ class LadderRung:
 
 @dataclass(frozen=True)
 class MeasuredRung:
-    """What all methods answered on a rung, with one draw of what is random.
+    """The outcomes of all methods on a rung, with one random draw.
 
     Attributes:
         rung: which.
         seed: of the draw.
-        drives: what tells the drives from all others.
-        outcomes: of each method, without and with the gate.
+        drives: fingerprint of the drives.
+        outcomes: of each method, without and
+            with the gate.
     """
 
     rung: LadderRung
@@ -74,7 +75,7 @@ class LadderRow:
         with_match: those that have a match.
         places: of the database.
         draws: of what is random.
-        drives: what tells the drives of all draws from all others.
+        drives: fingerprints of the drives of all draws.
         lost: queries that are right on the rung `none`, and wrong here; mean.
         found: the other way round.
         hidden: see `RungOutcome.num_hidden`; mean.

@@ -1,4 +1,4 @@
-"""What a ladder says, in words: which cause costs which method most."""
+"""The findings of a ladder in words: the causes that cost a method most."""
 
 from __future__ import annotations
 
@@ -45,16 +45,14 @@ def _paragraph(rows: Sequence[LadderRow]) -> str:
         for method in in_table_order(row.method for row in untold)
     ]
     if any(sentences):
-        parts.append(
-            f"No method knows the radius: {'; '.join(filter(None, sentences))}."
-        )
+        parts.append(f"Without the gate: {'; '.join(filter(None, sentences))}.")
         parts.append(_mildest(untold))
         parts.append(_difference(untold, told))
     return " ".join(filter(None, parts))
 
 
 def _sentence(rows: Sequence[LadderRow]) -> str:
-    """Returns what one method loses; "" where it had nothing to lose."""
+    """Returns the losses of one method; "" if it had nothing to lose."""
     known = {
         row.rung.cause: row for row in rows if not math.isnan(row.kept.share)
     }
@@ -75,7 +73,7 @@ def _sentence(rows: Sequence[LadderRow]) -> str:
 
 
 def _mildest(rows: Sequence[LadderRow]) -> str:
-    """Returns which causes cost no method much."""
+    """Returns the causes that cost no method much."""
     shares: dict[str, list[float]] = {}
     for row in rows:
         is_single = row.rung.cause not in (_NONE, _ALL)

@@ -1,4 +1,4 @@
-"""What the page says of what change leaves of each method."""
+"""The page's section on the survival of each method."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The table of how good the poses are that come with the places."""
+"""The table of the errors of estimated poses."""
 
 from __future__ import annotations
 

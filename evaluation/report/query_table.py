@@ -1,4 +1,4 @@
-"""Every query of every pair and method: what the tables are made of."""
+"""The table of all queries of all pairs and methods."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ _HEADER = (
 
 @dataclass(frozen=True)
 class DriveTrack:
-    """When and where the sensor was.
+    """Times and poses of the sensor.
 
     Attributes:
         stamps_ns: (N,) int64 of all frames.

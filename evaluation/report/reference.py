@@ -1,6 +1,6 @@
-"""What a report may stand beside: published numbers, and claims to judge.
+"""The reference of a report: published numbers, and claims to judge.
 
-A study of somebody's own city has none. `Reference` itself is that: nothing
+A study of a user's own city has none. `Reference` itself is that: nothing
 published, nothing judged. A study with numbers to compare with gets an object
 of another class.
 """
@@ -26,7 +26,7 @@ class Published:
 
 @dataclass(frozen=True)
 class Finding:
-    """A claim, and what our numbers say.
+    """A claim, and its verdict by our numbers.
 
     Attributes:
         claim: to be judged.

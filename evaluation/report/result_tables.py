@@ -1,4 +1,4 @@
-"""What a report holds, and the tables made of it."""
+"""The results of a report, and the tables made of them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The figure of what structural change leaves of each method."""
+"""The figure of the survival of each method under structural change."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tables of what structural change leaves of each method."""
+"""Tables of the survival of each method under structural change."""
 
 from __future__ import annotations
 

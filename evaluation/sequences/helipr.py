@@ -69,7 +69,7 @@ _LONGEST_GAP_NS = 1_000_000_000
 
 
 class HeliprSequence(FileSequence):
-    """What one LiDAR of HeLiPR saw on a drive.
+    """The scans of one LiDAR of HeLiPR on a drive.
 
     With `global_*_gt.txt` W is the UTM grid with a nearer origin, see
     `evaluation.sequences.utm`; else it is the frame of the drive's own

@@ -21,7 +21,7 @@ _ROTATION_TOLERANCE = 1e-3
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Where something was, at increasing times.
+    """Poses at increasing times.
 
     Attributes:
         path: the file it comes from, for messages.

@@ -20,7 +20,7 @@ from evaluation.sequences.text_tables import (
 
 
 class FileSequence(Sequence):
-    """A drive of which each scan is a file; the poses are in memory."""
+    """A drive with one file for each scan; the poses are in memory."""
 
     def __init__(
         self,

@@ -233,7 +233,7 @@ def _change(
         )
     if not changed:
         return (0.0 if total else math.nan), ""
-    # Of equal numbers, the first by name.
+    # If numbers are equal, the first name counts.
     name = min(changed, key=lambda one: (-changed[one], one))
     return changed.total() / total, name
 
@@ -247,8 +247,8 @@ class _Aligner:
     def fit(self, query: _Shown, place: _Shown) -> float:
         """Returns the part of the standing points that coincide.
 
-        Of the query's or of the place's, whichever is less, at the pose that
-        layered overlap finds.
+        The lesser part of the query's and of the place's, at the pose of
+        layered overlap.
         """
         one, other = query.standing, place.standing
         if not (len(one) and len(other)):

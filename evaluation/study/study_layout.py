@@ -13,7 +13,7 @@ from evaluation.study.chosen_methods import MethodChoice
 class SurveyFiles:
     """The parts that hold the survey of a recording.
 
-    Who needs one method's descriptions reads no other's.
+    A job that needs one method's descriptions reads no other's.
 
     Attributes:
         folder: in which they lie.

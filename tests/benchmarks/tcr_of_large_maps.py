@@ -61,7 +61,7 @@ def main() -> None:
             check=True,
         )
         seconds = time.perf_counter() - start
-    # Of the largest child, in KiB on Linux.
+    # Memory of the largest child, in KiB on Linux.
     peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
     print(
         f"2 x {arguments.points} points: {seconds:.1f} s, peak {peak:.0f} MiB"

@@ -16,13 +16,12 @@ OPENING = re.compile(
 
 # What only a person does.
 PERSONAL = re.compile(
-    r"\b(?:tells|told by|is told|are told|knows|nobody|somebody)\b"
+    r"\b(tells|told by|(?:is|are|was) told|knows|nobody|somebody)\b"
 )
 
-# File -> why a person does it there, or who else gave the word.
+# Found text -> why it stays.
 ALLOWED = {
-    "tests/documents/test_english.py": "this list",
-    "CHANGELOG.md": "names of old releases",
+    "Of a city drawn anew by cns-drake": "the mark of files, old ones too",
 }
 
 
@@ -31,8 +30,8 @@ def texts(*patterns: str) -> list[Path]:
         path
         for pattern in patterns
         for path in ROOT.glob(pattern)
-        if str(path.relative_to(ROOT)) not in ALLOWED
-        and not {"node_modules", "site"} & set(path.parts)
+        if not {"node_modules", "site"} & set(path.parts)
+        and path != Path(__file__)
     )
 
 
@@ -43,6 +42,7 @@ def findings(pattern: re.Pattern[str], paths: list[Path]) -> list[str]:
         for path in paths
         for text in [path.read_text(encoding="utf-8")]
         for found in pattern.finditer(text)
+        if not text.startswith(tuple(ALLOWED), found.start(1))
     ]
 
 

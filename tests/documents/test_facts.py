@@ -16,7 +16,7 @@ from evaluation.sequences import open_sequence
 
 PAGES = documents.pages()
 CODES = [piece.text for page in PAGES for piece in documents.inline(page)]
-# Of tools that are not this project's.
+# Options of tools of other projects.
 FOREIGN_OPTIONS = {
     *("--nthreads", "--nworkers"),
     *("--tls-ca-file", "--tls-cert", "--tls-key"),

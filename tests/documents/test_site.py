@@ -56,7 +56,7 @@ def test_every_link_leads_somewhere(site):
     shown = 0
     for path, page in pages.items():
         if path.name == "404.html":
-            continue  # Of whatever address was asked for.
+            continue  # The address does not matter.
         for target in page.targets - {None}:
             parts = urlparse(target)
             if parts.scheme or parts.netloc:

@@ -518,7 +518,7 @@ RECIPES = {
     ),
     "linter": Recipe(
         ".venv/bin/ruff check",
-        # Of the examples in the documents, by the rules of this project.
+        # Checks the examples in the documents, by the rules of this project.
         after=("method", "Python", "own diagram", "own beams"),
         prints=("All checks passed!", "already formatted"),
     ),

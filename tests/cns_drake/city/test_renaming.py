@@ -15,7 +15,7 @@ from cns_drake.command_line.cli import app
 pytestmark = pytest.mark.slow
 
 STAGES = """
-# Who was there first.
+# The first ones.
 stages:
   "01":
     story: without office_001 and its like

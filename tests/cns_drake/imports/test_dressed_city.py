@@ -29,7 +29,7 @@ from cns_drake.imports.staged_city import stage_city
 from cns_drake.imports.waypoint_drives import Drive
 from cns_drake.scenarios.sequence_table import write_table
 
-# Of an import before there was dressing.
+# The digest of an import before dressing existed.
 PLAIN = "100f7a75c0f44113"
 STREET = np.column_stack([np.linspace(-80, 80, 41), np.full(41, -12.0)])
 

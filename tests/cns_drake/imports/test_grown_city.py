@@ -130,7 +130,7 @@ def test_options_that_exclude_each_other(tmp_path, options, fault):
         ("C18", 1750), ("mid C14", 1350), ("late C19", 1880),
         ("1914..1918", 1918), ("mid C17..late C17", 1680),
         ("j:1918-01-31", 1918),
-        # Of the wiki: 8 November 2010.
+        # From the wiki: 8 November 2010.
         ("jd:2455511", 2010), ("13.5.1855", 1855), ("long ago", None),
         ("", None), ("0000", None), ("C0", None), ("jd:9999999", None),
         ("12345", None),

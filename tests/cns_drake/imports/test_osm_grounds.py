@@ -68,7 +68,7 @@ def test_the_sea_lies_right_of_the_coast(tmp_path, is_eastward):
     # It ends within the city, where the file was cut.
     line = [(-30, 0), (0, 0), (70, 0)]
     osm.way(line if is_eastward else line[::-1], natural="coastline")
-    # Of no account: it has no length.
+    # A coastline without length has no effect.
     osm.way([(10, 30), (10, 30)], natural="coastline")
     # Around an island the land is inside.
     island = [(0, -60), (20, -60), (20, -40), (0, -40)]

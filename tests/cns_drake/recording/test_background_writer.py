@@ -57,7 +57,7 @@ def test_small_messages_go_with_the_next_large_one():
 
     small = [bytes([k]) for k in range(70)]
     with BackgroundWriter(write) as writer:
-        # So many are handed over without waiting any longer.
+        # That many are handed over without waiting any longer.
         for data in small:
             writer.write(data)
         writer.write(bytes(5000))

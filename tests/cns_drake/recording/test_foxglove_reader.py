@@ -59,7 +59,7 @@ def test_profile_and_channels(found):
         assert topic["messageEncoding"] == "cdr"
         assert topic["schemaEncoding"] == "ros2msg"
         (qos,) = yaml.safe_load(topic["metadata"]["offered_qos_profiles"])
-        # Of rmw: reliable; transient local or volatile.
+        # As in rmw: reliable; transient local or volatile.
         assert qos["reliability"] == 1
         assert qos["durability"] == (1 if name == "/tf_static" else 2)
         assert topic["metadata"]["topic_type_hash"].startswith("RIHS01_")

@@ -124,7 +124,7 @@ def test_all_members_ride_and_measure_alike(tmp_path):
         assert member.imu.xyz == (0.5, 0.0, 1.0)
         update = {"ride": other.ride, "imu": other.imu}
         assert member.model_copy(update=update) == other
-    # So do their drives through the city of the drive that asks.
+    # Their drives also do so, those through the city of the drive that asks.
     asking = load_scenario("metropolis_04")
     controls = family_controls(rough, asking)
     assert controls[rough[0].name].ride == rough[0].ride
@@ -262,7 +262,7 @@ def test_other_cities_multiply_a_family_and_decay_on_their_own(tmp_path, town):
             assert f"seed {city_seed}" in member.title
         gone = sorted(int(name[5:]) for name in cns.without)
         assert len(gone) == 10 * city_seed * part // 1000
-        # Of a row, those nearest to a place are neighbours.
+        # The structures of a row nearest to a place are neighbours.
         assert all(b == a + 1 for a, b in itertools.pairwise(gone))
 
 

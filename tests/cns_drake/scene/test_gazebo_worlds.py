@@ -65,7 +65,7 @@ def write(tmp_path, *elements):
 
 
 def ranges(world):
-    """Of the level beams to the rear, left, ahead and right."""
+    """Ranges of the level beams to the rear, left, ahead and right."""
     scan = scan_world(world, RigidTransform([0.0, 0.0, 1.0]), AROUND)
     level = scan[scan["ring"] == 0]
     names = ("rear", "left", "ahead", "right")

@@ -75,7 +75,7 @@ def test_no_preset_of_that_name():
 
 
 def test_hokuyo():
-    """Of the specification: 1081 steps of 0.25 deg, in 3/4 of 25 ms."""
+    """From the specification: 1081 steps of 0.25 deg, in 3/4 of 25 ms."""
     beams = make_beam_pattern("hokuyo-ust-20lx").beams(0)
     azimuth, elevation = angles_deg(beams.d_Sset)
     expected = -135.0 + 0.25 * np.arange(1081)

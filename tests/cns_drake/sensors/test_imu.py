@@ -87,8 +87,8 @@ def test_a_steady_bend_with_a_lever_arm(slope):
     climb = np.arctan2(slope * flat, r * flat / radius)
     heading = 0.3 + flat * u / radius + np.pi / 2
     R_WB = RollPitchYaw(0, -climb, heading).ToRotationMatrix()
-    # Of a body that turns about a fixed vertical axis, every point is drawn
-    # to that axis with w^2 times its distance.
+    # In a body that turns about a fixed vertical axis, every point is
+    # accelerated to that axis by w^2 times its distance.
     p_BA = R_WB.matrix() @ X_BI.translation()
     outward = np.array([np.sin(heading), -np.cos(heading), 0])
     from_axis = r * outward + [p_BA[0], p_BA[1], 0]

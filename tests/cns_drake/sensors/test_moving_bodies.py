@@ -30,7 +30,7 @@ PATTERN = SpinningPattern(
     tuple(np.linspace(0.4, -0.4, 12)), 240, 0.05, 60.0, 0.1
 )
 X_PS = RigidTransform(RollPitchYaw(0.1, -0.2, 0.4), [0.3, 0.1, 0.2])
-# Of a shape on its body, so that it is swung round, too.
+# The pose of a shape on its body, so that it is swung round, too.
 X_BG = RigidTransform(RollPitchYaw(0.3, 0.5, -0.2), [0.5, -0.4, 0.3])
 SHAPES = {
     "box": (Box(1.0, 2.0, 1.5), lambda p, d: box(p, d, (1.0, 2.0, 1.5))),

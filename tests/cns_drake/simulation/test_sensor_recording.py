@@ -123,7 +123,7 @@ def read(folder):
 
 
 def test_odometry_of_a_frame_on_a_body(ride):
-    """Of a point that goes in a circle, in closed form."""
+    """The oracle is a point on a circle, in closed form."""
     for k, message in enumerate(read(ride[0])["/odometry"]):
         angle = RATE * PERIOD * k
         p = message.pose.pose.position
@@ -163,7 +163,7 @@ def test_points_are_those_of_the_lidars(ride):
 
 
 def test_places_of_the_sensors(ride):
-    """Of one on the seat to the seat, of one that stands to the map."""
+    """A sensor on the seat is posed there, a fixed one on the map."""
     found = read(ride[0])
     (static,) = found["/tf_static"]
     assert {t.child_frame_id for t in static.transforms} == {"lidar", "imu"}

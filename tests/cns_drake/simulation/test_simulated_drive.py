@@ -36,7 +36,7 @@ def test_scans_and_poses_are_those_of_a_recording(short_recording):
     assert [simulated.scenario[k] for k in keys] == [
         recorded.scenario[k] for k in keys
     ]
-    # So are all maps that are made of them.
+    # All maps made from them are equal as well.
     ours, theirs = (
         survey_recording(s, set(), []) for s in (source(), recorded)
     )

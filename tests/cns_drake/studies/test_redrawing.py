@@ -30,7 +30,7 @@ from cns_drake.studies.redrawing import (
 
 pytestmark = pytest.mark.slow
 
-SEED = 3  # Of the small city.
+SEED = 3  # Draws the small city.
 
 
 @pytest.fixture

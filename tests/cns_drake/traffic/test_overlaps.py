@@ -36,7 +36,7 @@ def test_agrees_with_shapely():
 
 
 def test_the_most_involved_goes_first():
-    """Of three in a row the middle one alone has to go."""
+    """Only the middle one of three in a row has to go."""
     poses = np.array([[[0.0, 0, 0], [2.0, 0, 0], [4.0, 0, 0], [np.nan] * 3]])
     found = np.zeros((4, 4), bool)
     find_overlaps(poses, np.full((4, 2), 1.1), found)

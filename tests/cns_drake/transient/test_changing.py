@@ -15,7 +15,7 @@ from cns_drake.transient.changing import change_world
 from cns_drake.transient.standing import read_standing
 
 X_WT = RigidTransform(RollPitchYaw(*ORIGIN[3:]), ORIGIN[:3])
-# Of everything below z = 2.2 m or so, cars and roads are driven through.
+# The drive leads through cars and roads, below z = 2.2 m or so.
 _CORNERS = [
     X_WT @ [x, y, 0] for x, y in ((-90, -3), (90, -3), (90, 2), (-90, 2))
 ]
@@ -177,7 +177,7 @@ def test_leaf_off_keeps_wood_and_the_rest(changed):
         old = before[tree.name].parts
         wood = next(part for part in old if part.name == "wood")
         assert np.array_equal(tree.parts[0].p_WPs, wood.p_WPs)
-        # Of a shrub, twigs stay.
+        # The twigs of a shrub stay.
         ratio = len(crown(bare, f"shrub_{k:03d}").triangles) / len(
             crown(before, f"shrub_{k:03d}").triangles
         )

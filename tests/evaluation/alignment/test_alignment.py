@@ -131,7 +131,7 @@ def test_a_common_frame_that_is_none(drives):
 
 def test_a_drive_that_drifts(drives, truth):
     told = ELSEWHERE @ drifted(drives.X_second, scale=1.02, turn_deg=5.0)
-    # So much that no rigid pose fits.
+    # The bend is so strong that no rigid pose fits.
     rigidly = drives.X_second[25] @ poses.inverse(told[25]) @ told
     assert apart(rigidly, drives.X_second) > 1.5
     result = align(drives.first(), drives.second(told, frame="odom"))

@@ -70,7 +70,7 @@ def test_by_hand():
     # point above it are not at a corner, and both are within 4.5 m.
     assert change.source_to_target.num_in_hull == 10
     assert change.source_to_target.num_unchanged == 10
-    # Of the target, (60, 0, 0) lies outside and so counts nowhere.
+    # The point (60, 0, 0) of the target is outside and counts nowhere.
     assert change.target_to_source.num_in_hull == 9
     assert change.target_to_source.num_unchanged == 9
     assert change.symmetric == 0.0

@@ -105,7 +105,7 @@ def test_tcr_tells_of_points_that_are_not_finite(capsys, towns, tmp_path):
     np.save(tmp_path / "a.npy", points)
     status, _, err = run(capsys, "tcr", tmp_path / "a.npy", tmp_path / "a.npy")
     assert status == 0
-    assert "a.npy: 1 points not finite" in err
+    assert "a.npy: 1 points are not finite" in err
 
 
 def test_pr_json(capsys, towns):

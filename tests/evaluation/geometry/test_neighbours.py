@@ -52,7 +52,7 @@ def test_against_all_distances(make, k):
     distances = all_distances(points)
     expected = np.sort(distances, axis=1)[:, :k]
     chosen = np.take_along_axis(distances, neighbours.astype(int), axis=1)
-    # Of equally far points any may be chosen, but none of them twice.
+    # Any of equally far points may be chosen, but none of them twice.
     np.testing.assert_array_equal(np.sort(chosen, axis=1), expected)
     ordered = np.sort(neighbours, axis=1)
     assert (np.diff(ordered, axis=1) > 0).all()
@@ -79,7 +79,7 @@ def test_points_in_one_place():
 
 
 def test_too_few_points():
-    with pytest.raises(ValueError, match="30 neighbours wanted of 29 points"):
+    with pytest.raises(ValueError, match="30 neighbours are wanted 29 points"):
         nearest_neighbours(np.zeros((29, 3)), 30)
 
 

@@ -226,7 +226,7 @@ class TestMatch:
             # The mean counts, not each: 0.6 + 0.8 + 0.7.
             ((0x3FF << 4, 0x3FF << 2, 0x3FF << 3), 1),
             ((0x3FF << 4, 0x3FF << 3, 0x3FF << 3), 0),
-            # Of subsets: 2 * 5 / 15, 0.667.
+            # For subsets: 2 * 5 / 15, 0.667.
             ((0x1F, 0x1F, 0x3FF), 1),
             ((0x1F, 0x1F, 0x1F), 0),
         ],

@@ -128,7 +128,7 @@ def test_trend():
 
 
 def test_trends_of_the_paper():
-    # Of its Table II, computed by hand of ranks: only RING++ gets worse.
+    # Its Table II, computed by hand of ranks: only RING++ gets worse.
     assert paper_trend("ring++").rho < 0
     assert paper_trend("btc").rho > 0.5
     assert paper_trend("scan-context++").rho > 0

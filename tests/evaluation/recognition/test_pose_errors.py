@@ -63,7 +63,7 @@ def test_metrics_of_hand_made_queries():
     assert found.translation_median == pytest.approx(2.0)
     assert found.translation_90 == pytest.approx(2.0)
     assert found.rotation_median_deg == pytest.approx(5.0)
-    # Of five with a match the first and the fifth are within both limits.
+    # The first and the fifth of five with a match are within both limits.
     assert found.success == pytest.approx(2 / 5)
     assert metrics.curve.recall_at_full_precision == pytest.approx(2 / 5)
 

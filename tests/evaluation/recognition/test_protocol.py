@@ -104,7 +104,7 @@ def test_a_drive_against_itself(tmp_path):
     found = retrieve(drive, drive, Means(), protocol)
     age = (found.query_frames[:, None] - found.database_frames) * 0.05
     assert np.isnan(found.scores[age < 0.5 - 1e-9]).all()
-    # Of what is known every place has a score, not just a search's best.
+    # Every known place has a score, not only a search's best ones.
     assert not np.isnan(found.scores[age >= 0.5 - 1e-9]).any()
     near = found.distances <= 7.5
     np.testing.assert_array_equal(found.matches, near & (age >= 0.5 - 1e-9))

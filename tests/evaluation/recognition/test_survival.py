@@ -9,7 +9,7 @@ from evaluation.recognition.survival import Kept, paired_intervals
 
 
 def outcomes(is_right, has_match=None):
-    """Of queries whose best places have one score: then AUC is R@1."""
+    """Outcomes with equal best scores: then AUC is R@1."""
     right = np.array(is_right, dtype=bool)
     match = np.ones(len(right), bool) if has_match is None else has_match
     return QueryOutcomes(

@@ -53,13 +53,13 @@ def measured(cause, level, answers, seed=1):
 
 
 def part(number, kept):
-    """Of so many queries the first are right."""
+    """Returns which queries are right: the first ones."""
     return np.arange(number) < kept
 
 
 @pytest.fixture(scope="module")
 def climbed():
-    """Of 60 queries, 45 survive snow and 30, then 15 survive works."""
+    """From 60 queries, 45 survive snow and 30, then 15 survive works."""
     return [
         measured(
             cause,
@@ -167,8 +167,8 @@ def test_what_is_wrong_with_each_answer():
     rungs = [measured("none", 0, [before]), measured("snow", 1, [one])]
     _, row = ladder_rows(rungs, 7.5)
     assert (row.lost, row.found) == (2.0, 1.0)
-    # Of the seven shares of 0.2 to 0.8 the first three are below a half, and
-    # of these the third is wrong.
+    # The first three of the seven shares of 0.2 to 0.8 are below a half, and
+    # the third of these is wrong.
     assert (row.hidden, row.overlap) == (1.0, pytest.approx(0.5))
     assert set(row.faults.values()) == {1.0}
 

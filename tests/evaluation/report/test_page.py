@@ -125,7 +125,7 @@ def test_reasons_are_offered_and_counted(text):
     assert re.findall(r'value="(\w*)"', choice) == ["", *FAULT_KINDS]
     section = text[text.index("Why best places are wrong") :]
     row = re.search(r"<tr>.*?Scan Context\+\+.*?</tr>", section, re.S).group()
-    # Of three wrong ones: a twin, no candidate, no place.
+    # Three wrong ones: a twin, no candidate, no place.
     assert re.findall(r"(\d+) %", row) == ["33", "33", "33"]
 
 

@@ -211,7 +211,7 @@ def test_only_wrong_ones(reader):
     assert reader.evaluate('byId("filtered").value') == "1 of 5"
     reader.press("ArrowRight")
     assert reader.evaluate("state.query") == 1
-    # Of the other method another one is wrong.
+    # Another query is wrong by the other method.
     choose(reader, "method", "1")
     shown(reader, 0, 1, 3, 0)
     assert "RING++: wrong" in status(reader)

@@ -181,7 +181,7 @@ def faulty_files(folder):
     np.save(folder / "wide.npy", np.zeros((3, 7)))
     yield "wide.npy", None, "instead of N x 3"
     np.save(folder / "words.npy", np.full((3, 3), "a"))
-    yield "words.npy", None, "no type of coordinates"
+    yield "words.npy", None, "not a type of coordinates"
     np.save(folder / "cut.npy", np.zeros((100, 3)))
     yield "cut.npy", (folder / "cut.npy").read_bytes()[:-8], "."
     pcds = {

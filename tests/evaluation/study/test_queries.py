@@ -16,7 +16,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def report(tmp_path_factory):
-    """Of a city that the paper has in both directions, with a control."""
+    """A city that the paper has in both directions, with a control."""
     folder = tmp_path_factory.mktemp("recordings")
     drive(folder / "riverside_01", "01", "a", city="riverside")
     drive(folder / "riverside_02", "02", "b", city="riverside")
@@ -146,7 +146,7 @@ def test_poses(report):
         pure = [tp / max(tp + fn, 1) for (tp, fp, fn), _ in curve if fp == 0]
         recall = float(row["recall_at_100_precision"])
         assert recall == pytest.approx(max(pure, default=0.0))
-        # Of equal values that of the greatest score.
+        # The greatest score counts among equal values.
         best = max(values, default=0.0)
         least = max(
             (s for (_, s), v in zip(curve, values, strict=True) if v == best),

@@ -41,8 +41,8 @@ def test_every_attempt_gets_further(tmp_path, monkeypatch):
     whole, broken = tmp_path / "whole", tmp_path / "broken"
     studies.do(measuring_jobs(tmp_path / "in", whole))
     expected = parts(whole)
-    # Of each drive two maps and, of each method, a description; results, and
-    # why they are wrong.
+    # Two maps for each drive and a description by each method; results, and
+    # reasons for wrong ones.
     assert len(expected) == 2 * (2 + METHODS) + METHODS + 1
     replace = os.replace
 

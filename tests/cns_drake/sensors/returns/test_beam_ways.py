@@ -35,7 +35,8 @@ def test_the_share_of_an_edge_is_that_of_the_beams_profile(part):
     distance = 10.0
     edge = part * distance * sheet.divergence
     near = plate("near", 0.4, facing(distance, edge - 5.0), (0.1, 10.0, 40.0))
-    # So near behind that both are one echo, whose energy gives the share.
+    # The far plate is so near that both are one echo, whose energy gives the
+    # share.
     far = plate("far", 0.0, facing(distance + 0.3))
     # A neighbour beyond the edge, so that the beam counts as next to one.
     off = 3.0 * sheet.divergence
@@ -93,7 +94,8 @@ def test_single_leaves_are_no_volume():
 
 def test_panes_share_light_by_fresnel():
     reflected, through = pane_shares(np.array([1.0]))
-    # Of n = 1.52: 4.3 % a face, 0.918 through a pane, 0.843 there and back.
+    # Glass of n = 1.52: 4.3 % a face, 0.918 through a pane, 0.843 there and
+    # back.
     face = (0.52 / 2.52) ** 2
     assert face == pytest.approx(0.043, abs=5e-4)
     assert through == pytest.approx((1 - face) / (1 + face))
