@@ -9,8 +9,8 @@ from itertools import pairwise
 from typing import Any
 
 from cns_drake.base.errors import InputError
+from cns_drake.imports.date_years import year_of_date
 from cns_drake.imports.import_faults import ImportFaults
-from cns_drake.imports.told_dates import told_year
 
 # The usual attributes, small letters, most reliable first: 3DBAG, CityGML, 3D
 # BAG's forerunners, OpenStreetMap.
@@ -80,7 +80,7 @@ def _year(value: object) -> int | None:
         return None
     if isinstance(value, (int, float)):
         return int(value) if 1 <= value <= 9999 else None
-    return told_year(str(value))
+    return year_of_date(str(value))
 
 
 def stage_names(years: Sequence[int]) -> list[str]:

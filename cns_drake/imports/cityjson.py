@@ -210,8 +210,8 @@ def _read_objects(
             city.faults.add("object without a type, left out", name)
             continue
         geometries = []
-        told = value.get("geometry") or []
-        for geometry in told if isinstance(told, list) else [told]:
+        listed = value.get("geometry") or []
+        for geometry in listed if isinstance(listed, list) else [listed]:
             found = _read_geometry(
                 geometry, vertices, templates, name, city.faults
             )
@@ -289,11 +289,11 @@ class _Templates:
         system: ReferenceSystem,
         where: str,
     ):
-        told = whole.get("geometry-templates")
-        told = told if isinstance(told, dict) else {}
-        self.geometries = told.get("templates") or []
+        templates = whole.get("geometry-templates")
+        templates = templates if isinstance(templates, dict) else {}
+        self.geometries = templates.get("templates") or []
         self.points = _numbers(
-            told.get("vertices-templates", []),
+            templates.get("vertices-templates", []),
             f"{where}: geometry-templates.vertices-templates",
         )
         self.vertices = vertices
@@ -343,15 +343,15 @@ def _read_geometry(
     except (LookupError, TypeError, ValueError, AttributeError):
         faults.add("geometry that is not an object, left out", name)
         return None
-    faces, told = [], []
+    faces, kept = [], []
     for boundary, one in zip(boundaries, kinds, strict=True):
         face = _face(boundary, vertices)
         if face is None:
             faults.add("face with unknown vertices, left out", name)
         else:
             faces.append(face)
-            told.append(one)
-    return CityGeometry(lod, faces, told, _NESTING[kind] > 0)
+            kept.append(one)
+    return CityGeometry(lod, faces, kept, _NESTING[kind] > 0)
 
 
 def _lod(value: object) -> float:

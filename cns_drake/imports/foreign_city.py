@@ -41,7 +41,7 @@ class Imported:
         lod: level of detail; 0 if unknown.
         original: name of the structure that it is a variant of; its own if
             empty.
-        is_gone: whether it stands no more, and it is not told since when.
+        is_gone: whether it was demolished, at an unknown date.
     """
 
     structure: Structure
@@ -76,14 +76,14 @@ class Thing:
 
     Attributes:
         source: name of its element in the file.
-        told: kind of that element, as the file has it.
+        element: kind of that element, as the file has it.
         kind: a key of `cns_drake.city.placement.objects.OBJECTS`.
         xy: its place [m].
         yaw: its heading, if known [rad].
     """
 
     source: str
-    told: str
+    element: str
     kind: str
     xy: tuple[float, float]
     yaw: float | None

@@ -1,4 +1,4 @@
-"""Buildings that stand no more, and those that stand in their place."""
+"""Demolished buildings, and their successors."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ def with_gone(
     later.
 
     Args:
-        gone: buildings that stood, until when is not told.
-        others: what stands today, as far as it may have stood then.
+        gone: demolished buildings without a date.
+        others: present structures that may have stood then.
     """
     others = list(others)
     later = [one for one in others if one.kind.startswith("Building")]

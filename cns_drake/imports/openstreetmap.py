@@ -41,7 +41,7 @@ from cns_drake.imports.osm_streets import (
     drivable_streets,
     street_surfaces,
 )
-from cns_drake.imports.osm_tags import told
+from cns_drake.imports.osm_tags import tag_value
 from cns_drake.imports.osm_things import make_things
 
 # Sizes of barriers and trees [m].
@@ -63,8 +63,8 @@ def import_openstreetmap(
         path: of the file.
         year_attribute: see `construction_year`.
         dressed: whether the sea, and grounds by what they are made of, are
-            made, bridges have parapets or are left out, and buildings are
-            made that are gone since a date that is not told.
+            made, bridges have parapets or are left out, and demolished
+            buildings without a date are made.
 
     Raises:
         InputError: if it cannot be read, has no building, or is larger than
@@ -162,7 +162,7 @@ def _barriers(
         else:
             continue
         where = (name, faults)
-        high = told(tags, "height", length, _TALLEST, where) or usual
+        high = tag_value(tags, "height", length, _TALLEST, where) or usual
         strip = LineString(local(line)).buffer(width / 2.0, cap_style="flat")
         solids = [
             np.concatenate(extruded(polygon, 0.0, high, name, faults))
@@ -191,7 +191,7 @@ def _trees(
             # Editors give negative numbers to new things.
             np.random.default_rng([abs(int(name[1:]))]),
             species="spruce" if needles else "lime_tree",
-            height=told(tags, "height", length, _TALLEST, (name, faults))
+            height=tag_value(tags, "height", length, _TALLEST, (name, faults))
             or None,
         )
         structure = Structure(

@@ -14,7 +14,7 @@ from cns_drake.imports.extrusions import extruded
 from cns_drake.imports.foreign_city import Imported, make_imported
 from cns_drake.imports.import_faults import ImportFaults
 from cns_drake.imports.osm_places import Local, parts_of, sound_parts
-from cns_drake.imports.osm_reading import OsmWay, is_told
+from cns_drake.imports.osm_reading import OsmWay, has_tag
 from cns_drake.imports.osm_tags import (
     path_width,
     sidewalk_sides,
@@ -54,20 +54,20 @@ def bridges_of(ways: Iterable[OsmWay], local: Local) -> Bridges:
         or street_width(way.tags) is not None
         or path_width(way.tags) is not None
     ]
-    tunnels = {way.name for way in used if is_told(way.tags, "tunnel")}
+    tunnels = {way.name for way in used if has_tag(way.tags, "tunnel")}
     open_ways = [way for way in used if way.name not in tunnels]
     lines = [LineString(local(way.line)) for way in open_ways]
     tree = STRtree(lines)
     over: set[str] = set()
     level: set[str] = set()
     for way, line in zip(open_ways, lines, strict=True):
-        if not is_told(way.tags, "bridge"):
+        if not has_tag(way.tags, "bridge"):
             continue
         crossed = [
             open_ways[k]
             for k in tree.query(line, "intersects")
             if not set(open_ways[k].nodes) & set(way.nodes)
-            and not is_told(open_ways[k].tags, "bridge")
+            and not has_tag(open_ways[k].tags, "bridge")
         ]
         (over if crossed else level).add(way.name)
     return Bridges(over, level, tunnels)

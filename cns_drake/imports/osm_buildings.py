@@ -14,13 +14,13 @@ from shapely.geometry import Polygon
 from shapely.strtree import STRtree
 
 from cns_drake.imports.building_years import construction_year
+from cns_drake.imports.date_years import year_of_date
 from cns_drake.imports.extrusions import extruded
 from cns_drake.imports.foreign_city import RED_ROOF, Imported, make_imported
 from cns_drake.imports.import_faults import ImportFaults
 from cns_drake.imports.osm_places import Local, parts_of, sound_parts
-from cns_drake.imports.osm_reading import OsmArea, Tags, is_told
+from cns_drake.imports.osm_reading import OsmArea, Tags, has_tag
 from cns_drake.imports.osm_tags import heights, why_absent
-from cns_drake.imports.told_dates import told_year
 
 # If parts leave less of an outline than this, they are the whole building.
 _ALL_OF_IT = 0.9
@@ -53,13 +53,12 @@ def standing_buildings(
     Args:
         areas: that are meant to be buildings.
         faults: counts those that are left out.
-        with_gone: whether what stands no more is among them even if it is
-            not told until when it did.
+        with_gone: whether to include demolished buildings without a date.
     """
     for one in areas:
         absent = why_absent(one.tags)
         is_past = absent == "demolished" and (
-            with_gone or told_year(one.tags.get("end_date", ""))
+            with_gone or year_of_date(one.tags.get("end_date", ""))
         )
         if absent is None or is_past:
             yield one
@@ -68,7 +67,7 @@ def standing_buildings(
 
 
 def make_buildings(
-    told: Iterable[OsmArea],
+    areas: Iterable[OsmArea],
     local: Local,
     year_attribute: str | None,
     faults: ImportFaults,
@@ -76,9 +75,9 @@ def make_buildings(
     """Yields buildings; parts replace the area that they cover."""
     outlines: list[_Block] = []
     parts: list[_Block] = []
-    for name, tags, polygons in told:
+    for name, tags, polygons in areas:
         low, high, roof = heights(tags, (name, faults))
-        group = parts if is_told(tags, "building:part") else outlines
+        group = parts if has_tag(tags, "building:part") else outlines
         for polygon in polygons:
             for one in sound_parts(local.polygon(polygon), name, faults):
                 group.append(_Block(name, tags, one, low, high, roof))
@@ -127,7 +126,7 @@ def make_buildings(
             {"body": np.concatenate(walls), "roof": np.concatenate(roofs)},
             {"roof": RED_ROOF},
             construction_year(whole.tags, year_attribute, whole.name, faults),
-            told_year(whole.tags.get("end_date", "")),
+            year_of_date(whole.tags.get("end_date", "")),
             # If parts look different, the first one's look counts.
             tags={**blocks[0].tags, **whole.tags},
             lod=1.0,
@@ -136,9 +135,9 @@ def make_buildings(
 
 
 def _is_gone(tags: Tags) -> bool:
-    """Tells whether a building stands no more since it is not told when."""
+    """Returns whether a building was demolished, at an unknown date."""
     return (
-        told_year(tags.get("end_date", "")) is None
+        year_of_date(tags.get("end_date", "")) is None
         and why_absent(tags) == "demolished"
     )
 

@@ -23,7 +23,7 @@ from cns_drake.imports.foreign_city import (
 )
 from cns_drake.imports.import_faults import ImportFaults
 from cns_drake.imports.osm_places import Local, parts_of, sound_parts
-from cns_drake.imports.osm_reading import OsmArea, OsmWay, Tags, is_told
+from cns_drake.imports.osm_reading import OsmArea, OsmWay, Tags, has_tag
 from cns_drake.imports.osm_tags import area_kind
 
 _SAND: Rgb = (0.76, 0.68, 0.51)
@@ -104,7 +104,7 @@ def ground_areas(
     """
     for name, tags, polygons in areas:
         look = _look(tags) if dressed else _plain_look(tags)
-        if look is None or is_told(tags, "building"):
+        if look is None or has_tag(tags, "building"):
             continue
         surface = [
             flat_surface(one, look.z, name, faults)

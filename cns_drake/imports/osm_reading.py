@@ -129,7 +129,7 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
 
     features = OsmFeatures()
     check_regular(path)
-    told: dict[str, None] = {}
+    wanted: dict[str, None] = {}
     try:
         reader = osmium.FileProcessor(str(path)).with_locations().with_areas()
         for one in reader:
@@ -146,10 +146,10 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
             elif isinstance(one, osmium.osm.Way) and tags:
                 name = f"w{one.id}"
                 if is_building(tags):
-                    told[name] = None
+                    wanted[name] = None
                 nodes = [n for n in one.nodes if n.location.valid()]
                 missing = len(one.nodes) - len(nodes)
-                if missing and name not in told:
+                if missing and name not in wanted:
                     features.faults.add(
                         "place of a way that is not in the file, left out",
                         name,
@@ -161,7 +161,7 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
                     features.ways.append(OsmWay(name, tags, line, numbers))
             elif isinstance(one, osmium.osm.Relation):
                 if tags.get("type") == "multipolygon" and is_building(tags):
-                    told[f"r{one.id}"] = None
+                    wanted[f"r{one.id}"] = None
             elif isinstance(one, osmium.osm.Node) and one.location.valid():
                 if tags.get("natural") == "tree":
                     place = (one.lon, one.lat)
@@ -180,7 +180,7 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
         first = str(error).splitlines()[0] if str(error) else "unreadable"
         raise InputError(f"{path}: {first}") from error
     closed = {name for name, _, _ in features.areas}
-    for name in (name for name in told if name not in closed):
+    for name in (name for name in wanted if name not in closed):
         features.faults.add(
             "building whose outline does not close, left out", name
         )
@@ -200,7 +200,7 @@ def _polygons(area: Any) -> list[Polygon]:
 def thing_kind(tags: Tags) -> str:
     """Returns the kind of a thing, by its first tag that gives one."""
     for key in _TELLING:
-        if is_told(tags, key):
+        if has_tag(tags, key):
             return f"{key}={tags[key]}"
     if any(key.startswith("addr:") for key in tags):
         return "address"
@@ -211,7 +211,7 @@ def thing_kind(tags: Tags) -> str:
     return f"relation of type {tags['type']}" if "type" in tags else "other"
 
 
-def is_told(tags: Tags, name: str) -> bool:
+def has_tag(tags: Tags, name: str) -> bool:
     """Returns whether the tag exists and is not `no`."""
     return tags.get(name, "no") != "no"
 
@@ -222,12 +222,12 @@ def is_building(tags: Tags) -> bool:
     A former building with the date of its end counts, too.
     """
     return (
-        is_told(tags, "building")
-        or is_told(tags, "building:part")
+        has_tag(tags, "building")
+        or has_tag(tags, "building:part")
         or ("end_date" in tags and was_building(tags))
     )
 
 
 def was_building(tags: Tags) -> bool:
-    """Tells whether a key says that there was a building."""
-    return any(is_told(tags, f"{stage}:building") for stage in _GONE)
+    """Returns whether a key marks a former building."""
+    return any(has_tag(tags, f"{stage}:building") for stage in _GONE)

@@ -14,7 +14,7 @@ from cns_drake.imports.foreign_city import Imported, make_imported
 from cns_drake.imports.import_faults import ImportFaults
 from cns_drake.imports.osm_bridges import Bridges
 from cns_drake.imports.osm_places import Local, parts_of, sound_parts
-from cns_drake.imports.osm_reading import OsmWay, Tags, is_told
+from cns_drake.imports.osm_reading import OsmWay, Tags, has_tag
 from cns_drake.imports.osm_tags import (
     driven_ways,
     is_marked,
@@ -48,7 +48,7 @@ def street_surfaces(
     roads: list[tuple[str, BaseGeometry]] = []
     walks: list[tuple[str, BaseGeometry]] = []
     for name, tags, line, _ in ways:
-        if is_told(tags, "tunnel") or is_told(tags, "area"):
+        if has_tag(tags, "tunnel") or has_tag(tags, "area"):
             continue
         if name in bridges.over_streets:
             continue
@@ -60,7 +60,7 @@ def street_surfaces(
         if width is None:
             walks.append((name, course.buffer((narrow or 0.0) / 2.0, 4)))
             continue
-        if is_told(tags, "bridge") and name not in bridges.level:
+        if has_tag(tags, "bridge") and name not in bridges.level:
             faults.add("bridge, laid on the ground", name)
         roads.append((name, course.buffer(width / 2.0, 4)))
         for side, has in zip((1.0, -1.0), sidewalk_sides(tags), strict=True):
@@ -99,7 +99,7 @@ def drivable_streets(
     streets = []
     for name, tags, line, nodes in ways:
         width = street_width(tags)
-        if width is None or is_told(tags, "tunnel") or is_told(tags, "area"):
+        if width is None or has_tag(tags, "tunnel") or has_tag(tags, "area"):
             continue
         if name in bridges.over_streets:
             continue
@@ -131,7 +131,7 @@ def crossing_stripes(
     marked = {number for number, tags in crossings if is_marked(tags)}
     for _, tags, line, nodes in ways:
         width = street_width(tags)
-        if width is None or is_told(tags, "tunnel"):
+        if width is None or has_tag(tags, "tunnel"):
             continue
         for k, number in enumerate(nodes):
             if number not in marked:

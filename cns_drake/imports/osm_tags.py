@@ -71,7 +71,7 @@ _ABSENT = {
 }
 
 
-def told(
+def tag_value(
     tags: Mapping[str, str],
     key: str,
     read: Callable[[str], float | None],
@@ -112,14 +112,14 @@ def heights(
 
     Args:
         tags: of the building.
-        where: see `told`.
+        where: see `tag_value`.
     """
 
     def metres(key: str, least: float = 0.0) -> float | None:
-        return told(tags, key, length, _TALLEST, where, least)
+        return tag_value(tags, key, length, _TALLEST, where, least)
 
     def number(key: str, least: float = 0.0) -> float | None:
-        return told(tags, key, count, _MOST_LEVELS, where, least)
+        return tag_value(tags, key, count, _MOST_LEVELS, where, least)
 
     roof_levels = number("roof:levels")
     # A building may have no levels if its roof has some.
@@ -180,15 +180,15 @@ def street_width(
 
     Args:
         tags: of a way.
-        where: see `told`.
+        where: see `tag_value`.
     """
     kind = tags.get("highway", "").removesuffix("_link")
     if kind not in _STREETS:
         return None
-    width = told(tags, "width", length, _WIDEST, where)
+    width = tag_value(tags, "width", length, _WIDEST, where)
     if width:
         return width
-    lanes = told(tags, "lanes", count, _MOST_LANES, where)
+    lanes = tag_value(tags, "lanes", count, _MOST_LANES, where)
     if lanes:
         return LANE * lanes + 0.5
     usual = _STREETS[kind]
@@ -221,7 +221,7 @@ def lanes_beside(tags: Mapping[str, str], width: float) -> float:
         tags: of the street.
         width: of its carriageway [m].
     """
-    lanes = told(tags, "lanes", count, _MOST_LANES, None)
+    lanes = tag_value(tags, "lanes", count, _MOST_LANES, None)
     if not lanes:
         lanes = 2.0 if all(driven_ways(tags)) else 1.0
     # If two cars cannot pass, both keep to the middle.
@@ -246,18 +246,18 @@ def path_width(tags: Mapping[str, str]) -> float | None:
     usual = _PATHS.get(tags.get("highway", ""))
     if usual is None:
         return None
-    return told(tags, "width", length, _WIDEST, None) or usual
+    return tag_value(tags, "width", length, _WIDEST, None) or usual
 
 
 def sidewalk_sides(tags: Mapping[str, str]) -> tuple[bool, bool]:
     """Returns whether a street has a sidewalk on its left and right."""
     both = tags.get("sidewalk:both") == "yes"
-    told = tags.get("sidewalk", "")
+    side = tags.get("sidewalk", "")
     left = (
-        both or told in ("both", "left") or tags.get("sidewalk:left") == "yes"
+        both or side in ("both", "left") or tags.get("sidewalk:left") == "yes"
     )
     right = (
-        both or told in ("both", "right") or tags.get("sidewalk:right") == "yes"
+        both or side in ("both", "right") or tags.get("sidewalk:right") == "yes"
     )
     return left, right
 

@@ -11,7 +11,7 @@ from shapely.geometry import LineString
 
 from cns_drake.imports.foreign_city import Thing
 from cns_drake.imports.osm_places import Local
-from cns_drake.imports.osm_reading import OsmWay, Tags, is_told
+from cns_drake.imports.osm_reading import OsmWay, Tags, has_tag
 
 # Key and value -> object; an empty value stands for any.
 _OBJECTS = (
@@ -43,7 +43,7 @@ def object_of(tags: Tags) -> str | None:
     found = [
         name
         for key, value, name in _OBJECTS
-        if is_told(tags, key) and value in ("", tags[key])
+        if has_tag(tags, key) and value in ("", tags[key])
     ]
     if not found:
         return None

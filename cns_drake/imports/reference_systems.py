@@ -132,9 +132,9 @@ def reference_system(name: str, where: str) -> ReferenceSystem:
     if heights_assumed:
         rows.append((2, 1.0))
     if sorted(row for row, _ in rows) != [0, 1, 2]:
-        told = ", ".join(f"{a.name} ({a.direction})" for a in axes)
+        listed = ", ".join(f"{a.name} ({a.direction})" for a in axes)
         raise InputError(
-            f"{where}: {name} ({system.name}) has the axes {told}, which are"
+            f"{where}: {name} ({system.name}) has the axes {listed}, which are"
             " not east, north and up; reproject the file first"
         )
     units = [(axis.unit_conversion_factor, axis.unit_name) for axis in axes]

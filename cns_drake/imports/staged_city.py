@@ -155,10 +155,10 @@ def stage_city(
 
 
 def _stands(one: Imported, stage: int, options: ImportOptions) -> bool:
-    """Tells whether a structure stands at the stage of a number.
+    """Returns whether a structure stands at the stage of a number.
 
-    What is gone since a date that is not told stood at all stages but the
-    last, as far as its year, or the lack of one, allows.
+    A structure that is gone without a date stood at all stages but the last, as
+    far as its year, or the lack of one, allows.
     """
     years, undated = options.years, options.undated
     if one.is_gone:

@@ -159,18 +159,18 @@ def _transient(name: str) -> Callable[[RungDrives, float, int], RungDrives]:
 
 def _traffic(drives: RungDrives, number: int, seed: int) -> RungDrives:
     traffic = TrafficConfig(vehicles=number, walkers=number, seed=seed)
-    return _asked(drives, traffic=traffic)
+    return _with_query(drives, traffic=traffic)
 
 
 def _weather(drives: RungDrives, visibility: float, seed: int) -> RungDrives:
     weather = WeatherConfig(visibility=visibility)
     query = drives.query.with_returns("calibrated", weather)
-    return _asked(replace(drives, query=query), seed=seed)
+    return _with_query(replace(drives, query=query), seed=seed)
 
 
 def _returns(drives: RungDrives, _: str, seed: int) -> RungDrives:
     query = drives.query.with_returns("calibrated")
-    return _asked(replace(drives, query=query), seed=seed)
+    return _with_query(replace(drives, query=query), seed=seed)
 
 
 def _ride(drives: RungDrives, roughness: Any, seed: int) -> RungDrives:
@@ -210,7 +210,7 @@ def _mapped(drives: RungDrives, **update: Any) -> RungDrives:
     return replace(drives, database=drives.database.model_copy(update=update))
 
 
-def _asked(drives: RungDrives, **update: Any) -> RungDrives:
+def _with_query(drives: RungDrives, **update: Any) -> RungDrives:
     return replace(drives, query=drives.query.model_copy(update=update))
 
 

@@ -45,7 +45,7 @@ class RecordingInfo:
         return self.made_by or RecordedDrive(self.path.absolute())
 
     def drives_like(self, other: RecordingInfo) -> bool:
-        """Tells whether both are known to lead the same way."""
+        """Returns whether both are known to lead the same way."""
         return self.way is not None and self.way == other.way
 
 

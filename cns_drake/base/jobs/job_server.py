@@ -74,7 +74,7 @@ class _Server:
     def start(self, job: bytes) -> tuple[Connection, _Forked]:
         ours, theirs = Pipe()
         try:
-            with theirs, self._asked(), self._lock:
+            with theirs, self._server_errors(), self._lock:
                 self._connection.send(("start", job))
                 send_handle(
                     self._connection, theirs.fileno(), self._process.pid
@@ -87,7 +87,7 @@ class _Server:
 
     def ask(self, kind: str, *values: int) -> int | None:
         """Returns the answer to a request; see `_serve`."""
-        with self._asked(), self._lock:
+        with self._server_errors(), self._lock:
             self._connection.send((kind, *values))
             return self._connection.recv()
 
@@ -97,7 +97,7 @@ class _Server:
         self._process.wait()
 
     @contextlib.contextmanager
-    def _asked(self) -> Iterator[None]:
+    def _server_errors(self) -> Iterator[None]:
         """Turns the end of the server into a ProcessDiedError."""
         try:
             yield

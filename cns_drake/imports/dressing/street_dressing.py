@@ -170,12 +170,12 @@ def may_park_on(side: str, street: Street) -> bool:
     """
     if street.tags.get("highway", "") in _WITHOUT_CARS:
         return False
-    told = {
+    values = {
         street.tags.get(key.format(which))
         for which in (side, "both")
         for key in _PARKING_KEYS
     }
-    return not told & set(_NO_PARKING)
+    return not values & set(_NO_PARKING)
 
 
 class _Placing:

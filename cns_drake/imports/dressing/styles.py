@@ -220,9 +220,9 @@ def building_use(
         words.append("shop")
     if "office" in tags:
         words.append("office")
-    told = set(re.findall(r"[a-z_]+", " ".join(words).lower()))
+    found = set(re.findall(r"[a-z_]+", " ".join(words).lower()))
     for use, names in _USES:
-        if told & set(names.split()):
+        if found & set(names.split()):
             return use, True
     if area < _SMALL and height < 4.0:
         return Use.SHED, False

@@ -92,7 +92,7 @@ def dress_city(
     for thing in city.things:
         if thing.source in things.sources:
             things.sources.remove(thing.source)
-            city.faults.take_back(f"{thing.told}, left out")
+            city.faults.take_back(f"{thing.element}, left out")
     origins = {one.structure.name: "dressed" for one in changed.values()}
     from_file = things.from_file
     origins |= {

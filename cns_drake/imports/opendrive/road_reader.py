@@ -178,11 +178,11 @@ def _road(
     if not pieces:
         faults.add("road without a course, left out", name)
         return None
-    told = element.number("length")
+    stated = element.number("length")
     length = pieces[-1].s + pieces[-1].length
-    if abs(told - length) > _ROUNDING:
+    if abs(stated - length) > _ROUNDING:
         faults.add("road whose length differs from its course's, cut", name)
-        length = min(told, length)
+        length = min(stated, length)
     if length > _LONGEST_ROAD:
         raise ValueError(f"{length:g} m are more than {_LONGEST_ROAD:g} m")
     sections = _sections(element, length, name, faults)
@@ -349,9 +349,9 @@ def _marks(lane: Element, start: float) -> list[RoadMark]:
     """Returns the marks of a lane, in their order along the road."""
     marks = []
     for one in lane.all("roadMark"):
-        told = one.number("width", 0.0)
-        width = told if 0.0 < told <= _WIDEST_MARK else _MARK_WIDTH
-        if one.text("weight", "standard") == "bold" and not told:
+        stated = one.number("width", 0.0)
+        width = stated if 0.0 < stated <= _WIDEST_MARK else _MARK_WIDTH
+        if one.text("weight", "standard") == "bold" and not stated:
             width *= 2.0
         marks.append(
             RoadMark(

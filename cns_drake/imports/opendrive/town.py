@@ -180,8 +180,8 @@ def _build(
         plan,
         str(source),
     )
-    told = {one.name for one in (*decks, *things, *marks)}
-    generated = [one for one in city.structures if one.name not in told]
+    imported = {one.name for one in (*decks, *things, *marks)}
+    generated = [one for one in city.structures if one.name not in imported]
     stages = starter_stages(City(tuple(generated), city.cars))
     return Town(
         roads,
@@ -198,12 +198,12 @@ def _build(
 
 def _kerb(bands: Sequence[LaneBand]) -> float:
     """Returns the height of sidewalks above the road [m]."""
-    told = [
+    kerbs = [
         band.lane.height
         for band in bands
         if band.kind == "sidewalk" and band.lane.height > 0.0
     ]
-    return float(np.clip(np.median(told), *_KERBS)) if told else _KERB
+    return float(np.clip(np.median(kerbs), *_KERBS)) if kerbs else _KERB
 
 
 def _park(

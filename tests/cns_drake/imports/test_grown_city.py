@@ -13,9 +13,9 @@ import yaml
 from cns_drake.base.errors import InputError
 from cns_drake.command_line.cli import app
 from cns_drake.imports.building_years import Undated
+from cns_drake.imports.date_years import year_of_date
 from cns_drake.imports.import_map import import_city
 from cns_drake.imports.import_report import ImportOptions
-from cns_drake.imports.told_dates import told_year
 
 
 def run(*arguments):
@@ -137,7 +137,7 @@ def test_options_that_exclude_each_other(tmp_path, options, fault):
     ],
 )  # fmt: skip
 def test_dates(text, year):
-    assert told_year(text) == year
+    assert year_of_date(text) == year
 
 
 def test_what_is_gone_stood_in_its_time(tmp_path):

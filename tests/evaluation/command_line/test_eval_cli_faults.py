@@ -71,7 +71,7 @@ def test_points_that_are_not_finite_are_told(capsys, towns, tmp_path):
     town = towns / "town_01"
     status, _, err = run(capsys, "tcr", town, tmp_path / "holes")
     assert status == 0
-    assert err == "holes: 7 points are not finite\n"
+    assert err == "holes: 7 points are not finite, and left out\n"
     (tmp_path / "scans").mkdir()
     np.save(
         tmp_path / "scans" / "a.npy",
@@ -82,7 +82,7 @@ def test_points_that_are_not_finite_are_told(capsys, towns, tmp_path):
     scores = ["scores", "--method", "solid", *folders, "--output", output]
     status, _, err = run(capsys, *scores)
     assert status == 0
-    assert err.startswith("14 points are not finite\n")
+    assert err.startswith("14 points are not finite, and left out\n")
     (row,) = csv.DictReader(output.open())
     assert float(row["score"]) == pytest.approx(1.0, abs=1e-12)
 

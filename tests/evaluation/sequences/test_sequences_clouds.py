@@ -171,7 +171,7 @@ def test_empty_clouds(tmp_path):
 
 def faulty_files(folder):
     """Yields name, content, and what the error must say."""
-    yield "short.bin", bytes(17), "17 bytes is no whole number"
+    yield "short.bin", bytes(17), "17 bytes is not a whole number"
     yield "text.npy", b"hello", "npy|pickle|magic"
     yield "text.pcd", b"hello\n", "no DATA line"
     yield "text.ply", b"hello\n", "not a PLY file"

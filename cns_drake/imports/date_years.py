@@ -20,7 +20,7 @@ _YEAR = re.compile(r"(?<!\d)(\d{3,4})(?!\d)", re.ASCII)
 _DAY_ZERO = 1721425
 
 
-def told_year(text: str) -> int | None:
+def year_of_date(text: str) -> int | None:
     """Returns the year of a date, None if it has none.
 
     A period gives its middle, or an earlier or later year with "early" and
