@@ -14,7 +14,7 @@ from cns_drake.recording.message_template import (
 )
 from cns_drake.recording.messages import make_imu
 
-# Of orientation, angular velocity and specific force.
+# Sizes of orientation, angular velocity and specific force.
 _SIZES = (4, 3, 3)
 
 
