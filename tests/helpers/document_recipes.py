@@ -64,7 +64,7 @@ def shorten_drives(folder: Path) -> None:
             "route": first["route"][:2],
             "speeds": {"cruise": 14.0, "longitudinal_acceleration": 8.0},
             "lidars": {"lidar": {"columns": 128}},
-            "frames": 100,
+            "frames": 60,
         }
         path = folder / f"town/sequence_{stage}.yaml"
         path.write_text(yaml.safe_dump(short))
@@ -100,7 +100,7 @@ RECIPES = {
         ".venv/bin/cns-drake list town\n",
         changes=(("town_output", "output"),),
         after=("repair stages",),
-        prints=("town_01", "town_02", "output/town_01: 100 frames"),
+        prints=("town_01", "town_02", "output/town_01: 60 frames"),
         makes=(
             "output/town_0[12]/metadata.yaml",
             "output/town_01_stage_02/metadata.yaml",

@@ -8,10 +8,10 @@ from pathlib import Path
 import queue
 import re
 import subprocess
-import sys
 import threading
 
 from helpers import documents
+from helpers.command_server import CommandServer
 from helpers.document_recipes import NOT_RUN, RECIPES
 
 # A machine that runs other tests beside may take its time to answer.
@@ -31,7 +31,8 @@ class Workplace:
     """Commands run as they are written, with the programs under test.
 
     A recipe is followed once, and so is a command that several have. What
-    does not end by itself is ended by `close`.
+    does not end by itself is ended by `close`. The programs are forks of one
+    process, see `command_server`; `test_wheel` runs them as installed.
     """
 
     def __init__(self, folder: Path):
@@ -45,7 +46,8 @@ class Workplace:
         ]
         self._followed: dict[str, str] = {}
         self._printed: dict[str, str] = {}
-        (folder / ".venv").symlink_to(sys.prefix)
+        server = CommandServer(folder / ".venv")
+        self._started.callback(server.close)
         for name in ("diagrams", "pyproject.toml"):
             (folder / name).symlink_to(documents.ROOT / name)
 

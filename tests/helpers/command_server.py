@@ -1,0 +1,122 @@
+"""Runs of the programs as forks of one process that has imported all.
+
+A command of the documents takes seconds to import what it needs, and is done
+in a moment. In a folder like that of a virtual environment, `cns-drake` and
+`cns-eval` are small clients, which hand their words, folder, environment and
+standard streams to a server. The server forks, and the fork runs the program.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+from pathlib import Path
+import pkgutil
+import select
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+
+_CLIENT = """#!{python} -IS
+import json, os, socket, sys
+
+with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as server:
+    server.connect({address!r})
+    request = [sys.argv, os.getcwd(), dict(os.environ)]
+    socket.send_fds(server, [json.dumps(request).encode()], [0, 1, 2])
+    status = server.recv(1)
+sys.exit(status[0] if status else 1)
+"""
+_PROGRAMS = {
+    "cns-drake": "cns_drake.__main__",
+    "cns-eval": "evaluation.command_line.cli",
+}
+_LONGEST = 1 << 17
+
+
+class CommandServer:
+    """A server, and a folder in which its clients stand.
+
+    Outside of the clients the folder is the environment of the tests.
+    """
+
+    def __init__(self, environment: Path):
+        """Makes the folder, and starts the server; `close` ends it."""
+        # The address of a socket has to be short.
+        self._folder = tempfile.TemporaryDirectory()
+        address = f"{self._folder.name}/server"
+        _link_all(Path(sys.prefix), environment, but={"bin"})
+        programs = environment / "bin"
+        _link_all(Path(sys.prefix) / "bin", programs, but=_PROGRAMS.keys())
+        for name in _PROGRAMS:
+            text = _CLIENT.format(python=sys.executable, address=address)
+            (programs / name).write_text(text)
+            (programs / name).chmod(0o755)
+        listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with listener:
+            listener.bind(address)
+            listener.listen()
+            number = listener.fileno()
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", __name__, str(number)],
+                pass_fds=[number],
+                stdin=subprocess.PIPE,
+                env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+            )
+
+    def close(self) -> None:
+        """Ends the server, which also ends with this process."""
+        self._process.communicate()
+        self._folder.cleanup()
+
+
+def _link_all(source: Path, target: Path, but) -> None:
+    target.mkdir()
+    for path in source.iterdir():
+        if path.name not in but:
+            (target / path.name).symlink_to(path)
+
+
+def _serve(listener: socket.socket) -> None:
+    """Forks for each client, until stdin ends; nothing waits for the forks."""
+    for package in map(importlib.import_module, ("cns_drake", "evaluation")):
+        prefix = f"{package.__name__}."
+        for found in pkgutil.walk_packages(package.__path__, prefix):
+            if "map_closures" not in found.name:  # It needs an extra.
+                importlib.import_module(found.name)
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+    while listener in select.select([listener, sys.stdin], [], [])[0]:
+        client, _ = listener.accept()
+        if os.fork() == 0:
+            signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+            listener.close()
+            _answer(client)
+            return
+        client.close()
+
+
+def _answer(client: socket.socket) -> None:
+    """Runs what a client asks for, and sends how it ended."""
+    request, streams, _, _ = socket.recv_fds(client, _LONGEST, 3)
+    words, folder, environment = json.loads(request)
+    process = os.fork()
+    if process == 0:
+        client.close()
+        for number, stream in enumerate(streams):
+            os.dup2(stream, number)
+            os.close(stream)
+        os.chdir(folder)
+        os.environ.clear()
+        os.environ.update(environment)
+        sys.argv = words
+        module = _PROGRAMS[Path(words[0]).name]
+        sys.exit(importlib.import_module(module).main())
+    status = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
+    client.send(bytes([status if status >= 0 else 128 - status]))
+
+
+if __name__ == "__main__":
+    _serve(socket.socket(fileno=int(sys.argv[1])))
