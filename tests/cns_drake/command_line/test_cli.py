@@ -95,9 +95,10 @@ def test_simulate_and_overwrite(files, tmp_path):
     assert run(*arguments, "--overwrite", "--frames", 2).returncode == 0
 
 
-def test_scan(files, tmp_path):
+def test_scan(files, tmp_path, capfd):
     output = tmp_path / "scan.npy"
-    result = run(
+    result = run_here(
+        capfd,
         "scan",
         files / "good.sdf",
         *POSE,
@@ -114,7 +115,7 @@ def test_scan(files, tmp_path):
     assert np.abs(x_W - 7.5).min() < 1e-5
 
 
-def test_scan_with_calibrated_returns(files, tmp_path):
+def test_scan_with_calibrated_returns(files, tmp_path, capfd):
     scans = {}
     for name, words in {
         "first": ("--returns", "calibrated", "--seed", 3),
@@ -124,7 +125,8 @@ def test_scan_with_calibrated_returns(files, tmp_path):
     }.items():
         path = tmp_path / f"{name}.npy"
         words = (*POSE, "--output", path, "--lidar", "vlp-16", *words)
-        assert run("scan", files / "good.sdf", *words).returncode == 0
+        result = run_here(capfd, "scan", files / "good.sdf", *words)
+        assert result.returncode == 0
         scans[name] = np.load(path)
     assert scans["first"].tobytes() == scans["again"].tobytes()
     assert scans["first"].tobytes() != scans["other"].tobytes()
@@ -143,9 +145,10 @@ def test_scan_with_calibrated_returns(files, tmp_path):
         (("--returns", "ideal", "--rain", 1), "--returns ideal: weather"),
     ],
 )
-def test_weather_that_cannot_be(files, tmp_path, words, fault):
+def test_weather_that_cannot_be(files, tmp_path, capfd, words, fault):
     output = ("--output", tmp_path / "a.npy")
-    result = run("scan", files / "good.sdf", *POSE, *output, *words)
+    good = files / "good.sdf"
+    result = run_here(capfd, "scan", good, *POSE, *output, *words)
     assert result.returncode == 2
     (line,) = result.stderr.splitlines()
     assert line.startswith(f"cns-drake: error: {fault}")
@@ -231,9 +234,10 @@ def test_output_that_cannot_be_written(files, capfd, command):
         (["{files}", "--calibrate", "01", "77"], "sequence_01.yaml: no such"),
     ],
 )
-def test_faults_of_city_are_one_line(files, arguments, fault):
+def test_faults_of_city_are_one_line(files, capfd, arguments, fault):
     before = sorted(files.iterdir())
-    result = run("city", *(a.format(files=files) for a in arguments))
+    words = (a.format(files=files) for a in arguments)
+    result = run_here(capfd, "city", *words)
     assert_one_line(result, fault)
     assert sorted(files.iterdir()) == before
 
