@@ -139,7 +139,7 @@ def test_a_world_is_no_stage(tmp_path):
 def test_quick_gives_the_same_tables(tmp_path):
     """Controls included, from simulation alone."""
     routes = {"01": "metropolis_04", "04": "metropolis_04"}
-    town = write_town(tmp_path / "town", routes, 60)
+    town = write_town(tmp_path / "town", routes, 40)
     cluster = Cluster(2)
     quick = reproduction.reproduce_maps(
         [str(town)], tmp_path / "quick", cluster, quick=True
