@@ -18,7 +18,7 @@ PAGES = documents.pages()
 CODES = [piece.text for page in PAGES for piece in documents.inline(page)]
 # Options of tools of other projects.
 FOREIGN_OPTIONS = {
-    *("--nthreads", "--nworkers"),
+    *("--nthreads", "--nworkers", "--config"),
     *("--tls-ca-file", "--tls-cert", "--tls-key"),
 }
 
