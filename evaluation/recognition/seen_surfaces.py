@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,6 +32,18 @@ _FARTHEST = 3.0
 _UP, _SIDE = 2, 1
 _ROWS, _COLUMNS = 180, 360
 _UNKNOWN, _SHOWN, _BEHIND = range(3)
+
+
+class Shares(NamedTuple):
+    """Parts of the points of another scan; NaN without points.
+
+    Attributes:
+        shown: lies on the seen surfaces.
+        hidden: lies behind all returns around its direction.
+    """
+
+    shown: float
+    hidden: float
 
 
 @dataclass(frozen=True)
@@ -59,13 +72,13 @@ class SeenSurfaces:
         # Straight up, and straight back, round to the limit.
         rows = np.minimum(elevation.astype(np.int64), _ROWS - 1)
         cells = rows * _COLUMNS + azimuth.astype(np.int64) % _COLUMNS
-        order = np.argsort(cells, kind="stable")
+        # NumPy sorts these by radix.
+        order = np.argsort(cells.astype(np.uint16), kind="stable")
+        counts = np.bincount(cells, minlength=_ROWS * _COLUMNS)
         return cls(
             points=np.ascontiguousarray(points[order], dtype=np.float64),
             angles_deg=np.stack([elevation, azimuth], axis=1)[order],
-            starts=np.searchsorted(
-                cells[order], np.arange(_ROWS * _COLUMNS + 1)
-            ),
+            starts=np.concatenate([[0], np.cumsum(counts)]),
             reach=float(np.linalg.norm(points, axis=1).max(initial=0.0)),
         )
 
@@ -75,26 +88,24 @@ class SeenSurfaces:
         Args:
             points: in this sensor's frame.
         """
-        return self._share(points, _SHOWN)
+        return self.shares_of(points).shown
 
-    def share_behind(self, points: np.ndarray) -> float:
-        """Returns which part of points (N, 3) the seen surfaces hide.
-
-        These lie behind all returns around their direction.
+    def shares_of(self, points: np.ndarray) -> Shares:
+        """Returns which parts of points (N, 3) are shown, and hidden.
 
         Args:
             points: in this sensor's frame.
         """
-        return self._share(points, _BEHIND)
+        if len(points) == 0:
+            return Shares(math.nan, math.nan)
+        kinds = self._kinds(points)
+        return Shares(
+            float(np.mean(kinds == _SHOWN)), float(np.mean(kinds == _BEHIND))
+        )
 
     def hides(self, points: np.ndarray) -> np.ndarray:
         """Returns which of points (N, 3) are behind, (N,) bool."""
         return self._kinds(points) == _BEHIND
-
-    def _share(self, points: np.ndarray, kind: int) -> float:
-        if len(points) == 0:
-            return math.nan
-        return float(np.mean(self._kinds(points) == kind))
 
     def _kinds(self, points: np.ndarray) -> np.ndarray:
         return _classify(
@@ -136,9 +147,19 @@ def _find_corners(
             cell = r * _COLUMNS + c % _COLUMNS
             for k in range(starts[cell], starts[cell + 1]):
                 up = angles[k, 0] - elevation
-                side = (angles[k, 1] - azimuth + 180.0) % 360.0 - 180.0
+                # What `% 360.0` gives, which is slow.
+                side = angles[k, 1] - azimuth + 180.0
+                if side < 0.0:
+                    side += 360.0
+                elif side >= 360.0:
+                    side -= 360.0
+                side -= 180.0
                 quadrant = 2 * int(up >= 0.0) + int(side >= 0.0)
-                distance = math.hypot(up, side * shrink)
+                across = side * shrink
+                # A root is slow, and most returns are too far one way alone.
+                if max(abs(up), abs(across)) >= away[quadrant]:
+                    continue
+                distance = math.hypot(up, across)
                 if distance < away[quadrant]:
                     away[quadrant] = distance
                     corners[quadrant] = k

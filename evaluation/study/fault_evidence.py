@@ -18,7 +18,9 @@ from cns_drake.base.poses import inverse, transform
 from cns_drake.base.progress import Track, silent
 from cns_drake.base.recordings.sequence import Sequence as Drive
 from evaluation.maps.voxel_maps import thin
-from evaluation.methods import MethodConfig, make_method
+from evaluation.methods import MethodConfig
+from evaluation.methods.layered_overlap import LayeredOverlap
+from evaluation.methods.overlap_coarse import LayeredScan
 from evaluation.recognition.fault_kinds import NEARLY, PairEvidence
 from evaluation.recognition.overlap_truth import sampled
 from evaluation.recognition.protocol import RetrievalProtocol
@@ -127,22 +129,26 @@ def find_evidence(
         right = None
         if matches and len(asking.points):
             seen = [
-                shown[k].seen.share_of(asking.seen_from(shown[k]))
+                shown[k].seen.shares_of(asking.seen_from(shown[k]))
                 for k in matches
             ]
-            right = shown[matches[int(np.argmax(seen))]]
-            overlaps[row] = max(seen)
-            hidden[row] = right.seen.share_behind(asking.seen_from(right))
+            best = int(np.argmax([one.shown for one in seen]))
+            right = shown[matches[best]]
+            overlaps[row], hidden[row] = seen[best]
             if classes:
                 changed[row], changed_classes[row] = _change(
                     right, asking, classes
                 )
-        answers = {int(places[row]) for places in wrong.values()} - {-1}
-        found = {k: aligner.fit(asking, shown[k]) for k in answers}
+        answers = sorted({int(places[row]) for places in wrong.values()} - {-1})
+        compared = [shown[k] for k in answers]
         if answers and right is not None:
-            right_fits[row] = aligner.fit(asking, right)
+            compared.append(right)
+        found = aligner.fits(asking, compared)
+        if len(found) > len(answers):
+            right_fits[row] = found[-1]
+        fit_of = dict(zip(answers, found, strict=False))
         for method, places in wrong.items():
-            fits[method][row] = found.get(int(places[row]), math.nan)
+            fits[method][row] = fit_of.get(int(places[row]), math.nan)
     return PairEvidence(
         overlaps, hidden, changed, changed_classes, right_fits, fits
     )
@@ -197,10 +203,20 @@ class _Shown:
         """(M, 3) points that stand, one a cell."""
         return thin(self.points[self.points[:, 2] > _standing()], _CELL)
 
+    @cached_property
+    def tree(self) -> cKDTree:
+        """Finds the nearest of the standing points."""
+        return cKDTree(self.standing)
+
+    @cached_property
+    def some(self) -> np.ndarray:
+        """(M, 3) some of the points, drawn at random."""
+        return sampled(self.points)
+
     def seen_from(self, other: _Shown) -> np.ndarray:
         """Returns some points in the frame of another scan's sensor."""
         X_OS = inverse(other.X_WS) @ self.X_WS
-        return transform(X_OS, sampled(self.points))
+        return transform(X_OS, self.some)
 
 
 def _change(
@@ -221,7 +237,7 @@ def _change(
     for one, other in ((place, query), (query, place)):
         if one.instances is None or other.instances is None:
             return math.nan, ""
-        points, instances = sampled(one.points), sampled(one.instances)
+        points, instances = one.some, sampled(one.instances)
         is_standing = points[:, 2] > _standing()
         total += int(is_standing.sum())
         is_gone = is_standing & ~np.isin(instances, other.instances)
@@ -242,34 +258,45 @@ class _Aligner:
     """Lays scans on each other as well as can be, whatever their poses."""
 
     def __init__(self) -> None:
-        self._method = make_method("layered-overlap", {})
+        self._method = LayeredOverlap()
+        self._places: dict[_Shown, LayeredScan] = {}
 
-    def fit(self, query: _Shown, place: _Shown) -> float:
-        """Returns the part of the standing points that coincide.
+    def fits(self, query: _Shown, places: Sequence[_Shown]) -> list[float]:
+        """Returns for each place the part of standing points that coincide.
 
         The lesser part of the query's and of the place's, at the pose of
         layered overlap.
         """
-        one, other = query.standing, place.standing
-        if not (len(one) and len(other)):
-            return 0.0
-        database = self._method.build_database(
-            [self._method.describe_place(place.points)]
+        shared = [0.0] * len(places)
+        standing = [k for k, one in enumerate(places) if len(one.standing)]
+        if not (len(query.standing) and standing):
+            return shared
+        method = self._method
+        poses = method.relative_poses(
+            method.describe(query.points),
+            method.build_database([self._place(places[k]) for k in standing]),
+            range(len(standing)),
         )
-        X_PQ = self._method.relative_pose(
-            self._method.describe(query.points), database, 0
-        )
-        if X_PQ is None:
-            return 0.0
-        moved = transform(X_PQ, one)
-        return min(_met(moved, other), _met(other, moved))
+        for k, X_PQ in zip(standing, poses, strict=True):
+            if X_PQ is not None:
+                moved = transform(X_PQ, query.standing)
+                place = places[k]
+                shared[k] = min(
+                    _met(moved, place.tree),
+                    _met(place.standing, cKDTree(moved)),
+                )
+        return shared
+
+    def _place(self, place: _Shown) -> LayeredScan:
+        """Returns the description of a place, which is made once."""
+        if place not in self._places:
+            self._places[place] = self._method.describe_place(place.points)
+        return self._places[place]
 
 
-def _met(points: np.ndarray, others: np.ndarray) -> float:
+def _met(points: np.ndarray, others: cKDTree) -> float:
     """Returns which part of points has another one near."""
-    distances, _ = cKDTree(others).query(
-        points, distance_upper_bound=_COINCIDENT
-    )
+    distances, _ = others.query(points, distance_upper_bound=_COINCIDENT)
     return float(np.isfinite(distances).mean())
 
 

@@ -99,7 +99,7 @@ def test_two_walls_of_which_half_is_seen(yaw):
     share = (45.0 + np.degrees(np.arctan(2.0 / 10.0))) / 90.0
     # Beams are a degree apart.
     assert seen.share_of(there) == pytest.approx(share, abs=1.0 / 90.0)
-    assert seen.share_behind(there) == pytest.approx(
+    assert seen.shares_of(there).hidden == pytest.approx(
         1.0 - share, abs=1.5 / 90.0
     )
 
