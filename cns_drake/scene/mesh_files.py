@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from itertools import pairwise
 from pathlib import Path
 import tempfile
@@ -23,6 +24,8 @@ from cns_drake.scene.vtk_meshes import read_vtk
 
 # Formats whose y axis points up. Drake turns them, so that z does.
 _Y_UP = (".gltf", ".glb", ".dae")
+# What is larger is parsed at each reading, so that it does not stay in memory.
+_SMALL_BYTES = 1 << 18
 
 
 class MeshFiles:
@@ -162,6 +165,32 @@ def _read_hull(shape: Convex) -> TriangleSurface:
 
 
 def _read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    status = path.stat()
+    if status.st_size > _SMALL_BYTES:
+        return _parse_obj(path)
+    return _parse_small_obj(
+        path, (status.st_size, status.st_mtime_ns, status.st_ino)
+    )
+
+
+@functools.lru_cache(maxsize=4096)
+def _parse_small_obj(
+    path: Path, identity: tuple[int, int, int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns what a file holds: the stages of a city share most files.
+
+    Args:
+        path: of the file.
+        identity: changes whenever the file does.
+    """
+    del identity
+    p_GVset, triangles = _parse_obj(path)
+    for array in (p_GVset, triangles):
+        array.setflags(write=False)
+    return p_GVset, triangles
+
+
+def _parse_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
     check_obj(path)
     mesh = ReadObjToTriangleSurfaceMesh(path)
     triangles = [[t.vertex(k) for k in range(3)] for t in mesh.triangles()]

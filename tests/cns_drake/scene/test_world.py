@@ -99,6 +99,21 @@ def test_a_fault_names_the_file_once(tmp_path, monkeypatch):
         assert told.count("a.sdf") == 1
 
 
+def test_a_mesh_that_changes_is_read_anew(tmp_path):
+    (tmp_path / "slab.obj").touch()
+    world = load_world(write_world(tmp_path, MESH.format("slab.obj")))
+    for x in (1, 2):
+        (tmp_path / "slab.obj").write_text(
+            f"v 0 0 0\nv {x} 0 0\nv 0 1 0\nf 1 2 3\n"
+        )
+        for _ in range(2):  # The second time it is known.
+            (geometry,) = read_perception_geometry(
+                world.scene_graph.model_inspector()
+            )
+            p_GVset = geometry.surface.p_GVset
+            assert p_GVset.tolist() == [[0, 0, 0], [x, 0, 0], [0, 1, 0]]
+
+
 def test_a_mesh_that_is_no_mesh(tmp_path, capfd):
     (tmp_path / "wedge.obj").touch()
     world = load_world(write_world(tmp_path, MESH.format("wedge.obj")))
