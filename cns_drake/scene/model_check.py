@@ -6,7 +6,6 @@ For text that is not a number or a valid size, libsdformat uses a part of it or
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass, field
 import math
 from pathlib import Path
@@ -44,7 +43,7 @@ _OTHER_NUMBERS = {
 }
 
 
-@dataclass
+@dataclass(slots=True)
 class _Element:
     """An element that is being read.
 
@@ -60,7 +59,7 @@ class _Element:
     line: int
     values: dict[str, str]
     text: str = ""
-    children: Counter = field(default_factory=Counter)
+    children: dict[str, int] = field(default_factory=dict)
 
 
 def check_model(path: Path) -> None:
@@ -88,6 +87,7 @@ class _ModelCheck:
         self.included: list[Path] = []
         self._path = path
         self._open: list[_Element] = []
+        self._names: list[str] = []
         parser = expat.ParserCreate("utf-8")
         parser.buffer_text = True
         parser.StartElementHandler = self._start
@@ -108,8 +108,10 @@ class _ModelCheck:
         if len(self._open) >= _DEEPEST:
             self._refuse(f"nested more than {_DEEPEST} deep")
         if self._open:
-            self._open[-1].children[name] += 1
-        self._open.append(_Element(name, line, dict(attributes)))
+            children = self._open[-1].children
+            children[name] = children.get(name, 0) + 1
+        self._open.append(_Element(name, line, attributes))
+        self._names.append(name)
         for key, value in attributes.items():
             if len(value) > _LONGEST_NAME:
                 self._refuse(f"{key} of {len(value)} letters")
@@ -119,7 +121,8 @@ class _ModelCheck:
 
     def _end(self, name: str) -> None:
         element = self._open[-1]
-        parents = [one.name for one in self._open[:-1]]
+        parents = self._names
+        parents.pop()
         if "plugin" not in parents:
             self._check(element, parents[-1] if parents else "", parents)
         self._open.pop()
@@ -133,7 +136,12 @@ class _ModelCheck:
             self._check_sizes(element)
         elif element.name == "geometry":
             shapes = [*_SIZES, *_OTHER_SHAPES]
-            found = [k for k in element.children.elements() if k in shapes]
+            found = [
+                one
+                for one, number in element.children.items()
+                for _ in range(number)
+                if one in shapes
+            ]
             if len(found) > 1:
                 self._refuse(f"two shapes, {found[0]} and {found[1]}")
         elif element.name == "pose":
@@ -152,8 +160,8 @@ class _ModelCheck:
         for name, count in _SIZES[shape.name].items():
             if name not in shape.values:
                 self._refuse(f"no {name}")
-            if shape.children[name] > 1:
-                self._refuse(f"{name} is there {shape.children[name]} times")
+            if (times := shape.children.get(name, 0)) > 1:
+                self._refuse(f"{name} is there {times} times")
             text = shape.values[name]
             numbers = self._numbers(text, name)
             if len(numbers) != count:
@@ -175,11 +183,12 @@ class _ModelCheck:
         return numbers
 
     def _check_uri(self, uri: str, parents: list[str]) -> None:
-        place = self._path.parent / uri
         if parents[-1:] == ["include"]:
+            place = self._path.parent / uri
             self.included += place.glob("*.sdf") if place.is_dir() else [place]
         # Visible meshes are checked when they are read.
-        elif "collision" in parents and place.suffix.lower() == ".obj":
+        elif "collision" in parents and uri.lower().endswith(".obj"):
+            place = self._path.parent / uri
             try:
                 if place.is_file():
                     check_obj(place)
