@@ -42,6 +42,12 @@ def compiled(function: _Function) -> _Function:
 
 
 @functools.cache
+def start_compiler() -> None:
+    """Has Numba load what it loads with the first function of a process."""
+    numba.njit(lambda: None)()
+
+
+@functools.cache
 def _state_of(folder: Path) -> str:
     """Returns a short text that changes when a module in a folder does."""
     files = sorted(folder.glob("*.py"))

@@ -127,11 +127,15 @@ def recording_fingerprint(scenario: Scenario, inputs: dict[str, str]) -> str:
             # LiDARs become text, since their order matters.
             "scenario": scenario.model_copy(update=places).model_dump_json(),
             "inputs": inputs,
-            "code": code_digest(
-                "cns_drake.simulation.simulation",
-                without=("cns_drake.pictures",),
-            ),
+            "code": recording_code(),
         }
+    )
+
+
+def recording_code() -> str:
+    """Returns a digest of the code that has a say in a recording."""
+    return code_digest(
+        "cns_drake.simulation.simulation", without=("cns_drake.pictures",)
     )
 
 

@@ -76,6 +76,11 @@ class DrawDrives(_Picture):
             for one in self._scenarios()
         }
 
+    def prepare(self) -> None:
+        super().prepare()
+        with uninterrupted():
+            import cns_drake.pictures.aerial_pictures  # noqa: F401
+
     def make(self, reporter: Reporter) -> None:
         with uninterrupted():
             from cns_drake.pictures.aerial_pictures import draw_drives
@@ -98,6 +103,11 @@ class DrawStages(_Picture):
     def inputs(self) -> dict[str, object]:
         files = [*self._two_stages(), MapFolder(self.folder).views]
         return {file.name: digest_file(file) for file in files}
+
+    def prepare(self) -> None:
+        super().prepare()
+        with uninterrupted():
+            import cns_drake.pictures.stage_pictures  # noqa: F401
 
     def make(self, reporter: Reporter) -> None:
         with uninterrupted():

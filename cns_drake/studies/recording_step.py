@@ -19,6 +19,7 @@ from cns_drake.scenarios.planning import shown_beside
 from cns_drake.scenarios.provenance import (
     digest_file,
     digest_inputs,
+    recording_code,
     recording_fingerprint,
 )
 from cns_drake.scenarios.scenario import Scenario
@@ -53,6 +54,14 @@ class Record(Step):
 
     def is_done(self) -> bool:
         return is_recorded(self.scenario, self.folder) and self._is_shown()
+
+    def prepare(self) -> None:
+        super().prepare()
+        recording_code()
+        if self.survey is not None:
+            self.survey.prepare()
+        with uninterrupted():
+            import cns_drake.simulation.simulation  # noqa: F401
 
     def run(self, reporter: Reporter) -> None:
         with uninterrupted():

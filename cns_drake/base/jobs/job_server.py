@@ -18,10 +18,10 @@ import os
 import pickle
 import signal
 import subprocess
+import sys
 import threading
 import time
 
-from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.jobs.job_process import (
     ProcessDiedError,
     start_interpreter,
@@ -153,7 +153,7 @@ def _serve(parent: Connection) -> tuple[Connection, bytes] | None:
         if kind == "start":
             (job,) = values
             connection = Connection(recv_handle(parent))
-            _import_for(job)
+            _prepare_for(job)
             answer = os.fork()
             if answer == 0:
                 os.setsid()
@@ -174,10 +174,12 @@ def _serve(parent: Connection) -> tuple[Connection, bytes] | None:
             parent.send(answer)
 
 
-def _import_for(job: bytes) -> None:
-    """Imports what a job needs; the job's process reports failures."""
+def _prepare_for(job: bytes) -> None:
+    """Prepares for a job; the job's process reports failures."""
     with contextlib.suppress(Exception):
-        code_digest(type(pickle.loads(job)).__module__)
+        pickle.loads(job).prepare()
+        if compiling := sys.modules.get("cns_drake.base.compiled"):
+            compiling.start_compiler()
     # Garbage collection would write to memory that the processes share.
     gc.freeze()
 

@@ -87,6 +87,14 @@ class Step(abc.ABC):
             InputError: it cannot be done.
         """
 
+    def prepare(self) -> None:
+        """Does what the runs of all steps of its kind begin with.
+
+        Processes that are forked from one in which it was called share what
+        was imported then, and the digests of code.
+        """
+        code_digest(type(self).__module__)
+
     def made_of(self, inputs: Mapping[str, object]) -> dict[str, object]:
         """Returns inputs with the digest of the code of this step."""
         return {**inputs, "code": code_digest(type(self).__module__)}
@@ -110,6 +118,10 @@ class Steps(Step):
 
     def is_done(self) -> bool:
         return all(step.is_done() for step in self.steps)
+
+    def prepare(self) -> None:
+        for step in self.steps:
+            step.prepare()
 
     def run(self, reporter: Reporter) -> None:
         for step in self.steps:
