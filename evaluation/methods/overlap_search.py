@@ -163,13 +163,21 @@ def climb(
         of the place, in each layer.
     """
     best = np.concatenate((start, _common(cells, starts, place, turns, start)))
+    move = (0, 0, 0)
     for level in range(len(steps)):
+        # How the centre moved last, in steps; at first, from out of reach.
+        last = (3, 3, 3)
         while True:
             centre = best.copy()
             for dt in range(-1, 2):
                 for dr in range(-1, 2):
                     for dc in range(-1, 2):
-                        if dt == 0 and dr == 0 and dc == 0:
+                        # Those around the centre before are no better.
+                        if (dt == 0 and dr == 0 and dc == 0) or (
+                            abs(last[0] + dt) <= 1
+                            and abs(last[1] + dr) <= 1
+                            and abs(last[2] + dc) <= 1
+                        ):
                             continue
                         pose = centre[:3].copy()
                         pose[0] = (pose[0] + dt * steps[level, 0]) % len(turns)
@@ -178,8 +186,10 @@ def climb(
                         found = _common(cells, starts, place, turns, pose)
                         if (found * weights).sum() > (best[3:] * weights).sum():
                             best = np.concatenate((pose, found))
+                            move = (dt, dr, dc)
             if (best == centre).all():
                 break
+            last = move
     return best
 
 
