@@ -182,7 +182,10 @@ def test_diagram_script(tmp_path):
         (["simulate", "{files}/drive.yaml", "--bogus"], "--bogus"),
         (["scan", "{files}/gone.sdf", *POSE], "gone.sdf: .*gone.obj"),
         (["scan", "{files}/torn.sdf", *POSE], "torn.sdf: "),
-        (["scan", "{files}/bare.sdf", *POSE], "bare.sdf: no visual"),
+        (
+            ["scan", "{files}/bare.sdf", *POSE],
+            "bare.sdf: the world has no visuals",
+        ),
         (["scan", "{files}/no.sdf", *POSE], "no.sdf: no such file"),
         (["scan", "{files}/good.sdf", "--pose", "1"], "--pose"),
         (

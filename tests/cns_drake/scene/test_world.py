@@ -54,7 +54,9 @@ def test_geometry_that_no_ray_can_hit(tmp_path, geometry, fault):
 def test_world_with_nothing_to_see(tmp_path):
     path = tmp_path / "empty.sdf"
     path.write_text(world_text([]))
-    with pytest.raises(InputError, match=r"empty\.sdf: no visual"):
+    with pytest.raises(
+        InputError, match=r"empty\.sdf: the world has no visuals"
+    ):
         load_world(path)
 
 
