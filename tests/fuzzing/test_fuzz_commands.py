@@ -4,12 +4,11 @@ As `test_fuzz`, but of whole programs, of which a dozen runs must do.
 """
 
 from concurrent.futures import ThreadPoolExecutor
-import os
 from pathlib import Path
 import shutil
 import subprocess
-import sys
 
+from helpers.command_server import CommandServer
 from helpers.fuzz_mutations import mutate
 from helpers.fuzz_targets import find_target
 import numpy as np
@@ -17,28 +16,28 @@ import pytest
 
 pytestmark = pytest.mark.slow
 
-_DRAKE = ("-m", "cns_drake")
-_EVALUATION = ("-m", "evaluation")
+_DRAKE = "cns-drake"
+_EVALUATION = "cns-eval"
 # Name, target whose files are damaged, which of them, words of the command,
 # how many runs.
 COMMANDS = {
     "simulate": (
         "drive",
         ("sequence_01.yaml", "roads.yaml", "stage_01.sdf", "structures.csv"),
-        (*_DRAKE, "simulate", "sequence_01.yaml", "--output", "out"),
+        (_DRAKE, "simulate", "sequence_01.yaml", "--output", "out"),
         2,
     ),
     "vary": (
         "family",
         ("family.yaml",),
-        (*_DRAKE, "generate", "--vary", "family.yaml", "--output", "out"),
+        (_DRAKE, "generate", "--vary", "family.yaml", "--output", "out"),
         1,
     ),
     "scan": (
         "world",
         ("stage_01.sdf", "wedge.obj"),
         (
-            *(*_DRAKE, "scan", "stage_01.sdf", "--output", "out/scan.pcd"),
+            *(_DRAKE, "scan", "stage_01.sdf", "--output", "out/scan.pcd"),
             *("--pose", "0", "0", "2", "0", "0", "0"),
         ),
         2,
@@ -46,38 +45,38 @@ COMMANDS = {
     "list": (
         "listing",
         ("sequence_01.yaml", "roads.yaml"),
-        (*_DRAKE, "list", "."),
+        (_DRAKE, "list", "."),
         1,
     ),
     "city": (
         "city",
         ("city.yaml", "roads.yaml", "stages.yaml"),
-        (*_DRAKE, "city", "--check", "."),
+        (_DRAKE, "city", "--check", "."),
         1,
     ),
     "export": (
         "mcap",
         ("town_07/town_07_0.mcap",),
-        (*_DRAKE, "export", "town_07", "--format", "kitti", "--output", "out"),
+        (_DRAKE, "export", "town_07", "--format", "kitti", "--output", "out"),
         1,
     ),
     "repair": (
         "repair",
         ("source.mcap",),
-        (*_DRAKE, "repair", "source.mcap", "--output", "out/new.mcap"),
+        (_DRAKE, "repair", "source.mcap", "--output", "out/new.mcap"),
         1,
     ),
     "tcr": (
         "clouds",
         ("*.pcd", "*.ply", "*.npy"),
-        (*_EVALUATION, "tcr", "{file}", "points.bin", "--json"),
+        (_EVALUATION, "tcr", "{file}", "points.bin", "--json"),
         1,
     ),
     "pr": (
         "kitti",
         ("kitti/**/*.*",),
         (
-            *(*_EVALUATION, "pr", "kitti/sequences/07", "kitti/sequences/07"),
+            *(_EVALUATION, "pr", "kitti/sequences/07", "kitti/sequences/07"),
             *("--method", "solid"),
         ),
         1,
@@ -99,14 +98,12 @@ def runs(tmp_path_factory, request):
     """All runs, two at a time: (command, number) -> folder, result."""
     top = tmp_path_factory.mktemp("commands")
     seed = request.config.option.fuzz_seed
+    server = CommandServer(top / "environment")
     with ThreadPoolExecutor(2) as pool:
-        return dict(
-            zip(
-                damaged_runs(),
-                pool.map(lambda key: run(top, seed, *key), damaged_runs()),
-                strict=True,
-            )
-        )
+        results = pool.map(lambda key: run(top, seed, *key), damaged_runs())
+        found = dict(zip(damaged_runs(), results, strict=True))
+    server.close()
+    return found
 
 
 def run(top: Path, seed: int, command: str, number: int):
@@ -124,12 +121,10 @@ def run(top: Path, seed: int, command: str, number: int):
     rng = np.random.default_rng([seed, number, len(command)])
     path = files[int(rng.integers(len(files)))]
     path.write_bytes(mutate(path, path.read_bytes(), rng))
-    words = [word.replace("{file}", path.name) for word in words]
+    program, *words = [word.replace("{file}", path.name) for word in words]
     result = subprocess.run(
-        [sys.executable, *words],
+        [top / "environment" / "bin" / program, *words],
         cwd=folder,
-        env=os.environ
-        | {"PYTHONPATH": os.pathsep.join([os.getcwd(), *sys.path])},
         capture_output=True,
         check=False,
     )
@@ -149,8 +144,7 @@ def test_a_result_or_one_line_and_status_2(runs, command, number):
     assert result.returncode in (0, 2), told
     if result.returncode == 2:
         *progress, line = errors.splitlines()
-        words = COMMANDS[command][2]
-        program = "cns-eval" if words[:2] == _EVALUATION else "cns-drake"
+        program = COMMANDS[command][2][0]
         assert line.startswith(f"{program}: error: "), told
         assert not progress or command in _TELL_PROGRESS, told
         assert result.stdout == b""

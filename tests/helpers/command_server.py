@@ -1,9 +1,9 @@
 """Runs of the programs as forks of one process that has imported all.
 
-A command of the documents takes seconds to import what it needs, and is done
-in a moment. In a folder like that of a virtual environment, `cns-drake` and
-`cns-eval` are small clients, which hand their words, folder, environment and
-standard streams to a server. The server forks, and the fork runs the program.
+A command takes seconds to import what it needs, and is often done in a moment.
+In a folder like that of a virtual environment, `cns-drake` and `cns-eval` are
+small clients, which hand their words, folder, environment and standard streams
+to a server. The server forks, and the fork runs the program.
 """
 
 from __future__ import annotations
