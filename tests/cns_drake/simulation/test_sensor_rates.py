@@ -97,6 +97,15 @@ def test_every_topic_has_its_rate(recording):
     }
 
 
+def test_samples_go_on_between_frames_and_after_the_last(tmp_path):
+    changes = {"imu": {"rate": 125}, "odometry": {}, "frames": 5}
+    scenario = make(tmp_path / "odd", lidars={"lidar": UNIT}, **changes)
+    found = stamps_ns(simulate(scenario, tmp_path / "drives").folder)
+    # 50 ms are no multiple of 8 ms, nor is the end of the last scan.
+    assert found["/imu/data"] == even(125, 256_000_000)
+    assert found["/odometry"] == even(20, 200_000_000)
+
+
 def test_samples_enclose_every_scan(recording):
     for lidar in LIDARS:
         sequence = McapSequence(recording, lidar)
