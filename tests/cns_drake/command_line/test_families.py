@@ -13,6 +13,9 @@ from evaluation.command_line.cli import app as evaluation_app
 
 pytestmark = pytest.mark.slow
 
+# Members and their control have them; the drive that asks has none.
+RIDE, IMU = {"roughness": "C"}, {"rate": 100}
+
 
 def run(program, *arguments):
     result = CliRunner().invoke(program, [str(a) for a in arguments])
@@ -41,12 +44,11 @@ def test_simulated_and_recorded_families_agree(tmp_path):
         }
         (town / f"sequence_{stage}.yaml").write_text(yaml.safe_dump(drive))
         if stage == "01":
-            drive["stage"] = "02"
+            drive |= {"stage": "02", "ride": RIDE, "imu": IMU}
             (town / "unchanged.yaml").write_text(yaml.safe_dump(drive))
     family = tmp_path / "family.yaml"
-    family.write_text(
-        yaml.safe_dump({"base": "town/sequence_01.yaml", "missing": [0.0, 0.5]})
-    )
+    values = {"base": "town/sequence_01.yaml", "missing": [0.0, 0.5]}
+    family.write_text(yaml.safe_dump(values | {"ride": RIDE, "imu": IMU}))
     recorded, simulated = tmp_path / "recorded", tmp_path / "simulated"
     asking = town / "sequence_02.yaml"
     varied = "--vary", family
