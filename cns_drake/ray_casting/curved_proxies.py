@@ -96,7 +96,7 @@ class NearCurvedShapes:
         """
         result = np.zeros(len(p_OSset), bool)
         if len(self._rows) and len(p_OSset):
-            low, high = p_OSset.min(axis=0), p_OSset.max(axis=0)
+            low, high = _find_box(p_OSset)
             if (
                 self._near is None
                 or (low < self._box[0]).any()
@@ -181,6 +181,17 @@ class _Sorted(NamedTuple):
     radii: np.ndarray
     begins: np.ndarray
     width: float
+
+
+@compiled
+def _find_box(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the least and the greatest coordinates of (K, 3) places."""
+    low, high = places[0].copy(), places[0].copy()
+    for i in range(1, len(places)):
+        for axis in range(3):
+            low[axis] = min(low[axis], places[i, axis])
+            high[axis] = max(high[axis], places[i, axis])
+    return low, high
 
 
 @compiled

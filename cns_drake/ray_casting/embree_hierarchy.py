@@ -111,10 +111,8 @@ class EmbreeHierarchy:
         error = self._lib.rtcGetDeviceError(self._device)
         if error:
             raise MemoryError(f"Embree cannot build the scene: error {error}")
-        # Rows of groups in the order of `Tree.first_primitive`; the last entry
-        # serves a miss, -1.
+        # Rows of groups in the order of `Tree.first_primitive`.
         rows = [fixed[0] if fixed else -1, *moving]
-        self._rows = np.array([*rows, -1], np.int32)
         self._arguments = embree.IntersectArguments(
             embree.COHERENT_RAYS, embree.INVALID_ID
         )
@@ -129,6 +127,7 @@ class EmbreeHierarchy:
                 [self._built.get(row, nothing).owners for row in rows]
             ),
             np.array([row not in copies for row in rows], np.int64),
+            np.array(rows, np.int32),
         )
 
     @property
@@ -207,7 +206,7 @@ class EmbreeHierarchy:
             with_normals: whether to return normals.
         """
         num_rays = len(rays.d_Sset)
-        hits = Hits.misses(num_rays, with_normals)
+        hits = Hits.room_for(num_rays, with_normals)
         parts = min(self._num_threads, -(-num_rays // BLOCK))
 
         def cast(part: int) -> None:
@@ -218,7 +217,7 @@ class EmbreeHierarchy:
             cast(0)
         for other in others:
             other.result()
-        return hits._replace(group=self._rows.take(hits.group))
+        return hits
 
     def _new_scene(self) -> int:
         scene = self._lib.rtcNewScene(self._device)

@@ -35,6 +35,8 @@ class Tree(NamedTuple):
         owner_of_primitive: (P,) int32.
         steps: (1 + I,) int64, from one primitive to the next in
             `owner_of_primitive`: 1, or 0 where all have the same owner.
+        groups: (1 + I,) int32 row of the group of the fixed scene and of each
+            instance.
     """
 
     intersect16: int
@@ -44,6 +46,7 @@ class Tree(NamedTuple):
     first_primitive: np.ndarray
     owner_of_primitive: np.ndarray
     steps: np.ndarray
+    groups: np.ndarray
 
 
 @intrinsic  # type: ignore[untyped-decorator]  # numba has no hints.
@@ -79,8 +82,7 @@ def cast_packets(
         tree: a `Tree`.
         mask: the geometries that rays can hit.
         rays: `Rays`.
-        hits: `Hits` to fill, so far all misses; the group is 0 in the fixed
-            scene and otherwise 1 + the number of the instance.
+        hits: `Hits` to fill.
         part, num_parts: select the blocks.
     """
     # A packet is an RTCRayHit16: 12 ray fields and 9 hit fields (10 with
@@ -157,6 +159,10 @@ def _cast_block(
             ray = begin + lane
             hit = packet_id[18, lane]
             if hit == INVALID_ID:
+                hits.ranges[ray] = np.inf
+                hits.owner[ray] = hits.group[ray] = -1
+                for axis in range(hits.normals.shape[1]):
+                    hits.normals[ray, axis] = 0.0
                 continue
             hits.ranges[ray] = packet[8, lane]
             instance = packet_id[19, lane]
@@ -164,6 +170,6 @@ def _cast_block(
             primitive = np.int64(packet_id[17, lane]) * tree.steps[row]
             primitive += tree.first_primitive[row, hit]
             hits.owner[ray] = tree.owner_of_primitive[primitive]
-            hits.group[ray] = row
+            hits.group[ray] = tree.groups[row]
             for axis in range(hits.normals.shape[1]):
                 hits.normals[ray, axis] = packet[12 + axis, lane]

@@ -14,6 +14,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
+from cns_drake.base.compiled import compiled
 from cns_drake.ray_casting.curved_proxies import NearCurvedShapes
 from cns_drake.ray_casting.embree_hierarchy import EmbreeHierarchy
 from cns_drake.ray_casting.embree_primitives import (
@@ -75,11 +76,8 @@ class EmbreeScene:
             return hits
         is_near = self._near_fixed.contain(rays.p_OSset)
         is_near |= self._near_moving.contain(rays.p_OSset)
-        is_unsure = hits.owner == PROXY_OWNER
-        if is_near.any():
-            turns = len(rays.d_Sset) // len(is_near)
-            is_unsure |= np.tile(is_near, turns)
-        again = np.flatnonzero(is_unsure)
+        again = np.empty(len(hits.owner), np.int64)
+        again = again[: _find_unsure(hits.owner, is_near, again)]
         if len(again):
             rest = rays.select(again, rays.max_ranges_of(again))
             on_curved = self._curved.cast(rest, with_normals=with_normals)
@@ -97,3 +95,23 @@ class EmbreeScene:
                 curved[is_flat] = flat[is_flat]
                 result[again] = curved
         return hits
+
+
+@compiled
+def _find_unsure(
+    owner: np.ndarray, is_near: np.ndarray, rows: np.ndarray
+) -> int:
+    """Fills in the rays that may meet curved shapes; returns how many.
+
+    Args:
+        owner: (N,) of what each has met in the hierarchy of triangles.
+        is_near: (K,) whether the origins, taken in turn, are near a shape.
+        rows: (N,) to fill.
+    """
+    count, origin = 0, -1
+    for ray in range(len(owner)):
+        origin = origin + 1 if origin + 1 < len(is_near) else 0
+        if owner[ray] == PROXY_OWNER or is_near[origin]:
+            rows[count] = ray
+            count += 1
+    return count

@@ -118,6 +118,7 @@ class RayCastingScene:
             solid, num_threads, None if previous is None else previous._scene
         )
         self._moving = MovingGroups(self._groups, self._p_WO)
+        self._normal_maps: np.ndarray | None = None
 
     def set_frame_poses(
         self,
@@ -137,6 +138,7 @@ class RayCastingScene:
         placed = self._moving.place(calc_X_WF, motions, known, seen)
         if placed:
             self._scene.place(placed)
+            self._normal_maps = None
 
     def cast_rays(
         self,
@@ -204,21 +206,28 @@ class RayCastingScene:
             (N,) whether each ray has met the outside of a surface.
         """
         is_outside = np.zeros(len(hits.group), bool)
-        turns = [
-            np.eye(3) if group.is_merged_world else group.X_OL[:, :3]
-            for group in self._groups
-        ]
-        # Normals transform by the inverse transpose.
-        maps = np.linalg.inv(np.reshape(turns, (-1, 3, 3)))
+        if self._normal_maps is None:
+            self._normal_maps = _map_normals(self._groups)
         face_origins(
             hits.normals,
             hits.group,
-            np.ascontiguousarray(maps.transpose(0, 2, 1)),
+            self._normal_maps,
             rays.R_OSset,
             rays.d_Sset,
             is_outside,
         )
         return is_outside
+
+
+def _map_normals(groups: Sequence[RayGroup]) -> np.ndarray:
+    """Returns what takes normals from each group's frame to O, (G, 3, 3)."""
+    turns = [
+        np.eye(3) if group.is_merged_world else group.X_OL[:, :3]
+        for group in groups
+    ]
+    # Normals transform by the inverse transpose.
+    maps = np.linalg.inv(np.reshape(turns, (-1, 3, 3)))
+    return np.ascontiguousarray(maps.transpose(0, 2, 1))
 
 
 def _assign_slots(

@@ -195,8 +195,16 @@ class CalibratedReturns:
         )
         rest = np.ones(len(turn.beam))
         meet_sides(sides, side_met, met, rest)
-        light, ways, ways_met = start_ways(
-            turn.beam, p_WSset, times, rest, met, sides, side_met, materials
+        axes, at_sides, ways, ways_met = start_ways(
+            turn.beam,
+            turn.orders[1],
+            p_WSset,
+            times,
+            rest,
+            met,
+            sides,
+            side_met,
+            materials,
         )
         followed = follow(
             key,
@@ -209,7 +217,8 @@ class CalibratedReturns:
             cast,
         )
         return report_echoes(
-            Light.sorted([light, *followed]),
+            axes,
+            Light.sorted([at_sides, *followed]),
             self._receiver(pattern),
             key,
             len(turn.beam),
@@ -222,8 +231,9 @@ class CalibratedTurn:
     Attributes:
         d_Sset: (N, 3) directions in the order of casting.
         beam: (N,) number of each beam, in firing order.
-        orders: (2, N) two orders in which neighbours follow each other: of
-            casting, and of firing.
+        orders: (2, N) orders of the rays in which neighbours follow each
+            other: that of casting, and that of firing, which has the row of
+            each beam.
     """
 
     def __init__(self, beams: Beams):

@@ -13,6 +13,7 @@ from cns_drake.sensors.returns.echo_choice import Echoes
 from cns_drake.sensors.returns.light import Light
 from cns_drake.sensors.returns.link_budget import (
     CERTAIN_SNR,
+    HOPELESS_SNR,
     LinkBudget,
     detection_probability,
     echo_energy,
@@ -86,7 +87,8 @@ def choice_of(echoes: Echoes) -> int:
 
 
 def report_echoes(
-    light: Light,
+    axes: Light,
+    others: Light,
     receiver: Receiver,
     key: np.uint64,
     num_beams: int,
@@ -98,7 +100,8 @@ def report_echoes(
     has the standard deviation that belongs to that.
 
     Args:
-        light: sorted.
+        axes: light sorted by beam, at most one part for each.
+        others: more light, sorted.
         receiver: of the unit.
         key: of the frame; see `frame_key`.
         num_beams: of the turn.
@@ -110,13 +113,14 @@ def report_echoes(
         np.zeros(most, np.float32),
         np.zeros(most, np.int32),
     )
-    count = _report(light, receiver, key, num_beams, reported)
+    count = _report(axes, others, receiver, key, num_beams, reported)
     return Reported(*(values[:count] for values in reported))
 
 
 @compiled
 def _report(
-    light: Light,
+    axes: Light,
+    others: Light,
     receiver: Receiver,
     key: np.uint64,
     num_beams: int,
@@ -125,105 +129,165 @@ def _report(
     """Fills in the reported points; returns their number."""
     echo = np.zeros((_MOST_ECHOES + _MOST_DROPS + 1, 3))
     source = np.zeros(len(echo), np.int32)
-    budget, extinction = receiver.budget, receiver.extinction
+    # All parts of the light of one beam: distance and energy, and from where.
+    most = _longest_run(others.beam) + 1
+    light, origin = np.zeros((most, 2)), np.zeros(most, np.int32)
     table = receiver.scattering
     is_clear = len(table.distances) == 0
     is_fog = not is_clear and table.fog_energies[-1] > 0.0
-    count, part = 0, 0
+    all_drops = 0.0 if is_clear else table.counts[-1]
+    budget, extinction = receiver.budget, receiver.extinction
+    min_range, max_range = receiver.min_range, receiver.max_range
+    resolution, choice = receiver.resolution, receiver.choice
+    retro_from = receiver.retro_from
+    # As names of their own, fields are fast.
+    axis_beam, other_beam = axes.beam, others.beam
+    axis_distance, other_distance = axes.distance, others.distance
+    axis_energy, other_energy = axes.energy, others.energy
+    axis_geometry, other_geometry = axes.geometry, others.geometry
+    to_beam, to_distance = reported.beam, reported.distance
+    to_intensity, to_geometry = reported.intensity, reported.geometry
+    count, axis, other = 0, 0, 0
     for beam in range(num_beams):
-        first = part
-        while part < len(light.beam) and light.beam[part] == beam:
-            part += 1
+        first_axis, first_other = axis, other
+        if axis < len(axis_beam) and axis_beam[axis] == beam:
+            axis += 1
+        while other < len(other_beam) and other_beam[other] == beam:
+            other += 1
         is_alone = is_clear
         if not is_clear and not is_fog:
             # The first drop is beyond the farthest end of a beam.
             arrived = -np.log(1.0 - uniform(key, beam, _FIRST_DROP_DRAW))
-            is_alone = arrived >= table.counts[-1]
-        if is_alone and part - first <= 1:
+            is_alone = arrived >= all_drops
+        if is_alone and axis - first_axis + other - first_other <= 1:
             # Most beams have at most a single echo.
-            if part == first:
+            if axis > first_axis:
+                distance = axis_distance[first_axis]
+                energy = axis_energy[first_axis]
+                geometry = axis_geometry[first_axis]
+            elif other > first_other:
+                distance = other_distance[first_other]
+                energy = other_energy[first_other]
+                geometry = other_geometry[first_other]
+            else:
                 continue
-            distance = light.distance[first]
-            if not receiver.min_range <= distance <= receiver.max_range:
+            if not min_range <= distance <= max_range:
                 continue
-            energy = light.energy[first]
             snr = target_snr(budget, extinction, energy, distance)
             if not _is_detected(key, beam, _FIRST_ECHO_DRAW, snr):
                 continue
             if extinction > 0.0:
                 energy *= np.exp(-2.0 * extinction * distance)
-            reported.beam[count] = beam
-            reported.distance[count] = _measured(
+            to_beam[count] = beam
+            to_distance[count] = _measured(
                 budget,
-                receiver.min_range,
-                receiver.max_range,
+                min_range,
+                max_range,
                 key,
                 beam,
                 _FIRST_ECHO_DRAW,
                 distance,
                 snr,
             )
-            reported.intensity[count] = _intensity(receiver.retro_from, energy)
-            reported.geometry[count] = light.geometry[first]
+            to_intensity[count] = _intensity(retro_from, energy)
+            to_geometry[count] = geometry
             count += 1
             continue
-        size = _merge(light, first, part, receiver, echo, source)
-        size = _scatter(receiver, key, beam, echo, source, size)
-        size = _detect(receiver, key, beam, echo, source, size)
-        if size == 0:
+        number = 0
+        while first_axis < axis or first_other < other:
+            if first_axis < axis and (
+                first_other == other
+                or axis_distance[first_axis] <= other_distance[first_other]
+            ):
+                light[number, 0] = axis_distance[first_axis]
+                light[number, 1] = axis_energy[first_axis]
+                origin[number] = axis_geometry[first_axis]
+                first_axis += 1
+            else:
+                light[number, 0] = other_distance[first_other]
+                light[number, 1] = other_energy[first_other]
+                origin[number] = other_geometry[first_other]
+                first_other += 1
+            number += 1
+        size = _merge(
+            light, origin, number, budget, extinction, resolution, echo, source
+        )
+        if not is_clear:
+            size = _scatter(receiver, key, beam, echo, source, size)
+        size = _detect(
+            budget, min_range, max_range, key, beam, echo, source, size
+        )
+        if size == 0 and is_fog:
             # A unit reports the broad echo of fog only without any other.
-            size = _add_fog(light, first, part, receiver, key, beam, echo)
+            nearest = light[0, 0] if number > 0 else math.inf
+            size = _add_fog(receiver, key, beam, nearest, echo)
             source[0] = SCATTERED
-            size = _detect(receiver, key, beam, echo, source, size)
+            size = _detect(
+                budget, min_range, max_range, key, beam, echo, source, size
+            )
         if size == 0:
             continue
-        best, nearest, farthest = 0, 0, 0
+        best, first, farthest = 0, 0, 0
         for i in range(1, size):
             if echo[i, 1] > echo[best, 1]:
                 best = i
-            if echo[i, 0] < echo[nearest, 0]:
-                nearest = i
+            if echo[i, 0] < echo[first, 0]:
+                first = i
             if echo[i, 0] > echo[farthest, 0]:
                 farthest = i
-        if receiver.choice == _FIRST:
-            best = nearest
-        elif receiver.choice == _LAST:
+        if choice == _FIRST:
+            best = first
+        elif choice == _LAST:
             best = farthest
-        count = _write(
-            receiver, beam, echo[best], source[best], reported, count
-        )
-        if receiver.choice == _DUAL and size > 1:
+        to_beam[count] = beam
+        to_distance[count] = echo[best, 0]
+        to_intensity[count] = _intensity(retro_from, echo[best, 2])
+        to_geometry[count] = source[best]
+        count += 1
+        if choice == _DUAL and size > 1:
             # The last one as well, or the second strongest if the last is the
             # strongest.
-            other = farthest
-            if other == best:
-                other = 0 if best != 0 else 1
+            second = farthest
+            if second == best:
+                second = 0 if best != 0 else 1
                 for i in range(size):
-                    if i != best and echo[i, 1] > echo[other, 1]:
-                        other = i
-            count = _write(
-                receiver, beam, echo[other], source[other], reported, count
-            )
+                    if i != best and echo[i, 1] > echo[second, 1]:
+                        second = i
+            to_beam[count] = beam
+            to_distance[count] = echo[second, 0]
+            to_intensity[count] = _intensity(retro_from, echo[second, 2])
+            to_geometry[count] = source[second]
+            count += 1
     return count
 
 
 @compiled
+def _longest_run(numbers: np.ndarray) -> int:
+    """Returns how many equal numbers follow each other at most."""
+    longest, length = 0, 0
+    for i in range(len(numbers)):
+        length = length + 1 if i and numbers[i] == numbers[i - 1] else 1
+        longest = max(longest, length)
+    return longest
+
+
+@compiled
 def _merge(
-    light: Light,
-    first: int,
-    last: int,
-    receiver: Receiver,
+    light: np.ndarray,
+    origin: np.ndarray,
+    number: int,
+    budget: LinkBudget,
+    extinction: float,
+    resolution: float,
     echo: np.ndarray,
     source: np.ndarray,
 ) -> int:
     """Fills in distance and SNR of each echo; returns their number."""
     size, begin, most = -1, -math.inf, 0.0
-    for part in range(first, last):
-        distance = light.distance[part]
-        snr = target_snr(
-            receiver.budget, receiver.extinction, light.energy[part], distance
-        )
-        if distance - begin > receiver.resolution:
+    for part in range(number):
+        distance = light[part, 0]
+        snr = target_snr(budget, extinction, light[part, 1], distance)
+        if distance - begin > resolution:
             if size + 1 == _MOST_ECHOES:
                 break
             size += 1
@@ -234,7 +298,7 @@ def _merge(
         echo[size, 1] += snr
         if snr > most:
             most = snr
-            source[size] = light.geometry[part]
+            source[size] = origin[part]
     for i in range(size + 1):
         if echo[i, 1] > 0.0:
             echo[i, 0] /= echo[i, 1]
@@ -252,7 +316,8 @@ def _scatter(
 ) -> int:
     """Adds echoes of the weather; returns the number of echoes."""
     table = receiver.scattering
-    if len(table.distances) == 0:
+    # Fog alone has no drops.
+    if table.counts[-1] == 0.0:
         return size
     # No drop is beyond the end of the beam.
     end = receiver.max_range
@@ -288,21 +353,23 @@ def _scatter(
 
 @compiled
 def _add_fog(
-    light: Light,
-    first: int,
-    last: int,
     receiver: Receiver,
     key: np.uint64,
     beam: int,
+    nearest: float,
     echo: np.ndarray,
 ) -> int:
-    """Fills in the echo of fog, if any; returns the number of echoes."""
+    """Fills in the echo of fog, unless something is nearer; returns how many.
+
+    Args:
+        receiver, key, beam: see `report_echoes`.
+        nearest: distance of the nearest light [m].
+        echo: to fill.
+    """
     table = receiver.scattering
-    if len(table.distances) == 0 or table.fog_energies[-1] == 0.0:
-        return 0
     share = uniform(key, beam, _FIRST_DROP_DRAW + 2 * _MOST_DROPS)
     distance = interpolate(share, table.fog_counts, table.distances)
-    if first < last and light.distance[first] < distance:
+    if nearest < distance:
         return 0
     energy = interpolate(distance, table.distances, table.fog_energies)
     echo[0, 0] = distance
@@ -328,7 +395,9 @@ def interpolate(x: float, xs: np.ndarray, ys: np.ndarray) -> float:
 
 @compiled
 def _detect(
-    receiver: Receiver,
+    budget: LinkBudget,
+    min_range: float,
+    max_range: float,
     key: np.uint64,
     beam: int,
     echo: np.ndarray,
@@ -344,21 +413,21 @@ def _detect(
         echo[i, 2] = 0.0
         if not is_sure and not _is_detected(key, beam, draw, snr):
             continue
-        # The true range decides, not the one with error.
-        if not receiver.min_range <= echo[i, 0] <= receiver.max_range:
+        # Where a surface lies decides; an error of its range does not.
+        if not min_range <= echo[i, 0] <= max_range:
             continue
         distance = _measured(
-            receiver.budget,
-            receiver.min_range,
-            receiver.max_range,
+            budget,
+            min_range,
+            max_range,
             key,
             beam,
             draw,
             echo[i, 0],
             snr,
         )
-        # Intensity is corrected by the true distance; the error is negligible.
-        energy = echo_energy(receiver.budget, snr, echo[i, 0])
+        # The unit corrects for the true distance; the error is too small.
+        energy = echo_energy(budget, snr, echo[i, 0])
         echo[kept, 0], echo[kept, 1] = distance, snr
         echo[kept, 2] = energy
         source[kept] = source[i]
@@ -372,6 +441,8 @@ def _detect(
 def _is_detected(key: np.uint64, beam: int, draw: int, snr: float) -> bool:
     if snr > CERTAIN_SNR:
         return True
+    if snr < HOPELESS_SNR:
+        return False
     return uniform(key, beam, draw) < detection_probability(snr)
 
 
@@ -389,22 +460,6 @@ def _measured(
     """Returns the distance with its error."""
     distance += range_deviation(budget, snr) * normal(key, beam, draw + 1)
     return min(max(distance, min_range), max_range)
-
-
-@compiled
-def _write(
-    receiver: Receiver,
-    beam: int,
-    echo: np.ndarray,
-    source: int,
-    reported: Reported,
-    count: int,
-) -> int:
-    reported.beam[count] = beam
-    reported.distance[count] = echo[0]
-    reported.intensity[count] = _intensity(receiver.retro_from, echo[2])
-    reported.geometry[count] = source
-    return count + 1
 
 
 @compiled

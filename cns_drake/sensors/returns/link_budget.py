@@ -27,6 +27,8 @@ from cns_drake.base.compiled import compiled
 THRESHOLD_SNR = 9.0
 # Above it an echo is missed less than once in 10^13 times.
 CERTAIN_SNR = 81.0
+# Below it the probability of detection is 0 in double precision.
+HOPELESS_SNR = 0.9
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from cns_drake.sensors.returns.propagation import Ways, add_light
 
 def start_ways(
     beam: np.ndarray,
+    row_of_beam: np.ndarray,
     p_WSset: np.ndarray,
     times: np.ndarray,
     rest: np.ndarray,
@@ -21,11 +22,12 @@ def start_ways(
     sides: Sides,
     side_met: Met,
     materials: Materials,
-) -> tuple[Light, Ways, Met]:
-    """Returns the light of opaque surfaces, and the rays that meet others.
+) -> tuple[Light, Light, Ways, Met]:
+    """Returns what opaque surfaces send back, and the rays that meet others.
 
     Args:
         beam: (N,) number of each beam.
+        row_of_beam: (N,) the inverse of that.
         p_WSset: (K, 3) positions of S, taken in turn.
         times: (T,) parts of the turn, taken in turn.
         rest: (N,) part of the light that its axis represents.
@@ -35,14 +37,17 @@ def start_ways(
         materials: of all geometries.
 
     Returns:
-        The light, the rays that meet panes or leaves, and their hits.
+        The light along the axes of beams, at most one part for each beam and
+        sorted by it, the light along rays at their sides, the rays that meet
+        panes or leaves, and what they meet.
     """
-    is_open = np.isin(materials.kind, (GLASS, LEAVES))
-    light = Light.room_for(len(beam) + len(sides.ray))
+    is_open = (materials.kind == GLASS) | (materials.kind == LEAVES)
+    axes, others = Light.room_for(len(beam)), Light.room_for(len(sides.ray))
     count = _count(is_open, met.geometry) + _count(is_open, side_met.geometry)
     ways_met = Met.room_for(count)
     ways = Ways.room_for(count)._replace(d_Wset=ways_met.d_Wset)
-    num_parts, num_ways = _start_ways(
+    num_axes = _light_axes(row_of_beam, rest, met, materials, is_open, axes)
+    num_others, num_ways = _start_ways(
         beam,
         p_WSset,
         times,
@@ -52,12 +57,13 @@ def start_ways(
         side_met,
         materials,
         is_open,
-        light,
+        others,
         ways,
         ways_met,
     )
     return (
-        light.first(num_parts),
+        axes.first(num_axes),
+        others.first(num_others),
         ways.first(num_ways),
         ways_met.first(num_ways),
     )
@@ -70,6 +76,36 @@ def _count(is_open: np.ndarray, geometry: np.ndarray) -> int:
         if one >= 0 and is_open[one]:
             count += 1
     return count
+
+
+@compiled
+def _light_axes(
+    row_of_beam: np.ndarray,
+    rest: np.ndarray,
+    met: Met,
+    materials: Materials,
+    is_open: np.ndarray,
+    light: Light,
+) -> int:
+    """Fills in what comes back along axes of beams; returns how much."""
+    num_parts = 0
+    for beam in range(len(row_of_beam)):
+        row = row_of_beam[beam]
+        geometry = met.geometry[row]
+        if geometry < 0 or rest[row] <= 0.0 or is_open[geometry]:
+            continue
+        add_light(
+            light,
+            num_parts,
+            beam,
+            met.ranges[row],
+            materials,
+            geometry,
+            met.cosine[row],
+            rest[row],
+        )
+        num_parts += 1
+    return num_parts
 
 
 @compiled
@@ -87,28 +123,15 @@ def _start_ways(
     ways: Ways,
     ways_met: Met,
 ) -> tuple[int, int]:
-    """Fills in returning light and continued rays; returns their numbers."""
+    """Fills in what else comes back, and what goes on; returns how many."""
     num_parts, num_ways = 0, 0
     for row in range(len(beam)):
         geometry = met.geometry[row]
-        if geometry < 0 or rest[row] <= 0.0:
+        if geometry < 0 or rest[row] <= 0.0 or not is_open[geometry]:
             continue
-        if is_open[geometry]:
-            copy_hit(met, row, ways_met, num_ways)
-            _start(ways, num_ways, beam, row, 0, p_WSset, times, rest[row])
-            num_ways += 1
-        else:
-            add_light(
-                light,
-                num_parts,
-                beam[row],
-                met.ranges[row],
-                materials,
-                geometry,
-                met.cosine[row],
-                rest[row],
-            )
-            num_parts += 1
+        copy_hit(met, row, ways_met, num_ways)
+        _start(ways, num_ways, beam, row, 0, p_WSset, times, rest[row])
+        num_ways += 1
     for side in range(len(sides.ray)):
         geometry, row = side_met.geometry[side], sides.ray[side]
         if geometry < 0:
