@@ -59,7 +59,7 @@ def plan_scenario_traffic(
     wanted = scenario.traffic
     where = f"{scenario.source}: traffic"
     check_files(scenario)
-    graph, walkways = _load_ways(map_folder(scenario))
+    graph, walkways = load_ways(map_folder(scenario))
 
     def ego(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         R_WB, p_WB = trajectory.poses(np.minimum(t, trajectory.duration))
@@ -95,8 +95,12 @@ def plan_scenario_traffic(
     return plan
 
 
-def _load_ways(folder: MapFolder) -> tuple[LaneGraph, list[Walkway]]:
-    """Returns lanes and walkways of a map."""
+def load_ways(folder: MapFolder) -> tuple[LaneGraph, list[Walkway]]:
+    """Returns what vehicles and walkers follow on a map.
+
+    Raises:
+        InputError: the map has neither roads nor lanes.
+    """
     if not folder.roads.is_file():
         return read_lanes(folder.lanes)
     network = load_road_network(folder.roads)

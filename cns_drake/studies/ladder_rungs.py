@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from cns_drake.base.jobs.fingerprint import fingerprint
-from cns_drake.roads.network import load_road_network
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder
+from cns_drake.simulation.scenario_traffic import load_ways
 from cns_drake.studies.ladder_causes import (
     ALL,
     CAUSES,
@@ -22,7 +22,6 @@ from cns_drake.studies.ladder_causes import (
     in_words,
     plain_drives,
 )
-from cns_drake.traffic.road_lanes import make_lane_graph
 from cns_drake.traffic.starting_places import room_for_vehicles
 
 # Greatest share of the roads' room for traffic: the car needs some, too.
@@ -146,8 +145,8 @@ def _known_strengths(
     known["construction"] = _stage_levels(before)
     if not before:
         notes.append(f"no stage before {scenario.stage}: no construction")
-    if folder.roads.is_file():
-        graph = make_lane_graph(load_road_network(folder.roads))
+    if folder.roads.is_file() or folder.lanes.is_file():
+        graph, _ = load_ways(folder)
         room = int(_MOST_ROOM * room_for_vehicles(graph))
         known["traffic"] = {
             level: min(number, room)
@@ -155,7 +154,7 @@ def _known_strengths(
         }
     else:
         del known["traffic"]
-        notes.append("no roads.yaml: no traffic")
+        notes.append("neither roads.yaml nor lanes.json: no traffic")
     known["size"] = {
         level: number
         for level, number in known["size"].items()

@@ -4,11 +4,16 @@ from helpers.small_map import scenario_values
 import numpy as np
 from pydrake.math import RigidTransform
 import pytest
+from scipy.special import lambertw
 
 from cns_drake.recording.frame_clock import FRAME_PERIOD
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_loading import make_scenario
 from cns_drake.scenarios.sensor_making import make_pattern, sensor_pose
+from cns_drake.scenarios.weather_config import WeatherConfig
+from cns_drake.scene.semantics import CLASS_IDS
+from cns_drake.sensors.returns.link_budget import HOPELESS_SNR
+from cns_drake.sensors.returns.unit_sheets import UNIT_SHEETS
 from cns_drake.simulation.simulation import simulate
 from cns_drake.simulation.stage_loading import load_stage
 from cns_drake.simulation.station import make_station
@@ -256,3 +261,32 @@ def test_swept_pose_is_where_the_vehicle_is(small_map):
         X_WB = trajectory.pose(time)
         found = RigidTransform(np.vstack([np.c_[R[k], p[k]], [0, 0, 0, 1]]))
         assert found.IsNearlyEqualTo(X_WB, 1e-12)
+
+
+def test_all_lidars_feel_the_same_weather(small_map):
+    """In fog, each of two units sees no farther than the fog lets it."""
+    units = {
+        "front": {"preset": "vlp-16", "columns": 128},
+        "back": {"preset": "os1-32", "columns": 128},
+    }
+    scenario = scenario_of(small_map, **units)
+    visibility = 20.0
+    clear, foggy = (
+        scans_at(scenario.with_returns("calibrated", weather), BEND_FRAME)
+        for weather in (None, WeatherConfig(visibility=visibility))
+    )
+    scattered = CLASS_IDS["outlier"]
+    alpha = np.log(20.0) / visibility
+    for name, unit in units.items():
+        # What a white target that faces the unit is seen at in clear air,
+        # where even the SNR of the least part of echoes suffices.
+        budget = UNIT_SHEETS[unit["preset"]].budget
+        reach = np.sqrt(budget.scale / HOPELESS_SNR)
+        farthest = lambertw(alpha * reach).real / alpha
+        r_clear, r_foggy = (
+            np.linalg.norm(positions(scans[name]), axis=1)
+            for scans in (clear, foggy)
+        )
+        assert r_clear.max() > farthest > r_foggy.max() > 5.0
+        assert not np.any(clear[name]["label"] == scattered)
+        assert np.any(foggy[name]["label"] == scattered)
