@@ -11,13 +11,16 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs.cluster import Cluster
+from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.simulation.scenario_traffic import load_ways
 from cns_drake.simulation.simulated_drive import SimulatedDrive
 from cns_drake.studies import distractors, ladder
 from cns_drake.studies.distractors import distracting_drives
 from cns_drake.studies.ladder import climb_ladder
 from cns_drake.studies.ladder_causes import CAUSES, STRENGTHS
 from cns_drake.studies.ladder_rungs import Extent, plan_rungs
+from cns_drake.traffic.lane_file import lane_text
 from evaluation.study.chosen_methods import MethodChoice
 
 METHODS = (MethodChoice("solid"), MethodChoice("layered-overlap"))
@@ -62,6 +65,26 @@ def differences(one, other):
         for name in type(one).model_fields
         if getattr(one, name) != getattr(other, name)
     }
+
+
+def test_traffic_climbs_on_imported_lanes(town, tmp_path):
+    """A map whose lanes are in lanes.json has the rungs of its roads.yaml."""
+    extent = Extent(causes=("traffic",))
+    folder = Path(shutil.copytree(town, tmp_path / "imported"))
+    asking = load_scenario(folder / "sequence_04.yaml")
+    graph, walkways = load_ways(map_folder(asking))
+    before, _ = plan_rungs(asking, extent)
+    (folder / "lanes.json").write_text(lane_text(graph, walkways))
+    (folder / "roads.yaml").unlink()
+    after, notes = plan_rungs(asking, extent)
+    wanted = [rung.drives.query.traffic for rung in after]
+    assert wanted == [rung.drives.query.traffic for rung in before]
+    assert max(traffic.vehicles for traffic in wanted) > 0
+    assert not [note for note in notes if "traffic" in note]
+    (folder / "lanes.json").unlink()
+    bare, notes = plan_rungs(asking, extent)
+    assert [rung.cause for rung in bare] == ["none"]
+    assert "neither roads.yaml nor lanes.json: no traffic" in notes
 
 
 def test_one_cause_changes_one_drive(asking):
