@@ -35,7 +35,7 @@ _GRID = 0.001
 class SkyCover:
     """What keeps snow off the ground below it.
 
-    Ground within closed walls does not count: nobody sees what lies there.
+    Ground within closed walls does not count, since no beam gets there.
 
     Attributes:
         area: below roofs and decks, seen from above [m].
@@ -70,7 +70,7 @@ class SkyCover:
         self._heights = corners[:, :, 2].mean(axis=1)
 
     def lies_over(self, corners: np.ndarray) -> np.ndarray:
-        """Tells which triangles (M, 3, 3) lie below it by their middles."""
+        """Returns which triangles (M, 3, 3) have their middles below it."""
         middles = corners.mean(axis=1)
         covered = np.zeros(len(corners), bool)
         row, index = self._tree.query(
@@ -81,7 +81,7 @@ class SkyCover:
         return covered & shapely.intersects_xy(self.area, middles[:, :2])
 
     def meets(self, corners: np.ndarray) -> np.ndarray:
-        """Tells which triangles (M, 3, 3) may lie below it in part."""
+        """Returns which triangles (M, 3, 3) may lie below it in part."""
         areas = from_above(corners)
         met = np.zeros(len(corners), bool)
         row, index = self._tree.query(areas, "intersects")

@@ -32,7 +32,7 @@ _LEAST_AREA = 0.3
 _BARE = frozenset(
     {"vegetation", "trunk", "pole", "traffic-sign", "fence", "bicycle", "road"}
 )
-# Of triangles at the edge of a cleared road or a roof, the longest side [m].
+# Longest side of triangles at the edge of a cleared road or a roof [m].
 _FINE = 0.7
 # A bank along a kerb: its reach to both sides as a multiple of its height, its
 # greatest height in depths of snow, and in [m].

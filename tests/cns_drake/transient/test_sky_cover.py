@@ -18,7 +18,7 @@ from cns_drake.transient.standing import read_standing
 
 DEPTH = 0.25
 DRIVE = shapely.LineString([(-18, 0), (18, 0)])
-# Of the roof, the bridge and the table: where, turned, and how large.
+# Poses of a roof, a bridge and a table, and their sizes.
 ROOF, BRIDGE, TABLE = (
     (9.0, 8.0, 3.1, 0.0, 0.0, 0.4),
     (-8.0, -9.0, 5.0, 0.0, 0.0, -0.2),
