@@ -233,7 +233,15 @@ def _read_objects(
 def _settle_axes(city: CityFile, vertices: np.ndarray) -> None:
     """Settles the order of coordinates, and counts assumptions."""
     defined = city.system
-    city.system = defined.as_used(vertices[len(vertices) // 2])
+    middle = vertices[len(vertices) // 2]
+    city.system = defined.as_used(middle)
+    if city.system == defined and defined.name:
+        first, second, _ = middle.tolist()
+        if not defined.has_place(first, second):
+            city.faults.add(
+                "coordinates beyond the area of their reference system",
+                defined.name,
+            )
     if city.system != defined:
         city.faults.add(
             "reference system with north first, but coordinates with east "

@@ -11,6 +11,7 @@ from pathlib import Path
 import re
 
 import numpy as np
+import shapely
 from shapely.geometry import LineString, Point
 
 from cns_drake.base.errors import InputError
@@ -29,6 +30,7 @@ from cns_drake.imports.osm_grounds import coasts_of, ground_areas, sea
 from cns_drake.imports.osm_lengths import length
 from cns_drake.imports.osm_places import Local, parts_of, sound_parts
 from cns_drake.imports.osm_reading import (
+    OsmArea,
     OsmFeatures,
     OsmWay,
     Tags,
@@ -80,11 +82,10 @@ def import_openstreetmap(
     buildings = list(standing_buildings(buildings, faults, dressed))
     if not buildings:
         raise InputError(f"{path}: the file has no buildings")
-    bounds = np.array([p.bounds for one in buildings for p in one.polygons])
-    low, high = bounds[:, :2].min(axis=0), bounds[:, 2:].max(axis=0)
+    low, high = _bounds(buildings)
     longitude, latitude = np.round((low + high) / 2.0, 6).tolist()
     local = Local(longitude, latitude)
-    size = local(np.array([high]))[0] - local(np.array([low]))[0]
+    size = local.metres(high - low)
     if size.max() > _LARGEST:
         raise InputError(
             f"{path}: {size.max() / 1000:.0f} km across; cut out a piece of at"
@@ -119,6 +120,19 @@ def import_openstreetmap(
             make_things(features.nodes, features.ways, features.kinds, local)
         ),
     )
+
+
+def _bounds(buildings: Iterable[OsmArea]) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the least and the greatest longitude and latitude (2,) [deg].
+
+    Across the 180th meridian longitudes go on beyond 180.
+    """
+    places = shapely.get_coordinates(
+        [polygon for one in buildings for polygon in one.polygons]
+    )
+    if np.ptp(places[:, 0]) > 180.0:
+        places[:, 0] %= 360.0
+    return places.min(axis=0), places.max(axis=0)
 
 
 def _count_unused(

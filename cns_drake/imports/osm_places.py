@@ -36,7 +36,14 @@ class Local:
         self._metres = np.radians(1.0) * np.array([east, north])
 
     def __call__(self, places: np.ndarray) -> np.ndarray:
-        return (places - self._origin) * self._metres
+        offset = places - self._origin
+        # The shorter way round, also across the 180th meridian.
+        offset[..., 0] -= 360.0 * np.rint(offset[..., 0] / 360.0)
+        return self.metres(offset)
+
+    def metres(self, offset: np.ndarray) -> np.ndarray:
+        """Returns a distance (..., 2) in degrees as one in metres."""
+        return np.asarray(offset * self._metres)
 
     def polygon(self, polygon: Polygon) -> Polygon:
         return shapely.transform(polygon, self)

@@ -73,30 +73,33 @@ class ReferenceSystem:
         """
         if not self.axes[0].startswith(("north", "south")):
             return self
-        system = pyproj.CRS.from_user_input(self.name)
-        area = system.area_of_use
-        to_degrees = pyproj.Transformer.from_crs(
-            system, "OGC:CRS84", always_xy=False
-        )
-
-        def is_inside(first: float, second: float) -> bool:
-            longitude, latitude = to_degrees.transform(first, second)
-            return area is not None and bool(
-                area.west - _NEAR_AREA_DEG
-                <= longitude
-                <= area.east + _NEAR_AREA_DEG
-                and area.south - _NEAR_AREA_DEG
-                <= latitude
-                <= area.north + _NEAR_AREA_DEG
-            )
-
-        first, second = float(point[0]), float(point[1])
-        if is_inside(first, second) or not is_inside(second, first):
+        first, second, _ = point.tolist()
+        if self.has_place(first, second) or not self.has_place(second, first):
             return self
         exchanged = np.array(self.matrix)[:, [1, 0, 2]]
         axes = (self.axes[1], self.axes[0], self.axes[2])
         return replace(
             self, axes=axes, matrix=tuple(map(tuple, exchanged.tolist()))
+        )
+
+    def has_place(self, first: float, second: float) -> bool:
+        """Tells whether coordinates, as defined, lie in the area of use.
+
+        A system that names none has none.
+        """
+        system = pyproj.CRS.from_user_input(self.name)
+        area = system.area_of_use
+        to_degrees = pyproj.Transformer.from_crs(
+            system, "OGC:CRS84", always_xy=False
+        )
+        longitude, latitude = to_degrees.transform(first, second)
+        return area is not None and bool(
+            area.west - _NEAR_AREA_DEG
+            <= longitude
+            <= area.east + _NEAR_AREA_DEG
+            and area.south - _NEAR_AREA_DEG
+            <= latitude
+            <= area.north + _NEAR_AREA_DEG
         )
 
 

@@ -11,6 +11,7 @@ import shapely
 from shapely.geometry import LineString, MultiLineString, MultiPoint, Point
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.city.furniture.parked_cars import PARKED_CARS
 from cns_drake.city.geometry.occupancy import Occupancy
 from cns_drake.city.geometry.polygons import placed
 from cns_drake.city.geometry.structures import Structure
@@ -205,6 +206,8 @@ class _Placing:
         ]
         empty = np.zeros((0, 3, 3))
         self._solids = UpperSides(np.concatenate([empty, *solids]))
+        roads = [one.triangles for one in structures if one.kind == "Road"]
+        self._roads = UpperSides(turned_up(np.concatenate([empty, *roads])))
         self._paved = UpperSides(turned_up(np.concatenate([empty, *paved])))
         self._taken = Occupancy()
         for one in structures:
@@ -226,8 +229,15 @@ class _Placing:
         yaw: float,
         rng: np.random.Generator,
     ) -> bool:
-        """Places an object, if there is room for it."""
+        """Places an object, if there is room for it.
+
+        Only cars stand on carriageways.
+        """
         builder = OBJECTS[kind]
+        at = np.array([xy])
+        is_car = kind in PARKED_CARS
+        if not is_car and np.isfinite(self._roads.heights(at)[0]):
+            return False
         model = without_curves(builder.build(rng))
         footprint = placed(model.footprint, xy, yaw)
         if (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from cns_drake.base.errors import InputError
@@ -24,6 +24,8 @@ from cns_drake.imports.foreign_city import ForeignCity, Imported
 from cns_drake.imports.import_ground import Ground
 from cns_drake.imports.staged_city import StagedCity
 from cns_drake.imports.waypoint_drives import Drive
+
+_TERRAIN = "TINRelief"
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,11 @@ class Dressing:
     def ground(self, bottom: Sequence[Structure]) -> list[Structure]:
         """Returns the guessed ground with its class and colour."""
         return [paved(one) if self.is_paved else one for one in bottom]
+
+
+def _is_told_ground(one: Imported) -> bool:
+    """Tells whether the file says what a ground is, beyond its height."""
+    return one.is_ground and one.kind != _TERRAIN
 
 
 def dress_city(
@@ -75,6 +82,12 @@ def dress_city(
     changed = dict(buildings.buildings)
     by_lot = Counter(buildings.by_lot)
     is_paved = is_dense(staged.kept)
+    if is_paved and not any(map(_is_told_ground, staged.kept)):
+        changed |= {
+            one: replace(one, structure=paved(one.structure))
+            for one in staged.kept
+            if one.kind == _TERRAIN
+        }
     added: list[Imported] = []
     if drives:
         walks = [one for one in staged.kept if one.kind == "Sidewalk"]

@@ -373,3 +373,17 @@ def test_parents_in_a_circle(tmp_path):
     city.box("b", 5, 0, (2, 2, 2), parents=["a"])
     _, found = structures(city.write(tmp_path / "city.json"))
     assert sum(volume(one) for one in found.values()) == pytest.approx(16.0)
+
+
+def test_coordinates_beyond_the_area_of_their_system_are_counted(tmp_path):
+    """A Dutch town said to lie in UTM zone 33, east of the Netherlands."""
+    for code, number in (("7415", 0), ("32633", 1)):
+        city = CityWriter()
+        city.metadata["referenceSystem"] = (
+            f"https://www.opengis.net/def/crs/EPSG/0/{code}"
+        )
+        city.box("house", 0.0, 0.0, (10.0, 10.0, 5.0))
+        found = read_cityjson(city.write(tmp_path / f"{code}.json"))
+        counts = {kind: count for kind, count, _ in found.faults.rows()}
+        kind = "coordinates beyond the area of their reference system"
+        assert counts.get(kind, 0) == number

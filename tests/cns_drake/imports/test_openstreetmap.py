@@ -251,6 +251,39 @@ def test_half_a_country_is_refused(tmp_path):
         import_openstreetmap(osm.write(tmp_path / "city.osm"), None)
 
 
+@pytest.mark.parametrize(
+    "houses",
+    [[(179.999, -16.8), (-179.999, -16.8)], [(13.0, 52.0), (13.002, 52.0)]],
+)
+def test_a_town_on_both_sides_of_the_180th_meridian(tmp_path, houses):
+    """Two houses 0.002 deg from each other lie as far apart as anywhere."""
+    nodes, ways = [], []
+    for k, (x, y) in enumerate(houses):
+        corners = [(0, 0), (2e-4, 0), (2e-4, 2e-4), (0, 2e-4)]
+        first = 10 * k + 1
+        nodes += [
+            f'<node id="{first + i}" version="1" lon="{x + dx:.6f}"'
+            f' lat="{y + dy:.6f}"/>'
+            for i, (dx, dy) in enumerate(corners)
+        ]
+        refs = "".join(f'<nd ref="{first + i}"/>' for i in (0, 1, 2, 3, 0))
+        ways.append(
+            f'<way id="{k + 1}" version="1">{refs}'
+            '<tag k="building" v="yes"/></way>'
+        )
+    path = tmp_path / "city.osm"
+    path.write_text(f'<osm version="0.6">{"".join(nodes + ways)}</osm>')
+    city = import_openstreetmap(path, None)
+    x, y = np.sort(
+        [one.triangles[:, :, :2].mean(axis=(0, 1)) for one in city.structures],
+        axis=0,
+    ).T
+    metres = 111_320.0 * np.cos(np.radians(houses[0][1]))
+    assert x[1] - x[0] == pytest.approx(0.002 * metres, rel=0.003)
+    assert x[0] + x[1] == pytest.approx(0.0, abs=0.1)
+    assert np.abs(y).max() < 0.1
+
+
 def test_no_such_file(tmp_path):
     with pytest.raises(InputError, match="No such file"):
         import_openstreetmap(tmp_path / "none.osm", None)

@@ -2,6 +2,7 @@
 
 from itertools import combinations
 
+from helpers.small_cityjson import CityWriter
 from helpers.small_osm import OsmWriter
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from cns_drake.imports.dressing.street_dressing import dress_streets
 from cns_drake.imports.dressing.whole_city import dress_city
 from cns_drake.imports.import_ground import bottom_of, ground_of
 from cns_drake.imports.import_report import ImportOptions
+from cns_drake.imports.import_structures import import_cityjson
 from cns_drake.imports.openstreetmap import import_openstreetmap
 from cns_drake.imports.osm_things import object_of
 from cns_drake.imports.staged_city import stage_city
@@ -255,3 +257,42 @@ def test_a_city_counts_what_is_from_the_file_and_what_by_lot(
     assert result.is_paved
     assert seen.model.parts[0].rgb == paved(bottom).model.parts[0].rgb
     assert seen.model.parts[0].rgb != bottom.model.parts[0].rgb
+
+
+def test_only_cars_stand_on_another_street(tmp_path):
+    """A lamp in a corner is moved off one street, and would be on the other."""
+    osm = OsmWriter()
+    write_street(osm)
+    crossing = [osm.node(10, -40), osm.node(10, 40)]
+    osm.way_of(crossing, highway="residential", width="8")
+    on_it = osm.node(13.5, -4.2, highway="street_lamp")
+    beside = osm.node(20, -5.5, highway="street_lamp")
+    found = dressed(read(osm, tmp_path))
+    names = {one.structure.name for one in found.structures}
+    assert f"lamp_post_n{beside}" in names
+    assert f"lamp_post_n{on_it}" not in names
+
+
+def test_terrain_of_a_dense_city_is_paved_if_nothing_is_told(tmp_path):
+    city = CityWriter()
+    for k in range(4):
+        city.box(f"house{k}", 30.0 * k, 10.0, (20.0, 15.0, 8.0))
+    corners = [(-10, 0, 0), (130, 0, 0), (130, 30, 0), (-10, 30, 0)]
+    ground = {
+        "type": "CompositeSurface",
+        "lod": "2",
+        "boundaries": [[city.ring(corners)]],
+    }
+    city.add("terrain", "TINRelief", ground)
+    for is_told in (False, True):
+        if is_told:
+            city.add("road", "Road", ground)
+        path = city.write(tmp_path / f"{is_told}.json")
+        found = import_cityjson(path, None, None)
+        staged = stage_city(path, found, ImportOptions())
+        below = ground_of(staged.kept)
+        result = dress_city(staged, found, [], below, 0).city.kept
+        (terrain,) = (o for o in result if o.kind == "TINRelief")
+        (before,) = (o for o in staged.kept if o.kind == "TINRelief")
+        same = terrain.structure.model.parts == before.structure.model.parts
+        assert same is is_told
