@@ -124,7 +124,7 @@ def test_terrain_is_cut(tmp_path):
         (
             [(0, 0), (30, 0), (30, 1), (0, 1)],
             None,
-            r"way\.csv: a bend of \d\.\d\d m radius at 2\d\.\d, .* 4\.11 m",
+            r"way\.csv: a bend at 2\d\.\d, .* radius of \d\.\d\d m.* 4\.11 m",
         ),
         ([(0, 0)], 9.0, "way.csv: fewer than two"),
     ],
