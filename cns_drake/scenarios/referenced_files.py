@@ -162,7 +162,7 @@ def _xml_references(content: bytes) -> list[str]:
     parser.StartElementHandler = start
     parser.CharacterDataHandler = texts.append
     parser.EndElementHandler = end
-    # What is no XML is refused by whoever loads it.
+    # The loader refuses a file that is not XML.
     with contextlib.suppress(expat.ExpatError):
         parser.Parse(content, True)
     return found

@@ -29,8 +29,8 @@ _OTHER_STYLES = (
 # Colours (red, green, blue) and what they mean.
 Legend = tuple[tuple[tuple[int, int, int], str], ...]
 
-# What figures are written as. On the page they are SVG where they consist of
-# lines, WebP where they consist of pixels.
+# The formats of figures. On the page they are SVG where they consist of lines,
+# WebP where they consist of pixels.
 PRINTED = ("pdf", "png")
 _DPI = 200
 _PAGE_DPI = 130

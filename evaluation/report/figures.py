@@ -53,7 +53,7 @@ _SMALL_OBLIQUE = View(
 _FROM_ABOVE = View(azimuth_deg=-90.0, elevation_deg=90.0, pixels_per_metre=2.5)
 # Red at the start and blue at the end, as in the paper.
 ROUTE_COLOURS = "turbo_r"
-# What a view from above shows beyond the route [m].
+# Margin of a view from above around the route [m].
 _MARGIN = 60.0
 _SCALE_BAR = 50.0
 _ROUTE_POINTS = 400

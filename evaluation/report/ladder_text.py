@@ -8,7 +8,7 @@ import math
 from evaluation.report.ladder_rows import LadderRow
 from evaluation.report.method_titles import in_table_order, title
 
-# What is kept of AUC where little is lost.
+# The kept share of AUC from which on little is lost.
 _MUCH = 0.95
 # Between what is kept with and without the gate.
 _DIFFERENT = 0.1

@@ -29,7 +29,7 @@ _LATEX = {
     "–": "--",
     "·": r"$\cdot$",
 }
-# What makes a table, a link, a picture or a tag of text.
+# Characters that make a table, a link, a picture or a tag of text.
 _MARKDOWN = {ord(c): f"\\{c}" for c in "\\`*_[]|"} | {
     ord("<"): "&lt;",
     ord(">"): "&gt;",

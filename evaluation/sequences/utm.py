@@ -21,7 +21,7 @@ DATUM = "utm-52n"
 # of the voxel size, so that voxels lie as they would on the UTM grid.
 ORIGIN = (350_000.0, 4_020_000.0, 0.0)
 
-# What an easting and a northing can be on the northern half of the Earth.
+# Ranges of easting and northing on the northern half of the Earth.
 _LIMITS = ((100_000.0, 900_000.0), (0.0, 10_000_000.0))
 
 

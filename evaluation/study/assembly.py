@@ -67,7 +67,7 @@ from evaluation.study.study_layout import StudyFiles
 
 @dataclass
 class _Collected:
-    """What the cities contribute, one after the other."""
+    """The parts of the cities, one after the other."""
 
     changes: list[ChangeResult] = field(default_factory=list)
     survivals: list[Survival] = field(default_factory=list)

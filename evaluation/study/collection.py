@@ -41,7 +41,7 @@ class RecordingInfo:
 
     @property
     def source(self) -> DriveSource:
-        """What opens the drive."""
+        """The function that opens the drive."""
         return self.made_by or RecordedDrive(self.path.absolute())
 
     def drives_like(self, other: RecordingInfo) -> bool:

@@ -1,4 +1,4 @@
-"""Where a drive comes from: opened, and identified, by whoever needs it.
+"""The source of a drive: each user opens and identifies it.
 
 A job that works on a drive may run in another process, or on another
 machine, before or after the drive is recorded. It is therefore given what opens

@@ -69,7 +69,7 @@ class FindEvidence(PartStep):
     def make(self, reporter: Reporter) -> PairEvidence | None:
         results = []
         for choice in self.methods:
-            # What a method kept may be of a type of its own.
+            # A method's description may be of its own type.
             choice.make()
             results.append(read_part(self.results.result(choice)))
         if None in results or not results:
@@ -255,7 +255,7 @@ def _change(
 
 
 class _Aligner:
-    """Lays scans on each other as well as can be, whatever their poses."""
+    """Aligns scans as well as possible, without their poses."""
 
     def __init__(self) -> None:
         self._method = LayeredOverlap()

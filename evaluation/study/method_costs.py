@@ -1,4 +1,4 @@
-"""What methods cost, measured on one core."""
+"""The costs of methods, measured on one core."""
 
 from __future__ import annotations
 

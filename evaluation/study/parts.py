@@ -62,7 +62,7 @@ class PartStep(Step):
         )
 
     def run(self, reporter: Reporter) -> None:
-        # What changes while it is made shall not count as its input.
+        # A file that changes during the work must not count as its input.
         inputs = self.made_of(self.inputs())
         write_part(self.part, inputs, self.make(reporter))
 

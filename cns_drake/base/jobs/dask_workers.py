@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 # How long a scheduler may take to answer [s].
 _ANSWER_TIMEOUT = 10.0
-# What Dask calls all jobs.
+# Dask's name for the key of all jobs.
 _KIND = "job"
 
 

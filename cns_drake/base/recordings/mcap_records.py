@@ -26,7 +26,7 @@ RECORD_HEADER = struct.Struct("<BQ")
 CHUNK_LIMIT_BYTES = 1 << 26
 SUMMARY_LIMIT_BYTES = 1 << 25
 _ATTACHMENT_LIMIT_BYTES = 1 << 23
-# What a chunk's record holds besides its data.
+# Size of a chunk's record without its data.
 _CHUNK_FIELDS_BYTES = 1 << 10
 # The last record: its header, where the summary begins, its offsets, its
 # checksum.

@@ -76,7 +76,7 @@ class Sequence(abc.ABC):
 
     @property
     def imu(self) -> np.ndarray | None:
-        """What the IMU measured, (M,) of `IMU_DTYPE`, if recorded."""
+        """Measurements of the IMU, (M,) of `IMU_DTYPE`, if recorded."""
         return None
 
     @property

@@ -15,7 +15,7 @@ from cns_drake.imports.dressing.wall_panels import Panel
 # of a frame [m].
 _BESIDE = 0.1
 _FRAME = 0.09
-# What is not cut into a panel lies so far before it [m].
+# Distance in front of a panel of parts that are not cut into it [m].
 _ON_WALL = 0.02
 _EXACT = 1e-3
 _LEAST_AREA = 1e-4

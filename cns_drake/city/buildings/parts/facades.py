@@ -55,7 +55,7 @@ def _no_relief(edge: int, length: float) -> Sequence[Relief]:
 
 @dataclass(frozen=True)
 class Facade:
-    """The walls of one or several storeys, whatever polygon they follow.
+    """The walls of one or several storeys, for any polygon.
 
     Attributes:
         height: [m].
