@@ -145,7 +145,7 @@ def test_a_real_run_ends_in_one_line_and_goes_on(tmp_path, request, disk):
     assert run.resumed_frames in ({16, 32} if disk == "tmpfs" else {32})
     assert told == [
         "tiny_01: found an interrupted run, reading it",
-        f"tiny_01: {run.resumed_frames} of {FRAMES} frames are there, going "
-        "on with the next",
+        f"tiny_01: {run.resumed_frames} of {FRAMES} frames are there; going"
+        " on with the next one",
     ]
     assert recorded(folder) == whole

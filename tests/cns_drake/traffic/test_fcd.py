@@ -166,8 +166,8 @@ def fault(path, **options):
 def test_a_trace_that_is_too_short(trace):
     play(trace, duration=7.9)
     assert fault(trace, duration=7.91) == (
-        "the trace has 7.9 s from 100 s on, the drive takes 7.91 s: record "
-        "more, or lower frames"
+        "the trace has 7.9 s from 100 s on, but the drive takes 7.91 s: record"
+        " more, or lower frames"
     )
 
 
@@ -179,9 +179,9 @@ def test_a_trace_of_another_map(tmp_path):
 
     path = write_trace(tmp_path / "moved.xml", change=move)
     assert re.fullmatch(
-        r"half of the trace is more than 5 m from the map's lanes: it lies at "
-        r"x 8\d\d to 9\d\d, .* m, they at x -30 to 30, y -30 to 30 m; give "
-        r"a trace of this map, without an offset",
+        r"half of the trace is more than 5 m from the map's lanes: the trace "
+        r"is at x 8\d\d to 9\d\d, .* m, the lanes are at x -30 to 30, y -30 to "
+        r"30 m; give a trace of this map, without an offset",
         fault(path),
     )
 
@@ -195,7 +195,7 @@ def test_a_trace_of_another_map(tmp_path):
         ('id="c"', 'id="b"', "line .*: vehicle 'b' is there twice"),
         ("</fcd-export>", "", "cannot be parsed: line .*: no element found"),
         ("fcd-export", "sumo", "line 2: sumo is no fcd-export"),
-        ("vehicle|person", "container", "no vehicle and no person"),
+        ("vehicle|person", "container", "the trace has no vehicle"),
         ("<fcd-export>", '<!DOCTYPE a [<!ENTITY b "c">]><fcd-export>', "line"),
     ],
 )
