@@ -104,4 +104,4 @@ def test_a_vehicle_elsewhere_is_noticed(scenario, tmp_path):
             faults.append(str(error))
 
     simulate(scenario, tmp_path, reader=read)
-    assert faults == ["frame 3: not at its planned place"]
+    assert faults == ["frame 3: the vehicle is not at its planned place"]
