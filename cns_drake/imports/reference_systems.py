@@ -83,7 +83,7 @@ class ReferenceSystem:
         )
 
     def has_place(self, first: float, second: float) -> bool:
-        """Tells whether coordinates, as defined, lie in the area of use.
+        """Returns whether coordinates, as defined, are in the area of use.
 
         A system that names none has none.
         """

@@ -19,7 +19,7 @@ from cns_drake.city.geometry.structures import (
     SphereShape,
 )
 
-# Of posts and balls; discs, such as signs, are to be told from octagons.
+# Sides of posts and balls; discs, such as signs, must differ from octagons.
 _SIDES, _SIDES_OF_DISC = 8, 20
 _POST, _DISC, _BALL = "round_post", "round_disc", "round_ball"
 

@@ -50,8 +50,8 @@ class Dressing:
         return [paved(one) if self.is_paved else one for one in bottom]
 
 
-def _is_told_ground(one: Imported) -> bool:
-    """Tells whether the file says what a ground is, beyond its height."""
+def _has_ground_kind(one: Imported) -> bool:
+    """Returns whether the file has the kind of a ground, not only its height."""
     return one.is_ground and one.kind != _TERRAIN
 
 
@@ -82,7 +82,7 @@ def dress_city(
     changed = dict(buildings.buildings)
     by_lot = Counter(buildings.by_lot)
     is_paved = is_dense(staged.kept)
-    if is_paved and not any(map(_is_told_ground, staged.kept)):
+    if is_paved and not any(map(_has_ground_kind, staged.kept)):
         changed |= {
             one: replace(one, structure=paved(one.structure))
             for one in staged.kept
