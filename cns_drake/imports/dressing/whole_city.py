@@ -51,7 +51,7 @@ class Dressing:
 
 
 def _has_ground_kind(one: Imported) -> bool:
-    """Returns whether the file has the kind of a ground, not only its height."""
+    """Returns whether the file has a ground's kind, not only its height."""
     return one.is_ground and one.kind != _TERRAIN
 
 
