@@ -176,4 +176,4 @@ def test_a_match_is_what_shows_the_same(rooms, capsys, tmp_path):
     )
     for truth in ("overlap", "overlap:0", "overlap:1.01", "overlap:x", "near"):
         assert_refused(capsys, [*pr, "--truth", truth], "--truth", truth)
-    assert_refused(capsys, [*pr, "--overlaps", output], "needs --truth")
+    assert_refused(capsys, [*pr, "--overlaps", output], "add --truth")
