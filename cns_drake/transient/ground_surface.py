@@ -85,33 +85,16 @@ class GroundSurface:
             xy: (N, 2) places [m].
             of_road: whether of carriageways, or of all other ground.
         """
-        place, index, z = self._heights_at(xy)
-        right = self._is_road[index] == of_road
-        found = np.full(len(xy), -np.inf)
-        np.maximum.at(found, place[right], z[right])
-        return np.where(np.isfinite(found), found, np.nan)
-
-    def lowest(self, xy: np.ndarray) -> np.ndarray:
-        """Returns the height of the lowest ground, inf where there is none.
-
-        Args:
-            xy: (N, 2) places [m].
-        """
-        place, _, z = self._heights_at(xy)
-        found = np.full(len(xy), np.inf)
-        np.minimum.at(found, place, z)
-        return found
-
-    def _heights_at(
-        self, xy: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Returns places, the triangles there, and their heights there."""
         place, index = self._tree.query(shapely.points(xy), "intersects")
+        right = self._is_road[index] == of_road
+        place, index = place[right], index[right]
         a, b, c = np.moveaxis(self._corners[index], 1, 0)
         normals = np.cross(b - a, c - a)
         offset = xy[place] - a[:, :2]
         z = a[:, 2] - (normals[:, :2] * offset).sum(axis=1) / normals[:, 2]
-        return place, index, z
+        found = np.full(len(xy), -np.inf)
+        np.maximum.at(found, place, z)
+        return np.where(np.isfinite(found), found, np.nan)
 
     def kerbs(self, spacing: float) -> Iterator[Kerb]:
         """Yields the edges of the carriageway within the area.

@@ -19,7 +19,6 @@ from cns_drake.transient.ground_surface import (
     upwardness,
 )
 from cns_drake.transient.scene_editing import Look, SceneEditing
-from cns_drake.transient.sky_cover import SkyCover
 from cns_drake.transient.standing import GROUND_CLASSES, Standing, StandingPart
 
 CAUSE = "snow"
@@ -32,7 +31,7 @@ _LEAST_AREA = 0.3
 _BARE = frozenset(
     {"vegetation", "trunk", "pole", "traffic-sign", "fence", "bicycle", "road"}
 )
-# Longest side of triangles at the edge of a cleared road or a roof [m].
+# Longest side of triangles at the edge of a cleared road [m].
 _FINE = 0.7
 # A bank along a kerb: its reach to both sides as a multiple of its height, its
 # greatest height in depths of snow, and in [m].
@@ -53,8 +52,7 @@ def lay_snow(
 ) -> None:
     """Lays snow near a drive, except on roads, plants and thin things.
 
-    Ground is raised. Roads are cleared, with banks along their kerbs. What
-    lies below a roof or a bridge stays bare.
+    Ground is raised. Roads are cleared, with banks along their kerbs.
 
     Args:
         editing: of the world.
@@ -64,7 +62,6 @@ def lay_snow(
         depth: of the snow [m].
         seed: of the banks' heights.
     """
-    cover = SkyCover(things, ground)
     for thing in things.values():
         if thing.semantic_class in _BARE:
             continue
@@ -73,17 +70,11 @@ def lay_snow(
             continue
         changed = False
         for part in thing.parts:
-            if (
-                is_ground
-                and not _lies_below_road(part, ground)
-                and not cover.meets(faced_up(triangle_corners(part))).any()
-            ):
+            if is_ground and not _lies_below_road(part, ground):
                 editing.cover_part(part, np.array([0.0, 0.0, depth]), _LOOK)
                 changed = True
             else:
-                changed |= _cover(
-                    editing, part, ground, cover, depth, is_ground
-                )
+                changed |= _cover(editing, part, ground, depth, is_ground)
         if changed:
             editing.blame(thing.name, CAUSE)
     if ground.carriageway.is_empty:
@@ -110,7 +101,6 @@ def _cover(
     editing: SceneEditing,
     part: StandingPart,
     ground: GroundSurface,
-    cover: SkyCover,
     depth: float,
     is_ground: bool,
 ) -> bool:
@@ -125,7 +115,6 @@ def _cover(
     corners = corners[upwardness(corners) > _LEAST_UP]
     if is_ground:
         corners = _beside(corners, ground)
-    corners = _below_the_sky(corners, cover)
     if len(corners) == 0:
         return False
     vertices, triangles = _merged(corners)
@@ -164,33 +153,15 @@ def _beside(corners: np.ndarray, ground: GroundSurface) -> np.ndarray:
         done.append(corners[~meets])
         corners = corners[meets]
         corners = corners[~shapely.covers(road, areas[meets])]
-        fine = _longest_sides(corners) <= _FINE
+        sides = np.linalg.norm(
+            corners - np.roll(corners, -1, axis=1), axis=2
+        ).max(axis=1)
+        fine = sides <= _FINE
         last = corners[fine]
         middles = last[:, :, :2].mean(axis=1)
         done.append(last[~shapely.contains_xy(road, middles)])
         corners = _halved(corners[~fine])
     return np.concatenate(done)
-
-
-def _below_the_sky(corners: np.ndarray, cover: SkyCover) -> np.ndarray:
-    """Returns triangles that nothing covers, finer along edges of covers."""
-    done = [np.zeros((0, 3, 3))]
-    while len(corners):
-        meets = cover.meets(corners)
-        done.append(corners[~meets])
-        corners = corners[meets]
-        fine = shapely.covers(cover.area, from_above(corners))
-        fine |= _longest_sides(corners) <= _FINE
-        last = corners[fine]
-        done.append(last[~cover.lies_over(last)])
-        corners = _halved(corners[~fine])
-    return np.concatenate(done)
-
-
-def _longest_sides(corners: np.ndarray) -> np.ndarray:
-    """Returns the length of the longest side of triangles (M, 3, 3) [m]."""
-    sides = corners - np.roll(corners, -1, axis=1)
-    return np.asarray(np.linalg.norm(sides, axis=2).max(axis=1))
 
 
 def _halved(corners: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from cns_drake.scene.world import load_world
 from cns_drake.transient.changing import change_world
 from cns_drake.transient.standing import read_standing
 
-WORLD = """<?xml version="1.0"?>
+_WORLD = """<?xml version="1.0"?>
 <sdf version="1.9">
   <world name="street">
     <model name="street">
@@ -123,7 +123,7 @@ def write_transient_town(folder):
             shape = box_shape(15, 8, 9)
             visuals.append(visual(f"{name}/body", shape, 5 * k, 24, 4))
             rows[name] = "building"
-    text = WORLD.format(origin=_numbers(ORIGIN), visuals="".join(visuals))
+    text = _WORLD.format(origin=_numbers(ORIGIN), visuals="".join(visuals))
     (folder / "street.sdf").write_text(text)
     lines = ["instance,name,class"]
     lines += [f"{k},{n},{c}" for k, (n, c) in enumerate(rows.items(), 1)]
