@@ -17,10 +17,8 @@ if TYPE_CHECKING:
     from cns_drake.motion.vehicle_motion import VehicleMotion
     from cns_drake.pictures.static_page import save_meshcat_page
     from cns_drake.recording.bag_writer import BagWriter
-    from cns_drake.recording.mcap_recorder import (
-        McapRecorder,
-        recording_topics,
-    )
+    from cns_drake.recording.mcap_recorder import McapRecorder
+    from cns_drake.recording.recorded_topics import recording_topics
     from cns_drake.scenarios.planning import plan_drive
     from cns_drake.scenarios.scenario import Scenario
     from cns_drake.scenarios.scenario_loading import (
@@ -105,7 +103,8 @@ _HOMES = {
     "cns_drake.motion.vehicle_motion": ("VehicleMotion",),
     "cns_drake.pictures.static_page": ("save_meshcat_page",),
     "cns_drake.recording.bag_writer": ("BagWriter",),
-    "cns_drake.recording.mcap_recorder": ("McapRecorder", "recording_topics"),
+    "cns_drake.recording.mcap_recorder": ("McapRecorder",),
+    "cns_drake.recording.recorded_topics": ("recording_topics",),
     "cns_drake.scenarios.planning": ("plan_drive",),
     "cns_drake.scenarios.scenario": ("Scenario",),
     "cns_drake.scenarios.scenario_loading": ("load_scenario", "make_scenario"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 import math
 from typing import Any, NamedTuple
 import warnings
@@ -29,9 +29,7 @@ from cns_drake.recording import messages
 from cns_drake.recording.background_writer import BackgroundWriter
 from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.image_messages import (
-    CAMERA_INFO,
     ENCODINGS,
-    IMAGE,
     make_camera_info,
     make_image,
 )
@@ -42,17 +40,22 @@ from cns_drake.recording.object_messages import (
     marked_detections,
     motion_table,
 )
+from cns_drake.recording.recorded_topics import (
+    BOXES_TOPIC,
+    IMU_TOPIC,
+    MOTION_TOPIC,
+    OBJECTS_TOPIC,
+    ODOMETRY_TOPIC,
+    TF_STATIC_TOPIC,
+    TF_TOPIC,
+    camera_info_topic,
+    image_topic,
+    labels_topic,
+    points_topic,
+    recording_topics,
+)
 from cns_drake.recording.rosbag2_metadata import Topic
 from cns_drake.recording.schedule import Schedule, make_schedule
-
-_TF_STATIC = Topic("/tf_static", ros_types.TF, latched=True)
-_TF = Topic("/tf", ros_types.TF)
-_ODOMETRY = Topic("/odometry", ros_types.ODOMETRY)
-_IMU = Topic("/imu/data", ros_types.IMU)
-_OBJECTS = Topic("/objects", ros_types.DETECTIONS_3D)
-_BOXES = Topic("/objects/boxes", ros_types.SCENE_UPDATE)
-_MOTION = Topic("/objects/motion", ros_types.POINT_CLOUD)
-OBJECT_TOPICS = (_OBJECTS, _BOXES, _MOTION)
 
 # Events of a periodic schedule come at multiples of the period. Their times
 # differ from a tick's only by rounding, at most this [ticks].
@@ -236,7 +239,7 @@ class McapRecorder(LeafSystem):
 
     def _declare_events(self) -> None:
         """Declares an event for each tick that needs one."""
-        waits = {_IMU.name} if self._samples is not None else set()
+        waits = {IMU_TOPIC.name} if self._samples is not None else set()
         steps = [
             step
             for name, step in self._schedule.steps.items()
@@ -248,7 +251,7 @@ class McapRecorder(LeafSystem):
             offset_sec=0.0,
             publish=self._publish,
         )
-        end = self._schedule.ends.get(_IMU.name, 0)
+        end = self._schedule.ends.get(IMU_TOPIC.name, 0)
         if waits and end % step:
             # The last samples come after all else.
             self.DeclarePeriodicPublishEvent(
@@ -270,23 +273,23 @@ class McapRecorder(LeafSystem):
             # Written at the first frame. A bag takes latched messages once: a
             # resumed one has this already.
             tf = messages.make_tf(messages.BASE_FRAME, self._X_BCs, stamp_ns)
-            self._write(_TF_STATIC, tf, stamp_ns, 0)
+            self._write(TF_STATIC_TOPIC, tf, stamp_ns, 0)
         outgoing: dict[Topic, Any] = {}
-        if _TF.name in due or _ODOMETRY.name in due:
+        if TF_TOPIC.name in due or ODOMETRY_TOPIC.name in due:
             outgoing |= self._locate(context, stamp_ns)
         if self._samples is not None:
             since = tick - 1 if self._last_tick is None else self._last_tick
             outgoing |= self._take_samples(context, since, tick)
-        elif _IMU.name in due:
+        elif IMU_TOPIC.name in due:
             outgoing |= self._feel(context, stamp_ns)
         self._last_tick = tick
-        if _OBJECTS.name in due:
+        if OBJECTS_TOPIC.name in due:
             outgoing |= self._list_objects(context, stamp_ns)
         for name in self._scans:
-            if _points_topic(name).name in due:
+            if points_topic(name).name in due:
                 outgoing |= self._scan(context, name, stamp_ns)
         for name in self._cameras:
-            if _camera_info_topic(name).name in due:
+            if camera_info_topic(name).name in due:
                 outgoing |= self._photograph(context, name, stamp_ns)
         for topic, message in outgoing.items():
             if topic.name in due:
@@ -306,11 +309,11 @@ class McapRecorder(LeafSystem):
         if odometry is not None:
             X_WCs = {messages.BASE_FRAME: odometry.X_WB, **X_WCs}
         if X_WCs:
-            outgoing[_TF] = messages.make_tf(
+            outgoing[TF_TOPIC] = messages.make_tf(
                 messages.MAP_FRAME, X_WCs, stamp_ns
             )
         if odometry is not None:
-            outgoing[_ODOMETRY] = messages.make_odometry(
+            outgoing[ODOMETRY_TOPIC] = messages.make_odometry(
                 odometry.X_WB, odometry.V_WB_B, stamp_ns
             )
         return outgoing
@@ -331,7 +334,7 @@ class McapRecorder(LeafSystem):
             None if value is None else np.array([value]) for value in values
         )
         (message,) = self._imu_messages.encode(quats, turns, forces, [stamp_ns])
-        return {_IMU: message}
+        return {IMU_TOPIC: message}
 
     def _take_samples(
         self, context: Context, since: int, tick: int
@@ -349,8 +352,8 @@ class McapRecorder(LeafSystem):
         Raises:
             ValueError: the port shows too few samples.
         """
-        step = self._schedule.steps[_IMU.name]
-        last = min(tick, self._schedule.ends.get(_IMU.name, tick))
+        step = self._schedule.steps[IMU_TOPIC.name]
+        last = min(tick, self._schedule.ends.get(IMU_TOPIC.name, tick))
         numbers = range(since // step + 1, last // step + 1)
         samples = _eval(self._samples, context)
         if samples is None or not numbers:
@@ -374,9 +377,9 @@ class McapRecorder(LeafSystem):
             numbers, stamps_ns, packed, strict=True
         ):
             if number * step == tick:
-                outgoing[_IMU] = message
+                outgoing[IMU_TOPIC] = message
             else:
-                self._write(_IMU, message, stamp_ns, number)
+                self._write(IMU_TOPIC, message, stamp_ns, number)
         return outgoing
 
     def _list_objects(
@@ -387,9 +390,9 @@ class McapRecorder(LeafSystem):
         if objects is None:
             return {}
         return {
-            _OBJECTS: self._detections.encode(objects, stamp_ns),
-            _BOXES: self._boxes.encode(objects, stamp_ns),
-            _MOTION: messages.make_point_cloud(
+            OBJECTS_TOPIC: self._detections.encode(objects, stamp_ns),
+            BOXES_TOPIC: self._boxes.encode(objects, stamp_ns),
+            MOTION_TOPIC: messages.make_point_cloud(
                 motion_table(objects), messages.MAP_FRAME, stamp_ns
             ),
         }
@@ -403,12 +406,12 @@ class McapRecorder(LeafSystem):
             return {}
         layout = self._layouts.get(name, "cns")
         outgoing = {
-            _points_topic(name): messages.make_point_cloud(
+            points_topic(name): messages.make_point_cloud(
                 to_layout(scan, layout), name, stamp_ns
             )
         }
         if layout != "cns":
-            outgoing[_labels_topic(name)] = messages.make_point_cloud(
+            outgoing[labels_topic(name)] = messages.make_point_cloud(
                 to_labels(scan), name, stamp_ns
             )
         return outgoing
@@ -421,11 +424,11 @@ class McapRecorder(LeafSystem):
         for kind, port in self._images[name].items():
             image = _eval(port, context)
             if image is not None:
-                outgoing[_image_topic(name, kind)] = make_image(
+                outgoing[image_topic(name, kind)] = make_image(
                     image.data, ENCODINGS[kind], name, stamp_ns
                 )
         if outgoing:
-            outgoing[_camera_info_topic(name)] = make_camera_info(
+            outgoing[camera_info_topic(name)] = make_camera_info(
                 self._cameras[name].info, name, stamp_ns
             )
         return outgoing
@@ -465,82 +468,3 @@ def _eval(port: InputPort | None, context: Context) -> Any:
     if port is None or not port.HasValue(context):
         return None
     return port.Eval(context)
-
-
-def recording_topics(
-    lidar_names: Iterable[str],
-    *,
-    camera_names: Iterable[str] = (),
-    with_imu: bool = True,
-    with_odometry: bool = True,
-    layouts: Mapping[str, str] | None = None,
-    with_objects: bool = False,
-) -> tuple[Topic, ...]:
-    """Returns the topics of a recording.
-
-    Args:
-        lidar_names: of its LiDARs.
-        camera_names: of its cameras.
-        with_imu: whether it has an IMU.
-        with_odometry: whether it has odometry.
-        layouts: LiDAR name -> layout of its points, if not `cns`.
-        with_objects: whether it has boxes of moving objects.
-
-    Example:
-        from cns_drake import recording_topics
-
-        topics = recording_topics(["lidar"])
-    """
-    topics = []
-    for name in lidar_names:
-        topics.append(_points_topic(name))
-        if (layouts or {}).get(name, "cns") != "cns":
-            topics.append(_labels_topic(name))
-    for name in camera_names:
-        topics += [_image_topic(name, kind) for kind in ENCODINGS]
-        topics.append(_camera_info_topic(name))
-    topics += [_IMU] if with_imu else []
-    topics += [_ODOMETRY] if with_odometry else []
-    topics += OBJECT_TOPICS if with_objects else []
-    return (*topics, _TF, _TF_STATIC)
-
-
-def make_calibration(
-    X_BSs: Mapping[str, RigidTransform], X_BI: RigidTransform | None
-) -> dict:
-    """Returns the sensor frames as a JSON value, for an attachment.
-
-    Args:
-        X_BSs: LiDAR name -> pose of its frame S in the vehicle frame B.
-        X_BI: pose of the imu frame I in B, None if there is none.
-
-    Returns:
-        Frame name -> parent frame, `translation` [m] and `quat_xyzw`.
-    """
-    X_BCs = dict(X_BSs)
-    if X_BI is not None:
-        X_BCs[messages.IMU_FRAME] = X_BI
-    return {
-        name: {
-            "parent": messages.BASE_FRAME,
-            "translation": [float(x) for x in X_BC.translation()],
-            "quat_xyzw": list(messages.to_quat_xyzw(X_BC.rotation())),
-        }
-        for name, X_BC in X_BCs.items()
-    }
-
-
-def _points_topic(lidar_name: str) -> Topic:
-    return Topic(f"/{lidar_name}/points", ros_types.POINT_CLOUD)
-
-
-def _labels_topic(lidar_name: str) -> Topic:
-    return Topic(f"/{lidar_name}/labels", ros_types.POINT_CLOUD)
-
-
-def _image_topic(camera_name: str, kind: str) -> Topic:
-    return Topic(f"/{camera_name}/{kind}", IMAGE)
-
-
-def _camera_info_topic(camera_name: str) -> Topic:
-    return Topic(f"/{camera_name}/camera_info", CAMERA_INFO)

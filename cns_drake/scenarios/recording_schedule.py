@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from cns_drake.recording.mcap_recorder import (
+from cns_drake.recording.recorded_topics import (
     OBJECT_TOPICS,
     recording_topics,
 )

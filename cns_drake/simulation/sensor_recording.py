@@ -11,9 +11,8 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.sensors import RgbdSensor
 
 from cns_drake.recording.bag_writer import BagWriter
-from cns_drake.recording.mcap_recorder import (
-    McapRecorder,
-    RecordedCamera,
+from cns_drake.recording.mcap_recorder import McapRecorder, RecordedCamera
+from cns_drake.recording.recorded_topics import (
     make_calibration,
     recording_topics,
 )

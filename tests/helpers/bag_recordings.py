@@ -4,7 +4,7 @@ import numpy as np
 
 from cns_drake.recording.bag_writer import BagWriter
 from cns_drake.recording.frame_clock import START_NS, frame_stamp_ns
-from cns_drake.recording.mcap_recorder import recording_topics
+from cns_drake.recording.recorded_topics import recording_topics
 from cns_drake.recording.resuming import take_over_frames
 from cns_drake.recording.schedule import make_schedule
 

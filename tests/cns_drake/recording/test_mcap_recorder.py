@@ -15,8 +15,8 @@ from scipy.spatial.transform import Rotation
 
 from cns_drake.base.errors import InputError
 from cns_drake.recording.bag_writer import BagWriter
-from cns_drake.recording.mcap_recorder import (
-    McapRecorder,
+from cns_drake.recording.mcap_recorder import McapRecorder
+from cns_drake.recording.recorded_topics import (
     make_calibration,
     recording_topics,
 )

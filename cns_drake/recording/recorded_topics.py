@@ -1,0 +1,100 @@
+"""Topics of a recording, and the frames of its sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from pydrake.math import RigidTransform
+
+from cns_drake.base.recordings import ros_types
+from cns_drake.recording import messages
+from cns_drake.recording.image_messages import CAMERA_INFO, ENCODINGS, IMAGE
+from cns_drake.recording.rosbag2_metadata import Topic
+
+TF_STATIC_TOPIC = Topic("/tf_static", ros_types.TF, latched=True)
+TF_TOPIC = Topic("/tf", ros_types.TF)
+ODOMETRY_TOPIC = Topic("/odometry", ros_types.ODOMETRY)
+IMU_TOPIC = Topic("/imu/data", ros_types.IMU)
+OBJECTS_TOPIC = Topic("/objects", ros_types.DETECTIONS_3D)
+BOXES_TOPIC = Topic("/objects/boxes", ros_types.SCENE_UPDATE)
+MOTION_TOPIC = Topic("/objects/motion", ros_types.POINT_CLOUD)
+OBJECT_TOPICS = (OBJECTS_TOPIC, BOXES_TOPIC, MOTION_TOPIC)
+
+
+def recording_topics(
+    lidar_names: Iterable[str],
+    *,
+    camera_names: Iterable[str] = (),
+    with_imu: bool = True,
+    with_odometry: bool = True,
+    layouts: Mapping[str, str] | None = None,
+    with_objects: bool = False,
+) -> tuple[Topic, ...]:
+    """Returns the topics of a recording.
+
+    Args:
+        lidar_names: of its LiDARs.
+        camera_names: of its cameras.
+        with_imu: whether it has an IMU.
+        with_odometry: whether it has odometry.
+        layouts: LiDAR name -> layout of its points, if not `cns`.
+        with_objects: whether it has boxes of moving objects.
+
+    Example:
+        from cns_drake import recording_topics
+
+        topics = recording_topics(["lidar"])
+    """
+    topics = []
+    for name in lidar_names:
+        topics.append(points_topic(name))
+        if (layouts or {}).get(name, "cns") != "cns":
+            topics.append(labels_topic(name))
+    for name in camera_names:
+        topics += [image_topic(name, kind) for kind in ENCODINGS]
+        topics.append(camera_info_topic(name))
+    topics += [IMU_TOPIC] if with_imu else []
+    topics += [ODOMETRY_TOPIC] if with_odometry else []
+    topics += OBJECT_TOPICS if with_objects else []
+    return (*topics, TF_TOPIC, TF_STATIC_TOPIC)
+
+
+def make_calibration(
+    X_BSs: Mapping[str, RigidTransform], X_BI: RigidTransform | None
+) -> dict:
+    """Returns the sensor frames as a JSON value, for an attachment.
+
+    Args:
+        X_BSs: LiDAR name -> pose of its frame S in the vehicle frame B.
+        X_BI: pose of the imu frame I in B, None if there is none.
+
+    Returns:
+        Frame name -> parent frame, `translation` [m] and `quat_xyzw`.
+    """
+    X_BCs = dict(X_BSs)
+    if X_BI is not None:
+        X_BCs[messages.IMU_FRAME] = X_BI
+    return {
+        name: {
+            "parent": messages.BASE_FRAME,
+            "translation": [float(x) for x in X_BC.translation()],
+            "quat_xyzw": list(messages.to_quat_xyzw(X_BC.rotation())),
+        }
+        for name, X_BC in X_BCs.items()
+    }
+
+
+def points_topic(lidar_name: str) -> Topic:
+    return Topic(f"/{lidar_name}/points", ros_types.POINT_CLOUD)
+
+
+def labels_topic(lidar_name: str) -> Topic:
+    return Topic(f"/{lidar_name}/labels", ros_types.POINT_CLOUD)
+
+
+def image_topic(camera_name: str, kind: str) -> Topic:
+    return Topic(f"/{camera_name}/{kind}", IMAGE)
+
+
+def camera_info_topic(camera_name: str) -> Topic:
+    return Topic(f"/{camera_name}/camera_info", CAMERA_INFO)
