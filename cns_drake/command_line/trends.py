@@ -59,7 +59,10 @@ def trend(
         from cns_drake.simulation.simulated_drive import SimulatedDrive
         from evaluation.study.chosen_methods import choose_methods
         from evaluation.study.trend import write_trend
-        from evaluation.study.trend_databases import Asked, measure_drives
+        from evaluation.study.trend_databases import (
+            TrendDatabase,
+            measure_drives,
+        )
 
     cluster = choose_cluster(jobs, scheduler)
     methods = choose_methods(method or (), parameter or ())
@@ -70,7 +73,7 @@ def trend(
         asking.name,
         SimulatedDrive(asking),
         {
-            member.name: Asked(
+            member.name: TrendDatabase(
                 SimulatedDrive(member), controls[member.name].name
             )
             for member in members

@@ -23,7 +23,7 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.simulation.simulated_drive import SimulatedDrive
 from evaluation.study.chosen_methods import choose_methods
-from evaluation.study.trend_databases import Asked, measure_drives
+from evaluation.study.trend_databases import TrendDatabase, measure_drives
 from evaluation.study.trend_points import TrendPoint
 
 _AS_IT_IS = "as_it_is"
@@ -70,7 +70,7 @@ def knob_effects(
             later.name,
             SimulatedDrive(later),
             {
-                name: Asked(SimulatedDrive(drive))
+                name: TrendDatabase(SimulatedDrive(drive))
                 for name, drive in drives.items()
             },
             {},

@@ -1,4 +1,4 @@
-"""Tables, figures and a page, of what the jobs of a study left."""
+"""Tables, figures and a page, from the results of the jobs of a study."""
 
 from __future__ import annotations
 
@@ -95,8 +95,8 @@ def assemble(
     Files: `report.html`, which holds everything; `report.md`; `survival`,
     `tcr`, `place_recognition` and `poses`, and with costs `costs`, each as
     .csv (all numbers), .md and .tex;
-    `metrics.csv`, what other benchmarks report; `why.csv`, what is wrong
-    with wrong best places; `queries.csv` and
+    `metrics.csv`, the metrics of other benchmarks; `why.csv`, the reasons
+    for wrong best places; `queries.csv` and
     `queries_unchanged.csv`, every query of the pairs and of their controls;
     and what is missing in the folder `figures`.
 
@@ -104,8 +104,8 @@ def assemble(
         recordings: as in `plan_study`.
         output: likewise.
         methods: likewise.
-        pages: recording -> address, relative to the page, of what shows it
-            in 3-D, for those that have one.
+        pages: recording -> address of its 3-D page, relative to the report,
+            for those that have one.
         protocol: likewise.
         with_costs: likewise.
         reference: likewise.
@@ -116,7 +116,7 @@ def assemble(
         The path of `report.html`.
 
     Raises:
-        InputError: if a job has not been done, or a file cannot be written.
+        InputError: a job has not been done, or a file cannot be written.
     """
     files = StudyFiles(output)
     chosen = choose_methods() if methods is None else methods
@@ -204,7 +204,7 @@ def _read_recognition(
     method: MethodChoice,
     files: StudyFiles,
 ) -> RecognitionResult | None:
-    """Returns a result; None of a drive that never comes back."""
+    """Returns a result; None of a drive that closes no loop."""
     database, query = pair
     return read_part(
         files.recognition(database.name, query.name).result(method)

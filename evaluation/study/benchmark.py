@@ -34,8 +34,8 @@ def write_report(
 ) -> Path:
     """Measures all recordings in a folder; writes tables, figures, a page.
 
-    See `evaluation.study` for the files. What an earlier run left, finished
-    or not, is used as far as it belongs to the same recordings and methods.
+    See `evaluation.study` for the files. Results of an earlier run, finished
+    or not, are used if they belong to the same recordings and methods.
 
     Args:
         recordings: folder of recordings; drives of one map that share stage
@@ -48,7 +48,7 @@ def write_report(
         on_note: takes which recordings are left out, and for which cities
             there is nothing to compare.
         settings: see `choose_methods`.
-        with_costs: measure what the methods cost, too.
+        with_costs: whether to measure the costs of the methods, too.
         reference_for: returns what the report of some maps stands beside.
         lidar: whose scans to read, of recordings with several.
 
@@ -56,7 +56,7 @@ def write_report(
         The path of `report.html`.
 
     Raises:
-        InputError: if a recording cannot be read, or the output not be
+        InputError: a recording cannot be read, or the output cannot be
             written.
     """
     methods = choose_methods(own_methods, settings)

@@ -31,7 +31,7 @@ class MethodChoice:
         name: under which it is registered.
         file: the Python file that registers it; None for a method of this
             package.
-        settings: name and value of parameters; the others are as by default.
+        settings: name and value of parameters; the others have their defaults.
     """
 
     name: str
@@ -52,7 +52,7 @@ class MethodChoice:
         return make_method(self.name, dict(self.settings))
 
     def inputs(self) -> dict:
-        """Returns what its results depend on, ready for JSON.
+        """Returns all that its results depend on, ready for JSON.
 
         Raises:
             InputError: if its file cannot be used.
@@ -67,11 +67,11 @@ class MethodChoice:
 
 
 def parse_setting(text: str, form: str = "NAME=VALUE") -> tuple[str, Setting]:
-    """Returns name and value of what follows `--set`.
+    """Returns name and value of a setting, the text after `--set`.
 
     Args:
-        text: what follows it; commas separate several values.
-        form: of the text, for whoever gets it wrong.
+        text: of the setting; commas separate several values.
+        form: of the text, for the error message.
 
     Raises:
         InputError: if it has no name or no equals sign.
@@ -90,8 +90,7 @@ def choose_methods(
     Args:
         files: Python files that register a method each, or names of optional
             methods of this package.
-        settings: `METHOD.NAME=VALUE` of parameters that are not as by
-            default.
+        settings: `METHOD.NAME=VALUE` of parameters without their defaults.
 
     Raises:
         InputError: if a file registers no method, or one that is there
@@ -103,7 +102,8 @@ def choose_methods(
     for file in files:
         if str(file) in optional_methods():
             chosen.append(MethodChoice(str(file)))
-            chosen[-1].make()  # Whether it is installed is known at once.
+            # A missing package is found before anything slow.
+            chosen[-1].make()
             continue
         path = Path(file).absolute()
         # Modules of one name would replace each other.
@@ -129,5 +129,5 @@ def choose_methods(
     ]
     for one in chosen:
         if one.settings:
-            one.make()  # What does not fit is found before anything slow.
+            one.make()  # A wrong value is found before anything slow.
     return tuple(chosen)

@@ -1,4 +1,4 @@
-"""The recordings in a folder: which belong together, and in which role."""
+"""The recordings in a folder, in groups, with their roles."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _UNPLACED = "map and stage are unknown: no scenario, and no name <map>_<stage>"
 
 @dataclass(frozen=True)
 class RecordingInfo:
-    """A recording, or one that is going to be made, and what it is of.
+    """A recording that exists or will be made, and its place in a study.
 
     Attributes:
         name: of the recording.
@@ -58,7 +58,7 @@ class City:
         stages: one recording a stage, by stage: `<map>_<stage>`.
         others: further drives through one of the stages, which may serve as
             controls.
-        reference: says which pairs are asked both ways.
+        reference: names the pairs that are compared both ways.
     """
 
     name: str
@@ -179,7 +179,7 @@ def group_cities(
 
     Args:
         recordings: of any cities.
-        reference: says which pairs are asked both ways.
+        reference: names the pairs that are compared both ways.
 
     Raises:
         InputError: if two have one name, or claim the same place.

@@ -24,17 +24,17 @@ from evaluation.study.study_layout import SurveyFiles
 
 @dataclass(frozen=True)
 class DescribeDrive(Step):
-    """Writes what each method keeps of a drive.
+    """Writes each method's descriptions of a drive.
 
     Only the scans that are described are read.
 
     Attributes:
         source: opens the drive.
-        role: what the drive serves as.
+        role: of the drive.
         methods: that describe it.
         protocol: where it has places and queries.
         files: to write; only those of the descriptions, and of the scans.
-        with_scans: keep the single scans that are described, too.
+        with_scans: whether to keep the described scans, too.
     """
 
     source: DriveSource
@@ -69,7 +69,7 @@ class DescribeDrive(Step):
         return self.files.described(method)
 
     def _missing(self) -> dict[Path, dict]:
-        """Returns the parts that are missing, and what they are made of."""
+        """Returns the missing parts, and their inputs."""
         inputs = self.made_of(
             {
                 "drive": self.source.identity(),
@@ -98,11 +98,11 @@ def describe(
     reporter: Reporter,
     scans: list[np.ndarray] | None = None,
 ) -> dict[str, DescribedDrive]:
-    """Returns name of method -> what it keeps of a drive.
+    """Returns name of method -> its descriptions of a drive.
 
     Args:
         source: opens the drive.
-        role: what the drive serves as.
+        role: of the drive.
         methods: that describe it.
         protocol: where it has places and queries.
         reporter: takes the progress.

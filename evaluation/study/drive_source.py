@@ -1,8 +1,8 @@
-"""The source of a drive: each user opens and identifies it.
+"""The source of a drive, which opens and identifies it.
 
 A job that works on a drive may run in another process, or on another
-machine, before or after the drive is recorded. It is therefore given what opens
-the drive.
+machine, before or after the drive is recorded. The job therefore has the source
+of the drive, not the drive.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ class DriveSource(Protocol):
     def __call__(self) -> Sequence:
         """Opens the drive.
 
-        Its scans are asked for in increasing order, each once; a drive may
-        thus be made while it is read.
+        Its scans are read in increasing order, each once; a drive may thus
+        be made while it is read.
 
         Raises:
             InputError: if it cannot be opened.
         """
 
     def identity(self) -> object:
-        """Returns what identifies the drive, ready for JSON.
+        """Returns the identity of the drive, ready for JSON.
 
         Results that were found from a drive with an equal identity are not
         found again.
@@ -58,8 +58,8 @@ class RecordedDrive:
     def identity(self) -> list[list]:
         """Returns LiDAR, and name, size and time of change of each file.
 
-        Their content would be as good as the only thing to go by, but takes
-        as long to read as to evaluate.
+        The content of the files would be the surest identity, but reading it
+        takes as long as evaluating it.
         """
         try:
             path = self.path.resolve(strict=True)

@@ -20,8 +20,8 @@ def change_stems(
     city: City, pair: tuple[RecordingInfo, RecordingInfo]
 ) -> tuple[str, str]:
     """Returns the names of the figures of a change: points, and sets."""
-    # What joins the parts stands in none but the first, so that no two
-    # cities' stages make one name.
+    # Underscores join the parts. They are escaped in all but the first, so that
+    # two pairs of stages never share a name.
     earlier, later = (
         one.stage.replace("%", "%p").replace("_", "%u") for one in pair
     )
@@ -90,7 +90,7 @@ def auc_illustration(folder: Path, beside: str = "") -> Illustration:
 
     Args:
         folder: of figures.
-        beside: whose values stand beside; empty for none.
+        beside: title of the reference in the figure; empty for none.
     """
     others = f", and of {beside}" if beside else ""
     return Illustration(

@@ -89,7 +89,7 @@ class RecognisePlaces(PartStep):
         }
 
     def make(self, reporter: Reporter) -> RecognitionResult | None:
-        # The method comes first: what it kept may be of a type of its own.
+        # The method comes first: its descriptions may be of a type of its own.
         method = self.method.make()
         (placed, database), (placed_query, query) = map(
             read_part, self._described

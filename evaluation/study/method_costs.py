@@ -17,7 +17,7 @@ from evaluation.study.drive_source import DriveSource
 from evaluation.study.parts import PartStep, part_digest, read_part
 from evaluation.study.study_layout import SurveyFiles
 
-# Clouds that are described, and queries that are asked; the first warms up.
+# Number of clouds and of queries; the first of each warms up.
 _NUM_TRIALS = 12
 
 
@@ -26,10 +26,10 @@ class MeasureCosts(PartStep):
     """Writes a list of `Cost`, one a method.
 
     Attributes:
-        source: opens the drive that asks.
-        surveys: of a database, and of the drive that asks.
+        source: opens the query drive.
+        surveys: of a database, and of the query drive.
         methods: to measure.
-        protocol: that both were described by.
+        protocol: by which both were described.
         part: to write.
     """
 

@@ -1,8 +1,9 @@
-"""Files of intermediate results that state what they were made of.
+"""Files of intermediate results that name their inputs.
 
-A part is a line that says so, a line of JSON with its inputs, and a value
-(see `plain_values`), compressed by zstd at its fastest level, which halves
-maps and takes a tenth of a second for 50 MB of spectra that hardly shrink.
+A part begins with a line that names its format and a line of JSON with its
+inputs. Its value follows (see `plain_values`), compressed by zstd at its
+fastest level. That halves maps, and takes a tenth of a second for 50 MB of
+spectra that hardly shrink.
 """
 
 from __future__ import annotations
@@ -45,10 +46,10 @@ class PartStep(Step):
 
     @abc.abstractmethod
     def inputs(self) -> dict[str, object]:
-        """Returns all that the part is made of but code, ready for JSON.
+        """Returns all inputs of the part but the code, ready for JSON.
 
         Raises:
-            InputError: something that it is made of cannot be read.
+            InputError: an input cannot be read.
         """
 
     @abc.abstractmethod
@@ -73,7 +74,7 @@ def write_part(path: Path, inputs: Mapping, value: object) -> None:
     Args:
         path: of the file.
         inputs: all that the value depends on, ready for JSON.
-        value: what `plain_values` can keep.
+        value: of types that `plain_values` can keep.
 
     Raises:
         InputError: if it cannot be kept or written.
@@ -106,7 +107,7 @@ def is_current(path: Path, inputs: Mapping) -> bool:
 
 
 def part_digest(path: Path) -> str:
-    """Returns the digest of what a part was made of.
+    """Returns the digest of the inputs of a part.
 
     Raises:
         InputError: if there is no such part, or it is cut off.

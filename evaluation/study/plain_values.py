@@ -1,8 +1,8 @@
 """Values as bytes that carry no code: numbers, text, arrays, dataclasses.
 
-Whoever unpickles runs what the bytes ask for. Here a tree of JSON names what
-there is, and arrays follow as NumPy stores them, bit by bit. Dataclasses are
-made of their fields, without running anything of theirs.
+Unpickling can run any code that the bytes name. Here a tree of JSON holds the
+values, and arrays follow as NumPy stores them, bit by bit. Dataclasses are made
+of their fields, without running their code.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def decode(data: bytes) -> Any:
             arrays.append(np.lib.format.read_array(stream, allow_pickle=False))
         return _decode(tree, arrays)
     except (
-        # What a tree of another form, or of other fields, comes to.
+        # Raised by a tree of another form, or with other fields.
         AttributeError,
         ImportError,
         IndexError,

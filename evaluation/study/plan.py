@@ -1,4 +1,4 @@
-"""Which jobs a study consists of."""
+"""The jobs of a study."""
 
 from __future__ import annotations
 
@@ -57,19 +57,19 @@ def plan_study(
     with_costs: bool = False,
     reference: Reference = NO_REFERENCE,
 ) -> list[Job]:
-    """Returns the jobs that leave what `assemble` makes a report of.
+    """Returns the jobs whose results `assemble` puts into a report.
 
     A city with one stage only gets its route drawn.
 
     Args:
-        recordings: which need not exist before the jobs that they need are
-            done; drives of one map that share stage and route with others
-            serve as same-stage controls.
+        recordings: each may be made by the jobs that it needs; drives of
+            one map that share stage and route with others serve as same-stage
+            controls.
         output: folder to write.
         methods: those of this package if left out.
         protocol: of place recognition.
-        with_costs: measure what the methods cost, too, when all else is
-            done.
+        with_costs: whether to measure the costs of the methods, too, when all
+            else is done.
         reference: which the report stands beside.
 
     Raises:
@@ -158,7 +158,7 @@ def _pair_name(city: City, pair: tuple[RecordingInfo, RecordingInfo]) -> str:
 def _roles(
     city: City, protocol: RetrievalProtocol
 ) -> list[tuple[RecordingInfo, set[Role]]]:
-    """Returns all drives that are needed, with what they serve as."""
+    """Returns all drives that are needed, with their roles."""
     roles: dict[str, tuple[RecordingInfo, set[Role]]] = {}
 
     def need(recording: RecordingInfo, *new: Role) -> None:

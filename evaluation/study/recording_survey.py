@@ -1,4 +1,4 @@
-"""All that a report needs of one recording, found in one go."""
+"""All that a report needs of one recording, found in one pass."""
 
 from __future__ import annotations
 
@@ -82,11 +82,11 @@ def survey_recording(
 ) -> RecordingSurvey:
     """Maps a recording and describes its places and queries.
 
-    Each scan is asked for once, in order.
+    Each scan is read once, in order.
 
     Args:
         recording: the drive.
-        roles: what it serves as in place recognition; may be empty.
+        roles: of the drive in place recognition; may be empty.
         methods: that describe it; may be none.
         protocol: where it has places and queries.
         track: reports progress.

@@ -43,7 +43,7 @@ class SurveyFiles:
 
 @dataclass(frozen=True)
 class RecognitionFiles:
-    """The parts that hold what methods made of two recordings.
+    """The parts that hold the results of methods on two recordings.
 
     Attributes:
         folder: in which they lie.
@@ -111,5 +111,5 @@ class StudyFiles:
         return self._parts / "rungs" / f"{file_name(name)}.data"
 
     def drawn(self, stem: str) -> Path:
-        """Says what a figure was drawn of."""
+        """Returns the file that names the inputs of a figure."""
         return self._parts / "figures" / f"{file_name(stem)}.data"

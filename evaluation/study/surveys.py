@@ -1,4 +1,4 @@
-"""The survey of one recording, which leaves a part for each reader."""
+"""The survey of one recording, in a part for each reader."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from evaluation.study.study_layout import SurveyFiles
 
 @dataclass(frozen=True)
 class Survey(Step):
-    """Writes the survey of a drive, or what is missing of it.
+    """Writes the survey of a drive, or its missing parts.
 
     Attributes:
         source: opens the drive.
-        roles: what it serves as in place recognition; may be empty.
+        roles: of the drive in place recognition; may be empty.
         methods: that describe its places and queries.
         protocol: where it has these.
         files: to write.
@@ -71,7 +71,7 @@ class Survey(Step):
         )
 
     def write(self, found: RecordingSurvey) -> None:
-        """Writes what is missing of the survey, as far as it was found.
+        """Writes the missing parts of the survey that were found.
 
         Raises:
             InputError: a file cannot be written.
@@ -95,7 +95,7 @@ class Survey(Step):
     def _missing(
         self,
     ) -> tuple[dict[MethodChoice, Mapping], dict[str, Mapping]]:
-        """Returns which parts are missing, with what they are to be made of.
+        """Returns the missing parts, each with the inputs that it is made of.
 
         Returns:
             The methods whose descriptions are missing, and the names of

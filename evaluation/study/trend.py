@@ -1,7 +1,7 @@
 """How place recognition depends on structural change, over many databases.
 
-One drive asks, many others, of more or less changed cities, are its database
-in turn: every pair gives a TCR_sym and, for each method, an AUC.
+One query drive is compared with many databases, from cities that changed more
+or less. Each pair gives a TCR_sym and, for each method, an AUC.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from evaluation.report.drawing import method_entry, method_style, save
 from evaluation.report.method_titles import in_table_order
 from evaluation.study.trend_points import TrendPoint
 
-# Width of the kernel that smooths over TCR_sym, as part of its range; the
-# band is found: by drawing databases with replacement.
+# Width of the kernel that smooths over TCR_sym, as part of its range. The band
+# comes from drawing databases with replacement.
 _BANDWIDTH = 0.15
 _RESAMPLES = 1000
 _LEAST_POINTS = 5
@@ -154,7 +154,7 @@ def smooth(x: np.ndarray, y: np.ndarray, grid: np.ndarray) -> np.ndarray:
     s0, s1, s2 = ((weight * offset**power).sum(axis=1) for power in (0, 1, 2))
     t0, t1 = ((weight * offset**power) @ y for power in (0, 1))
     determinant = s0 * s2 - s1**2
-    # With one distinct place only, the mean is all that there is.
+    # One distinct value of x has no slope, only a mean.
     flat = determinant <= 1e-12 * s0 * width**2 * s0
     safe = np.where(flat, 1.0, determinant)
     return np.where(flat, t0 / s0, (s2 * t0 - s1 * t1) / safe)

@@ -1,4 +1,4 @@
-"""One drive that asks, and many databases: their change and their AUC.
+"""A query drive and many databases: their change and their AUC.
 
 Every database is a job of its own.
 """
@@ -33,7 +33,7 @@ _COST = 30.0
 
 
 @dataclass(frozen=True)
-class Asked:
+class TrendDatabase:
     """A database drive, and what separates the change from the route.
 
     Attributes:
@@ -59,13 +59,13 @@ def measure_trend(
 ) -> list[TrendPoint]:
     """Returns the points of all databases and methods.
 
-    What an earlier run left, finished or not, is used as far as it belongs
-    to the same recordings and methods. A database leaves only its points,
-    since the surveys of many would fill a disk.
+    Results of an earlier run, finished or not, are used if they belong to the
+    same recordings and methods. A database leaves only its points, since the
+    surveys of many would fill a disk.
 
     Args:
-        query: the drive that asks.
-        databases: the drives that are asked.
+        query: the query drive.
+        databases: the drives whose places are searched.
         output: folder for intermediate results, made if needed.
         cluster: where the work is done.
         own_methods: Python files with one method each, to run besides those
@@ -85,7 +85,7 @@ def measure_trend(
     asking = open_sequence(query, lidar)
     names = {asking.name}
     if protocol.exclude_recent is not None:
-        # A drive may be asked about itself then.
+        # With loop closure a drive may be its own database.
         names = set()
     opened: dict[Path, Recorded] = {}
     for path in (*databases, *controls):
@@ -104,7 +104,7 @@ def measure_trend(
             for control in serving
             if way is not None and driven_way(control.scenario) == way
         ]
-        asked[opened[path].name] = Asked(
+        asked[opened[path].name] = TrendDatabase(
             _recorded(path, lidar), same[0] if same else None
         )
     used = {one.control for one in asked.values()}
@@ -126,7 +126,7 @@ def measure_trend(
 def measure_drives(
     asking: str,
     query: DriveSource,
-    databases: Mapping[str, Asked],
+    databases: Mapping[str, TrendDatabase],
     controls: Mapping[str, DriveSource],
     output: Path,
     cluster: Cluster,
@@ -136,9 +136,9 @@ def measure_drives(
     """Returns the points of drives that need not be recorded.
 
     Args:
-        asking: name of the drive that asks.
+        asking: name of the query drive.
         query: opens it.
-        databases: name -> a drive that is asked.
+        databases: name -> drive whose places are searched.
         controls: name -> what opens a control of databases.
         output: folder for intermediate results, made if needed.
         cluster: where the work is done.

@@ -1,4 +1,4 @@
-"""A database that is asked: its change, and the AUC of each method."""
+"""A database of a trend: its change, and the AUC of each method."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class TrendPoint:
         auc, auc_low, auc_high: with its 95 % interval over queries.
         recall_at_1: over queries with a match.
         queries, with_match: how many.
-        protocol: by which they asked.
+        protocol: of place recognition.
         auc_unchanged: of the database's control; NaN without one.
     """
 
@@ -60,7 +60,7 @@ class MeasureDatabase(PartStep):
 
     Attributes:
         source: opens the database, which is of the world of the query.
-        query: survey of the drive that asks.
+        query: survey of the query drive.
         methods: to run.
         protocol: of place recognition.
         part: to write.

@@ -77,7 +77,7 @@ class DrawChange(PartStep):
         surveys: of the earlier drive, and of the later one.
         change: part with their `ChangeResult`.
         stems: of the two figures, without endings.
-        part: says what they were drawn of.
+        part: names their inputs.
     """
 
     surveys: tuple[SurveyFiles, SurveyFiles]
