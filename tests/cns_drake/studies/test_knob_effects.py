@@ -99,5 +99,7 @@ def test_what_is_not_there_is_not_taken_back(town):
 
 def test_of_one_map_only(town, tmp_path):
     other = drive(town, "02").model_copy(update={"map": str(tmp_path)})
-    with pytest.raises(InputError, match="town_02: map: not that of town_01"):
+    with pytest.raises(
+        InputError, match="town_02: map: it is not that of town_01"
+    ):
         knob_effects(drive(town, "01"), other, Cluster())

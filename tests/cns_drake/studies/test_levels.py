@@ -90,8 +90,13 @@ def test_a_method_in_two_tables_must_be_equal(tmp_path):
 @pytest.mark.parametrize(
     ("row", "column", "value", "fault"),
     [
-        (0, 5, "other", "line 2: drives: not those of level 0 of town"),
-        (1, 2, "7", "line 3: drives: not those of level 7"),
+        (
+            0,
+            5,
+            "other",
+            "line 2: drives: they are not those of level 0 of town",
+        ),
+        (1, 2, "7", "line 3: drives: they are not those of level 7"),
         (2, 6, "1.2", "line 4: auc"),
         (2, 7, "0.9999", None),
         (2, 7, "1.5", "line 4: auc"),

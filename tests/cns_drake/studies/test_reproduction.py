@@ -132,7 +132,7 @@ def test_a_world_is_no_stage(tmp_path):
     }
     (folder / "way.csv").write_text("x,y\n0,0\n9,0\n")
     (folder / "sequence_04.yaml").write_text(yaml.safe_dump(world))
-    with pytest.raises(InputError, match=r"sequence_04.yaml: map: needed"):
+    with pytest.raises(InputError, match=r"sequence_04.yaml: map: missing"):
         reproduction.reproduce_maps([str(folder)], tmp_path, Cluster())
 
 

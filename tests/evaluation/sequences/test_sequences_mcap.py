@@ -182,7 +182,9 @@ def test_scenario_and_structures(tmp_path):
 )
 def test_attachments_of_another_kind(tmp_path, attachments, attribute):
     path, _, _ = record(tmp_path / "s", attachments=attachments)
-    with pytest.raises(InputError, match=f"{path}: attachment .*json: no "):
+    with pytest.raises(
+        InputError, match=f"{path}: attachment .*json: (not a|no) "
+    ):
         getattr(open_sequence(path), attribute)
 
 
