@@ -41,9 +41,9 @@ class StageDifference:
     """A stage compared with another one.
 
     Attributes:
-        common: parts of this stage that the other one has as well. additional:
-            structures of this stage that the other one lacks, and parts of
-            structures above their height there.
+        common: parts of this stage that the other one has as well.
+        additional: structures of this stage that the other one lacks, and parts
+            of structures above their height there.
         absent: structures of the other stage that this one lacks.
         lower: parts of structures of the other stage above their height here.
     """

@@ -89,8 +89,8 @@ class MovingGroups:
         Args:
             calc_X_WF: gives the pose of a frame in the world.
             motions: of the frames that move during the turn.
-            known: poses of frames, which replace calls of `calc_X_WF`. seen:
-                the ball in which rays can meet geometry.
+            known: poses of frames, which replace calls of `calc_X_WF`.
+            seen: the ball in which rays can meet geometry.
 
         Returns:
             The rows of the groups that were placed.

@@ -132,8 +132,8 @@ class RayCastingScene:
         Args:
             calc_X_WF: gives the pose of a frame in the world.
             motions: of the frames that move during the next casts.
-            known: poses of frames, which replace calls of `calc_X_WF`. seen:
-                the ball in which the next rays can meet geometry.
+            known: poses of frames, which replace calls of `calc_X_WF`.
+            seen: the ball in which the next rays can meet geometry.
         """
         placed = self._moving.place(calc_X_WF, motions, known, seen)
         if placed:

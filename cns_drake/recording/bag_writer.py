@@ -108,8 +108,9 @@ class BagWriter:
                 if the name ends with `.yaml`, and else as JSON.
                 An interrupted recording with the same attachments is of the
                 same kind, and its messages can be taken over.
-            scenario: the content of `scenario.yaml` beside the MCAP. beside:
-                name of a further file beside the MCAP -> its content, as YAML.
+            scenario: the content of `scenario.yaml` beside the MCAP.
+            beside: name of a further file beside the MCAP -> its content, as
+                YAML.
             custom_data: key -> text for `ros2 bag info`.
             fingerprint: the content of `fingerprint.txt`, if any. An
                 interrupted recording with another one is of another kind, too.

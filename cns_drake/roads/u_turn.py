@@ -97,8 +97,8 @@ class Loop(NamedTuple):
     """A car's turn between two lanes.
 
     Attributes:
-        begin: distance along its lane at which the car leaves it [m]. points:
-            (N, 2) from there to the place where it joins the other lane,
+        begin: distance along its lane at which the car leaves it [m].
+        points: (N, 2) from there to the place where it joins the other lane,
             opposite [m].
     """
 

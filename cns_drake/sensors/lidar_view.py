@@ -23,8 +23,8 @@ def add_lidar_view(
 
     Args:
         builder: of the diagram that holds the LiDAR.
-        lidar: its points are shown at the path of its system's name. meshcat:
-            the view.
+        lidar: its points are shown at the path of its system's name.
+        meshcat: the view.
         period: time between two shown scans [s]; by default that of a turn.
         color: of the points.
         point_size: their size [m].

@@ -99,8 +99,8 @@ class SeenGeometry:
             revision: of the geometry (`geometry_revision_port`), None if
                 unknown; all geometries are then compared.
             motions: of the frames that move during the turn.
-            known: poses of frames, which replace calls of `query_object`. seen:
-                the ball in which beams can meet geometry.
+            known: poses of frames, which replace calls of `query_object`.
+            seen: the ball in which beams can meet geometry.
 
         Raises:
             InputError: see `GeometryReader.read`.

@@ -25,8 +25,8 @@ class TracedObject:
     Attributes:
         name: its id.
         type_name: of its type, "" if it has none.
-        steps: (M,) numbers of the times at which it is there, ascending. xy:
-            (M, 2) of a vehicle's front, or of a person's middle [m].
+        steps: (M,) numbers of the times at which it is there, ascending.
+        xy: (M, 2) of a vehicle's front, or of a person's middle [m].
         yaw: (M,) heading, from x towards y [rad].
         slope: (M,) of the road, upwards positive [rad].
     """

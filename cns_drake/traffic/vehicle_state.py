@@ -34,8 +34,8 @@ class Vehicles(NamedTuple):
         v: speed [m/s].
         granted: whether it may leave its lane.
         held: the way that is kept free for it, -1 for none.
-        since: start of its wait for its way, inf without a wait [s]. refused:
-            time without room beyond its way [s].
+        since: start of its wait for its way, inf without a wait [s].
+        refused: time without room beyond its way [s].
         left_lane: the lane that it is changing from, -1 for none.
         change_start, change_length: of the lane change, along the lane [m].
         draws: number of random numbers that each has drawn.

@@ -177,8 +177,8 @@ class Obstacles:
         """Collects footprints, and an area without a name.
 
         Args:
-            kept_free: area that stays free, seen from above [m]. things:
-                structures whose footprints are obstacles.
+            kept_free: area that stays free, seen from above [m].
+            things: structures whose footprints are obstacles.
         """
         feet = ((thing.name, thing.footprint) for thing in things)
         return cls([("", kept_free), *feet])

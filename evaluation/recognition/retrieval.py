@@ -86,8 +86,8 @@ def retrieve(
 
     Args:
         database: the drive of the places.
-        query: the drive of the queries, in the same world frame. method:
-            describes and compares.
+        query: the drive of the queries, in the same world frame.
+        method: describes and compares.
         protocol: of the comparison.
         track: reports progress.
         across_maps: the two may be of maps of different names.

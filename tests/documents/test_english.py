@@ -20,6 +20,9 @@ PERSONAL = re.compile(
     re.IGNORECASE,
 )
 
+# A field of a docstring behind the end of another one's text.
+HIDDEN_FIELD = re.compile(r"\n +\w[^\n]*\. ([a-z_]+:)\n")
+
 # Found text -> why it stays.
 ALLOWED = {
     'not told"': "the value of an unknown reference system in import.yaml",
@@ -79,3 +82,9 @@ def test_a_wrong_beginning_is_found(text):
 @pytest.mark.parametrize("text", ["Offset", "# Sofia", "Whose", "One of So"])
 def test_other_words_are_left_alone(text):
     assert not OPENING.search(text)
+
+
+def test_each_field_of_a_docstring_begins_a_line():
+    assert findings(HIDDEN_FIELD, texts(*CODE)) == []
+    text = "\n    a: the first. b:\n        the second.\n"
+    assert HIDDEN_FIELD.search(text)[1] == "b:"

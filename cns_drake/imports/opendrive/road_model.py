@@ -143,8 +143,8 @@ class Thing:
         size: length, width, height; 0 where unknown [m].
         outline: (N, 3) corners about the place, or none: u, v, height; or
         road_outline: (N, 3) corners s, t, height; or none [m].
-        is_dynamic: whether it has changing states, as lights have. faces_back:
-            whether it is for the traffic against the road.
+        is_dynamic: whether it has changing states, as lights have.
+        faces_back: whether it is for the traffic against the road.
     """
 
     name: str
