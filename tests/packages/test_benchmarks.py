@@ -29,6 +29,7 @@ BY_HAND = {
     "memory.py",
     "peers.py",
     "real_scans.py",
+    "source_rays.py",
 }
 SHARED = {"processes.py", "stages.py"}
 
