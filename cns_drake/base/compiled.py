@@ -33,10 +33,12 @@ def compiled(function: _Function) -> _Function:
     numba.config.CACHE_DIR = str(
         Path(before or cache_folder() / "compiled") / _state_of(own_folder)
     )
+    # Nothing calls these functions as those of C.
+    options = {"nogil": True, "no_cfunc_wrapper": True}
     try:
-        return numba.njit(cache=True, nogil=True)(function)
+        return numba.njit(cache=True, **options)(function)
     except RuntimeError:
-        return numba.njit(nogil=True)(function)
+        return numba.njit(**options)(function)
     finally:
         numba.config.CACHE_DIR = before
 

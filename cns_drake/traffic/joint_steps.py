@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from cns_drake.base.compiled import compiled
 from cns_drake.traffic.lane_arrays import LaneArrays
 from cns_drake.traffic.lane_changing import change_lanes
 from cns_drake.traffic.presence import Presence
@@ -22,15 +21,14 @@ from cns_drake.traffic.vehicle_steps import (
 from cns_drake.traffic.walker_steps import (
     Walkers,
     WalkwayArrays,
-    height_of,
     step_walkers,
+    write_walkers,
 )
 
 # A driver considers a change of lane only at every such step.
 _THINKS = 10
 
 
-@compiled
 def run_steps(
     lanes: LaneArrays,
     vehicles: Vehicles,
@@ -61,12 +59,7 @@ def run_steps(
     """
     for k in range(len(presence.until)):
         write_poses(lanes, vehicles, vehicle_poses[k])
-        for i in range(len(walkers.speed)):
-            walker_poses[k, i, 0] = walkers.xy[i, 0]
-            walker_poses[k, i, 1] = walkers.xy[i, 1]
-            walker_poses[k, i, 2] = height_of(ways, walkers, i)
-            walker_poses[k, i, 3] = walkers.yaw[i]
-            walker_poses[k, i, 4] = walkers.phase[i]
+        write_walkers(ways, walkers, walker_poses[k])
         find_occupants(occupants, lanes, vehicles, presence, k)
         grant_ways(lanes, vehicles, occupants, presence, permits, k, dt, seed)
         wanted, gaps = accelerations(lanes, vehicles, occupants)

@@ -347,6 +347,19 @@ def height_of(ways: WalkwayArrays, walkers: Walkers, i: int) -> float:
 
 
 @compiled
+def write_walkers(
+    ways: WalkwayArrays, walkers: Walkers, poses: np.ndarray
+) -> None:
+    """Writes x, y, z [m], yaw, phase [rad] of all walkers to (N, 5) poses."""
+    for i in range(len(walkers.speed)):
+        poses[i, 0] = walkers.xy[i, 0]
+        poses[i, 1] = walkers.xy[i, 1]
+        poses[i, 2] = height_of(ways, walkers, i)
+        poses[i, 3] = walkers.yaw[i]
+        poses[i, 4] = walkers.phase[i]
+
+
+@compiled
 def _begin(
     ways: WalkwayArrays,
     walkers: Walkers,
