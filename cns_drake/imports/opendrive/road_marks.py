@@ -15,7 +15,7 @@ import numpy as np
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.imports.foreign_city import Rgb, make_imported
 from cns_drake.imports.opendrive.lane_bands import LaneBand
-from cns_drake.imports.opendrive.road_model import RoadMark
+from cns_drake.imports.opendrive.road_model import MarkLine, RoadMark
 
 # Default length of a dash and its gap; distance from the middle of a double
 # line to its lines; height above the road [m].
@@ -101,25 +101,47 @@ def _painted(
     left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
     ends = [*(mark.start for mark in marks[1:]), end][: len(marks)]
     for mark, last in zip(marks, ends, strict=True):
-        styles = [word for word in mark.kind.split() if word in _STYLES]
-        for k, style in enumerate(styles):
-            out = (2 * k - 1) * _ASIDE if len(styles) > 1 else 0.0
-            aside = left * out * np.sign(side)
-            for a, b in _stretches(style, mark.start, last):
-                quads = _stripe(border, s, left, aside, (a, b), mark.width)
+        for line in _lines(mark, float(np.sign(side))):
+            for a, b in _stretches(line, mark.start, last):
+                quads = _stripe(
+                    border, s, left, left * line.aside, (a, b), line.width
+                )
                 if len(quads):
                     yield mark.colour_of(_COLOURS), quads
 
 
+def _lines(mark: RoadMark, side: float) -> Sequence[MarkLine]:
+    """Returns the lines of a mark, as the file has them or usual ones.
+
+    Args:
+        mark: of the file.
+        side: positive if outwards is to the left.
+    """
+    styles = [word for word in mark.kind.split() if word in _STYLES]
+    if mark.lines and (styles or mark.kind == "custom"):
+        return mark.lines
+    apart = _ASIDE * side if len(styles) > 1 else 0.0
+    return [
+        MarkLine(
+            aside=(2 * k - 1) * apart,
+            start=0.0,
+            dash=_DASH,
+            gap=0.0 if style == "solid" else _GAP,
+            width=mark.width,
+        )
+        for k, style in enumerate(styles)
+    ]
+
+
 def _stretches(
-    style: str, start: float, end: float
+    line: MarkLine, start: float, end: float
 ) -> Iterator[tuple[float, float]]:
     """Yields start and end of the painted stretches of a line [m]."""
-    if style == "solid":
-        yield start, end
+    if line.gap == 0.0:
+        yield start + line.start, end
         return
-    for s in np.arange(start, end, _DASH + _GAP).tolist():
-        yield s, min(s + _DASH, end)
+    for s in np.arange(start + line.start, end, line.dash + line.gap).tolist():
+        yield max(s, start), min(s + line.dash, end)
 
 
 def _stripe(

@@ -72,6 +72,25 @@ class Cubics:
 
 
 @dataclass(frozen=True)
+class MarkLine:
+    """One line of a mark whose measures the file has.
+
+    Attributes:
+        aside: distance from the border of the lane, positive to the left [m].
+        start: of the first dash, from the start of the mark [m].
+        dash, gap: lengths of a dash and of the gap after it; the line is
+            continuous if the gap is 0 [m].
+        width: [m].
+    """
+
+    aside: float
+    start: float
+    dash: float
+    gap: float
+    width: float
+
+
+@dataclass(frozen=True)
 class RoadMark:
     """A line painted on the border of a lane.
 
@@ -80,12 +99,14 @@ class RoadMark:
         kind: its type, such as `solid broken`.
         colour: as the file names it.
         width: of one line [m].
+        lines: the lines it consists of; those usual for its kind if empty.
     """
 
     start: float
     kind: str
     colour: str
     width: float
+    lines: tuple[MarkLine, ...] = ()
 
     def colour_of(self, known: Container[str]) -> str:
         """Returns its colour, or the standard one if it is not known."""

@@ -13,6 +13,7 @@ import numpy as np
 from cns_drake.base.errors import InputError
 from cns_drake.base.xml_elements import Element, read_elements
 from cns_drake.imports.import_faults import ImportFaults
+from cns_drake.imports.opendrive.mark_reader import read_marks
 from cns_drake.imports.opendrive.plan_view import (
     Arc,
     Cubic,
@@ -27,7 +28,6 @@ from cns_drake.imports.opendrive.road_model import (
     Lane,
     LaneSection,
     RoadMap,
-    RoadMark,
 )
 from cns_drake.imports.opendrive.road_things import read_things
 
@@ -87,8 +87,6 @@ _LONGEST_TOGETHER = 2_000_000.0
 _FAR = 10_000.0
 # Lengths that differ by less are equal [m].
 _ROUNDING = 0.01
-# Width of a painted line without a plausible one [m].
-_MARK_WIDTH, _WIDEST_MARK = 0.12, 1.0
 # Greatest width of a lane, and curvature of a curve [m, 1/m].
 _WIDEST = 100.0
 _SHARPEST = 100.0
@@ -304,7 +302,7 @@ def _sections(
         lanes: dict[int, Lane] = {}
         for side in ("left", "right"):
             for element in one.all(side, "lane"):
-                lane = _lane(element, start)
+                lane = _lane(element, start, name, faults)
                 if lane.number == 0:
                     continue
                 if lane.number in lanes:
@@ -315,13 +313,15 @@ def _sections(
         middle = [
             mark
             for element in one.all("center", "lane")
-            for mark in _marks(element, start)
+            for mark in read_marks(element, start, name, faults)
         ]
         found.append(LaneSection(start, end, lanes, tuple(middle)))
     return found
 
 
-def _lane(element: Element, start: float) -> Lane:
+def _lane(
+    element: Element, start: float, name: str, faults: ImportFaults
+) -> Lane:
     number = element.number("id")
     if number != int(number):
         raise ValueError(
@@ -334,7 +334,7 @@ def _lane(element: Element, start: float) -> Lane:
         width=_cubics(element.all("width"), "sOffset", start),
         border=_cubics(element.all("border"), "sOffset", start),
         height=heights.number("inner", 0.0) if heights else 0.0,
-        marks=tuple(_marks(element, start)),
+        marks=tuple(read_marks(element, start, name, faults)),
     )
     for one in (*element.all("width"), *element.all("border")):
         if abs(one.number("a", 0.0)) > _WIDEST:
@@ -343,25 +343,6 @@ def _lane(element: Element, start: float) -> Lane:
                 f"{one.number('a'):g} m is more than {_WIDEST:g} m"
             )
     return lane
-
-
-def _marks(lane: Element, start: float) -> list[RoadMark]:
-    """Returns the marks of a lane, in their order along the road."""
-    marks = []
-    for one in lane.all("roadMark"):
-        stated = one.number("width", 0.0)
-        width = stated if 0.0 < stated <= _WIDEST_MARK else _MARK_WIDTH
-        if one.text("weight", "standard") == "bold" and not stated:
-            width *= 2.0
-        marks.append(
-            RoadMark(
-                start + one.number("sOffset", 0.0),
-                one.text("type", "none"),
-                one.text("color", "standard"),
-                width,
-            )
-        )
-    return sorted(marks, key=lambda mark: mark.start)
 
 
 def _limits(road: Element) -> Iterator[tuple[float, float]]:

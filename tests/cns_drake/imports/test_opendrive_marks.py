@@ -30,10 +30,14 @@ ROAD = f"""<OpenDRIVE><header revMajor="1" revMinor="6"/>
 
 @pytest.fixture(scope="module")
 def paint(tmp_path_factory):
-    """Returns colour -> triangles in the world, about the bend's middle."""
     path = tmp_path_factory.mktemp("road") / "road.xodr"
-    path.write_text(ROAD)
-    roads = read_roads(path, ImportFaults())
+    return painted(path, ROAD, ImportFaults())
+
+
+def painted(path, text, faults):
+    """Returns colour -> triangles in the world, about the bend's middle."""
+    path.write_text(text)
+    roads = read_roads(path, faults)
     bands = [band for road in roads.roads for band in lane_bands(road)]
     (one,) = road_marks("marks", bands, lambda xy: np.full(len(xy), 0.5))
     assert one.name == "marks_1"
@@ -81,3 +85,62 @@ def test_lines_are_seen_from_above_the_ground(paint):
         a, b, c = np.moveaxis(triangles, 1, 0)
         assert (np.cross(b - a, c - a)[:, 2] > 0.0).all()
         np.testing.assert_allclose(triangles[..., 2], 0.515, atol=1e-9)
+
+
+def with_lines(*lines, kind="broken broken"):
+    """Returns the road with lines of its own on the right edge."""
+    inner = "".join(f"<line {line}/>" for line in lines)
+    return ROAD.replace(
+        'type="solid broken" color="no colour"/>',
+        f'type="{kind}" color="red"><type name="x" width="0.2">{inner}</type>'
+        "</roadMark>",
+    )
+
+
+@pytest.mark.parametrize("kind", ["broken broken", "custom"])
+def test_dashes_are_those_of_the_file(tmp_path, kind):
+    text = with_lines(
+        'length="2" space="4" tOffset="0.3" sOffset="1" width="0.1"',
+        'length="0" space="0" tOffset="-0.4" sOffset="10" width="0.25"',
+        kind=kind,
+    )
+    faults = ImportFaults()
+    red = painted(tmp_path / "road.xodr", text, faults)["red"]
+    assert not faults.rows()
+    # Outwards is to the right, and the bend's middle is on the left.
+    edge = RADIUS + 3.5
+    inner = (radii(red) < edge).all(axis=1)
+    dashes, line = red[inner], red[~inner]
+    off = radii(dashes) - (edge - 0.3)
+    assert np.abs(np.abs(off) - 0.05).max() < 0.005
+    off = radii(line) - (edge + 0.4)
+    assert np.abs(np.abs(off) - 0.125).max() < 0.005
+    # 15 dashes, from 1 m to 87 m along the road; and from 10 m to its end.
+    places = np.arctan2(dashes[..., 0], -dashes[..., 1]) * RADIUS
+    assert places.min() == pytest.approx(1.0, abs=0.01)
+    assert places.max() == pytest.approx(1.0 + 14 * 6.0 + 2.0, abs=0.01)
+    inside = 15 * 2.0 * 0.1 * (edge - 0.3) / RADIUS
+    assert area(dashes) == pytest.approx(inside, rel=0.01)
+    outside = 80.0 * 0.25 * (edge + 0.4) / RADIUS
+    assert area(line) == pytest.approx(outside, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    "line",
+    ['length="-3" space="6"', 'length="0" space="6"',
+     'length="3" space="-6"', 'length="1e-9" space="1e-9"'],
+)  # fmt: skip
+def test_impossible_dashes_are_counted(tmp_path, line):
+    faults = ImportFaults()
+    text = with_lines(line, kind="broken")
+    red = painted(tmp_path / "road.xodr", text, faults)["red"]
+    rows = [("road mark with impossible dashes, made usual", 1, "1")]
+    assert faults.rows() == rows
+    stretch = (RADIUS + 3.5) / RADIUS
+    expected = 10 * 3.0 * 0.12 * stretch
+    assert area(red) == pytest.approx(expected, rel=0.01)
+
+
+def test_marks_that_are_no_paint_are_left_out(tmp_path):
+    text = with_lines('length="3" space="6"', kind="curb")
+    assert "red" not in painted(tmp_path / "road.xodr", text, ImportFaults())

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from cns_drake.imports.dressing.lane_marks import lane_marks
-from cns_drake.imports.dressing.street_dressing import may_park_on
+from cns_drake.imports.dressing.street_parking import may_park_on
 from cns_drake.imports.openstreetmap import import_openstreetmap
 from cns_drake.imports.street_lanes import Street
 from cns_drake.imports.waypoint_drives import Drive
