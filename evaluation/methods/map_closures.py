@@ -74,13 +74,14 @@ class MapClosuresDatabase:
 class MapClosures(Method[np.ndarray, MapClosuresDatabase]):
     """MapClosures, by its own package.
 
-    Descriptors are local maps (N, 3), thinned. A hundred scans are about
-    50 m of a drive at 10 m/s and 20 scans a second.
+    Descriptors are local maps (N, 3), thinned. Two hundred scans are about
+    50 m of a drive either way, at 10 m/s and 20 scans a second.
     """
 
     Config = MapClosuresConfig
     config: MapClosuresConfig
-    scans_per_place = 100
+    scans_per_place = 200
+    is_centred = True
 
     def __init__(self, config: MapClosuresConfig | None = None):
         """Prepares the package.

@@ -41,8 +41,9 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     Attributes:
         name: as on the command line.
         Config: type of its parameters.
-        scans_per_place: number of consecutive scans that are merged, in the
-            frame of the first, into the described cloud.
+        scans_per_place: number of consecutive scans that are merged into the
+            described cloud, from that of the place on and in its frame.
+        is_centred: whether half of the merged scans come before the place's.
         point_fields: further fields of points that it needs, such as intensity,
             ring, t or label.
         batch_size: number of clouds for a call of `describe_batch`.
@@ -50,10 +51,10 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
             compares by their points; 0 without one.
         config: the parameters in use.
 
-    A cloud is (N, 3) float64, finite, in the frame of the LiDAR, or of the
-    first of the merged scans [m]. If the method names `point_fields`, it is
-    a structured array (N,) instead, of float64 `x`, `y` and `z` and those
-    fields in the types of the recording.
+    A cloud is (N, 3) float64, finite, in the frame of the LiDAR at the place
+    [m]. If the method names `point_fields`, it is a structured array (N,)
+    instead, of float64 `x`, `y` and `z` and those fields in the types of the
+    recording.
 
     Example:
         from evaluation import make_method
@@ -66,6 +67,7 @@ class Method(abc.ABC, Generic[Descriptor, Database]):
     name: ClassVar[str]
     Config: ClassVar[type[MethodConfig]] = MethodConfig
     scans_per_place: ClassVar[int] = 1
+    is_centred: ClassVar[bool] = False
     point_fields: ClassVar[tuple[str, ...]] = ()
     batch_size: ClassVar[int] = 1
     rerank_best: ClassVar[int] = 0

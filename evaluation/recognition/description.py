@@ -96,18 +96,19 @@ def describe_drive(
     ]
     frames = {role: _frames(sequence, role, protocol) for role in roles}
     wanted = np.unique(np.concatenate([*frames.values()])).tolist()
-    # Number of merged scans of a cloud, and fields of its points.
+    # Number of merged scans of a cloud, of those before its frame, and fields
+    # of its points.
     kinds = {one.kind for one in describing}
-    single: tuple[int, tuple[str, ...]] = (1, ())
+    single: tuple[int, int, tuple[str, ...]] = (1, 0, ())
     if visit is not None:
         kinds.add(single)
     num_points = 0
     for frame in track(wanted, f"describing {sequence.name}", len(wanted)):
         clouds = {
-            (number, fields): gather(
-                sequence, frame, number, protocol.max_range, fields
+            (number, before, fields): gather(
+                sequence, frame, number, protocol.max_range, fields, before
             )
-            for number, fields in kinds
+            for number, before, fields in kinds
         }
         num_points += max(map(len, clouds.values()))
         if visit is not None:
@@ -141,7 +142,11 @@ class _Describing:
         roles: Set[Role],
         protocol: RetrievalProtocol,
     ):
-        self.kind = (protocol.scans(method), tuple(method.point_fields))
+        self.kind = (
+            protocol.scans(method),
+            protocol.scans_before(method),
+            tuple(method.point_fields),
+        )
         self._method = method
         self._waiting: list[tuple[int, np.ndarray]] = []
         scans = {}

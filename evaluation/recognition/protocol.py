@@ -66,6 +66,10 @@ class RetrievalProtocol:
             return self.scans_per_place
         return method.scans_per_place
 
+    def scans_before(self, method: Method) -> int:
+        """Returns how many scans of a method's place come before its own."""
+        return self.scans(method) // 2 if method.is_centred else 0
+
     @property
     def gate_radius(self) -> float | None:
         """The radius that the gate compares with [m]; None without a gate."""

@@ -53,32 +53,35 @@ def gather(
     num_scans: int,
     max_range: float,
     fields: tuple[str, ...] = (),
+    num_before: int = 0,
 ) -> np.ndarray:
     """Returns the cloud that a method describes at a frame.
 
     Args:
         sequence: the drive.
-        frame: the first scan.
-        num_scans: how many consecutive scans are merged; fewer at the end
+        frame: whose place is described.
+        num_scans: how many consecutive scans are merged; fewer at the ends
             of the drive.
         max_range: see `within_range`.
         fields: of the points, beside their coordinates.
+        num_before: how many of the scans come before the frame.
 
     Returns:
-        (N, 3) float64, in the sensor frame of the first scan; with fields,
+        (N, 3) float64, in the sensor frame of the frame's scan; with fields,
         a structured array (N,) of float64 x, y, z and the fields.
 
     Raises:
         InputError: if the scans lack a field.
     """
-    last = min(frame + num_scans, len(sequence))
+    first = max(frame - num_before, 0)
+    end = min(frame - num_before + num_scans, len(sequence))
     X_WS = sequence.X_WS
     X_S0W = poses.inverse(X_WS[frame])
     clouds = []
-    for index in range(frame, last):
+    for index in range(first, end):
         scan = sequence.scan(index)
         cloud = point_arrays.xyz(scan)
-        if index > frame:
+        if index != frame:
             cloud = poses.transform(X_S0W @ X_WS[index], cloud)
         clouds.append(select(scan, cloud, max_range, fields, sequence.name))
     return np.concatenate(clouds)

@@ -67,6 +67,7 @@ class MeasureCosts(PartStep):
                         number,
                         protocol.max_range,
                         method.point_fields,
+                        protocol.scans_before(method),
                     )
                     for frame in frames
                 ]

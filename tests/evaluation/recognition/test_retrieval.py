@@ -4,6 +4,7 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from evaluation.methods import Method, MethodConfig, make_method
+from evaluation.recognition.description import describe_drive
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.retrieval import retrieve
@@ -123,7 +124,7 @@ def test_match_radius_is_inclusive(tmp_path):
         assert result.matches.tolist() == [[is_match]]
 
 
-def test_merged_scans_are_in_the_frame_of_the_first(tmp_path):
+def test_merged_scans_are_in_the_frame_of_the_place(tmp_path):
     # A post at (20, 4, 1) in the world, seen from a turning car.
     post = np.array([20.0, 4.0, 1.0])
     X_WBs = [yaw_pose(2.0 * i, 0.5 * i, 0.0, 0.4 * i) for i in range(5)]
@@ -132,14 +133,43 @@ def test_merged_scans_are_in_the_frame_of_the_first(tmp_path):
         for X in X_WBs
     ]
     sequence = open_sequence(write_recording(tmp_path / "s", scans, X_WBs))
-    for frame, number in ((0, 1), (1, 3), (3, 2), (3, 9)):
-        cloud = gather(sequence, frame, number, 100.0)
-        assert len(cloud) == min(number, 5 - frame)
+    # The frame, its scans, those of them before it, and those there are.
+    for frame, number, before, there in (
+        (0, 1, 0, 1),
+        (1, 3, 0, 3),
+        (3, 2, 0, 2),
+        (3, 9, 0, 2),
+        (2, 4, 2, 4),
+        (1, 4, 2, 3),
+        (4, 6, 3, 4),
+    ):
+        cloud = gather(sequence, frame, number, 100.0, (), before)
+        assert len(cloud) == there
         expected = (post - X_WBs[frame][:3, 3]) @ X_WBs[frame][:3, :3]
         expected -= [0.0, 0.0, 1.6]
         np.testing.assert_allclose(
             cloud, np.tile(expected, (len(cloud), 1)), atol=1e-5
         )
+
+
+def test_a_centred_place_has_as_many_scans_before_as_after(tmp_path):
+    X_WBs = [yaw_pose(5.0 * i, 0.0, 0.0, 0.0) for i in range(9)]
+    scans = [make_scan(np.array([[10.0, 0.0, 0.0]]))] * 9
+    sequence = open_sequence(write_recording(tmp_path / "s", scans, X_WBs))
+    seen = []
+
+    class Centred(OddOneOut):
+        scans_per_place = 4
+        is_centred = True
+
+        def describe(self, points):
+            seen.append(len(points))
+            return super().describe(points)
+
+    protocol = RetrievalProtocol(query_spacing=20.0)
+    (drive,) = describe_drive(sequence, [Centred()], {"queries"}, protocol)
+    assert drive.queries.frames.tolist() == [0, 4, 8]
+    assert seen == [2, 4, 3]
 
 
 def test_metrics_of_a_pair(tmp_path):
