@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -90,6 +91,21 @@ class Thing:
 
 
 @dataclass(frozen=True)
+class StreetPlaces:
+    """Places on and beside streets, for traffic.
+
+    Attributes:
+        crossed: numbers of the streets' nodes at which people cross.
+        signals: (N, 2) [m].
+        paths: (M, 2) middles of ways for people [m].
+    """
+
+    crossed: AbstractSet[int] = frozenset()
+    signals: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
+    paths: Sequence[np.ndarray] = ()
+
+
+@dataclass(frozen=True)
 class ForeignCity:
     """The content of a file.
 
@@ -100,6 +116,7 @@ class ForeignCity:
         reference_system: of the origin, as the file names it.
         faults: counts of parts that were repaired or left out.
         streets: streets with known lanes, in which drives are searched.
+        street_places: signals, crossings and paths, for traffic.
         keeps_left: whether traffic keeps left, by the file.
         things: small things, which only a dressed city gets; until then the
             faults count them as left out.
@@ -112,6 +129,7 @@ class ForeignCity:
     reference_system: str
     faults: ImportFaults
     streets: Sequence[Street] = ()
+    street_places: StreetPlaces = StreetPlaces()
     keeps_left: bool = False
     axes: tuple[str, ...] = ()
     things: Sequence[Thing] = ()

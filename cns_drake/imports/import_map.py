@@ -12,6 +12,7 @@ import re
 import numpy as np
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.map_folder import LANES_NAME
 from cns_drake.city.geometry.structures import MeshShape
 from cns_drake.imports.dressing.whole_city import dress_city
 from cns_drake.imports.drive_files import write_drives
@@ -29,6 +30,7 @@ from cns_drake.imports.near_drives import drive_along
 from cns_drake.imports.opendrive.town import build_town
 from cns_drake.imports.opendrive.town_files import write_town
 from cns_drake.imports.openstreetmap import import_openstreetmap
+from cns_drake.imports.osm_traffic import lanes_of_streets
 from cns_drake.imports.overview import draw_overview
 from cns_drake.imports.staged_city import StagedCity, stage_city
 from cns_drake.imports.street_drives import StreetGraph
@@ -80,10 +82,21 @@ def import_city(
         ground = ground_of(staged.kept)
     drives = _lifted(drives, ground, city.faults)
     bare, dressing = staged.kept, None
+    added: list[Imported] = []
     if options.dressed:
         progress("dressing buildings and streets")
         dressing = dress_city(staged, city, drives, ground, options.seed)
         staged = dressing.city
+        names = {one.structure.name for one in bare}
+        added = [one for one in staged.kept if one.structure.name not in names]
+    lanes = lanes_of_streets(
+        city.streets,
+        city.street_places,
+        [*bare, *added],
+        [one for one in added if one.kind not in ("Sidewalk", "Lane mark")],
+        drives,
+        _side(city, options),
+    )
     progress(f"writing {output}")
     with map_draft(output) as draft:
         bottom = bottom_of(bare, ground)
@@ -104,6 +117,8 @@ def import_city(
             _titles(staged, options),
             [drive.waypoints for drive in drives],
         )
+        if lanes is not None:
+            (draft / LANES_NAME).write_text(lanes, "utf-8")
         draw_overview(draft / "from_above.png", bare, space, drives)
         finish(draft, sizes)
     return _report(staged, drives, city.faults)
@@ -172,11 +187,15 @@ def _find_drives(
     city: ForeignCity, space: FreeSpace, options: ImportOptions
 ) -> list[Drive]:
     """Returns drives in the lanes of streets, or else in free space."""
-    side = options.drive_on
-    if side is None:
-        side = DriveOn.LEFT if city.keeps_left else DriveOn.RIGHT
-    streets = StreetGraph(city.streets, space, side)
+    streets = StreetGraph(city.streets, space, _side(city, options))
     return find_drives(streets) or find_drives(CellGraph(space))
+
+
+def _side(city: ForeignCity, options: ImportOptions) -> DriveOn:
+    """Returns the side of the streets on which traffic keeps."""
+    if options.drive_on is not None:
+        return options.drive_on
+    return DriveOn.LEFT if city.keeps_left else DriveOn.RIGHT
 
 
 def _lifted(

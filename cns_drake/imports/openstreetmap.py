@@ -41,6 +41,7 @@ from cns_drake.imports.osm_reading import (
 from cns_drake.imports.osm_streets import (
     crossing_stripes,
     drivable_streets,
+    street_places,
     street_surfaces,
 )
 from cns_drake.imports.osm_tags import tag_value
@@ -112,6 +113,7 @@ def import_openstreetmap(
         "WGS 84",
         faults,
         drivable_streets(features.ways, local, bridges),
+        street_places(features, local),
         any(
             tags.get("driving_side") == "left"
             for _, tags, _, _ in features.ways

@@ -10,11 +10,20 @@ from shapely.geometry import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.imports.extrusions import flat_surface
-from cns_drake.imports.foreign_city import Imported, make_imported
+from cns_drake.imports.foreign_city import (
+    Imported,
+    StreetPlaces,
+    make_imported,
+)
 from cns_drake.imports.import_faults import ImportFaults
 from cns_drake.imports.osm_bridges import Bridges
 from cns_drake.imports.osm_places import Local, parts_of, sound_parts
-from cns_drake.imports.osm_reading import OsmWay, Tags, has_tag
+from cns_drake.imports.osm_reading import (
+    OsmFeatures,
+    OsmWay,
+    Tags,
+    has_tag,
+)
 from cns_drake.imports.osm_tags import (
     driven_ways,
     is_marked,
@@ -119,6 +128,33 @@ def drivable_streets(
                 )
             )
     return streets
+
+
+def street_places(features: OsmFeatures, local: Local) -> StreetPlaces:
+    """Returns where people cross and signals stand, and ways for people."""
+    signals = [
+        place
+        for _, tags, place in features.nodes
+        if tags.get("highway") == "traffic_signals"
+    ]
+    paths = [
+        local(line)
+        for _, tags, line, _ in features.ways
+        if path_width(tags) is not None
+        and tags.get("highway") not in ("steps", "cycleway")
+        and tags.get("footway") != "crossing"
+        and not has_tag(tags, "tunnel")
+        and not has_tag(tags, "area")
+    ]
+    return StreetPlaces(
+        frozenset(
+            number
+            for number, tags in features.crossings
+            if tags.get("crossing") != "no"
+        ),
+        local(np.array(signals).reshape(-1, 2)),
+        paths,
+    )
 
 
 def crossing_stripes(

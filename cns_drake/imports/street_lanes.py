@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 # Sharpest turn from one street into another.
-_SHARPEST_TURN_DEG = 125.0
+SHARPEST_TURN_DEG = 125.0
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def _leads_on(lane: Lane, after: Lane) -> bool:
         return False
     a, b = lane.line[-1] - lane.line[-2], after.line[1] - after.line[0]
     cross, dot = a[0] * b[1] - a[1] * b[0], a @ b
-    return bool(abs(np.degrees(np.arctan2(cross, dot))) <= _SHARPEST_TURN_DEG)
+    return bool(abs(np.degrees(np.arctan2(cross, dot))) <= SHARPEST_TURN_DEG)
 
 
 def lane_path(lanes: Sequence[Lane], spacing: float) -> np.ndarray:

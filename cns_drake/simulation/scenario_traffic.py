@@ -21,7 +21,7 @@ from cns_drake.scenarios.traffic_config import TrafficConfig
 from cns_drake.scene.world import World
 from cns_drake.traffic.fcd_trace import read_fcd
 from cns_drake.traffic.fcd_traffic import play_trace
-from cns_drake.traffic.lane_file import read_lanes
+from cns_drake.traffic.lane_file import LaneFile, read_lanes
 from cns_drake.traffic.lane_graph import LaneGraph
 from cns_drake.traffic.presence import EgoBox
 from cns_drake.traffic.road_lanes import make_lane_graph
@@ -59,7 +59,7 @@ def plan_scenario_traffic(
     wanted = scenario.traffic
     where = f"{scenario.source}: traffic"
     check_files(scenario)
-    graph, walkways = load_ways(map_folder(scenario))
+    graph, walkways, _ = load_ways(map_folder(scenario))
 
     def ego(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         R_WB, p_WB = trajectory.poses(np.minimum(t, trajectory.duration))
@@ -95,7 +95,7 @@ def plan_scenario_traffic(
     return plan
 
 
-def load_ways(folder: MapFolder) -> tuple[LaneGraph, list[Walkway]]:
+def load_ways(folder: MapFolder) -> LaneFile:
     """Returns what vehicles and walkers follow on a map.
 
     Raises:
@@ -105,7 +105,7 @@ def load_ways(folder: MapFolder) -> tuple[LaneGraph, list[Walkway]]:
         return read_lanes(folder.lanes)
     network = load_road_network(folder.roads)
     graph = make_lane_graph(network)
-    return graph, make_walkways(network, graph)
+    return LaneFile(graph, make_walkways(network, graph))
 
 
 def _check_room(

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
@@ -13,6 +16,7 @@ from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder, world_file
 from cns_drake.scenarios.shipped import vehicle_file
 from cns_drake.scene.world import World, load_world
+from cns_drake.traffic.lane_file import read_lanes
 from cns_drake.transient.changing import change_world
 
 # Distance from the car's middle line to its sides, with a margin [m].
@@ -35,11 +39,15 @@ def load_stage(
     Raises:
         InputError: the scenario's files cannot be used.
     """
+    in_the_way = _in_the_way(scenario)
     world = load_world(
         world_file(scenario),
         vehicle=vehicle_file() if with_vehicle else None,
-        without=scenario.without,
+        without=(*scenario.without, *in_the_way),
     )
+    if in_the_way:
+        note = f"traffic: {len(in_the_way)} things in its lanes left out"
+        world = replace(world, notes=(*world.notes, note))
     if scenario.transient.is_off:
         return world
     trajectory = trajectory or plan_drive(scenario)
@@ -48,6 +56,16 @@ def load_stage(
     return change_world(
         world, scenario.transient, drive, _driven(scenario, drive)
     )
+
+
+def _in_the_way(scenario: Scenario) -> Sequence[str]:
+    """Returns the names of what stands where the traffic drives."""
+    if scenario.traffic.is_off or scenario.map is None:
+        return ()
+    folder = map_folder(scenario)
+    if folder.roads.is_file() or not folder.lanes.is_file():
+        return ()
+    return read_lanes(folder.lanes).in_the_way
 
 
 def _driven(scenario: Scenario, drive: shapely.LineString) -> BaseGeometry:

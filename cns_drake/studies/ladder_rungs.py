@@ -146,8 +146,7 @@ def _known_strengths(
     if not before:
         notes.append(f"no stage before {scenario.stage}: no construction")
     if folder.roads.is_file() or folder.lanes.is_file():
-        graph, _ = load_ways(folder)
-        room = int(_MOST_ROOM * room_for_vehicles(graph))
+        room = int(_MOST_ROOM * room_for_vehicles(load_ways(folder).graph))
         known["traffic"] = {
             level: min(number, room)
             for level, number in known["traffic"].items()

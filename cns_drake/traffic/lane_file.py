@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -13,13 +13,20 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from cns_drake.base.errors import InputError, describe_validation_error
 from cns_drake.base.files import read_bytes
 from cns_drake.base.json_text import parse_json
-from cns_drake.traffic.lane_graph import LaneGraph, Piece, resampled
+from cns_drake.traffic.lane_graph import (
+    Crossing,
+    LaneGraph,
+    Piece,
+    make_crossing,
+    resampled,
+)
 from cns_drake.traffic.walkways import Walkway
 
 # Between the points of a lane in a file [m].
 _FILE_SPACING = 1.0
 _FARTHEST = 1e6
 _MOST = 20_000
+_MOST_PHASES = 8
 
 _Coordinate = Annotated[float, Field(ge=-_FARTHEST, le=_FARTHEST)]
 _Points = Annotated[
@@ -38,6 +45,14 @@ class _Lane(_Model):
     way: bool
     after: list[Annotated[int, Field(ge=0)]]
     junction: int = Field(ge=0)
+    left: int = Field(default=-1, ge=-1)
+    right: int = Field(default=-1, ge=-1)
+    phase: int = Field(default=-1, ge=-1, le=_MOST_PHASES - 1)
+
+
+class _Crossing(_Model):
+    line: _Points
+    width: float = Field(gt=0.0, le=20.0)
 
 
 class _Walkway(_Model):
@@ -45,16 +60,38 @@ class _Walkway(_Model):
     half_width: float = Field(gt=0.0, le=10.0)
     start: int = Field(ge=0)
     end: int = Field(ge=0)
+    crossing: int = Field(default=-1, ge=-1)
 
 
 class _File(_Model):
     lanes: list[_Lane] = Field(min_length=1, max_length=_MOST)
     walkways: list[_Walkway] = Field(default=[], max_length=_MOST)
+    crossings: list[_Crossing] = Field(default=[], max_length=_MOST)
+    in_the_way: list[str] = Field(default=[], max_length=_MOST)
 
 
-def lane_text(graph: LaneGraph, walkways: Sequence[Walkway]) -> str:
-    """Returns the text of a file of lanes without signals and crossings."""
-    content = {
+class LaneFile(NamedTuple):
+    """The content of a file of lanes.
+
+    Attributes:
+        graph: lanes, their signals, and crossings.
+        walkways: of the walkers.
+        in_the_way: names of structures, such as parked cars, that stand where
+            vehicles drive; a drive with traffic is without them.
+    """
+
+    graph: LaneGraph
+    walkways: list[Walkway]
+    in_the_way: Sequence[str] = ()
+
+
+def lane_text(
+    graph: LaneGraph,
+    walkways: Sequence[Walkway],
+    in_the_way: Sequence[str] = (),
+) -> str:
+    """Returns the text of a file of lanes, see `LaneFile`."""
+    content: dict[str, Any] = {
         "lanes": [
             {
                 "points": _thinned(piece.points),
@@ -62,6 +99,8 @@ def lane_text(graph: LaneGraph, walkways: Sequence[Walkway]) -> str:
                 "way": piece.is_way,
                 "after": list(piece.after),
                 "junction": piece.junction,
+                **_unless(-1, left=piece.left, right=piece.right),
+                **_unless(-1, phase=piece.phase),
             }
             for piece in graph.pieces
         ],
@@ -71,14 +110,35 @@ def lane_text(graph: LaneGraph, walkways: Sequence[Walkway]) -> str:
                 "half_width": round(way.half_width, 3),
                 "start": way.start,
                 "end": way.end,
+                **_unless(-1, crossing=way.crossing),
             }
             for way in walkways
         ],
     }
+    if graph.crossings:
+        content["crossings"] = [
+            {
+                "line": np.round(crossing.line, 3).tolist(),
+                "width": round(_width(crossing), 3),
+            }
+            for crossing in graph.crossings
+        ]
+    if in_the_way:
+        content["in_the_way"] = list(in_the_way)
     return json.dumps(content, separators=(",", ":")) + "\n"
 
 
-def read_lanes(path: Path) -> tuple[LaneGraph, list[Walkway]]:
+def _unless(usual: int, **values: int) -> dict[str, int]:
+    return {key: value for key, value in values.items() if value != usual}
+
+
+def _width(crossing: Crossing) -> float:
+    """Returns the width of the rectangle about a crossing's line [m]."""
+    length = float(np.linalg.norm(np.diff(crossing.line[:, :2], axis=0)))
+    return crossing.area.area / length
+
+
+def read_lanes(path: Path) -> LaneFile:
     """Reads a text of `lane_text`.
 
     Raises:
@@ -92,12 +152,24 @@ def read_lanes(path: Path) -> tuple[LaneGraph, list[Walkway]]:
         ) from None
     except ValueError as error:
         raise InputError(f"{path}: not JSON: {error}") from None
+    count = len(found.lanes)
     for k, lane in enumerate(found.lanes):
-        wrong = [one for one in lane.after if one >= len(found.lanes)]
+        wrong = [one for one in lane.after if one >= count]
         if wrong or not lane.after:
             raise InputError(
                 f"{path}: lanes: {k}: after: "
                 f"{wrong[0] if wrong else 'nothing'} is no lane"
+            )
+        for key in ("left", "right"):
+            beside = getattr(lane, key)
+            if beside >= count or (beside >= 0 and found.lanes[beside].way):
+                raise InputError(
+                    f"{path}: lanes: {k}: {key}: {beside} is no lane"
+                )
+    for k, one in enumerate(found.walkways):
+        if one.crossing >= len(found.crossings):
+            raise InputError(
+                f"{path}: walkways: {k}: crossing: {one.crossing} is none"
             )
     pieces = tuple(
         Piece(
@@ -105,20 +177,34 @@ def read_lanes(path: Path) -> tuple[LaneGraph, list[Walkway]]:
             lane.limit,
             lane.way,
             tuple(lane.after),
-            junction=lane.junction,
+            lane.left,
+            lane.right,
+            lane.junction,
+            lane.phase,
         )
         for lane in found.lanes
     )
-    count = 1 + max(piece.junction for piece in pieces)
-    if count > _MOST:
+    junctions = 1 + max(piece.junction for piece in pieces)
+    if junctions > _MOST:
         raise InputError(f"{path}: lanes: junction: at most {_MOST - 1}")
+    phases = [1] * junctions
+    for piece in pieces:
+        phases[piece.junction] = max(phases[piece.junction], piece.phase + 1)
     walkways = [
         Walkway(
-            resampled(np.array(way.points)), way.half_width, way.start, way.end
+            resampled(np.array(way.points)),
+            way.half_width,
+            way.start,
+            way.end,
+            way.crossing,
         )
         for way in found.walkways
     ]
-    return LaneGraph(pieces, phases=(1,) * count), walkways
+    crossings = tuple(
+        make_crossing(np.array(one.line), one.width) for one in found.crossings
+    )
+    graph = LaneGraph(pieces, crossings, tuple(phases))
+    return LaneFile(graph, walkways, tuple(found.in_the_way))
 
 
 def _thinned(points: np.ndarray) -> list[list[float]]:

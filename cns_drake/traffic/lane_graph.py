@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
 # Distance of the points of a piece at most [m].
@@ -57,6 +58,12 @@ class Crossing:
 
     line: np.ndarray
     area: BaseGeometry
+
+
+def make_crossing(line: np.ndarray, width: float) -> Crossing:
+    """Returns a crossing of a width [m] about a line (2, 3) [m]."""
+    course = LineString(line[:, :2])
+    return Crossing(line, course.buffer(width / 2, cap_style="flat"))
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -39,19 +39,23 @@ class DirectedLane(NamedTuple):
 
 
 def join_lanes(
-    lanes: Sequence[DirectedLane], links: Iterable[tuple[int, int]]
+    lanes: Sequence[DirectedLane],
+    links: Iterable[tuple[int, int]],
+    right_of: Mapping[int, int] | None = None,
 ) -> LaneGraph:
     """Returns lanes with ways between them.
 
     Args:
         lanes: of a map, cut at its own places.
         links: pairs of lane numbers; the second lane follows the first.
+        right_of: number of a lane -> that of the lane on its right, in the
+            same direction; without it, vehicles do not change lanes.
 
     Returns:
-        A graph without signals, crossings and changes of lanes. It is empty if
-        vehicles cannot drive for ever anywhere.
+        A graph without signals and crossings. It is empty if vehicles cannot
+        drive for ever anywhere.
     """
-    merged, after = _merge(lanes, links)
+    merged, after, beside = _merge(lanes, links, right_of or {})
     points = [resampled(lane.points) for lane in merged]
     long = [
         k
@@ -59,6 +63,7 @@ def join_lanes(
         if not lane.connects and SPACING * len(points[k]) >= _SHORTEST_LANE
     ]
     number = {k: row for row, k in enumerate(long)}
+    left_of = {right: left for left, right in beside.items()}
     clusters = _Clusters()
     ways = []
     for k in long:
@@ -89,6 +94,8 @@ def join_lanes(
             after=tuple(
                 len(long) + row for row, way in enumerate(ways) if way[0] == k
             ),
+            left=number.get(left_of.get(k, -1), -1),
+            right=number.get(beside.get(k, -1), -1),
             junction=junctions[clusters.of((k, "end"))],
         )
         for k in long
@@ -109,10 +116,12 @@ def join_lanes(
 
 
 def _merge(
-    lanes: Sequence[DirectedLane], links: Iterable[tuple[int, int]]
-) -> tuple[list[DirectedLane], list[list[int]]]:
-    """Returns lanes, with single continuations joined, and the successors of
-    each."""
+    lanes: Sequence[DirectedLane],
+    links: Iterable[tuple[int, int]],
+    right_of: Mapping[int, int],
+) -> tuple[list[DirectedLane], list[list[int]], dict[int, int]]:
+    """Returns lanes, with single continuations joined, the successors of each,
+    and the lane on the right of some."""
     after: list[list[int]] = [[] for _ in lanes]
     before: list[list[int]] = [[] for _ in lanes]
     for first, second in links:
@@ -156,9 +165,16 @@ def _merge(
         )
         for chain in chains
     ]
-    return merged, [
+    following = [
         [number[k] for k in after[chain[-1]] if k in number] for chain in chains
     ]
+    beside = {
+        row: number[right]
+        for row, chain in enumerate(chains)
+        if (right := right_of.get(chain[0], -1)) in number
+        and right_of.get(chain[-1], -1) == chains[number[right]][-1]
+    }
+    return merged, following, beside
 
 
 def _ways(

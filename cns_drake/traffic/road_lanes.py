@@ -6,7 +6,6 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from shapely.geometry import LineString
 
 from cns_drake.roads.network import Connection, RoadNetwork
 from cns_drake.roads.road import ENDS, End, LaneRef, Road
@@ -14,6 +13,7 @@ from cns_drake.traffic.lane_graph import (
     Crossing,
     LaneGraph,
     Piece,
+    make_crossing,
     resampled,
     without_dead_ends,
 )
@@ -217,11 +217,7 @@ def _crossings(
     for road in network.roads.values():
         for end in ENDS:
             if trims[road.name, end] == _STOP_LINE:
-                line = crossing_line(road, end)
-                area = LineString(line[:, :2]).buffer(
-                    CROSSING_WIDTH / 2, cap_style="flat"
-                )
-                yield Crossing(line, area)
+                yield make_crossing(crossing_line(road, end), CROSSING_WIDTH)
 
 
 def crossing_line(road: Road, end: End) -> np.ndarray:

@@ -72,7 +72,7 @@ def test_traffic_climbs_on_imported_lanes(town, tmp_path):
     extent = Extent(causes=("traffic",))
     folder = Path(shutil.copytree(town, tmp_path / "imported"))
     asking = load_scenario(folder / "sequence_04.yaml")
-    graph, walkways = load_ways(map_folder(asking))
+    graph, walkways, _ = load_ways(map_folder(asking))
     before, _ = plan_rungs(asking, extent)
     (folder / "lanes.json").write_text(lane_text(graph, walkways))
     (folder / "roads.yaml").unlink()

@@ -1,5 +1,7 @@
 """Lanes of other maps: what follows what, and files of them."""
 
+import copy
+from dataclasses import replace
 import json
 
 import numpy as np
@@ -7,7 +9,7 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.traffic.lane_file import lane_text, read_lanes
-from cns_drake.traffic.lane_graph import LaneGraph
+from cns_drake.traffic.lane_graph import LaneGraph, make_crossing
 from cns_drake.traffic.lane_joining import DirectedLane, join_lanes
 from cns_drake.traffic.walkways import Walkway
 
@@ -70,7 +72,8 @@ def test_a_file_gives_the_same_graph(graph, tmp_path):
     path = tmp_path / "lanes.json"
     walk = Walkway(np.array([(0, -3, 1.1), (9.0, -3, 1.1)]), 0.6, 4, 5)
     path.write_text(lane_text(graph, [walk]))
-    found, walkways = read_lanes(path)
+    found, walkways, in_the_way = read_lanes(path)
+    assert in_the_way == ()
     assert found.phases == graph.phases
     assert len(found.pieces) == len(graph.pieces)
     for one, other in zip(found.pieces, graph.pieces, strict=True):
@@ -83,6 +86,67 @@ def test_a_file_gives_the_same_graph(graph, tmp_path):
     (found_walk,) = walkways
     assert (found_walk.start, found_walk.end) == (4, 5)
     assert found_walk.half_width == 0.6
+
+
+def test_lanes_beside_each_other_stay_so():
+    """Lanes of two pieces each, and a third that is longer than the others."""
+    lanes = [
+        straight((0, 0), (20, 0)),
+        straight((0, -3), (20, -3)),
+        straight((20, 0), (50, 0)),
+        straight((20, -3), (50, -3)),
+        straight((50, 0), (0, 0), connects=True),
+        straight((50, -3), (0, -3), connects=True),
+    ]
+    links = [(0, 2), (1, 3), (2, 4), (3, 5), (4, 0), (5, 1)]
+    # A lane does not lead to itself.
+    links += [(4, 1), (5, 0)]
+    graph = join_lanes(lanes, links, {0: 1, 2: 3})
+    left, right = (k for k in graph.lanes)
+    assert graph.pieces[left].right == right
+    assert graph.pieces[right].left == left
+    assert graph.pieces[left].left == graph.pieces[right].right == -1
+    partly = join_lanes(lanes, links, {0: 1})
+    assert all(partly.pieces[k].right == -1 for k in partly.lanes)
+
+
+def test_a_file_keeps_signals_and_crossings(graph, tmp_path):
+    first, second, way, other = graph.pieces
+    full = LaneGraph(
+        (
+            replace(first, right=1),
+            replace(second, left=0),
+            replace(way, phase=1),
+            replace(other, phase=0),
+        ),
+        (make_crossing(np.array([(9, -4, 1.0), (9, 4.0, 1.0)]), 2.4),),
+        graph.phases,
+    )
+    over = Walkway(np.array([(9, -5, 1.0), (9, 5, 1.0)]), 0.8, 0, 1, 0)
+    path = tmp_path / "lanes.json"
+    path.write_text(lane_text(full, [over], ["car_1"]))
+    found, (walk,), in_the_way = read_lanes(path)
+    assert in_the_way == ("car_1",)
+    assert walk.crossing == 0
+    assert [(p.left, p.right, p.phase) for p in found.pieces] == [
+        (p.left, p.right, p.phase) for p in full.pieces
+    ]
+    assert found.phases[way.junction] == 2
+    (crossing,) = found.crossings
+    assert crossing.area.bounds == pytest.approx((7.8, -4, 10.2, 4))
+    content = json.loads(path.read_text())
+    for part, row, key, value, fault in (
+        ("lanes", 0, "right", 2, "lanes: 0: right: 2 is no lane"),
+        ("lanes", 0, "left", 4, "lanes: 0: left: 4 is no lane"),
+        ("lanes", 2, "phase", 8, "phase"),
+        ("walkways", 0, "crossing", 1, "walkways: 0: crossing: 1 is none"),
+        ("crossings", 0, "width", 0.0, "width"),
+    ):
+        wrong = copy.deepcopy(content)
+        wrong[part][row][key] = value
+        path.write_text(json.dumps(wrong))
+        with pytest.raises(InputError, match=fault):
+            read_lanes(path)
 
 
 @pytest.mark.parametrize(

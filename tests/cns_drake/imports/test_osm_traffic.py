@@ -1,0 +1,341 @@
+"""Traffic on streets of OpenStreetMap."""
+
+from helpers.small_osm import OsmWriter
+import numpy as np
+import pytest
+import shapely
+
+from cns_drake.base.errors import InputError
+from cns_drake.imports.import_map import ImportOptions, import_city
+from cns_drake.imports.import_report import DriveOn
+from cns_drake.imports.openstreetmap import import_openstreetmap
+from cns_drake.imports.osm_traffic import lanes_of_streets
+from cns_drake.imports.waypoint_drives import Drive
+from cns_drake.motion.trajectory import Trajectory
+from cns_drake.scenarios.planning import plan_drive
+from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scene.perception_geometry import structure_name
+from cns_drake.simulation.scenario_traffic import (
+    EGO_BOX,
+    plan_scenario_traffic,
+)
+from cns_drake.simulation.stage_loading import load_stage
+from cns_drake.traffic.lane_file import read_lanes
+from cns_drake.traffic.traffic_plan import WALKER_SIZE, plan_traffic
+
+WIDTH = 12.5
+# The origin is in the middle of the buildings.
+CORNERS = [(-90, -70), (90, -70), (90, 70), (-90, 70)]
+
+
+def write_blocks(path, *, wall=False, lanes="2", **ring):
+    """Writes a ring of streets, and one across it with a crossing."""
+    osm = OsmWriter()
+    around = [osm.node(*xy) for xy in CORNERS]
+    south, north = osm.node(0, -70), osm.node(0, 70)
+    crossing = osm.node(0, 5, highway="crossing", crossing="zebra")
+    osm.node(-12, -69, highway="traffic_signals")
+    nodes = [around[0], south, around[1], around[2], north, around[3]]
+    osm.way_of(
+        [*nodes, around[0]], highway="tertiary", lanes=lanes,
+        maxspeed="30 mph", **ring,
+    )  # fmt: skip
+    osm.way_of(
+        [south, crossing, north], highway="primary", lanes="4", width="12.5",
+        sidewalk="both",
+    )  # fmt: skip
+    # A street that ends.
+    osm.way_of([around[2], osm.node(170, 70)], highway="residential")
+    osm.box(-70, -35, 40, 70, building="yes")
+    osm.box(30, -35, 40, 70, building="yes")
+    if wall:
+        osm.way([(80, -10), (100, -10)], barrier="wall")
+    return osm.write(path)
+
+
+ROUTE = np.array([(-86, -71.7), (0, -71.7), (86, -71.7)])
+
+
+def lanes_of(path, tmp_path, side=DriveOn.RIGHT, added=()):
+    city = import_openstreetmap(path, None)
+    drive = Drive(ROUTE, ROUTE)
+    text = lanes_of_streets(
+        city.streets,
+        city.street_places,
+        city.structures,
+        added,
+        [drive],
+        side,
+    )
+    if text is None:
+        return city, None
+    file = tmp_path / "lanes.json"
+    file.write_text(text)
+    return city, read_lanes(file)
+
+
+@pytest.fixture(scope="module")
+def blocks(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("blocks")
+    return lanes_of(write_blocks(folder / "a.osm"), folder)
+
+
+def lines(graph):
+    return [shapely.LineString(piece.points[:, :2]) for piece in graph.pieces]
+
+
+def surface(city, kind="Road"):
+    triangles = [one.triangles for one in city.structures if one.kind == kind]
+    flat = np.concatenate(triangles)[:, :, :2]
+    return shapely.union_all(shapely.polygons(flat), grid_size=0.001)
+
+
+def test_lanes_lie_on_the_laid_streets(blocks):
+    city, (graph, *_) = blocks
+    paved = surface(city).buffer(0.02)
+    for piece, line in zip(graph.pieces, lines(graph), strict=True):
+        # Half a lane to both sides, but not where vehicles turn.
+        room = line if piece.is_way else line.buffer(1.5, cap_style="flat")
+        assert paved.covers(room)
+    assert {piece.points[:, 2].max() for piece in graph.pieces} == {0.0}
+
+
+@pytest.mark.parametrize("side", list(DriveOn))
+def test_traffic_keeps_to_its_side(tmp_path, side):
+    path = write_blocks(tmp_path / "a.osm")
+    _, (graph, *_) = lanes_of(path, tmp_path, side)
+    checked = 0
+    for piece in graph.pieces:
+        steps = np.gradient(piece.points, axis=0)
+        x, y = piece.points[:, 0], piece.points[:, 1] + 70.0
+        # On the southern street, right of the middle if it goes east.
+        here = (np.abs(y) < 5) & (x > -70) & (x < -20)
+        if piece.is_way or not here.any():
+            continue
+        is_right = (y[here] < 0) == (steps[here, 0] > 0)
+        assert (is_right == (side is DriveOn.RIGHT)).all()
+        np.testing.assert_allclose(np.abs(y[here]), 3.25 / 2, atol=0.1)
+        checked += 1
+    assert checked == 2
+
+
+def test_lanes_of_four(blocks):
+    """The street across has two lanes a direction, and changes of lane."""
+    _, (graph, *_) = blocks
+    beside = 0
+    for k, piece in enumerate(graph.pieces):
+        if piece.right < 0:
+            continue
+        other = graph.pieces[piece.right]
+        assert other.left == k
+        assert not other.is_way
+        ahead = piece.points[-1] - piece.points[0]
+        across = other.points[0] - piece.points[0]
+        # It is on the right: clockwise from the driving direction.
+        assert ahead[0] * across[1] - ahead[1] * across[0] < 0
+        assert np.linalg.norm(across) == pytest.approx(12.5 / 4, abs=0.1)
+        beside += 1
+    assert beside >= 4
+
+
+def test_turns_follow_the_rules(blocks):
+    """Left turns end in the innermost lane, right turns in the outermost."""
+    _, (graph, *_) = blocks
+    seen = set()
+    for piece in graph.pieces:
+        if piece.is_way:
+            continue
+        for k in piece.after:
+            way = graph.pieces[k]
+            a, b = way.points[-1] - way.points[-2], piece.points[-1]
+            before = piece.points[-1] - piece.points[-2]
+            turn = np.degrees(
+                np.arctan2(
+                    before[0] * a[1] - before[1] * a[0], before[:2] @ a[:2]
+                )
+            )
+            assert abs(turn) < 126.0
+            following = graph.pieces[way.after[0]]
+            if turn > 60 and b[0] < 0 and abs(b[1] + 70) < 5:
+                # Innermost: there is no lane on the left.
+                assert following.left == -1
+                assert following.right >= 0
+                seen.add("left")
+            if turn < -60 and b[0] > 0 and abs(b[1] + 70) < 5:
+                assert following.right == -1
+                assert following.left >= 0
+                seen.add("right")
+    assert seen == {"left", "right"}
+
+
+def test_limits_and_dead_ends(blocks):
+    _, (graph, *_) = blocks
+    assert {piece.limit for piece in graph.pieces} == {13.411, 13.889}
+    # No vehicle turns round in a street that ends.
+    assert max(piece.points[:, 0].max() for piece in graph.pieces) < 100
+
+
+def test_a_signal_governs_its_junction(blocks):
+    _, (graph, *_) = blocks
+    signalled = [p for p in graph.pieces if p.phase >= 0]
+    assert {p.phase for p in signalled} == {0, 1}
+    assert all(p.is_way for p in signalled)
+    # One phase is for the street along, the other for the one across.
+    phases = {True: set(), False: set()}
+    for piece in signalled:
+        assert graph.phases[piece.junction] == 2
+        place = piece.points[0, :2] - (0, -70)
+        assert np.hypot(*place) < 25
+        phases[bool(abs(place[1]) > abs(place[0]))].add(piece.phase)
+    assert len(phases[True]) == len(phases[False]) == 1
+    assert phases[True] != phases[False]
+    assert len({piece.junction for piece in signalled}) == 1
+    assert all(
+        p.phase == -1
+        for p in graph.pieces
+        if p.is_way and np.hypot(*(p.points[0, :2] - (0, -70))) > 40
+    )
+
+
+def test_walkers_have_sidewalks_and_a_crossing(blocks):
+    city, (graph, walkways, _) = blocks
+    (crossing,) = graph.crossings
+    np.testing.assert_allclose(
+        np.sort(crossing.line[:, 0]), [-WIDTH / 2, WIDTH / 2],
+        atol=0.1,
+    )  # fmt: skip
+    np.testing.assert_allclose(crossing.line[:, 1], 5.0, atol=0.1)
+    over = [way for way in walkways if way.crossing == 0]
+    assert len(over) == 1
+    beside = [way for way in walkways if way.crossing < 0]
+    # Each sidewalk is cut at the crossing.
+    assert sorted(
+        sum(end in (way.start, way.end) for way in beside)
+        for end in (over[0].start, over[0].end)
+    ) == [2, 2]
+    walked = surface(city, "Sidewalk")
+    for way in beside:
+        line = shapely.LineString(way.points[:, :2])
+        assert walked.covers(line.buffer(way.half_width))
+        assert (way.points[:, 2] == 0.12).all()
+    # Vehicles cross it on a way, for which they need a permit.
+    for piece, line in zip(graph.pieces, lines(graph), strict=True):
+        assert piece.is_way or not line.intersects(crossing.area)
+
+
+def test_a_wall_closes_its_lanes(tmp_path):
+    """Lanes in which something stands are left out, and what leads there."""
+    path = write_blocks(tmp_path / "a.osm", wall=True)
+    _, (graph, *_) = lanes_of(path, tmp_path)
+    wall = shapely.LineString([(80, -10), (100, -10)])
+    assert not any(line.dwithin(wall, 1.3) for line in lines(graph))
+
+
+def test_one_way_streets(tmp_path):
+    path = write_blocks(tmp_path / "a.osm", oneway="yes")
+    _, (graph, *_) = lanes_of(path, tmp_path)
+    eastwards = [
+        np.gradient(piece.points[:, 0])[piece.points[:, 1] < -67]
+        for piece in graph.pieces
+        if not piece.is_way
+    ]
+    assert sum(map(len, eastwards)) > 100
+    assert min(steps.min() for steps in eastwards if len(steps)) > 0
+
+
+def test_no_lane_without_a_round_trip(tmp_path):
+    osm = OsmWriter()
+    osm.way([(0, 0), (200, 0)], highway="primary")
+    osm.box(20, 30, 40, 70, building="yes")
+    _, found = lanes_of(osm.write(tmp_path / "a.osm"), tmp_path)
+    assert found is None
+
+
+def boxes(places, yaw, size):
+    c, s = np.cos(yaw), np.sin(yaw)
+    reach = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)]) * np.array(size) / 2
+    corners = [
+        (places[:, 0] + x * c - y * s, places[:, 1] + x * s + y * c)
+        for x, y in reach
+    ]
+    return shapely.polygons(np.array(corners).transpose(2, 0, 1))
+
+
+def test_nobody_meets_anybody(blocks):
+    """Two minutes with the ego car on the southern street."""
+    city, (graph, walkways, _) = blocks
+
+    def ego(t):
+        x = np.minimum(8.0 * t - 86.0, 86.0)
+        return np.column_stack([x, np.full(len(x), -71.7)]), np.zeros(len(x))
+
+    plan = plan_traffic(
+        graph, walkways, vehicles=12, walkers=12, seed=3, duration=120.0,
+        ego=ego, ego_box=EGO_BOX,
+    )  # fmt: skip
+    assert len(plan.kinds) == plan.walkers.values.shape[1] == 12
+    paved = surface(city).buffer(0.1)
+    shapely.prepare(paved)
+    on_street, crossed = [], 0
+    for t in np.arange(0.0, 120.0, 0.25):
+        xy, yaw = ego(np.array([t]))
+        xy[:, 0] += (EGO_BOX.rear + EGO_BOX.front) / 2
+        length = EGO_BOX.front - EGO_BOX.rear
+        found = [boxes(xy, yaw, (length, 2 * EGO_BOX.half_width))]
+        where = plan.vehicles.at(t)[0]
+        found += [
+            boxes(row[None, :2], row[None, 3], kind.size[:2])
+            for row, kind in zip(where, plan.kinds, strict=True)
+        ]
+        on_street += [
+            shapely.area(shapely.intersection(one, paved)) / shapely.area(one)
+            for one in found[1:]
+        ]
+        feet = plan.walkers.at(t)[0]
+        found.append(boxes(feet[:, :2], feet[:, 3], WALKER_SIZE[:2]))
+        crossed += int((np.abs(feet[:, 0]) < 4).sum())
+        every = np.concatenate(found)
+        a, b = shapely.STRtree(every).query(every, predicate="intersects")
+        assert not (a < b).any()
+    part = np.concatenate(on_street)
+    # Long vehicles swing over the kerbs of corners without a radius.
+    assert (part > 0.999).mean() > 0.95
+    assert part.min() > 0.6
+    assert crossed > 0
+    travelled = np.abs(np.diff(plan.vehicles.values[..., :2], axis=0)).sum(0)
+    assert (travelled.sum(axis=1) > 50.0).mean() > 0.8
+
+
+def test_an_import_carries_traffic(tmp_path):
+    path = write_blocks(tmp_path / "a.osm")
+    folder = tmp_path / "town"
+    import_city(path, folder, ImportOptions(dressed=True))
+    scenario = load_scenario(folder / "sequence_01.yaml")
+    assert isinstance(plan_drive(scenario), Trajectory)
+    plan = plan_scenario_traffic(scenario.with_traffic(5), plan_drive(scenario))
+    assert len(plan.kinds) == 5
+    with pytest.raises(InputError, match=r"vehicles: 900 .* hold \d+$"):
+        plan_scenario_traffic(scenario.with_traffic(900), plan_drive(scenario))
+
+
+def test_things_in_the_lanes_give_way_to_traffic(tmp_path):
+    """Parked cars on a lane are there without traffic only."""
+    path = write_blocks(tmp_path / "a.osm")
+    folder = tmp_path / "town"
+    import_city(path, folder, ImportOptions(dressed=True))
+    file = read_lanes(folder / "lanes.json")
+    assert file.in_the_way
+    scenario = load_scenario(folder / "sequence_01.yaml")
+    plain, busy = (
+        _names(load_stage(one, with_vehicle=False))
+        for one in (scenario, scenario.with_traffic(5))
+    )
+    assert plain - busy == set(file.in_the_way)
+
+
+def _names(world):
+    inspector = world.scene_graph.model_inspector()
+    return {
+        structure_name(inspector.GetName(geometry))
+        for geometry in inspector.GetAllGeometryIds()
+    }
