@@ -198,5 +198,5 @@ def level_table(results: Iterable[LevelResult]) -> Table:
         ]
         words = ("yes" if one else "no" for one in solved)
         rows.append((name, "solved", "no", *words))
-    header = ("map", "method", "radius told", *(f"level {n}" for n in numbers))
+    header = ("map", "method", "gate", *(f"level {n}" for n in numbers))
     return Table(header, tuple(rows))

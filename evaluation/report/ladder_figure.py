@@ -25,7 +25,7 @@ _SHARES = Normalize(0.0, 1.0)
 _CELL_WIDTH, _CELL_HEIGHT = 0.95, 0.3
 _EDGES = (2.4, 1.6)
 _FONT_SIZE = 8.5
-_TITLES = {False: "radius untold", True: "radius told"}
+_TITLES = {False: "without the gate", True: "with the gate"}
 
 
 def draw_ladder(rows: Sequence[LadderRow], stem: Path) -> None:

@@ -207,8 +207,12 @@ def main() -> None:
     parser.add_argument("--ride", default="A")
     parser.add_argument("--imu-rate", type=int, default=400)
     parser.add_argument("--frames", type=int)
-    parser.add_argument("--output", help="folder for the recording, temporary")
+    parser.add_argument(
+        "--output", help="folder for the recording, which is removed"
+    )
     options = parser.parse_args()
+    if options.output is not None:
+        Path(options.output).mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=options.output) as scratch:
         scenario, recording = record(options, Path(scratch))
         trajectory = plan_drive(scenario)

@@ -52,7 +52,7 @@ def test_maps_and_what_is_solved(tmp_path):
     easy = EASY | {("city", 1): 0.985}
     theirs = write(tmp_path / "theirs.csv", rows("theirs", easy))
     table = level_table(read_results([ours, theirs], LEVELS))
-    header = ("map", "method", "radius told", "level 0", "level 1")
+    header = ("map", "method", "gate", "level 0", "level 1")
     assert table.header == header
     assert table.rows == (
         ("city", "SOLiD", "no", 0.7, 0.4),
