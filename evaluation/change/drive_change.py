@@ -1,7 +1,7 @@
 """The structural change between two drives, with its context.
 
-A published TCR_sym needs company: the part of it that comes from the two
-routes alone (the control), and its value where both routes saw the city (the
+A TCR_sym is published with two more values: one that comes from the two routes
+alone (the control), and one for the parts of the city that both routes saw (the
 coverage-masked one).
 """
 
@@ -41,7 +41,7 @@ from evaluation.sequences import (
 if TYPE_CHECKING:
     from evaluation.alignment import AlignmentReport, When
 
-# Two drives on one route are this close to each other [m]; lanes are 3.5 m.
+# Greatest distance of two drives on one route [m]; lanes are 3.5 m wide.
 _SAME_ROUTE = 1.0
 
 
@@ -75,7 +75,7 @@ class ChangeReport:
         control: between two drives on the two routes in one stage; None if
             none was given.
         control_names: the two that `control` compares.
-        alignment: of the two; None if they were in one world.
+        alignment: of the two; None if they had one world.
     """
 
     source: str
@@ -134,7 +134,7 @@ def survey(path: Path, track: Track = silent) -> Surveyed:
     """Maps a sequence, or reads a map file.
 
     Raises:
-        InputError: if it cannot be read as either.
+        InputError: if it can be read as neither.
     """
     return _survey(_open(path), track)
 
@@ -148,7 +148,7 @@ def survey_in_one_world(
     """Maps sequences, or reads map files, all in one world.
 
     Args:
-        paths: of sequences or map files; map files are in that world already.
+        paths: of sequences or map files; map files must be in that world.
         when: whether later sequences are aligned with the first.
         track: reports progress.
         lidar: name of the LiDAR, for recordings with several.
@@ -204,9 +204,8 @@ def compare(
         source: A.
         target: B.
         control: a drive on A's route in B's stage, or on B's route in A's
-            stage. Its route shows which of them it is. It is compared with the
-            drive of its own stage: the two routes are those of A and B, in one
-            stage.
+            stage. Its route shows which one. It is compared with the drive of
+            its own stage: these two have the routes of A and B in one stage.
         alignment: of the two, for the report.
 
     Raises:

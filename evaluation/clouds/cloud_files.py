@@ -1,4 +1,4 @@
-"""Single point clouds: map files, and scans stored one a file."""
+"""Single point clouds: map files, and scans with a file each."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SCAN_LIMIT_BYTES = 1 << 27
 
 
 def read_cloud(path: Path) -> np.ndarray:
-    """Reads one point cloud into memory; the ending of its name is its format.
+    """Reads one point cloud, in the format of its name's ending, into memory.
 
     `.pcd` and `.ply` in all their encodings; `.npy` holds N x 3 or N x 4
     numbers or a structured array; `.bin` is KITTI's sequence of float32
@@ -51,7 +51,7 @@ def read_cloud(path: Path) -> np.ndarray:
         size = path.stat().st_size
         if size > SCAN_LIMIT_BYTES:
             raise ValueError(f"{size} bytes is too large for a scan")
-    # All of it, of whatever size.
+    # One block holds the whole file.
     (points,) = read_blocks(path, block=SCAN_LIMIT_BYTES)
     return points
 
@@ -61,7 +61,7 @@ def read_blocks(path: Path, block: int = _BLOCK) -> Iterator[np.ndarray]:
 
     Args:
         path: an existing file.
-        block: how many points a part has.
+        block: number of points in a part.
 
     Yields:
         At least one part, maybe empty.
@@ -98,7 +98,7 @@ def _find_reader(path: Path) -> _Reader:
 
 @contextlib.contextmanager
 def _faults(path: Path) -> Iterator[None]:
-    """Turns what readers raise into one line that names the file."""
+    """Turns errors of readers into one line that names the file."""
     try:
         yield
     except OSError as error:
@@ -132,7 +132,7 @@ def _read_npy(path: Path, block: int) -> Iterator[np.ndarray]:
 def _read_npy_header(
     path: Path,
 ) -> tuple[np.dtype, tuple[int, ...], bool, int]:
-    """Returns type, shape, whether column after column, and the offset."""
+    """Returns type, shape, whether stored by columns, and the offset."""
     try:
         values = np.load(path, mmap_mode="r", allow_pickle=False)
     except OSError:

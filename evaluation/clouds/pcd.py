@@ -12,10 +12,10 @@ from cns_drake.base.points import store
 from evaluation.clouds.record_blocks import check_size, read_binary, read_text
 
 _KINDS = {"F": "f", "I": "i", "U": "u"}
-# A header is some hundred bytes; a file without one is not searched further.
+# A header takes some hundred bytes; the search for it ends here.
 _HEADER_LIMIT_BYTES = 1 << 16
-# LZF makes 264 bytes of three at most. Compressed files are unpacked in memory;
-# larger ones must not be compressed.
+# LZF expands three bytes to at most 264. Compressed files are unpacked in
+# memory; larger ones must not be compressed.
 _LZF_RATIO = 88
 _UNPACKED_LIMIT_BYTES = 1 << 27
 
@@ -39,7 +39,7 @@ def read_pcd(path: Path, block: int) -> Iterator[np.ndarray]:
     dtype, count = _describe(header)
     encoding = header["DATA"][0].lower() if header["DATA"] else ""
     if encoding == "ascii":
-        # A point takes a byte at the very least: no buffer for more of them.
+        # A point takes at least one byte, which bounds the buffer.
         check_size(path, offset + count, exactly=False)
         return read_text(
             path, offset, count, block, lambda rows: _to_points(rows, dtype)
@@ -112,7 +112,7 @@ def _describe(header: dict[str, list[str]]) -> tuple[np.dtype, int]:
 
 
 def _to_points(values: np.ndarray, dtype: np.dtype) -> np.ndarray:
-    """Returns points of rows of numbers."""
+    """Returns points from rows of numbers."""
     if len(values) == 0:
         return np.empty(0, dtype)
     names = dtype.names or ()

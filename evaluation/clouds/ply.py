@@ -39,7 +39,7 @@ def read_ply(path: Path, block: int) -> Iterator[np.ndarray]:
 
     Args:
         path: the file.
-        block: how many vertices to yield at once.
+        block: number of vertices in a block.
 
     Yields:
         Structured arrays of shape (N,) under the file's property names, at
@@ -51,7 +51,7 @@ def read_ply(path: Path, block: int) -> Iterator[np.ndarray]:
     """
     encoding, dtype, count, alone, offset = _read_header(path)
     if encoding == "ascii":
-        # A vertex takes a byte at the very least.
+        # A vertex takes at least one byte.
         check_size(path, offset + count, exactly=False)
         return read_text(
             path,
@@ -117,7 +117,7 @@ def _describe_vertices(
 
 
 def _to_vertices(values: np.ndarray, dtype: np.dtype) -> np.ndarray:
-    """Returns vertices of rows of numbers."""
+    """Returns vertices from rows of numbers."""
     names = dtype.names or ()
     vertices = np.empty(len(values), dtype=dtype)
     if len(values) and values.shape[1] != len(names):

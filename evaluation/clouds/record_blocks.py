@@ -1,7 +1,7 @@
 """Records of a file, read block by block into memory of our own.
 
-A mapped file would end the process without a message (SIGBUS) if another
-program cuts it meanwhile.
+A memory-mapped file would end the process without a message (SIGBUS) if another
+program shortened it meanwhile.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-# A number as text has some tens of characters, a row some tens of numbers.
+# Enough for rows of some tens of numbers with some tens of characters.
 _LONGEST_LINE_BYTES = 1 << 16
 
 

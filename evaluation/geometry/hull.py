@@ -40,7 +40,7 @@ def in_convex_hull(points: np.ndarray, vertices: np.ndarray) -> np.ndarray:
         try:
             facets = ConvexHull(hull @ axes[:rank].T).equations
         except QhullError:
-            # Flat up to rounding, for Qhull.
+            # Qhull takes the cloud as flat up to rounding.
             rank -= 1
             continue
         return _in_half_spaces(inside @ axes[:rank].T, facets, tolerance) & (

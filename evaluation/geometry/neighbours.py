@@ -76,8 +76,8 @@ def _select(
             high = smaller - 1
             continue
         if smaller == low:
-            # The pivot is the least: pass over all that equal it, for many
-            # equal keys would otherwise take one round each.
+            # The pivot is the least key. All keys equal to it are passed over;
+            # otherwise each would take a round.
             for index in range(low, high + 1):
                 key, item = keys[index], items[index]
                 keys[index], items[index] = keys[smaller], items[smaller]
@@ -196,8 +196,8 @@ def _search(
                     dx, dy = x[candidate] - px, y[candidate] - py
                     dz = z[candidate] - pz
                     distance = dx * dx + dy * dy + dz * dz
-                    # Always written, and kept if near: a branch would often
-                    # be predicted wrongly.
+                    # Each point is written, and kept if it is near: a branch
+                    # would often be predicted wrongly.
                     squared[count] = distance
                     found[count] = candidate
                     count += distance <= limit
@@ -247,8 +247,7 @@ def _farthest(
 def _near_groups(
     boxes: np.ndarray, group: int, reach: float, near: np.ndarray
 ) -> int:
-    """Writes to `near` the boxes within reach of a group's; returns their
-    number."""
+    """Writes boxes within a group's reach to `near`; returns their number."""
     count = 0
     for other in range(len(boxes)):
         gap = 0.0

@@ -23,7 +23,7 @@ Z_ORIGIN = -2.5
 
 # One slot of the hash table of voxels: the number of a voxel, how many points
 # it has (0: the slot is free), and their sum relative to its corner [m]. A slot
-# is one record, since most time goes into fetching slots from memory.
+# is one record, because fetching slots from memory takes most of the time.
 _SLOT = np.dtype(
     [
         ("ix", "i4"),
@@ -84,7 +84,7 @@ class VoxelMap:
             return np.full(len(points_W), -1)
         lifted = points_W - np.array([0.0, 0.0, Z_ORIGIN])
         wanted = np.floor(lifted / self.voxel_size).astype(np.int64)
-        # Both become numbers that sort like rows of indices.
+        # Both become numbers with the order of rows of indices.
         low, high = self.indices.min(axis=0), self.indices.max(axis=0)
         spans = (high - low).astype(np.int64) + 1
         weights = np.array([spans[1] * spans[2], spans[2], 1])

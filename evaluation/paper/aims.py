@@ -1,4 +1,4 @@
-"""Compares our numbers with the paper's, by the aims.
+"""Judges the differences of our numbers from the paper's by aims.
 
 The shipped cities were fitted and judged by these aims. TCR_sym and SOLiD's AUC
 were fitted to the paper; the rest was held out.

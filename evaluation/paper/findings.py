@@ -18,7 +18,7 @@ from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.report.method_titles import in_table_order, title
 from evaluation.report.reference import Finding
 
-# A trend is not judged from fewer pairs.
+# Least number of pairs from which a trend is judged.
 _FEWEST_PAIRS = 5
 _SIGNIFICANCE = 0.05
 

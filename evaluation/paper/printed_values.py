@@ -33,7 +33,7 @@ def is_protocol(method: str, protocol: RetrievalProtocol) -> bool:
 
 
 def is_printed(result: RecognitionResult) -> bool:
-    """Returns whether the paper has such a number: map, method, protocol."""
+    """Returns whether the paper has a number for map, method and protocol."""
     return (
         result.pair[0] in city_names()
         and result.method in method_names()
@@ -42,7 +42,7 @@ def is_printed(result: RecognitionResult) -> bool:
 
 
 def mode_of(method: str) -> Mode:
-    """Returns the mode that the paper seems to have counted a method in."""
+    """Returns the mode in which the paper seems to count a method."""
     for key in recognition_values():
         if key[3] == method:
             return key[4]

@@ -27,10 +27,10 @@ class Cost:
         scans_per_place: number of scans merged into a cloud.
         points: mean number in a cloud.
         describe_ms: to describe a cloud, as a query [ms].
-        query_ms: to compare a query with all places, a second stage, the gate
-            and the pose of the best place included [ms].
-        places: their number.
-        place_bytes: of a place's description, pickled, in the mean.
+        query_ms: to compare a query with all places, including a second stage,
+            the gate and the pose of the best place [ms].
+        places: number of places.
+        place_bytes: mean size of a place's pickled description.
     """
 
     method: str
@@ -54,11 +54,11 @@ def measure_cost(
 
     Args:
         method: to measure.
-        clouds: to describe, two or more; the first is not counted, since it
-            includes loading and compiling.
+        clouds: clouds to describe, two or more; the time of the first is not
+            counted, since it includes loading and compiling.
         scans_per_place: number of merged scans.
         database: with places.
-        query: with queries, of which as many are used as there are clouds.
+        query: with queries; as many are used as there are clouds.
         gate_radius: see `score_places`.
     """
     describing = [_cpu_ms(method.describe, cloud) for cloud in clouds]

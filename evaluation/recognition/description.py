@@ -30,9 +30,9 @@ class DescribedScans:
         frames: (K,) of the drive.
         stamps_ns: (K,) int64.
         X_WS: (K, 4, 4) poses of the sensor.
-        descriptors: K; none if the drive does not have this role.
-        clouds: K clouds that were described, for methods with a second
-            stage; else none.
+        descriptors: K descriptors; none if the drive does not have this role.
+        clouds: the K described clouds, for methods with a second stage; else
+            none.
     """
 
     frames: np.ndarray
@@ -72,8 +72,8 @@ def describe_drive(
 ) -> list[DescribedDrive]:
     """Describes the places and queries of a drive, each cloud once.
 
-    If a frame is both, a method that describes both alike does so once. Clouds
-    are shared between methods.
+    If a frame is both a place and a query, a method that describes both alike
+    describes it once. Clouds are shared between methods.
 
     Args:
         sequence: the drive.
@@ -133,7 +133,7 @@ def _frames(
 
 
 class _Describing:
-    """One method, at work on one drive."""
+    """The descriptions of one drive by one method, in progress."""
 
     def __init__(
         self,
@@ -188,7 +188,7 @@ class _Describing:
         members: set[int],
         of_places: bool,
     ) -> dict[int, object]:
-        """Returns frame -> descriptor of those that are members."""
+        """Returns frame -> descriptor of the frames that are members."""
         chosen = [
             (frame, cloud) for frame, cloud in waiting if frame in members
         ]

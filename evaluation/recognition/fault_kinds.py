@@ -9,7 +9,7 @@ import numpy as np
 
 from evaluation.recognition.recognition_result import RecognitionResult
 
-# The kinds in order of precedence; each wrong answer has the first that fits.
+# The kinds in order of precedence: a wrong answer gets the first one that fits.
 FAULT_KINDS = (
     "no_place",
     "no_candidate",
@@ -20,11 +20,12 @@ FAULT_KINDS = (
     "twin",
     "elsewhere",
 )
-# Up to this number of radii, a place is only too far away, and not elsewhere.
+# Within this number of radii a place counts as too far away and not as
+# elsewhere.
 NEARLY = 2.0
 # Least overlap of two scans, as in truth by overlap.
 _ENOUGH = 0.5
-# Part of the surroundings that has come or gone.
+# Least part of the surroundings that has come or gone.
 MUCH_CHANGED = 0.25
 
 
@@ -42,7 +43,8 @@ class PairEvidence:
         changed: (Q,) part of the standing points of both scans on a structure
             that the other scan lacks without being hidden; NaN also if a
             recording does not name its structures.
-        changed_classes: Q classes of most of these points; "" without any.
+        changed_classes: Q names of the class with most of these points; ""
+            without any.
         right_fits: (Q,) part of the standing points of the query and its right
             place that coincide at the best alignment of the two scans; NaN if
             no method is wrong.

@@ -21,7 +21,7 @@ from evaluation.methods.method import Method
 from evaluation.recognition.pose_errors import checked_pose
 from evaluation.recognition.ranking import ranking
 
-# Chosen on development worlds, see docs/notes/fitting.md.
+# These values were chosen on development worlds, see docs/notes/fitting.md.
 NUM_GATED = 30
 SOFTNESS = 0.05
 
@@ -46,9 +46,9 @@ def gated(
 ) -> np.ndarray:
     """Returns scores (D,) after the gate; NaN for rejected places.
 
-    Places beyond the best `NUM_GATED` are no candidates then. A place whose
-    pose the method does not estimate keeps its score; if that is so for all,
-    every score stays.
+    Places after the best `NUM_GATED` are no candidates. A place whose pose the
+    method does not estimate keeps its score. If the method estimates no pose at
+    all, every score stays.
 
     A score s with weight w becomes s - (1 - w) |s|: the part w of a positive
     score, and a negative score falls likewise.

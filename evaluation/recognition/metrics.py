@@ -1,6 +1,6 @@
 """Recall, precision-recall curve, AUC and F1 of place recognition.
 
-The definition follows from the paper's own numbers. Each query counts with
+The definitions were derived from the paper's numbers. Each query counts with
 its best place only:
 
 - TP: accepted, and the best place is a true match,
@@ -11,8 +11,8 @@ A rejected query without a match counts nowhere. A query without a candidate
 is never accepted. In mode `all` every query counts; in mode `filtered` only
 those that have a match (then F1max carries no more than recall at 1).
 
-R@N is the part of the queries with a match that have one among their N best
-places, in both modes.
+In both modes R@N is the part of the queries with a match that have a match
+among their N best places.
 """
 
 from __future__ import annotations
@@ -76,14 +76,14 @@ class QueryOutcomes:
     def mean_reciprocal_rank(self) -> float:
         """Mean of 1 / rank of the best true match, over queries with one.
 
-        0 for a query whose candidates hold none; NaN if no query has a match.
+        A query without a match among its candidates counts 0. NaN if no query
+        has a match.
         """
         return _mean(1.0 / self.first_right_ranks[self.has_match])
 
     @property
     def match_auroc(self) -> float:
-        """The power of the best score to separate queries with a match from
-        others.
+        """The best score's power to separate queries with a match from others.
 
         The area under the receiver operating characteristic: the chance that
         a query with a match has a higher best score than one without; equal
@@ -95,8 +95,8 @@ class QueryOutcomes:
         if num_with == 0 or num_without == 0:
             return math.nan
         scores = np.where(np.isnan(self.best_scores), -np.inf, self.best_scores)
-        # The sum of ranks is that of Mann and Whitney's U; equal scores share
-        # the mean of their ranks.
+        # This is the sum of ranks of Mann and Whitney's U test; equal scores
+        # share the mean of their ranks.
         _, of_score, counts = np.unique(
             scores, return_inverse=True, return_counts=True
         )
@@ -186,7 +186,7 @@ class PlaceRecognitionMetrics:
         recall_at_n: (25,) R@1 to R@25.
         recall_at_1_percent: R@N for a hundredth of the database.
         num_queries: queries asked.
-        num_with_match: N, those that have a match.
+        num_with_match: N, the number of queries with a match.
         num_right: TP with every candidate accepted: the queries whose best
             place is right. R@1 = num_right / N.
         auc_interval: 95 % bootstrap interval over the queries.
@@ -249,8 +249,8 @@ def judge(scores: np.ndarray, matches: np.ndarray) -> QueryOutcomes:
     num_queries, num_places = scores.shape
     first_right = np.full(num_queries, np.inf)
     best_scores = np.full(num_queries, np.nan)
-    # Row by row: another array of all pairs of long drives could fill the
-    # memory.
+    # One row at a time: a second array of all pairs of long drives could fill
+    # the memory.
     for query, (row, is_match) in enumerate(zip(scores, matches, strict=True)):
         candidates = np.flatnonzero(~np.isnan(row))
         if len(candidates) == 0:

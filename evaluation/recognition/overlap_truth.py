@@ -1,9 +1,9 @@
 """Truth by overlap: the part of a query's scan that a place's scan shows.
 
-Poses are exact. A point of the query's scan is shown by the place's scan if it
-lies on a surface that the latter shows, see `seen_surfaces`. The overlap is
-the part of the query's points that are shown. Parts that are hidden from the
-place's sensor, or absent when it passes, do not count.
+Poses are exact. The place's scan shows a point of the query's scan if the point
+lies on a surface that the place's scan shows, see `seen_surfaces`. The overlap
+is the part of the query's points that are shown. Parts that are hidden from the
+place's sensor, or absent when it passes, are not shown.
 
 The idea is that of OverlapNet (Chen et al., RSS 2020), which compares range
 images pixel by pixel.
@@ -21,7 +21,7 @@ from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.seen_surfaces import TOLERANCE, SeenSurfaces
 from evaluation.sequences.sampling import gather, sample_frames
 
-# Number of points of a query's scan that are looked up.
+# Number of points of a query's scan that are compared.
 _NUM_POINTS = 8192
 
 
@@ -83,13 +83,13 @@ def best_overlaps(
     X_WQs: np.ndarray,
     matches: np.ndarray,
 ) -> np.ndarray:
-    """Returns the part of each query's scan that its best match shows, (Q,).
+    """Returns the part (Q,) of each query's scan that its best match shows.
 
     Args:
         place_scans: D scans (N, 3), each in the frame of its sensor.
         X_WPs: (D, 4, 4) poses of these sensors.
         query_scans: Q scans.
-        X_WQs: (Q, 4, 4) poses of theirs.
+        X_WQs: (Q, 4, 4) poses of their sensors.
         matches: (Q, D) bool, the truth.
 
     Returns:

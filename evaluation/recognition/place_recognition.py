@@ -28,7 +28,7 @@ from evaluation.recognition.protocol import (
 )
 from evaluation.recognition.retrieval import Retrieval, retrieve
 
-# Radii of a match for further values of AUC [m].
+# Radii of a match for which AUC is computed as well [m].
 RADII = (2.5, 5.0, 7.5, 10.0, 15.0, 20.0, 25.0)
 
 
@@ -132,11 +132,11 @@ def run(
     """Runs a method on a pair of drives.
 
     Args:
-        database: the drive whose places are known.
-        query: the drive that asks.
-        method: that runs.
+        database: the drive of the places.
+        query: the drive of the queries.
+        method: the method.
         mode: which queries count.
-        protocol: what is asked.
+        protocol: of the comparison.
         track: reports progress.
         across_maps: the two may be of maps of different names.
 
@@ -190,10 +190,10 @@ def judge_retrieval(
 
     Args:
         method: that made the scores.
-        database: name of the drive whose places are known.
-        query: name of the drive that asks.
+        database: name of the drive of the places.
+        query: name of the drive of the queries.
         retrieval: scores and truth.
-        protocol: by which it was asked.
+        protocol: of the comparison.
         mode: which queries count.
 
     Raises:

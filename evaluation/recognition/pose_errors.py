@@ -1,4 +1,4 @@
-"""Errors of the relative poses that a method estimates with a place."""
+"""Errors of the relative poses that methods estimate."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def pose_error(
         X_WQ: (4, 4) truth.
     """
     X_error = poses.inverse(X_WQ) @ X_WP @ X_PQ
-    # From the sine and the cosine, which is exact for small and large angles.
+    # Sine and cosine together give exact small and large angles.
     R = X_error[:3, :3]
     axis = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
     angle = math.atan2(float(np.linalg.norm(axis)), float(np.trace(R)) - 1.0)
@@ -113,17 +113,17 @@ def pose_metrics(
 
     Args:
         errors: of the queries.
-        outcomes: of the same.
-        metrics: of the same, in mode all.
+        outcomes: of the same queries.
+        metrics: of the same queries, in mode all.
     """
     accepted = np.zeros(len(outcomes), dtype=bool)
     if metrics.f1_max_index is not None:
         least = metrics.curve.thresholds[metrics.f1_max_index]
-        # A comparison with NaN is false.
+        # A comparison with NaN is false: such a pose is no success.
         accepted = outcomes.is_right & (outcomes.best_scores >= least)
     known = ~np.isnan(errors.translation)
     success = math.nan
-    # A method without any places localises no query.
+    # A method that finds no place localises no query.
     estimates = known.any() or np.isnan(outcomes.best_scores).all()
     if estimates and outcomes.has_match.any():
         is_near = (errors.translation <= SUCCESS_TRANSLATION) & (

@@ -17,20 +17,19 @@ class RetrievalProtocol:
     """The protocol of a comparison of two drives; by default the paper's.
 
     Attributes:
-        radius: within which a place is a match of a query, limit included
-            [m].
+        radius: greatest distance of a match from its query [m].
         query_spacing: between two queries, along the path [m].
         place_spacing: likewise between two places of the database [m].
-        max_range: points farther along x, y or z of the sensor's frame are
+        max_range: points with a greater x, y or z in the sensor's frame are
             left out [m].
         scans_per_place: number of consecutive scans that are merged into the
             described cloud; None for each method's own number.
-        exclude_recent: for a drive against itself: only places that it passed
-            at least this long before count [s]. None for two drives.
-        overlap: a place is a match, wherever it is, whose scan shows at least
-            this part of what the query's shows (see `overlap_truth`), up to
-            1; None for matches by the radius.
-        gate: among the best places of a query, reject those that the method's
+        exclude_recent: for a drive against itself: only places count that it
+            passed at least this long before [s]. None for two drives.
+        overlap: a place is a match at any distance if its scan shows at least
+            this part of the query's scan (see `overlap_truth`), up to 1; None
+            for matches by the radius.
+        gate: whether to reject those of a query's best places that the method's
             own pose puts farther away than the radius, see `gate`.
 
     Raises:
@@ -123,8 +122,8 @@ GATE_TEXT = (
 # The defaults, which are the paper's.
 PAPER_PROTOCOL = RetrievalProtocol()
 
-# Columns of a table of results: the options of the protocol. No table has
-# matches by overlap.
+# Columns of a table of results: the options of the protocol. Tables are made
+# without matches by overlap.
 PROTOCOL_COLUMNS = tuple(
     one.name for one in fields(RetrievalProtocol) if one.name != "overlap"
 )

@@ -1,8 +1,7 @@
-"""Agreement of the ranking of methods on two sets of drives, such as simulated
-and real ones.
+"""Agreement of the rankings of methods on two sets of drives.
 
 The measure is Kendall's tau-b (Kendall, Biometrika 33, 1945): 1 if every two
-methods are in the same order on both, -1 if in the opposite one.
+methods have the same order on both sets, -1 if the opposite one.
 """
 
 from __future__ import annotations
@@ -40,12 +39,12 @@ class RankAgreement:
     """The agreement of two rankings of methods.
 
     Attributes:
-        methods: M that answered on all pairs of both sets.
-        first: (M,) mean AUC over the pairs of the one set.
-        second: (M,) of the other.
-        tau: Kendall's tau-b; NaN if all of one set are equal.
-        interval: 95 %: bootstrap over the queries of each pair, in each
-            sample the same ones for every method.
+        methods: names of the M methods that ran on all pairs of both sets.
+        first: (M,) mean AUC over the pairs of the first set.
+        second: (M,) of the second set.
+        tau: Kendall's tau-b; NaN if all values of a set are equal.
+        interval: 95 % interval by bootstrap over the queries of each pair; a
+            sample has the same queries for every method.
     """
 
     methods: tuple[str, ...]
@@ -143,7 +142,7 @@ def _flag(cell: str) -> int:
 def _outcomes(rows: list[tuple[float, ...]]) -> QueryOutcomes:
     scores, right, match = np.array(rows).T
     is_right = right == 1.0
-    # Ranks beyond the first do not matter here.
+    # Only the first rank matters here.
     ranks = np.where(is_right, 1.0, np.inf)
     return QueryOutcomes(scores, is_right, match == 1.0, ranks, 0)
 
@@ -168,7 +167,7 @@ def _areas(
 
 def _tau(first: np.ndarray, second: np.ndarray) -> float:
     with warnings.catch_warnings():
-        # SciPy warns of equal values; the result is NaN then.
+        # SciPy warns if all values are equal; the result is then NaN.
         warnings.simplefilter("ignore")
         return float(kendalltau(first, second).statistic)
 

@@ -9,7 +9,7 @@ def ranking(scores: np.ndarray) -> np.ndarray:
     """Returns places from the best to the worst.
 
     If places have equal scores, the first one in the database is better. Places
-    that are no candidates come last, behind those with a score of minus
+    that are no candidates come last, after those with a score of minus
     infinity.
 
     Args:
@@ -18,5 +18,5 @@ def ranking(scores: np.ndarray) -> np.ndarray:
     Returns:
         (..., D) indices of places.
     """
-    # NaN is sorted behind everything.
+    # NumPy sorts NaN last.
     return np.argsort(-scores, axis=-1, kind="stable")

@@ -11,7 +11,7 @@ from evaluation.recognition.place_recognition import PlaceRecognition
 
 @dataclass(frozen=True)
 class RecognitionResult:
-    """A method on a pair of stages of a map: database, query.
+    """The result of a method on two stages of a map.
 
     Attributes:
         map_name: of the city.
@@ -29,7 +29,7 @@ class RecognitionResult:
     def of(
         cls, map_name: str, stages: tuple[str, str], outcome: PlaceRecognition
     ) -> RecognitionResult:
-        """Counts an outcome in both modes."""
+        """Returns the result of an outcome, counted in both modes."""
         return cls(
             map_name,
             stages,

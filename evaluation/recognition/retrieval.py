@@ -44,8 +44,8 @@ class Retrieval:
             the method does not consider.
         distances: (Q, D) float64 between the sensor positions [m].
         matches: (Q, D) bool, whether a place is a true match of a query.
-        pose_errors: of the best place of each query.
-        is_known: (Q, D) bool, whether a query may find a place.
+        pose_errors: errors of the pose at each query's best place.
+        is_known: (Q, D) bool, whether the place is a candidate for the query.
         overlaps: (Q, D) float64, see `overlap_truth`; None if truth is by
             radius.
 
@@ -127,11 +127,10 @@ def compare(
         query: with its queries described; in the same world frame.
         protocol: that both were described by.
         track: reports progress.
-        overlaps: (Q, D), see `overlap_matrix`; needed where they are the
-            truth.
+        overlaps: (Q, D), see `overlap_matrix`; needed for matches by overlap.
 
     Raises:
-        InputError: if the method returns what it must not.
+        InputError: if the method returns an invalid result.
     """
     (found,) = _compare(
         method,
@@ -162,7 +161,7 @@ def compare_both_ways(
         track: reports progress.
 
     Raises:
-        InputError: if the method returns what it must not.
+        InputError: if the method returns an invalid result.
     """
     radii = [None, protocol.radius]
     without, with_gate = _compare(

@@ -14,7 +14,8 @@ from evaluation.recognition.retrieval import Retrieval
 
 # Kinds of wrong best places, in order of precedence.
 FAULTS = ("no_place", "no_candidate", "other_city", "too_far", "elsewhere")
-# Up to this number of radii, a place is only too far away, and not elsewhere.
+# Within this number of radii a place counts as too far away and not as
+# elsewhere.
 _NEARLY = 2.0
 _HALF = 0.5
 
@@ -68,7 +69,7 @@ class RungOutcome:
             method: that made the scores.
             radius_told: whether they were gated.
             retrieval: of Q queries and D places.
-            query: the drive that asks.
+            query: the drive of the queries.
             drives: D names of the drives of the places; that of the query's
                 own city comes first.
             overlaps: (Q,) of the best match of each query.

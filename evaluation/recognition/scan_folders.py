@@ -29,21 +29,20 @@ def write_scores(
 ) -> int:
     """Writes the score of every query with every place as CSV.
 
-    Columns `query`, `database` (file stems) and `score`, which is empty
-    where the method finds no candidate; rows by query, then by place, both
-    by name. The file appears under its name only when it is complete. For
-    methods that match sequences the queries are one, in the order of names.
+    Columns are `query`, `database` (file stems) and `score`, which is empty if
+    the place is no candidate. Rows are sorted by the names of query and place.
+    The file appears under its name only when it is complete. Methods that match
+    sequences take the queries as one sequence, in the order of names.
 
     Args:
         method: describes and compares.
-        database: folder of scans, one a file.
+        database: folder of scans, each a file.
         query: likewise.
         output: the file to write.
         track: reports progress.
         gate_radius: reject places by the gate, see `gate.gated` [m].
 
-    Returns:
-        How many points were left out as not finite.
+    Returns: The number of points left out because they are not finite.
 
     Raises:
         InputError: if a folder or a scan cannot be read, a scan has no point
@@ -90,7 +89,7 @@ def write_scores(
 
 
 def _read(path: Path, method: Method) -> tuple[np.ndarray, int]:
-    """Returns a cropped cloud of N > 0 points, and how many are not finite."""
+    """Returns a cropped cloud, N > 0, and the number of points not finite."""
     scan = read_cloud(path)
     points = point_arrays.xyz(scan)
     num_finite = int(np.isfinite(points).all(axis=1).sum())

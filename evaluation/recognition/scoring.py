@@ -31,14 +31,13 @@ def score_places(
 
     Args:
         method: that described queries and places.
-        queries: descriptors, from the first of the drive to the one that
-            asks.
-        query_cloud: of that one; for a second stage.
-        database: that `build_database` made of the places.
-        place_clouds: of the D places; likewise.
-        is_known: (D,) bool, which places may be candidates. A search for the
-            best few of all would find others: unless all are known, every
-            place is compared.
+        queries: descriptors, from the first of the drive to the current one.
+        query_cloud: cloud of the current query, for a second stage.
+        database: the result of `build_database` for the places.
+        place_clouds: clouds of the D places, for a second stage.
+        is_known: (D,) bool, which places may be candidates. Unless all are,
+            every place is compared, because a search for the best few of all
+            would find others.
         gate_radius: radius of a match for `gated` [m]; None without a gate.
         exhaustive: see `Method.score`.
 
@@ -73,7 +72,7 @@ def _reranked(
         places: clouds of the D places.
 
     Raises:
-        InputError: if the method returns what are no scores.
+        InputError: if the method does not return scores.
     """
     order = ranking(scores)
     num_candidates = int((~np.isnan(scores)).sum())

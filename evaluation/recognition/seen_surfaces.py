@@ -5,8 +5,8 @@ direction, one in each quadrant, say where the surface lies there: in the plane
 of the three nearest ones, or, at edges and where the beams graze it, between
 the nearest and the farthest of them.
 
-Line of sight, cast in the world of the sensor, is the oracle: of the points of
-scans that were taken up to 30 m away, 3 % more of them count as shown, and at
+Rays cast in the sensor's world showed the error. For points of scans that were
+taken up to 30 m away, 3 % more points count as shown than are visible, and at
 most 7 % (Metropolis, 32 pairs of scans).
 """
 
@@ -22,13 +22,13 @@ from cns_drake.base.compiled import compiled
 
 # Greatest distance of a shown point from a surface [m].
 TOLERANCE = 0.2
-# A return this near to a direction is enough by itself [deg]: edges of roofs,
-# and of the field of view, have returns on one side only.
+# One return this near to a direction is enough [deg], because edges of roofs
+# and of the field of view have returns on one side only.
 _NEAR_DEG = 0.75
 # If one return around a direction is this many times as far as another, they
 # are on two surfaces.
 _FARTHEST = 3.0
-# Numbers of the cells of 1 deg in elevation and in azimuth.
+# Numbers of cells in elevation and in azimuth; a cell has a width of 1 deg.
 _UP, _SIDE = 2, 1
 _ROWS, _COLUMNS = 180, 360
 _UNKNOWN, _SHOWN, _BEHIND = range(3)
@@ -69,10 +69,11 @@ class SeenSurfaces:
         x, y, z = points.T.astype(np.float64)
         elevation = np.degrees(np.arctan2(z, np.hypot(x, y))) + 90.0
         azimuth = np.degrees(np.arctan2(y, x)) + 180.0
-        # Straight up, and straight back, round to the limit.
+        # The directions straight up and straight back are rounded to the upper
+        # limit.
         rows = np.minimum(elevation.astype(np.int64), _ROWS - 1)
         cells = rows * _COLUMNS + azimuth.astype(np.int64) % _COLUMNS
-        # NumPy sorts these by radix.
+        # NumPy sorts these integers by radix.
         order = np.argsort(cells.astype(np.uint16), kind="stable")
         counts = np.bincount(cells, minlength=_ROWS * _COLUMNS)
         return cls(
@@ -138,7 +139,7 @@ def _find_corners(
     flat = math.hypot(p[0], p[1])
     elevation = math.degrees(math.atan2(p[2], flat)) + 90.0
     azimuth = math.degrees(math.atan2(p[1], p[0])) + 180.0
-    # A degree of azimuth is less of an angle high up.
+    # A degree of azimuth is a smaller angle at a high elevation.
     shrink = math.sin(math.radians(elevation))
     row = min(int(elevation), _ROWS - 1)
     column = int(azimuth)
@@ -147,7 +148,7 @@ def _find_corners(
             cell = r * _COLUMNS + c % _COLUMNS
             for k in range(starts[cell], starts[cell + 1]):
                 up = angles[k, 0] - elevation
-                # What `% 360.0` gives, which is slow.
+                # This equals `% 360.0`, which is slow.
                 side = angles[k, 1] - azimuth + 180.0
                 if side < 0.0:
                     side += 360.0
@@ -156,7 +157,8 @@ def _find_corners(
                 side -= 180.0
                 quadrant = 2 * int(up >= 0.0) + int(side >= 0.0)
                 across = side * shrink
-                # A root is slow, and most returns are too far one way alone.
+                # Square roots are slow, and one coordinate alone shows that
+                # most returns are too far.
                 if max(abs(up), abs(across)) >= away[quadrant]:
                     continue
                 distance = math.hypot(up, across)

@@ -1,8 +1,8 @@
 """The part of a method's performance that survives structural change.
 
-The control of a pair of drives takes the place of one of them: the same
-route, driven through the other's stage of the city. The loss of a method from
-the control to the pair is then due to the change alone, and not to the routes.
+The control of a pair replaces one of its drives by the same route through the
+stage of the other drive. The loss of a method from the control to the pair is
+due to the change alone, and not to the routes.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ class Kept:
     """A number without the change, with it, and the share that is kept.
 
     Attributes:
-        unchanged: without the change; NaN without a control.
-        changed: with it.
-        interval: 95 %, of the share: bootstrap over queries, in each sample
-            the same ones with and without the change. NaN where the two do
-            not ask equally many queries, so that none has a partner.
+        unchanged: the number without the change; NaN without a control.
+        changed: the number with the change.
+        interval: 95 % interval of the share by bootstrap over queries; a sample
+            has the same queries with and without the change. NaN if control and
+            pair have different numbers of queries.
     """
 
     unchanged: float
@@ -41,7 +41,7 @@ class Kept:
 
     @property
     def share(self) -> float:
-        """Changed over unchanged; NaN where there was nothing to keep."""
+        """Changed over unchanged; NaN if `unchanged` is 0 or NaN."""
         return float(_share(self.changed, self.unchanged))
 
 
@@ -65,7 +65,7 @@ class Survival:
     def of(
         cls, changed: RecognitionResult, unchanged: RecognitionResult | None
     ) -> Survival:
-        """Compares a result with that of the control, if there is one."""
+        """Compares a result with the control's result, if there is one."""
         after = changed.metrics["all"]
         if unchanged is None:
             unknown = Interval(math.nan, math.nan)
@@ -103,12 +103,12 @@ class Survival:
 
     @property
     def protocol(self) -> RetrievalProtocol:
-        """By which both were found."""
+        """The protocol of both results."""
         return self.changed.outcome.protocol
 
     @property
     def control(self) -> str | None:
-        """The drive that takes the place of one of the pair."""
+        """The drive that replaces one of the pair."""
         if self.unchanged is None:
             return None
         before, after = self.unchanged.outcome, self.changed.outcome

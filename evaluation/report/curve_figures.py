@@ -23,17 +23,17 @@ from evaluation.report.drawing import (
 from evaluation.report.method_titles import in_table_order, title
 from evaluation.report.reference import NO_REFERENCE, Reference
 
-# A line is not fitted through fewer.
+# The least number of points that a line is fitted through.
 _LEAST_POINTS = 5
 
 
 def draw_pr_curves(
     map_name: str, results: Sequence[RecognitionResult], stem: Path
 ) -> None:
-    """Draws precision over recall: a column for each pair, a row a mode.
+    """Draws precision over recall: a column for each pair, a row for each mode.
 
     Args:
-        map_name: of the city.
+        map_name: name of the city.
         results: of its pairs and methods.
         stem: path to write, without ending.
     """
@@ -70,14 +70,14 @@ def draw_auc_over_change(
 ) -> None:
     """Draws AUC against TCR_sym, with 95 % intervals.
 
-    Left all queries are counted, then those with a match; right of them are
-    the reference's values, where it has such.
+    The left panel counts all queries, the next one those with a match. Right of
+    them are the reference's values, if there are any.
 
     Args:
         results: of all pairs and methods.
-        changes: TCR_sym of each pair.
+        changes: each pair's TCR_sym.
         stem: path to write, without ending.
-        reference: whose values stand beside.
+        reference: published values to draw beside ours.
     """
     with_reference = any(map(reference.covers, results))
     count = len(MODES) + with_reference
@@ -92,7 +92,8 @@ def draw_auc_over_change(
                 for r in results
                 if r.method == method and r.pair in changes
             ]
-            # Side by side, so that intervals of one pair do not hide.
+            # Side by side, so that the intervals of one pair do not hide each
+            # other.
             shift = 0.0008 * (index - 0.5 * (len(methods) - 1))
             if _draw_points(axes, method, points, shift):
                 with_line.add(method)
@@ -124,8 +125,8 @@ def _draw_curve(
 ) -> None:
     colour, style, marker = method_style(method)
     curve = metrics.curve
-    # From recall 0 on with the precision of the first point: the area that
-    # is drawn is the AUC.
+    # The curve begins at recall 0 with the precision of its first point. The
+    # drawn area is then the AUC.
     recall = np.concatenate([[0.0], curve.recall])
     precision = np.concatenate([curve.precision[:1], curve.precision])
     axes.plot(
@@ -156,7 +157,7 @@ def _draw_points(
     y = np.array([metrics.auc for _, metrics in points])
     below = [m.auc - m.auc_interval.low for _, m in points]
     above = [m.auc_interval.high - m.auc for _, m in points]
-    # A percentile interval may, rarely, leave out the value itself.
+    # A percentile interval rarely leaves out the value itself.
     lengths = np.maximum([below, above], 0.0)
     axes.errorbar(
         x,

@@ -86,7 +86,7 @@ def save(figure: Figure, stem: Path, page_kind: str) -> None:
         InputError: if a file cannot be written.
     """
     FigureCanvasAgg(figure)
-    # Arranged once, not for each format again.
+    # The layout is computed once for all formats.
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
     for kind in (*PRINTED, page_kind):

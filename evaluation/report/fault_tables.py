@@ -38,7 +38,7 @@ def fault_table(
 
     Args:
         results: of all pairs and methods.
-        evidence: by database and query; pairs without have no row.
+        evidence: (database, query) -> evidence; a pair without it has no row.
     """
     rows = []
     for result, kinds, changed in _counted(results, evidence):

@@ -42,7 +42,7 @@ SETS_LEGEND: Legend = (
     (_ONLY_IN_H, "in H, changed"),
     (_OUTSIDE_H, "outside H"),
 )
-# From above, as plans have it: streets pale, walls dark.
+# The view from above is coloured like a plan: streets pale, walls dark.
 _GROUND = (226, 229, 232)
 _HIGHEST = (72, 88, 112)
 
@@ -107,7 +107,8 @@ def judge_points(
         (N,) bool, whether the point lies in the other map's hull, so that
         this counts.
     """
-    # Far away is all that matters; the bound saves the search beyond.
+    # A distance beyond the bound only counts as far away, so the search stops
+    # there.
     distances, _ = cKDTree(other).query(points, distance_upper_bound=2.0 * tau)
     return distances > tau, in_convex_hull(points, other)
 
@@ -135,7 +136,7 @@ def draw_routes(map_name: str, routes: Sequence[SeenRoute], stem: Path) -> None:
 
     Args:
         map_name: of the city.
-        routes: of its stages.
+        routes: one for each of its stages.
         stem: path to write, without ending.
     """
     figure, grid = _picture_grid([route.view for route in routes])
@@ -155,17 +156,17 @@ def draw_change(
 ) -> None:
     """Draws what changed between two stages, and the sets behind the TCR.
 
-    Nothing but the metric decides on a colour. In the first figure, red is a
-    point without a counterpart in the other map. It is pale where the point
-    lies outside the other map's hull: there the other drive may just not
-    have looked, and the TCR does not count it. The second shows the sets H
-    and O in both orders and united; a point has the colour of its voxel.
+    The metric alone decides on a colour. In the first figure, red is a point
+    without a counterpart in the other map. It is pale where the point lies
+    outside the other map's hull: the other drive may not have passed there, and
+    the TCR does not count the point. The second shows the sets H and O in both
+    orders and united; a point has the colour of its voxel.
 
     Args:
         map_name: of the city.
         earlier: stage A.
         later: stage B.
-        change: between them, A the source.
+        change: from A to B.
         stems: paths to write, without endings.
     """
     stages = (earlier, later)
@@ -174,13 +175,13 @@ def draw_change(
 
 
 def voxel_of_each(points: np.ndarray, coarse: VoxelMap) -> np.ndarray:
-    """Returns in which voxel of their map some points lie.
+    """Returns the voxel of their map in which each point lies.
 
-    A point on a border may have been counted on its other side, with a
-    rounding error. The occupied voxel with the nearest centre is meant.
+    By a rounding error a point on a border may have been counted on its other
+    side. The occupied voxel with the nearest centre is taken therefore.
 
     Args:
-        points: (N, 3) of those that were mapped [m].
+        points: (N, 3) of the points that made the map [m].
         coarse: their map.
 
     Returns:
@@ -296,7 +297,8 @@ def _show(axes: Axes, picture: Picture) -> None:
 
 def _draw_route(axes: Axes, line: np.ndarray) -> None:
     """Draws a route (N, 2) with a triangle at its start, a square at end."""
-    # No picture has room for more; each one is drawn by itself.
+    # A picture has too few pixels for more points. Each piece is drawn by
+    # itself.
     number = min(len(line), _ROUTE_POINTS)
     line = line[np.linspace(0, len(line) - 1, number).round().astype(int)]
     segments = LineCollection(

@@ -29,7 +29,7 @@ _TITLES = {False: "without the gate", True: "with the gate"}
 
 
 def draw_ladder(rows: Sequence[LadderRow], stem: Path) -> None:
-    """Draws how much of AUC without a change each cause leaves.
+    """Draws the share of the AUC without a change that each cause leaves.
 
     A cell has a strip for each level, the weakest at its left; the number is
     that of the strongest level [%]. Without a change it is AUC itself.

@@ -26,8 +26,8 @@ class LadderRung:
 
     Attributes:
         map_name: of the city.
-        database: of the drive whose route is that of the database.
-        query: of the drive that asks.
+        database: name of the drive along the database's route.
+        query: name of the query drive.
         cause: of the change; `none` without one.
         level: its strength, from 1 to 4; 0 without a change.
         strength: in words.
@@ -67,20 +67,21 @@ class LadderRow:
         rung: which.
         method: its name.
         radius_told: whether it was gated by the radius.
-        auc_interval: 95 %, of AUC: bootstrap over queries, in each sample the
-            same ones for each draw.
+        auc_interval: 95 % interval of AUC by bootstrap over queries; a sample
+            has the same queries in each draw.
         r1: R@1.
-        kept: of AUC, against the rung `none` of the same map.
-        queries: asked in each draw.
-        with_match: those that have a match.
-        places: of the database.
-        draws: of what is random.
+        kept: share of the AUC on the rung `none` of the same map.
+        queries: number of queries in each draw.
+        with_match: number of those with a match.
+        places: number of places of the database.
+        draws: number of random draws.
         drives: fingerprints of the drives of all draws.
-        lost: queries that are right on the rung `none`, and wrong here; mean.
-        found: the other way round.
+        lost: mean number of queries that are right on the rung `none` and wrong
+            here.
+        found: mean number of queries that are wrong there and right here.
         hidden: see `RungOutcome.num_hidden`; mean.
         overlap: mean over queries, see `RungOutcome.overlaps`.
-        faults: fault -> how many queries have it; mean. See
+        faults: fault -> mean number of queries with it. See
             `RungOutcome.faults`.
     """
 

@@ -8,11 +8,11 @@ import math
 from evaluation.report.ladder_rows import LadderRow
 from evaluation.report.method_titles import in_table_order, title
 
-# The kept share of AUC from which on little is lost.
+# A kept share of AUC from this one on counts as a small loss.
 _MUCH = 0.95
-# Between what is kept with and without the gate.
+# Least difference of the kept shares with and without the gate that is named.
 _DIFFERENT = 0.1
-# Rungs that are no single cause.
+# Rungs with more than one cause.
 _NONE, _ALL = "none", "all"
 
 
@@ -52,7 +52,7 @@ def _paragraph(rows: Sequence[LadderRow]) -> str:
 
 
 def _sentence(rows: Sequence[LadderRow]) -> str:
-    """Returns the losses of one method; "" if it had nothing to lose."""
+    """Returns the losses of one method; "" if its AUC without a change is 0."""
     known = {
         row.rung.cause: row for row in rows if not math.isnan(row.kept.share)
     }
@@ -90,7 +90,7 @@ def _mildest(rows: Sequence[LadderRow]) -> str:
 
 
 def _difference(untold: Sequence[LadderRow], told: Sequence[LadderRow]) -> str:
-    """Returns what depends on the gate."""
+    """Returns the sentence on causes whose cost depends on the gate."""
     before = {(row.rung.cause, row.method): row for row in untold}
     changed = [
         f"{title(row.method)} under {_cause(row)} keeps"

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-# As their authors write them, in the order of tables; ours after them.
+# The spelling of the methods' authors, in the order of tables; our methods come
+# last.
 _TITLES = {
     "scan-context++": "Scan Context++",
     "solid": "SOLiD",

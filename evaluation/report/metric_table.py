@@ -1,4 +1,4 @@
-"""The table of metrics that others report, beside those of the paper."""
+"""The table of metrics of other publications, beside those of the paper."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ from evaluation.report.survival_tables import (
 from evaluation.report.tables import Table
 
 _MEDIA_TYPES = {"svg": "image/svg+xml", "webp": "image/webp"}
-# Name -> the word for it, in the order of the page.
+# Name of a section -> its heading, in the order of the page.
 _SECTIONS = {
     "survival": "Survival",
     "summary": "Summary",
@@ -51,7 +51,7 @@ _SECTIONS = {
     "figures": "Figures",
     "browser": "Queries",
 }
-# In the order in which they rely on one another.
+# Each script uses only those before it.
 _SCRIPTS = ("state.js", "pictures.js", "page.js")
 
 
@@ -60,23 +60,24 @@ class PageContent:
     """All that the page shows.
 
     Attributes:
-        notes: of which cities there is nothing to compare.
-        judgements: claims, judged.
-        beside: whose numbers stand beside; empty for none.
+        notes: cities without a pair to compare.
+        judgements: claims and their verdicts.
+        beside: source of the published numbers beside ours; empty for none.
         changes: TCR of all pairs.
         change: Table I.
-        recognition: Table II in its forms, that of mode all last but one.
+        recognition: all forms of Table II; the last but one is that of mode
+            all.
         audit: all numbers.
-        why: what is wrong with wrong best places.
-        evidence: of it, by database and query.
-        poses: how good the poses are that come with the places.
+        why: reasons for wrong best places.
+        evidence: (database, query) -> evidence of these reasons.
+        poses: errors of the poses that methods estimate.
         costs: of the methods; without rows if they were not measured.
         illustrations: figures, already written.
         recognitions: place recognition of all pairs.
         survivals: the same with their controls.
-        drives: name -> drive, all that occur in a pair.
-        pages: drive -> address, relative to the page, of its recording to
-            look around in; drives without one may be left out.
+        drives: name -> drive, for all drives of a pair.
+        pages: drive -> address, relative to the page, of the page of its
+            recording; drives without a page may be left out.
     """
 
     notes: Sequence[str]
@@ -159,7 +160,7 @@ def _by_section(
 
 
 def _facts(content: PageContent) -> list[tuple[str, int]]:
-    """Returns of what there is how much."""
+    """Returns the labels and numbers of maps, pairs and methods."""
     maps = {result.map_name for result in content.changes}
     pairs = {result.pair for result in content.recognitions}
     methods = {result.method for result in content.recognitions}
@@ -192,13 +193,13 @@ def _drives_of_maps(content: PageContent) -> dict[str, list[str]]:
 
 
 def _data_address(one: Illustration) -> str:
-    """Returns an address that holds the figure itself."""
+    """Returns a data URL that contains the figure."""
     path = one.stem.with_name(f"{one.stem.name}.{one.page_kind}")
     data = base64.b64encode(path.read_bytes()).decode("ascii")
     return f"data:{_MEDIA_TYPES[one.page_kind]};base64,{data}"
 
 
 def _to_script(data: dict | None) -> Markup:
-    """Returns JSON that cannot end the script element it stands in."""
+    """Returns JSON that cannot end the script element around it."""
     text = json.dumps(data, separators=(",", ":"), allow_nan=False)
     return Markup(text.replace("<", "\\u003c"))

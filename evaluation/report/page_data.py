@@ -21,10 +21,10 @@ from evaluation.report.drawing import Legend
 from evaluation.report.method_titles import in_table_order, title
 from evaluation.report.point_rendering import Picture
 
-# Points in all scans of a page; at some 3 bytes each they leave room for the
-# figures in 25 MB.
+# Points in all scans of a page. At some 3 bytes each they leave room for the
+# figures within 25 MB.
 _POINTS_OF_A_PAGE = 5_000_000
-# Best places that are kept of each query.
+# Number of best places that are kept for each query.
 _NUM_BEST = 5
 # Between the points of a drawn route [m].
 _ROUTE_STEP = 2.0
@@ -41,10 +41,10 @@ class Illustration:
         stem: its path without ending.
         title: what it shows.
         page_kind: "svg" or "webp", the form in which the page holds it.
-        section: of the page that shows it; "print" for none.
-        num_panels: that lie side by side; a phone shows one at a time.
-        legend: red, green, blue and meaning of colours, named again below
-            the figure, where a phone shows it legibly.
+        section: section of the page with the figure; "print" for none.
+        num_panels: number of panels side by side; a phone shows one at a time.
+        legend: red, green, blue and meaning of the colours. The page repeats it
+            below the figure, in letters that a phone shows legibly.
     """
 
     stem: Path
@@ -125,17 +125,17 @@ def browser_data(
 ) -> dict:
     """Returns what the query browser reads, ready for JSON.
 
-    The maps from above are not in it: it takes them from
+    The maps from above are not included; the browser takes them from
     `evaluation.report.page_routes.route_picture`.
 
     Args:
         recognitions: of all pairs and methods.
-        drives: name -> drive, all that occur in a pair.
+        drives: name -> drive, for all drives of a pair.
         changes: TCR_sym of each pair.
-        pages: drive -> address of its recording to look around in; drives
-            without one may be left out.
-        evidence: of why best places are wrong, by database and query; pairs
-            may be left out.
+        pages: drive -> address of the page of its recording; drives without a
+            page may be left out.
+        evidence: (database, query) -> evidence of why best places are wrong;
+            pairs may be left out.
     """
     pairs: dict[tuple, list[RecognitionResult]] = {}
     for result in recognitions:
@@ -164,7 +164,7 @@ def browser_data(
 
 
 def _drive_data(drive: PageDrive, num_points: int) -> dict:
-    # Sorted, so that neighbours are alike and compress well.
+    # Sorted points have similar neighbours, which compress well.
     scans = [
         points[np.lexsort(points.T[::-1])]
         for points in (whole[:num_points] for whole in drive.thumbnails)

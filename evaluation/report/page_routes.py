@@ -14,9 +14,9 @@ from evaluation.report.figures import ROUTE_COLOURS
 from evaluation.report.page_data import PageDrive
 from evaluation.report.page_templates import render
 
-# Pieces of one colour that a route is drawn in.
+# Number of pieces of one colour in a drawn route.
 _NUM_PIECES = 48
-# Size of start and end, as a part of the picture.
+# Size of the marks of start and end, as a part of the picture.
 _MARK = 0.016
 # Length of the scale bar [m].
 BAR_LENGTH = 50.0
@@ -56,7 +56,7 @@ def route_colours(num: int = 9) -> list[str]:
 
 
 def _pieces(route: np.ndarray) -> list[tuple[str, str]]:
-    """Returns colour and points of pieces; each begins where one ended."""
+    """Returns colour and points of pieces, joined at their ends."""
     last = len(route) - 1
     num = min(_NUM_PIECES, max(last, 1))
     ends = np.linspace(0, last, num + 1).astype(int)

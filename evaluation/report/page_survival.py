@@ -18,7 +18,7 @@ from evaluation.report.tables import to_text
 def survival_groups(
     survivals: Sequence[Survival],
 ) -> list[tuple[str, list[dict[str, object]]]]:
-    """Returns the rows of each pair under its name, as the page shows them."""
+    """Returns the name of each pair and its rows, as the page shows them."""
     return [
         (f"{map_name} {' → '.join(stages)}", [_row(one) for one in group])
         for (map_name, *stages), group in by_pair(survivals).items()

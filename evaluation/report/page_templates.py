@@ -1,4 +1,4 @@
-"""Templates of the page, and files that it holds as they are."""
+"""Templates of the page, and files that it includes unchanged."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def render(name: str, /, **values: object) -> Markup:
 
 
 def read_asset(name: str) -> Markup:
-    """Returns a style sheet or a script as it is."""
+    """Returns a style sheet or a script unchanged."""
     folder = resources.files(__package__) / _FOLDER
     return Markup((folder / name).read_text("utf-8"))
 

@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 _WHITE = 255
-# How strongly a step in depth darkens: of one metre, by 1 - exp(-strength).
+# Strength of the darkening: a step of one metre darkens by 1 - exp(-strength).
 _STEP_STRENGTH = 0.35
 # Deeper steps darken no more than this [m].
 _STEP_LIMIT = 4.0
@@ -95,8 +95,8 @@ def render(
     width = int(column.max()) + size_px
     height = int(up.max()) + size_px
     row = height - size_px - up
-    # From back to front, counted from 1: of those at one place the last one
-    # assigned stays, and the highest number where squares overlap.
+    # Points are numbered from back to front, from 1 on. At one place the last
+    # assigned one stays; where squares overlap, the highest number stays.
     order = np.argsort(seen[:, 2], kind="stable")
     corners = np.zeros((height - size_px + 1, width - size_px + 1), np.int32)
     corners[row[order], column[order]] = np.arange(1, len(order) + 1)
@@ -153,7 +153,8 @@ def _height_parts(heights: np.ndarray) -> np.ndarray:
     # A river's bed is up to 5 %, and must be no brighter than streets.
     low, high = np.quantile(heights, [0.05, 0.99])
     part = np.clip((heights - low) / max(high - low, 1e-9), 0.0, 1.0)
-    # Root, because most of a city is near the ground.
+    # The square root spreads low heights, because most of a city is near the
+    # ground.
     return np.sqrt(part)
 
 

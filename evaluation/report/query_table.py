@@ -68,13 +68,13 @@ def query_table(
     tracks: Mapping[str, DriveTrack],
     evidence: Mapping[tuple[str, str], PairEvidence],
 ) -> Table:
-    """Returns one row for each pair, method and query, as it is asked.
+    """Returns a row for each pair, method and query, in the queries' order.
 
     Args:
-        results: each with the map, database and query that it stands for.
-        tracks: drive -> its track, of all that occur.
-        evidence: of why best places are wrong, by database and query; those
-            without have nothing in its columns.
+        results: each with its map, database and query.
+        tracks: drive -> its track, for all drives.
+        evidence: (database, query) -> evidence of why best places are wrong;
+            its columns are empty for pairs without it.
     """
     rows = tuple(
         row

@@ -1,8 +1,8 @@
 """The reference of a report: published numbers, and claims to judge.
 
-A study of a user's own city has none. `Reference` itself is that: nothing
-published, nothing judged. A study with numbers to compare with gets an object
-of another class.
+A study of a user's own city has no such numbers and uses `Reference` itself,
+which publishes and judges nothing. A study with published numbers gets an
+object of a subclass.
 """
 
 from __future__ import annotations
@@ -48,12 +48,13 @@ class Judgement:
 
 
 class Reference:
-    """Published numbers and claims; of this class itself: none.
+    """Published numbers and claims; this class has none.
 
     Attributes:
-        title: whose they are, as the report calls it.
-        counting: in which modes its methods were counted, for a caption and
-            in brief for a figure; only of use where something is published.
+        title: the source's name in the report.
+        counting: the modes in which the source counted its methods, in words
+            for a caption and in brief for a figure; used only if something is
+            published.
     """
 
     title: str = ""
@@ -77,7 +78,7 @@ class Reference:
         return []
 
     def covers(self, result: RecognitionResult) -> bool:
-        """Returns whether such a number is published."""
+        """Returns whether the number is published."""
         del result
         return False
 
@@ -87,7 +88,7 @@ class Reference:
         return "all"
 
     def values(self, result: RecognitionResult, mode: Mode) -> Published | None:
-        """Returns what was published of this, counted in that mode."""
+        """Returns the published numbers, counted in a mode."""
         del result, mode
         return None
 
@@ -101,7 +102,7 @@ class Reference:
         results: Sequence[RecognitionResult],
         changes: Sequence[ChangeResult],
     ) -> list[Judgement]:
-        """Judges claims by our numbers; without those that cannot be."""
+        """Returns verdicts on all claims that our numbers can judge."""
         del results, changes
         return []
 

@@ -21,7 +21,7 @@ from evaluation.report.tables import Table, ranked
 
 
 def protocol_text(results: Sequence[RecognitionResult]) -> str:
-    """Returns what was asked; how many scans a place is, is each method's."""
+    """Returns the protocol in words; each method sets its scans per place."""
     if not results:
         return ""
     return replace(results[0].outcome.protocol, scans_per_place=None).to_text()
@@ -42,11 +42,11 @@ def by_pair_and_method(
 def change_table(
     results: Sequence[ChangeResult], reference: Reference = NO_REFERENCE
 ) -> Table:
-    """Returns Table I: the change of each pair, and what it is made of.
+    """Returns Table I: the change of each pair, and its parts.
 
     Args:
         results: of all pairs.
-        reference: whose values stand beside, and below.
+        reference: its published values stand beside ours, and below.
     """
     header = (
         "map",
@@ -98,8 +98,8 @@ def recognition_tables(
 ) -> list[Table]:
     """Returns Table II in its forms.
 
-    First as the reference counted, where it has such numbers; then in each
-    mode.
+    The first form counts as the reference does, if it has such numbers; one
+    form for each mode follows.
     """
     modes: list[Mode | None] = list(MODES)
     if any(map(reference.covers, results)):
@@ -120,9 +120,9 @@ def recognition_table(
     Args:
         results: of all pairs and methods.
         changes: for the TCR_sym of the pairs.
-        mode: in which methods are counted; None for that which the reference
-            used for each.
-        reference: whose values stand beside.
+        mode: mode in which methods are counted; None for the mode that the
+            reference used for each.
+        reference: its values stand beside ours.
     """
     methods = in_table_order(result.method for result in results)
     names = ("AUC", "R@1", "F1")
@@ -167,7 +167,7 @@ def recognition_table(
 def audit_table(
     results: Sequence[RecognitionResult], reference: Reference = NO_REFERENCE
 ) -> Table:
-    """Returns all numbers with what they are made of, one row for each."""
+    """Returns all numbers with the counts behind them, a row each."""
     header = (
         "map",
         "DB → query",

@@ -14,7 +14,7 @@ from evaluation.report.drawing import method_style, plain, save
 from evaluation.report.method_titles import title
 from evaluation.report.survival_tables import by_pair, percent
 
-# As wide as a phone's screen, so that letters stay legible there [inches].
+# The width of a phone's screen, on which letters stay legible [inches].
 _WIDTH = 3.9
 _ROW = 0.17
 _EDGES = 0.75
@@ -27,11 +27,11 @@ _TITLE_ROWS = 1.5
 def draw_survival(survivals: Sequence[Survival], stem: Path) -> None:
     """Draws AUC without and with the change, for each pair and method.
 
-    Hollow is without the change, full is with it; the share that is kept
-    stands beside. Pairs without a control are left out.
+    A hollow marker is AUC without the change, a full one AUC with it; the kept
+    share stands beside them. Pairs without a control are left out.
 
     Args:
-        survivals: of all pairs and methods; one at least has a control.
+        survivals: of all pairs and methods; at least one has a control.
         stem: path to write, without ending.
     """
     groups = by_pair([one for one in survivals if one.unchanged is not None])

@@ -129,7 +129,7 @@ def survival_table(survivals: Sequence[Survival]) -> Table:
 
 
 def survival_summary(survivals: Sequence[Survival]) -> str:
-    """Returns one sentence, or two, on who keeps how much of its AUC."""
+    """Returns one or two sentences on the share of AUC that methods keep."""
     known = [one for one in survivals if one.unchanged is not None]
     pairs = dict.fromkeys(one.pair for one in survivals)
     without = len(pairs) - len({one.pair for one in known})

@@ -29,7 +29,7 @@ _LATEX = {
     "–": "--",
     "·": r"$\cdot$",
 }
-# Characters that make a table, a link, a picture or a tag of text.
+# Characters that turn text into a table, a link, a picture or a tag.
 _MARKDOWN = {ord(c): f"\\{c}" for c in "\\`*_[]|"} | {
     ord("<"): "&lt;",
     ord(">"): "&gt;",
@@ -38,11 +38,11 @@ _MARKDOWN = {ord(c): f"\\{c}" for c in "\\`*_[]|"} | {
 
 @dataclass(frozen=True)
 class Cell:
-    """A number that competes with others, with the paper's beside it.
+    """A number that is ranked in its row, with the paper's number beside it.
 
     Attributes:
-        value: ours; None or NaN where there is none.
-        printed: the paper's; None where it has none.
+        value: our number; None or NaN if there is none.
+        printed: the paper's number; None if there is none.
         rank: 1 for the best of its row, 2 for the second, None for others.
     """
 
@@ -57,10 +57,11 @@ class Table:
 
     Attributes:
         header: name of each column.
-        rows: one value a column: text, a number, a `Cell`, or None where
-            there is nothing.
-        groups: names over some columns, each with how many it spans; empty
-            names are left out. All columns, or no group at all.
+        rows: one value for each column: text, a number, a `Cell`, or None for
+            an empty one.
+        groups: names over columns, each with the number of columns that it
+            spans; empty names are left out. Groups span all columns, or there
+            are none.
         caption: what the table shows.
     """
 
@@ -87,7 +88,7 @@ class Table:
     def to_csv(self) -> str:
         """Returns the table with all digits; a missing value is empty.
 
-        Cells become two columns, of which the second is the paper's.
+        A cell becomes two columns; the second holds the paper's number.
         """
         stream = io.StringIO()
         writer = csv.writer(stream, lineterminator="\n")
@@ -184,15 +185,15 @@ class Table:
 def ranked(
     values: Sequence[float | None], printed: Sequence[float | None]
 ) -> list[Cell]:
-    """Returns cells of a row, of which the greatest two are marked.
+    """Returns the cells of a row with the greatest two marked.
 
-    Equal values share a rank, as they are printed with four decimals.
+    Values that are equal as printed, with four decimals, share a rank.
     """
     shown = [
         None if v is None or math.isnan(v) else round(v, 4) for v in values
     ]
     order = sorted({v for v in shown if v is not None}, reverse=True)
-    # With a single competitor nothing is best.
+    # A single number has no rank.
     places = {value: rank for rank, value in enumerate(order[:2], start=1)}
     if sum(v is not None for v in shown) < 2:
         places = {}
@@ -210,9 +211,9 @@ def to_text(value: object) -> str:
 
 
 def escape_markdown(text: str) -> str:
-    """Returns text that Markdown shows as it is."""
+    """Returns text that Markdown shows unchanged."""
     named = re.sub(r"&(?=#?\w+;)", "&amp;", text)
-    # An underscore within a word is one.
+    # Markdown shows an underscore within a word as an underscore.
     return re.sub(r"(?<=\w)\\_(?=\w)", "_", named.translate(_MARKDOWN))
 
 

@@ -1,4 +1,4 @@
-"""Readers of recorded drives and of point clouds, one a format."""
+"""Readers of recorded drives and of point clouds, one for each format."""
 
 from __future__ import annotations
 

@@ -40,14 +40,14 @@ from evaluation.sequences.text_tables import read_stamped_rows
 
 _POSES = "gt.csv"
 _IMU = "imu.csv"
-# The paper's and the download's name of the folder.
+# Names of the folder in the paper and in the download.
 _FOLDERS = ("pcd", "LiDAR")
 _MOUNT = "transformation_lidar.yaml"
 # Above the vehicle, by the data set's figure of its sensors [m].
 _LIDAR_HEIGHT = 1.6
 
-# Everything is recorded at one time; only the notation may differ, as by a
-# double that holds nanoseconds since 1970.
+# Scans and poses have the same times. Only their notation may differ: a double
+# holds nanoseconds since 1970 with an error.
 _TOLERANCE_NS = 1000
 
 
@@ -148,7 +148,7 @@ def _read_mount(path: Path | None) -> np.ndarray:
 
 
 class _Loader(yaml.SafeLoader):
-    """Reads what has a tag of its own (OpenCV's matrices) as if it had none."""
+    """Reads values with tags of their own (OpenCV's matrices) as if without."""
 
 
 _Loader.add_multi_constructor(
@@ -196,7 +196,7 @@ def _compose(p: np.ndarray, rotation: np.ndarray, path: Path) -> np.ndarray:
 
 
 def _numbers(node: Any) -> np.ndarray | None:
-    """Returns the numbers of a list, nested or not, or of x y z (w) keys."""
+    """Returns the numbers of a flat or nested list, or of x, y, z, w keys."""
     if isinstance(node, dict):
         keys = [key for key in "xyzw" if key in node]
         node = [node[key] for key in keys] if len(keys) >= 3 else None

@@ -10,20 +10,21 @@ from cns_drake.base import poses
 from cns_drake.base.errors import InputError
 from cns_drake.base.recordings.sequence import Sequence
 
-# Poses on either side of a scan that show how the LiDAR moved. The ends of
-# the splines through them are free, so that an error there fades by about a
-# quarter from pose to pose.
+# Number of poses before and after a scan from which its motion is interpolated.
+# The ends of the splines are free; an error there fades to about a quarter from
+# pose to pose.
 _REACH = 4
 
 
 def deskew(sequence: Sequence, index: int) -> np.ndarray:
     """Returns a scan as if it had been taken at once, at its stamp.
 
-    A point is where its beam left the LiDAR `t` ns after the stamp, in the
-    frame S that the LiDAR had then. The pose at that time comes from cubic
-    splines through the poses of the sequence around the scan (positions, and
-    rotations as angular rates that are smooth; scipy's RotationSpline); it
-    takes the point into the world, and the pose at the stamp back into S.
+    A point was measured `t` ns after the stamp and is given in the frame that
+    the LiDAR had then. The pose at that time comes from cubic splines through
+    the poses of the sequence around the scan: one for positions, and scipy's
+    RotationSpline, with smooth angular rates, for rotations. This pose takes
+    the point into the world. The pose at the stamp takes it into the LiDAR's
+    frame S.
 
     At the end of the sequence the motion is extrapolated over one scan.
 

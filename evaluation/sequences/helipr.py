@@ -4,7 +4,7 @@
     SEQ/LiDAR_GT/{LiDAR}_gt.txt           ns x y z qx qy qz qw of X_LS
     SEQ/LiDAR_GT/global_{LiDAR}_gt.txt    the same in the UTM grid
 
-Poses are those of the LiDAR itself, one a scan.
+Poses are those of the LiDAR itself, one for each scan.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _AEVA_EARLY = [
     ("time_offset_ns", "<i4"),
     ("line_index", "u1"),
 ]
-# Records are packed: 26, 22, 19, 29 and 25 bytes.
+# Records have no padding: 26, 22, 19, 29 and 25 bytes.
 _RECORDS = {
     "Ouster": np.dtype(
         [
@@ -61,18 +61,18 @@ _RECORDS = {
     ),
     "Aeva": np.dtype([*_AEVA_EARLY, ("intensity", "<f4")]),
 }
-# Up to this time Aeva's records had no intensity yet [ns].
+# Records of Aeva up to this time have no intensity [ns].
 _AEVA_CHANGE_NS = 1691936557946849179
 _NUM_RINGS = {"Ouster": 128, "Velodyne": 16}
-# There is a pose for every scan, at 10 Hz.
+# Each scan has a pose, at 10 Hz.
 _LONGEST_GAP_NS = 1_000_000_000
 
 
 class HeliprSequence(FileSequence):
     """The scans of one LiDAR of HeLiPR on a drive.
 
-    With `global_*_gt.txt` W is the UTM grid with a nearer origin, see
-    `evaluation.sequences.utm`; else it is the frame of the drive's own
+    With a `global_*_gt.txt`, W is the UTM grid with a nearer origin, see
+    `evaluation.sequences.utm`; else W is the frame of the drive's own
     `*_gt.txt`. Points without a return are left out.
     """
 
@@ -81,8 +81,8 @@ class HeliprSequence(FileSequence):
 
         Args:
             path: the folder of the drive, or `LiDAR/<name>` in it.
-            lidar: which one, if `path` does not say: by default the Ouster,
-                or else the only one there.
+            lidar: name of the LiDAR, if `path` does not contain it: by default
+                the Ouster, or else the only one there.
 
         Raises:
             InputError: if there is none, or its poses cannot be used.
@@ -119,7 +119,7 @@ class HeliprSequence(FileSequence):
 
 
 def holds_helipr(path: Path) -> bool:
-    """Returns whether a folder looks like a drive of HeLiPR, or a LiDAR's."""
+    """Returns whether a folder is a drive of HeLiPR, or one LiDAR of it."""
     return _is_lidar_folder(path.resolve()) or bool(_lidars(path))
 
 

@@ -7,8 +7,9 @@
 
 C is the left grey camera (x right, y down, z forward), C0 that at the first
 scan, S the LiDAR. Without a `calib.txt` the poses are those of the LiDAR,
-X_S0S. Scans may be missing: then the rows that their numbers name are used.
-Where scans were renumbered, `frames.txt` has their old numbers, one a scan.
+X_S0S. If scans are missing, the numbers in the names of the others select their
+rows. If scans were renumbered, `frames.txt` has their old numbers, one for each
+scan.
 
 Beside these there may be, in SemanticKITTI's form,
 
@@ -90,7 +91,8 @@ class KittiSequence(FileSequence):
         notes: list[str] = []
         stamps_ns = _rows_of_scans(times_path, stamps_ns, numbers, notes)
         X_C0C = _rows_of_scans(poses_path, X_C0C, numbers, notes)
-        # With gaps, one table may have a row a number, the other a row a scan.
+        # If numbers are missing, one table may have a row for each number and
+        # the other a row for each scan.
         gaps = numbers != list(range(len(files)))
         if rows[0] != rows[1] and not gaps:
             raise InputError(
@@ -176,7 +178,7 @@ def _numbered_files(path: Path) -> tuple[list[Path], list[int]]:
     if len(listed) != len(files):
         raise InputError(f"{frames}: {len(listed)} rows for {len(files)} scans")
     for row, text in enumerate(listed.tolist()):
-        # No frame of a drive has a number of ten digits.
+        # No drive has a frame whose number has ten digits.
         if re.fullmatch("[0-9]{1,9}", text) is None:
             raise InputError(f"{frames}: row {row + 1}: {text!r} is no number")
     renumbered = numbers == list(range(len(files)))
@@ -200,7 +202,7 @@ def _rows_of_scans(
 
     Args:
         path: the table.
-        rows: (M, ...): one a scan, or one for each number there is.
+        rows: (M, ...): one for each scan, or one for each number.
         numbers: of the N scans.
         notes: gets a note if scans are missing.
 

@@ -11,7 +11,7 @@ from evaluation.sequences.sequence_view import SequenceView
 
 
 class MovedSequence(SequenceView):
-    """Another sequence's scans, at other poses."""
+    """The scans of another sequence at corrected poses."""
 
     def __init__(
         self,
@@ -20,7 +20,7 @@ class MovedSequence(SequenceView):
         world_frame: str,
         datum: str | None,
     ):
-        """Puts a drive elsewhere.
+        """Gives a drive other poses.
 
         Args:
             sequence: of N scans.

@@ -34,13 +34,14 @@ _WHOLE = np.dtype([*_STORED.descr, ("ring", "<u2"), ("t", "<u4")])
 _NUM_RINGS = 64
 _NUM_COLUMNS = 1024
 _SWEEP_NS = 100_000_000
-# The poses come at 100 Hz.
+# Poses have a rate of 100 Hz.
 _LONGEST_GAP_NS = 1_000_000_000
 
-# Pose of the LiDAR on the vehicle, from the data set's calib_base2ouster.
-# Read as it is named, it puts the LiDAR above the base. Other programs apply
-# its inverse; as it turns by almost 180 degrees, that puts the LiDAR within a
-# centimetre of the same place seen from above, but 1.8 m below the ground.
+# Pose of the LiDAR on the vehicle, from the data set's calib_base2ouster. Read
+# as its name says, it puts the LiDAR above the base. Other programs apply its
+# inverse. Since it turns by almost 180 degrees, the inverse puts the LiDAR
+# within a centimetre of the same horizontal position, but 1.8 m below the
+# ground.
 _X_BS = poses.make_pose(
     Rotation.from_euler(
         "xyz", [0.0001, 0.0003, 179.6654], degrees=True
@@ -54,9 +55,10 @@ class MulranSequence(FileSequence):
 
     W is the UTM grid with a nearer origin, see `evaluation.sequences.utm`.
     The pose of a scan is interpolated at its stamp. Points without a return,
-    which are stored as (0, 0, 0), are left out. A whole scan has the fields
-    `ring` and `t` [ns since the stamp] beside the stored ones; a file that
-    is short of points does not say which are missing, so its scan has not.
+    which are stored as (0, 0, 0), are left out. A complete scan has the fields
+    `ring` and `t` [ns since the stamp] beside the stored ones. A scan with too
+    few points lacks these two, because its file does not show which points are
+    missing.
     """
 
     def __init__(self, path: Path):
@@ -91,7 +93,7 @@ class MulranSequence(FileSequence):
         stored = read_packed(path, _STORED)
         if len(stored) != _NUM_RINGS * _NUM_COLUMNS:
             return stored
-        # Column by column, each from ring to ring.
+        # Points are stored column by column, each from ring to ring.
         points = np.empty(len(stored), dtype=_WHOLE)
         for name in stored.dtype.names or ():
             points[name] = stored[name]

@@ -15,7 +15,8 @@ from evaluation.sequences.text_tables import (
     read_stamped_rows,
 )
 
-# How far a rotation matrix or quaternion may be off: texts of four digits.
+# Greatest error of a rotation matrix or quaternion: that of texts with four
+# digits.
 _ROTATION_TOLERANCE = 1e-3
 
 
@@ -39,9 +40,9 @@ class Trajectory:
         """Returns poses between those of the table (SLERP and linear).
 
         Args:
-            stamps_ns: (M,) int64 times that are asked for [ns].
-            longest_gap_ns: between two poses, across which there is still
-                something to interpolate [ns].
+            stamps_ns: (M,) int64 times of the wanted poses [ns].
+            longest_gap_ns: greatest time between two poses that are
+                interpolated [ns].
 
         Returns:
             (K, 4, 4) poses at those times that the table spans; (M,) bool,
@@ -77,11 +78,11 @@ class Trajectory:
         )
 
     def at(self, stamps_ns: np.ndarray, tolerance_ns: int) -> np.ndarray:
-        """Returns the poses with these times, none of them interpolated.
+        """Returns the poses with these times, without interpolation.
 
         Args:
             stamps_ns: (M,) int64 [ns].
-            tolerance_ns: by which times may differ [ns].
+            tolerance_ns: greatest difference of two equal times [ns].
 
         Returns:
             (M, 4, 4).
@@ -110,8 +111,8 @@ def read_matrices(path: Path, separator: str | None) -> Trajectory:
     """Reads rows of a time and the upper 3 x 4 of a pose, row by row.
 
     Raises:
-        InputError: if the table is not of that form, a rotation is none, or
-            the poses are out of order.
+        InputError: if the table does not have that form, a matrix is no
+            rotation, or the poses are out of order.
     """
     stamps_ns, values = read_stamped_rows(path, 12, separator)
     return _in_order(path, stamps_ns, pose_matrices(path, values))
@@ -138,22 +139,22 @@ def read_quaternions(path: Path, separator: str | None) -> Trajectory:
 
 
 def pose_matrices(path: Path, values: np.ndarray) -> np.ndarray:
-    """Returns poses of rows of twelve numbers: the upper 3 x 4, row by row.
+    """Returns poses from rows of twelve numbers: the upper 3 x 4, row by row.
 
     Args:
-        path: where the numbers come from, for messages.
+        path: file of the numbers, for messages.
         values: (N, 12).
 
     Returns:
-        (N, 4, 4) with the rotations as they are, which texts round.
+        (N, 4, 4) with the rotations as they are in the text, rounded.
 
     Raises:
-        InputError: if a number is not finite or a rotation is none.
+        InputError: if a number is not finite or a matrix is no rotation.
     """
     check_finite(path, values)
     upper = values.reshape(-1, 3, 4)
     R = upper[:, :, :3]
-    # Numbers that overflow, or NaN after that, are no rotation either.
+    # Numbers that overflow, and the NaN that they give, are no rotation either.
     with np.errstate(over="ignore", invalid="ignore"):
         error = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2))
         bad = ~((error <= _ROTATION_TOLERANCE) & (np.linalg.det(R) > 0.0))
@@ -178,7 +179,7 @@ def _check_near(path: Path, positions: np.ndarray) -> None:
 def _in_order(
     path: Path, stamps_ns: np.ndarray, X_WB: np.ndarray
 ) -> Trajectory:
-    # Loggers repeat lines; a row that says nothing new does no harm.
+    # Loggers repeat lines; a repeated row does no harm.
     news = np.ones(len(stamps_ns), dtype=bool)
     news[1:] = np.diff(stamps_ns) != 0
     news[1:] |= (np.diff(X_WB, axis=0) != 0.0).any(axis=(1, 2))

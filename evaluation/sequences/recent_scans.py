@@ -13,16 +13,16 @@ from evaluation.sequences.sequence_view import SequenceView
 class RecentScans(SequenceView):
     """A sequence that reads each scan once.
 
-    That holds for a reader who asks in increasing order, give or take as many
-    scans as are kept.
+    This holds for a program that reads scans in increasing order, or goes back
+    by at most as many scans as are kept.
     """
 
     def __init__(self, sequence: Sequence, kept: int):
-        """Starts with no scan.
+        """Starts without a scan in memory.
 
         Args:
             sequence: the drive.
-            kept: how many of the last scans stay in memory.
+            kept: number of the last scans that stay in memory.
         """
         super().__init__(sequence)
         self.world_frame = sequence.world_frame

@@ -1,9 +1,8 @@
 """Places along a drive, and the clouds seen there.
 
-- Places d metres apart: frame i is one when the length of the path so far
-  first reaches a multiple of d. The first frame is one.
-- Points are limited to a range, 100 m as the paper has it: each of x, y, z in
-  the frame of the sensor.
+- Places d metres apart: frame i is a place when the length of the path so far
+first reaches a multiple of d. The first frame is a place. - Points are limited
+to a range, 100 m in the paper: each of x, y, z in the frame of the sensor.
 """
 
 from __future__ import annotations
@@ -40,9 +39,9 @@ def within_range(points: np.ndarray, max_range: float) -> np.ndarray:
         max_range: greatest absolute value of each coordinate [m].
     """
     kept = np.ones(len(points), dtype=bool)
-    # By column: NumPy is slow in reducing along the shorter axis.
+    # One column at a time, because NumPy reduces slowly along a short axis.
     for coordinates in points.T:
-        # A comparison with NaN is false.
+        # A comparison with NaN is false, so NaN is out of range.
         kept &= np.abs(coordinates) <= max_range
     return kept
 
@@ -59,8 +58,8 @@ def gather(
 
     Args:
         sequence: the drive.
-        frame: whose place is described.
-        num_scans: how many consecutive scans are merged; fewer at the ends
+        frame: of the described place.
+        num_scans: number of consecutive scans that are merged; fewer at the ends
             of the drive.
         max_range: see `within_range`.
         fields: of the points, beside their coordinates.

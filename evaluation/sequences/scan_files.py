@@ -1,4 +1,4 @@
-"""Drives that are stored as one file a scan."""
+"""Drives that are stored as one file for each scan."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class FileSequence(Sequence):
 
     @abc.abstractmethod
     def _read(self, path: Path, stamp_ns: int) -> np.ndarray:
-        """Reads the points of one scan, as they are in the file.
+        """Reads the points of one scan as they are in the file.
 
         Raises:
             ValueError: if the file is not of its format.
@@ -99,17 +99,17 @@ class FileSequence(Sequence):
 
 
 def list_stamped(folder: Path, suffix: str) -> tuple[list[Path], np.ndarray]:
-    """Finds files that are named by their time.
+    """Finds files whose names are their times.
 
     Args:
-        folder: where they lie.
-        suffix: how their names end, after the time.
+        folder: their folder.
+        suffix: end of their names, after the time.
 
     Returns:
         The files in order of time; (N,) int64 times [ns]; N >= 1.
 
     Raises:
-        InputError: if there is none, or a name is no time.
+        InputError: if there is no file, or a name is no time.
     """
     files = [
         path
@@ -136,7 +136,7 @@ def keep_spanned(
     """Leaves out the scans before the first and after the last pose.
 
     Returns:
-        The other files; a note about it, if there is something to note.
+        The other files; a note if scans were left out.
     """
     if spanned.all():
         return files, ()
@@ -149,11 +149,11 @@ def keep_spanned(
 
 
 def read_packed(path: Path, dtype: np.dtype) -> np.ndarray:
-    """Reads a file that is nothing but records.
+    """Reads a file that consists of records only.
 
     Raises:
-        ValueError: if it is no whole number of them.
-        InputError: if it cannot be read, or is too large for a scan.
+        ValueError: if the last record is incomplete.
+        InputError: if the file cannot be read, or is too large for a scan.
     """
     data = read_bytes(path, SCAN_LIMIT_BYTES)
     if len(data) % dtype.itemsize:
@@ -167,7 +167,7 @@ def read_packed(path: Path, dtype: np.dtype) -> np.ndarray:
 def check_below(points: np.ndarray, name: str, limit: int) -> None:
     """Refuses points with a number that their sensor does not have.
 
-    It differs between files of two sensors.
+    The numbers differ between files of two sensors.
 
     Raises:
         ValueError: if `points[name]` reaches `limit`.
@@ -180,14 +180,14 @@ def check_below(points: np.ndarray, name: str, limit: int) -> None:
 
 
 def _returns(points: np.ndarray) -> np.ndarray:
-    """Leaves out what came back from nowhere: points at the origin.
+    """Leaves out points without a return, which are stored at the origin.
 
     Raises:
-        ValueError: if a coordinate is not finite, or out of this world.
+        ValueError: if a coordinate is not finite, or too large for a point.
     """
     is_return = np.zeros(len(points), dtype=bool)
     for name in "xyz":
-        # A comparison with NaN is false, and with some worth a warning.
+        # A comparison with NaN is false, and NumPy warns of some NaN.
         with np.errstate(over="ignore", invalid="ignore"):
             bad = ~(np.abs(points[name]) < FARTHEST_RETURN)
         if bad.any():

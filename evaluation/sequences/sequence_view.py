@@ -1,4 +1,4 @@
-"""A drive seen through another one."""
+"""A drive with the times, poses and scenario of another one."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from cns_drake.base.recordings.sequence import Sequence
 
 
 class SequenceView(Sequence):
-    """Shows length, times, poses and scenario of another sequence."""
+    """Has the length, times, poses and scenario of another sequence."""
 
     def __init__(self, sequence: Sequence):
-        """Begins with what it shows.
+        """Begins with the other sequence.
 
         Args:
             sequence: the drive.

@@ -13,28 +13,28 @@ from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
 
 _NS_PER_S = 1_000_000_000
-# Hours of an IMU [bytes].
+# Enough for hours of an IMU [bytes].
 _TABLE_LIMIT_BYTES = 1 << 26
 
 
 def read_stamped_rows(
     path: Path, width: int, separator: str | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Reads a table of a time and `width` numbers a row.
+    """Reads a table whose rows are a time and `width` numbers.
 
-    A first line that does not begin with a number is taken for a header.
+    A first line that does not begin with a number is a header.
 
     Args:
         path: the file.
-        width: how many numbers follow the time.
+        width: number of values after the time.
         separator: between columns; None is white space.
 
     Returns:
         (N,) int64 times [ns], see `parse_stamps_ns`; (N, width) float64.
 
     Raises:
-        InputError: if there is no such table, it is empty, a row is of
-            another length, or a value is no number or not finite.
+        InputError: if there is no such table, it is empty, a row has another
+            length, or a value is no number or not finite.
     """
     rows = read_numbers(
         path, [("stamp", "U40"), ("values", "f8", width)], separator
@@ -61,14 +61,14 @@ def read_numbers(
         (N,) records, or (N, width) numbers; N >= 1.
 
     Raises:
-        InputError: if there is no such table, it is empty, or a row is of
-            another form.
+        InputError: if there is no such table, it is empty, or a row has another
+            form.
     """
     try:
         text = read_bytes(path, _TABLE_LIMIT_BYTES).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: not a text file") from error
-    # No more than a file's line ends ends a line.
+    # Only the line ends of files end a line; str.splitlines splits at more.
     lines = [line for line in io.StringIO(text, newline=None) if line.strip()]
     if lines and not _begins_with_number(lines[0]):
         lines = lines[1:]
@@ -90,7 +90,7 @@ def read_numbers(
 
 
 def parse_stamps_ns(texts: np.ndarray) -> np.ndarray:
-    """Returns times in nanoseconds, exactly as they are written.
+    """Returns times in nanoseconds, exactly as written.
 
     A double has 53 bits: nanoseconds since 1970 would be rounded to 256 ns.
 
@@ -102,7 +102,7 @@ def parse_stamps_ns(texts: np.ndarray) -> np.ndarray:
         (N,) int64.
 
     Raises:
-        ValueError: if one is no such number.
+        ValueError: if a string is no such number.
     """
     try:
         return np.asarray(texts).astype(np.int64)
@@ -119,7 +119,7 @@ def parse_seconds(texts: np.ndarray) -> np.ndarray:
     """Returns times [ns], (N,) int64, of strings that hold seconds.
 
     Raises:
-        ValueError: if one is no number.
+        ValueError: if a string is no number.
     """
     return np.array([_seconds_to_ns(text) for text in map(str, texts)])
 

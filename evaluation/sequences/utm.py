@@ -2,9 +2,9 @@
 
 MulRan and HeLiPR give positions as easting, northing and height in zone 52N.
 Here W has its axes east, north and up, and its origin at a fixed point of
-that grid near the drives. All sequences have the same W, and coordinates
-are a few kilometres instead of thousands: a float32 resolves them to under
-a millimetre where easting and northing would move in steps of 0.25 m.
+that grid near the drives. All sequences have the same W, and coordinates are a
+few kilometres instead of thousands. A float32 resolves them to under a
+millimetre; easting and northing would have steps of 0.25 m.
 """
 
 from __future__ import annotations
@@ -17,8 +17,9 @@ from cns_drake.base.errors import InputError
 
 DATUM = "utm-52n"
 
-# Easting, northing, height of the origin of W [m]: in Daejeon, and multiples
-# of the voxel size, so that voxels lie as they would on the UTM grid.
+# Easting, northing and height of the origin of W [m]. It is in Daejeon. Its
+# coordinates are multiples of the voxel size, so that voxels have the same
+# borders as on the UTM grid.
 ORIGIN = (350_000.0, 4_020_000.0, 0.0)
 
 # Ranges of easting and northing on the northern half of the Earth.
@@ -26,10 +27,10 @@ _LIMITS = ((100_000.0, 900_000.0), (0.0, 10_000_000.0))
 
 
 def to_world(X_UB: np.ndarray, path: Path) -> np.ndarray:
-    """Returns poses X_WB (N, 4, 4) of poses in the UTM grid U.
+    """Returns poses X_WB (N, 4, 4) from poses in the UTM grid U.
 
     Raises:
-        InputError: if a position cannot be one in UTM metres.
+        InputError: if a position cannot be in UTM metres.
     """
     p_UB = X_UB[:, :3, 3]
     for axis, (name, limits) in enumerate(

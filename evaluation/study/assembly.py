@@ -67,7 +67,7 @@ from evaluation.study.study_layout import StudyFiles
 
 @dataclass
 class _Collected:
-    """The parts of the cities, one after the other."""
+    """The parts of all cities."""
 
     changes: list[ChangeResult] = field(default_factory=list)
     survivals: list[Survival] = field(default_factory=list)
@@ -109,8 +109,8 @@ def assemble(
         protocol: likewise.
         with_costs: likewise.
         reference: likewise.
-        on_note: takes which cities have nothing to compare; the
-            report says so too.
+        on_note: gets a note on each city without a pair to compare; the report
+            has these notes too.
 
     Returns:
         The path of `report.html`.
@@ -204,7 +204,7 @@ def _read_recognition(
     method: MethodChoice,
     files: StudyFiles,
 ) -> RecognitionResult | None:
-    """Returns a result; None of a drive that closes no loop."""
+    """Returns a result; None for a drive that closes no loop."""
     database, query = pair
     return read_part(
         files.recognition(database.name, query.name).result(method)

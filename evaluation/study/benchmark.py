@@ -45,12 +45,12 @@ def write_report(
         own_methods: Python files with one method each, to run besides those
             of this package.
         protocol: of place recognition.
-        on_note: takes which recordings are left out, and for which cities
-            there is nothing to compare.
+        on_note: gets notes on recordings that are left out, and on cities
+            without a pair to compare.
         settings: see `choose_methods`.
         with_costs: whether to measure the costs of the methods, too.
-        reference_for: returns what the report of some maps stands beside.
-        lidar: whose scans to read, of recordings with several.
+        reference_for: returns the reference for the report of some maps.
+        lidar: name of the LiDAR, for recordings with several.
 
     Returns:
         The path of `report.html`.

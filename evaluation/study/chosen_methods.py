@@ -45,7 +45,7 @@ class MethodChoice:
             InputError: if its file cannot be used, or a setting is not known
                 or does not fit.
         """
-        # Run once: a second run would make a second, different type of its
+        # The file runs once: a second run would make another type of its
         # descriptions.
         if self.file is not None and self.name not in known_methods():
             load_method(self.file)
@@ -85,7 +85,7 @@ def parse_setting(text: str, form: str = "NAME=VALUE") -> tuple[str, Setting]:
 def choose_methods(
     files: Iterable[Path] = (), settings: Iterable[str] = ()
 ) -> tuple[MethodChoice, ...]:
-    """Returns the methods of this package, and those of some files.
+    """Returns the methods of this package and those in files.
 
     Args:
         files: Python files that register a method each, or names of optional
@@ -102,11 +102,11 @@ def choose_methods(
     for file in files:
         if str(file) in optional_methods():
             chosen.append(MethodChoice(str(file)))
-            # A missing package is found before anything slow.
+            # A missing package is reported before anything slow.
             chosen[-1].make()
             continue
         path = Path(file).absolute()
-        # Modules of one name would replace each other.
+        # Two modules with one name would replace each other.
         if path.stem in stems:
             raise InputError(f"--method: {path.name} is there twice")
         stems.add(path.stem)

@@ -23,12 +23,12 @@ class RecordingInfo:
 
     Attributes:
         name: of the recording.
-        path: where it lies, or will lie.
+        path: of the recording, which may not exist yet.
         map_name: of the city.
         stage: of the city's life; stages sort by name.
         way: where the drive leads (see `driven_way`); None if it is unknown.
         needs: names of the jobs that make the recording.
-        made_by: opens the drive where it is not read from `path`.
+        made_by: opens the drive if it is not read from `path`.
     """
 
     name: str
@@ -45,7 +45,7 @@ class RecordingInfo:
         return self.made_by or RecordedDrive(self.path.absolute())
 
     def drives_like(self, other: RecordingInfo) -> bool:
-        """Returns whether both are known to lead the same way."""
+        """Returns whether both drives have a route, and the same one."""
         return self.way is not None and self.way == other.way
 
 
@@ -76,8 +76,8 @@ class City:
     ) -> list[tuple[RecordingInfo, RecordingInfo]]:
         """Returns pairs of database and query.
 
-        Every earlier stage is a database for the last one; the other way
-        round where the reference has it.
+        Every earlier stage is a database for the last one. The last one is a
+        database too if the reference has such a pair.
 
         Args:
             with_itself: also each stage with itself, for loop closure.
@@ -106,9 +106,9 @@ class City:
     ) -> tuple[RecordingInfo, RecordingInfo] | None:
         """Returns the control of a pair: its routes, in one stage.
 
-        A drive on the route of one, in the stage of the other, takes the
-        place of the one; rather of the database, so that the very same scans
-        ask. A drive against itself has none.
+        One drive of the pair is replaced by a drive on its route in the stage
+        of the other. The database is replaced if possible, so that the queries
+        keep their scans. A drive against itself has no control.
         """
         if database is query:
             return None
@@ -131,17 +131,17 @@ def find_recordings(
     Drives in the layout of CNS, and in that of KITTI if a `scenario.yaml`
     lies in them, are found up to three levels down, where exports put them.
     A recording states its map and stage in its scenario; without one they
-    are taken from its name, `<map>_<stage>`. Where neither has them, it is
-    left out.
+    are taken from its name, `<map>_<stage>`. A recording with neither is left
+    out.
 
     Args:
-        folder: that holds them.
-        on_note: takes what is left out.
-        lidar: whose scans to read, of recordings with several.
+        folder: of the recordings.
+        on_note: gets a note on each recording that is left out.
+        lidar: name of the LiDAR, for recordings with several.
 
     Raises:
-        InputError: if there is no recording of which map and stage are
-            known, or one cannot be read.
+        InputError: if no recording has a map and a stage, or one cannot be
+            read.
     """
     folder = Path(folder)
     if not folder.is_dir():
@@ -175,7 +175,7 @@ def nothing_to_compare(cities: Iterable[City]) -> list[str]:
 def group_cities(
     recordings: Iterable[RecordingInfo], reference: Reference = NO_REFERENCE
 ) -> list[City]:
-    """Returns the cities that recordings are of, by name.
+    """Returns the cities of recordings, by name.
 
     Args:
         recordings: of any cities.

@@ -59,7 +59,7 @@ class DescribeDrive(Step):
             self.source, self.role, methods, self.protocol, reporter, scans
         )
         for choice in methods:
-            # Each is let go when it is written.
+            # Each value is dropped when it is written.
             file = self._file(choice)
             write_part(file, missing[file], found.pop(choice.name))
         if self.files.scans in missing:

@@ -32,8 +32,7 @@ class DriveSource(Protocol):
     def identity(self) -> object:
         """Returns the identity of the drive, ready for JSON.
 
-        Results that were found from a drive with an equal identity are not
-        found again.
+        Results of a drive with an equal identity are not computed again.
 
         Raises:
             InputError: if there is no drive.
@@ -45,8 +44,8 @@ class RecordedDrive:
     """A drive on disk, in any format that can be read.
 
     Attributes:
-        path: where it lies.
-        lidar: whose scans to read, of a drive with several.
+        path: of the drive.
+        lidar: name of the LiDAR, for a drive with several.
     """
 
     path: Path

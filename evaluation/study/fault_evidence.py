@@ -32,23 +32,23 @@ from evaluation.study.drive_source import DriveSource
 from evaluation.study.parts import PartStep, part_digest, read_part
 from evaluation.study.study_layout import RecognitionFiles
 
-# From this height above the ground on, points count as standing [m].
+# Points at least this high above the ground count as standing [m].
 _STANDING = 0.5
-# Edge of the cells of which a scan keeps one point each, to be laid on
-# another one [m]; and how near two points coincide [m].
+# Edge of the cells in which a scan keeps one point for alignment, and the
+# greatest distance of two points that coincide [m].
 _CELL = 0.5
 _COINCIDENT = 1.0
 
 
 @dataclass(frozen=True)
 class FindEvidence(PartStep):
-    """Writes the `PairEvidence` of two drives; None of one that closes no loop.
+    """Writes the `PairEvidence` of two drives; None if a drive closes no loop.
 
     Attributes:
         drives: database, and query.
-        methods: that answered.
-        results: what they made of the two.
-        protocol: by which they did.
+        methods: the methods.
+        results: their results on the two drives.
+        protocol: of these results.
         part: to write.
     """
 
@@ -69,7 +69,7 @@ class FindEvidence(PartStep):
     def make(self, reporter: Reporter) -> PairEvidence | None:
         results = []
         for choice in self.methods:
-            # A method's description may be of its own type.
+            # The method registers the type of its descriptions.
             choice.make()
             results.append(read_part(self.results.result(choice)))
         if None in results or not results:
@@ -87,13 +87,13 @@ def find_evidence(
     protocol: RetrievalProtocol,
     track: Track = silent,
 ) -> PairEvidence:
-    """Looks at the scans of queries, of their matches and of wrong answers.
+    """Compares the scans of queries, of their matches and of wrong answers.
 
     Args:
-        database: the drive whose places are known.
-        query: the drive that asks, in the same world frame.
+        database: the drive of the places.
+        query: the drive of the queries, in the same world frame.
         results: of one method or several on the two.
-        protocol: by which they answered.
+        protocol: of these results.
         track: reports progress.
 
     Raises:
@@ -222,10 +222,10 @@ class _Shown:
 def _change(
     place: _Shown, query: _Shown, classes: Mapping[int, str]
 ) -> tuple[float, str]:
-    """Returns which part of two scans has come or gone, and mostly what.
+    """Returns the part of two scans that has come or gone, and its main class.
 
-    That are standing points on structures of which the other scan shows
-    nothing, although nothing hides them from its sensor.
+    Points have come or gone if they stand on a structure without a point in the
+    other scan, although nothing hides them from its sensor.
 
     Args:
         place: scan of the right place of the query.
@@ -249,7 +249,7 @@ def _change(
         )
     if not changed:
         return (0.0 if total else math.nan), ""
-    # If numbers are equal, the first name counts.
+    # If numbers are equal, the first name is returned.
     name = min(changed, key=lambda one: (-changed[one], one))
     return changed.total() / total, name
 
@@ -264,8 +264,8 @@ class _Aligner:
     def fits(self, query: _Shown, places: Sequence[_Shown]) -> list[float]:
         """Returns for each place the part of standing points that coincide.
 
-        The lesser part of the query's and of the place's, at the pose of
-        layered overlap.
+        The pose is that of layered overlap; the lesser of the query's and the
+        place's parts counts.
         """
         shared = [0.0] * len(places)
         standing = [k for k, one in enumerate(places) if len(one.standing)]
@@ -288,18 +288,18 @@ class _Aligner:
         return shared
 
     def _place(self, place: _Shown) -> LayeredScan:
-        """Returns the description of a place, which is made once."""
+        """Returns the description of a place, computed once."""
         if place not in self._places:
             self._places[place] = self._method.describe_place(place.points)
         return self._places[place]
 
 
 def _met(points: np.ndarray, others: cKDTree) -> float:
-    """Returns which part of points has another one near."""
+    """Returns the part of points that have a counterpart nearby."""
     distances, _ = others.query(points, distance_upper_bound=_COINCIDENT)
     return float(np.isfinite(distances).mean())
 
 
 def _standing() -> float:
-    """Returns the height from which on points stand, over the sensor [m]."""
+    """Returns the least height of standing points above the sensor [m]."""
     return _STANDING - MethodConfig().sensor_height

@@ -44,7 +44,7 @@ def illustrations(city: City, folder: Path) -> list[Illustration]:
             folder / routes_stem(city),
             f"Routes in {city.name}, from red to blue",
             PAGE_KIND,
-            # The page has each drive's map by itself.
+            # The page shows each drive's map in a figure of its own.
             section="print",
         )
     ]
@@ -102,7 +102,7 @@ def auc_illustration(folder: Path, beside: str = "") -> Illustration:
 
 
 def survival_illustration(folder: Path) -> Illustration:
-    """Returns the figure of what the change leaves of each method."""
+    """Returns the figure of the AUC that each method keeps."""
     return Illustration(
         folder / "survival",
         "AUC without the change (hollow) and with it (full), and the share"

@@ -57,14 +57,14 @@ class MeasureChange(PartStep):
 class RecognisePlaces(PartStep):
     """Writes the `RecognitionResult` of a method on two drives of one world.
 
-    It is None of a drive that is asked about itself and closes no loop.
+    The result is None if a drive is compared with itself and closes no loop.
 
     Attributes:
         map_name: of the city.
         stages: of the database, and of the query.
         surveys: likewise.
         method: that described both.
-        protocol: by which it did.
+        protocol: of the descriptions.
         part: to write.
     """
 
@@ -89,7 +89,8 @@ class RecognisePlaces(PartStep):
         }
 
     def make(self, reporter: Reporter) -> RecognitionResult | None:
-        # The method comes first: its descriptions may be of a type of its own.
+        # The method comes first, because it registers the type of its
+        # descriptions.
         method = self.method.make()
         (placed, database), (placed_query, query) = map(
             read_part, self._described

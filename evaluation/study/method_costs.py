@@ -17,19 +17,19 @@ from evaluation.study.drive_source import DriveSource
 from evaluation.study.parts import PartStep, part_digest, read_part
 from evaluation.study.study_layout import SurveyFiles
 
-# Number of clouds and of queries; the first of each warms up.
+# Number of clouds and of queries; the time of the first does not count.
 _NUM_TRIALS = 12
 
 
 @dataclass(frozen=True)
 class MeasureCosts(PartStep):
-    """Writes a list of `Cost`, one a method.
+    """Writes a list of `Cost`, one for each method.
 
     Attributes:
         source: opens the query drive.
         surveys: of a database, and of the query drive.
         methods: to measure.
-        protocol: by which both were described.
+        protocol: of the descriptions.
         part: to write.
     """
 

@@ -2,8 +2,8 @@
 
 A part begins with a line that names its format and a line of JSON with its
 inputs. Its value follows (see `plain_values`), compressed by zstd at its
-fastest level. That halves maps, and takes a tenth of a second for 50 MB of
-spectra that hardly shrink.
+fastest level. This halves maps. For 50 MB of spectra, which hardly shrink, it
+takes a tenth of a second.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ _LEVEL = 1
 
 
 class PartStep(Step):
-    """A step that leaves a part, and perhaps figures that belong to it.
+    """A step that writes a part, and figures of it if it has any.
 
     Attributes:
-        part: where the part lies.
+        part: path of the part.
     """
 
     part: Path
@@ -46,7 +46,7 @@ class PartStep(Step):
 
     @abc.abstractmethod
     def inputs(self) -> dict[str, object]:
-        """Returns all inputs of the part but the code, ready for JSON.
+        """Returns all inputs of the part except the code, ready for JSON.
 
         Raises:
             InputError: an input cannot be read.
@@ -63,7 +63,8 @@ class PartStep(Step):
         )
 
     def run(self, reporter: Reporter) -> None:
-        # A file that changes during the work must not count as its input.
+        # Inputs are read first, so that a file that changes during the work
+        # counts as changed.
         inputs = self.made_of(self.inputs())
         write_part(self.part, inputs, self.make(reporter))
 
@@ -99,7 +100,7 @@ def write_part(path: Path, inputs: Mapping, value: object) -> None:
 
 
 def is_current(path: Path, inputs: Mapping) -> bool:
-    """Returns whether a whole part is there that was made of these inputs."""
+    """Returns whether a complete part exists that has these inputs."""
     try:
         return part_digest(path) == fingerprint(inputs)
     except InputError:
@@ -137,7 +138,7 @@ def read_part(path: Path) -> Any:
 
 
 def _read_header(path: Path, stream: BinaryIO) -> dict:
-    """Reads up to the value, which must be there in its full length."""
+    """Reads up to the value, which must have its full length."""
     try:
         if stream.readline(len(_MAGIC)) != _MAGIC:
             raise ValueError("no part of a study")

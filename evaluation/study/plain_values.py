@@ -1,8 +1,8 @@
-"""Values as bytes that carry no code: numbers, text, arrays, dataclasses.
+"""Values as bytes without code: numbers, text, arrays, dataclasses.
 
-Unpickling can run any code that the bytes name. Here a tree of JSON holds the
-values, and arrays follow as NumPy stores them, bit by bit. Dataclasses are made
-of their fields, without running their code.
+Unpickling can run any code that the bytes name. Here a tree of JSON contains
+the values. Arrays follow it as NumPy stores them, with all bits. Dataclasses
+are made of their fields, without running their code.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def decode(data: bytes) -> Any:
     imported.
 
     Raises:
-        ValueError: if they are none, or of a type that is not known.
+        ValueError: if the bytes are not from `encode`, or a type is unknown.
     """
     try:
         (length,) = _LENGTH.unpack_from(data)
@@ -57,7 +57,7 @@ def decode(data: bytes) -> Any:
             arrays.append(np.lib.format.read_array(stream, allow_pickle=False))
         return _decode(tree, arrays)
     except (
-        # Raised by a tree of another form, or with other fields.
+        # Errors for a tree of another form, or with other fields.
         AttributeError,
         ImportError,
         IndexError,
@@ -74,7 +74,7 @@ class _Encoder:
 
     def __init__(self) -> None:
         self.arrays = io.BytesIO()
-        # By an array's identity; it stays alive meanwhile.
+        # Keys are identities of arrays, which stay alive meanwhile.
         self._numbers: dict[int, tuple[int, np.ndarray]] = {}
 
     def encode(self, value: Any) -> Any:

@@ -29,8 +29,8 @@ from evaluation.study.study_layout import StudyFiles, SurveyFiles
 from evaluation.study.surveys import Survey
 from evaluation.study.views import DrawChange, DrawCity
 
-# Expected seconds: for a process to start and import all that it needs; for
-# the maps of a drive of 3000 scans, with 250 places and 150 queries.
+# Expected seconds to start a process with its imports, and for the maps of a
+# drive of 3000 scans with 250 places and 150 queries.
 _START_COST = 2.0
 _MAP_COST = 10.0
 _ROLE_COST = {"places": 12.0, "queries": 8.0}
@@ -59,18 +59,18 @@ def plan_study(
 ) -> list[Job]:
     """Returns the jobs whose results `assemble` puts into a report.
 
-    A city with one stage only gets its route drawn.
+    For a city with one stage, only its route is drawn.
 
     Args:
         recordings: each may be made by the jobs that it needs; drives of
             one map that share stage and route with others serve as same-stage
             controls.
         output: folder to write.
-        methods: those of this package if left out.
+        methods: by default those of this package.
         protocol: of place recognition.
-        with_costs: whether to measure the costs of the methods, too, when all
-            else is done.
-        reference: which the report stands beside.
+        with_costs: whether to measure the costs of the methods, too, after all
+            other jobs.
+        reference: published numbers beside those of the report.
 
     Raises:
         InputError: if two recordings claim the same place.
@@ -256,7 +256,7 @@ def _cost_job(
     protocol: RetrievalProtocol,
     others: tuple[str, ...],
 ) -> Job:
-    """Returns the job that waits for all others, to have the machine alone."""
+    """Returns the job that runs after all others, alone on the machine."""
     database, query = pair
     return Job(
         name="costs of the methods",

@@ -1,4 +1,4 @@
-"""All that a report needs of one recording, found in one pass."""
+"""The parts of a report that come from one recording, found in one pass."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class SurveyedDrive:
     """A drive with its map on the grid of the TCR.
 
     Attributes:
-        placed: its name, and the world that it lies in.
+        placed: name and world of the drive.
         stamps_ns: (N,) int64 of its frames.
         X_WS: (N, 4, 4) poses of the sensor along the drive.
         coarse: the map.
@@ -59,12 +59,12 @@ class SurveyedDrive:
 
 @dataclass(frozen=True)
 class RecordingSurvey:
-    """A recording's maps, places and queries; no scan is needed any more.
+    """A recording's maps, places and queries, which replace its scans.
 
     Attributes:
         drive: with its map on the grid of the TCR.
         fine: (K, 3) cloud for pictures, in W [m].
-        described: method -> what it keeps of the drive; empty if the
+        described: method -> its descriptions of the drive; empty if the
             recording has no role.
     """
 
@@ -88,7 +88,7 @@ def survey_recording(
         recording: the drive.
         roles: of the drive in place recognition; may be empty.
         methods: that describe it; may be none.
-        protocol: where it has places and queries.
+        protocol: sets the places and queries.
         track: reports progress.
 
     Raises:

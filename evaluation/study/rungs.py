@@ -1,6 +1,6 @@
-"""One rung of a ladder: a query drive asks a database, all methods answer.
+"""One rung of a ladder: all methods find a query drive in a database.
 
-Each method answers twice, without the gate and with it.
+Each method has two results, without the gate and with it.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from evaluation.study.drive_source import DriveSource
 from evaluation.study.parts import PartStep, part_digest, read_part
 from evaluation.study.study_layout import SurveyFiles
 
-# Between a city and the next one that distracts from it [m]. No scan reaches
-# so far.
+# Distance between a city and the next distracting one [m]. No scan reaches so
+# far.
 _APART = 1e5
 
 
@@ -38,8 +38,8 @@ class RungDrive:
 
     Attributes:
         source: opens it.
-        files: where its descriptions and scans lie that serve several rungs;
-            None if this rung alone needs them.
+        files: files of its descriptions and scans, if several rungs use them;
+            None if only this rung does.
     """
 
     source: DriveSource
@@ -51,12 +51,12 @@ class MeasureRung(PartStep):
     """Writes the list of `RungOutcome`s of a rung, two for each method.
 
     Attributes:
-        database: drive whose places are known.
-        query: drive that asks, in the same world frame.
+        database: drive of the places.
+        query: drive of the queries, in the same world frame.
         distractors: descriptions of drives through other cities, whose places
-            stand among those of the database.
-        num_distractors: how many of their places do.
-        methods: that answer.
+            are added to the database.
+        num_distractors: number of these places.
+        methods: to run.
         protocol: of place recognition.
         part: to write.
     """
@@ -128,7 +128,7 @@ class MeasureRung(PartStep):
         reporter: Reporter,
         scans: list[np.ndarray],
     ) -> dict[str, DescribedDrive]:
-        """Returns descriptions that are not in files; adds all scans."""
+        """Returns descriptions that are not in files, with all scans."""
         if drive.files is not None:
             scans += read_part(drive.files.scans)
             return {}
@@ -148,13 +148,13 @@ class MeasureRung(PartStep):
 def joined_places(
     drives: Sequence[DescribedScans], num_others: int
 ) -> DescribedScans:
-    """Returns the places of a drive with places of others among them.
+    """Returns the places of a drive together with places of others.
 
     Args:
-        drives: the first is that of the query's world. The others are moved
-            so far away that no place of theirs is a match.
-        num_others: how many places of the others there are at most, from the
-            first one on.
+        drives: the first is that of the query's world. The others are moved so
+            far away that none of their places is a match.
+        num_others: greatest number of places of the others, from the first one
+            on.
     """
     first, *others = drives
     poses = [first.X_WS]

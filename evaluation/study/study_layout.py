@@ -1,4 +1,4 @@
-"""Where the files of a study lie in its output folder."""
+"""Paths of a study's files in its output folder."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class SurveyFiles:
     A job that needs one method's descriptions reads no other's.
 
     Attributes:
-        folder: in which they lie.
+        folder: of the parts.
     """
 
     folder: Path
@@ -46,7 +46,7 @@ class RecognitionFiles:
     """The parts that hold the results of methods on two recordings.
 
     Attributes:
-        folder: in which they lie.
+        folder: of the parts.
     """
 
     folder: Path

@@ -1,4 +1,4 @@
-"""The survey of one recording, in a part for each reader."""
+"""The survey of one recording, in a part for each use."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Survey(Step):
         source: opens the drive.
         roles: of the drive in place recognition; may be empty.
         methods: that describe its places and queries.
-        protocol: where it has these.
+        protocol: sets the places and queries.
         files: to write.
     """
 
@@ -55,7 +55,7 @@ class Survey(Step):
         """Returns the survey of a drive, described by some of the methods.
 
         Args:
-            drive: that of the source, or the same while it is made.
+            drive: that of the source, or the same drive while it is being made.
             methods: to describe it; none if it has no role.
             reporter: takes the progress.
 
@@ -71,7 +71,7 @@ class Survey(Step):
         )
 
     def write(self, found: RecordingSurvey) -> None:
-        """Writes the missing parts of the survey that were found.
+        """Writes the parts of the survey that were missing.
 
         Raises:
             InputError: a file cannot be written.
@@ -86,7 +86,7 @@ class Survey(Step):
     ) -> None:
         for method, inputs in described.items():
             if method.name in found.described:
-                # Each is let go when it is written.
+                # Each value is dropped when it is written.
                 value = found.drive.placed, found.described.pop(method.name)
                 write_part(self.files.described(method), inputs, value)
         for name, inputs in maps.items():
@@ -95,11 +95,11 @@ class Survey(Step):
     def _missing(
         self,
     ) -> tuple[dict[MethodChoice, Mapping], dict[str, Mapping]]:
-        """Returns the missing parts, each with the inputs that it is made of.
+        """Returns the missing parts, each with its inputs.
 
         Returns:
-            The methods whose descriptions are missing, and the names of
-            maps that are.
+            The methods whose descriptions are missing, and the names of missing
+            maps.
         """
         inputs = self.made_of(
             {

@@ -1,4 +1,4 @@
-"""How place recognition depends on structural change, over many databases.
+"""Place recognition over structural change, with many databases.
 
 One query drive is compared with many databases, from cities that changed more
 or less. Each pair gives a TCR_sym and, for each method, an AUC.
@@ -78,7 +78,7 @@ def _to_csv(value: object) -> object:
 def draw_trend(points: Sequence[TrendPoint], stem: Path) -> None:
     """Draws AUC over TCR_sym: points, a smooth line and its 95 % band.
 
-    Beside it, where databases have controls, the share of AUC that is kept.
+    A second panel shows the kept share of AUC, if databases have controls.
 
     Args:
         points: of all databases and methods.

@@ -1,6 +1,6 @@
 """A query drive and many databases: their change and their AUC.
 
-Every database is a job of its own.
+Each database is a separate job.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _COST = 30.0
 
 @dataclass(frozen=True)
 class TrendDatabase:
-    """A database drive, and what separates the change from the route.
+    """A database drive and its control.
 
     Attributes:
         source: opens it.
@@ -60,8 +60,8 @@ def measure_trend(
     """Returns the points of all databases and methods.
 
     Results of an earlier run, finished or not, are used if they belong to the
-    same recordings and methods. A database leaves only its points, since the
-    surveys of many would fill a disk.
+    same recordings and methods. Only the points of a database are kept, because
+    the surveys of many would fill a disk.
 
     Args:
         query: the query drive.
@@ -73,7 +73,7 @@ def measure_trend(
         protocol: of place recognition.
         controls: drives on the routes of databases through the stage of the
             query; each serves the databases whose route it has.
-        lidar: whose scans to read, of recordings with several.
+        lidar: name of the LiDAR, for recordings with several.
         settings: `METHOD.NAME=VALUE` of parameters of methods.
 
     Raises:
@@ -85,7 +85,7 @@ def measure_trend(
     asking = open_sequence(query, lidar)
     names = {asking.name}
     if protocol.exclude_recent is not None:
-        # With loop closure a drive may be its own database.
+        # For loop closure a drive may be its own database.
         names = set()
     opened: dict[Path, Recorded] = {}
     for path in (*databases, *controls):
@@ -139,7 +139,7 @@ def measure_drives(
         asking: name of the query drive.
         query: opens it.
         databases: name -> drive whose places are searched.
-        controls: name -> what opens a control of databases.
+        controls: name -> source of a control of databases.
         output: folder for intermediate results, made if needed.
         cluster: where the work is done.
         methods: to run.

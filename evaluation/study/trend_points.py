@@ -29,7 +29,7 @@ class TrendPoint:
         tcr_sym: between database and query.
         auc, auc_low, auc_high: with its 95 % interval over queries.
         recall_at_1: over queries with a match.
-        queries, with_match: how many.
+        queries, with_match: numbers of queries, and of those with a match.
         protocol: of place recognition.
         auc_unchanged: of the database's control; NaN without one.
     """
@@ -48,7 +48,7 @@ class TrendPoint:
 
     @property
     def kept(self) -> float:
-        """Share of AUC that the change leaves; NaN where it is unknown."""
+        """Share of AUC that remains after the change; NaN if it is unknown."""
         if not self.auc_unchanged > 0.0:
             return math.nan
         return self.auc / self.auc_unchanged
@@ -59,7 +59,7 @@ class MeasureDatabase(PartStep):
     """Writes the list of `TrendPoint`s of one database.
 
     Attributes:
-        source: opens the database, which is of the world of the query.
+        source: opens the database, which is in the world of the query.
         query: survey of the query drive.
         methods: to run.
         protocol: of place recognition.

@@ -20,7 +20,7 @@ from evaluation.report.page_data import PageDrive, make_drive
 from evaluation.study.parts import PartStep, part_digest, read_part
 from evaluation.study.study_layout import SurveyFiles
 
-# Format of a figure of pixels on the page.
+# Format of pictures on the page.
 PAGE_KIND = "webp"
 
 
