@@ -42,7 +42,8 @@ def write_scores(
         track: reports progress.
         gate_radius: reject places by the gate, see `gate.gated` [m].
 
-    Returns: The number of points left out because they are not finite.
+    Returns:
+        The number of points left out because they are not finite.
 
     Raises:
         InputError: if a folder or a scan cannot be read, a scan has no point

@@ -1,4 +1,4 @@
-"""Compiled code is kept where no installation is."""
+"""Compiled code is cached outside of the installation."""
 
 import os
 from pathlib import Path
@@ -22,7 +22,7 @@ print(len(thin(np.zeros((3, 3)), 1.0)))
 @pytest.mark.slow
 @pytest.mark.parametrize("is_there", [True, False])
 def test_nothing_is_kept_beside_the_code(tmp_path, is_there):
-    """Whether there is a user's folder, or none can be."""
+    """This holds with and without a folder of the user."""
     ours = tmp_path / "installed"
     shutil.copytree(
         documents.ROOT / "evaluation",

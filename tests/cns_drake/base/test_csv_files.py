@@ -1,4 +1,4 @@
-"""Tables as text: what is read of them, and what is refused."""
+"""Tables as text: accepted and refused ones."""
 
 import pytest
 

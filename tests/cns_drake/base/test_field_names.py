@@ -1,4 +1,4 @@
-"""What an error of validation advises."""
+"""Advice in errors of validation."""
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 import pytest

@@ -1,4 +1,4 @@
-"""When interrupts strike, and how they end a process."""
+"""Interrupts at different moments, and how they end a process."""
 
 import os
 import signal

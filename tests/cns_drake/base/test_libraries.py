@@ -1,4 +1,4 @@
-"""A machine without the libraries that wheels want."""
+"""A machine without the libraries that wheels need."""
 
 import os
 import subprocess
@@ -31,7 +31,7 @@ def test_what_is_told(text, told):
 
 
 def test_a_missing_library_is_one_line_and_names_the_package(tmp_path):
-    """Where Drake's own import fails as it does without GLib."""
+    """The import of Drake fails here as it does without GLib."""
     stub = tmp_path / "path" / "pydrake"
     stub.mkdir(parents=True)
     (stub / "__init__.py").write_text(

@@ -1,4 +1,4 @@
-"""What the commands show: one line for each task, however narrow."""
+"""Commands show one line for each task in a terminal of any width."""
 
 import io
 import subprocess
@@ -30,7 +30,7 @@ def test_faults_are_one_line(monkeypatch, capsys, error, status, line):
     def fail():
         raise error
 
-    # Signals stay as the tests have them.
+    # Signal handlers stay as the tests set them.
     monkeypatch.setattr(terminal, "interrupt_on_termination", lambda: None)
     monkeypatch.setattr(terminal, "ignore_interrupts", lambda: None)
     monkeypatch.setattr("sys.argv", ["program"])
@@ -101,7 +101,7 @@ def test_what_an_earlier_run_did_is_no_speed(monkeypatch):
     ("closed", "status"), [((), 0), ((1,), 2), ((0, 2), 0), ((0, 1, 2), 2)]
 )
 def test_streams_that_are_closed(tmp_path, program, closed, status):
-    """As by `>&-`: what is opened next must not take their places."""
+    """Shells close them by `>&-`. Later files must not get their numbers."""
     words = [sys.executable, "-m", program, "--version"]
     redirections = " ".join(f"{number}>&-" for number in closed)
     result = subprocess.run(

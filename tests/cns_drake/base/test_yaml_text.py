@@ -1,4 +1,4 @@
-"""YAML that must not be taken at its word."""
+"""YAML that must not be expanded."""
 
 import pytest
 

@@ -34,7 +34,7 @@ ANY_OUTLINE = [name for name in NAMES if ARCHETYPES[name].any_outline]
 PARTY_WALLS = [name for name in NAMES if ARCHETYPES[name].party_walls]
 # Rays along an edge may hit the face behind it, in single precision.
 EDGE_HITS = 2e-4
-# Meshes that many buildings use.
+# Meshes that many buildings share.
 SHARED = ("roof_", "fire_stairs", "railing_panel")
 HOUSES = (
     "bungalow",
@@ -144,7 +144,7 @@ def test_faces_are_plane_convex_and_not_degenerate(name):
         )
         mean = turns.sum(axis=1, keepdims=True)
         mean /= np.linalg.norm(mean, axis=2, keepdims=True)
-        # Millimetres of rounding may bend an almost straight corner.
+        # Rounding to millimetres may bend an almost straight corner.
         assert ((turns * mean).sum(axis=2) > -2e-3).all(), key
 
 
@@ -201,7 +201,7 @@ def test_windows_lie_as_deep_as_asked(builder):
     origins = np.column_stack([xs.ravel(), np.full(xs.size, 30.0), zs.ravel()])
     directions = np.tile([0.0, -1.0, 0.0], (xs.size, 1))
     _, distance = cast(placed_triangles(model), origins, directions)
-    depth = distance - 18.0  # Behind the wall at y = 12.
+    depth = distance - 18.0  # It is behind the wall at y = 12.
     wall = np.abs(depth) < 2e-3
     glass = np.abs(depth - parameters.recess) < 6e-3
     assert wall.mean() > 0.15
@@ -217,7 +217,7 @@ def test_any_outline_gets_closed_walls(name):
     overhang = ARCHETYPES[name].overhang
     corners = triangles.reshape(-1, 3)
     assert outside(corners[:, :2], block) <= overhang + 2e-3
-    # Convex within the overhang: nothing is left of the block uncovered.
+    # The hull of the lowest metre, widened a little, covers the whole block.
     hull = MultiPoint(corners[corners[:, 2] < 1.0][:, :2]).convex_hull
     assert block.difference(hull.buffer(0.05)).area < 0.01 * block.area
     origins, directions = rays_from_the_street(block, 40.0, 12_000, 1)
@@ -226,7 +226,7 @@ def test_any_outline_gets_closed_walls(name):
 
 @pytest.mark.parametrize(
     ("name", "blind"),
-    # One of the three for each, in turn.
+    # Each building gets one of the three in turn.
     zip(NAMES, cycle([(1,), (3,), (1, 3)]), strict=False),
 )
 def test_nothing_crosses_blind_edges(name, blind):
@@ -257,7 +257,7 @@ def test_party_walls_stand_flush_on_the_boundary(name):
     origins = np.column_stack([np.full(ys.size, 90.0), ys.ravel(), zs.ravel()])
     directions = np.tile([-1.0, 0.0, 0.0], (ys.size, 1))
     _, distance = cast(placed_triangles(model), origins, directions)
-    # There may be room for steps in front and for a yard behind.
+    # Steps in front and a yard behind may take room.
     near = distance < 90.0 - x1 + 2.0
     assert near.mean() > 0.35
     assert np.isclose(distance[near], 90.0 - x1, atol=1e-3).mean() > 0.85

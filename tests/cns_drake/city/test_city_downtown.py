@@ -1,4 +1,4 @@
-"""The heights of Downtown, its monument, and what its districts hold."""
+"""The heights of Downtown, its monument, and its districts."""
 
 from functools import cache, partial
 
@@ -32,7 +32,7 @@ def standing(kind):
 
 
 class Surface:
-    """Looks up how high the upper sides of some ground lie."""
+    """Finds the heights of the upper sides of some ground."""
 
     def __init__(self, names):
         corners = np.concatenate([triangles_of(name) for name in names])
@@ -74,7 +74,7 @@ def test_the_carriageway_carries_the_vehicle(number):
     p = trajectory.positions(np.arange(0.0, trajectory.duration, 0.2))
     z = Surface(["carriageway"]).heights(p[:, :2])
     off = np.abs(p[:, 2] - z)
-    # The path rounds the bends at the ramps' ends off a little.
+    # The path rounds off the bends at the ends of ramps a little.
     assert off.max() < 0.08
     assert np.quantile(off, 0.98) < 0.02
 
@@ -102,7 +102,7 @@ def test_paint_lies_on_the_ramps(name):
     middle = p[triangles].mean(axis=1)
     assert np.ptp(middle[:, 2]) > 6.0
     gap = middle[:, 2] - Surface(["carriageway"]).heights(middle[:, :2])
-    # Hidden or hovering only where the ramp bends most sharply.
+    # A wheel is under or above the ground only at the ramp's sharpest bend.
     assert np.mean(gap > 0) > 0.98
     assert np.abs(gap).max() < 0.02
     assert road.length > 40
@@ -121,7 +121,7 @@ def test_no_ground_hangs_over_the_carriageway():
 
 
 def test_the_ground_meets_the_sidewalks():
-    """No slit and no step along the edge of the streets."""
+    """The edge of the streets has no slit and no step."""
     edge = shapely.union_all(
         [network().carriageway(), network().sidewalks()]
     ).boundary
@@ -150,7 +150,7 @@ def test_buildings_stand_on_level_ground():
         p = shapely.get_coordinates(shapely.segmentize(rim, 1.0))
         beside = ~shapely.contains_xy(network().sidewalks(), *p.T)
         z = ground().heights(p[beside])
-        # Some stand at the rim of the city.
+        # Some buildings stand at the city's rim.
         off = z[np.isfinite(z)] - building.xyz[2]
         sunk.append(np.abs(off).max())
     # Where houses stand wall to wall on a slope, the ground at the joint is
@@ -158,7 +158,7 @@ def test_buildings_stand_on_level_ground():
     assert np.max(sunk) < 0.45
     assert np.quantile(sunk, 0.95) < 0.05
     floors = np.array([building.xyz[2] for building in buildings])
-    # Some on the plateau, some on the way up, most at the foot.
+    # Some buildings are on the plateau, some on the slope, most at its foot.
     assert (floors > 8.0).sum() >= 12
     assert (floors < 1.0).sum() >= 100
 

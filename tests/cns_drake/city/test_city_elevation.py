@@ -20,8 +20,8 @@ from cns_drake.roads.road_surface import RoadSurface
 
 KERB = 0.2
 BOUNDS = (-50.0, -40.0, 150.0, 60.0)
-# Two parallel roads, 60 m apart and 6 m different in height, with a ramp
-# between them at their eastern ends.
+# Two parallel roads, 60 m apart and 6 m apart in height. A ramp joins their
+# eastern ends.
 ROADS = """
 defaults: {sidewalk: 2.0, kerb_height: 0.2, lane_width: 3.5}
 junctions:
@@ -150,7 +150,7 @@ def test_pads_are_level_and_the_first_one_wins(roads):
     np.testing.assert_allclose(ground(x, y), 3.25, atol=0.01)
     x, y = rng.uniform((12.5, 4), (30, 14), (200, 2)).T
     np.testing.assert_allclose(ground(x, y), 5.0, atol=0.01)
-    # Just outside of the lone edge there is no step.
+    # The ground has no step just outside of the free edge.
     y = rng.uniform(0, 3, 50)
     np.testing.assert_allclose(ground(np.full(50, -0.01), y), 3.25, atol=0.02)
 
@@ -164,7 +164,7 @@ def test_an_apron_surrounds_its_building_but_not_the_street(roads):
     assert pad.height == 2.4
     assert pad.area.contains(building.footprint_W)
     assert pad.area.intersection(streets).area < 1e-6
-    # 0.6 m wide at the sides and the back.
+    # The pad is 0.6 m wider at the sides and the back.
     x0, _, x1, y1 = pad.area.bounds
     assert (x0, x1, y1) == pytest.approx((43.4, 56.6, -5.6), abs=2e-3)
 
@@ -175,7 +175,7 @@ def test_the_same_input_gives_the_same_heights(roads):
     x, y = rng.uniform(BOUNDS[:2], BOUNDS[2:], (500, 2)).T
     first, second = (ground_of(roads, pads)(x, y) for _ in range(2))
     np.testing.assert_array_equal(first, second)
-    # One point at a time as well, as objects ask.
+    # Objects look up one point at a time.
     ground = ground_of(roads, pads)
     single = [ground(x[k : k + 1], y[k : k + 1])[0] for k in range(50)]
     np.testing.assert_allclose(single, first[:50], atol=1e-9)

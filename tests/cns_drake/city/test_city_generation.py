@@ -1,4 +1,4 @@
-"""The committed files of the cities: what the generator makes, and fit."""
+"""The committed files of the cities equal the generator's files."""
 
 import csv
 import xml.etree.ElementTree as ElementTree
@@ -66,7 +66,7 @@ def growing(name, stages):
 
 
 def lot_of(structure: str) -> str:
-    """Returns the building on whose lot something stands before it does."""
+    """Returns the building that later stands on the lot of a structure."""
     return structure.partition("_lot_")[0] if "_lot_" in structure else ""
 
 
@@ -105,7 +105,7 @@ def test_stages_differ_by_the_listed_names_only(name, stages):
 
 
 def test_an_earlier_stage_lies_within_the_later_one(name, stages, growing):
-    """What stands below a new roof is a part of the whole city, and grows."""
+    """Parts below a temporary roof belong to the last city, and grow."""
     whole = {s.name: s for s in city(name).structures}
     later: dict[str, float] = {}
     for stage in reversed(list(stages.stages)):
@@ -122,7 +122,7 @@ def test_an_earlier_stage_lies_within_the_later_one(name, stages, growing):
 
 
 def check_walls_are_those_of(low, high, height):
-    """Each part is one of the higher building's, or its lower end."""
+    """Each part is a part of the higher building, or its lower end."""
     if low.model is high.model:
         return
     parts = {part.name: part for part in high.model.parts}
@@ -156,7 +156,7 @@ def test_the_list_of_stages_is_complete(name, stages):
         s.name for s in city(name).structures if s.semantic_class == "building"
     }
     low = buildings & stages.heights("01").keys()
-    # It grew: most buildings stand from the first stage on.
+    # Most buildings stand from the first stage on, because the city grew.
     assert len(buildings & stages.absent("01")) < len(buildings) / 2
     assert len(low) > 10
 

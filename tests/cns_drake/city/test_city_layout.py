@@ -1,4 +1,4 @@
-"""Plans of a small city: what they give, and faults named in one line."""
+"""Plans of a small city, and their faults in one line."""
 
 from functools import cache
 
@@ -26,7 +26,7 @@ def network(tmp_folder) -> RoadNetwork:
 
 @pytest.fixture
 def lay_out_text(tmp_path, tmp_path_factory):
-    """Returns a function from the text of a plan to a city."""
+    """Returns a function that turns the text of a plan into a city."""
     roads = network(tmp_path_factory.getbasetemp())
 
     def make(text: str) -> City:

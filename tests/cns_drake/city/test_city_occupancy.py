@@ -1,4 +1,4 @@
-"""What is taken stays free of others."""
+"""Occupied ground stays free of other structures."""
 
 import numpy as np
 from shapely.geometry import box
@@ -20,7 +20,7 @@ def test_clearance_is_a_distance():
     ground.add(box(0, 0, 10, 10))
     assert ground.is_free(box(12.01, 0, 20, 10), 2.0)
     assert not ground.is_free(box(11.99, 0, 20, 10), 2.0)
-    # Across the corner, where the bounds come closer than the polygons.
+    # At the corner the bounds are closer than the polygons.
     assert ground.is_free(box(11.5, 11.5, 12, 12), 2.0)
     assert not ground.is_free(box(11.4, 11.4, 12, 12), 2.0)
 

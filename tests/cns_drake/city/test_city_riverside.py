@@ -1,4 +1,4 @@
-"""The river of Riverside and what crosses it."""
+"""The river of Riverside and its bridges."""
 
 from functools import partial
 
@@ -13,10 +13,10 @@ from cns_drake.city.ground.streets import GROUND_TAG
 pytestmark = pytest.mark.slow
 
 WATER = -2.8
-# From bank to bank; the quays are at y = -131 and -197.
+# The river from bank to bank; its quays are at y = -131 and -197.
 RIVER = (-182.0, -146.0)
-# Where the middle lines of the four street bridges cross the river's, and
-# where the footbridge does [m].
+# Points where the middle lines of the four street bridges and of the footbridge
+# cross the river's [m].
 STREETS = {"ring_west": 0.0, "mill": 90.4, "church": 336.8, "ring_east": 394.4}
 FOOTBRIDGE = 204.0
 
@@ -55,7 +55,7 @@ def test_streets_cross_the_river_above_water(x, y):
     assert found.pop("carriageway") == [0.0]
     heights = sorted(z for zs in found.values() for z in zs)
     assert heights[0] == WATER
-    # The underside keeps clear of the water and of the carriageway.
+    # The underside is well above the water and below the carriageway.
     assert all(WATER + 1.5 < z < -0.5 for z in heights[1:])
     assert len(heights) == 2
 
@@ -80,7 +80,7 @@ def test_between_the_bridges_there_is_open_water(x):
 
 
 def test_the_river_has_walls_from_bank_to_bottom():
-    """All along both banks, below the bridges too, water meets a wall."""
+    """Along both banks, also below the bridges, water meets a wall."""
     for y in RIVER:
         covered = []
         for name in structures():
@@ -119,7 +119,7 @@ def test_every_bridge_has_sides_and_piers():
         assert sides[:, 2].max() == pytest.approx(0.15)
         piers = bridge.model.meshes[f"{bridge.name}_piers"].vertices
         assert piers[:, 2].min() == pytest.approx(WATER)
-        # Room for boats between piers and banks.
+        # Boats have room between piers and banks.
         assert piers[:, 1].min() > RIVER[0] + 9
         assert piers[:, 1].max() < RIVER[1] - 9
 
@@ -151,7 +151,7 @@ def test_the_river_runs_from_bound_to_bound_below_its_banks():
     # Quay walls are drawn a little longer than the world.
     assert x0 == pytest.approx(min(b[0] for b in ground), abs=0.5)
     assert x1 == pytest.approx(max(b[2] for b in ground), abs=0.5)
-    # Whatever stands on the banks stands above the water.
+    # Structures on the banks stand above the water.
     for structure in structures().values():
         _, y, z = structure.xyz
         if GROUND_TAG not in structure.tags and RIVER[0] - 9 < y < RIVER[1] + 9:
@@ -181,7 +181,7 @@ def test_cars_park_in_bays_and_on_drives_but_in_no_lane():
 
 
 def test_front_gardens_are_fenced():
-    """Along the garden street, but for paths and drives."""
+    """Fences line the garden street except at paths and driveways."""
     runs = shapely.union_all(
         [
             s.footprint_W.buffer(0.1)

@@ -1,8 +1,8 @@
 """Scans of a real stage against oracles that share no code with us.
 
-Drake's signed distance tells whether a point lies on the geometry that is
-said to have been hit; Open3D, which reads the SDF's meshes and casts the same
-rays with code of its own, tells whether anything was in the way.
+Drake's signed distance shows whether a point lies on the geometry that is
+reported as hit. Open3D reads the SDF's meshes and casts the same rays with its
+own code, which shows whether anything was in the way.
 """
 
 from xml.etree import ElementTree
@@ -67,7 +67,7 @@ def scans(geometries):
 
 
 def test_points_lie_on_the_geometry_that_was_hit(world, geometries, scans):
-    """To a tenth of a millimetre, by Drake's own signed distance."""
+    """Drake's signed distance of a point is at most a tenth of a millimetre."""
     rng = np.random.default_rng(0)
     inspector = world.scene_graph.model_inspector()
     checked, refused = 0, 0
@@ -93,7 +93,7 @@ def test_points_lie_on_the_geometry_that_was_hit(world, geometries, scans):
                     for point in points
                 ]
             except RuntimeError as error:
-                # Drake wants vertex normals, which sharp needles lack.
+                # Drake needs vertex normals, which sharp needles lack.
                 if "needle" not in str(error):
                     raise
                 refused += 1
@@ -121,8 +121,8 @@ def test_nothing_was_in_the_way(stage_file, scans):
         error[np.isinf(hits.ranges) & np.isinf(expected)] = 0.0
         differing += np.count_nonzero(~(error < 1e-3))
         total += len(error)
-    # Rays along an edge may go either way, and posts are exact cylinders
-    # here and polygons there. Measured: 19 of 131072.
+    # Rays along an edge may hit or miss it, and posts are cylinders here and
+    # polygons in Open3D. Measured: 19 of 131072.
     assert differing < 1e-3 * total
 
 

@@ -1,4 +1,4 @@
-"""The shipped cities: nothing in anything else, ground everywhere."""
+"""The shipped cities: no structures intersect, ground is everywhere."""
 
 from collections import Counter
 
@@ -26,7 +26,7 @@ def name(request):
 
 @pytest.fixture(scope="module")
 def standing(name):
-    """Returns everything that stands on the ground."""
+    """Returns all structures that stand on the ground."""
     return [s for s in city(name).structures if not is_ground(s)]
 
 
@@ -76,7 +76,7 @@ def test_nothing_low_reaches_far_out_of_its_footprint(standing, network):
 
 
 def test_ground_lies_under_everything(name, standing):
-    """What a stage lacks leaves ground behind."""
+    """There is ground also below the structures that a stage lacks."""
     ground = shapely.union_all(
         [s.model.footprint for s in city(name).structures if is_ground(s)]
     ).buffer(0.002)
@@ -86,13 +86,13 @@ def test_ground_lies_under_everything(name, standing):
 
 
 def test_ground_meshes_fill_the_bounds_without_gaps(name):
-    """Seen from above the ground has no holes, and overlaps nowhere."""
+    """From above the ground has neither holes nor overlaps."""
     triangles = []
     for structure in city(name).structures:
         if not is_ground(structure):
             continue
         if structure.name.startswith(("markings", "bridge_")):
-            continue  # Paint lies on the ground, what bears a bridge below.
+            continue  # Paint lies on the ground, and piers of bridges below it.
         for mesh in structure.model.meshes.values():
             triangles.append(mesh.vertices[mesh.triangles()][:, :, :2])
     corners = np.concatenate(triangles)
@@ -107,7 +107,7 @@ def test_ground_meshes_fill_the_bounds_without_gaps(name):
 
 
 def test_no_two_buildings_are_the_same(name):
-    """No repeated block: every building's geometry is its own."""
+    """Each building has a geometry of its own."""
     seen = {}
     for structure in city(name).structures:
         if structure.semantic_class != "building":

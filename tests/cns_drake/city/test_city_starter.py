@@ -1,4 +1,4 @@
-"""A city of one's own from nothing but its roads."""
+"""A user's own city, made from its roads alone."""
 
 import subprocess
 import sys
@@ -49,7 +49,7 @@ def run(*words, cwd):
 
 @pytest.fixture(scope="module")
 def town(tmp_path_factory):
-    """A folder with roads, brought to a city by the command."""
+    """A folder with roads, made into a city by the command."""
     folder = tmp_path_factory.mktemp("own") / "town"
     folder.mkdir()
     (folder / "roads.yaml").write_text(ROADS)
@@ -119,7 +119,7 @@ def test_it_is_listed_and_driven(town, tmp_path):
     )
     assert done.returncode == 0, done.stderr
     sequence = open_sequence(tmp_path / "town_02")
-    # The LiDAR of the vehicle stands straight above its path's first point.
+    # The vehicle's LiDAR is vertically above the first point of its path.
     start = plan_drive(load_scenario(town / "sequence_02.yaml")).pose(0.0)
     np.testing.assert_allclose(
         sequence.X_WS[0][:3, 3],

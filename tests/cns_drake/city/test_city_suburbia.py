@@ -37,7 +37,7 @@ def test_every_junction_is_a_t():
 
 
 def test_gardens_in_the_west_are_enclosed():
-    """Seen from the houses, hardly a way leads out but the driveways."""
+    """Driveways are nearly the only ways out, as seen from the houses."""
     runs = shapely.union_all(
         [
             s.footprint_W.buffer(0.1)
@@ -128,7 +128,7 @@ def test_the_pond_lies_below_the_lawn():
 
 
 def test_stage_01_is_not_bare():
-    """Wherever one drives, something of the village stands close by."""
+    """Part of the village is close to every point of the drive."""
     left = shapely.MultiPoint(
         [
             s.xyz[:2]
@@ -144,7 +144,7 @@ def test_stage_01_is_not_bare():
 
 
 def test_nothing_is_left_hanging_on_what_is_away():
-    """Street furniture stays; a lot that is cleared is cleared of cars."""
+    """Street furniture stays; a cleared lot has no cars."""
     for name in absent():
         assert not name.startswith("lamp"), name
     lots = [

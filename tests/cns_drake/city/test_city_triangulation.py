@@ -77,7 +77,7 @@ def test_it_uses_all_vertices_and_no_others(shape):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_points_of_a_hull_give_delaunays_triangles(seed):
-    """Without ties the triangulation is unique, so GEOS finds the same."""
+    """Without ties the triangulation is unique and must equal that of GEOS."""
     rng = np.random.default_rng([12, seed])
     hull = MultiPoint(rng.uniform(-50, 50, (40, 2)).round(3)).convex_hull
     expected = shapely.get_parts(shapely.delaunay_triangles(hull))

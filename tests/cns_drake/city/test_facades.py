@@ -45,7 +45,7 @@ def corners(mesh):
 
 
 def random_patches(seed):
-    """Disjoint patches, the same for every call with the same edge."""
+    """Disjoint patches, equal for equal edges."""
 
     def layout(edge, length):
         rng = np.random.default_rng([seed, edge])
@@ -107,7 +107,7 @@ def test_walls_stay_closed_beside_plain_ones(outline, plain):
     rng = np.random.default_rng(3)
     low, high = mesh.vertices.min(axis=0) - 0.5, mesh.vertices.max(axis=0) + 0.5
     found = winding_numbers(corners(mesh), rng.uniform(low, high, (400, 3)))
-    # A gap or a face wound the wrong way leaves fractions.
+    # A gap, or a face with its vertices in the wrong order, gives fractions.
     np.testing.assert_allclose(found, np.round(found), atol=1e-4)
     assert set(np.round(found)) == {0.0, 1.0}
     for edge in plain:

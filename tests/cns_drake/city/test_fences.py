@@ -29,7 +29,7 @@ def test_length_is_as_asked(name, length):
 @pytest.mark.parametrize("length", LENGTHS)
 @pytest.mark.parametrize("name", RUN_KINDS)
 def test_leaves_the_next_run_its_room(name, length):
-    # Runs in a row stand 6 cm apart; outlines are drawn 2 cm too large.
+    # Runs in a row are 6 cm apart; outlines are 2 cm too large.
     model = OBJECTS[name].build(np.random.default_rng(0), length=length)
     x0, _, x1, _ = model.footprint.bounds
     assert x0 > -length / 2 - 0.03
@@ -45,7 +45,7 @@ def test_height_is_as_asked(name):
         )
         z = points(model)[:, 2]
         assert z.max() == pytest.approx(height, rel=0.08)
-        if name != "site_fence":  # Stands on its feet.
+        if name != "site_fence":  # It stands on its posts.
             assert z.min() <= -0.3
 
 
@@ -79,7 +79,7 @@ def test_length_must_be_positive(length):
 
 
 def share_hit(name):
-    """The share of level rays across a fence that it stops."""
+    """The share of level rays across a fence that hit it."""
     mesh = object_mesh(f"{name}_x4")
     rng = np.random.default_rng(2)
     x = rng.uniform(0.3, 4 * RUN_KINDS[name].panel - 0.3, 600)

@@ -1,4 +1,4 @@
-"""Buildings that are lower yet, young plants, building sites and lots."""
+"""Buildings of less height, young plants, building sites and lots."""
 
 from helpers.building_checks import (
     cast,
@@ -26,7 +26,7 @@ from cns_drake.city.growth.young_plants import younger
 from cns_drake.city.placement.objects import OBJECTS
 from cns_drake.city.plan.stages import Growth, Stage, Stages
 
-# The roof's edge covers this much of the walls that it closes [m].
+# Height of the walls that the edge of the roof covers [m].
 BAND = 0.51
 
 
@@ -35,7 +35,7 @@ def building(name, model, xyz, yaw):
 
 
 def ring(polygon, reverse=False):
-    """The edges of a polygon, what it holds on their left."""
+    """The edges of a polygon, with its inside to their left."""
     corners = np.array(polygon.exterior.coords[:-1])
     corners = corners if polygon.exterior.is_ccw else corners[::-1]
     if reverse:
@@ -61,7 +61,7 @@ def test_a_courtyard_is_not_enclosed():
     block, yard = box(0, 0, 30, 20), box(8, 6, 22, 14)
     edges = np.concatenate([ring(block), ring(yard, reverse=True)])
     assert enclosed(edges).area == pytest.approx(600 - 112, rel=0.01)
-    # A tower in the yard is.
+    # A tower in the yard is enclosed.
     edges = np.concatenate([edges, ring(box(12, 8, 18, 12))])
     assert enclosed(edges).area == pytest.approx(600 - 112 + 24, rel=0.01)
 
@@ -76,8 +76,8 @@ def test_the_front_below_the_new_roof_stays_as_it_is(name):
         before, after = (placed_triangles(m, True) for m in (whole, low))
         (hit, t), (hit_low, t_low) = (cast(m, *rays) for m in (before, after))
         z, z_low = (rays[0][:, 2] + d * rays[1][:, 2] for d in (t, t_low))
-        # Whatever was seen below the height is seen there still, unless the
-        # roof hides it now; and nothing else is there.
+        # Surfaces visible below the height stay visible unless the roof hides
+        # them. No surface is added.
         below = (hit >= 0) & (z < height)
         assert (hit_low[below] >= 0).all()
         assert (t_low[below] < t[below] + 2e-3).all()
@@ -188,7 +188,7 @@ def test_a_city_grows_from_stage_to_stage():
     assert last == [tower, block]
     assert [s.name for s in second] == ["tower_001", "block_001"]
     assert top_of(first[0].model) < 10.1 < 20 < top_of(second[0].model) < 21.1
-    # The lot is in use while nothing stands on it, and ids stay.
+    # The lot is in use while no building stands on it, and ids stay.
     assert {s.name.split("_lot_")[0] for s in first[1:]} == {"block_001"}
     assert city.structures[:2] == [tower, block]
     assert first[1:] == city.structures[2:]

@@ -14,7 +14,7 @@ from cns_drake.city.buildings.parts.wings import Roof, Wing, add_roof
 from cns_drake.city.geometry.mesh import box_mesh
 
 HALL = Wing.at(0, 0, 20, 8, 6.0, 9.0, Roof())
-# Stands against the middle of the hall's front, lower than its walls.
+# The porch stands at the middle of the hall's front, lower than its walls.
 PORCH = Wing.at(8, -3, 12, 0.1, 2.5, 3.5, Roof())
 
 

@@ -24,7 +24,7 @@ def corners(mesh):
 
 
 def assert_closed(mesh, margin=0.4):
-    """Checks that random points are wholly inside or outside."""
+    """Checks that each random point is clearly inside or clearly outside."""
     rng = np.random.default_rng(0)
     low = mesh.vertices.min(axis=0) - margin
     high = mesh.vertices.max(axis=0) + margin
@@ -50,8 +50,8 @@ def test_inset_limit_leaves_every_edge_a_length():
     ring = massing.rounded(massing.rectangle(0, 0, 30, 20), {0: 5.0}, 2.0)
     limit = massing.inset_limit(ring)
     assert Polygon(massing.inset(ring, limit)).is_valid
-    # The chords of the arc vanish at its centre: 0.7 of the radius but for
-    # the outer half chords, which belong to no corner.
+    # The chords of the arc vanish near its centre, at 0.7 of the radius: the
+    # outer half chords belong to no corner.
     assert 0.6 * 5.0 < limit < 0.8 * 5.0
 
 
@@ -189,7 +189,7 @@ def test_clockwise_outline_is_refused():
 def test_details_are_wound_outwards_on_any_wall(solid):
     for edge in range(4):
         placed = details.WallFrame(TURNED, edge).place(solid)
-        # Placing mirrors and turns faces: no solid is left inside out.
+        # Placing mirrors and turns faces, but leaves no solid inside out.
         rng = np.random.default_rng(edge)
         low, high = placed.vertices.min(axis=0), placed.vertices.max(axis=0)
         points = rng.uniform(low, high, (200, 3))
@@ -217,13 +217,13 @@ def test_balcony_is_a_tray_open_to_the_wall():
     back = massing.flat(massing.rectangle(1.0, -0.01, 4.0, 0.0), 0.0)
     assert placed.vertices[:, 1].min() == pytest.approx(-1.2)
     assert back.vertices[:, 1].max() == pytest.approx(0.0)
-    # Seen from in front, from the side, from below and into the tray.
+    # Views from the front, the side, below and into the tray.
     normals = np.cross(
         corners(placed)[:, 1] - corners(placed)[:, 0],
         corners(placed)[:, 2] - corners(placed)[:, 0],
     )
     total = normals.sum(axis=0) / 2
-    # What is open is the section at the wall; its area is the deficit:
-    # slab and rails, less the room between the rails.
+    # The open part is the section at the wall. Its area is the deficit: slab
+    # and rails less the room between the rails.
     section = 3.0 * 1.2 - (3.0 - 0.24) * 1.0
     np.testing.assert_allclose(total, (0.0, -section, 0.0), atol=1e-9)

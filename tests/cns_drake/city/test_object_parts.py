@@ -57,7 +57,7 @@ def test_footprint_ignores_what_hangs_above_the_headroom():
 
 
 def test_footprint_cuts_a_slanted_part_at_the_headroom():
-    # From the ground to twice the headroom: half of it counts.
+    # The post reaches from the ground to twice the headroom; half of it counts.
     lean = bar("lean", (0, 0, 0), (4.0, 0, 2 * HEADROOM), 0.001)
     assert assemble(lean).footprint.bounds[2] == pytest.approx(2.0, abs=0.03)
 

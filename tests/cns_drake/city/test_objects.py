@@ -1,4 +1,4 @@
-"""What holds for every kind of object."""
+"""Properties of every kind of object."""
 
 from helpers.mesh_checks import out_of_plane, parse_obj, surface_points
 import numpy as np
@@ -90,7 +90,7 @@ def test_footprint_contains_the_geometry_near_the_ground(name):
         assert points[:, 2].min() > -1.0
         low = points[points[:, 2] < 2.3, :2]
         assert model.footprint.covers(MultiPoint(low))
-        # And nothing more: what is high up claims no ground.
+        # Parts high above the ground occupy none of it.
         claimed = points[points[:, 2] < 2.6, :2]
         hull = MultiPoint(claimed).convex_hull
         assert hull.buffer(0.3).covers(model.footprint)

@@ -71,7 +71,7 @@ def test_meshes_are_closed_solids_wound_outwards(form):
 def test_size_of_a_real_vehicle(form):
     v = all_vertices(form)
     body = vehicle_meshes(form)[f"{form}_body"]
-    # The mirrors stand out; the large solids alone have the width.
+    # Mirrors stick out; the large solids alone have the width.
     widths = [
         np.ptp(body.vertices[sorted(set(sum(piece.faces, ()))), 1])
         for piece, volume in solids(body)
@@ -152,6 +152,6 @@ def test_cars_differ_in_size_and_colour(form):
     assert all(0.96 < s < 1.04 for scale in scales for s in scale)
     assert len({m.parts[0].rgb for m in models}) >= 5
     for model in models:
-        # All parts of a car keep together.
+        # All parts of a car move together.
         assert len({p.shape.scale for p in model.parts}) == 1
         assert all(isinstance(p.shape, MeshShape) for p in model.parts)

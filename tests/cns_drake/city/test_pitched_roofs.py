@@ -71,7 +71,7 @@ def test_a_shell_is_a_closed_solid_of_even_thickness(kind, along_y):
 def test_a_gable_wall_fills_the_space_below_its_line():
     line = LINES["gable"]
     plain = pitched_roofs.gable_wall(line, 2.0, 10.0, 4.0)
-    # It reaches a few centimetres into the roof.
+    # The wall reaches a few centimetres into the roof.
     wanted = area_below(line, 4.0)
     assert wanted < area(plain) < wanted + 8.0 * 0.04
     np.testing.assert_allclose(plain.vertices[:, 1], 0.0)
@@ -87,7 +87,7 @@ def test_windows_of_a_gable_are_recesses_with_a_pane():
     reveals = 4.0 * 0.3 + 2.6 * 0.1
     assert area(panes) == pytest.approx(openings)
     assert area(wall) == pytest.approx(area(plain) - openings + reveals)
-    # Seen from outside (+y) nothing faces away.
+    # From outside (+y) no face shows its back.
     both = [*wall.triangles()], [*panes.triangles()]
     for mesh, triangles in zip((wall, panes), both, strict=True):
         for a, b, c in (mesh.vertices[t] for t in triangles):

@@ -1,4 +1,4 @@
-"""Names in `stages.yaml` that follow a plan that grows."""
+"""Names in `stages.yaml` after a plan has grown."""
 
 import csv
 import re
@@ -30,7 +30,7 @@ stages:
   "02": {story: all of it}
 lots: {market: [office_051]}
 """
-# What is built in it bears the first numbers.
+# Its structures have the first numbers.
 DISTRICT = """
   - name: new_square
     area: [[-55, -105], [-15, -105], [-15, -55], [-55, -55]]
@@ -60,7 +60,7 @@ def insert(folder):
 
 @pytest.fixture
 def grown(tmp_path):
-    """A city whose plan has got another first district."""
+    """A city whose plan has a new first district."""
     folder = write_small_city(tmp_path / "small")
     (folder / "stages.yaml").write_text(STAGES)
     generate_city(folder)
@@ -76,7 +76,7 @@ def test_a_grown_plan_is_not_generated_with_the_old_names(grown):
         generate_city(grown)
     assert "--repair-stages" in str(e.value)
     assert files == {path: path.read_bytes() for path in grown.glob("*.*")}
-    # Without a table the names are taken as they are; there is one no more.
+    # Without a table the names stay; one of them no longer exists.
     (grown / "structures.csv").unlink()
     with pytest.raises(InputError, match="unknown structure tree_001"):
         generate_city(grown)
@@ -94,7 +94,7 @@ def test_names_follow_what_stays_where_it_is(grown):
     assert done.exit_code == 0, done.output
     after = rows_of(grown)
     text = (grown / "stages.yaml").read_text()
-    # Each name is that of what stands where its bearer stood.
+    # Each name is that of the structure at the old one's place.
     named = re.compile(
         r"(?<=[\[ '])(?:office|brick_block|tree)_\d+(?=[\],'\n])"
     )
@@ -104,12 +104,12 @@ def test_names_follow_what_stays_where_it_is(grown):
         assert one != other
         assert place(before[one]) == place(after[other])
         assert f"{one} is {other} now" in told.output
-    # All else is as it was, to the letter.
+    # All other text is unchanged.
     assert named.sub("", text) == named.sub("", STAGES)
     stages = yaml.safe_load(text)["stages"]
     assert "office_001" in stages["01"]["story"]
     assert "trees: tree_001" in stages["01"]["absent"]
-    # And again, there is nothing to do.
+    # A second run changes nothing.
     again = CliRunner().invoke(app, ["city", str(grown), "--repair-stages"])
     assert again.exit_code == 0
     assert " is " not in again.output

@@ -56,7 +56,7 @@ def test_meshes_are_closed_solids_wound_outwards(name):
             assert all(volume > 0 for _, volume in solids(mesh))
 
 
-# Least and greatest extent x, y, z above the ground, as in the street.
+# Least and greatest size along x, y, z above the ground, as of real ones.
 SIZES = {
     "bench": ((0.45, 0.8), (1.5, 2.2), (0.75, 1.0)),
     "litter_bin": ((0.4, 0.7), (0.4, 0.7), (0.8, 1.3)),

@@ -74,13 +74,13 @@ def test_size_of_the_meshes(name, variant):
 
 @pytest.mark.parametrize(("name", "variant"), VARIANTS)
 def test_crown_lets_about_half_of_the_rays_in(name, variant):
-    """Rays that rise like a LiDAR's, through the crown's ellipsoid."""
+    """Rays rise like those of a LiDAR and cross the crown's ellipsoid."""
     wood, crown = tree_meshes(name, variant)
     low, high = np.percentile(crown.vertices, [1, 99], axis=0)
     center, half = (low + high) / 2, (high - low) / 2
     rng = np.random.default_rng([variant, 3])
     n = 300
-    # Through points that are uniform in the unit ball.
+    # The rays pass points that are uniform in the unit ball.
     p = rng.standard_normal((n, 3))
     p /= np.linalg.norm(p, axis=1, keepdims=True)
     p *= np.cbrt(rng.uniform(size=(n, 1)))
@@ -103,7 +103,7 @@ def test_crown_lets_about_half_of_the_rays_in(name, variant):
     chord = leave - enter
     assert 0.2 <= (hits >= chord).mean() <= 0.7
     assert 0.3 <= (hits >= chord / 2).mean() <= 0.8
-    # Some returns come from inside the crown, not only from its skin.
+    # Some returns come from inside the crown, not only from its surface.
     inside = (hits > 0.25 * chord) & (hits < 0.9 * chord)
     assert inside.mean() > 0.1
 

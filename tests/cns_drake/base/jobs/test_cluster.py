@@ -63,7 +63,7 @@ def test_a_worker_that_is_killed_costs_nothing(
     for scenario in scenarios[:2]:
         folder = simulate(scenario, tmp_path / "whole").folder
         assert contents(output / scenario.name) == contents(folder)
-    # What it was doing has ended, and before its successor began.
+    # The killed worker's job has ended before its successor begins.
     assert psutil.wait_procs([job], timeout=600)[1] == []
     assert {path.name for path in output.iterdir()} == {"first", "second"}
 
@@ -110,7 +110,7 @@ def test_jobs_end_with_the_client_that_wanted_them(dask, tmp_path, number):
 
 
 def test_a_worker_that_dies_each_time_is_a_fault(dask, tmp_path):
-    # The scheduler tries three times more, and needs as many workers.
+    # The scheduler tries three more times, and needs a worker for each.
     dask.add_workers(4)
     tries = tmp_path / "tries"
     step = job_functions.Call(job_functions.kill_worker, (tries,))
@@ -156,7 +156,7 @@ def certificates(tmp_path_factory):
 
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="no openssl")
 def test_a_scheduler_that_asks_for_certificates(certificates, tmp_path):
-    """As Dask's configuration names them, in the environment of a command."""
+    """A command's environment names the certificates as Dask's settings do."""
     ca_file, cert, key = (certificates[k] for k in ("ca-file", "cert", "key"))
     security = Security(
         tls_ca_file=ca_file,

@@ -1,4 +1,4 @@
-"""Fingerprints: which code counts for a result."""
+"""Fingerprints: the code that a result depends on."""
 
 import importlib.metadata
 import shutil
@@ -68,7 +68,7 @@ NOT_COUNTED = {
 
 @pytest.fixture
 def packages(tmp_path, monkeypatch):
-    """A folder in which the packages are looked for."""
+    """A folder from which packages are imported."""
     monkeypatch.setattr(fingerprints, "_ROOT", tmp_path)
     code_digest.cache_clear()
     yield tmp_path
@@ -102,7 +102,7 @@ def test_what_is_imported_in_any_way_counts(packages):
         "evaluation/page.js",
     }
     assert changing == expected
-    # The whole of a package.
+    # All modules of a package.
     assert differs(packages / "evaluation/inner/unasked.py", "evaluation.*")
     assert not differs(
         packages / "evaluation/inner/first.py",

@@ -1,4 +1,4 @@
-"""How far many jobs are: the time that is left, and how it is shown."""
+"""The progress of many jobs: the remaining time, and how it is shown."""
 
 import io
 
@@ -15,7 +15,7 @@ def test_before_anything_is_known_costs_count():
     assert left.share() == 0.0
     left.start("a", now=100.0)
     left.start("b", now=100.0)
-    # Two work side by side.
+    # Two workers run side by side.
     assert left.seconds() == pytest.approx(30.0)
 
 
@@ -32,7 +32,7 @@ def test_a_slow_machine_takes_longer():
     left = TimeLeft({"a": 1000.0, "b": 500.0})
     left.start("a", now=0.0)
     left.end("a", now=2000.0)
-    # Ten seconds' worth of belief in the costs remain.
+    # The expected costs still weigh as much as ten measured seconds.
     assert left.seconds() == pytest.approx(500.0 * 2010.0 / 1010.0)
     assert left.share() == pytest.approx(2 / 3)
     left.start("b", now=2000.0)
@@ -53,7 +53,7 @@ def test_what_an_earlier_run_did_tells_no_pace():
     left.progress("drive", 0.75, now=45.0)
     pace = (10.0 + 40.0) / (10.0 + 25.0)
     assert left.seconds() == pytest.approx(pace * 25.0, rel=0.15)
-    # It starts again, elsewhere.
+    # The job starts again on another worker.
     left.start("drive", now=50.0)
     assert left.seconds() == pytest.approx(100.0)
 
@@ -90,7 +90,7 @@ def test_without_a_terminal_there_is_a_line_now_and_then(monkeypatch):
         shown.end("a drive")
         shown.note("[bold] " + "word " * 20)
     lines = paper.file.getvalue().splitlines()
-    # That it has begun is told at once, then every five seconds.
+    # The begin is reported at once, then the progress every five seconds.
     assert [line.rpartition("; ")[2] for line in lines[:-2]] == [
         "a drive 0 of 10",
         "a drive 5 of 10",

@@ -39,7 +39,7 @@ def job(
 
 
 def test_what_is_done_starts_no_process(tmp_path, monkeypatch, capsys):
-    """Not even a cluster, if it is all; but what needs other work does."""
+    """No cluster starts if all is done; jobs that need other work do start."""
     old, path = tmp_path / "old", tmp_path / "path"
     old.write_text("old")
     done = job(
@@ -56,7 +56,7 @@ def test_what_is_done_starts_no_process(tmp_path, monkeypatch, capsys):
         "new", job_functions.join, [], path, needs=["done"],
         is_done=job_functions.is_there,
     )  # fmt: skip
-    # Whether this is done is known only to its own process, when `new` is.
+    # This step is checked in its own process, after `new` is done.
     again = job(
         "again", job_functions.join, [], path, needs=["new"],
         is_done=job_functions.is_there,
@@ -72,7 +72,7 @@ def test_what_is_done_starts_no_process(tmp_path, monkeypatch, capsys):
 
 
 def test_a_job_asks_again_when_it_has_its_output(tmp_path):
-    """Another copy of it may have come first."""
+    """Another copy of the job may have written its output first."""
     output = tmp_path / "output"
     output.write_text("of the other")
     for is_done, expected in (
@@ -92,7 +92,7 @@ def test_what_is_needed_is_there_and_faults_stay_alone(tmp_path, capsys):
     first, second, both, last = (tmp_path / name for name in "abcd")
     process, tries, survivor = (tmp_path / name for name in "ptu")
     jobs = [
-        # The one that needs most comes first in the list, not in time.
+        # The job with the most needs comes first in the list and runs last.
         job("last", job_functions.join, [both], last, needs=["both"]),
         job(
             "both",
@@ -127,7 +127,7 @@ def test_what_is_needed_is_there_and_faults_stay_alone(tmp_path, capsys):
     assert survivor.read_text() == "at last"
     # No lock is left behind.
     assert {path.name for path in tmp_path.iterdir()} == set("abcdpstu")
-    # A process and a session of its own, for which Ctrl-C is not meant.
+    # The process has a session of its own, which Ctrl-C does not reach.
     pid, session, *parents = map(int, process.read_text().split())
     assert pid == session
     assert os.getpid() in parents
@@ -138,11 +138,11 @@ def test_what_is_needed_is_there_and_faults_stay_alone(tmp_path, capsys):
 
 
 class ScriptedCluster:
-    """Has workers whose jobs end as they are told, one after the other.
+    """Workers whose jobs end as a script says, one after the other.
 
     Attributes:
         slots: see `Cluster`.
-        names: of what was submitted.
+        names: of the submitted jobs.
     """
 
     def __init__(self, *errors, slots=None):
@@ -177,7 +177,7 @@ def test_what_is_lost_with_its_worker_is_asked_for_again(capsys):
     [(1, "b first; c needs b; a; d"), (None, "b first; a; d; c needs b")],
 )
 def test_a_free_worker_gets_what_is_most_urgent_then(slots, order):
-    """Not what was most urgent when its last job began."""
+    """The most urgent job may have changed since its last job began."""
     jobs = [
         job("a", job_functions.refuse, cost=3.0),
         job("b first", job_functions.refuse, cost=1.0),
@@ -199,7 +199,7 @@ def test_a_fault_makes_room_for_the_next(capsys):
 
 
 def test_a_scheduler_that_is_lost():
-    """As its client tells; what was done under a key is not asked again."""
+    """The client reports the loss; finished keys are not fetched again."""
     told, keys = [], []
     statuses = iter(["cancelled", "lost", "finished"])
 
@@ -230,7 +230,7 @@ def test_a_scheduler_that_is_lost():
 
 
 def test_nobody_else_can_reach_local_jobs(tmp_path):
-    """No port is open, here or in the process of a job."""
+    """Neither this process nor that of a job opens a port."""
     path = tmp_path / "ports"
     script = (
         "import sys\n"
@@ -350,7 +350,7 @@ def test_forked_jobs_leave_nothing_to_each_other(tmp_path):
 
 
 def test_a_job_survives_the_process_that_it_was_forked_from(tmp_path, capsys):
-    """How it ended cannot be found out then: it starts again elsewhere."""
+    """The job's end cannot be found out then, so it starts elsewhere."""
     tries, path = tmp_path / "tries", tmp_path / "path"
     run_jobs(
         [job("survives", job_functions.kill_parent_once, tries, path)],
@@ -416,7 +416,7 @@ def test_progress_is_told_now_and_then(monkeypatch):
     for done in range(11):
         reporter.progress(done, 10)
         now[0] += 0.2
-    # The first, the last, and one in half a second.
+    # The first and the last one are shown, and one in half a second.
     assert [done for _, done, _ in told] == [0, 3, 6, 9, 10]
     reporter.note(3)
     assert told[-1] == ("note", "3")
