@@ -102,7 +102,7 @@ def test_paint_lies_on_the_ramps(name):
     middle = p[triangles].mean(axis=1)
     assert np.ptp(middle[:, 2]) > 6.0
     gap = middle[:, 2] - Surface(["carriageway"]).heights(middle[:, :2])
-    # A wheel is under or above the ground only at the ramp's sharpest bend.
+    # The paint is below the ramp only where the ramp bends most sharply.
     assert np.mean(gap > 0) > 0.98
     assert np.abs(gap).max() < 0.02
     assert road.length > 40

@@ -39,7 +39,7 @@ ELSEWHERE = rigid([40.0, -25.0, 13.0], 115.0)
 
 
 class Drives:
-    """Two drives through a street, of which seven houses have gone since."""
+    """Two drives through a street; the second one lacks seven houses."""
 
     X_first = route(lane=-1.75)
     X_second = route(lane=1.75, reverse=True)
@@ -79,7 +79,7 @@ def apart(X, Y):
 
 
 def test_a_wrong_datum(drives, truth):
-    """Tens of metres and more than a quarter turn, with nothing in common."""
+    """The datum is wrong by tens of metres and more than a quarter turn."""
     told = ELSEWHERE @ drives.X_second
     first, second = drives.first(), drives.second(told, frame="odom")
     assert in_one_world(first, second, "never") is None
@@ -122,7 +122,7 @@ def test_a_small_error_in_a_common_frame(drives, truth):
 
 
 def test_a_common_frame_that_is_none(drives):
-    """The poses claim one frame but are far off: places must be recognised."""
+    """The poses name one frame but are far off: places must be recognised."""
     told = ELSEWHERE @ drives.X_second
     result = align(drives.first(), drives.second(told))
     assert result.report.guess == "places that look alike"
@@ -131,7 +131,7 @@ def test_a_common_frame_that_is_none(drives):
 
 def test_a_drive_that_drifts(drives, truth):
     told = ELSEWHERE @ drifted(drives.X_second, scale=1.02, turn_deg=5.0)
-    # The bend is so strong that no rigid pose fits.
+    # The trajectory is bent so strongly that no rigid pose fits.
     rigidly = drives.X_second[25] @ poses.inverse(told[25]) @ told
     assert apart(rigidly, drives.X_second) > 1.5
     result = align(drives.first(), drives.second(told, frame="odom"))
@@ -142,7 +142,7 @@ def test_a_drive_that_drifts(drives, truth):
 
 
 def test_the_drive_that_drifts_gives_way(drives):
-    """Forth and back: a drive sees that it does not agree with itself."""
+    """Forth and back, so that a drive's disagreement with itself shows."""
     X = np.concatenate([route(lane=-1.75), route(lane=1.75, reverse=True)])
     town = make_town()
     scans = make_scans(town, X)
@@ -157,7 +157,7 @@ def test_the_drive_that_drifts_gives_way(drives):
     assert apart(result.first.X_WS, X) < 0.3
     good = change(TownDrive("good", scans, X), drives.second())
     assert change(result.first, result.second) == pytest.approx(good, abs=0.01)
-    # Unless others are aligned to it already.
+    # This does not hold if others are aligned to it already.
     held = align(bad, drives.second(), hold_first=True)
     assert held.report.held == "bad"
     np.testing.assert_array_equal(held.first.X_WS, told)
@@ -168,7 +168,7 @@ def test_heights_start_at_the_ground(drives):
     result = align(drives.first(told, frame="utm"), drives.second())
     assert result.report.ground == pytest.approx(61.3, abs=0.05)
     for sequence in (result.first, result.second):
-        # Others in the frame of the first one have not been lowered.
+        # Other drives in the frame of the first one keep their heights.
         assert sequence.world_frame not in ("utm", "map")
         np.testing.assert_allclose(
             sequence.X_WS[:, 2, 3], LIDAR_HEIGHT, atol=0.05
@@ -285,13 +285,13 @@ def test_map_files_are_taken_as_they_are(recordings, drives, tmp_path):
 
 
 def test_mulran_and_helipr(capsys, tmp_path, drives, truth):
-    """The paper's KAIST row: two data sets on one grid, metres apart."""
+    """The paper's KAIST row has two data sets on one grid, metres apart."""
     stamps_ns = [T0_NS + 100_000_000 * i for i in range(len(drives.X_first))]
     mulran = tmp_path / "KAIST01"
     for stamp, scan in zip(stamps_ns, drives.scans_first, strict=True):
         four = np.c_[xyz(scan, np.float32), np.ones(len(scan), np.float32)]
         write_bytes(mulran / "Ouster" / f"{stamp}.bin", four.tobytes())
-    # The mount is known to the reader only; ask it.
+    # Only the reader has the mount.
     write_matrices(
         mulran / "global_pose.csv",
         stamps_ns,
@@ -312,7 +312,7 @@ def test_mulran_and_helipr(capsys, tmp_path, drives, truth):
         rows = [(*p, 1.0, 0, 0, 0, 0) for p in xyz(scan).tolist()]
         data = pack("ffffIHHH", rows)
         write_bytes(helipr / "LiDAR" / "Ouster" / f"{stamp}.bin", data)
-    # Another receiver: metres beside, and heights above another surface.
+    # Another receiver is metres off, and its heights have another reference.
     off = rigid([2.0, -3.0, 24.0], 0.4)
     off[:3, 3] += UTM - off[:3, :3] @ UTM
     write_quaternions(

@@ -10,7 +10,7 @@ from evaluation.alignment.anchor_search import (
 
 
 def make_candidates(X_TS, right, wrong, seed=1, drift=0.0):
-    """Returns candidates; the first ones are right within cells' sizes."""
+    """Returns candidates; the first ones are right to the size of a cell."""
     rng = np.random.default_rng([seed, right, wrong])
     number = right + wrong
     p_S = rng.uniform([-150, -100, 0], [150, 100, 5], (number, 3))
@@ -37,7 +37,7 @@ def test_finds_what_few_agree_on(yaw, wrong):
     cosine = (best.X_TS[:2, :2] * X_TS[:2, :2]).sum() / 2.0
     assert np.degrees(np.arccos(min(cosine, 1.0))) < 1.5
     assert np.count_nonzero(best.pairs < 40) >= 38
-    # The wrong ones that agree do so by chance.
+    # Wrong candidates agree by chance only.
     assert np.count_nonzero(best.pairs >= 40) <= 3
 
 
@@ -68,7 +68,7 @@ def test_guesses_come_in_the_order_of_their_votes():
 
 
 def test_one_place_votes_once():
-    """A place proposed again and again is no more than one."""
+    """A place that is proposed many times counts once."""
     X_TS = rigid([5.0, 5.0, 0.0], 45.0)
     few = make_candidates(X_TS, 12, 0)
     other = make_candidates(rigid([99.0, 0.0, 0.0], -80.0), 5, 0, seed=2)

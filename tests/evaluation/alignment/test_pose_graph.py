@@ -52,7 +52,7 @@ def test_consistent_ties_are_kept_exactly():
 
 
 def test_offsets_on_either_side():
-    """Z = inverse(V_i A) V_j B, with all of them in the way."""
+    """Z = inverse(V_i A) V_j B, with no identity among these poses."""
     rng = np.random.default_rng(2)
     X = random_poses(rng, 3)
     i, j = np.array([0, 1, 0]), np.array([1, 2, 2])
@@ -67,7 +67,7 @@ def test_offsets_on_either_side():
 
 
 def test_disagreement_is_shared_by_precision():
-    """A pose held at 0 and at 1, three times as sure of the latter."""
+    """A pose is measured at 0 and at 1, the latter with triple precision."""
     A = np.tile(EYE, (2, 1, 1))
     A[1, 0, 3] = 1.0
     unsure = ties([FIXED], [0], EYE[None], A=A[:1], sigma=0.3)
@@ -78,7 +78,7 @@ def test_disagreement_is_shared_by_precision():
 
 
 def test_a_loop_spreads_its_error_over_the_chain():
-    """Ten steps of 1 m, and a loop that saw 11 m: a tenth for each step."""
+    """Ten steps of 1 m and a loop of 11 m give a tenth to each step."""
     number = 11
     start = np.tile(EYE, (number, 1, 1))
     start[:, 0, 3] = np.arange(number)
@@ -123,6 +123,6 @@ def test_wrong_ties_are_outvoted(part):
     distance, angle = apart(X, optimise(start, [seen, chain]))
     assert distance < 0.1
     assert angle < 0.02
-    # Each believed alike, they would draw the poses away.
+    # With equal weights they would pull the poses away.
     believed = ties(seen.i, j, seen.Z, A=A, sigma=0.05)
     assert apart(X, optimise(start, [believed, chain]))[0] > 2.0 * distance

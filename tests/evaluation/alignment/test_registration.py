@@ -29,7 +29,8 @@ def test_normals_are_those_of_the_eigenvectors():
     rng = np.random.default_rng(4)
     tilt = Rotation.from_rotvec([0.4, -0.7, 0.2]).as_matrix()
     flat = rng.normal(size=(400, 3)) * [20.0, 20.0, 0.01]
-    # Far from the origin, where squares of coordinates would cancel.
+    # The cloud is far from the origin, where squares of coordinates would
+    # cancel.
     points = flat @ tilt.T + [4e5, -2e5, 50.0]
     found = make_surface(points)
     cosines = np.abs(found.normals @ tilt[:, 2])
@@ -72,7 +73,7 @@ def test_finds_back_from_a_rough_guess(town, move, yaw):
 
 
 def test_what_is_gone_does_not_count(town):
-    """One side has lost most of its houses; the rest fits, either way."""
+    """One cloud lacks most houses; the rest fits in both directions."""
     left = surface(make_town(gone=[i for i in range(26) if i % 4]))
     guess = rigid([1.0, 1.0, 0.2], 2.0)
     for source, target in ((left, town), (town, left)):
@@ -89,7 +90,7 @@ def test_another_place_does_not_fit(town):
 
 
 def test_a_road_without_houses_is_open_along_itself():
-    """Two walls and the ground hold all but the way along them."""
+    """Two walls and the ground fix all directions except along the road."""
     rng = np.random.default_rng(6)
     ground = rng.uniform([-40, -10, 0], [40, 10, 0], (6000, 3))
     walls = rng.uniform([-40, -10, 0], [40, -10, 8], (6000, 3))

@@ -24,13 +24,13 @@ def make_drive(X_WS=None, number=50):
 def test_keyframes_lie_evenly_along_the_path():
     drive = make_drive()
     assert drive.length > 120.0
-    # A short drive has them closer together than 10 m.
+    # A short drive has its keyframes closer together than 10 m.
     np.testing.assert_allclose(np.diff(drive.path), 6.1, atol=2.5)
     np.testing.assert_array_equal(drive.X_WK, drive.X_WS[drive.frames])
 
 
 def test_a_submap_is_consistent():
-    """Scans of a stretch, merged, lie on the town as one scan would."""
+    """The merged scans of a stretch fit the town as well as one scan."""
     drive = make_drive()
     index = len(drive) // 2
     surface = drive.surface(index)
@@ -60,10 +60,10 @@ def test_bending_follows_the_keyframes():
     X = route()
     told = drifted(X, scale=1.03, turn_deg=8.0)
     drive = make_drive(told)
-    # Moved as one piece.
+    # All frames move as one piece.
     Y = rigid([10.0, -5.0, 2.0], 77.0)
     np.testing.assert_allclose(drive.bend(Y @ drive.X_WK), Y @ told, atol=1e-9)
-    # Given the truth at the keyframes, the frames between are near it.
+    # With true poses at the keyframes, the frames between are nearly right.
     bent = drive.bend(X[drive.frames])
     np.testing.assert_allclose(bent[drive.frames], X[drive.frames], atol=1e-9)
     inside = slice(0, drive.frames[-1])

@@ -52,7 +52,7 @@ def test_a_recording_maps_like_its_points(tmp_path, drives):
     assert from_file.name == "late.npy"
     assert from_file.sequence is None
     recorded = drives["late", "south"].voxels
-    # The drive sees whole only what is near; that must agree.
+    # The drive sees only near parts completely; these must agree.
     near = np.abs(from_file.voxels.centroids_W[:, 0] - 50.0) < 30.0
     near &= np.abs(from_file.voxels.centroids_W[:, 1]) < 25.0
     expected = {tuple(i) for i in from_file.voxels.indices[near]}
@@ -127,7 +127,7 @@ def test_map_files_have_no_coverage_and_no_control(tmp_path, drives):
 def test_control_on_a_third_route(tmp_path, drives):
     other = drive(tmp_path / "other", "late", "south", reach=50.0)
     shifted = survey(other)
-    # The same drive, but 3 m aside.
+    # The same drive, 3 m aside.
     aside = type(shifted)(
         shifted.name,
         shifted.voxels,

@@ -50,7 +50,7 @@ def brute_force(source, target, tau):
 
 @pytest.mark.parametrize("tau", [4.5, 9.0])
 def test_agrees_with_the_definition(tau):
-    # Only some of the points: the oracle is slow.
+    # The oracle is slow, so it gets only some of the points.
     a, b = HALF[::15], OTHER[::15]
     expected = brute_force(a, b, tau)
     assert 0.1 < expected < 0.9
@@ -58,8 +58,8 @@ def test_agrees_with_the_definition(tau):
 
 
 def test_by_hand():
-    # A cube of 8 corners and its centre against the cube without, and with a
-    # point outside: worked out on paper.
+    # A cube's 8 corners and its centre against the corners and a point outside:
+    # worked out on paper.
     cube = np.array(
         [[x, y, z] for x in (0, 30) for y in (0, 30) for z in (0, 30)], float
     )
@@ -144,7 +144,7 @@ def test_moving_both_by_whole_voxels_changes_nothing(voxels):
 
 
 def test_literal_equation_counts_outside_the_hull():
-    # Everything is near, but the source reaches out of the target's hull.
+    # All points are near, but the source reaches out of the target's hull.
     target = np.array(
         [[x, y, z] for x in (0, 4) for y in (0, 4) for z in (0, 4)], float
     )
@@ -225,7 +225,7 @@ def test_coverage():
     )
     first = np.array([[x, 0.0, 1.6] for x in np.arange(-50.0, 1.0)])
     second = first[:21]
-    # Height plays no part; every trajectory must be near.
+    # Height does not count; every trajectory must be near.
     assert covered(points, (first,)).tolist() == [True, False, True, True]
     assert covered(points, (first, second)).tolist() == [
         False,

@@ -1,4 +1,4 @@
-"""Drives of two maps are compared when told so."""
+"""Drives of two maps are compared with the option `--across-maps`."""
 
 import json
 

@@ -134,7 +134,7 @@ def test_pr_json(capsys, towns):
     } <= values.keys()
     assert values["method"] == "scan-context++"
     assert values["mode"] == "all"
-    # Every scene is another; the side step of 1 m hides none of them.
+    # Every scene differs; a side step of 1 m hides none of them.
     assert values["recall_at_1"] == values["auc"] == 1.0
     assert values["true_positives"] == values["queries"] == 8
 
@@ -195,7 +195,7 @@ def test_scores_of_all_pairs(capsys, towns, tmp_path):
 
 @pytest.mark.slow
 def test_help_is_instant_and_modules_stay_apart():
-    # A time is no test; what is imported is.
+    # The imported modules are tested in place of a time.
     code = (
         "import sys; sys.argv = ['cns-eval', '--help']\n"
         "from evaluation.command_line import cli\n"

@@ -1,4 +1,4 @@
-"""Which of a recording's LiDARs the commands read."""
+"""The choice of a recording's LiDAR in commands."""
 
 import csv
 import json

@@ -5,7 +5,7 @@ from evaluation.geometry.neighbours import _select, nearest_neighbours
 
 
 def rings(seed):
-    """Returns what a LiDAR sees of uneven ground: dense near by, (N, 3)."""
+    """Returns a LiDAR's points (N, 3) on uneven ground, dense nearby."""
     rng = np.random.default_rng([seed, 3])
     r = np.repeat(3.0 * 1.25 ** np.arange(14), 150)
     a = np.tile(np.linspace(0.0, 2.0 * np.pi, 150, endpoint=False), 14)
@@ -52,7 +52,7 @@ def test_against_all_distances(make, k):
     distances = all_distances(points)
     expected = np.sort(distances, axis=1)[:, :k]
     chosen = np.take_along_axis(distances, neighbours.astype(int), axis=1)
-    # Any of equally far points may be chosen, but none of them twice.
+    # Any of equally far points may be chosen, but each only once.
     np.testing.assert_array_equal(np.sort(chosen, axis=1), expected)
     ordered = np.sort(neighbours, axis=1)
     assert (np.diff(ordered, axis=1) > 0).all()

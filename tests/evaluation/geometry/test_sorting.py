@@ -20,7 +20,7 @@ def test_cells_as_by_comparing(span, dtype):
     rng = np.random.default_rng(7)
     low = -(2**31)
     cells = rng.integers(low, low + span, (3000, 3), endpoint=True)
-    # The outermost ones, and one cell several times.
+    # The outermost cells, and one cell several times.
     cells[[17, 30]] = low, low + span, low
     cells[1700] = low + span
     cells = cells.astype(dtype)

@@ -27,7 +27,7 @@ def test_same_map_and_scans_whoever_asks(drive, asked):
     np.testing.assert_array_equal(result.centroids_W, expected.centroids_W)
     np.testing.assert_array_equal(result.counts, expected.counts)
     np.testing.assert_array_equal(fine, MappedSequence(drive, 1).finish()[1])
-    # A point in each cube of half a metre that has one.
+    # One point remains in each occupied cube of half a metre.
     cubes = map_sequence(drive, 0.5).indices
     found = np.floor((fine - [0.0, 0.0, -2.5]) / 0.5)
     assert set(map(tuple, found)) == set(map(tuple, cubes))

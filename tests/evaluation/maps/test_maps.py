@@ -140,7 +140,7 @@ def test_samples_are_the_first_point_of_each_part(divisions):
     np.testing.assert_allclose(
         accumulator.samples(), points[np.sort(firsts)], atol=1e-12
     )
-    # They change nothing about the map.
+    # These points do not change the map.
     plain, _ = voxelise(from_xyz(points))
     voxels = accumulator.to_map()
     assert voxels.indices.tobytes() == plain.indices.tobytes()
@@ -178,7 +178,7 @@ def test_points_next_to_a_border_are_sampled_in_a_part_beside_it(
             voxels, samples = accumulator.to_map(), accumulator.samples()
             assert voxels.counts.tolist() == [1]
             np.testing.assert_allclose(samples, points, rtol=1e-15, atol=1e-14)
-            # Whichever side it was counted on.
+            # The point may be counted on either side.
             off = np.abs(voxels.centres_W - points)
             assert off.max() <= 0.5 * voxel_size + 2e-9
 
@@ -226,7 +226,7 @@ def test_points_find_their_voxels():
     points = rng.normal(scale=12.0, size=(400, 3))
     voxels, _ = voxelise(from_xyz(points), 5.0)
     occupied = {tuple(index): k for k, index in enumerate(voxels.indices)}
-    # Half of them somewhere else, also out of all bounds.
+    # Half of the points lie elsewhere, some out of all bounds.
     asked = np.concatenate([points, rng.normal(scale=40.0, size=(400, 3))])
     lifted = asked + np.array([0.0, 0.0, 2.5])
     cells = np.floor(lifted / 5.0).astype(int)

@@ -30,7 +30,7 @@ def test_too_many_points_are_thinned_evenly():
     first = thumbnail(points, 1.6, 3)
     assert first.shape == (MAX_POINTS, 3)
     np.testing.assert_array_equal(first, thumbnail(points, 1.6, 3))
-    # Any part from the front covers all quarters.
+    # Any first part of the points covers all quarters.
     quarters = (first[:200, :2] >= 128) @ [2, 1]
     assert np.bincount(quarters, minlength=4).min() > 30
 

@@ -80,7 +80,7 @@ def database(places):
 
 class TestMovedCopies:
     def check(self, X_PQ, points, database, place, lowest, **parameters):
-        """A copy scores highest at its place, and its motion is found."""
+        """A moved copy scores highest at its place, and its motion is found."""
         query = method(**parameters).describe(points)
         scores = method().score(query, database)
         assert np.nanargmax(scores) == place
@@ -106,7 +106,7 @@ class TestMovedCopies:
         self.check(X_PQ, seen_from(X_PQ, scenes[2]), database, 2, 0.9)
 
     def test_leaning(self, scenes, database):
-        """With the public program's axes, keypoints lean, too."""
+        """With the axes of the public program, keypoints lean, too."""
         X_PQ = motion(20.0, [1.3, 0.8, 0.0], tilt=0.15)
         points = seen_from(X_PQ, scenes[0])
         self.check(X_PQ, points, database, 0, 0.9, image_axes="orthogonal")
@@ -147,7 +147,7 @@ class TestCandidates:
         few = method(candidates=2)
         database = few.build_database(chosen)
         scores = few.score(places[0], database)
-        # Equal votes: the first places.
+        # With equal votes the first places are taken.
         assert scores[[0, 2]].tolist() == [1.0, 1.0]
         assert np.isnan(scores[[1, 3]]).all()
         scores = few.score(places[0], database, exhaustive=True)
@@ -193,8 +193,8 @@ class TestSmallClouds:
         assert method().score(places[0], both)[1] == 1.0
 
     def test_posts_without_ground(self):
-        # No two voxels have a plane in common: level, through the first
-        # point. Bits start 1 m below it.
+        # No two voxels share a plane, so the plane is level and through the
+        # first point. Bits start 1 m below it.
         posts = make_scene(0)
         posts = posts[posts[:, 2] > GROUND + 1e-6]
         first = np.array([[0.0, 0.0, GROUND]])

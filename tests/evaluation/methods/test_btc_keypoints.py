@@ -188,7 +188,7 @@ class TestHeightImage:
 
 class TestLeaningAxes:
     def test_image_is_of_the_plane_whatever_the_axes(self):
-        """A post along the normal is one cell, though an axis leans."""
+        """A post along the normal is one cell even if an axis leans."""
         normal = np.array([0.05, 0.3, 1.0]) / np.linalg.norm([0.05, 0.3, 1.0])
         foot = np.array([3.0, -2.0, 0.0])
         points = foot + np.arange(0.05, 3.5, 0.1)[:, None] * normal
@@ -246,8 +246,8 @@ class TestPeaks:
             (7 + down, 7 + right): one,
             (7, 7): 20,
         }
-        # Equal heights: the first of the segment is the one looked at, so
-        # the middle one is raised by none but must be the highest.
+        # Heights are equal: the first of the segment is the one compared, so
+        # the middle one must be the highest without a bonus.
         if one == 20:
             cells[7, 7] = 21
         assert ((7, 7) in self.found(cells)) == stays
@@ -298,7 +298,7 @@ class TestKeypoints:
         image = draw(points @ R.T + center, center, axes)
         found = find_keypoints(image, center, axes, min_heights=10)
         local = (found.positions - center) @ R
-        # The wall is a line, but for its ends.
+        # The wall is a line except at its ends.
         inner = np.abs(local[:, 1]) < 8.0
         assert np.count_nonzero(inner) == 2
         for at, (low, high) in posts.items():
@@ -330,7 +330,7 @@ class TestKeypoints:
         np.testing.assert_array_equal(kept.heights, keypoints.heights[left])
 
     def test_suppressed_ones_suppress(self):
-        # The middle one falls to the last, the first to the middle one.
+        # The last one removes the middle one, and that removes the first.
         positions = [[0, 0, 0], [1.5, 0, 0], [3.0, 0, 0]]
         kept = suppress(self.make(positions, (10, 11, 12)), 2.0, 500)
         assert kept.positions.tolist() == [[3.0, 0.0, 0.0]]

@@ -33,7 +33,7 @@ def moments(points):
 
 
 def is_alike(planes, i, j, normal_limit, distance_limit):
-    """The definition, with differences of normals written out."""
+    """The definition, with explicit differences of normals."""
     n, m = planes.normals[i], planes.normals[j]
     offset = planes.centers[j] - planes.centers[i]
     return (
@@ -190,7 +190,7 @@ class TestMerging:
 
         # D and C found groups with their only neighbours.
         assert merged("ABCD") == [50, 55]
-        # B takes A in first, and C and D follow.
+        # B joins with A first; C and D follow.
         assert merged("DCAB") == [105]
 
 
@@ -225,7 +225,7 @@ class TestBasePlane:
             np.testing.assert_allclose(normal, tilted, atol=1e-9)
 
     def test_merged_twice(self):
-        # Two groups of flat patches, founded apart, are alike as a whole.
+        # Two separate groups of flat patches are alike as groups.
         centers = np.array([[0, 0, 0], [3, 0, 0], [20, 0, 0], [23, 0, 0]])
         angles = [0.06, 0.06, -0.06, -0.06]
         normals = np.array([[0, math.sin(a), math.cos(a)] for a in angles])

@@ -14,7 +14,7 @@ from evaluation.methods.btc_triangles import (
 
 
 def keypoints(*positions):
-    """Returns keypoints on the ground; the heights tell which is which."""
+    """Returns keypoints on the ground, identified by their heights."""
     positions = np.asarray(positions, float).reshape(-1, 2)
     return Keypoints(
         np.column_stack([positions, np.full(len(positions), 0.5)]),
@@ -32,7 +32,7 @@ def triangles(points, num_neighbours=10, side_range=(2.0, 50.0)):
 
 
 def random_triangles(seed, number, low=4.0, high=6.0):
-    """Returns triangles with few different descriptors, and many alike."""
+    """Returns triangles of which many share a descriptor."""
     rng = np.random.default_rng([seed, 52])
     words = rng.integers(1, 1 << 12, 6)
     return Triangles(
@@ -223,7 +223,7 @@ class TestMatch:
             # 0.1: a mean of 0.7 counts.
             ((0x3FF, 0x3FF, 0x3FF << 9), 1),
             ((0x3FF, 0x3FF << 1, 0x3FF << 9), 0),
-            # The mean counts, not each: 0.6 + 0.8 + 0.7.
+            # Only the mean counts: 0.6 + 0.8 + 0.7.
             ((0x3FF << 4, 0x3FF << 2, 0x3FF << 3), 1),
             ((0x3FF << 4, 0x3FF << 3, 0x3FF << 3), 0),
             # For subsets: 2 * 5 / 15, 0.667.

@@ -50,7 +50,7 @@ class TestAlign:
         )
 
     def test_mirrored_triangle_is_turned_over(self):
-        # In the plane it could only be mirrored; in space it can be turned.
+        # In the plane this would need a mirror; in space a turn does it.
         triangle = np.array([[0.0, 0.0, 1.0], [3.0, 0.0, 1.0], [0.0, 4.0, 1.0]])
         X = align(triangle, triangle * [-1.0, 1.0, 1.0])
         np.testing.assert_allclose(
@@ -102,8 +102,8 @@ class TestFindMotion:
     @pytest.mark.parametrize(("offset", "found"), [(2.9, True), (3.1, False)])
     @pytest.mark.parametrize("vertex", range(3))
     def test_every_vertex_must_be_near(self, vertex, offset, found):
-        # Three agree on no motion at all; the fourth triangle is off by one
-        # vertex, as seen from each of them.
+        # The first three agree on no motion. The fourth differs from each of
+        # them by one vertex.
         _, query, _ = self.pairs(5, 4, 0)
         place = query.copy()
         place[3, vertex, 2] += offset

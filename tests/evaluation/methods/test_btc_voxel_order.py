@@ -1,4 +1,4 @@
-"""The order of a hash table, against what the C++ library really does."""
+"""The order of a hash table, against that of the C++ library."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from evaluation.methods.btc_voxel_order import (
     voxel_order,
 )
 
-# Voxel k of these 40, put in one after the other, and their order in a
+# The order of these 40 voxels, inserted one after the other, in a
 # std::unordered_map with the public program's hash (GCC 12.2, x86-64). The
 # table grows twice on the way, at 13 and at 29 elements.
 VOXELS = np.array(
@@ -27,7 +27,7 @@ IN_CPP = [
 
 
 def by_lists(codes):
-    """The same by the rules of the library, element by element."""
+    """The same order by the rules of the library, element by element."""
     num_buckets, entries = 13, []
     for k, code in enumerate(codes):
         if k == num_buckets:
@@ -64,7 +64,7 @@ def test_a_large_table_holds_every_element_once():
     codes = np.random.default_rng(61).integers(0, 10**10, 40_000)
     order = hash_table_order(codes.astype(np.uint64))
     np.testing.assert_array_equal(np.sort(order), np.arange(40_000))
-    # Those of a bucket follow each other, the latest first.
+    # Elements of a bucket follow each other, the latest first.
     bucket = codes[order] % 42043
     same = bucket[1:] == bucket[:-1]
     assert same.sum() == 40_000 - len(np.unique(bucket))

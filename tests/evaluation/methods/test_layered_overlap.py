@@ -1,4 +1,4 @@
-"""Layered overlap: what it counts, by brute force, and what it finds."""
+"""Layered overlap: its counts by brute force, and its poses."""
 
 import math
 
@@ -15,7 +15,7 @@ def method(**parameters) -> LayeredOverlap:
     return make_method("layered-overlap", parameters)
 
 
-# By brute force: no words, no bits, no compiled loops.
+# By brute force: without words of bits, without compiled loops.
 
 
 def cells_by_layers(points, height=1.6):
@@ -177,7 +177,7 @@ class TestLittleToSee:
         chosen = method()
         one = chosen.describe(np.array([[12.3, -4.5, 6.0]]))
         database = chosen.build_database([one])
-        # It coincides with itself, and says little.
+        # A scan of one point coincides with itself, and its score is low.
         assert 0.0 < chosen.score(one, database)[0] < 0.3
 
     def test_layers_that_do_not_count(self):

@@ -1,4 +1,4 @@
-"""MapClosures: what is asked of its package, and what is made of the answer.
+"""MapClosures: the calls of its package, and the use of their results.
 
 The package needs an older NumPy, and is not installed here. A stand-in of its
 interface aligns maps that are turned and shifted copies of each other.
@@ -21,7 +21,7 @@ PACKAGE = "map_closures"
 
 @pytest.fixture(autouse=True)
 def own_registry(monkeypatch):
-    """The method is not known to the tests that follow."""
+    """The tests after this one do not find the method registered."""
     monkeypatch.setattr(registry, "_METHODS", dict(registry._METHODS))
     monkeypatch.delitem(sys.modules, "evaluation.methods.map_closures", False)
 
@@ -113,8 +113,8 @@ def test_inliers_are_scores_and_poses_are_the_querys(method):
         X_PQ = method.relative_pose(query, database, place)
         np.testing.assert_allclose(X_PQ @ X_QP, np.eye(4), atol=1e-9)
         assert method.relative_pose(query, database, 0) is None
-    # Three places, three queries; asking for poses adds none. Queries are
-    # aligned with places only, and places with nothing.
+    # There are three places and three queries; poses need no further map.
+    # Queries are aligned with places only, and places with nothing.
     assert len(database.program.maps) == 6
     assert database.program.aligned == 3 * 3
     assert database.program.config.density_threshold == 0.1

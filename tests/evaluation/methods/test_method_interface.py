@@ -1,4 +1,4 @@
-"""What a method may ask for beyond the coordinates of one scan."""
+"""Inputs of methods beyond the coordinates of one scan."""
 
 from helpers.drive_files import make_scan, write_recording, yaw_pose
 import numpy as np
@@ -13,7 +13,7 @@ from evaluation.sequences import open_sequence
 
 
 def record(folder, heights, y=0.0):
-    """Drives along x, 10 m a frame; the scan shows a point of that height."""
+    """Drives along x, 10 m a frame; a scan shows a point at height x."""
     scans = [
         make_scan(np.array([[5.0, 0.0, height], [9.0, 1.0, 0.0]]))
         for height in heights
@@ -137,7 +137,7 @@ def test_queries_before_are_known(drives):
 
 
 class TwoStages(Highest):
-    """A second stage that prefers what the first one likes less."""
+    """A second stage that reverses the order of the first one."""
 
     rerank_best = 3
 

@@ -40,7 +40,7 @@ def test_coarse_maps():
 
 
 def test_first_search():
-    # More than stand side by side.
+    # More numbers than are handled side by side.
     query, places = some_cells(2), [some_cells(k) for k in range(20, 30)]
     turned = turns(3)
     shifts = np.array([(r, c) for r in range(3) for c in range(3)])
@@ -65,7 +65,8 @@ def test_first_search():
                         )
                         for scan, t in ((query, turn), (place, turned[0]))
                     )
-                    # The map's rows were shifted the other way round.
+                    # The rows of the map were shifted in the opposite
+                    # direction.
                     common = shifted(a, right, up) & b
                     total += (1 if group[0] < 3 else 2) * common.sum()
                 totals.append(total)
@@ -144,7 +145,7 @@ def test_last_search_counts_cells_that_meet_neighbours():
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
 def test_full_maps(share):
-    # Every carry of the sums, up to the greatest count there is.
+    # The sums have every carry, up to the greatest possible count.
     rng = np.random.default_rng(5)
 
     def maps(*shape):

@@ -1,4 +1,4 @@
-"""Methods of one's own, from a file."""
+"""A user's own methods, from a file."""
 
 import json
 
@@ -12,7 +12,7 @@ from evaluation.methods.own_file import load_method
 
 
 def shown_method(folder):
-    """Saves the method that the documents show, as a file of a name."""
+    """Saves the method of the documents to a file."""
     blocks = documents.fenced(documents.read("docs/how-to/own_method.md"))
     (example,) = (block.text for block in blocks if "@register" in block.text)
     path = folder / "shown_heights.py"
@@ -21,7 +21,7 @@ def shown_method(folder):
 
 
 def test_the_method_in_the_documents(capsys, towns, tmp_path, monkeypatch):
-    # Others need not know of it.
+    # Other tests do not find the method registered.
     monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
     path = shown_method(tmp_path)
     assert len(path.read_text().splitlines()) < 40

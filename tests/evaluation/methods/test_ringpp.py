@@ -9,7 +9,7 @@ from evaluation.methods.radon import radon
 from evaluation.methods.ringpp import RingPlusPlus, _normalise
 
 CELL = 140.0 / 120.0
-# No pair can be nearer than this: see `test_no_pair_is_nearer`.
+# Least possible distance of a pair, see `test_no_pair_is_nearer`.
 NEAREST = 1.0 - 1.0 / (0.15 * math.sqrt(120.0))
 
 
@@ -85,7 +85,7 @@ class TestBev:
         assert image[68, 68, 5] == pytest.approx(0.1**2)
 
     def test_shape_is_described_in_scaled_coordinates(self):
-        # As wide as high, once 70 m are one and 10 m are one.
+        # The scene is as wide as high in units of 70 m and 10 m.
         a, b = 0.7, 0.1
         scan = np.array(
             [
@@ -137,7 +137,7 @@ class TestBev:
 
 class TestScore:
     def test_against_the_definition(self):
-        """All at full length, one pair, one shift after the other."""
+        """The definition is computed in full: each pair, each shift."""
         n = 12
         method = ring(cells=n)
         scans = [make_scene(seed) for seed in (3, 4)]

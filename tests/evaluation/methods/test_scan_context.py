@@ -67,7 +67,7 @@ class TestPolarContext:
             (41.0, 179.9, 10, 29),
             (41.0, -179.9, 10, 30),
             (79.9, -0.1, 19, 59),
-            # What is beyond the last ring counts there.
+            # Points beyond the last ring count in the last ring.
             (80.1, 200.0, 19, 33),
             (140.0, 200.0, 19, 33),
         ],
@@ -128,7 +128,8 @@ class TestCartContext:
     @pytest.mark.parametrize(
         ("x", "y", "row", "column"),
         [
-            # Cells count outwards: those at the axes are twice as large.
+            # Numbers of cells are rounded towards zero: cells at the axes are
+            # twice as large.
             (0.1, 0.1, 20, 20),
             (-4.9, -1.9, 20, 20),
             (5.0, -2.0, 21, 19),
@@ -204,7 +205,7 @@ def test_key_shift_of_a_rolled_key():
 @pytest.mark.parametrize("turns", [0, 1, 7, 30, 59])
 def test_turning_by_whole_sectors_changes_nothing(turns):
     m = method(variant="polar")
-    # Thinning has a grid of its own; here it must not get in the way.
+    # Thinning has its own grid, which must not matter here.
     coarse = method(variant="polar", voxel_size=1e-3)
     scene = make_scene(1)
     query, place = (
@@ -239,7 +240,7 @@ def test_relative_pose_of_a_turned_sensor(yaw_deg):
 def test_augmented_place_knows_its_neighbouring_lanes(side):
     scene = make_scene(4)
     m, plain = method(), method(variant="polar")
-    # The query stands to one side: what it sees moves to the other.
+    # The query's sensor is moved to one side; its points move to the other.
     query = m.describe(scene - [0.0, side, 0.0])
     database = m.build_database(
         [m.describe_place(make_scene(5)), m.describe_place(scene)]
@@ -260,7 +261,7 @@ def test_augmented_place_knows_its_neighbouring_lanes(side):
 @pytest.mark.parametrize("lanes", [-3, 0, 2])
 def test_cart_context_finds_the_lane(lanes):
     m = method(variant="cart")
-    # Away from the axes, where the cells are regular.
+    # Cells away from the axes are regular.
     scene = make_scene(6)
     scene = scene[(np.abs(scene[:, 1]) > 10) & (np.abs(scene[:, 1]) < 28)]
     offset = 2.0 * lanes

@@ -74,7 +74,7 @@ class TestDescribe:
         assert azimuths[0] + azimuths[59] == 1.0
 
     def test_weights_are_scaled_counts(self):
-        # Three elevations of four: 4, 2 and 1 points, least none.
+        # Three of four elevations have 4, 2 and 1 points, the lowest has none.
         config = {"elevations": 4, "lowest_deg": -20.0, "highest_deg": 20.0}
         near = [at(10.0, 1.0 + 30.0 * i, -15.0) for i in range(4)]
         middle = [at(21.0, 1.0 + 30.0 * i, -5.0) for i in range(2)]
@@ -111,7 +111,7 @@ class TestDescribe:
         np.testing.assert_array_equal(inside.ranges, outside.ranges)
 
     def test_range_limits(self):
-        # In three dimensions, both limits excluded.
+        # Distances are in three dimensions, with both limits excluded.
         kept = [[3.001, 0.0, 0.0], [0.0, 79.0, 12.0]]
         dropped = [
             [3.0, 0.0, 0.0],

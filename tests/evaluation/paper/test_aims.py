@@ -1,4 +1,4 @@
-"""The aims, judged on the paper's own numbers and on ones beside them."""
+"""The aims, judged on the paper's numbers and on numbers near them."""
 
 from types import SimpleNamespace
 
@@ -71,7 +71,7 @@ def test_who_is_best_and_near():
     found = aims(make_results(falls), make_changes())
     assert found[1].verdict == MISSED
     assert found[1].evidence.startswith("It is so on 8. ")
-    # Eight of ten are as near as can be.
+    # Eight of ten differences are 0.
     assert found[2].verdict == MET
     assert [one.verdict for one in found[3:]] == [MET] * 3
 

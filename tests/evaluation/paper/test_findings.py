@@ -19,7 +19,10 @@ def asked(method):
 
 
 def make_results(city="metropolis", **aucs):
-    """Returns one result a method and pair; pairs are 01, 02, ... -> 09."""
+    """Returns a result for each method and pair; pairs are 01, 02, ...
+
+    -> 09.
+    """
     return [
         SimpleNamespace(
             pair=(city, f"{i + 1:02d}", "09"),
@@ -128,7 +131,7 @@ def test_trend():
 
 
 def test_trends_of_the_paper():
-    # Its Table II, computed by hand of ranks: only RING++ gets worse.
+    # By hand from the ranks of Table II: only RING++ gets worse.
     assert paper_trend("ring++").rho < 0
     assert paper_trend("btc").rho > 0.5
     assert paper_trend("scan-context++").rho > 0

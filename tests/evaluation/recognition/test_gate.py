@@ -25,7 +25,7 @@ FULL, NONE = (1.0 - SOFTNESS) * RADIUS, (1.0 + SOFTNESS) * RADIUS
 
 
 class Far(Method):
-    """Has places at distances that its database states; None: no pose."""
+    """Has places at the distances in its database; None is no pose."""
 
     name = "far"
     Config = MethodConfig
@@ -60,11 +60,11 @@ def test_the_ramp():
     assert weight[3] == pytest.approx(0.5)
     assert 0.0 < weight[4] < 1e-8
     assert weight[5:].tolist() == [0.0, 0.0]
-    # A straight line between: a quarter of the way is a quarter less.
+    # The weight falls linearly: a quarter of the way takes a quarter.
     assert gate_weight(FULL + 0.25 * (NONE - FULL), RADIUS) == pytest.approx(
         0.75
     )
-    # Lengths in other units change nothing.
+    # Other units of length change nothing.
     np.testing.assert_allclose(
         gate_weight(1e3 * np.array(distances), 1e3 * RADIUS), weight, atol=1e-9
     )
@@ -134,7 +134,7 @@ def test_too_few_poses_are_refused():
 
 
 class Line(Method):
-    """Scans show where they are; scores prefer places farther on."""
+    """Scans contain their position; scores prefer places farther on."""
 
     name = "line"
     Config = MethodConfig
@@ -165,13 +165,13 @@ def test_a_pair_of_drives(tmp_path):
     assert free.metrics.recall_at_1 == 0.0
     shut = run(database, query, Line(), protocol=RetrievalProtocol(gate=True))
     assert shut.metrics.recall_at_1 == 1.0
-    # Each is answered by the farthest place that counts: 4 m ahead; one 9 m
-    # ahead is rejected.
+    # The best place of each query is the farthest one that counts: 4 m ahead;
+    # one 9 m ahead is rejected.
     np.testing.assert_allclose(_offsets(shut), 4.0)
     assert not np.isnan(free.retrieval.scores).any()
     far = shut.retrieval.distances >= 7.5 * (1.0 + SOFTNESS)
     assert np.isnan(shut.retrieval.scores[far]).all()
-    # A wider radius lets places 9 m ahead in.
+    # A wider radius accepts places 9 m ahead.
     wide = RetrievalProtocol(gate=True, radius=10.5)
     np.testing.assert_allclose(
         _offsets(run(database, query, Line(), protocol=wide)), 9.0
@@ -179,7 +179,7 @@ def test_a_pair_of_drives(tmp_path):
 
 
 def _offsets(outcome):
-    """Returns how far the best place of each query is."""
+    """Returns the distance of each query's best place."""
     found = outcome.retrieval
     rows = np.arange(len(found.query_frames))
     return found.distances[rows, found.best_places]
@@ -208,7 +208,7 @@ def test_the_option_of_pr_and_scores(capsys, towns, tmp_path):
     free, shut, wide = tables
     assert wide == free
     assert shut != free
-    # What is rejected is empty; what is near keeps its score.
+    # A rejected place has no score; a near one keeps its score.
     assert "" in shut
     assert any(
         one and one == other for one, other in zip(free, shut, strict=True)

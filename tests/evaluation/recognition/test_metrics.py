@@ -13,8 +13,8 @@ NAN = np.nan
 def outcomes_of(rows):
     """Makes outcomes of (best score, is right, has a match) for each query.
 
-    The database has three places. The first gets the best score; the truth
-    is put there, or else on the third, which comes last.
+    The database has three places. The first gets the best score. The match is
+    the first one, or else the third, whose score is the least.
     """
     scores, matches = [], []
     for best, is_right, has_match in rows:
@@ -135,7 +135,7 @@ def test_tied_places_rank_in_the_order_of_the_database():
 
 @pytest.mark.parametrize("right", [0, 1, 2, 3])
 def test_the_worst_candidate_is_before_what_is_none(right):
-    # By hand: 2 and 3 are candidates, though as bad as can be; 0, 1 are none.
+    # By hand: 2 and 3 are candidates with the worst score; 0 and 1 are none.
     scores = np.array([[NAN, NAN, -math.inf, -math.inf]])
     matches = np.arange(4)[None] == right
     outcomes = judge(scores, matches)
@@ -257,7 +257,8 @@ def test_bootstrap_intervals():
     assert metrics.recall_at_1_interval == again.recall_at_1_interval
     assert metrics.auc_interval == again.auc_interval
     assert evaluate(outcomes, seed=4).auc_interval != metrics.auc_interval
-    # A part r of n: 1.96 standard deviations, to the noise of 1000 samples.
+    # For a part r of n: 1.96 standard deviations, up to the noise of 1000
+    # samples.
     r = metrics.recall_at_1
     half = 1.96 * math.sqrt(r * (1.0 - r) / 200)
     interval = metrics.recall_at_1_interval

@@ -1,4 +1,4 @@
-"""Overlap of scans: closed forms, and rooms that are seen as a whole."""
+"""Overlap of scans: closed forms, and rooms that are wholly visible."""
 
 import csv
 import json
@@ -17,7 +17,7 @@ from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.recognition.seen_surfaces import TOLERANCE, SeenSurfaces
 from evaluation.sequences import open_sequence
 
-# Beams of a degree, that miss the borders of cells.
+# Beams are a degree apart and miss the borders of cells.
 AZIMUTH, ELEVATION = np.radians(
     np.meshgrid(np.arange(-179.7, 180.0), np.arange(-44.7, 45.0))
 )
@@ -53,7 +53,7 @@ def test_what_is_hidden_or_not_there_is_not_shown():
     assert seen.share_of(np.vstack([10.0 * BEAMS, 5.0 * few])) == pytest.approx(
         0.75, abs=1e-3
     )
-    # Above the field of view, nothing is known.
+    # Surfaces above the field of view are unknown.
     assert seen.share_of(np.array([[0.5, 0.0, 10.0]])) == 0.0
 
 
@@ -64,9 +64,9 @@ def test_nothing():
 
 
 def walls_scan(p_WS, yaw, screens):
-    """Returns what a sensor sees of walls at y = 10 and y = -10, |x| < 10.
+    """Returns a sensor's points on walls at y = 10 and y = -10, |x| < 10.
 
-    Screens hide, at y = 5 and y = -5, all that is right of x = 2 there.
+    Screens at y = 5 and y = -5 hide all beyond x = 2.
     """
     turn = np.array(
         [
@@ -88,8 +88,8 @@ def walls_scan(p_WS, yaw, screens):
 
 @pytest.mark.parametrize("yaw", [0.0, 0.7, -2.0])
 def test_two_walls_of_which_half_is_seen(yaw):
-    # The query sees both from the origin, in 90 deg of azimuth each; the
-    # place stands 2 m farther on, and sees of both what lies before x = 2.
+    # The query sees both walls from the origin, in 90 deg of azimuth each. The
+    # place is 2 m farther on, and sees of both the part before x = 2.
     query = walls_scan(np.zeros(3), 0.0, False)
     place = np.array([2.0, 0.0, 0.0])
     seen = SeenSurfaces.of(walls_scan(place, yaw, True))
@@ -105,7 +105,7 @@ def test_two_walls_of_which_half_is_seen(yaw):
 
 
 def room_scan(X_WS, half):
-    """Returns what a sensor sees of the walls of a room about the origin."""
+    """Returns a sensor's points on the walls of a room about the origin."""
     d_W = BEAMS @ X_WS[:3, :3].T
     with np.errstate(divide="ignore"):
         times = (np.sign(d_W) * half - X_WS[:3, 3]) / d_W
@@ -137,7 +137,7 @@ def test_one_room_is_seen_as_a_whole_from_anywhere(rooms):
     protocol = RetrievalProtocol(query_spacing=5.0)
     found = overlap_matrix(*map(open_sequence, rooms), protocol)
     assert found.shape == (3, 3)
-    # But for what is above or below the other's field of view.
+    # Only parts above or below the other's field of view are missing.
     assert found[:2, :2].min() > 0.85
     assert found[2, 2] > 0.85
     # Its walls are 10 or 20 m behind those of the smaller room.

@@ -1,4 +1,4 @@
-"""Pose errors against turns and moves that are known."""
+"""Pose errors against given turns and moves."""
 
 from helpers.drive_files import make_scan, write_recording, yaw_pose
 import numpy as np
@@ -47,7 +47,7 @@ def make_outcomes(scores, right, matched):
 
 
 def test_metrics_of_hand_made_queries():
-    # Accepted at the greatest F1 are the best four, of which one is wrong.
+    # At the greatest F1 the best four are accepted; one of these is wrong.
     outcomes = make_outcomes(
         [0.9, 0.8, 0.7, 0.6, 0.1, np.nan],
         [True, True, False, True, False, False],
@@ -83,7 +83,7 @@ def test_a_method_without_poses():
 
 
 class Poses(Method):
-    """Scans hold their own pose, so that it knows what is true."""
+    """Scans contain their own pose, from which the method gets the truth."""
 
     name = "poses"
     Config = MethodConfig

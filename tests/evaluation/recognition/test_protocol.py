@@ -1,4 +1,4 @@
-"""What is asked, and what counts, is the user's."""
+"""The user chooses queries, places and matches."""
 
 from helpers.drive_files import make_scan, write_recording, yaw_pose
 import numpy as np
@@ -17,7 +17,7 @@ from evaluation.sequences import open_sequence
 
 
 class Means(Method):
-    """Compares the means of clouds; a quick search knows few places."""
+    """Compares the means of clouds; a quick search finds few places."""
 
     name = "means"
     Config = MethodConfig
@@ -61,7 +61,7 @@ def test_spacing_of_queries_and_places(drives):
 @pytest.mark.parametrize(("radius", "number"), [(0.5, 1), (0.499, 0), (5.5, 3)])
 def test_radius_includes_its_limit(drives, radius, number):
     found = retrieve(*drives, Means(), RetrievalProtocol(radius=radius))
-    # The query at 10.5 m, of places that lie 5 m apart.
+    # The query is at 10.5 m, and places are 5 m apart.
     assert found.matches[1].sum() == number
 
 
@@ -97,19 +97,19 @@ def test_scans_are_merged_for_every_method(drives):
 
 
 def test_a_drive_against_itself(tmp_path):
-    # There and back again: 40 m in 41 frames of 50 ms each way.
+    # There and back: 40 m in 41 frames of 50 ms each way.
     there = np.arange(0.0, 41.0)
     drive = record(tmp_path / "loop", np.concatenate([there, there[::-1]]))
     protocol = RetrievalProtocol(exclude_recent=0.5)
     found = retrieve(drive, drive, Means(), protocol)
     age = (found.query_frames[:, None] - found.database_frames) * 0.05
     assert np.isnan(found.scores[age < 0.5 - 1e-9]).all()
-    # Every known place has a score, not only a search's best ones.
+    # Each candidate has a score, not only the best ones of a search.
     assert not np.isnan(found.scores[age >= 0.5 - 1e-9]).any()
     near = found.distances <= 7.5
     np.testing.assert_array_equal(found.matches, near & (age >= 0.5 - 1e-9))
     outcome = run(drive, drive, Means(), protocol=protocol)
-    # All queries of the way back, but those just after the turn.
+    # These are all queries of the way back except those just after the turn.
     assert outcome.metrics.num_with_match in (3, 4)
     assert outcome.metrics.recall_at_1 == 1.0
     with pytest.raises(InputError, match=r"loop: never within 7.5 m of where"):
@@ -149,5 +149,5 @@ def test_the_gate_is_said():
     assert "With the gate" in shut.to_text()
     assert (open_gate.gate_radius, shut.gate_radius) == (None, 7.5)
     assert protocol_values(shut)[PROTOCOL_COLUMNS.index("gate")] == 1
-    # What a drive is described by does not depend on it.
+    # Descriptions of a drive do not depend on this option.
     assert shut.described() == open_gate.described()

@@ -16,7 +16,7 @@ HEADER = ("map", "db", "query", "method", "correct", "has_match", "score")
 def write_report(folder, pairs, number=200):
     """Writes a report in which all scores of a method are equal.
 
-    Then its AUC is the part of its answers that is right.
+    AUC is then the part of its best places that are right.
 
     Args:
         folder: to write.
@@ -37,7 +37,7 @@ def write_report(folder, pairs, number=200):
 
 
 def counted_tau(first, second):
-    """Pairs in the same order, less those in the other, as a part of all."""
+    """Pairs in the same order less those in the opposite, over all pairs."""
     signs = [
         np.sign((one - other) * (second[i] - second[k]))
         for (i, one), (k, other) in itertools.combinations(enumerate(first), 2)
@@ -68,7 +68,7 @@ def test_equal_and_opposite_rankings(tmp_path):
     assert rank_agreement(up, up).tau == pytest.approx(1.0)
     found = rank_agreement(up, down)
     assert found.tau == pytest.approx(-1.0)
-    # Far apart, no sample turns two of them round.
+    # The values are far apart, so no sample swaps two of them.
     assert found.interval.low == found.interval.high == pytest.approx(-1.0)
 
 
@@ -77,8 +77,8 @@ def test_close_methods_leave_it_open(tmp_path):
     one = write_report(tmp_path / "one", wide, number=100)
     other = write_report(tmp_path / "other", {"02": (0.9, 0.7, 0.4, 0.1)})
     found = rank_agreement(one, other)
-    # Whatever one method answers rightly, so do the better ones: no sample
-    # turns two of them round, but some hold no query that tells them apart.
+    # Queries that one method gets right, the better ones get right too. No
+    # sample swaps two methods, but some have no query on which they differ.
     assert found.interval.low == found.tau == pytest.approx(-1.0)
     assert -0.95 < found.interval.high < 0.0
     assert found.to_json()["kendall_tau"] == found.tau

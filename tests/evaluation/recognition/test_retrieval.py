@@ -36,12 +36,11 @@ def test_frames_along_a_line():
 
 
 def test_length_counts_along_the_path_not_across():
-    # Round a square of 10 m: the second time a corner is near, 40 m are
-    # behind.
+    # The route is a square of 10 m: before a corner's second visit lie 40 m.
     corners = np.array([[0, 0, 0], [10, 0, 0], [10, 10, 0], [0, 10, 0]])
     positions = np.concatenate([corners, corners]).astype(float)
     assert sample_frames(positions, 20.0).tolist() == [0, 2, 4, 6]
-    # In three dimensions.
+    # Distances are in three dimensions.
     steep = np.array([[0, 0, 3.0 * i] for i in range(8)])
     assert sample_frames(steep, 10.0).tolist() == [0, 4, 7]
 
@@ -89,7 +88,7 @@ class OddOneOut(Method):
 
 
 def record_line(folder, xs, **options):
-    """Drives along x; the scan at x shows one point, x high."""
+    """Drives along x; the scan at x shows one point at height x."""
     scans = [make_scan(np.array([[5.0, 0.0, float(x)]])) for x in xs]
     X_WBs = [yaw_pose(x, 0.0, 0.0, 0.0) for x in xs]
     return open_sequence(write_recording(folder, scans, X_WBs, **options))
@@ -106,7 +105,7 @@ def test_retrieval_from_two_drives(tmp_path):
     np.testing.assert_allclose(
         result.distances, np.abs(queries[:, None] - places)
     )
-    # The limit of 7.5 m: 33 m is 8 m from the last but one place.
+    # The limit is 7.5 m: 33 m is 8 m from the last but one place.
     assert result.matches.sum(axis=1).tolist() == [3, 3, 3, 1, 0]
     np.testing.assert_allclose(
         result.scores[:, :-1],
@@ -177,7 +176,7 @@ def test_metrics_of_a_pair(tmp_path):
     query = record_line(tmp_path / "b", np.arange(3.0, 44.0, 5.0))
     result = run(database, query, OddOneOut())
     values = result.to_json()
-    # Query at 43 m has no match, that at 33 m only the place left out.
+    # The query at 43 m has no match; that at 33 m has only the omitted place.
     assert values["queries"] == 5
     assert values["queries_with_match"] == 4
     assert values["true_positives"] == 3

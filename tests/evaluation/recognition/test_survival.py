@@ -9,7 +9,7 @@ from evaluation.recognition.survival import Kept, paired_intervals
 
 
 def outcomes(is_right, has_match=None):
-    """Outcomes with equal best scores: then AUC is R@1."""
+    """Outcomes with equal best scores, whose AUC is R@1."""
     right = np.array(is_right, dtype=bool)
     match = np.ones(len(right), bool) if has_match is None else has_match
     return QueryOutcomes(
@@ -22,16 +22,16 @@ def outcomes(is_right, has_match=None):
 
 
 def test_the_same_queries_are_drawn_with_and_without_the_change():
-    # Half of them are right, and the change does nothing: whichever queries
-    # a sample holds, all is kept.
+    # Half of the queries are right and the change has no effect: every sample
+    # keeps all.
     right = np.arange(40) % 2 == 0
     for interval in paired_intervals(outcomes(right), outcomes(right)):
         assert (interval.low, interval.high) == (1.0, 1.0)
 
 
 def test_intervals_of_a_binomial():
-    # All are right without the change: what a sample keeps is how many it
-    # holds of those that still are.
+    # All are right without the change: a sample keeps the part of its queries
+    # that are still right.
     number, kept = 60, 45
     changed = outcomes(np.arange(number) < kept)
     low, high = binom.ppf([0.025, 0.975], number, kept / number) / number
@@ -42,11 +42,11 @@ def test_intervals_of_a_binomial():
 
 
 def test_pairs_are_closer_than_their_parts():
-    # Every query that is still right was right before; of 80, 40 and 36.
+    # Each query that is still right was right before: 36 of 40, of 80 in all.
     before = outcomes(np.arange(80) < 40)
     after = outcomes(np.arange(80) < 36)
     for interval in paired_intervals(before, after):
-        # Given 40 right ones in a sample, 36 of them on average are kept.
+        # A sample with 40 right ones keeps 36 of them on average.
         low, high = binom.ppf([0.025, 0.975], 40, 0.9) / 40
         assert interval.low == pytest.approx(low, abs=0.05)
         assert interval.high == pytest.approx(high, abs=0.05)

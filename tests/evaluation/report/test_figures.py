@@ -47,7 +47,7 @@ def test_view_from_above_shows_the_route_and_60_m_around():
     np.testing.assert_allclose([left, right], [340.0, 560.0], atol=2.0)
     assert bottom <= 3.0 <= top
     assert picture.project(positions)[:, 0].tolist() == [400.0, 500.0]
-    # Without a point in sight the whole map is shown.
+    # Without a point in view the whole map is shown.
     far = top_view(line, positions + np.array([0.0, 500.0, 0.0]))
     assert far.extent[1] > 990.0
 
@@ -79,7 +79,7 @@ def test_no_line_through_fewer_than_five_points(
             results, changes, tmp_path / "auc", reference_for({city})
         )
     for figure, has_line in zip(drawn, (False, True), strict=True):
-        # The paper's own table has ten pairs, and stands beside its cities.
+        # The paper's table has ten pairs, and is shown beside its cities.
         assert len(figure.axes) == panels
         styles = [line.get_linestyle() for line in figure.axes[0].lines]
         assert ("--" in styles) is has_line
@@ -102,7 +102,7 @@ def test_points_of_pictures_know_their_voxels():
 
 @pytest.mark.parametrize("side", [-np.inf, 0.0, np.inf])
 def test_points_on_a_border_know_a_voxel_beside_it(side):
-    """Also where the one that they seem to lie in has no point."""
+    """This holds even if the voxel that seems to contain them is empty."""
     indices = np.array([[-9, 0, 0], [2, 4, 3], [2, 4, 5], [9, 9, 9]], np.int32)
     coarse = VoxelMap(indices, indices * 5.0, np.ones(4, np.int64), 5.0)
     low, high = indices[1] * 5.0 + [0.0, 0.0, -2.5], coarse.centres_W[1] + 2.5

@@ -59,7 +59,7 @@ def part(number, kept):
 
 @pytest.fixture(scope="module")
 def climbed():
-    """From 60 queries, 45 survive snow and 30, then 15 survive works."""
+    """Snow leaves 45 of 60 queries, and works leave 30, then 15."""
     return [
         measured(
             cause,
@@ -82,8 +82,8 @@ def climbed():
 
 
 def test_the_share_of_auc_that_is_kept(climbed):
-    # All scores are equal: at the only threshold nothing is rejected, and AUC
-    # is the precision there.
+    # All scores are equal: the only threshold rejects nothing, and AUC is its
+    # precision.
     found = {
         (row.rung.cause, row.rung.level): row
         for row in ladder_rows(climbed, 7.5)
@@ -111,7 +111,7 @@ def test_draws_are_averaged(climbed):
 
 
 def test_every_number_follows_from_the_queries(climbed):
-    """AUC is counted by hand: the precision at the only threshold."""
+    """AUC is computed by hand: the precision at the only threshold."""
     rows = list(
         csv.DictReader(
             io.StringIO(
@@ -149,7 +149,7 @@ def test_every_number_follows_from_the_queries(climbed):
 
 
 def test_what_is_wrong_with_each_answer():
-    """Each kind of fault once, and two right answers."""
+    """Each kind of fault occurs once, and two best places are right."""
     one = answered("btc", False, [1, 1, 0, 0, 0, 0, 0])
     one.outcomes.has_match[2] = False
     one.match_frames[3] = -1
@@ -167,8 +167,8 @@ def test_what_is_wrong_with_each_answer():
     rungs = [measured("none", 0, [before]), measured("snow", 1, [one])]
     _, row = ladder_rows(rungs, 7.5)
     assert (row.lost, row.found) == (2.0, 1.0)
-    # The first three of the seven shares of 0.2 to 0.8 are below a half, and
-    # the third of these is wrong.
+    # Three of the seven shares of 0.2 to 0.8 are below a half; the third has a
+    # wrong best place.
     assert (row.hidden, row.overlap) == (1.0, pytest.approx(0.5))
     assert set(row.faults.values()) == {1.0}
 
@@ -178,7 +178,7 @@ def test_the_words_name_the_worst_cause(climbed):
     assert "SOLiD loses most by works (much works), which leaves 28 %" in text
     assert "and keeps 0 % (0 to 0) under all causes together" in text
     assert "No cause leaves 95 % or more to every method" in text
-    # With the gate 6 more of 60 are right: 6 of 60 instead of none.
+    # With the gate 6 of 60 are right instead of none.
     assert "With the gate, SOLiD under all keeps 10 % instead of 0 %;" in text
     text = ladder_text(ladder_rows([climbed[0], climbed[-1]], 7.5))
     assert "SOLiD keeps 0 % (0 to 0) under all causes together" in text

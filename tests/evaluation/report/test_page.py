@@ -29,7 +29,7 @@ def text(content, tmp_path_factory):
 
 def test_page_stands_alone(text):
     assert "{{" not in text
-    # No address but those within the page and of XML's names.
+    # The only addresses are those within the page and XML's names.
     sources = re.findall(r'(?:src|href)="([^"]*)"', text)
     assert sources
     assert all(s.startswith(("data:", "#")) for s in sources)
@@ -39,7 +39,7 @@ def test_page_stands_alone(text):
 def test_links_lead_to_sections(text):
     links = re.findall(r'<a href="#(\w+)">', text)
     assert links == [
-        # At the top, and among all.
+        # It is at the top, and among all tables.
         "browser",
         "survival", "summary", "maps", "change", "recognition", "figures",
         "browser",
@@ -50,8 +50,8 @@ def test_links_lead_to_sections(text):
 def test_survival_comes_first(text):
     section = text[text.index('<section id="survival">') :]
     section = section[: section.index("</section>")]
-    # The one pair that has a control, by hand: of four queries with a place
-    # two are right with the change, four without.
+    # One pair has a control. By hand: of four queries with a match two are
+    # right with the change, four without.
     body = section[section.index("The same of R@1") :]
     row = re.search(
         r"Scan Context\+\+</th><td>(.*?)</td><td>(.*?)</td><td><b>(.*?)</b>",
@@ -85,7 +85,7 @@ def test_recordings_are_linked(tmp_path):
     content = make_content(tmp_path, pages=PAGES)
     write_page(tmp_path / "report.html", content)
     text = (tmp_path / "report.html").read_text()
-    # In the summary and with the map; the browser makes its own.
+    # The picture is in the summary and with the map; the browser draws its own.
     address = "../pages/metropolis_04.html?a=1&amp;b"
     assert text.count(f'<a href="{address}">') == 2
     data = browser_data(content.recognitions, content.drives, {}, PAGES, {})
@@ -125,7 +125,7 @@ def test_reasons_are_offered_and_counted(text):
     assert re.findall(r'value="(\w*)"', choice) == ["", *FAULT_KINDS]
     section = text[text.index("Why best places are wrong") :]
     row = re.search(r"<tr>.*?Scan Context\+\+.*?</tr>", section, re.S).group()
-    # Three wrong ones: a twin, no candidate, no place.
+    # Three are wrong: a twin, no candidate, no place.
     assert re.findall(r"(\d+) %", row) == ["33", "33", "33"]
 
 
@@ -151,7 +151,7 @@ def test_route_from_red_to_blue(content):
         [tuple(map(float, p.split(","))) for p in points.split()]
         for *_, points in pieces
     ]
-    # Each begins where the one before ended; y points down.
+    # Each piece begins at the end of the one before; y points down.
     assert all(a[-1] == b[0] for a, b in itertools.pairwise(lines))
     assert lines[0][0] == (0.0, -2.0)
     assert lines[-1][-1] == (100.0, -2.0)
@@ -181,6 +181,6 @@ def test_page_without_recognition_has_no_browser(content, tmp_path):
     text = (tmp_path / "report.html").read_text()
     assert "Queries, one by one" not in text
     assert '<script type="application/json" id="data">null</script>' in text
-    # Drives are shown all the same, each under its own name.
+    # Drives are shown nevertheless, each under its own name.
     assert "<h3>metropolis_01</h3>" in text
     assert re.findall(r'<a href="#(\w+)">', text) == ["summary", "maps"]

@@ -49,7 +49,7 @@ def reader(browser, address):
 
 
 def shown(browser, *state):
-    """Returns when pair, method, query and rank have been drawn."""
+    """Waits until pair, method, query and rank have been drawn."""
     text = "/".join(map(str, state))
     browser.wait_for(f'document.body.dataset.shown === "{text}"')
 
@@ -66,10 +66,10 @@ def choose(browser, name, value):
 
 
 def on_map(browser, content, x, y):
-    """Returns where a place in the world [m] is on the canvas of the map.
+    """Returns the canvas position of a place in the world [m].
 
-    What is shown is the database's map and 10 m about the query's route, in
-    the middle and as large as fits.
+    The canvas shows the database's map and 10 m about the query's route,
+    centred and as large as fits.
     """
     size = browser.evaluate(
         '[byId("map").clientWidth, byId("map").clientHeight]'
@@ -91,7 +91,7 @@ def test_page_fits_its_screen(browser, address, size, scheme):
     width = browser.evaluate("document.scrollingElement.scrollWidth")
     assert width <= size[0]
     assert browser.complaints == []
-    # Nothing reaches out but what scrolls by itself.
+    # Only elements that scroll by themselves are wider than the page.
     assert not browser.evaluate(
         """[...document.querySelectorAll("body *")].filter((one) =>
           one.getBoundingClientRect().right > innerWidth + 1 &&
@@ -166,7 +166,7 @@ def test_slider_and_keys(reader):
     )
     shown(reader, 0, 0, 4, 0)
     assert "no true place" in status(reader)
-    # At the end it stays.
+    # At the last query it stays there.
     reader.press("ArrowRight")
     reader.evaluate('byId("next").click()')
     assert reader.evaluate("state.query") == 4
@@ -211,7 +211,7 @@ def test_only_wrong_ones(reader):
     assert reader.evaluate('byId("filtered").value') == "1 of 5"
     reader.press("ArrowRight")
     assert reader.evaluate("state.query") == 1
-    # Another query is wrong by the other method.
+    # The other method is wrong on another query.
     choose(reader, "method", "1")
     shown(reader, 0, 1, 3, 0)
     assert "RING++: wrong" in status(reader)
@@ -255,7 +255,7 @@ def test_verdicts_of_all_methods(reader):
     reader.evaluate('byId("all-methods").querySelectorAll("button")[1].focus()')
     reader.press(" ")
     shown(reader, 0, 1, 1, 0)
-    # The rows are new ones, and the focus is still there.
+    # The rows are new elements, and the focus is kept.
     assert reader.evaluate("document.activeElement.textContent") == "RING++"
     assert reader.evaluate('byId("method").value') == "1"
 
@@ -307,7 +307,7 @@ def test_address_leads_to_a_query(reader, address):
     ],
 )
 def test_addresses_that_lead_nowhere(browser, address, fragment):
-    """What is shown then is the best method, RING++."""
+    """The page then shows the best method, RING++."""
     browser.open(address + fragment, *DESKTOP)
     shown(browser, 0, 1, 0, 0)
     assert browser.complaints == []
@@ -329,15 +329,15 @@ def test_links_to_recordings(reader):
         ((text, href),) = reader.evaluate(links.format(place))
         assert text in ("metropolis_04", "look around in 3-D")
         assert href.endswith("/pages/metropolis_04.html")
-    # The other drive has none.
+    # The other drive has no page.
     assert reader.evaluate(links.format("#match-caption")) == []
 
 
 def test_print_fits_its_paper(browser, address):
-    # As wide as A4 less its margins.
+    # The width of A4 less its margins.
     browser.open(address, 718, 1000, media="print")
     shown(browser, 0, 1, 0, 0)
-    # All numbers of Table II are too many, and stay folded.
+    # The table of all numbers is too long and stays folded.
     wide = browser.evaluate(
         """[...document.querySelectorAll("h2, p, img, svg, table")]
           .filter((one) => one.checkVisibility() && !one.closest("details") &&

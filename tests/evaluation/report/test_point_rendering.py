@@ -12,8 +12,8 @@ RED, GREEN = (200, 0, 0), (0, 200, 0)
 
 
 def test_axes_of_the_camera():
-    # From above with the camera's foot in the south, east is right and
-    # north is up.
+    # With the camera above and turned to the north, east is right and north is
+    # up.
     above = View(azimuth_deg=-90.0, elevation_deg=90.0).axes()
     np.testing.assert_allclose(
         above, [[1, 0, 0], [0, 1, 0], [0, 0, 1]], atol=1e-12
@@ -21,14 +21,14 @@ def test_axes_of_the_camera():
     axes = View(azimuth_deg=20.0, elevation_deg=35.0).axes()
     np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
     assert np.linalg.det(axes) == pytest.approx(1.0)
-    # What is higher is drawn higher.
+    # Higher points are drawn higher.
     assert axes[1, 2] > 0.0
     assert axes[0, 2] == 0.0
 
 
 def test_the_nearer_point_hides_the_farther():
     view = View(azimuth_deg=-90.0, elevation_deg=90.0, pixels_per_metre=1.0)
-    # Above each other, in both orders; two more to span an image.
+    # Points above each other in both orders, and two more to span an image.
     points = np.array(
         [[2.3, 2.3, 5.0], [2.3, 2.3, 0.0], [0, 0, 0], [4.3, 4.3, 0]]
     )

@@ -53,14 +53,14 @@ def test_numbers():
     assert first.startswith("town,01,03,btc,0.8,0.4,0.5,0.25,0.75,")
     protocol = "5.0,10.0,5.0,100.0,10,,0"
     assert first.endswith(f",0.125,town_01_stage_03,{protocol}")
-    # Without a control, nothing but what was measured.
+    # Without a control, only the measured values stand there.
     assert last.startswith("town,00,03,btc,,0.5,,,,,")
     assert last.endswith(f",,{protocol}")
 
 
 def test_table_for_print():
     table = survival_table([*SOME, NO_CONTROL])
-    # Pair by pair, methods in the paper's order.
+    # Rows are sorted by pair, then in the paper's order of methods.
     assert [row[1:3] for row in table.rows] == [
         ("01 → 03", "SOLiD"),
         ("01 → 03", "BTC"),

@@ -91,7 +91,7 @@ def test_html_is_escaped():
     ("values", "ranks"),
     [
         ([0.2, 0.9, 0.5], [None, 1, 2]),
-        # Equal as printed is equal.
+        # Values that are printed equally share a rank.
         ([0.90001, 0.90002, 0.5], [1, 1, 2]),
         ([None, 0.9, float("nan")], [None, None, None]),
         ([None, 0.9, 0.1], [None, 1, 2]),

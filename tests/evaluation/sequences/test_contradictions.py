@@ -1,4 +1,4 @@
-"""Recordings of sound parts that contradict each other are refused."""
+"""Recordings whose valid parts contradict each other are refused."""
 
 import subprocess
 import sys
@@ -14,7 +14,7 @@ from evaluation.sequences import open_sequence
 
 @pytest.fixture
 def recording(tmp_path):
-    """Path of a recording; what it holds."""
+    """Path of a recording, and its content."""
     bent_drive.write_drive(tmp_path / "town_07")
     path = tmp_path / "town_07" / "town_07_0.mcap"
     return path, *read_messages(path.read_bytes())
@@ -33,7 +33,7 @@ def read_all(path):
 def test_a_lie_is_refused_by_what_it_says(recording, name):
     path, messages, attachments = recording
     change, fault = CONTRADICTIONS[name]
-    # Scan 3 has no point that a change could be made to.
+    # Scan 3 has no point that could be changed.
     rng = np.random.default_rng(1)
     change(messages, rng)
     path.write_bytes(write_messages(messages, attachments))
@@ -116,7 +116,7 @@ print(peak.split()[1])
 @pytest.mark.slow
 @pytest.mark.parametrize("topic", ["/odometry", "/lidar/points", "/tf_static"])
 def test_a_small_file_takes_little_memory(recording, topic):
-    """Messages that are nearly all padding, of which zstd leaves nothing."""
+    """The messages are nearly all padding, which zstd compresses to nothing."""
     path, messages, attachments = recording
     place = next(k for k, one in enumerate(messages) if one.topic == topic)
     padded = messages[place].copy()

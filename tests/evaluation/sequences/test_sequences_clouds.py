@@ -91,7 +91,7 @@ def test_pcd_with_padding_doubles_and_arrays(tmp_path):
     ("packed", "plain"),
     [
         (b"\x02abc", b"abc"),
-        # A copy of 3 from 3 back; one that overlaps what it writes.
+        # A copy of 3 bytes from 3 back, and one that overlaps its output.
         (b"\x02abc\x20\x02", b"abcabc"),
         (b"\x00a\x80\x00", b"a" + b"a" * 6),
         # A long copy: 7 + 200 + 2 bytes from 1 back.
@@ -170,7 +170,7 @@ def test_empty_clouds(tmp_path):
 
 
 def faulty_files(folder):
-    """Yields name, content, and what the error must say."""
+    """Yields name, content, and expected text of the error."""
     yield "short.bin", bytes(17), "17 bytes is not a whole number"
     yield "text.npy", b"hello", "npy|pickle|magic"
     yield "text.pcd", b"hello\n", "no DATA line"
@@ -360,7 +360,7 @@ def test_a_file_that_is_cut_while_it_is_read(tmp_path):
         size = path.stat().st_size
         parts = read_blocks(path, block=10)
         next(parts)
-        # A stream holds some of what follows.
+        # A buffered stream has read some of the following bytes.
         os.truncate(path, size // 10)
         with pytest.raises(InputError, match=f"^{path}: .*(cut off|instead)"):
             list(parts) and list(read_blocks(path))
@@ -436,7 +436,7 @@ def test_a_line_without_an_end(tmp_path):
 
 
 def test_odd_floats_without_a_word(tmp_path):
-    """Half precision, which ends at 65504, and NaN that signal."""
+    """Half precision, which ends at 65504, and signalling NaN."""
     np.save(tmp_path / "half.npy", np.array([[1, 2, 3], [np.inf, 0, 0]], "f2"))
     signalling = np.zeros((4, 3), "<f4")
     signalling.view("<u4")[1] = 0x7F800001

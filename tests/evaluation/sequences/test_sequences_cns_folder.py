@@ -81,7 +81,7 @@ def test_the_folders_tell_map_and_stage(tmp_path):
 
 
 def test_a_drive_on_its_own(tmp_path):
-    """Without the files above it the mount is that of the data set."""
+    """Without files in the folders above, the mount is the data set's."""
     drive, X_WB = write_drive(tmp_path, place=("my_drive",), mount=None)
     sequence = open_sequence(drive)
     assert sequence.name == "my_drive"
@@ -147,7 +147,7 @@ def test_mounts_that_cannot_be_used(tmp_path, mount, fault):
             ["12.05", "12.1", "12.15", "12.2", "12.25"],
             ["12.050000", "1.21e1", "12.15", "12.200", "12.25"],
         ),
-        # Nanoseconds that have been through a double.
+        # Nanoseconds that were stored as a double.
         (None, [f"{1.7e9 + 0.05 * i:.9f}" for i in range(NUM_SCANS)]),
     ],
 )

@@ -124,7 +124,7 @@ def test_a_file_of_another_lidar(tmp_path):
     write_drive(tmp_path / "s")
     folder = tmp_path / "s" / "LiDAR"
     name = f"{stamps()[0]}.bin"
-    # 11 x 26 = 13 x 22 bytes: only what is in them tells them apart.
+    # 11 x 26 = 13 x 22 bytes: only the content shows the format.
     data, _ = records(FORMATS["Velodyne"], make_points(13))
     write_bytes(folder / "Ouster" / name, data)
     with pytest.raises(InputError, match=f"^{folder / 'Ouster' / name}: "):
@@ -243,7 +243,7 @@ def test_missing_poses(tmp_path):
     write_drive(tmp_path / "s", ("Ouster",), ground_truth=())
     with pytest.raises(InputError, match=r"Ouster_gt.txt: No such file"):
         open_sequence(tmp_path / "s")
-    # Those of another LiDAR do not help.
+    # Poses of another LiDAR do not help.
     write_drive(tmp_path / "s", ("Aeva",))
     with pytest.raises(InputError, match=r"Ouster_gt.txt: No such file"):
         open_sequence(tmp_path / "s" / "LiDAR" / "Ouster")

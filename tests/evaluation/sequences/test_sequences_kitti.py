@@ -68,7 +68,7 @@ def test_reads_what_was_written(tmp_path, beside):
 
 
 def test_the_world_is_upright(tmp_path):
-    """A drive ahead on the flat is along x of the LiDAR, not z."""
+    """A drive straight ahead on flat ground is along x of the LiDAR, not z."""
     folder, _ = write_drive(tmp_path)
     ahead = np.tile(np.eye(4), (NUM_SCANS, 1, 1))
     ahead[:, 2, 3] = 3.0 * np.arange(NUM_SCANS)  # z of the camera
@@ -135,7 +135,7 @@ def test_rows_of_the_scans_alone(tmp_path):
 
 
 def test_scans_that_were_renumbered(tmp_path):
-    """`frames.txt` names the rows of tables that are still whole."""
+    """`frames.txt` names the rows of tables that are still complete."""
     folder, X_0S = write_drive(tmp_path)
     (folder / "velodyne/000000.bin").unlink()
     (folder / "velodyne/000003.bin").unlink()

@@ -206,7 +206,8 @@ def test_odometry_and_imu_of_a_simulated_drive(short_recording):
         atol=1e-12,
     )
     np.testing.assert_allclose(odometry["quat_xyzw"], imu["quat_xyzw"])
-    # From rest on level ground: the change of speed is the specific force.
+    # The drive starts at rest on level ground: the change of speed is the
+    # specific force.
     speed = odometry["velocity"][:, 0]
     assert speed[0] == 0.0
     assert speed[-1] > 0.5
@@ -311,7 +312,7 @@ def everything_of(path):
 
 
 def test_flipped_bits_are_noticed(tmp_path):
-    """Wherever they are: in chunks, indexes, the summary, attachments."""
+    """Bits flip in chunks, indexes, the summary and attachments."""
     scans, X_WBs = make_drive(num_frames=4, points=20)
     path = write_recording(
         tmp_path / "s",
@@ -342,7 +343,7 @@ def test_flipped_bits_are_noticed(tmp_path):
 
 
 def tamper(path, change):
-    """Replaces the record of the first chunk by what `change` makes of it."""
+    """Replaces the record of the first chunk by the result of `change`."""
     data = path.read_bytes()
     stream = open_sequence(path)._file
     start = stream._chunk_indexes[0].chunk_start_offset
@@ -422,12 +423,12 @@ def test_index_out_of_range(tmp_path):
 
 
 class TestPointCloud2:
-    """Messages as other writers make them."""
+    """Messages as other programs write them."""
 
     def decode(self, **changes):
         scan = make_scan(np.arange(12.0).reshape(4, 3))
         message = point_cloud(scan, **changes)
-        # Through CDR and back, as from a file.
+        # The message goes through CDR and back, as in a file.
         data = TYPES.serialize_cdr(message, message.__msgtype__)
         return scan, to_points(TYPES.deserialize_cdr(data, message.__msgtype__))
 

@@ -76,7 +76,7 @@ def test_utm_loses_nothing(tmp_path):
     check_same_world(a, b)
     apart = b.X_WS[:, :3, 3] - a.X_WS[:, :3, 3]
     np.testing.assert_allclose(apart, [[0.0, 1e-6, 0.0]] * 5, atol=2e-9)
-    # A single keeps millimetres, unlike 4e6 m of northing.
+    # Single precision keeps millimetres here, unlike at 4e6 m of northing.
     single = a.X_WS[:, :3, 3].astype(np.float32)
     assert np.abs(single - a.X_WS[:, :3, 3]).max() < 1e-3
 
@@ -85,7 +85,7 @@ def test_points_without_a_return_are_left_out(tmp_path):
     write_drive(tmp_path / "s")
     points = make_points(50)
     points[[0, 7, 49]] = 0.0
-    # On an axis, but not at the origin.
+    # The point is on an axis, but not at the origin.
     points[8] = [0.0, 0.0, 3.0]
     path = tmp_path / "s/sensor_data/Ouster" / f"{T0_NS}.bin"
     write_bytes(path, xyzi(points))
@@ -132,7 +132,7 @@ def test_a_pose_at_the_very_stamp_serves_alone(tmp_path):
     write_drive(tmp_path / "s", table=(stamps_ns, X_UB))
     with pytest.raises(InputError, match="time: no pose for the scan"):
         open_sequence(tmp_path / "s")
-    # Only the first scan is left, and it needs no second pose.
+    # Only the first scan remains; it needs no second pose.
     for stamp in scan_stamps()[1:]:
         (tmp_path / "s/sensor_data/Ouster" / f"{stamp}.bin").unlink()
     X_WS = open_sequence(tmp_path / "s").X_WS

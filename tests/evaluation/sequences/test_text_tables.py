@@ -1,4 +1,4 @@
-"""Tables of text as strangers write them."""
+"""Tables of text as other programs write them."""
 
 import os
 

@@ -1,4 +1,4 @@
-"""Which drive is a control: one on the very same way through a city."""
+"""Controls: drives on exactly the same route through a city."""
 
 from helpers.small_towns import ROUTES, drive
 import pytest

@@ -41,7 +41,7 @@ def block(low, high, step=0.25):
 
 
 def court(x):
-    """A court about (x, 0) of four walls that no turn maps on itself."""
+    """A court of four walls about (x, 0); no turn maps it onto itself."""
     return np.concatenate(
         [
             block((x - 12, 14, 0), (x + 14, 14, 6)),
@@ -54,7 +54,7 @@ def court(x):
 
 
 def write(folder, scans, table, places):
-    """Writes a drive; each scan is points in the world by instance."""
+    """Writes a drive; a scan is a dict of instance -> points in the world."""
     made, X_WBs = [], []
     for parts, (x, y, yaw) in zip(scans, places, strict=True):
         X_WB = yaw_pose(x, y, 0.0, yaw)
@@ -79,7 +79,7 @@ def write(folder, scans, table, places):
 
 
 def result_of(best, distances, protocol, method="solid"):
-    """A method whose best places are these; None for no candidate."""
+    """The result of a method with these best places; None is no candidate."""
     scores = np.full(distances.shape, np.nan)
     for row, place in zip(scores, best, strict=True):
         if place is not None:
@@ -102,7 +102,7 @@ def result_of(best, distances, protocol, method="solid"):
 
 
 def test_what_scans_say(tmp_path):
-    """Twins 200 m apart; a screen before a wall; a tree that came."""
+    """Twins are 200 m apart; a screen hides a wall; a tree is new."""
     far = court(200.0)
     # 4 m before the wall in the north; it hides what is behind it.
     screen = block((-12, 4, 0), (14, 4, 6), step=0.06)
@@ -132,8 +132,8 @@ def test_what_scans_say(tmp_path):
     twin = result_of([1, 0], distances, protocol)
     other = result_of([2, 1], distances, protocol, "ring++")
     found = find_evidence(database, query, [twin, other], protocol)
-    # The screen hides what is behind it, up to the height at which the sensor
-    # looks over it; the tree is in nobody's way, and not there.
+    # The screen hides points behind it up to the height at which the sensor
+    # looks over it. The tree hides nothing, and is missing in the other scan.
     total = len(points) + len(tree)
     behind = points[points[:, 1] > 4.5]
     height = HEIGHT + (6.0 - HEIGHT) * behind[:, 1] / 4.0
@@ -142,7 +142,7 @@ def test_what_scans_say(tmp_path):
     assert found.overlaps[0] == pytest.approx(len(before) / total, abs=0.03)
     assert found.hidden[1] < 0.02
     assert found.overlaps[1] > 0.95
-    # Standing points alone, of at most 8192 of either scan, drawn at random.
+    # Only standing points count, at most 8192 of each scan, drawn at random.
     # (0.51: no point of the grids lies on the limit.)
     came = standing = 0.0
     for changed, kept in ((screen, before), (tree, points)):
@@ -153,7 +153,7 @@ def test_what_scans_say(tmp_path):
     assert found.changed[0] == pytest.approx(came / standing, abs=0.01)
     assert found.changed_classes == ["fence", ""]
     assert found.changed[1] == 0.0
-    # The twin fits, whatever the turn; the wood does not; right ones have none.
+    # The twin fits at any turn, the wood does not; right places have no value.
     assert found.fits["solid"][0] > 0.8
     assert found.right_fits[0] < found.fits["solid"][0]
     assert found.fits["ring++"][0] < 0.5
@@ -175,8 +175,8 @@ def test_without_names_nothing_is_said_of_change(tmp_path):
 
 
 NAN = float("nan")
-# Best place, fit, overlap, hidden, changed, and what is wrong. The places are
-# 0, 10 and 100 m away from each query.
+# Best place, fit, overlap, hidden, changed, and the fault. The places are 0, 10
+# and 100 m away from each query.
 CASES = [
     (0, NAN, 0.1, 0.9, 0.9, ""),
     (None, NAN, 0.9, 0.0, 0.9, "no_candidate"),

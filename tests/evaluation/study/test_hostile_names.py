@@ -1,4 +1,4 @@
-"""What a recording calls its map and stage leads nowhere, and stays text."""
+"""A recording's names of map and stage are text, neither paths nor code."""
 
 import html
 from pathlib import Path
@@ -29,7 +29,7 @@ def test_a_report_stays_in_its_folder(tmp_path):
     new = set(tmp_path.rglob("*")) - before
     assert all(output in path.parents or path == output for path in new)
     assert len(list((output / "figures").glob("change_*.png"))) == 2
-    # The text is there as it was, and is no more than text.
+    # The text is unchanged, and only text.
     assert html.escape(STAGE) in page.read_text()
     assert "<b>&" not in page.read_text()
     latex = (output / "tcr.tex").read_text()

@@ -1,4 +1,4 @@
-"""Costs of methods, as the report has them."""
+"""Costs of methods in the report."""
 
 import csv
 import pickle
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.slow
 
 
 def test_costs_in_the_report(tmp_path, monkeypatch):
-    # A clock that advances 1 ms whenever it is looked at.
+    # A clock that advances by 1 ms whenever it is read.
     ticks = iter(range(0, 10**12, 10**6))
     monkeypatch.setattr(costs, "process_time_ns", lambda: next(ticks))
     for stage, route in (("01", "a"), ("02", "b")):
@@ -27,7 +27,7 @@ def test_costs_in_the_report(tmp_path, monkeypatch):
     found = find_recordings(tmp_path / "in")
     output = tmp_path / "out"
     jobs = plan_study(found, output, with_costs=True)
-    # It has the machine alone.
+    # The job runs alone on the machine.
     assert set(jobs[-1].needs) == {job.name for job in jobs[:-1]}
     studies.do(jobs)
     assert jobs[-1].step.is_done()

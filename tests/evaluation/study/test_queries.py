@@ -1,4 +1,4 @@
-"""Each number of the tables, computed anew from the rows of the queries."""
+"""Each number of the tables, recomputed from the rows of the queries."""
 
 from collections import defaultdict
 import csv
@@ -16,7 +16,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def report(tmp_path_factory):
-    """A city that the paper has in both directions, with a control."""
+    """A city with a control that the paper compares in both directions."""
     folder = tmp_path_factory.mktemp("recordings")
     drive(folder / "riverside_01", "01", "a", city="riverside")
     drive(folder / "riverside_02", "02", "b", city="riverside")

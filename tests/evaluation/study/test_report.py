@@ -18,7 +18,7 @@ from evaluation.study.plan import plan_study
 
 pytestmark = pytest.mark.slow
 
-# Describes a scan by how many points it has.
+# Describes a scan by its number of points.
 OWN_METHOD = """
 from dataclasses import dataclass
 
@@ -221,7 +221,7 @@ def test_what_is_done_needs_no_process(recordings, report, monkeypatch):
 
 
 def test_own_method_beside_the_others(recordings, tmp_path, monkeypatch):
-    # Others need not know of it.
+    # Other tests do not find the method registered.
     monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
     path = tmp_path / "counting.py"
     path.write_text(OWN_METHOD)

@@ -153,7 +153,8 @@ def test_places_of_other_cities_are_never_right(folder, tmp_path):
             elsewhere = np.array(after.match_drives) == "suburbia_01"
             assert not after.outcomes.is_right[elsewhere].any()
             assert np.isnan(after.distances[elsewhere]).all()
-    # Stage 01 lacks what the query sees, and the other town has it.
+    # Stage 01 lacks the structures that the query sees; the other town has
+    # them.
     assert elsewhere.any()
 
 

@@ -101,7 +101,7 @@ def test_what_cannot_be_kept_leaves_the_part_as_it_was(part):
 
 
 def test_a_part_runs_nothing_of_what_it_names(tmp_path, monkeypatch):
-    """Neither imports nor constructors: it may be somebody else's."""
+    """It may come from others, so it runs neither imports nor constructors."""
     path = tmp_path / "ran"
     (tmp_path / "evil_module.py").write_text(
         f"from pathlib import Path\nPath({str(path)!r}).touch()\n"
@@ -131,7 +131,7 @@ def test_a_part_runs_nothing_of_what_it_names(tmp_path, monkeypatch):
     refuses(b"[" * 100_000, "RecursionError|Expecting")
     refuses(b"\xff", "decode")
     assert not path.exists()
-    # Whatever bytes a pickle has.
+    # A pickle with any bytes is refused.
     (tmp_path / "old.data").write_bytes(
         b"cns-eval part 1\n{}\n" + pickle.dumps(described)
     )

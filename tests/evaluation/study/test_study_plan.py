@@ -1,4 +1,4 @@
-"""Studies are planned of recordings that nobody has made yet."""
+"""Studies are planned before their recordings exist."""
 
 from pathlib import Path
 import pickle
@@ -21,7 +21,7 @@ FAMILY = [
     info("metropolis_02", "02", "b", needs=("metropolis_02",)),
     info("metropolis_04", "04", "c", needs=("metropolis_04",)),
     info("metropolis_01_stage_04", "04", "a"),
-    # Through a stage, but on a route that serves nobody.
+    # The drive is through a stage, but on a route without a pair.
     info("metropolis_walk", "02", "d"),
 ]
 
@@ -84,7 +84,7 @@ def test_a_control_takes_the_place_of_one_drive():
     assert city.unchanged_pair(last, first) == (last, again)
     (city,) = group_cities([first, last, before])
     assert city.unchanged_pair(first, last) == (first, before)
-    # With both, the very same scans ask.
+    # With both, the queries keep their scans.
     (city,) = group_cities([first, last, before, again])
     assert city.unchanged_pair(first, last) == (again, last)
     assert city.unchanged_pair(last, first) == (before, first)

@@ -50,7 +50,7 @@ def test_loop_closure_beside_the_pairs(tmp_path, capsys):
     # The straight drive closes no loop, and is left out.
     assert [row["DB → query"] for row in rows] == ["01 → 04", "04 → 04"]
     assert {row["exclude_recent"] for row in rows} == {"0.2"}
-    # The pair is the paper's all the same; no loop is.
+    # The paper has values for the pair, but none for a loop.
     assert rows[0]["paper's AUC"] == "0.2582"
     assert rows[1]["paper's AUC"] == ""
     queries = [r for r in read(out / "queries.csv") if r["db"] == "04"]

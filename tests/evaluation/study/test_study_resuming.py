@@ -18,7 +18,7 @@ METHODS = len(known_methods())
 
 
 def measuring_jobs(recordings, output):
-    """Returns the jobs that draw nothing, which takes the time."""
+    """Returns the jobs without drawing, which takes most of the time."""
     return [
         job
         for job in plan_study(find_recordings(recordings), output)

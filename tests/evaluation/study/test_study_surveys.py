@@ -1,4 +1,4 @@
-"""Surveys of drives that are made while they are read, and what is kept."""
+"""Surveys of drives that are made while they are read."""
 
 from dataclasses import dataclass, field
 
@@ -26,7 +26,7 @@ BOTH = frozenset({"places", "queries"})
 
 
 class OnTheFly(Sequence):
-    """A drive whose scans exist once, in order, and are gone."""
+    """A drive whose scans can be read once, in order."""
 
     def __init__(self, recorded):
         self.name = recorded.name
@@ -72,7 +72,7 @@ class Source:
 
 
 def survey(source, methods, files, roles=BOTH):
-    """Does a survey, unless there is nothing to do."""
+    """Runs a survey unless all its parts exist."""
     step = Survey(source, roles, tuple(methods), PAPER_PROTOCOL, files)
     if not step.is_done():
         step.run(Reporter())
@@ -80,7 +80,7 @@ def survey(source, methods, files, roles=BOTH):
 
 
 def assert_equal(one, other):
-    """Compares what is made of dataclasses, lists and arrays, bit by bit."""
+    """Compares nested dataclasses, lists and arrays bit by bit."""
     assert type(one) is type(other)
     if isinstance(one, np.ndarray):
         assert (one.dtype, one.shape) == (other.dtype, other.shape)

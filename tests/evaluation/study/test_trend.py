@@ -1,4 +1,4 @@
-"""AUC over TCR_sym: the numbers of `cns-eval pr` and `tcr`, smoothed well."""
+"""AUC over TCR_sym: the numbers of `cns-eval pr` and `tcr`, and their line."""
 
 import csv
 
