@@ -1,15 +1,15 @@
 """Fixtures that several test modules use.
 
-What is slow to import is imported where it is needed: the process that hands
-out the tests needs none of it.
+Slow modules are imported inside the fixtures, because the process that
+distributes the tests needs none of them.
 """
 
 import signal
 
 import pytest
 
-# What is started in the background ignores Ctrl-C, and so does all that it
-# starts; the tests of interrupts need it.
+# A process started in the background ignores Ctrl-C, and so do its children.
+# Tests of interrupts need the signal.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 

@@ -174,8 +174,7 @@ def bottom_of(
 
 
 def _lattice(triangles: np.ndarray, spacing: float) -> Iterator[np.ndarray]:
-    """Yields points (N, 3) on triangles (M, 3, 3), equally dense in all
-    directions.
+    """Yields evenly dense points (N, 3) on triangles (M, 3, 3).
 
     No place on a triangle is farther from all of them than the spacing.
 

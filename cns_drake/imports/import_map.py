@@ -239,8 +239,7 @@ def _report(
 
 
 def _triangles_of(one: Imported) -> int:
-    """Returns the number of triangles of a structure; 0 if it shares its
-    meshes."""
+    """Returns a structure's number of triangles; 0 if it shares its meshes."""
     shapes = [part.shape for part in one.structure.model.parts]
     if not one.kind.startswith("Building"):
         return len(one.triangles)

@@ -114,14 +114,12 @@ class Trajectory:
         return Moments(u, rate, acceleration, jet, section, ride)
 
     def path_motion(self, t: ArrayLike) -> FrameMotion:
-        """Returns the motion of the path's frame F in the world at (N,)
-        times."""
+        """Returns the path frame F's motion in the world at (N,) times."""
         u, rate, acceleration = self.path_parameter(t)
         return _path_motion(self._path.evaluate(u), rate, acceleration)
 
     def body_motion(self, t: ArrayLike) -> FrameMotion:
-        """Returns the motion of the vehicle frame B in the world at (N,)
-        times."""
+        """Returns the vehicle frame B's motion in the world at (N,) times."""
         motion = self.path_motion(t)
         if self._ride is None:
             return motion

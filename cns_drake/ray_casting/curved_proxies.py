@@ -145,8 +145,7 @@ class NearCurvedShapes:
     def _travels(
         self, rows: np.ndarray, places: np.ndarray, reaches: np.ndarray
     ) -> np.ndarray:
-        """Returns the greatest distance that shapes of groups move during a
-        turn."""
+        """Returns the greatest motion of groups' shapes during a turn [m]."""
         ways, angles = np.zeros((2, len(self._groups)))
         p_OFs = np.zeros((len(self._groups), 3))
         for row, group in enumerate(self._groups):

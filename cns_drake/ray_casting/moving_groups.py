@@ -150,8 +150,7 @@ def _meets(ball: Ball, places: np.ndarray, radii: np.ndarray) -> np.ndarray:
 
 
 def _radius_about_F(group: RayGroup) -> float:
-    """Returns the greatest distance of a group's geometry from F's origin
-    [m]."""
+    """Returns the greatest distance of a group's geometry from origin F [m]."""
     stretch = float(np.linalg.norm(group.X_FL[:3, :3], 2))
     middle = float(np.linalg.norm(group.X_FL[:3, 3]))
     return middle + stretch * _radius_about_L(group.members)

@@ -90,8 +90,7 @@ class RayGroup:
         return X_OL
 
     def holds_the_same(self, other: RayGroup) -> bool:
-        """Returns whether another group has the same members with the same
-        poses."""
+        """Returns whether another group has equal members with equal poses."""
         return (
             self.frame_id == other.frame_id
             and self.is_merged_world == other.is_merged_world

@@ -292,8 +292,7 @@ class BagWriter:
         return stream
 
     def _goes_on(self, stream: PartFile, preamble: io.BytesIO) -> bool:
-        """Returns whether the existing file is a beginning of this
-        recording."""
+        """Returns whether the existing file is the start of this recording."""
         if not stream.replaying:
             return True
         found = ""

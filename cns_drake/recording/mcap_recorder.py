@@ -156,8 +156,8 @@ class McapRecorder(LeafSystem):
                 fixed place there.
             X_BI: pose of the imu frame I in B, None if it has none.
             cameras: camera name -> camera.
-            period: time between frames [s], if all sensors have one; or
-                schedule: the ticks of each topic, by name.
+            period: time between frames [s], if all sensors share it.
+            schedule: the ticks of each topic, by name, if they do not.
             layouts: LiDAR name -> layout of its points (see
                 `point_layouts`), `cns` unless given.
             imu_variances: of specific force [m^2/s^4] and angular velocity

@@ -1,5 +1,4 @@
-"""ROS 2 messages of moving objects: detections, boxes for viewers,
-velocities."""
+"""ROS 2 messages of moving objects: detections, boxes, velocities."""
 
 from __future__ import annotations
 

@@ -52,8 +52,7 @@ class Areas:
 def corner_setback(
     half_width: float, other_half_width: float, angle: float, kerb_radius: float
 ) -> float:
-    """Returns the distance from a junction's position at which a road must end
-    [m].
+    """Returns the distance from a junction at which a road must end [m].
 
     There the kerb of the given radius between two neighbouring roads
     touches the road's edge. The edges meet at (b + a cos(angle)) /

@@ -230,8 +230,7 @@ class RoadNetwork:
 
 
 def _turn_deg(a: Sequence[float], b: Sequence[float]) -> float:
-    """Returns the angle from a's heading to the left to b's; (x, y, z,
-    heading)."""
+    """Returns the left turn from a's heading to b's; (x, y, z, heading)."""
     return float(np.degrees(wrapped(b[3] - a[3])))
 
 

@@ -233,8 +233,7 @@ def _turn_round(
     road = network.roads[leg.road]
 
     def lanes_at(travelled: float) -> tuple[np.ndarray, float]:
-        """Returns the lane's pose and the distance of the other lane to its
-        left."""
+        """Returns the lane's pose and the other lane's distance to its left."""
         offsets = [
             _moved_right(
                 road,

@@ -21,13 +21,11 @@ class StreetAreas(Protocol):
         ...
 
     def sidewalks(self) -> MultiPolygon:
-        """Returns the sidewalks: the area beside the carriageway, a kerb
-        higher."""
+        """Returns the sidewalks: areas beside the road, a kerb higher."""
         ...
 
     def medians(self) -> MultiPolygon:
-        """Returns the medians: the area between the directions, a kerb
-        higher."""
+        """Returns the medians: areas between the directions, a kerb higher."""
         ...
 
 

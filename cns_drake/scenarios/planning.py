@@ -97,8 +97,7 @@ def count_frames(scenario: Scenario, trajectory: Trajectory) -> int:
 
 
 def shown_beside(scenario: Scenario) -> tuple[Scenario | None, str]:
-    """Returns the stage that a drive's page compares with its own, and its
-    name.
+    """Returns the stage that a drive's page compares with its own, and a name.
 
     It is the last stage, or the first one if the drive is in the last. For a
     drive without some structures it is the same stage with them.

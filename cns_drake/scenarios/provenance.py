@@ -160,8 +160,7 @@ def digest_file(path: Path, watch: FileWatch | None = None) -> str:
 
 
 def _take(path: Path | str, update: Callable[[bytes], None]) -> None:
-    """Updates a digest with a file, block by block: meshes may have any
-    size."""
+    """Updates a digest with a file, block by block for meshes of any size."""
     with user_errors(path), open(path, "rb") as stream:
         while block := stream.read(_BLOCK_BYTES):
             update(block)

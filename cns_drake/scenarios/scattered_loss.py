@@ -12,8 +12,7 @@ from cns_drake.base.errors import InputError
 
 
 def is_on_a_lot(row: Mapping[str, str]) -> bool:
-    """Returns whether a structure is on a lot only until a building is built
-    there."""
+    """Returns whether a structure occupies a lot only until it is built on."""
     tags = (row.get("tags") or "").split()
     return "_lot_" in row["name"] and "lot" in tags
 

@@ -72,8 +72,7 @@ class ModelFinder:
 
 
 def model_file(path: Path) -> Path:
-    """Returns the SDF file of a model: the path itself, or the one its folder
-    names.
+    """Returns a model's SDF file: the path, or the file named by its folder.
 
     Raises:
         InputError: the folder has none.

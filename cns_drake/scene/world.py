@@ -139,8 +139,7 @@ def load_world(
 def _mismatches(
     table: Path, listed: set[str], found: set[str]
 ) -> tuple[str, ...]:
-    """Returns a note if a table has rows for some structures and not for
-    others.
+    """Returns a note if a table has rows for only some of the structures.
 
     Rows without structures are normal: another stage may have these.
     """

@@ -1,5 +1,4 @@
-"""The geometry of a SceneGraph that a LiDAR sees, with its ray-casting
-scene."""
+"""The geometry of a SceneGraph that a LiDAR sees, and its ray scene."""
 
 from __future__ import annotations
 

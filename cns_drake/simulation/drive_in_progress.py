@@ -30,8 +30,7 @@ class DriveInProgress(PlannedSequence):
         self._fault: BaseException | None = None
 
     def raise_fault(self) -> None:
-        """Raises an exception of the simulation, even if the reader caught
-        it."""
+        """Raises the simulation's exception, even if the reader caught it."""
         if self._fault is not None:
             raise self._fault
 

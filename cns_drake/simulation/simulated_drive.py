@@ -52,8 +52,7 @@ class SimulatedDrive:
         return SimulatedSequence(self.scenario)
 
     def identity(self) -> dict:
-        """Returns the scenario, and digests of all its files and of the
-        code."""
+        """Returns the scenario, and digests of its files and of the code."""
         return {
             "simulated": self.scenario.model_dump(mode="json"),
             "inputs": digest_inputs(self.scenario),

@@ -56,8 +56,7 @@ def plan_recordings(
     overwrite: bool = True,
     pages: Mapping[str, Path] | None = None,
 ) -> list[Job]:
-    """Returns a job for each recording that is not finished; notes the finished
-    ones.
+    """Returns a job for each unfinished recording; notes the finished ones.
 
     The job has the recording's name.
 

@@ -90,8 +90,7 @@ def _round(
 def vehicle_limbs(
     kind: VehicleKind, rng: np.random.Generator
 ) -> tuple[Limb, ...]:
-    """Returns the one limb of a vehicle; its frame is on the ground below
-    the middle of its box.
+    """Returns a vehicle's only limb; its frame is on the ground below its box.
 
     Args:
         kind: of the vehicle.

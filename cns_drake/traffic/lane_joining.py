@@ -120,8 +120,7 @@ def _merge(
     links: Iterable[tuple[int, int]],
     right_of: Mapping[int, int],
 ) -> tuple[list[DirectedLane], list[list[int]], dict[int, int]]:
-    """Returns lanes, with single continuations joined, the successors of each,
-    and the lane on the right of some."""
+    """Returns joined lanes, their successors, and the lanes to their right."""
     after: list[list[int]] = [[] for _ in lanes]
     before: list[list[int]] = [[] for _ in lanes]
     for first, second in links:

@@ -152,8 +152,7 @@ def _cut(line: np.ndarray, start: float, end: float) -> np.ndarray:
 
 
 def _clusters(network: RoadNetwork, long: set[str]) -> dict[str, int]:
-    """Returns numbers of junctions; junctions joined by short roads share
-    one."""
+    """Returns junction numbers; junctions joined by short roads share one."""
     group = {name: {name} for name in network.junctions}
     for road in network.roads.values():
         if road.name not in long:

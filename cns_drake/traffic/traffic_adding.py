@@ -80,8 +80,7 @@ def make_traffic(
     turn: float = 0.05,
     name: str = "traffic",
 ) -> TrafficMotion:
-    """Adds vehicles and walkers to a SceneGraph, and returns the system that
-    moves them.
+    """Adds vehicles and walkers to a SceneGraph; returns the moving system.
 
     Args:
         scene_graph: takes their geometry, on frames of a source of its own.

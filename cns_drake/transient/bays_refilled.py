@@ -89,8 +89,7 @@ class Bay:
         return Polygon(corners @ np.array([[c, s], [-s, c]]) + self.middle)
 
     def grow(self, car: Standing, cars: Obstacles, others: Obstacles) -> None:
-        """Grows towards surrounding things, and half the way towards other
-        cars.
+        """Grows towards surroundings, and half the way towards other cars.
 
         Args:
             car: in the bay.

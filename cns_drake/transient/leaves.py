@@ -63,8 +63,7 @@ def _thin(
 
 
 def _is_leafy(part: StandingPart) -> bool:
-    """Returns whether a part is leaves and not wood, by name or else by
-    colour."""
+    """Returns whether a part is leaves and not wood, by name or by colour."""
     if not isinstance(part.geometry.surface, TriangleSurface):
         return False
     name = part.name.lower()

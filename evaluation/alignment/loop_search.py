@@ -38,8 +38,7 @@ class LoopSearch:
     num_attempts: int = 0
 
     def near(self, X_TK: np.ndarray) -> np.ndarray:
-        """Returns the keyframes (M,) that have a neighbour under guesses (K, 4,
-        4)."""
+        """Returns keyframes (M,) with a neighbour under guesses (K, 4, 4)."""
         return np.flatnonzero([self._place(X) is not None for X in X_TK])
 
     def attempt(self, k: int, X_TK: np.ndarray) -> bool:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+from collections.abc import Iterator
 from pathlib import Path
 import re
 
@@ -52,11 +54,23 @@ def findings(pattern: re.Pattern[str], paths: list[Path]) -> list[str]:
 
 
 CODE = ("cns_drake/**/*.py", "evaluation/**/*.py", "diagrams/*.py")
+ALL_CODE = (*CODE, "tests/**/*.py", "docs/*.py")
 DOCUMENTS = ("*.md", "docs/**/*.md", "worlds/**/*.md", "worlds/**/*.yaml")
 
 
+def docstrings(paths: list[Path]) -> Iterator[tuple[str, str]]:
+    """Yields the place and the text of each docstring."""
+    for path in paths:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+                text = ast.get_docstring(node)
+                if text is not None:
+                    line = node.body[0].lineno
+                    yield f"{path.relative_to(ROOT)}:{line}", text
+
+
 def test_subjects_come_first():
-    paths = texts(*CODE, *DOCUMENTS, "tests/**/*.py", "docs/*.py")
+    paths = texts(*ALL_CODE, *DOCUMENTS)
     assert len(paths) > 900
     assert findings(OPENING, paths) == []
 
@@ -84,7 +98,16 @@ def test_other_words_are_left_alone(text):
     assert not OPENING.search(text)
 
 
+def test_a_docstring_begins_with_one_line():
+    long = [
+        place
+        for place, text in docstrings(texts(*ALL_CODE))
+        if "\n" in text.split("\n\n")[0]
+    ]
+    assert long == []
+
+
 def test_each_field_of_a_docstring_begins_a_line():
-    assert findings(HIDDEN_FIELD, texts(*CODE)) == []
+    assert findings(HIDDEN_FIELD, texts(*ALL_CODE)) == []
     text = "\n    a: the first. b:\n        the second.\n"
     assert HIDDEN_FIELD.search(text)[1] == "b:"

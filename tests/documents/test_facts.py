@@ -78,7 +78,7 @@ def test_names_in_modules_exist():
         assert pydoc.locate(code.partition("(")[0]) is not None, code
 
 
-def test_examples_of_what_multiplies_families():
+def test_examples_of_options_that_multiply_families():
     page = documents.read("docs/scenarios.md")
     codes = [piece.text for piece in documents.inline(page)]
     routes = yaml.safe_load(next(c for c in codes if c.startswith("routes: {")))
@@ -153,7 +153,7 @@ def test_dependencies():
     assert said == needed
 
 
-def test_what_is_installed_is_what_ci_installs():
+def test_ci_installs_the_documented_packages():
     script = (documents.ROOT / ".ci/run").read_text()
     (command,) = (code for code in CODES if code.startswith("apt install "))
     image = (documents.ROOT / "Dockerfile").read_text()

@@ -51,7 +51,7 @@ def test_each_piece_has_one_recipe():
         "| `dask scheduler` | starts |",
     ],
 )
-def test_what_is_new_is_noticed(text):
+def test_new_pieces_are_noticed(text):
     page = documents.read("docs/how-to/own_city.md")
     before = documents.pieces(page)
     longer = replace(page, text=f"{page.text}\n{text}\n")

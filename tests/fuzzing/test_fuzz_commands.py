@@ -82,8 +82,8 @@ COMMANDS = {
         1,
     ),
 }
-# These tell in lines what they are at before they meet the fault.
-_TELL_PROGRESS = ("city", "list")
+# These print lines of progress before they find the fault.
+_PRINT_PROGRESS = ("city", "list")
 
 
 def damaged_runs():
@@ -135,18 +135,18 @@ def run(top: Path, seed: int, command: str, number: int):
 def test_a_result_or_one_line_and_status_2(runs, command, number):
     folder, result = runs[command, number]
     errors = result.stderr.decode()
-    told = f"{folder}: status {result.returncode}:\n{errors}"
-    assert "Traceback" not in errors, told
+    report = f"{folder}: status {result.returncode}:\n{errors}"
+    assert "Traceback" not in errors, report
     if command == "city" and result.returncode == 1:
         # There are no generated files yet: all of them would change.
         assert result.stdout
         return
-    assert result.returncode in (0, 2), told
+    assert result.returncode in (0, 2), report
     if result.returncode == 2:
         *progress, line = errors.splitlines()
         program = COMMANDS[command][2][0]
-        assert line.startswith(f"{program}: error: "), told
-        assert not progress or command in _TELL_PROGRESS, told
+        assert line.startswith(f"{program}: error: "), report
+        assert not progress or command in _PRINT_PROGRESS, report
         assert result.stdout == b""
         finished = [
             path
@@ -156,5 +156,5 @@ def test_a_result_or_one_line_and_status_2(runs, command, number):
             and path.name != "export.yaml"
             and ".part" not in str(path.relative_to(folder))
         ]
-        assert not finished, told
+        assert not finished, report
     shutil.rmtree(folder)

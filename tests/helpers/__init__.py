@@ -1,1 +1,1 @@
-"""What tests of several rooms share: small inputs, oracles, programs."""
+"""Common parts of tests of several rooms: small inputs, oracles, programs."""

@@ -27,7 +27,7 @@ def open_bag(folder, title="drive", **kwargs):
 
 
 def record(folder, frames=FRAMES, size=60, **kwargs):
-    """Records, or goes on recording; returns the frames taken over."""
+    """Records, or resumes a recording; returns the frames taken over."""
     with open_bag(folder, **kwargs) as bag:
         taken_over = take_over_frames(bag, TOPICS, SCHEDULE, "/tf")
         for frame in range(taken_over, frames):
@@ -36,7 +36,7 @@ def record(folder, frames=FRAMES, size=60, **kwargs):
 
 
 def write_frame(bag, frame, size=60):
-    """Writes a message of `size` bytes on each topic that frame has."""
+    """Writes a message of `size` bytes on each topic of a frame."""
     rng = np.random.default_rng(frame)
     for topic in reversed(TOPICS):
         if not topic.latched or frame == 0:

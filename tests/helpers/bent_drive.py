@@ -1,10 +1,10 @@
-"""A small recording whose places and numbers cannot be confused."""
+"""A small recording with distinct places and numbers."""
 
 import numpy as np
 
 from helpers.drive_files import make_scan, write_recording, yaw_pose
 
-# A place in the world and on the vehicle that nothing can be confused with.
+# Poses in the world and on the vehicle without equal or trivial numbers.
 P_BS = (0.3, -0.2, 1.7)
 QUAT_BS = (0.0, np.sin(0.1), 0.0, np.cos(0.1))
 NUM_SCANS = 5
@@ -15,7 +15,7 @@ def write_drive(folder, **options):
     rng = np.random.default_rng(7)
     scans = []
     for i in range(NUM_SCANS):
-        # A scan without a point is a scan.
+        # A scan may have no point.
         scan = make_scan(rng.uniform(-90.0, 90.0, (0 if i == 3 else 60, 3)))
         scan["intensity"] = rng.uniform(0.0, 1.0, len(scan))
         scan["label"] = rng.integers(0, 256, len(scan))

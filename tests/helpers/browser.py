@@ -1,4 +1,4 @@
-"""A headless Chromium that tests drive as a reader would.
+"""A headless Chromium for tests.
 
 It speaks the Chrome DevTools Protocol over two pipes, messages of JSON that
 end with a zero byte, and needs no library. Unlike with a window's size, pages
@@ -18,7 +18,7 @@ import subprocess
 
 # Numbers of the pipes that Chromium reads from and writes to.
 _IN, _OUT = 3, 4
-# For an answer; only a broken page or browser takes that long [s].
+# Longest wait for an answer; only a broken page or browser takes so long [s].
 _PATIENCE = 600.0
 _KEYS = {"ArrowLeft": 37, "ArrowRight": 39, "Escape": 27, "Tab": 9, " ": 32}
 
@@ -30,7 +30,7 @@ def has_chromium() -> bool:
 @contextmanager
 def chromium(profile: Path, *options: str):
     """Yields a `Browser`; ends its process afterwards."""
-    # Higher than the numbers that they get in the process.
+    # These are higher than their numbers in the process.
     child_in, ours_out = (_high(fd) for fd in os.pipe())
     ours_in, child_out = (_high(fd) for fd in os.pipe())
 
@@ -61,7 +61,7 @@ def chromium(profile: Path, *options: str):
     finally:
         os.close(ours_out)
         os.close(ours_in)
-        # It ends when its pipes do; who does not is ended.
+        # It ends when its pipes are closed, or else it is killed.
         try:
             process.wait(timeout=60)
         except subprocess.TimeoutExpired:
@@ -99,8 +99,8 @@ class Browser:
         scheme: str = "light",
         media: str = "screen",
     ) -> None:
-        """Opens a page, on a screen of so many pixels or on paper."""
-        # Between, so that the same page with another fragment is loaded anew.
+        """Opens a page, on a screen of a size in pixels or on paper."""
+        # An empty page between makes a page with another fragment load again.
         self._load("about:blank")
         self.complaints.clear()
         self._send(

@@ -1,4 +1,4 @@
-"""What holds for the structures of every city."""
+"""Properties of the structures of every city."""
 
 import numpy as np
 import pytest
@@ -35,11 +35,10 @@ def check_no_structure_stands_in_a_lane(standing, network):
 
 
 def check_nothing_low_reaches_far_out_of_its_footprint(standing, network):
-    """The footprints tell the truth, so that the tests above mean something.
+    """Tests of footprints rely on this.
 
-    Every triangle that is partly below head height is clipped by eye height
-    planes through its vertices: only vertices are looked at, and edges that
-    cross head height are cut there.
+    Triangles that cross head height are cut there; only vertices and these cuts
+    are compared.
     """
     lanes = network.lane_area()
     shapely.prepare(lanes)

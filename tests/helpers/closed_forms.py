@@ -15,7 +15,7 @@ def _nearest(candidates) -> np.ndarray:
 
 
 def box(p, d, size) -> np.ndarray:
-    """From outside or inside an axis-aligned box."""
+    """Distances to an axis-aligned box, from outside or inside."""
     half = np.asarray(size) / 2.0
     with np.errstate(divide="ignore", invalid="ignore"):
         low, high = (-half - p) / d, (half - p) / d
@@ -45,7 +45,7 @@ def _quadratic(p, d, radius=1.0):
 
 
 def cylinder(p, d, radius, length) -> np.ndarray:
-    """Closed, its axis along z."""
+    """Distances to a closed cylinder along z."""
     p = np.broadcast_to(p, d.shape)
     candidates = []
     for t in _quadratic(p[:, :2], d[:, :2], radius):
@@ -60,7 +60,7 @@ def cylinder(p, d, radius, length) -> np.ndarray:
 
 
 def capsule(p, d, radius, length) -> np.ndarray:
-    """`length` is that of the cylindrical part, its axis along z."""
+    """Distances to a capsule along z; `length` is its cylindrical part's."""
     p = np.broadcast_to(p, d.shape)
     candidates = []
     for t in _quadratic(p[:, :2], d[:, :2], radius):

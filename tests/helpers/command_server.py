@@ -1,9 +1,9 @@
 """Runs of the programs as forks of one process that has imported all.
 
-A command takes seconds to import what it needs, and is often done in a moment.
-In a folder like that of a virtual environment, `cns-drake` and `cns-eval` are
-small clients, which hand their words, folder, environment and standard streams
-to a server. The server forks, and the fork runs the program.
+A command takes seconds to import its modules, and often little else. In a
+folder like that of a virtual environment, `cns-drake` and `cns-eval` are small
+clients, which pass their words, folder, environment and standard streams to a
+server. The server forks, and the fork runs the program.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ _LONGEST = 1 << 17
 
 
 class CommandServer:
-    """A server, and a folder in which its clients stand.
+    """A server, and the folder of its clients.
 
-    Outside of the clients the folder is the environment of the tests.
+    Apart from the clients, the folder is the environment of the tests.
     """
 
     def __init__(self, environment: Path):
         """Makes the folder, and starts the server; `close` ends it."""
-        # The address of a socket has to be short.
+        # The address of a socket must be short.
         self._folder = tempfile.TemporaryDirectory()
         address = f"{self._folder.name}/server"
         _link_all(Path(sys.prefix), environment, but={"bin"})
@@ -81,7 +81,7 @@ def _link_all(source: Path, target: Path, but) -> None:
 
 
 def _serve(listener: socket.socket) -> None:
-    """Forks for each client, until stdin ends; nothing waits for the forks."""
+    """Forks for each client until stdin ends, without waiting for the forks."""
     for package in map(importlib.import_module, ("cns_drake", "evaluation")):
         prefix = f"{package.__name__}."
         for found in pkgutil.walk_packages(package.__path__, prefix):
@@ -99,7 +99,7 @@ def _serve(listener: socket.socket) -> None:
 
 
 def _answer(client: socket.socket) -> None:
-    """Runs what a client asks for, and sends how it ended."""
+    """Runs a client's program, and sends its exit status."""
     request, streams, _, _ = socket.recv_fds(client, _LONGEST, 3)
     words, folder, environment = json.loads(request)
     process = os.fork()

@@ -26,15 +26,15 @@ _LIDAR, _ODOMETRY, _IMU, _MOUNTS = (
 
 @dataclass(frozen=True)
 class RecordedMessage:
-    """A message, and how it is recorded.
+    """A message, and its form in a recording.
 
     Attributes:
         topic: of its channel.
         kind: its type.
         body: the message.
-        log_time: when it was logged [ns].
-        channel: channels of one topic differ in it.
-        encoding: that its channel claims.
+        log_time: of the message [ns].
+        channel: distinguishes channels of one topic.
+        encoding: named by its channel.
     """
 
     topic: str
@@ -92,7 +92,7 @@ def write_messages(messages: list[RecordedMessage], attachments: list) -> bytes:
 def _some(
     messages: list[RecordedMessage], topic: str, rng, later: bool = False
 ) -> int:
-    """Returns the place of a message of a topic, not the first if `later`."""
+    """Returns the index of a topic's first message, or of a later one."""
     places = [k for k, one in enumerate(messages) if one.topic == topic]
     if not places:
         return _some(messages, _ODOMETRY, rng, later)
@@ -182,7 +182,7 @@ def _far_point(message, rng) -> None:
 
 
 def _other_size(message, rng) -> None:
-    # Fewer would be padding at the end of a row.
+    # A smaller number would be padding at the end of a row.
     message.width += int(rng.choice([1, 2, 1000]))
 
 
@@ -219,7 +219,7 @@ def _scan_again(messages: list[RecordedMessage], rng) -> None:
     messages.insert(place, messages[place].copy(channel=int(rng.integers(2))))
 
 
-# Name -> edit, and what the refusal says of it.
+# Name -> edit, and a text of the error.
 CONTRADICTIONS: dict[
     str, tuple[Callable[[list[RecordedMessage], Any], None], str]
 ] = {
@@ -253,7 +253,7 @@ def contradict(path: Path, data: bytes, rng) -> bytes:
 
 
 def contradict_cloud(path: Path, data: bytes, rng) -> bytes:
-    """Returns a point cloud whose header and rows tell different numbers."""
+    """Returns a point cloud whose header and rows differ in number."""
     more = int(rng.choice([1, 2, 7, 1000]))
     is_text = path.stem in ("text", "ascii")
     if path.suffix in (".npy", ".bin") or rng.random() < 0.3:
@@ -267,7 +267,7 @@ def contradict_cloud(path: Path, data: bytes, rng) -> bytes:
 
 
 def contradict_size(path: Path, data: bytes, rng) -> bytes:
-    """Returns a world with a number that is none, or no size."""
+    """Returns a world with an invalid number or size."""
     text = data.decode()
     places = list(re.finditer(r"<(radius|length|size|scale)>([^<]+)", text))
     place = places[int(rng.integers(len(places)))]
@@ -289,7 +289,7 @@ def contradict_size(path: Path, data: bytes, rng) -> bytes:
 
 
 def contradict_rows(path: Path, data: bytes, rng) -> bytes:
-    """Returns a file of an exported drive with more or less in it."""
+    """Returns a file of an exported drive with added or missing rows."""
     if path.suffix in (".label", ".bin"):
         size = 4 if path.suffix == ".label" else 16
         if rng.random() < 0.5 and len(data) > size:

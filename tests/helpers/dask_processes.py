@@ -1,4 +1,4 @@
-"""A scheduler of Dask and its workers, as processes like on any cluster."""
+"""A scheduler of Dask and its workers as processes, as on a cluster."""
 
 import contextlib
 import os
@@ -11,15 +11,15 @@ import psutil
 
 
 class DaskProcesses:
-    """A context manager: a scheduler, and workers that it is told to start.
+    """A context manager: a scheduler, and workers started on demand.
 
     Attributes:
         address: of the scheduler.
-        workers: the processes, one thread each and nobody to restart them.
+        workers: the processes, one thread each, which are not restarted.
     """
 
     def __init__(self, folder, security=None, options=()):
-        """Takes what clients need to reach it, and what it is told itself."""
+        """Takes the settings of clients and those of the scheduler."""
         self._folder = folder
         self._security = security
         self._options = options
@@ -35,7 +35,7 @@ class DaskProcesses:
             if "Scheduler at:" in line:
                 self.address = line.split()[-1]
                 break
-        # Whoever does not read on stops who writes.
+        # Output that is not read would stop the writing process.
         threading.Thread(
             target=self._scheduler.stderr.read, daemon=True
         ).start()
@@ -47,7 +47,7 @@ class DaskProcesses:
             process.wait()
 
     def add_workers(self, number):
-        """Starts workers and waits until the scheduler knows them."""
+        """Starts workers and waits until they have registered."""
         for _ in range(number):
             worker = self._start(
                 "dask_worker",
@@ -74,7 +74,7 @@ class DaskProcesses:
         return found
 
     def _start(self, module, *arguments, quiet=False):
-        # The workers find the functions of the tests as well.
+        # The workers import the functions of the tests as well.
         path = os.pathsep.join(sys.path)
         return subprocess.Popen(
             [sys.executable, "-m", f"distributed.cli.{module}", *arguments],

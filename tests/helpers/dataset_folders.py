@@ -9,7 +9,7 @@ import struct
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-# Nanoseconds that a double cannot hold.
+# Nanoseconds that a double cannot represent.
 T0_NS = 1_561_000_444_390_857_631
 SCAN_PERIOD_NS = 100_000_003
 UTM = np.array([355_123.25, 4_026_987.75, 61.5])

@@ -1,8 +1,7 @@
 """How each command and example of the documents is run, on a small town.
 
-Where they speak of Metropolis or Riverside, a town of five roads takes their
-place, with two stages and two short drives. All that differs from what they
-say is written here.
+A town of five roads, with two stages and two short drives, replaces Metropolis
+and Riverside. All differences from the documents are written here.
 """
 
 from __future__ import annotations
@@ -31,16 +30,16 @@ class Recipe:
     """How one piece of a document is run.
 
     Attributes:
-        start: how the piece begins.
-        changes: (old, new) texts, applied in order; each old one is there.
+        start: first words of the piece.
+        changes: (old, new) texts, applied in order; each old one must occur.
             `{scheduler}` in a new one is the scheduler's address.
-        after: names of recipes that make what it needs.
-        file: where its text is saved; otherwise its lines are run.
-        command: what is run once it is saved.
-        ready: for what does not end by itself, what it says on stderr when
-            others may go on.
+        after: names of recipes that make its inputs.
+        file: path to save its text; otherwise its lines are run.
+        command: run after saving.
+        ready: text on stderr after which others may go on, for a command that
+            does not end by itself.
         prints: texts on stdout.
-        makes: files that are there afterwards, as globs.
+        makes: globs of files that exist afterwards.
         prepare: called afterwards with the folder.
     """
 
@@ -56,7 +55,7 @@ class Recipe:
 
 
 def shorten_drives(folder: Path) -> None:
-    """Two roads instead of some twenty, fast, with few beams."""
+    """Shortens drives to two roads, at a high speed, with few beams."""
     first = yaml.safe_load((folder / "town/sequence_01.yaml").read_text())
     for stage in ("01", "02"):
         short = first | {
@@ -112,7 +111,7 @@ RECIPES = {
     "imported scenario": Recipe(
         'map: .\nstage: "01"',
         file="imported.yaml",
-        # What a reader has from elsewhere.
+        # Inputs that a reader has from elsewhere.
         prepare=_write_sources,
     ),
     "imports": Recipe(
@@ -518,7 +517,8 @@ RECIPES = {
     ),
     "linter": Recipe(
         ".venv/bin/ruff check",
-        # Checks the examples in the documents, by the rules of this project.
+        # Type-checks the examples of the documents by the rules of this
+        # project.
         after=("method", "Python", "own diagram", "own beams"),
         prints=("All checks passed!", "already formatted"),
     ),
@@ -549,7 +549,7 @@ RECIPES = {
     ),
 }
 
-# What cannot run here: how it begins, and why.
+# Pieces that cannot run here: first words -> reason.
 NOT_RUN = {
     ".venv/bin/python docs/reference_pages.py": "writes into this project; "
     "test_fields compares the pages with what is there",

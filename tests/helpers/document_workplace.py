@@ -14,12 +14,12 @@ from helpers import documents
 from helpers.command_server import CommandServer
 from helpers.document_recipes import NOT_RUN, RECIPES
 
-# A machine that runs other tests beside may take its time to answer.
+# A machine that runs other tests as well may answer late.
 _PATIENT = {"DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "300s"}
 
 
 def claims(piece: documents.Piece) -> list[str]:
-    """Returns the recipes of a piece, or why it is not run: one, hopefully."""
+    """Returns the recipes of a piece, or the reasons not to run it."""
     starts = {name: recipe.start for name, recipe in RECIPES.items()}
     starts |= {reason: start for start, reason in NOT_RUN.items()}
     return [
@@ -30,8 +30,8 @@ def claims(piece: documents.Piece) -> list[str]:
 class Workplace:
     """Commands run as they are written, with the programs under test.
 
-    A recipe is followed once, and so is a command that several have. What
-    does not end by itself is ended by `close`. The programs are forks of one
+    Each recipe runs once; so does a command of several recipes. `close` ends
+    commands that do not end by themselves. The programs are forks of one
     process, see `command_server`; `test_wheel` runs them as installed.
     """
 
@@ -60,7 +60,7 @@ class Workplace:
         return self._followed[name]
 
     def close(self) -> None:
-        """Ends what is still running."""
+        """Ends the commands that are still running."""
         self._started.close()
 
     def _follow(self, name: str) -> str:
@@ -107,20 +107,20 @@ class Workplace:
             text=True,
             env=os.environ | _PATIENT,
         )
-        # Read to the end, or the process would stop when the pipe is full.
+        # The pipe is read to the end, because a full pipe stops the process.
         lines = queue.SimpleQueue()
         reader = threading.Thread(target=_pass_on, args=(process, lines))
         reader.start()
         self._started.callback(reader.join)
         self._started.callback(process.wait)
         self._started.callback(process.terminate)
-        told = []
+        printed = []
         while (line := lines.get()) is not None:
-            told.append(line)
+            printed.append(line)
             if match := re.search(ready, line):
                 self._values |= match.groupdict()
                 return
-        raise AssertionError(f"{command}\n{''.join(told)}")
+        raise AssertionError(f"{command}\n{''.join(printed)}")
 
 
 def _pass_on(process, lines: queue.SimpleQueue) -> None:

@@ -1,4 +1,4 @@
-"""The documents taken apart: all in them that a reader may run or copy."""
+"""The parts of the documents that a reader may run or copy."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import textwrap
 
 ROOT = Path(__file__).resolve().parents[2]
 
-# What an inline piece of code begins with if it is meant to be run.
+# First words of inline code that is meant to be run.
 PROGRAMS = (
     *("cns-drake", "cns-eval", "dask", "python", "python3", "pip", "pytest"),
     *("ruff", "ros2", "npm", "apt", "git", "docker", "pre-commit", "mkdocs"),
 )
 _FENCE = re.compile(r"^( *)```(\w*)\n(.*?)^\1```$", re.DOTALL | re.MULTILINE)
 _INLINE = re.compile(r"`([^`]+)`")
-# `cns-drake scan`, as a name of what the table of commands explains.
+# A name such as `cns-drake scan`, which the table of commands explains.
 _MENTION = re.compile(r"(cns-drake|cns-eval) [a-z]+")
 
 
@@ -39,7 +39,7 @@ class Piece:
 
     Attributes:
         page: name of its page.
-        line: where it begins there, from 1.
+        line: its first line on the page, from 1.
         language: of a fenced block; empty for shell; "inline" in a sentence
             or a table.
         text: the code itself, without indentation.
@@ -52,7 +52,7 @@ class Piece:
 
     @property
     def place(self) -> str:
-        """Where it is, as editors jump to."""
+        """Its place, in the form that editors jump to."""
         return f"{self.page}:{self.line}"
 
 
@@ -130,7 +130,7 @@ def table(page: Page, title: str) -> list[list[str]]:
 
 
 def anchors(page: Page) -> set[str]:
-    """Returns what links may name within a page, as GitHub makes it."""
+    """Returns the anchors of a page, as GitHub makes them."""
     headings = re.findall(r"^#+ (.+)$", prose(page), re.MULTILINE)
     return {
         re.sub(r"[^\w -]", "", heading).lower().replace(" ", "-")

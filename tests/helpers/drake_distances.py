@@ -1,4 +1,4 @@
-"""How far a ray goes, by what SceneGraph itself tells of its geometry."""
+"""Distances along rays by SceneGraph's own signed distances."""
 
 import numpy as np
 
@@ -6,8 +6,8 @@ import numpy as np
 def marched_range(query_object, p_WS, d_W, max_range):
     """Distance along a ray by sphere tracing, inf for a miss.
 
-    Signed distances of Drake's proximity geometry tell how far one may go
-    without meeting anything.
+    A signed distance of Drake's proximity geometry bounds a step that meets
+    nothing.
     """
     distance = 0.0
     for _ in range(2000):

@@ -1,7 +1,7 @@
 """Writes small recordings and point cloud files for tests.
 
-The recordings follow the contract of the project, but are written here from
-the libraries alone, so that readers are tested against a second hand.
+The recordings follow the contract of the project. They are written here with
+the libraries alone, so that readers are tested against an independent writer.
 """
 
 from __future__ import annotations
@@ -71,14 +71,14 @@ def write_recording(
         folder: created; its name becomes the sequence's.
         scans: structured arrays, in the sensor frame.
         X_WBs: poses of the vehicle (4, 4).
-        p_BS: place of the sensor on the vehicle [m].
+        p_BS: position of the sensor on the vehicle [m].
         quat_xyzw_BS: its orientation there.
         topics: those that are written.
         odometry_shift_ns: added to the stamps of the odometry.
         stamps_ns: of the frames; every 50 ms by default.
         chunk_size: of the MCAP file [bytes].
         attachments: name -> JSON value.
-        lidar_topic: under which the scans are written.
+        lidar_topic: topic of the scans.
         world_frame: of the odometry.
         mast: parent of the sensor's frame; the vehicle carries `mast`.
         compression: of the chunks.

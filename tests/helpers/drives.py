@@ -28,7 +28,7 @@ def helix_points(radius, slope, count, start=0.3) -> np.ndarray:
     Args:
         radius: of the bend seen from above [m].
         slope: height per horizontal distance.
-        count: how many points, SPACING apart along the helix.
+        count: number of points, SPACING apart along the helix.
         start: polar angle of the first [rad].
     """
     arc = SPACING / np.hypot(1.0, slope) * np.arange(count)

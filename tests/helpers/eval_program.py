@@ -26,7 +26,7 @@ def make_block_scene(seed):
 
 
 def write_towns(folder):
-    """Writes two drives of eight frames, 10 m apart; and their scans."""
+    """Writes two drives of eight frames, 10 m apart, and their scans."""
     for name, side in (("town_01", 0.0), ("town_02", 1.0)):
         scans = [make_block_scene(i) - [0.0, side, 0.0] for i in range(8)]
         write_recording(
@@ -50,12 +50,12 @@ def run(capsys, *arguments):
 def run_program(capture, name, main, *arguments):
     """Runs a program in this process; returns status, stdout, stderr."""
     old = sys.argv
-    # The program leaves signals as a process that ends wants them.
+    # The program leaves signal handlers in a state for its end.
     handlers = {number: signal.getsignal(number) for number in SIGNALS}
     sys.argv = [name, *map(str, arguments)]
     try:
         with pytest.MonkeyPatch.context() as patch:
-            # No lines of progress, however slow the machine is.
+            # No lines of progress appear, even on a slow machine.
             for module in (progress_bars, terminal):
                 patch.setattr(module, "LINE_INTERVAL", math.inf)
             with pytest.raises(SystemExit) as info:

@@ -1,4 +1,4 @@
-"""Mutations of files: of their bytes, and of what their formats are made of."""
+"""Mutations of files: of their bytes, and of the elements of their formats."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ _VALUES = (
     *([], {}, [[]], [None], [0, 0], ["a"], {"a": 1}, {1: 2}, b"\xff\0"),
     *(*_WORDS, [1.0] * 2000, {str(k): k for k in range(500)}),
 )
-# Sizes and places that a binary file may claim.
+# Sizes and offsets that a binary file may contain.
 _NUMBERS = (b"\xff" * 8, bytes(8), b"\x7f" * 8, b"\xff" * 4 + bytes(4))
 _FACTORS = (-1.0, 0.0, 1e-9, 1e-3, 0.5, 1.001, 2, 3.0, 1e3, 1e6, 1e9, 1e300)
-# Whole files of YAML that ask more of a reader than they are long.
+# Short files of YAML that cost a reader much.
 _DOCUMENTS = (
     "",
     "---\n---\n",
@@ -57,7 +57,7 @@ _DOCUMENTS = (
     "\ta: 1\n",
     "a: 'unended\n",
 )
-# Whole files of OpenStreetMap that ask more of a reader than they are long.
+# Short files of OpenStreetMap that cost a reader much.
 _OSM_DOCUMENTS = (
     "",
     "<osm/>",
@@ -163,7 +163,7 @@ def _mutate_tree(tree, rng):
         elif kind == 2:
             holder.insert(int(rng.integers(len(holder) + 1)), value)
         elif kind == 3:
-            # What belongs elsewhere.
+            # A value that belongs elsewhere.
             other, place = places[int(rng.integers(len(places)))]
             holder[key] = json.loads(json.dumps(other[place], default=repr))
         elif kind == 4:
@@ -214,10 +214,10 @@ def _mutate_table(data: bytes, rng) -> bytes:
 
 
 def _mutate_tokens(data: bytes, rng, first: int = 4000) -> bytes:
-    """Replaces words of a text, or of the text that a file begins with."""
+    """Replaces words of a text, or of the text at a file's start."""
     if rng.random() < 0.2:
         return _mutate_lines(data, rng)
-    # The header of a point cloud; the whole of most models.
+    # This is the header of a point cloud, and all of most models.
     head, tail = data[:first], data[first:]
     tokens = list(re.finditer(rb"[^\s<>\"=/]+", head))
     for _ in range(int(_pick(rng, (1, 1, 2)))):
@@ -231,7 +231,7 @@ def _mutate_tokens(data: bytes, rng, first: int = 4000) -> bytes:
 
 
 def mutate_osm(path: Path, data: bytes, rng: np.random.Generator) -> bytes:
-    """Mutates OpenStreetMap's XML: words, bytes, or what it refers to."""
+    """Mutates OpenStreetMap's XML: words, bytes, or references."""
     kind = rng.integers(6)
     if kind < 2:
         return _mutate_tokens(data, rng, first=1 << 20)

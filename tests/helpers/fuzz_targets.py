@@ -1,4 +1,4 @@
-"""What reads files, each with good files to begin with."""
+"""Readers of files, each with valid files to start from."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ def _plan(name: str):
 
 
 def _simulate(folder: Path) -> None:
-    """Records what is left of a scenario, unless that takes too long."""
+    """Records a damaged scenario, unless that takes too long."""
     scenario = load_scenario(folder / "sequence_01.yaml")
     if _is_small(scenario):
         simulate(scenario, folder / "out")
@@ -206,7 +206,7 @@ def _write_recording(folder: Path, **options) -> None:
 
 
 def _read_sequence(path: Path):
-    """Reads all that there is, and returns it."""
+    """Reads all parts of a sequence and returns them."""
     sequence = sequences.open(path)
     return repr(
         (
@@ -244,7 +244,7 @@ def _write_source(folder: Path) -> None:
 
 
 def _write_interrupted(folder: Path) -> None:
-    """What a run leaves that is killed just before its end."""
+    """Writes the files of a run that was killed just before its end."""
     record(folder / "whole" / "drive", 20)
     files = RecordingFolder(folder / "drive")
     shutil.copytree(folder / "whole" / "drive", files.path)
@@ -254,7 +254,7 @@ def _write_interrupted(folder: Path) -> None:
 
 
 def _go_on(folder: Path) -> dict[str, bytes]:
-    """Goes on with a copy; whatever is left, the result is the same."""
+    """Resumes a copy; the result is the same for any remaining files."""
     shutil.copytree(folder / "drive", folder / "out" / "drive")
     record(folder / "out" / "drive", 20)
     return contents(folder / "out" / "drive")
@@ -409,7 +409,7 @@ TARGETS = (
         mutate=mutate_osm,
     ),
     Target("opendrive", 8, write_opendrive, ("town.xodr",), read_opendrive),
-    # Well-formed parts that contradict each other.
+    # Targets with well-formed parts that contradict each other.
     Target(
         "false recording", 8, _write_recording, ("town_07/*.mcap",),
         lambda folder: _read_sequence(folder / "town_07"),

@@ -1,7 +1,7 @@
-"""A process that feeds damaged files to what reads files.
+"""A process that feeds damaged files to readers.
 
-A reader that crashes, hangs or takes all memory is then a failure told with
-its input, like any other.
+If a reader crashes, hangs or takes all memory, the failure is reported with its
+input, like any other.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ import numpy as np
 
 from helpers.fuzz_mutations import mutate, mutate_bytes
 
-# A case takes milliseconds; the machine may be ever so busy.
+# A case takes milliseconds; the limit is for a busy machine.
 DEADLINE_S = 600.0
-# What one case may take beyond what the libraries have taken [bytes].
+# Memory that one case may take beyond that of the libraries [bytes].
 _MEMORY_BYTES = 3 << 30
 
 
@@ -35,13 +35,13 @@ class Target:
     Attributes:
         name: of the target.
         share: of all mutations, relative to the other targets'.
-        build: writes good files into a folder, which exists.
-        mutated: glob patterns of those that are mutated.
-        use: reads them, given the folder; may write into `<folder>/out`.
-        exact: whether it finds all damage: what it returns for a damaged
-            file is what it returns for the whole one.
+        build: writes valid files into a folder, which exists.
+        mutated: glob patterns of the files to mutate.
+        use: reads the files of a folder; may write into `<folder>/out`.
+        exact: whether it finds all damage: it then returns the same for a
+            damaged file as for the whole one.
         only_bytes: whether to mutate bytes alone, once a case.
-        mutate: makes a mutated file of a whole one in some other way.
+        mutate: returns a file mutated in some other way.
     """
 
     name: str
@@ -55,14 +55,14 @@ class Target:
 
 
 class Bench:
-    """A folder with a target's files, of which one at a time is damaged."""
+    """A folder with a target's files; one at a time is damaged."""
 
     def __init__(self, target: Target, folder: Path):
         """Builds the files, and uses them undamaged.
 
         Args:
-            target: what to feed.
-            folder: a new folder; nothing but `<folder>/a/b/c/out` may change.
+            target: the reader.
+            folder: a new folder; only `<folder>/a/b/c/out` may change.
         """
         self.target = target
         self._top = folder
@@ -85,7 +85,7 @@ class Bench:
         self._contents = self._list()
 
     def damage(self, seed: int, number: int) -> Path:
-        """Damages a file in the way that a number stands for."""
+        """Damages a file in the way that a number selects."""
         rng = np.random.default_rng([seed, number])
         path = self._files[int(rng.integers(len(self._files)))]
         data = self._originals[path]
@@ -102,11 +102,11 @@ class Bench:
         self._clear()
 
     def fault(self, refusals: tuple[type[Exception], ...], printed) -> str:
-        """Uses the files; returns what is wrong with that, "" if nothing.
+        """Uses the files; returns the fault of the reader, "" without one.
 
         Args:
-            refusals: what a reader may raise.
-            printed: returns what has been printed meanwhile.
+            refusals: errors that a reader may raise.
+            printed: returns the text printed meanwhile.
         """
         refused = None
         with warnings.catch_warnings(record=True) as warned:
@@ -139,7 +139,7 @@ class Bench:
             Path(folder, name)
             for folder, _, names in os.walk(self._top)
             for name in names
-            # What is not finished does not bear the name of what is.
+            # An unfinished file must not have its final name.
             if not name.endswith(".part")
         }
 
@@ -166,9 +166,9 @@ class Worker:
         """Starts the process.
 
         Args:
-            folder: for its files, and for the inputs that readers fail on.
+            folder: for its files, and for the inputs on which readers fail.
             find: module-level function: name -> target.
-            refusals: what readers may raise.
+            refusals: errors that readers may raise.
         """
         self._folder = folder
         self._arguments = (find, refusals)
@@ -176,7 +176,7 @@ class Worker:
         self._start()
 
     def run(self, name: str, seed: int, count: int) -> list[str]:
-        """Feeds a number of damaged files; returns what went wrong."""
+        """Feeds a number of damaged files; returns the faults."""
         faults = []
         number = 0
         self._pipe.send((name, seed, number, count))
@@ -210,13 +210,13 @@ class Worker:
         )
         self._process.start()
         other.close()
-        # It has no deadline: how long imports take is up to the machine.
+        # There is no deadline, because imports may be slow.
         self._pipe.recv()
 
     def _receive(self) -> int | str | None:
         """Returns the number of the next case, a fault, or None at the end.
 
-        A fault that the process does not tell itself ends the process.
+        A fault that the process does not report itself ends the process.
         """
         try:
             if self._pipe.poll(DEADLINE_S):
@@ -239,7 +239,7 @@ class Worker:
 
 
 def _work(pipe, folder: Path, find, refusals) -> None:
-    """Feeds what it is told to, until the other end is closed."""
+    """Feeds the requested cases until the other end is closed."""
     log = open(folder / "printed", "w+b", buffering=0)  # noqa: SIM115
     for number in (1, 2):
         os.dup2(log.fileno(), number)
@@ -247,7 +247,7 @@ def _work(pipe, folder: Path, find, refusals) -> None:
     pipe.send("started")
 
     def printed() -> str:
-        """Returns what was printed since the last call."""
+        """Returns the text printed since the last call."""
         log.seek(0)
         text = log.read().decode(errors="replace")
         log.seek(0)
@@ -263,7 +263,8 @@ def _work(pipe, folder: Path, find, refusals) -> None:
                 try:
                     benches[name] = Bench(find(name), folder / name)
                 except BaseException:
-                    # Whole files are not read: damaged ones tell nothing.
+                    # If the reader fails on whole files, damaged ones show
+                    # nothing.
                     pipe.send(traceback.format_exc())
                     pipe.recv()
                     pipe.send(None)
@@ -274,7 +275,7 @@ def _work(pipe, folder: Path, find, refusals) -> None:
                 printed()
                 path = bench.damage(seed, number)
                 pipe.send(number)
-                # Before the parent ends all: tells where it hangs.
+                # Prints the place of a hang before the parent ends the process.
                 faulthandler.dump_traceback_later(DEADLINE_S - 5)
                 fault = bench.fault(refusals, printed)
                 faulthandler.cancel_dump_traceback_later()
@@ -286,7 +287,7 @@ def _work(pipe, folder: Path, find, refusals) -> None:
 
 
 def _limit_memory(more: int | None) -> None:
-    """Bounds the memory of this process to somewhat more than it has."""
+    """Limits the memory of this process to a little more than it has."""
     size = resource.RLIM_INFINITY
     if more is not None:
         pages = int(Path("/proc/self/statm").read_text().split()[0])

@@ -20,21 +20,21 @@ class Generation:
             start_new_session=True,
             env={**os.environ, **environment},
         )
-        self.told = []
+        self.lines = []
 
     def wait_for(self, text):
         """Reads until a line contains a text."""
         for line in self.process.stderr:
-            self.told.append(line)
+            self.lines.append(line)
             if text in line:
                 return
-        pytest.fail("".join(self.told))
+        pytest.fail("".join(self.lines))
 
     def end(self):
         """Returns exit status and results once every process has ended.
 
         All have the same stderr: it ends when the last of them does.
         """
-        self.told.extend(self.process.stderr)
+        self.lines.extend(self.process.stderr)
         results = self.process.stdout.read().splitlines()
         return self.process.wait(), results

@@ -12,7 +12,7 @@ from helpers.dataset_folders import (
     write_quaternions,
 )
 
-# The last stamp at which Aeva's records are short.
+# The last stamp with short records of Aeva.
 CHANGE_NS = 1691936557946849179
 NUM_SCANS = 4
 # Layout of struct, bytes, and the numbers of point i after x y z.

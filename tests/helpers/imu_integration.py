@@ -7,13 +7,13 @@ _GRAVITY_W = np.array([0.0, 0.0, -9.81])
 
 
 def integrate_imu(force, rate, period, X_WI):
-    """Returns (N, 3) places of an IMU that starts at rest, trapezoidal rule.
+    """Returns positions (N, 3) of an IMU from rest by the trapezoidal rule.
 
     Args:
         force: (N, 3) specific force at even times [m/s^2].
         rate: (N, 3) angular velocity [rad/s].
         period: between these times [s].
-        X_WI: where it starts.
+        X_WI: its first pose.
     """
     R = Rotation.from_matrix(X_WI.rotation().matrix())
     p, v = X_WI.translation(), np.zeros(3)

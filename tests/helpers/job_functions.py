@@ -1,4 +1,4 @@
-"""What jobs of the tests do; imported by the processes in which they run."""
+"""Functions of the tests' jobs; the processes of jobs import them."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from cns_drake.base.jobs.step import Step
 
 @dataclass(frozen=True)
 class Call(Step):
-    """Calls a function of this module; another says whether it has to."""
+    """Calls a function of this module if another one finds that it must."""
 
     function: Callable
     arguments: tuple = ()
@@ -53,7 +53,7 @@ def cannot_tell(*arguments):
 
 
 def note_process(path, reporter):
-    """Writes its number, its session, and the numbers of its parents."""
+    """Writes the process's number, its session, and its parents' numbers."""
     import psutil
 
     reporter.note("here I am")
@@ -72,7 +72,7 @@ def kill_parent_once(tries, path, reporter):
 
 
 def leave_a_trace(path, reporter):
-    """Changes the process, after it has written how it found it."""
+    """Changes the process after writing the state that it found."""
     path.write_text(os.environ.get("LEFT_BY_A_JOB", "nothing"))
     os.environ["LEFT_BY_A_JOB"] = "a trace"
 
@@ -86,14 +86,14 @@ def stumble(reporter):
 
 
 def die(tries, reporter):
-    """Dies each time, and leaves a mark."""
+    """Ends its process each time, and leaves a mark."""
     with tries.open("a") as stream:
         stream.write("x")
     os.kill(os.getpid(), signal.SIGKILL)
 
 
 def die_first(tries, path, reporter):
-    """Dies twice, of two causes, then succeeds."""
+    """Ends its process twice, by two causes, then succeeds."""
     with tries.open("a") as stream:
         stream.write("x")
     tried = len(tries.read_text())
@@ -105,18 +105,19 @@ def die_first(tries, path, reporter):
 
 
 def hold(pipe: Path, reporter):
-    """Says its process through a named pipe, then works for ever."""
+    """Writes its process to a named pipe, then works for ever."""
     with pipe.open("w") as stream:
         stream.write(str(os.getpid()))
-    # However a signal falls, it is noticed.
+    # A signal at any moment is noticed.
     while not threading.Event().wait(0.1):
         pass
 
 
 def read_holder(pipe: Path) -> int:
-    """Returns the process that holds, as soon as it is told.
+    """Returns the holding process as soon as it has written its number.
 
-    Open for both, the pipe does not wait for one that fails before it tells.
+    The pipe is open for reading and writing, so that a process that fails
+    before is not waited for.
     """
     reader = os.open(pipe, os.O_RDWR)
     try:
@@ -127,7 +128,7 @@ def read_holder(pipe: Path) -> int:
 
 
 def kill_worker(tries, reporter):
-    """Takes the worker along, and leaves a mark."""
+    """Ends its own process and the worker, and leaves a mark."""
     with tries.open("a") as stream:
         stream.write("x")
     os.kill(os.getppid(), signal.SIGKILL)
@@ -139,7 +140,7 @@ def note_variable(name, output, reporter):
 
 
 def note_ports(path, reporter):
-    """Writes on how many processes there are, and who listens where."""
+    """Writes the number of processes, and the ports they listen on."""
     import psutil
 
     processes = [psutil.Process(), *psutil.Process().parents()[:2]]

@@ -32,7 +32,7 @@ def town(seed, number=45):
         centre = rng.uniform(-40.0, 40.0, 2)
         z = np.linspace(-1.6, 3.0, 40)
         parts.append(np.column_stack([np.tile(centre, (40, 1)), z]))
-    # Ground in each ring of each sector in which it is sought.
+    # Each ring of each sector has ground where the method needs it.
     r, turn = np.meshgrid(np.arange(0.5, 90.0), np.arange(0.5, 360.0))
     x, y = (r * f(np.radians(turn)) for f in (np.cos, np.sin))
     parts.append(np.stack([x, y, np.full(x.shape, -1.6)], -1).reshape(-1, 3))
@@ -49,7 +49,7 @@ def seen_from(points, yaw, x, y):
     return (points - [x, y, 0.0]) @ matrix(yaw)
 
 
-# No words, no bits, no compiled loops.
+# The oracle has no words of bits and no compiled loops.
 
 
 def image(cells, starts, layer, turn, halvings):

@@ -32,7 +32,7 @@ def _unfiltered(data, length):
 
 
 def objects(commands):
-    """Returns path -> the geometry that was put there."""
+    """Returns path -> geometry."""
     return {
         command["path"]: command["object"]["geometries"][0]
         for command in commands
@@ -51,7 +51,7 @@ def colors(geometry):
 
 
 def properties(commands):
-    """Returns (path, property) -> the value that it was given last."""
+    """Returns (path, property) -> its last value."""
     return {
         (command["path"], command["property"]): command["value"]
         for command in commands

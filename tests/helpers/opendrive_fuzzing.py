@@ -1,4 +1,4 @@
-"""A small file of OpenDRIVE to be changed, and all that reads it."""
+"""A small file of OpenDRIVE to damage, and its readers."""
 
 from pathlib import Path
 

@@ -17,7 +17,7 @@ from cns_drake.sensors.returns.calibrated import CalibratedReturns
 
 
 def plate(name, reflectivity, X_WG, size=(0.1, 400.0, 400.0), shape=None):
-    """Returns a surface: a plate, whose near face is that at lesser x."""
+    """Returns a plate, whose near face is the one at the lesser x."""
     instance = GeometryInstance(X_WG, shape or Box(*size), name)
     properties = PerceptionProperties()
     if reflectivity is not None:
@@ -27,12 +27,12 @@ def plate(name, reflectivity, X_WG, size=(0.1, 400.0, 400.0), shape=None):
 
 
 def facing(distance, offset=0.0):
-    """Returns the pose of a plate whose near face is so far ahead."""
+    """Returns the pose of a plate with its near face at a distance ahead."""
     return RigidTransform([distance + 0.05, offset, 0.0])
 
 
 def ahead(num_beams, spread=1e-4, max_range=400.0):
-    """Returns beams that all go along x, but for a tiny fan."""
+    """Returns beams along x, with a tiny spread."""
     angle = np.linspace(-spread, spread, num_beams)
     d_Sset = np.stack(
         [np.cos(angle), np.sin(angle), np.zeros(num_beams)], axis=1
@@ -45,7 +45,7 @@ def ahead(num_beams, spread=1e-4, max_range=400.0):
 def beside(num_beams, angle):
     """Returns beams that go along x, each followed by one off by an angle.
 
-    Those have odd numbers as their ring.
+    The turned beams have odd ring numbers.
     """
     angles = np.tile([0.0, angle], num_beams)
     d_Sset = np.stack(

@@ -1,4 +1,4 @@
-"""A crossing of two roads whose ends are joined in a loop."""
+"""A crossing of two roads with joined ends."""
 
 import yaml
 

@@ -1,4 +1,4 @@
-"""The cities as the generator makes them and as their files hold them."""
+"""The cities, both as generated and as in their files."""
 
 from dataclasses import dataclass
 import fcntl
@@ -22,11 +22,11 @@ from cns_drake.scenarios.shipped import worlds_folder
 
 @dataclass(frozen=True)
 class Plan:
-    """What a city should have; ranges hold least and greatest count.
+    """The expected contents of a city; ranges are least and greatest counts.
 
     Attributes:
         last_stage: the whole city.
-        buildings, trees, small: numbers of structures that stand.
+        buildings, trees, small: numbers of structures.
         sides: least and greatest length of the world's sides [m].
     """
 
@@ -52,9 +52,9 @@ def world_of(name: str) -> Path:
 
 @cache
 def city(name: str) -> City:
-    """Returns the generated city, made by the first process that asks."""
+    """Returns the generated city; the first process makes it."""
     file = Path(os.environ["CNS_DRAKE_TEST_CITIES"]) / f"{name}.pickle"
-    # Opened without truncation: who waits must find what was written.
+    # The file is opened without truncation, for processes that wait.
     with file.open("a+b") as stream:
         fcntl.flock(stream, fcntl.LOCK_EX)
         if file.stat().st_size == 0:

@@ -92,7 +92,7 @@ class CityWriter:
 def write_blocks(path, years=True):
     """Writes a town of three by three blocks of four houses, streets of 12 m.
 
-    Houses of a block were built 10 years after those of the one before.
+    The houses of each block are 10 years younger than those of the last.
     """
     city = CityWriter()
     for block in range(9):

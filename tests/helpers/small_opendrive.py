@@ -1,4 +1,4 @@
-"""Writes small files of OpenDRIVE, and reads any on a way of its own."""
+"""Writes small files of OpenDRIVE; reads any by independent means."""
 
 from itertools import pairwise
 import math
@@ -105,7 +105,7 @@ def _records(elements, key):
 
 
 def _value(records, s):
-    """The record that holds at s, which is not at a joint."""
+    """The value of the record at s, away from joints."""
     held = [r for r in records if r[0] <= s]
     if not held:
         return 0.0
@@ -225,7 +225,7 @@ def sampled_lanes(path, spacing=1.0, only=None):
         for e, start in zip(sections, bounds, strict=False):
             joints |= {start + _number(w, "sOffset") for w in e.iter("width")}
         joints = sorted(j for j in joints if 0.0 <= j <= length)
-        # A hair beyond each joint, on both sides of it.
+        # Just before and just after each joint.
         wanted = []
         for a, b in pairwise(joints):
             if b - a > 1e-3:

@@ -79,7 +79,7 @@ def _tags(tags):
 
 
 def write_corner(path):
-    """Writes a bit of everything: streets that cross, houses, land, trees."""
+    """Writes some of each: streets that cross, houses, land, trees."""
     osm = OsmWriter()
     osm.way([(-60, 0), (0, 0), (60, 0)], highway="residential", oneway="yes")
     osm.way([(0, -50), (0, 50)], highway="tertiary", sidewalk="both")

@@ -1,4 +1,4 @@
-"""A small report to make pages of: two drives, two methods."""
+"""A small report for tests of pages: two drives, two methods."""
 
 import numpy as np
 
@@ -31,7 +31,7 @@ MAP = "metropolis"
 
 
 def make_content(folder, **changed):
-    """Returns the content of a page; its figures are written to a folder."""
+    """Returns the content of a page, and writes its figures to a folder."""
     svg = (
         '<svg xmlns="http://www.w3.org/2000/svg" width="900" height="300">'
         "</svg>"
@@ -44,8 +44,8 @@ def make_content(folder, **changed):
         _result("ring++", [0, 0, 1, 1, 1, 2, 2, 3, 3, 4], back=True),
     ]
     nothing = np.full(5, np.nan)
-    # The second query is taken to a twin by Scan Context++; no other one is
-    # wrong and has a candidate.
+    # Scan Context++ takes a twin for the second query; no other query has a
+    # wrong candidate.
     fits = {"scan-context++": np.array([np.nan, 0.9, *nothing[2:]])}
     fits["ring++"] = nothing
     evidence = {

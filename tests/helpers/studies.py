@@ -1,7 +1,7 @@
 """Studies whose jobs run in the process of a test, one after the other.
 
-That jobs run anywhere else is the business of `cns_drake.base.jobs` and its
-tests; processes would only make these slow.
+Tests of `cns_drake.base.jobs` cover other processes, which would only slow
+these tests.
 """
 
 from cns_drake.base.jobs.job_process import nothing_left
@@ -14,10 +14,10 @@ from evaluation.study.plan import plan_study
 
 
 def do(jobs):
-    """Does what is left to do of jobs, none of which needs a later one.
+    """Runs unfinished jobs, sorted so that none needs a later one.
 
     Returns:
-        The names of those that had anything to do.
+        The names of the jobs that ran.
     """
     done = []
     for job in jobs:
@@ -38,7 +38,7 @@ def report(recordings, output, methods=None, protocol=PAPER_PROTOCOL):
 
 
 def report_files(output):
-    """Returns name -> bytes of all files that a report consists of."""
+    """Returns name -> bytes of all files of a report."""
     return {
         path.relative_to(output).as_posix(): path.read_bytes()
         for path in sorted(output.rglob("*"))

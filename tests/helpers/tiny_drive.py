@@ -1,4 +1,4 @@
-"""A drive that costs next to nothing: one hall, few beams, three seconds."""
+"""A drive that costs little: one hall, few beams, three seconds."""
 
 import contextlib
 import signal
@@ -35,7 +35,7 @@ def tiny_scenario(folder, **changes):
             "longitudinal_acceleration": 1.5,
             "lateral_acceleration": 2.0,
         },
-        # Noise and motion must not depend on where a run has begun.
+        # Noise and motion must not depend on the first frame of a run.
         "lidars": {
             "lidar": {
                 "preset": "vlp-16",
@@ -51,7 +51,7 @@ def tiny_scenario(folder, **changes):
 
 
 def long_scenario(folder, name):
-    """The same drive at a crawl: seconds of work, so that it can be killed."""
+    """The same drive at a low speed: seconds of work, in which it is killed."""
     crawl = {
         "cruise": 0.6,
         "longitudinal_acceleration": 1.5,
@@ -68,7 +68,7 @@ def write_scenario(scenario, folder):
 
 
 def run_and_tell(scenario, output, sender):
-    """Simulates in a process of its own and tells of each frame.
+    """Simulates in a process of its own and prints each frame.
 
     Exits with INTERRUPTED if SIGTERM has ended the run in good order.
     """

@@ -17,7 +17,7 @@ def make_town(seed=3, gone=()):
 
     Args:
         seed: of the whole town.
-        gone: numbers of boxes that are not there.
+        gone: numbers of missing boxes.
     """
     rng = np.random.default_rng([seed, 1])
     ground = rng.uniform([-70, -60], [190, 60], (45_000, 2))
@@ -56,7 +56,7 @@ def rigid(move, yaw_deg):
 
 
 def drifted(X, scale, turn_deg):
-    """Returns poses of odometry that is off.
+    """Returns poses of odometry with errors.
 
     Args:
         X: (N, 4, 4) true poses.
@@ -76,7 +76,7 @@ def drifted(X, scale, turn_deg):
 
 
 def make_scans(town, X_WS):
-    """Returns what a LiDAR sees of a town at some poses: what is in range."""
+    """Returns the points of a town in range of a LiDAR at some poses."""
     scans = []
     for index, X in enumerate(X_WS):
         near = np.hypot(*(town - X[:3, 3])[:, :2].T) < _RANGE

@@ -66,7 +66,7 @@ def write_transient_town(folder):
     signs at y = 5, trees and shrubs at y = 12, houses beyond.
     """
     rng = np.random.default_rng(3)
-    # What lies farthest out stays, and so do the coordinates of casting.
+    # The farthest structures stay, and with them the coordinates of casting.
     edge = pole_shape(0.1, 1)
     visuals = [
         visual("west/edge", edge, -200, -200),

@@ -83,7 +83,7 @@ def test_the_user_keeps_theirs(folder):
 @pytest.mark.parametrize(
     "folder", ["package", "failing", "module"], indirect=True
 )
-def test_a_study_from_python_says_what_hides_its_evaluation(folder):
+def test_a_study_from_python_names_what_hides_its_evaluation(folder):
     done = run_script(folder, STUDY)
     (line,) = done.stdout.splitlines()
     assert line.startswith(f"{folder}/evaluation"), done.stderr
@@ -112,7 +112,7 @@ def test_diagram_script(folder):
 @pytest.mark.parametrize(
     "folder", ["package", "failing", "module"], indirect=True
 )
-def test_a_program_says_what_hides_its_evaluation(folder, tmp_path_factory):
+def test_a_program_names_what_hides_its_evaluation(folder, tmp_path_factory):
     elsewhere = tmp_path_factory.mktemp("elsewhere")
     done = run(elsewhere, "-m", "cns_drake", "list", path=[str(folder)])
     assert (done.stdout, done.returncode) == ("", 2)

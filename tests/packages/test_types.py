@@ -21,5 +21,5 @@ def test_mypy_finds_nothing():
 
 
 @pytest.mark.parametrize("package", ["cns_drake", "evaluation"])
-def test_packages_tell_that_they_have_hints(package):
+def test_packages_declare_their_hints(package):
     assert (ROOT / package / "py.typed").is_file()

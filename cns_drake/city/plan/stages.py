@@ -101,8 +101,7 @@ class Stages(_Model):
         return heights
 
     def sites(self, stage: str) -> dict[str, float]:
-        """Returns the buildings under construction at a stage, and how high
-        [m]."""
+        """Returns a stage's buildings under construction, with heights [m]."""
         return {
             name: group.height
             for group in self.stages[stage].sites.values()

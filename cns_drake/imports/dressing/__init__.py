@@ -1,2 +1,1 @@
-"""Dressing: details added to an imported city's bare shapes, from tags and by
-lot."""
+"""Dressing: details for an imported city's bare shapes, by tags and by lot."""

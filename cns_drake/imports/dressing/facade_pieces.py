@@ -166,8 +166,7 @@ def _add_cornice(faces: Faces, plan: FacadePlan) -> None:
 
 
 def _between(plan: FacadePlan, top: float) -> tuple[np.ndarray, np.ndarray]:
-    """Returns start and end of the stretches of a wall without openings below a
-    height."""
+    """Returns the stretches of a wall without openings below a height."""
     o = plan.openings
     low = o.z0 < top + 0.05
     order = np.argsort(o.x0[low])

@@ -232,8 +232,7 @@ def _wall_between(
 def _fitting(
     panel: Panel, openings: Openings
 ) -> tuple[Openings, tuple[float, float, float, float]] | None:
-    """Returns openings whose bounding rectangle is in a panel, and that
-    rectangle."""
+    """Returns openings in a panel, with their bounding rectangles."""
     outline = shapely.buffer(panel.whole(), _EXACT, join_style="mitre")
     while len(openings.row):
         found = (

@@ -68,8 +68,7 @@ class DriveViews:
         return np.asarray(self._tree.query(middles)[0] <= reach + distance)
 
     def distances(self, panels: Sequence[Panel], most: float) -> np.ndarray:
-        """Returns the distance (N,) of the nearest place that sees each panel
-        [m].
+        """Returns panels' distances (N,) from the nearest viewing place [m].
 
         The distance is infinite if no place within `most` sees the panel.
 
@@ -93,8 +92,7 @@ class DriveViews:
     def _looks(
         self, panel: Panel, most: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Returns places (K,) in front of a panel, and their distances (K,)
-        [m]."""
+        """Returns places (K,) in front of a panel, and distances (K,) [m]."""
         middle = panel.origin[:2] + panel.along * panel.length / 2.0
         near = self._tree.query_ball_point(middle, most + panel.length / 2.0)
         index = np.array(near, dtype=int)
@@ -110,8 +108,7 @@ class DriveViews:
         return index[usable], distance[usable]
 
     def _is_seen(self, probes: np.ndarray, eyes: np.ndarray) -> np.ndarray:
-        """Returns which (K,) sets of probes (K, P, 3) are seen from eyes (K, 3)
-        [m]."""
+        """Returns (K,) bool: whether eyes (K, 3) see probes (K, P, 3)."""
         if self._scene is None:
             return np.ones(len(eyes), dtype=bool)
         starts = np.repeat(eyes - self._middle, probes.shape[1], axis=0)

@@ -60,8 +60,7 @@ def bridge_ends(bands: Sequence[LaneBand]) -> BaseGeometry:
 
 
 def _strip(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Returns the triangles between two lines (N, 3), seen from above if
-    the second lies to the left of the first."""
+    """Returns triangles between lines (N, 3), upward if the second is left."""
     return np.concatenate(
         [
             np.stack([a[:-1], a[1:], b[1:]], axis=1),

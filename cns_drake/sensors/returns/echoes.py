@@ -47,8 +47,8 @@ class Receiver(NamedTuple):
     Attributes:
         budget: its `LinkBudget`.
         extinction: of the weather [1/m].
-        resolution: echoes nearer to each other are one [m]. min_range,
-            max_range: limits of reported ranges [m].
+        resolution: echoes nearer to each other are one [m].
+        min_range, max_range: limits of reported ranges [m].
         retro_from: see `UnitSheet`.
         choice: index of one of `Echoes`.
         scattering: by the weather; empty in clear air.

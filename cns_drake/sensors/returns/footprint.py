@@ -243,8 +243,7 @@ def _limit(distance: float) -> float:
 
 @compiled
 def _range_on(met: Met, i: int, d_W: np.ndarray) -> float:
-    """Returns the range at which a ray meets the plane of the i-th ray's hit
-    [m].
+    """Returns a ray's range at the plane of the i-th ray's hit [m].
 
     It is inf if the ray does not meet the plane, or the i-th ray is a miss.
     """

@@ -93,8 +93,7 @@ class Weather:
         )
 
     def drops(self, diameters_mm: np.ndarray) -> list[tuple[np.ndarray, float]]:
-        """Returns for each kind of drops N(D) [1/(m3 mm)], and the
-        reflectivity.
+        """Returns N(D) [1/(m3 mm)] and the reflectivity of each kind of drops.
 
         Args:
             diameters_mm: D.

@@ -38,7 +38,7 @@ def test_rows_with_the_numbers_of_their_lines(tmp_path):
         (b"a,b\n1," + b"7" * 200_000, "not CSV: field larger"),
     ],
 )
-def test_what_is_no_table(tmp_path, content, fault):
+def test_tables_that_are_none(tmp_path, content, fault):
     path = write(tmp_path, content)
     with pytest.raises(InputError, match=rf"table\.csv: {fault}"):
         read_records(path, ("b",))

@@ -35,7 +35,7 @@ def test_older_file_stays_until_completion(tmp_path):
     assert path.read_text() == "new"
 
 
-def test_full_disk_is_told_in_one_line(tmp_path):
+def test_full_disk_is_one_line(tmp_path):
     path = tmp_path / "page.html"
     part_path(path).symlink_to("/dev/full")
     with pytest.raises(InputError) as error:
@@ -76,7 +76,7 @@ def test_check_refuses_what_cannot_be_written(tmp_path):
         check_writable(tmp_path)
 
 
-def test_what_is_no_file_is_not_read(tmp_path):
+def test_only_files_are_read(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "zero").symlink_to("/dev/zero")
     for name, fault in (

@@ -29,7 +29,7 @@ def test_what_json_writes_is_read(value):
         (b"9" * 5000, "digits"),
     ],
 )
-def test_what_is_refused(data, fault):
+def test_refused_values(data, fault):
     with pytest.raises(ValueError, match=fault):
         parse_json(data)
 

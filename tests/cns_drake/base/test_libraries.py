@@ -10,7 +10,7 @@ from cns_drake.base.libraries import missing_library
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "expected"),
     [
         (
             "libglib-2.0.so.0: cannot open shared object file: No such file or"
@@ -26,8 +26,8 @@ from cns_drake.base.libraries import missing_library
         ("/x/a.so: undefined symbol: b", None),
     ],
 )
-def test_what_is_told(text, told):
-    assert missing_library(ImportError(text)) == told
+def test_named_libraries(text, expected):
+    assert missing_library(ImportError(text)) == expected
 
 
 def test_a_missing_library_is_one_line_and_names_the_package(tmp_path):

@@ -3,7 +3,7 @@
 from cns_drake.base.map_folder import MapFolder, sequence_name
 
 
-def test_what_is_there(tmp_path):
+def test_existing_files(tmp_path):
     folder = MapFolder(tmp_path / "town")
     folder.path.mkdir()
     assert folder.name == "town"

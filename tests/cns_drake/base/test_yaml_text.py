@@ -41,7 +41,7 @@ def test_what_people_write_is_read():
         ("a: [", "while parsing"),
     ],
 )
-def test_what_is_no_good_is_told_in_a_line(text, fault, tmp_path):
+def test_bad_text_is_one_line(text, fault, tmp_path):
     with pytest.raises(ValueError, match=fault) as error:
         parse_yaml(text)
     assert "\n" not in str(error.value)

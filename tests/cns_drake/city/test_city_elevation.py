@@ -73,7 +73,7 @@ def test_relaxed_keeps_a_harmonic_polynomial():
     np.testing.assert_allclose(relaxed(holes), z, atol=1e-9)
 
 
-def test_relaxed_stays_between_what_is_given():
+def test_relaxed_stays_between_given_values():
     rng = np.random.default_rng(3)
     z = np.full((20, 30), np.nan)
     given = rng.random(z.shape) < 0.1

@@ -223,7 +223,7 @@ def _count_triangles(path) -> int:
     return sum(len(x.split()) - 3 for x in lines if x.startswith("f "))
 
 
-def test_stories_are_told(name):
+def test_stories_are_shown(name):
     path = world_of(name) / "stages.yaml"
     raw = yaml.safe_load(path.read_text())
     for stage in raw["stages"].values():

@@ -86,7 +86,7 @@ def test_the_first_stage_lacks_the_east(town):
     assert max(standing) <= min(missing)
 
 
-def test_what_is_there_is_left_alone(tmp_path):
+def test_existing_files_stay(tmp_path):
     (tmp_path / "roads.yaml").write_text(ROADS)
     assert [path.name for path in sorted(start_city(tmp_path))] == INPUTS
     before = {name: (tmp_path / name).read_bytes() for name in INPUTS}

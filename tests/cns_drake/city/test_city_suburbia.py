@@ -143,7 +143,7 @@ def test_stage_01_is_not_bare():
             assert len(shapely.get_parts(near)) >= 3, (road.name, x, y)
 
 
-def test_nothing_is_left_hanging_on_what_is_away():
+def test_nothing_hangs_on_missing_structures():
     """Street furniture stays; a cleared lot has no cars."""
     for name in absent():
         assert not name.startswith("lamp"), name

@@ -95,10 +95,10 @@ def test_bad_input_is_one_line_and_writes_nothing(
     (folder / file).write_text(text.replace(old, new, 1))
     with pytest.raises(InputError) as caught:
         city(folder)
-    told = str(caught.value)
-    assert told.startswith(str(folder / file))
-    assert fault in told
-    assert "\n" not in told
+    message = str(caught.value)
+    assert message.startswith(str(folder / file))
+    assert fault in message
+    assert "\n" not in message
     assert len(list(folder.iterdir())) == 3
 
 

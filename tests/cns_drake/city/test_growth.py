@@ -152,7 +152,7 @@ def test_the_rectangle_lies_within_the_lot():
 
 
 @pytest.mark.parametrize("use", USES)
-def test_what_is_on_a_lot_keeps_apart_and_within(use):
+def test_objects_on_a_lot_stay_apart_and_inside(use):
     lot = building("office_001", typical_model("office"), (30, -8, 2.5), 0.7)
     cars = dict.fromkeys(PARKED_CARS, 1.0)
     things = list(lot_objects(lot, use, cars, np.random.default_rng(1)))

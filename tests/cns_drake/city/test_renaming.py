@@ -84,12 +84,12 @@ def test_a_grown_plan_is_not_generated_with_the_old_names(grown):
 
 def test_names_follow_what_stays_where_it_is(grown):
     before = rows_of(grown)
-    told = CliRunner().invoke(
+    outcome = CliRunner().invoke(
         app, ["city", str(grown), "--repair-stages", "--check"]
     )
-    assert told.exit_code == 1
+    assert outcome.exit_code == 1
     assert (grown / "stages.yaml").read_text() == STAGES
-    assert str(grown / "stages.yaml") in told.output
+    assert str(grown / "stages.yaml") in outcome.output
     done = CliRunner().invoke(app, ["city", str(grown), "--repair-stages"])
     assert done.exit_code == 0, done.output
     after = rows_of(grown)
@@ -103,7 +103,7 @@ def test_names_follow_what_stays_where_it_is(grown):
     for one, other in zip(old, new, strict=True):
         assert one != other
         assert place(before[one]) == place(after[other])
-        assert f"{one} is {other} now" in told.output
+        assert f"{one} is {other} now" in outcome.output
     # All other text is unchanged.
     assert named.sub("", text) == named.sub("", STAGES)
     stages = yaml.safe_load(text)["stages"]
@@ -116,7 +116,7 @@ def test_names_follow_what_stays_where_it_is(grown):
     assert (grown / "stages.yaml").read_text() == text
 
 
-def test_what_is_gone_is_named_and_nothing_written(grown):
+def test_missing_names_are_listed_and_nothing_written(grown):
     plan = (grown / "city.yaml").read_text()
     (grown / "city.yaml").write_text(
         plan.replace("at: [30, -21]", "at: [36, -21]")
@@ -128,7 +128,7 @@ def test_what_is_gone_is_named_and_nothing_written(grown):
     assert (grown / "stages.yaml").read_text() == STAGES
 
 
-def test_patterns_that_mean_others_are_told(grown):
+def test_patterns_that_match_others_are_noted(grown):
     text = STAGES.replace("tree_*", '"office_00?"')
     (grown / "stages.yaml").write_text(text)
     lines = []

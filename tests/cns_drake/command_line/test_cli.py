@@ -32,7 +32,7 @@ def run(*arguments, script=None):
 
 
 def run_here(capfd, *arguments):
-    """As `run`, in this process, which has loaded everything already."""
+    """Like `run`, in this process, which has loaded everything already."""
     result = run_program(capfd, "cns-drake", main, *arguments)
     return subprocess.CompletedProcess(arguments, *result)
 
@@ -252,7 +252,7 @@ def assert_one_line(result, fault):
     assert last.startswith("cns-drake: error: ")
     assert re.search(fault, last), last
     assert "Traceback" not in result.stderr
-    # Nothing but progress may come before.
+    # Only progress may come before it.
     errors = [line for line in result.stderr.splitlines() if "error" in line]
     assert errors == [last]
 

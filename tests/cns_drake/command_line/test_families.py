@@ -1,4 +1,4 @@
-"""A family that nobody records gives what its recordings give."""
+"""A family without recordings gives the results of its recordings."""
 
 import csv
 
@@ -13,7 +13,7 @@ from evaluation.command_line.cli import app as evaluation_app
 
 pytestmark = pytest.mark.slow
 
-# Members and their control have them; the drive that asks has none.
+# Members and their control have scenario files; the query drive has none.
 RIDE, IMU = {"roughness": "C"}, {"rate": 100}
 
 
@@ -69,7 +69,7 @@ def test_simulated_and_recorded_families_agree(tmp_path):
     assert tables[0] == tables[1]
     rows = list(csv.DictReader(tables[0].splitlines()))
     assert {row["database"] for row in rows} == {m.name for m in members}
-    # One control serves both, whose routes are one.
+    # One control serves both, because they share a route.
     unchanged = {(row["method"], row["auc_unchanged"]) for row in rows}
     assert len(unchanged) == len(rows) / 2
     assert any(row["kept"] for row in rows)

@@ -1,4 +1,4 @@
-"""What both programs tell of themselves: help, version, completion."""
+"""Help, version and completion of both programs."""
 
 import re
 import shlex
@@ -43,7 +43,7 @@ def find(program, *words):
 
 
 def squeezed(text):
-    """Returns a text without what wrapping changes."""
+    """Returns a text without white space, which wrapping changes."""
     return "".join(text.split())
 
 
@@ -53,27 +53,27 @@ def words(request):
 
 
 @pytest.fixture
-def told(words, capsys, monkeypatch):
+def shown(words, capsys, monkeypatch):
     """The help of a command on a narrow terminal."""
     monkeypatch.setenv("COLUMNS", str(WIDTH))
     return run(capsys, *words, "--help")
 
 
-def test_help_fits_the_terminal(told):
-    assert max(map(len, told.splitlines())) <= WIDTH
+def test_help_fits_the_terminal(shown):
+    assert max(map(len, shown.splitlines())) <= WIDTH
 
 
-def test_help_has_every_word(words, told):
+def test_help_has_every_word(words, shown):
     command = find(*words)
     texts = [command.help, *(each.help for each in command.params)]
     for text in filter(None, texts):
-        assert squeezed(text) in squeezed(told)
+        assert squeezed(text) in squeezed(shown)
     for name, each in getattr(command, "commands", {}).items():
-        assert squeezed(name + each.help.split("\n\n")[0]) in squeezed(told)
+        assert squeezed(name + each.help.split("\n\n")[0]) in squeezed(shown)
 
 
-def test_help_ends_with_an_example_that_is_good_usage(words, told):
-    _, _, example = told.partition("\n  Example:\n")
+def test_help_ends_with_an_example_that_is_good_usage(words, shown):
+    _, _, example = shown.partition("\n  Example:\n")
     for line in example.replace("\\\n", " ").splitlines():
         program, name, *arguments = shlex.split(line)
         assert program == words[0]
@@ -100,8 +100,8 @@ def test_called_with_nothing_a_program_shows_its_help(program, capsys):
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_version(program, capsys):
-    told = run(capsys, program, "--version")
-    assert told == f"{program} {cns_drake.__version__}\n"
+    shown = run(capsys, program, "--version")
+    assert shown == f"{program} {cns_drake.__version__}\n"
 
 
 @pytest.mark.parametrize(

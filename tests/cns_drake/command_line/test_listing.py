@@ -1,4 +1,4 @@
-"""The table of sequences: whole in files, legible on narrow terminals."""
+"""The table of sequences: complete in files, legible in narrow terminals."""
 
 import re
 import sys
@@ -56,7 +56,8 @@ def test_columns_give_way_but_not_names(width, columns):
         row.sequence for row in ROWS
     ]
     assert max(map(len, lines)) <= max(width, len(ROWS[0].sequence))
-    # What stands right has its last digit below its heading's last letter.
+    # In right-aligned columns the last digit is below the heading's last
+    # letter.
     if width > 10:
         assert len({len(line) for line in lines}) == 1
 

@@ -1,4 +1,4 @@
-"""Points on what another stage lacks, against stages of a few boxes."""
+"""Points on structures that another stage lacks, with stages of a few boxes."""
 
 import json
 import re
@@ -14,9 +14,9 @@ from cns_drake.export.exporting import export_sequence
 from cns_drake.scenarios.shipped import shipped_maps
 from evaluation import sequences
 
-# Instance -> name, class, its id, and the id where stage 01 lacks it, as
-# semantic-kitti.yaml has them: moving-car, -person, -bus, -truck, and
-# moving-other-vehicle for all else. None: it stands in stage 01.
+# Instance -> name, class, its id, and its id if stage 01 lacks it. The ids are
+# those of semantic-kitti.yaml: moving-car, -person, -bus, -truck, and
+# moving-other-vehicle for all others. None: it is in stage 01.
 STRUCTURES = {
     1: ("ground", "terrain", 72, None),
     2: ("old_car", "car", 10, None),
@@ -29,7 +29,7 @@ STRUCTURES = {
     9: ("young_tower", "building", 50, None),
     10: ("new_tree", "vegetation", 70, 259),
     11: ("gone_before", "pole", 80, 259),
-    # In stages, but not in the table.
+    # The structure is in stages, but not in the table.
     12: ("shed", "unlabeled", 0, None),
     13: ("unlisted", "unlabeled", 0, 259),
 }
@@ -105,7 +105,7 @@ def read_labels(folder, scan):
     return stored & 0xFFFF, stored >> 16
 
 
-def test_what_is_absent_has_labels_of_what_moves(drive, tmp_path):
+def test_absent_structures_have_labels_of_moving_ones(drive, tmp_path):
     plain = export_sequence(drive, "kitti", tmp_path / "plain")
     marked = export_sequence(
         drive, "kitti", tmp_path / "marked", absent_in="01"
@@ -121,14 +121,14 @@ def test_what_is_absent_has_labels_of_what_moves(drive, tmp_path):
             assert after[k] == (label if absent is None else absent)
         seen |= set(instance.tolist())
     assert seen == {0, *STRUCTURES}
-    # All else is as without.
+    # The rest is as without the option.
     for path in plain.rglob("*.*"):
         if path.suffix != ".label" and path.name != "structures.json":
             other = marked / path.relative_to(plain)
             assert other.read_bytes() == path.read_bytes()
 
 
-def test_the_table_of_structures_says_it(drive, tmp_path):
+def test_the_table_of_structures_names_them(drive, tmp_path):
     marked = export_sequence(drive, "kitti", tmp_path / "out", absent_in="01")
     table = json.loads((marked / "structures.json").read_text())
     assert {entry["instance"]: entry.get("absent_in") for entry in table} == {
@@ -228,7 +228,7 @@ def test_points_without_instances(town, tmp_path):
     [("downtown", True), ("riverside", True), ("metropolis", False)],
 )
 def test_cities_that_only_grow_lack_nothing(name, only_grows):
-    """As the documents say of Downtown and Riverside."""
+    """The documents say this about Downtown and Riverside."""
     stages = {
         frozenset(re.findall(r'<visual name="([^"/]+)', path.read_text()))
         for path in shipped_maps()[name].glob("stage_*.sdf")

@@ -112,7 +112,7 @@ def test_tum_by_plain_means(drive, tmp_path):
         stamps = [
             line.split()[0] for line in (folder / name).read_text().splitlines()
         ]
-        # No digit is lost: a float has not as many.
+        # No digit is lost, because a float has fewer.
         assert [
             int(stamp.replace(".", "")) for stamp in stamps
         ] == recorded.stamps_ns.tolist()
@@ -125,7 +125,8 @@ def test_kitti_by_the_loader_of_kiss_icp(drive, kitti):
 
     recorded = sequences.open(drive)
     dataset = KITTIOdometryDataset(kitti, "07")
-    # It bends the scans of KITTI's own sensor, which errs.
+    # The program corrects an error of KITTI's own sensor, which bends our
+    # scans.
     dataset.correct_kitti_scan = lambda points: points
     X_S0W = np.linalg.inv(recorded.X_WS[0])
     np.testing.assert_allclose(
@@ -154,7 +155,7 @@ def test_labels_as_semantic_kitti_has_them(drive, kitti):
 
 
 def test_camera_axes_are_right_down_forward(kitti):
-    # The drive goes forward: along z of the camera. It bends to the left.
+    # The drive goes forward, along the camera's z, and bends to the left.
     rows = np.loadtxt(kitti / "poses/07.txt")
     np.testing.assert_allclose(rows[0].reshape(3, 4), np.eye(4)[:3], atol=1e-12)
     Tr = next(
@@ -178,7 +179,7 @@ def test_cns_reads_back(drive, cns):
 
 
 def test_cns_by_plain_means(drive, cns):
-    """gt.csv holds the vehicle, transformation_lidar.yaml the LiDAR on it."""
+    """gt.csv has the vehicle's poses, transformation_lidar.yaml the LiDAR's."""
     recorded = sequences.open(drive)
     rows = np.loadtxt(cns / "Town/07/gt.csv", delimiter=",")
     mount = yaml.safe_load((cns / "transformation_lidar.yaml").read_text())
@@ -322,7 +323,7 @@ def test_an_interrupted_export_has_no_final_name(drive, tmp_path, format_name):
         export_sequence(drive, format_name, tmp_path / "out", on_frame=stop)
     left = [p.name for p in (tmp_path / "out").rglob("*") if p.is_file()]
     assert left == ["export.yaml"]
-    # Killed outright, it leaves its part behind, which is of no use to others.
+    # A killed export leaves its part file, which no other export uses.
     final = tmp_path / "out" / ("Town" if format_name == "cns" else "sequences")
     part = final / "07.part"
     part.mkdir(parents=True)
@@ -357,7 +358,7 @@ def test_a_full_disk_leaves_nothing_half(
 @pytest.mark.parametrize("format_name", ["cns", "kitti"])
 @pytest.mark.parametrize("depth", [".", "exports"])
 def test_a_report_finds_exports(tmp_path, format_name, depth):
-    """As it finds recordings, by the map and stage that they tell."""
+    """It finds them like recordings, by the map and stage in their scenario."""
     for number in ("1", "2"):
         name = f"town_0{number}"
         recording = write_drive(
@@ -455,7 +456,7 @@ def test_names_that_lead_elsewhere_are_refused(tmp_path):
 
 @pytest.mark.parametrize("format_name", ["cns", "tum"])
 def test_quaternions_are_of_unit_length(tmp_path, format_name):
-    """Also where the source's are not: our own reader wants them so."""
+    """This holds even if the source's are not; our own reader needs it."""
     recording = write_drive(tmp_path / "town_07")
     path = recording / "town_07_0.mcap"
     messages, attachments = read_messages(path.read_bytes())
@@ -481,7 +482,7 @@ def test_quaternions_are_of_unit_length(tmp_path, format_name):
     assert not list((tmp_path / "new").glob("*/*"))
 
 
-def test_what_is_no_recording(kitti, tmp_path):
+def test_folders_without_a_recording(kitti, tmp_path):
     for path in (tmp_path, tmp_path / "missing", kitti / "sequences/07"):
         with pytest.raises(InputError, match=f"{path}: no recording"):
             export_sequence(path, "cns", tmp_path / "out")

@@ -68,14 +68,14 @@ def test_every_type_of_geometry(tmp_path):
     read, found = structures(city.write(tmp_path / "city.json"))
     assert area(found["surfaces"]) == pytest.approx(80.0)
     assert area(found["composite"]) == pytest.approx(96.0)
-    # The inner shell belongs to it.
+    # The inner shell is a part of the solid.
     assert area(found["solid"]) == pytest.approx(96.0 + 24.0)
     assert area(found["solids"]) == area(found["joined"])
     assert area(found["joined"]) == pytest.approx(96.0 + 6.0)
     assert "line" not in found
-    told = {kind for kind, _, _ in read.faults.rows()}
-    assert "geometry of type MultiLineString, left out" in told
-    assert "object without a surface, left out" in told
+    notes = {kind for kind, _, _ in read.faults.rows()}
+    assert "geometry of type MultiLineString, left out" in notes
+    assert "object without a surface, left out" in notes
 
 
 def test_templates_are_placed(tmp_path):
@@ -118,7 +118,7 @@ def test_a_building_and_its_parts_are_one_structure(tmp_path):
     (one,) = found.values()
     assert one.structure.name == "NL.1_2"
     assert one.year == 1931
-    # Its footprint is no wall where its parts are solids.
+    # The footprint gives no wall if the parts are solids.
     assert area(one) == pytest.approx(48.0)
 
 
@@ -136,8 +136,8 @@ def test_levels_of_detail(tmp_path):
     assert volume(structures(path, lod=1.2)[1]["a"]) == pytest.approx(4.0)
     read, found = structures(path, lod=3.0)
     assert found == {}
-    told = {kind for kind, _, _ in read.faults.rows()}
-    assert told == {"object without level of detail 3, left out"}
+    notes = {kind for kind, _, _ in read.faults.rows()}
+    assert notes == {"object without level of detail 3, left out"}
 
 
 def test_a_solid_inside_out_is_turned_back(tmp_path):
@@ -330,7 +330,7 @@ def test_degrees_without_a_word(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "notes"),
     [
         (
             set_in("CityObjects", "a", "geometry", 0, "boundaries", 7),
@@ -354,7 +354,7 @@ def test_degrees_without_a_word(tmp_path):
         (set_in("CityObjects", "b", {"type": 5}), "without a type"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_used_is_told(tmp_path, change, told):
+def test_unusable_parts_are_noted(tmp_path, change, notes):
     city = CityWriter()
     city.box("a", 0, 0, (2, 2, 2))
     city.box("ok", 5, 5, (2, 2, 2))
@@ -364,7 +364,7 @@ def test_what_cannot_be_used_is_told(tmp_path, change, told):
     path.write_text(json.dumps(document))
     read, found = structures(path)
     assert "ok" in found
-    assert any(told in kind for kind, _, _ in read.faults.rows())
+    assert any(notes in kind for kind, _, _ in read.faults.rows())
 
 
 def test_parents_in_a_circle(tmp_path):
@@ -376,7 +376,7 @@ def test_parents_in_a_circle(tmp_path):
 
 
 def test_coordinates_beyond_the_area_of_their_system_are_counted(tmp_path):
-    """A Dutch town said to lie in UTM zone 33, east of the Netherlands."""
+    """The file puts a Dutch town into UTM zone 33, east of the Netherlands."""
     for code, number in (("7415", 0), ("32633", 1)):
         city = CityWriter()
         city.metadata["referenceSystem"] = (

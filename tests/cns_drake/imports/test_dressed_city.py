@@ -1,4 +1,4 @@
-"""Buildings are dressed on the walls of the file, by tags and by lot."""
+"""Walls of the file get details from tags and by lot."""
 
 import csv
 import hashlib
@@ -68,7 +68,7 @@ def read(osm, folder):
 
 @pytest.fixture(scope="module")
 def row(tmp_path_factory):
-    """Houses of a street: a wall in common, an odd outline, a gable."""
+    """Houses of a street: with a common wall, an odd outline, a gable."""
     osm = OsmWriter()
     common = {"building": "apartments", "building__levels": "5"}
     osm.box(-60, -4, 20, 14, **common)
@@ -143,7 +143,7 @@ def test_a_wall_against_a_neighbour_has_no_windows(row):
         x = np.concatenate([parts["glass"], parts["doors"]])[:, :, 0]
         wall = row.structures[0].triangles[:, :, 0].max()
         assert (np.abs(x - wall) > 0.4).all()
-        # On the far side of the same house there are windows.
+        # The far side of the same house has windows.
         assert (np.abs(x - (wall - 20.0 * side)).max(axis=1) < 0.5).any()
 
 
@@ -229,7 +229,7 @@ def test_only_what_drives_see_from_near_has_windows(tmp_path):
     after, _ = dressed(city, path)
     glass = surfaces(after[f"building_w{near}"])["glass"]
     y = city.structures[0].triangles[:, :, 1]
-    # The rear cannot be seen.
+    # The rear is invisible.
     assert glass[:, :, 1].max() < y.min() + 11.0
     assert (glass[:, :, 1] < y.min() + 0.5).any()
     assert set(surfaces(after[f"building_w{far}"])) >= {"body", "roof"}
@@ -358,7 +358,7 @@ def test_plain_is_what_an_import_gave_before_there_was_dressing(tmp_path):
 
 
 @pytest.mark.slow
-def test_what_is_from_the_file_and_what_by_lot_is_told(tmp_path):
+def test_the_notes_count_details_of_the_file_and_by_lot(tmp_path):
     folder = run_import(tmp_path, "--grow", "0.5")
     facts = yaml.safe_load((folder / "import.yaml").read_text())["dressing"]
     assert facts["seed"] == 0
@@ -376,7 +376,7 @@ def test_what_is_from_the_file_and_what_by_lot_is_told(tmp_path):
         else:
             # Sidewalks have kerbs; lamps and cars are not in the file.
             assert origin == ("dressed" if name.startswith("walk") else "lot")
-    # The table has what the worlds have, though no world was loaded for it.
+    # The table equals the worlds, though no world was loaded for it.
     table = folder / "sequences.csv"
     told = table.read_text()
     table.unlink()

@@ -1,4 +1,4 @@
-"""Faces against areas and normals that are known."""
+"""Faces against known areas and normals."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def test_a_face_with_a_hole_however_it_lies(seed):
     triangles = face_triangles(rings, "one", faults)
     vectors = areas(triangles)
     normal = R[:, 2]
-    # Each triangle looks to where the outer ring does; none overlap.
+    # Each triangle has the direction of the outer ring; none overlap.
     assert (vectors @ normal > 0).all()
     assert (vectors @ normal).sum() == pytest.approx(11.0, abs=5e-3)
     corners = np.concatenate(rings)
@@ -69,7 +69,7 @@ def test_an_arrowhead_is_not_filled_across_its_notch():
         ([(0, 0), (0, 0), (3, 0), (3, 1), (0, 0)], "repeated corner", 1.5),
     ],
 )
-def test_faults_are_repaired_or_left_out_and_told(xy, kind, area):
+def test_faults_are_repaired_or_left_out_and_noted(xy, kind, area):
     faults = ImportFaults()
     points = ring(xy) if xy else np.zeros((0, 3))
     found = areas(face_triangles([points], "the one", faults))

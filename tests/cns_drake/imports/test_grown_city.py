@@ -28,7 +28,7 @@ def names(folder, stage):
 
 
 def write_rows(path, extra=0):
-    """Five rows of eight houses of 12 m that touch, and ten alone."""
+    """Five rows of eight touching houses of 12 m, and ten single ones."""
     city = CityWriter()
     for row in range(5):
         for k in range(8):
@@ -53,7 +53,7 @@ def test_a_part_is_not_there_yet_or_lower(tmp_path, part, seed):
     expected = (whole - missing - set(lower)) | {f"{n}_lower" for n in lower}
     assert names(folder, "01") == expected
     assert report.stages == {"01": 50 - len(missing), "02": 50}
-    # Only what is high enough has been lower, and it stands on the ground.
+    # Only high buildings were lower before, and they stand on the ground.
     assert all(name.startswith("row") for name in lower)
     for name, share in lower.items():
         text = (folder / "meshes" / f"{name}_body_lower.obj").read_text()
@@ -62,7 +62,7 @@ def test_a_part_is_not_there_yet_or_lower(tmp_path, part, seed):
         assert min(z) == 0.0
         assert max(z) == pytest.approx(12.0 * share, abs=1e-3)
         assert 0.4 <= share <= 0.7
-    # Half of it by whole rows of houses.
+    # Half of the volume goes in whole rows of houses.
     changed = missing | set(lower)
     rows = [sum(n.startswith(f"row.{k}.") for n in changed) for k in range(5)]
     assert rows.count(8) >= (1 if part < 0.5 else 2)
@@ -102,7 +102,7 @@ def test_a_city_without_years_has_two_stages_and_two_drives(tmp_path):
         dict.fromkeys(re.findall('visual name="([^/"]+)', text))
         for text in (last, only)
     ]
-    # All of it, and what was added along the streets.
+    # All buildings, and the objects added along the streets.
     of_file = [name for name in standing[0] if name in standing[1]]
     assert of_file == list(standing[1])
 
@@ -140,7 +140,7 @@ def test_dates(text, year):
     assert year_of_date(text) == year
 
 
-def test_what_is_gone_stood_in_its_time(tmp_path):
+def test_demolished_buildings_stood_in_their_time(tmp_path):
     osm = OsmWriter()
     boxes = {
         "old": {"building": "yes", "start_date": "1890"},
@@ -182,7 +182,7 @@ def test_what_is_gone_stood_in_its_time(tmp_path):
 
 
 def write_gone(path):
-    """Writes three houses, two of which were built where others stood."""
+    """Writes three houses; two replaced others."""
     osm = OsmWriter()
     number = {
         "old": osm.box(0, 0, 10, 10, building="yes"),
@@ -200,14 +200,14 @@ def write_gone(path):
 @pytest.mark.parametrize(
     ("undated", "first", "second", "third"),
     [
-        # The house of 1990 was there in 2000: what it replaced was not.
+        # In 2000 the house of 1990 was there, and its predecessor was not.
         (Undated.FIRST, "old razed was historic until",
          "old razed dated historic", "old new dated"),
         (Undated.LAST, "was", "razed historic dated", "old new dated"),
         (Undated.NEVER, "was", "dated", "dated"),
     ],
 )  # fmt: skip
-def test_what_is_gone_without_a_date_stood_before_the_last_stage(
+def test_demolished_buildings_without_a_date_stood_before_the_last_stage(
     tmp_path, undated, first, second, third
 ):
     number, source = write_gone(tmp_path)
@@ -219,7 +219,7 @@ def test_what_is_gone_without_a_date_stood_before_the_last_stage(
         assert {name for name in found if "building" in name} == expected
 
 
-def test_the_first_stage_by_lot_has_what_is_gone(tmp_path):
+def test_the_first_stage_by_lot_has_demolished_buildings(tmp_path):
     number, source = write_gone(tmp_path)
     import_city(
         source, tmp_path / "town", ImportOptions(grow=0.01, dressed=True)

@@ -131,7 +131,7 @@ def test_a_scan_sees_the_walls(blocks, tmp_path):
     np.testing.assert_allclose(cloud["x"][right], 6.0, atol=2e-3)
 
 
-def test_points_know_their_building(blocks, tmp_path):
+def test_points_have_their_building(blocks, tmp_path):
     folder, _ = blocks
     scenario = folder / "sequence_03.yaml"
     result = run("simulate", scenario, "--frames", "1", "--output", tmp_path)
@@ -163,7 +163,7 @@ def test_the_command_from_end_to_end(tmp_path):
     )
     assert result.exit_code == 0, result.output
     standing = re.search(r"stage 02 \(1945\) +(\d+) structures", result.output)
-    # Houses, and what stands along the drives.
+    # Houses, and objects along the drives.
     assert standing is not None
     assert int(standing[1]) > 24
     assert re.search(r"without a year +4", result.output)
@@ -306,7 +306,7 @@ def test_real_files(tmp_path):
         assert report.triangles > 0
 
 
-def test_what_lies_far_away_is_left_out(tmp_path):
+def test_far_structures_are_left_out(tmp_path):
     city = CityWriter()
     for k in range(4):
         city.box(f"house_{k}", 40.0 * k, 0.0, (20.0, 20.0, 6.0))

@@ -1,4 +1,4 @@
-"""Imports of what stands near a drive only, and drives of one's own."""
+"""Imports of structures near a drive only, and a user's own drives."""
 
 import csv
 
@@ -13,7 +13,7 @@ from cns_drake.imports.import_report import ImportOptions
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_loading import load_scenario
 
-# The map's origin in the town of blocks is the middle of it.
+# The map's origin is the middle of the town of blocks.
 MIDDLE = 72.0
 WAY = [(-26.0, -70.0), (-26.0, 20.0)]
 HOUSES = {
@@ -41,7 +41,7 @@ def names(folder):
 
 
 @pytest.mark.parametrize("within", [7.0, 20.0, 50.0])
-def test_only_what_is_near_an_own_drive_is_kept(tmp_path, within):
+def test_only_structures_near_an_own_drive_are_kept(tmp_path, within):
     source = write_blocks(tmp_path / "blocks.json")
     way = write_way(tmp_path / "way.csv")
     options = ImportOptions((1915, 1980), along=way, within=within)
@@ -59,7 +59,7 @@ def test_only_what_is_near_an_own_drive_is_kept(tmp_path, within):
     assert path.length == pytest.approx(90.0, abs=0.1)
 
 
-def test_what_is_near_the_proposed_drives(tmp_path):
+def test_structures_near_the_proposed_drives(tmp_path):
     source = write_blocks(tmp_path / "blocks.json")
     options = ImportOptions(within=8.0)
     report = import_city(source, tmp_path / "town", options)

@@ -1,4 +1,4 @@
-"""Roads of OpenDRIVE lie where their file says, by other means too."""
+"""Roads of OpenDRIVE lie as in their file, by independent means too."""
 
 import math
 import os
@@ -27,7 +27,7 @@ from cns_drake.imports.opendrive.plan_view import Arc, Cubic, Spiral
 from cns_drake.imports.opendrive.road_heights import RoadHeights
 from cns_drake.imports.opendrive.road_reader import read_roads
 
-# One after the other: all kinds of curves.
+# All kinds of curves, one after the other.
 SHAPES = [
     ("<line/>", 20.0),
     ('<spiral curvStart="0" curvEnd="0.04"/>', 25.0),
@@ -50,7 +50,7 @@ def write_every_kind(path):
     """A road of all curves, with heights, roll, and lanes that change."""
     pieces, s = [], 0.0
     for k, (shape, length) in enumerate(SHAPES):
-        # Apart, so that none hides the faults of another.
+        # Roads are apart, so that none hides the faults of another.
         pieces.append(
             geometry(s, 60.0 * k, 7.0 * k, 0.3 * k - 1.0, length, shape)
         )
@@ -80,7 +80,7 @@ def write_every_kind(path):
 
 
 def outlines(path):
-    """Road and lane -> its edges as the program has them."""
+    """(Road, lane) -> its edges by the program."""
     found = {}
     for one in read_roads(path, ImportFaults()).roads:
         for band in lane_bands(one):
@@ -90,7 +90,7 @@ def outlines(path):
 
 
 def deviation(path, spacing, only=None):
-    """The greatest distance from independent places to the program's [m]."""
+    """The greatest distance of independent places from the program's [m]."""
     bands = outlines(path)
     worst, count = 0.0, 0
     for name, number, _, inner, outer in sampled_lanes(path, spacing, only):
@@ -111,7 +111,7 @@ def deviation(path, spacing, only=None):
 
 def test_every_kind_of_curve_against_integration(tmp_path):
     path = write_every_kind(tmp_path / "all.xodr")
-    # Chords between places on the borders are true to 5 mm and a little.
+    # Chords between places on the borders have errors of little over 5 mm.
     assert deviation(path, 0.5) < 0.008
 
 
@@ -141,7 +141,7 @@ def test_spirals_against_fresnel_s_integrals(start, end, length):
     )
     expected = (turned @ (whole(s) - whole(0.0)[:, None])).T
     found = Spiral(start, end, length).evaluate(s)
-    # Where it is almost an arc the closed form loses digits, not the other.
+    # Near an arc the closed form loses digits; the other one does not.
     atol = 1e-9 if abs(growth) > 1e-6 else 1e-3
     np.testing.assert_allclose(found[:, :2], expected, atol=atol)
     np.testing.assert_allclose(found[:, 2], heading - first, atol=1e-9)
@@ -160,12 +160,12 @@ def test_arcs_and_lines_in_closed_form():
 
 
 def test_cubic_curves_run_at_the_speed_of_the_road():
-    # A straight line told with an uneven parameter.
+    # A straight line with an uneven parameter.
     uneven = Cubic((0, 1, 1, 1), (0, 0, 0, 0), 1.0, 3.0)
     s = np.linspace(0.0, 3.0, 31)
     found = uneven.evaluate(s)
     np.testing.assert_allclose(found, np.stack([s, 0 * s, 0 * s], 1), atol=1e-9)
-    # A parabola, whose length is known: v = u^2 / 20.
+    # A parabola with a length in closed form: v = u^2 / 20.
     parabola = Cubic((0, 1, 0, 0), (0, 0, 0.05, 0), 30.0, 30.0, stretched=False)
     u = parabola.evaluate(np.array([17.0]))[0, 0]
     assert 5 * (
@@ -181,7 +181,7 @@ def test_both_sides_of_every_joint_are_there(tmp_path):
     at = np.flatnonzero(np.abs(first.s - 30.0) < 1e-9)
     assert len(at) == 2
     np.testing.assert_allclose(first.width[at], [3.0, 3.5], atol=1e-6)
-    # And where the section ends another begins, at the same place.
+    # Another section begins at the section's end, at the same place.
     assert first.s[-1] == bands[1].s[0] == 71.5
     assert bands[1].width[0] == pytest.approx(3.25, abs=1e-6)
 
@@ -235,27 +235,27 @@ def test_real_networks_against_integration():
 
 
 def check_surface(path):
-    """The surface covers the file's lanes, no more, and at their height."""
+    """The surface covers exactly the file's lanes, at their height."""
     bands = [b for group in outlines(path).values() for b in group]
     streets = ImportedStreets(bands)
     surface = RoadHeights(bands)
     whole = shapely.union_all(
         [streets.carriageway(), streets.sidewalks(), streets.medians()]
     )
-    told, places = [], []
+    areas, places = [], []
     for _, _, kind, inner, outer in sampled_lanes(path, 1.0):
         if kind == "none":
             continue
         area = Polygon(np.concatenate([inner, outer[::-1]])[:, :2])
-        told.append(shapely.make_valid(area))
+        areas.append(shapely.make_valid(area))
         middle = (inner + outer) / 2
         inside = shapely.contains_xy(whole.buffer(0.1), *middle[:, :2].T)
         assert inside.all(), path
         places.append(middle)
     check_heights(surface, np.concatenate(places))
-    told = shapely.union_all(told)
-    assert told.difference(whole.buffer(0.1)).area < 0.1
-    beyond = whole.difference(told.buffer(0.1)).difference(
+    areas = shapely.union_all(areas)
+    assert areas.difference(whole.buffer(0.1)).area < 0.1
+    beyond = whole.difference(areas.buffer(0.1)).difference(
         streets.junctions.buffer(0.1)
     )
     closed = [b for b in bands if b.kind == "enclosed"]
@@ -267,12 +267,12 @@ def check_surface(path):
 
 
 def check_heights(surface, places):
-    """Heights are those of the file, or between two that contradict."""
+    """Heights are those of the file, or between two contradicting ones."""
     z = surface.heights(places[:, :2])
     off = np.flatnonzero(np.abs(z - places[:, 2]) > 0.1)
     near = cKDTree(places[:, :2]).query_ball_point(places[off, :2], 2.0)
     for k, some in zip(off, near, strict=True):
-        told = places[some, 2]
-        assert np.ptp(told) > 0.1
-        assert told.min() - 0.1 < z[k] < told.max() + 0.1
+        heights = places[some, 2]
+        assert np.ptp(heights) > 0.1
+        assert heights.min() - 0.1 < z[k] < heights.max() + 0.1
     assert len(off) < 0.01 * len(places)

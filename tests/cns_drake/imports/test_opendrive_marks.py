@@ -63,7 +63,7 @@ def test_lines_lie_on_their_borders(paint):
     for colour, radius, half in (("white", 50.0, 0.05), ("yellow", 50.0, 0.1)):
         off = radii(paint[colour]) - radius
         assert np.abs(np.abs(off) - half).max() < 0.005
-    # Inside first, and the middle of the bend is on the left.
+    # The inner line is first; the middle of the bend is on the left.
     outer = RADIUS + 3.5
     r = radii(paint["standard"]).reshape(-1)
     expected = [outer + a + b for a in (-0.12, 0.12) for b in (-0.06, 0.06)]
@@ -71,7 +71,7 @@ def test_lines_lie_on_their_borders(paint):
     assert nearest.max() < 0.005
 
 
-def test_lines_are_as_long_as_the_file_says(paint):
+def test_lines_have_the_lengths_of_the_file(paint):
     # From 0 to 30 m, 3 m of each 9 m; from 30 m to 90 m.
     assert area(paint["white"]) == pytest.approx(4 * 3.0 * 0.1, rel=0.01)
     assert area(paint["yellow"]) == pytest.approx(60.0 * 0.2, rel=0.01)

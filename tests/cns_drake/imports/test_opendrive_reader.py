@@ -1,4 +1,4 @@
-"""Files of OpenDRIVE that are wrong, or hostile: one line, and no harm."""
+"""Wrong or hostile files of OpenDRIVE give one line and do no harm."""
 
 import math
 
@@ -275,7 +275,7 @@ def test_links_to_nothing_are_counted(tmp_path):
 
 @pytest.mark.parametrize(("end_deg", "count"), [(49.9, 0), (50.1, 1), (-97, 1)])
 def test_superelevation_has_a_limit(tmp_path, end_deg, count):
-    """Reached at the end of the road, 50 m on."""
+    """The limit is reached at the end of the road, 50 m on."""
     growth = math.radians(end_deg) / 50.0
     banked = cubic("superelevation", 0, 0.0, growth, 0, 0, "s")
     path = write_roads(

@@ -38,7 +38,7 @@ SIGNS = """<signals>
 </objects>"""
 
 
-def test_signals_and_objects_stand_where_told(tmp_path):
+def test_signals_and_objects_stand_at_their_places(tmp_path):
     path = write_roads(
         tmp_path / "a.xodr", straight("1", 0, 0, 200, 0, more=SIGNS)
     )
@@ -47,7 +47,7 @@ def test_signals_and_objects_stand_where_told(tmp_path):
     stop = found["signal_1_0"]
     assert stop.semantic_class == "traffic-sign"
     assert stop.xyz[:2] == (20.0, -6.0)
-    # It looks back at who comes along the road.
+    # The sign faces the drivers that approach on the road.
     assert abs(stop.yaw) == pytest.approx(math.pi, abs=1e-4)
     house = found["object_1_0"]
     assert house.semantic_class == "building"
@@ -64,7 +64,7 @@ def test_signals_and_objects_stand_where_told(tmp_path):
         "signal over a lane, left out": 1,
         "object that is painted on the road, left out": 1,
     }
-    # What the file has is there at all stages, and nothing is built on it.
+    # Objects of the file are there at all stages, and stay free of buildings.
     absent = {n for stage in built.stages.stages for n in
               built.stages.absent(stage)}  # fmt: skip
     assert not absent & set(found).intersection({"object_1_0", *poles})
@@ -91,7 +91,7 @@ def test_a_road_over_another_is_a_bridge(tmp_path):
         ]
     )
     assert {band.road.name for band in raised} == {"2"}
-    # It reaches a little farther than what it crosses: 5.5 m, and 10 m.
+    # The bridge is a little longer than the roads below: 5.5 m, and 10 m.
     s = np.concatenate([band.s for band in raised])
     assert 81.0 < s.min() < 90.0
     assert 110.0 < s.max() < 119.0

@@ -50,7 +50,7 @@ def crossing(name, x, y, arms):
     found = []
     for k in arms:
         heading = math.pi / 2 * k
-        # On the right of who comes in.
+        # The lane is on the right of incoming drivers.
         c, s = math.cos(heading), math.sin(heading)
         start = (x + ARM * c, y + ARM * s)
         inwards = heading + math.pi
@@ -129,7 +129,7 @@ def test_junctions_have_no_holes(source):
         around = Point(x, y).buffer(ARM)
         for part in shapely.get_parts(carriageway.intersection(around)):
             assert not part.interiors
-    # The middle of the T-junction is no lane's, and road all the same.
+    # The middle of the T-junction belongs to no lane and is road nevertheless.
     assert carriageway.contains(Point(100, 0))
     # Two lanes of 3.5 m and a sidewalk of 2 m on both sides.
     across = LineString([(50, -20), (50, 20)])
@@ -200,7 +200,7 @@ def test_drives_keep_to_their_lanes(source, town):
     for drive in town.drives:
         assert drive.length > 80.0
         places = shapely.points(drive.path)
-        # Rounded from waypoint to waypoint, every 2 m.
+        # Coordinates are rounded at each waypoint, every 2 m.
         assert shapely.distance(lines, places).max() < 0.03
         # Traffic keeps right: the road's middle line is on the left.
         for name, line in (

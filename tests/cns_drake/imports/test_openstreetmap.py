@@ -1,4 +1,4 @@
-"""OpenStreetMap files, written here, and what becomes of them."""
+"""Imports of OpenStreetMap files that are written here."""
 
 import re
 
@@ -37,7 +37,7 @@ def volume(triangles):
     return np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6
 
 
-def test_buildings_are_where_and_as_high_as_told(tmp_path):
+def test_buildings_have_places_and_heights_of_the_file(tmp_path):
     osm = OsmWriter()
     first = osm.box(-100, -50, 20, 10, building="yes", height="12.5 m")
     last = osm.box(80, 40, 20, 10, building="house", start_date="1910")
@@ -61,7 +61,8 @@ def test_a_building_with_parts_is_what_these_are(tmp_path):
     (one,) = found.values()
     assert one.structure.name == f"building_w{outline}"
     assert bounds(one)[1][2] == 20.0
-    # Not the outline's 50 m; and the raised part has an underside.
+    # The height is not the outline's 50 m, and the raised part has an
+    # underside.
     expected = 200.0 * 10.0 + 200.0 * 15.0
     assert volume(one.triangles) == pytest.approx(expected, rel=1e-3)
 
@@ -113,7 +114,7 @@ def test_only_buildings_lack_a_year(tmp_path):
     assert (second - first, third - second) == (0, 2)
 
 
-def test_roofs_that_cannot_be_are_flat_and_told():
+def test_impossible_roofs_are_flat_and_noted():
     bent = Polygon([(0, 0), (9, 0), (9, 9), (5, 9), (5, 4), (0, 4)])
     faults = ImportFaults()
     _, top = extruded(bent, 0, 9, "a", faults, "gabled", 3.0)
@@ -256,7 +257,7 @@ def test_half_a_country_is_refused(tmp_path):
     [[(179.999, -16.8), (-179.999, -16.8)], [(13.0, 52.0), (13.002, 52.0)]],
 )
 def test_a_town_on_both_sides_of_the_180th_meridian(tmp_path, houses):
-    """Two houses 0.002 deg from each other lie as far apart as anywhere."""
+    """Two houses 0.002 deg apart have the same distance as elsewhere."""
     nodes, ways = [], []
     for k, (x, y) in enumerate(houses):
         corners = [(0, 0), (2e-4, 0), (2e-4, 2e-4), (0, 2e-4)]
@@ -289,7 +290,7 @@ def test_no_such_file(tmp_path):
         import_openstreetmap(tmp_path / "none.osm", None)
 
 
-def test_what_is_cut_off_at_the_edge_is_told(tmp_path):
+def test_objects_cut_off_at_the_edge_are_noted(tmp_path):
     osm = OsmWriter()
     osm.box(0, 0, 10, 10, building="yes")
     street = osm.way([(0, 20), (40, 20), (80, 20)], highway="residential")
@@ -437,7 +438,7 @@ def height_above(one, x, y):
 
 def test_a_part_takes_the_place_of_what_it_covers(tmp_path):
     osm = OsmWriter()
-    # Another house, so that the origin is in between.
+    # Another house puts the origin between the two.
     osm.box(-60, -10, 20, 20, building="yes", height="6")
     tower = osm.box(20, -10, 40, 20, building="yes", height="30")
     osm.box(20, -10, 10, 20, building__part="yes", height="40",
@@ -453,7 +454,7 @@ def test_a_part_takes_the_place_of_what_it_covers(tmp_path):
     assert height_above(one, 45.0, -25.0) == [30.0]
     expected = 30.0 * 800 + 10.0 * 200
     assert volume(one.triangles) == pytest.approx(expected, rel=2e-3)
-    # Parts that are all of a building leave room below an overhang.
+    # If parts make up the whole building, the room below an overhang is free.
     one = found[f"building_w{porch}"]
     assert height_above(one, 40.0, 20.0) == [9.0]
     assert height_above(one, 40.0, 30.0) == [4.0, 8.0]

@@ -65,12 +65,12 @@ def test_the_sea_lies_right_of_the_coast(tmp_path, is_eastward):
     osm = OsmWriter()
     osm.box(-50, -50, 10, 10, building="yes")
     osm.box(40, 40, 10, 10, building="yes")
-    # It ends within the city, where the file was cut.
+    # The coastline ends within the city, where the file was cut.
     line = [(-30, 0), (0, 0), (70, 0)]
     osm.way(line if is_eastward else line[::-1], natural="coastline")
     # A coastline without length has no effect.
     osm.way([(10, 30), (10, 30)], natural="coastline")
-    # Around an island the land is inside.
+    # An island has the land inside its coastline.
     island = [(0, -60), (20, -60), (20, -40), (0, -40)]
     osm.way(island, closed=True, natural="coastline")
     city = read(osm, tmp_path)

@@ -1,4 +1,4 @@
-"""Streets are furnished by the file first, then by lot, off the drives."""
+"""Streets get furniture from the file, then by lot, away from the drives."""
 
 from itertools import combinations
 
@@ -43,7 +43,7 @@ def read(osm, folder):
 
 
 def origin(city):
-    """Returns where the writer's origin lies in the map."""
+    """Returns the position of the writer's origin in the map."""
     return city.streets[0].line.mean(axis=0)
 
 
@@ -185,7 +185,7 @@ def test_lots_do_not_depend_on_each_other(tmp_path):
     assert names[0] == names[1] != names[2]
 
 
-def test_sidewalks_are_added_where_nothing_is_told_of_them(tmp_path):
+def test_sidewalks_are_added_where_the_file_is_silent(tmp_path):
     osm = OsmWriter()
     ends = [osm.node(-100, 0), osm.node(100, 0)]
     osm.way_of(ends, highway="residential", width="9")
@@ -260,7 +260,7 @@ def test_a_city_counts_what_is_from_the_file_and_what_by_lot(
 
 
 def test_only_cars_stand_on_another_street(tmp_path):
-    """A lamp in a corner is moved off one street, and would be on the other."""
+    """A lamp in a corner, moved off one street, would stand on the other."""
     osm = OsmWriter()
     write_street(osm)
     crossing = [osm.node(10, -40), osm.node(10, 40)]
@@ -273,7 +273,7 @@ def test_only_cars_stand_on_another_street(tmp_path):
     assert f"lamp_post_n{on_it}" not in names
 
 
-def test_terrain_of_a_dense_city_is_paved_if_nothing_is_told(tmp_path):
+def test_terrain_of_a_dense_city_is_paved_by_default(tmp_path):
     city = CityWriter()
     for k in range(4):
         city.box(f"house{k}", 30.0 * k, 10.0, (20.0, 15.0, 8.0))

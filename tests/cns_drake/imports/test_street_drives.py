@@ -47,7 +47,7 @@ def write_grid(path, one_way=(), columns=4, rows=3, more=None, **extra):
             tags.get("oneway"),
             LineString([low + STEP * np.array(place) for place in places]),
         )
-    # All around the origin: the map's is the middle of all buildings.
+    # Buildings surround the origin, which the map puts into their middle.
     for k, m in ((0, 0), (columns - 2, rows - 2)):
         x, y = low + STEP * (np.array([k, m]) + 0.5)
         osm.box(x - 15, y - 15, 30, 30, building="yes")
@@ -119,7 +119,7 @@ def test_drives_share_a_part(tmp_path):
     assert b.difference(a.buffer(15.0)).length > 20.0
 
 
-def test_the_file_may_tell_the_side(tmp_path):
+def test_the_file_may_set_the_side(tmp_path):
     write_grid(tmp_path / "city.osm", driving_side="left")
     assert import_openstreetmap(tmp_path / "city.osm", None).keeps_left
     write_grid(tmp_path / "city.osm")
@@ -146,7 +146,7 @@ def test_lanes_are_cut_where_streets_meet():
         (lanes[a].begin, lanes[a].end, lanes[b].end)
         for a, b in zip(*links, strict=True)
     }
-    # Nobody turns round, nor into the one-way street.
+    # No drive turns round or enters the one-way street.
     assert leads == {(1, 3, 4), (4, 3, 1), (5, 3, 1), (5, 3, 4)}
 
 
@@ -189,7 +189,7 @@ def test_a_roundabout_is_driven_one_way():
         ({"motor_vehicle": "no", "oneway": "yes"}, (False, False)),
     ],
 )
-def test_who_may_drive_where(tags, expected):
+def test_ways_that_cars_may_use(tags, expected):
     assert driven_ways(tags) == expected
 
 
@@ -265,7 +265,7 @@ def test_no_drive_goes_through_a_wall(tmp_path, barrier):
     streets = write_grid(tmp_path / "plain.osm")
     import_city(tmp_path / "plain.osm", tmp_path / "plain", ImportOptions())
     (first, _), _ = drives_of(tmp_path / "plain")
-    # In the way of the drive, on a street between two junctions.
+    # The house is in the way of the drive, between two junctions.
     name, line = max(
         ((name, line) for name, (_, line) in streets.items()),
         key=lambda item: sum(
@@ -276,7 +276,7 @@ def test_no_drive_goes_through_a_wall(tmp_path, barrier):
     x, y = middle.x, middle.y
     shape = {
         "house": Point(x, y).buffer(9.0, cap_style="square"),
-        # Hollow: a wall of less than a metre at either side.
+        # The house is hollow; its walls are less than a metre thick.
         "house around": LineString([(x - 30, y), (x + 30, y)])
         if name[0] == "y"
         else LineString([(x, y - 30), (x, y + 30)]),

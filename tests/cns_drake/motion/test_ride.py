@@ -77,7 +77,7 @@ def test_accelerations_have_no_jumps():
                 for t in np.linspace(middle, middle + span, 50)
             ]
         )
-        # No faster than the wheels' swing on the tyres, 13 Hz, allows.
+        # The wheels swing on their tyres at 13 Hz, which limits the rate.
         assert np.ptp(A, axis=0).max() < 40.0 * 2 * np.pi * 13.0 * span
 
 
@@ -91,7 +91,7 @@ def test_the_body_rests_before_and_after_the_drive():
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_steady_acceleration_tilts_the_body(sign):
-    # Time enough to swing in: 2 m/s^2 up to 30 m/s and down again.
+    # The body has time to settle: 2 m/s^2 up to 30 m/s and down again.
     speeds = Speeds(
         cruise=30.0, longitudinal_acceleration=2.0, lateral_acceleration=3.0
     )
@@ -128,7 +128,7 @@ def test_bends_and_slopes_tilt_the_body_by_the_specific_force():
     t = trajectory.duration / 2
     moment = trajectory.at(t)
     speed = moment.jet.speed[0] * moment.rate[0]
-    # The path's own radius, as the body's centre of mass sees it.
+    # The radius of the path at the body's centre of mass.
     lateral = speed**2 / radius / (1 + slope**2)
     _, roll, pitch = moment.ride.q[0]
     one_g = 9.81 * np.eye(7)

@@ -45,7 +45,7 @@ def test_a_place_has_one_height():
     np.testing.assert_array_equal(again, alone)
     differs = RoadProfile("B", 8).heights(first) - alone
     assert np.std(differs) > np.std(alone)
-    # Each class has twice the heights of the one before.
+    # Each class has twice the heights of the class before.
     rougher = RoadProfile("C", 7).heights(first)
     np.testing.assert_allclose(rougher, 2.0 * alone, rtol=1e-12)
 

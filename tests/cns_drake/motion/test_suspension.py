@@ -26,7 +26,7 @@ def rates(spring, damper, tyre, bar):
     )
 
 
-# As long before its centre of mass as behind it.
+# The car's centre of mass is in its middle.
 CAR = CarMasses(
     body=1200.0,
     roll_inertia=500.0,
@@ -86,7 +86,7 @@ def test_heave_on_waves_is_that_of_a_quarter_car(frequency):
     inputs[:, :4] = 0.01 * np.sin(omega * t)[:, None]
     answers = car.respond(inputs, step)
 
-    # m z'' = k (u - z) + c (u' - z'), M u'' = kt (w - u) - what the body has.
+    # m z'' = k (u - z) + c (u' - z'), M u'' = kt (w - u) - the body's force.
     s = 1j * omega
     link = SPRING + DAMPER * s
     body = CAR.body / 4 * s**2

@@ -44,7 +44,7 @@ def drive(riding):
 
 
 class Measured:
-    """A system's ports, to be read at any time."""
+    """Readings of a system's ports at any time."""
 
     def __init__(self, trajectory, rate, noise=None):
         errors = ImuErrors(noise or ImuNoise(), rate)
@@ -73,7 +73,7 @@ def test_it_measures_as_drakes_sensors_do(riding):
     diagram = builder.Build()
     context = diagram.CreateDefaultContext()
     ours = Measured(trajectory, 400.0)
-    # Also between samples, and after the end.
+    # This holds between samples and after the end, too.
     for time in [*np.linspace(0.0, trajectory.duration, 23), 1e3]:
         context.SetTime(time)
         for name in NAMES:
@@ -88,7 +88,7 @@ def test_it_measures_as_drakes_sensors_do(riding):
 @pytest.mark.parametrize("riding", [False, True])
 def test_samples_have_the_orientation(riding):
     trajectory = drive(riding)
-    # Past the end of the first block.
+    # The time is past the end of the first block.
     samples = Measured(trajectory, 400.0).read(1.5, "samples")
     assert samples.first + len(samples.quat_xyzw) == 601
     times = (samples.first + np.arange(256)) / 400.0
@@ -101,7 +101,7 @@ def test_samples_have_the_orientation(riding):
     )
 
 
-def test_a_sample_is_the_same_however_it_is_asked_for():
+def test_a_sample_does_not_depend_on_earlier_reads():
     noise = ImuNoise(
         accelerometer_noise_density=0.01,
         gyroscope_noise_density=0.005,
@@ -113,13 +113,13 @@ def test_a_sample_is_the_same_however_it_is_asked_for():
     assert samples.first == numbers[0]
     ours = Measured(drive(True), 400.0, noise)
     for name in NAMES:
-        # Backwards: what was asked for before plays no part.
+        # Times go backwards: earlier readings have no effect.
         singles = [ours.read(k / 400.0, name) for k in numbers[::-1]]
         np.testing.assert_array_equal(getattr(samples, name), singles[::-1])
 
 
 def error_of_integration(trajectory, rate):
-    """Returns how far dead reckoning errs, at most within 20 s [m]."""
+    """Returns the greatest error of dead reckoning within 20 s [m]."""
     ours = Measured(trajectory, rate)
     times = np.arange(20 * rate + 1) / rate
     force, turn = (

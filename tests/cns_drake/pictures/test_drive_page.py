@@ -1,4 +1,4 @@
-"""The page of a drive, as someone who opens it sees it."""
+"""The page of a drive in a browser."""
 
 import json
 import re
@@ -165,12 +165,12 @@ def reader(browser, page, request):
     browser.evaluate("viewer.animator.pause()")
     go_to(browser, 0.0)
     yield browser
-    # Software that draws complains of its own slowness.
+    # Software renderers warn of their own slowness.
     assert not [c for c in browser.complaints if "'rendering'" not in c]
 
 
 def click(browser, name):
-    """Clicks where a button is seen, as a finger would."""
+    """Clicks at the visible position of a button."""
     x, y = browser.evaluate(
         f"""(() => {{
           const box = document.getElementById("{name}").getBoundingClientRect();
@@ -261,7 +261,7 @@ class TestInChromium:
             go_to(reader, time)
             X_WB = X_WB_at(round(time / PERIOD))
             p_BCs.append(X_WB.inverse() @ p_WC(reader))
-        # Behind the car and above it, at all times.
+        # The camera is always behind the car and above it.
         assert p_BCs[0][0] < -5.0
         assert abs(p_BCs[0][1]) < 1e-6
         assert p_BCs[0][2] > 2.0

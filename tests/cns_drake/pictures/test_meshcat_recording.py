@@ -105,7 +105,7 @@ class _Car(LeafSystem):
     def __init__(self, plant):
         super().__init__()
         self._plant, self._scratch = plant, plant.CreateDefaultContext()
-        # One object for all times, as a careless system might have it.
+        # One object is reused for all times, as a careless system may do.
         self._X_WB = RigidTransform()
         time = {self.time_ticket()}
         self.DeclareVectorOutputPort(
@@ -244,7 +244,7 @@ def test_structures_that_the_stage_lacks_are_a_layer(early):
     assert properties(early)["/stage_difference/absent", "visible"] is False
 
 
-def test_what_is_lower_is_a_layer(folder, tmp_path):
+def test_lower_structures_are_a_layer(folder, tmp_path):
     recorder = drive(folder, "stage_01", "stage_03", num_frames=2)
     commands = page_commands(recorder, tmp_path / "lower.html")
     drawn = objects(commands)
@@ -267,7 +267,7 @@ def test_structures_that_the_stage_has_in_addition_are_a_layer(
         "/stage_difference/additional/building",
         "/stage_difference/additional/pole",
     }
-    # Not in the city as well, or it could not have a colour of its own.
+    # The structure is not in the city as well; it needs a colour of its own.
     assert len(vertices(drawn["/city/building"])) == 8
     assert "/city/pole" not in drawn
 
@@ -330,7 +330,7 @@ def test_scans_appear_where_they_were_taken(early):
         np.testing.assert_allclose(
             vertices(objects(early)[path]), np.concatenate(expected), atol=4e-3
         )
-        # As large from afar as near by.
+        # Points have the same size from far and near.
         material = f"{path}/<object>", "material.sizeAttenuation"
         assert properties(early)[material] is False
         if k > 0:

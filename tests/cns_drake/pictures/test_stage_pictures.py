@@ -1,4 +1,4 @@
-"""Pictures of stages: where things are in them, and what they show."""
+"""Pictures of stages: positions of structures, and visible changes."""
 
 from matplotlib.image import imread
 import numpy as np

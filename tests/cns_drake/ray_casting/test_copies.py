@@ -1,4 +1,4 @@
-"""A mesh that stands many times is held once; rays meet what they met."""
+"""Copies of a mesh share memory; rays have the same hits as before."""
 
 import numpy as np
 from pydrake.geometry import FrameId, GeometryId, Mesh
@@ -85,7 +85,7 @@ def rays():
 
 def assert_equal_hits(found, expected):
     same = found.geometry == expected.geometry
-    # At edges the last bit decides.
+    # At edges the last bit decides which is hit.
     assert same.mean() > 0.998
     hit = same & (expected.geometry >= 0)
     np.testing.assert_allclose(
@@ -124,7 +124,7 @@ def test_rays_meet_copies_as_if_they_were_merged(
 
 
 def test_copies_come_and_go(monkeypatch):
-    """What stays is not built again, and keeps its right index."""
+    """Remaining geometry is not rebuilt and keeps its index."""
     shapes = geometries()
     scene = make_scene(shapes, 99, monkeypatch)
     built = set(scenes_of_copies(scene))

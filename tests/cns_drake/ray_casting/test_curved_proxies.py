@@ -138,8 +138,8 @@ def plate(p, size=0.02):
 
 
 @pytest.mark.parametrize("start", [1.001, 1.01, 1.03, 1.2, 3.0])
-def test_what_lies_between_polyhedron_and_shape_is_found(start):
-    """A ray along -x meets a ball at 1 m, unless a plate is in the way."""
+def test_geometry_between_polyhedron_and_shape_is_found(start):
+    """A ray along -x meets a ball at 1 m unless a plate is in the way."""
     ball = geometry(EllipsoidSurface((1.0,) * 3), RigidTransform())
     ray = (np.array([start, 0.0, 0.0]), np.array([[-1.0, 0.0, 0.0]]), 50.0)
     for x, owner in ((1.0005, 1), (0.9, 0), (-1.5, 0)):

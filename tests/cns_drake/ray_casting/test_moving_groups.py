@@ -1,4 +1,4 @@
-"""What is out of sight is not placed anew, and nobody can see that."""
+"""Geometry out of sight is not placed again; scans stay the same."""
 
 import numpy as np
 from pydrake.geometry import FrameId, GeometryId
@@ -61,7 +61,7 @@ def cast_about(scene, p_WS, times):
 
 @pytest.mark.parametrize("with_motions", [False, True])
 def test_a_scene_sees_what_a_new_one_sees(with_motions):
-    """Over jumps of everything, and moves of which some are tiny or none."""
+    """All geometry jumps, and moves by steps that may be tiny or zero."""
     rng = np.random.default_rng(3)
     geometries = make_geometries()
     poses = random_poses(rng)
@@ -120,7 +120,7 @@ def test_only_what_moves_in_sight_is_placed():
     def place():
         return set(moving.place(X_WF_of.get, known=known, seen=near))
 
-    # All are where they were built, but few are in sight.
+    # All are at their first poses, and few are in sight.
     hidden = {row_of[FRAMES[k]] for k in range(1, len(FRAMES))}
     assert place() == hidden
     assert place() == set()
@@ -129,7 +129,7 @@ def test_only_what_moves_in_sight_is_placed():
     assert place() == {row_of[FRAMES[0]]}
     X_WFs[20, :3, 3] = (3.0, 0.0, 0.0)
     X_WFs[0, :3, 3] = (500.0, 0.0, 0.0)
-    # One comes, and the other goes, which has to be seen as well.
+    # One appears and the other disappears; both must be seen.
     assert place() == {row_of[FRAMES[0]], row_of[FRAMES[20]]}
     X_WFs[0, :3, 3] = (600.0, 0.0, 0.0)
     assert place() == set()

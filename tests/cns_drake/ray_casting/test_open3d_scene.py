@@ -1,4 +1,4 @@
-"""Where Embree's wheel is missing, Open3D finds the same."""
+"""Without Embree's wheel, Open3D finds the same hits."""
 
 import numpy as np
 from pydrake.geometry import FrameId, GeometryId
@@ -80,7 +80,7 @@ def test_the_same_on_triangles_that_stand_and_move(monkeypatch, capsys):
         for scene in (embree, open3d)
     )
     assert len(np.unique(a.geometry)) == 5
-    # At edges the last bit decides.
+    # At edges the last bit decides which is hit.
     same = a.geometry == b.geometry
     assert same.mean() > 0.999
     hit = same & (a.geometry >= 0)
@@ -88,7 +88,7 @@ def test_the_same_on_triangles_that_stand_and_move(monkeypatch, capsys):
     assert np.isinf(b.ranges[b.geometry < 0]).all()
     cosine = np.einsum("ij,ij->i", a.normals_W[hit], b.normals_W[hit])
     assert cosine.min() > 1 - 1e-4
-    # Said once, however many scenes there are.
+    # The note appears once for any number of scenes.
     RayCastingScene(geometries, {WORLD}, pose_of)
     assert capsys.readouterr().err == ""
 

@@ -98,7 +98,7 @@ def test_shape_matches_its_closed_form(name, distance, moving):
     hits = scene.cast_rays(p_W, d_W, 300.0, with_normals=True)
 
     hit = np.isfinite(expected)
-    # A ray that grazes within float32's resolution may go either way.
+    # A ray that grazes within float32's resolution may hit or miss.
     disagree = np.isfinite(hits.ranges) != hit
     assert np.count_nonzero(disagree) <= 2
     both = hit & ~disagree
@@ -287,7 +287,7 @@ def test_threads_change_nothing(num_rays):
     ("num_positions", "num_frames"), [(1, 6), (6, 1), (3, 2)]
 )
 def test_poses_are_taken_in_turn(num_positions, num_frames):
-    """As if each ray had been given in the world."""
+    """The results are those of rays given in the world."""
     rng = np.random.default_rng(7)
     scene = RayCastingScene(
         [
@@ -325,7 +325,7 @@ def test_poses_are_taken_in_turn(num_positions, num_frames):
 @pytest.mark.parametrize("tiny", [-5e-19, 5e-19, -1e-30, -0.0, 0.0])
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_a_ray_that_hardly_leaves_a_plane(axis, tiny):
-    """It takes none of the others of its packet with it."""
+    """The other rays of its packet stay right."""
     walls = []
     for k in range(3):
         for side in (-1, 1):

@@ -1,4 +1,4 @@
-"""The thread keeps the order, and its errors come out."""
+"""The thread keeps the order, and its errors reach the caller."""
 
 import threading
 
@@ -8,7 +8,7 @@ from cns_drake.recording.background_writer import BackgroundWriter
 
 
 def feed(write, count):
-    """Hands over the numbers up to `count`; returns how many were taken."""
+    """Hands over the numbers up to `count`; returns the number accepted."""
     taken = 0
     try:
         with BackgroundWriter(write) as writer:
@@ -57,7 +57,7 @@ def test_small_messages_go_with_the_next_large_one():
 
     small = [bytes([k]) for k in range(70)]
     with BackgroundWriter(write) as writer:
-        # That many are handed over without waiting any longer.
+        # As many numbers are handed over without waiting.
         for data in small:
             writer.write(data)
         writer.write(bytes(5000))
@@ -87,7 +87,7 @@ def test_after_an_error_nothing_more_is_written_or_taken():
 
     taken = feed(write, 1_000_000)
     assert written == [0, 1, 2]
-    # A few were on their way when it happened.
+    # A few were queued when the error occurred.
     assert 3 <= taken < 1_000_000
 
 

@@ -67,7 +67,7 @@ def stamps_read_indexed(path):
 
 
 def stamps_read_linearly(path):
-    """Reads a file without its end, as far as it goes."""
+    """Reads a file without an end up to its last message."""
     stamps = []
     with open(path, "rb") as stream, contextlib.suppress(McapError):
         for record in StreamReader(stream, emit_chunks=False).records:

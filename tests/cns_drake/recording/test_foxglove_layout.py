@@ -15,7 +15,7 @@ def layout():
 
 @pytest.fixture(scope="module")
 def messages(short_recording):
-    """Topic -> its first message, as a library that did not write it reads."""
+    """Topic -> its first message, as read by an independent library."""
     first = {}
     with AnyReader([short_recording]) as reader:
         for connection, _, data in reader.messages():
@@ -35,7 +35,7 @@ def panels_of(node):
 
 
 def test_panels_are_those_configured(layout):
-    # What an import looks for.
+    # The keys that an import needs.
     for name in ("configById", "globalVariables", "playbackConfig"):
         assert isinstance(layout[name], dict)
     assert layout["playbackConfig"]["speed"] == 1
@@ -57,7 +57,7 @@ def test_clouds_are_coloured_by_their_fields(layout, messages):
         shown = {key.removeprefix("frame:") for key in panel["transforms"]}
         assert shown <= frames
         for topic, settings in panel["topics"].items():
-            # Clouds are hidden in Foxglove unless a layout says otherwise.
+            # Foxglove hides clouds unless a layout shows them.
             assert settings["visible"] is True
             assert settings["colorMode"] == "colormap"
             fields = {field.name for field in messages[topic].fields}

@@ -1,7 +1,7 @@
-"""Recordings, as the libraries of Foxglove read them.
+"""Recordings, as read by the libraries of Foxglove.
 
-Foxglove itself cannot be run here; @mcap/core and its ROS 2 decoder are what
-it opens files with.
+Foxglove itself cannot run here; it opens files with @mcap/core and its ROS 2
+decoder.
 """
 
 import json
@@ -22,10 +22,10 @@ POINT_FIELDS = ("x", "y", "z", "intensity", "ring", "t", "label", "instance")
 
 @pytest.fixture(scope="module")
 def found(short_recording):
-    """What Node prints of the recording."""
+    """The output of Node for the recording."""
     if shutil.which("node") is None or not (NODE / "node_modules").is_dir():
         missing = "needs Node and `npm ci --prefix tests/node`"
-        # Where it has been installed, it must not be missing unnoticed.
+        # If it was installed, its absence must not go unnoticed.
         if "CNS_DRAKE_TEST_NODE" in os.environ:
             pytest.fail(missing)
         pytest.skip(missing)
@@ -59,7 +59,7 @@ def test_profile_and_channels(found):
         assert topic["messageEncoding"] == "cdr"
         assert topic["schemaEncoding"] == "ros2msg"
         (qos,) = yaml.safe_load(topic["metadata"]["offered_qos_profiles"])
-        # As in rmw: reliable; transient local or volatile.
+        # Values of rmw: reliable; transient local or volatile.
         assert qos["reliability"] == 1
         assert qos["durability"] == (1 if name == "/tf_static" else 2)
         assert topic["metadata"]["topic_type_hash"].startswith("RIHS01_")

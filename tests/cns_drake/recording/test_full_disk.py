@@ -1,4 +1,4 @@
-"""Disks that fill up: one line, no final name, and room makes it go on.
+"""A full disk gives one line and no final name; with room it goes on.
 
 Where the tests run as root the disk is real, a tmpfs of a few kilobytes.
 Elsewhere, and in any case, a limit on the size of files makes writes fail.
@@ -92,7 +92,7 @@ def test_limits_of_any_size(tmp_path, whole):
 
 
 def recorded(folder):
-    """Returns files, but that which tells the way to the world."""
+    """Returns files except the one with the path to the world."""
     files = contents(folder)
     del files["scenario.yaml"]
     return files
@@ -130,20 +130,20 @@ def test_a_real_run_ends_in_one_line_and_goes_on(tmp_path, request, disk):
     assert result.returncode == 2
     assert result.stdout == ""
     assert "Traceback" not in result.stderr
-    told = result.stderr.splitlines()[-1]
-    assert told == f"cns-drake: error: {part}: {FAULTS[disk]}"
-    # What the rest would be made of is known, and the recording is not done.
+    last = result.stderr.splitlines()[-1]
+    assert last == f"cns-drake: error: {part}: {FAULTS[disk]}"
+    # The inputs are recorded, and the recording is not finished.
     assert {path.name for path in folder.iterdir()} == {
         part.name,
         "fingerprint.txt.part",
     }
     if disk == "tmpfs":
         small.filler.unlink()
-    told = []
-    run = simulate(scenario, output, on_note=told.append)
+    notes = []
+    run = simulate(scenario, output, on_note=notes.append)
     # A tmpfs has room for whole pages only.
     assert run.resumed_frames in ({16, 32} if disk == "tmpfs" else {32})
-    assert told == [
+    assert notes == [
         "tiny_01: found an interrupted run, reading it",
         f"tiny_01: {run.resumed_frames} of {FRAMES} frames are there; going"
         " on with the next one",

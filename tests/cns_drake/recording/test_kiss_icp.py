@@ -1,8 +1,7 @@
 """KISS-ICP, as published, finds the drive from `/lidar/points`.
 
-KISS-ICP reads the file itself, through its own loader, and knows neither our
-odometry nor our frames: it would go astray on wrong axes, units, stamps or
-point layouts.
+KISS-ICP reads the file through its own loader and uses neither our odometry nor
+our frames. Wrong axes, units, stamps or point layouts would lead it astray.
 """
 
 from mcap.reader import make_reader
@@ -61,15 +60,15 @@ def test_kiss_icp_finds_the_drive(recording, tmp_path, capsys):
             f"\nKISS-ICP: {errors[-1]:.2f} m and {angle_deg:.2f} deg off"
             f" after {length:.1f} m"
         )
-    # Rings on the ground and on walls move with the car, and KISS-ICP takes
-    # some of them for the same points: the more so, the fewer and the more
-    # exact they are. With os1-128 the angle is a tenth.
+    # Rings on the ground and on walls move with the car, and KISS-ICP matches
+    # some of them as the same points, especially if they are few and exact.
+    # With os1-128 the angle is a tenth.
     assert errors.max() < 0.04 * length
     assert angle_deg < 3.0
 
 
 def test_definitions_have_the_constants_of_a_field(recording):
-    """KISS-ICP's reader of single files misses them; they are there."""
+    """KISS-ICP's reader of single files omits them; our files have them."""
     (mcap,) = recording.glob("*.mcap")
     with open(mcap, "rb") as stream:
         schemas = make_reader(stream).get_summary().schemas.values()

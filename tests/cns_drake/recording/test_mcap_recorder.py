@@ -32,7 +32,7 @@ X_BI = RigidTransform(RollPitchYaw(0.3, 0.2, 0.1), [-1.0, 0.0, 1.6])
 
 
 def X_WB_at(time):
-    """A turning climb; any pose that differs from frame to frame will do."""
+    """A turning climb, whose pose differs from frame to frame."""
     return RigidTransform(
         RollPitchYaw(0.1 * time, 0.05, 0.7 * time),
         [10.0 * time, 3.0 - time, 0.5 * time],
@@ -162,7 +162,7 @@ def read_with_rosbags(path):
     scope="module", params=["mcap-ros2", "rosbags-folder", "rosbags-file"]
 )
 def topics(request, recording):
-    """The recording as libraries read it that did not write it."""
+    """The recording, as read by independent libraries."""
     if request.param == "mcap-ros2":
         return read_with_mcap_ros2(recording)
     if request.param == "rosbags-folder":
@@ -326,7 +326,7 @@ def test_forced_publish_writes_the_frame_of_the_time():
     context.SetTime(7 * PERIOD)
     diagram.ForcedPublish(context)
     stamp_ns = START_NS + 350_000_000
-    # It is the first that is written: what never moves comes with it.
+    # It is the first written frame, so the static transforms come with it.
     assert sorted(bag.written) == sorted(
         [(topic, stamp_ns, 7) for topic in FRAME_TOPICS]
         + [("/tf_static", stamp_ns, 0)]
@@ -351,7 +351,7 @@ def test_time_between_frames_is_refused():
         diagram.ForcedPublish(context)
 
 
-def test_a_start_before_time_zero_is_told():
+def test_a_start_before_time_zero_is_refused():
     bag = _BagStub()
     simulator = Simulator(make_diagram(bag))
     simulator.get_mutable_context().SetTime(-2 * PERIOD)

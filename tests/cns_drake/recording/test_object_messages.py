@@ -1,4 +1,4 @@
-"""Messages of boxes: what a reader finds is what there was."""
+"""Messages of boxes: a reader gets the boxes that were written."""
 
 from types import SimpleNamespace
 
@@ -73,7 +73,7 @@ def read_entity(one):
 )
 def test_a_reader_finds_every_box(make, kind, boxes, read):
     messages = BoxMessages(make)
-    # Others, then the same again: the numbers are new each time.
+    # Other boxes, then the first ones again: the values change each time.
     for seed, count in ((1, 3), (2, 3), (3, 2), (4, 0), (5, 3)):
         objects = make_objects(seed, count)
         found = deserialize(messages.encode(objects, STAMP_NS + seed), kind)
@@ -90,7 +90,8 @@ def test_a_reader_finds_every_box(make, kind, boxes, read):
             stamp = header.stamp.sec * 10**9 + header.stamp.nanosec
             assert stamp == STAMP_NS + seed
     if kind == SCENE_UPDATE:
-        # All boxes before are gone, also those of whom nothing is said.
+        # All boxes before are removed, also those that the message does not
+        # name.
         assert [one.type for one in found.deletions] == [1]
 
 

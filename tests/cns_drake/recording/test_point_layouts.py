@@ -1,4 +1,4 @@
-"""Layouts of points against what drivers document, and back."""
+"""Layouts of points against the documents of drivers, and back."""
 
 import numpy as np
 import pytest
@@ -70,7 +70,7 @@ def points():
 
 
 def sent(points):
-    """Returns points as a message, by way of its bytes."""
+    """Returns the message of points after a trip through its bytes."""
     data = serialize(make_point_cloud(points, "lidar", 10**18))
     return deserialize(data, POINT_CLOUD)
 
@@ -105,7 +105,7 @@ def test_points_come_back(points, layout):
     )
 
 
-def test_what_is_derived(points):
+def test_derived_fields(points):
     p = np.stack([points[axis].astype(float) for axis in "xyz"], axis=1)
     distance = np.linalg.norm(p, axis=1)
     ouster = to_layout(points, "ouster")

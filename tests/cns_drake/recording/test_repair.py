@@ -1,4 +1,4 @@
-"""Repaired recordings, and files that were made to harm a reader."""
+"""Repaired recordings, and files made to harm a reader."""
 
 import io
 import resource
@@ -81,7 +81,7 @@ def test_a_whole_file_stays_whole(tmp_path, compression, use_chunking):
         attachments = {a.name: a.data for a in reader.iter_attachments()}
         metadata = {m.name: m.metadata for m in reader.iter_metadata()}
     assert attachments == {"first.txt": b"first", "last.txt": b"last"}
-    # What rosbag2 knew of the old file does not hold for the new one.
+    # The metadata of rosbag2 for the old file is invalid for the new one.
     assert metadata == {"note": {"key": "value"}}
 
 
@@ -137,7 +137,7 @@ def test_bytes_inserted_and_removed_between_chunks(tmp_path):
         assert len(messages) >= 200 - 2 * 17
 
 
-def test_a_ros2_file_gets_metadata_of_what_is_there(short_recording, tmp_path):
+def test_a_ros2_file_gets_metadata_of_its_content(short_recording, tmp_path):
     content = (short_recording / "metropolis_04_0.mcap").read_bytes()
     result, _ = repaired(tmp_path, content[: len(content) // 2])
     with result.output.open("rb") as stream:
@@ -226,7 +226,7 @@ def chunk_of(data, *, size, compression=b"zstd", length=None):
 
 
 def make_bomb(size):
-    """A little that decompresses to much."""
+    """Few bytes that decompress to many."""
     compressor = zstandard.ZstdCompressor().compressobj(size=size)
     zeros = bytes(2**20)
     parts = [compressor.compress(zeros) for _ in range(size // len(zeros))]
@@ -318,8 +318,8 @@ def test_more_definitions_than_a_recording_has(tmp_path):
 
 
 def test_false_chunks_do_not_keep_a_reader_busy():
-    # Each is shaped like a chunk that reaches to the end of the file, and
-    # each has to be read to see that it is none.
+    # Each has the form of a chunk up to the end of the file, and must be read
+    # to find out that it is none.
     count, size = 3000, 53
     total = 8 + count * size
     content = bytearray(MCAP0_MAGIC)

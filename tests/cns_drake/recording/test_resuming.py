@@ -1,4 +1,4 @@
-"""Recordings that were interrupted at any byte, and go on."""
+"""Recordings that go on after an interruption at any byte."""
 
 import os
 
@@ -45,7 +45,7 @@ def test_cut_off_at_any_byte(folder, whole):
         leave(folder, mcap[:size])
         found.append(record(folder))
         assert contents(folder) == whole
-    # Whole chunks, and at last all that there is.
+    # Whole chunks, and finally the complete file.
     assert sorted(found) == found
     assert set(found) == {0, 16, 32, 48, FRAMES}
 
@@ -74,7 +74,7 @@ def test_interrupted_by_an_exception_in_any_frame(tmp_path, whole):
 
         with pytest.raises(KeyboardInterrupt):
             record_until(stop)
-        # Even the last second is there: the file was closed in good order.
+        # Even the last second is there, because the file was closed properly.
         assert record(folder) == stop
         assert contents(folder) == whole
 
@@ -90,7 +90,7 @@ def test_interrupted_again_while_frames_are_taken_over(folder, whole):
 
     with pytest.raises(KeyboardInterrupt):
         take_over_some()
-    # The first 25 frames were written again, and yet all 50 are there.
+    # The first 25 frames were written again, and all 50 are there.
     assert (folder / "drive_01_0.mcap.part").read_bytes() == whole[
         "drive_01_0.mcap"
     ]

@@ -1,8 +1,8 @@
 """RKO-LIO, as published, finds a drive on springs from LiDAR and IMU.
 
-RKO-LIO reads the folder itself, frames and extrinsics included. It would go
-astray on wrong axes, units, stamps, gravity or places of the sensors, and on
-an IMU that does not feel what the LiDAR sees.
+RKO-LIO reads the folder itself, with frames and extrinsics. Wrong axes, units,
+stamps, gravity or positions of the sensors would lead it astray, and so would
+an IMU whose motion is not the LiDAR's.
 """
 
 import subprocess
@@ -50,7 +50,7 @@ def test_rko_lio_finds_the_drive(tmp_path, capsys):
         poses.rotation_from_quaternion(rows[:, 4:]), rows[:, 1:4]
     )
 
-    # Where the car is at the times for which RKO-LIO says it, ends of scans.
+    # The car's true positions at RKO-LIO's times, the ends of scans.
     times = rows[:, 0] - START_NS * 1e-9
     exact = poses.make_pose(*plan_drive(scenario).poses(times))
     assert len(found) >= 10 * SECONDS - 2

@@ -1,4 +1,4 @@
-"""When messages are due, against the times themselves."""
+"""The times of messages, against an explicit list."""
 
 from fractions import Fraction
 

@@ -77,8 +77,8 @@ def test_blend_of_offset_lanes_keeps_the_headings():
     np.testing.assert_allclose(points[[0, -1]], [(0, 0), (40, 7)], atol=1e-9)
 
 
-def test_only_the_pieces_that_are_asked_for_are_looked_at(monkeypatch):
-    """Otherwise 100,000 waypoints take minutes."""
+def test_only_the_needed_pieces_are_computed(monkeypatch):
+    """Looking at all pieces, 100,000 waypoints would take minutes."""
     corners = [(10.0 * k, float(k % 2)) for k in range(40)]
     curve = Centreline(corners, np.ones(38))
     asked = []

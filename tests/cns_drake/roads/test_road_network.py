@@ -244,7 +244,7 @@ def test_a_loop_road_and_a_joint_of_two_roads(load):
     assert ways["loop_a", "forward", "loop_a", "forward"] == "straight"
     assert ways["to_b", "backward", "loop_a", "forward"] == "right"
     assert ways["to_b", "backward", "loop_a", "backward"] == "left"
-    # One-way: in at the start, out at the end only.
+    # The road is one-way: entry at the start, exit at the end.
     into_loop = [
         way
         for way in network.connections("c")

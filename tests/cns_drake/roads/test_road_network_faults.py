@@ -1,4 +1,4 @@
-"""Road networks that cannot be: file, field and fault are named."""
+"""Impossible road networks: errors name file, field and fault."""
 
 import copy
 
@@ -131,7 +131,7 @@ roads:
 
 
 def test_a_bend_beside_a_junction_has_a_carriageway(tmp_path):
-    """Where the corner of two kerbs is sharp."""
+    """The corner of two kerbs is sharp there."""
     path = tmp_path / "roads.yaml"
     text = ROADS.replace("[100, -50, 20]", "[100, -10, 20]")
     assert text != ROADS
@@ -147,7 +147,7 @@ def test_a_bend_beside_a_junction_has_a_carriageway(tmp_path):
 @pytest.mark.parametrize(
     ("far", "via", "fault"),
     [
-        # One upon the other: they would never part.
+        # The roads lie on each other and would never part.
         (200, "", r"roads\.one: its junctions need inf m"),
         ("1.0e+308", "", r"junctions\.b\.position\.0: .*less than or equal"),
         # On the inside of the bend the road's edge crosses itself.

@@ -63,7 +63,7 @@ def lateral(network, road, direction, lane, aside):
     [
         ("ring_north_east", 2, -1.5, 3.75),
         ("ring_north_east", 2, 0.3, 5.55),
-        # As far as there is room for a car.
+        # The car moves over as far as it has room.
         ("ring_north_east", 2, 1.0, 7.0 - CAR_ROOM),
         ("ring_north_east", 1, -2.5, -0.75),
         ("boulevard_middle", 1, -1.0, 2.25 + CAR_ROOM),

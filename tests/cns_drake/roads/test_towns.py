@@ -154,14 +154,14 @@ def test_streets_are_one_piece_and_sidewalks_line_them(networks, town):
     (carriageway,) = network.carriageway().geoms
     assert carriageway.is_valid
     assert network.sidewalks().intersection(carriageway).area < 1e-6
-    # No slit in it, and no island too small for a sign.
+    # The area has no slit, and no island too small for a sign.
     filled = carriageway.buffer(0.2, join_style="mitre").buffer(
         -0.2, join_style="mitre"
     )
     assert filled.difference(carriageway.buffer(0.01)).area < 1e-3
     assert all(Polygon(hole).area > 5 for hole in carriageway.interiors)
     for road in network.roads.values():
-        # Beside the roundabout's short ones there is another road.
+        # There is another road beside the roundabout's short ones.
         if road.name.startswith("circle_"):
             continue
         middle = [(road.first_station + road.last_station) / 2]
@@ -254,11 +254,11 @@ def test_the_roundabout_turns_one_way(downtown):
         radius = np.linalg.norm(points - centre, axis=1)
         np.testing.assert_allclose(radius, 21.7, atol=0.1)
         angles.append(np.unwrap(np.arctan2(*(points - centre).T[::-1])))
-    # Counter-clockwise, as traffic on the right goes, and once round.
+    # Traffic on the right goes round once, counter-clockwise.
     assert all(np.all(np.diff(angle) > 0) for angle in angles)
     turn = sum(angle[-1] - angle[0] for angle in angles)
     assert turn == pytest.approx(2 * np.pi, abs=0.01)
-    # In from each avenue and out to each other one, without a wrong way.
+    # Routes lead from each avenue to each other one, in legal directions.
     for side in ("north", "east", "south", "west"):
         entry = downtown.roads[f"circle_entry_{side}"]
         leaving = downtown.roads[f"circle_exit_{side}"]

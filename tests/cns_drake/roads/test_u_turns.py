@@ -117,7 +117,8 @@ def test_bends_are_driven_down_to_the_limit_of_steering(tmp_path):
     assert TIGHTEST_RADIUS < min(driven_) < TIGHTEST_RADIUS + 0.03
 
 
-# Lanes, and between which ones; width of the loop is that between the lanes.
+# Numbers of lanes, and lanes of the turn; the loop is as wide as their
+# distance.
 ROOMY = {
     "a dead end": ({}, [leg("up"), leg("up", "backward")]),
     "a dead end behind a bend": (
@@ -153,7 +154,7 @@ def test_the_car_turns_round_on_the_carriageway(tmp_path, where):
     network = network_of(tmp_path, **style)
     places, curvature = driven(drive(network, *legs))
     assert np.abs(curvature).max() <= 1 / TIGHTEST_RADIUS
-    # All of it stays between the kerbs, at every time.
+    # The whole car stays between the kerbs at every time.
     steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
     moving = places[np.concatenate([[True], steps > 1e-4])]
     outside = swept_area(moving).difference(network.lane_area())
@@ -167,7 +168,7 @@ def test_the_car_turns_round_on_the_carriageway(tmp_path, where):
         np.testing.assert_allclose(point, lane[:2], atol=1e-6)
 
 
-def test_it_turns_round_where_it_is_told(tmp_path):
+def test_it_turns_round_at_the_waypoint(tmp_path):
     network = network_of(tmp_path, lanes=[2, 2])
     places, _ = driven(drive(network, leg("in", end=50), leg("in", "backward")))
     # The loop's centre lies at 50 m, its far end 4.4 m on.
@@ -251,7 +252,7 @@ def test_waypoints_that_double_back_are_loops(turn_deg):
     places, curvature = driven(trajectory)
     tightest = 1 / np.abs(curvature).max()
     assert TIGHTEST_RADIUS <= tightest < TIGHTEST_RADIUS + 0.1
-    # It passes the waypoint, and nothing lies farther.
+    # The loop passes the waypoint, its farthest point.
     near = np.linalg.norm(places - points[1, :2], axis=1).min()
     assert near < 0.3
     yaw = trajectory.path.evaluate([0.0, trajectory.path.end]).yaw
@@ -260,7 +261,7 @@ def test_waypoints_that_double_back_are_loops(turn_deg):
     assert path.points[:, 2].max() == pytest.approx(1.0)
 
 
-def test_doubling_back_has_to_be_asked_for_and_needs_room():
+def test_doubling_back_needs_the_field_and_room():
     points = [(0, 0, 0), (30, 0, 0), (2, 0, 0)]
     with pytest.raises(InputError, match=r"1: turns by 180 .*u_turns: true"):
         make_waypoint_path(points, 2.0)
@@ -291,7 +292,7 @@ def test_a_loop_is_smooth():
     assert np.ptp(heading[round_]) == pytest.approx(expected, abs=0.01)
 
 
-def test_a_scenario_tells_whether_it_turns_round(tmp_path):
+def test_a_scenario_states_whether_it_turns_round(tmp_path):
     (tmp_path / "d.csv").write_text("0,0\n40,0\n5,0\n")
     (tmp_path / "d.sdf").write_text("<sdf version='1.9'/>")
     text = "{world: d.sdf, waypoints: d.csv, speeds: {}%s}"

@@ -60,8 +60,8 @@ def test_a_world_and_waypoints_give_a_recording(yard, tmp_path):
     np.testing.assert_allclose(position, [-10, 5, 0], atol=1e-9)
 
 
-def test_nothing_depends_on_where_it_lies(yard, tmp_path):
-    """The world, nor the recording; both moved, it is the very same."""
+def test_nothing_depends_on_the_folder(yard, tmp_path):
+    """World and recording are moved together; the bytes stay the same."""
     moved = tmp_path / "else" / "where"
     shutil.copytree(yard, moved)
     folders = [
@@ -74,7 +74,7 @@ def test_nothing_depends_on_where_it_lies(yard, tmp_path):
     ]
     first, second, third = map(contents, folders)
     assert first == second
-    # Only its way to the world is another.
+    # Only the path to the world differs.
     assert first.pop("scenario.yaml") != third.pop("scenario.yaml")
     assert first == third
     assert load_scenario(folders[2] / "scenario.yaml").world == str(

@@ -20,7 +20,7 @@ MODEL = """<sdf version="1.9"><!-- <uri>left_out.obj</uri> --><model name="m">
 <link name="l"><visual name="v"><geometry><mesh><uri>{}</uri></mesh></geometry>
 <material><pbr><metal><albedo_map>wall.png</albedo_map></metal></pbr></material>
 </visual></link></model></sdf>"""
-# Files that a world reads, directly or not, and what they hold.
+# Files that a world reads, directly or not, with their content.
 READ = {
     "models/hut/hut.sdf": MODEL.format("roof.obj"),
     "models/hut/roof.obj": "mtllib roof.mtl\nv 0 0 0\n",

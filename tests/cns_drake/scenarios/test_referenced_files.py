@@ -1,4 +1,4 @@
-"""Which files a model refers to, and whether one of them changes."""
+"""The files of a model, and changes of one of them."""
 
 import os
 from pathlib import Path
@@ -40,7 +40,7 @@ def test_a_change_of_any_of_its_files_is_noticed(
     assert watch.changed() is None
     path = model.parent / name
     status = path.stat()
-    # Another content of the same size, and a clock that stands still.
+    # Other content of the same size, and a clock that stands still.
     path.write_bytes(path.read_bytes()[::-1])
     os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
     assert watch.changed() == str(path)

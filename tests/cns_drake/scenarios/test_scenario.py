@@ -1,4 +1,4 @@
-"""Scenarios: what is accepted, what is refused, what comes back."""
+"""Scenarios: accepted and refused ones, and their text."""
 
 from helpers.small_map import scenario_values
 import numpy as np
@@ -45,7 +45,7 @@ def test_defaults_are_the_sensor_contract():
     assert imu.rotation().IsNearlyIdentity(0.0)
 
 
-def test_what_is_recorded_loads_again(small_map, tmp_path):
+def test_a_recorded_scenario_loads_again(small_map, tmp_path):
     values = scenario_values(small_map)
     values["lidars"] = {"roof": {"preset": "vlp-16", "rpy_deg": [0, 10, 0]}}
     scenario = make_scenario(values, "test")
@@ -93,7 +93,7 @@ def test_returns_and_weather_are_replaced(small_map):
     foggy = scenario.with_returns("calibrated", fog)
     assert foggy.weather == fog
     assert foggy.lidars["a"] == LidarConfig(returns="calibrated")
-    # What is written is read again.
+    # A written scenario is read again.
     values = foggy.model_dump(mode="json")
     assert make_scenario(values, "test") == foggy
     clear = foggy.with_returns("ideal")

@@ -1,4 +1,4 @@
-"""What sections of a scenario write."""
+"""The text of sections of a scenario."""
 
 from cns_drake.scenarios.section import Section, field_off_by_default
 

@@ -36,7 +36,7 @@ def folder(tmp_path):
 
 
 def measured(folder):
-    """The rows, and the sequences that had to be measured."""
+    """The rows, and the sequences that were measured."""
     lines = []
     rows = sequence_rows(folder, lines.append)
     return rows, [line.split()[-1] for line in lines]

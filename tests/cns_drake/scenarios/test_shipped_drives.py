@@ -78,7 +78,7 @@ def test_bounds_hold_at_every_instant(drives, name):
     assert speed.max() <= speeds.cruise + 1e-9
     assert np.abs(along).max() <= speeds.longitudinal_acceleration
     assert across.max() <= speeds.lateral_acceleration
-    # And they are made use of.
+    # The drives reach these limits.
     assert speed.max() > 0.99 * speeds.cruise
     assert np.abs(along).max() > 0.9 * speeds.longitudinal_acceleration
     assert across.max() > 0.99 * speeds.lateral_acceleration
@@ -130,7 +130,7 @@ def test_the_vehicle_stays_in_its_lane(drives, name):
     # In the tightest turns the wheel cannot be turned at once.
     lane = linestrings(path.points[:, :2])
     assert distance(lane, points(jet.p[:, :2])).max() < 0.15
-    # The whole body, 4.7 m by 1.9 m, keeps off the kerbs.
+    # The whole body, 4.7 m by 1.9 m, stays off the kerbs.
     body = np.array([(3.7, 0.95), (3.7, -0.95), (-1, -0.95), (-1, 0.95)])
     ahead = np.stack([np.cos(jet.yaw), np.sin(jet.yaw)], axis=1)
     left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
@@ -195,7 +195,7 @@ def test_facts_are_those_of_the_drive(drives):
 
 @pytest.fixture(scope="module")
 def frames(drives):
-    """Where the LiDAR is in each frame, and which way the vehicle heads."""
+    """The LiDAR's position and the vehicle's heading in each frame."""
     result = {}
     for name, (scenario, _, trajectory) in drives.items():
         t = FRAME_PERIOD * np.arange(frames_within(trajectory.duration))
@@ -231,16 +231,16 @@ def test_pairs_meet_as_often_as_the_papers(frames, pair):
     matched = distances <= PAPER_PROTOCOL.radius
     wanted = QUERIES_WITH_MATCH[pair]
     assert np.count_nonzero(matched) == pytest.approx(wanted, rel=0.1)
-    # They overlap in part only.
+    # The drives overlap in part only.
     assert 0.6 < matched.mean() < 0.98
-    # Some places are passed the same way, some the other way round.
+    # Some places are passed in the same direction, some in the opposite.
     assert np.count_nonzero(turns[matched] < np.radians(20)) >= 12
     assert np.count_nonzero(turns[matched] > np.radians(160)) >= 12
 
 
 @pytest.mark.parametrize("pair", QUERIES_WITH_MATCH)
 def test_pairs_see_nearly_the_same_streets(drives, frames, pair):
-    # What one drive sees and the other does not would count as change.
+    # Structures that only one drive sees would count as change.
     network = load_road_network(map_folder(drives[pair[0]][0]).roads)
     places = np.concatenate(
         [

@@ -1,4 +1,4 @@
-"""Families: each member lacks what it should, and stands on its own."""
+"""Families: each member lacks the right structures, independently."""
 
 import csv
 import itertools
@@ -40,7 +40,7 @@ def test_parts_that_are_missing_grow_out_of_one_place(tmp_path):
     removable = [
         name
         for name, (kind, *_) in everything.items()
-        # Not what stands on lots until they are built on.
+        # Objects on lots before building do not count.
         if kind in ("building", "vegetation") and "_lot_" not in name
     ]
     assert [m.name.split("_")[2] for m in members] == [
@@ -55,7 +55,7 @@ def test_parts_that_are_missing_grow_out_of_one_place(tmp_path):
         assert member.stage == "04"
     for less, more in itertools.pairwise(members):
         assert set(less.without) < set(more.without)
-    # What is missing fits into a circle that holds nothing else.
+    # The missing structures fill a circle without other structures.
     gone = members[1].without
     x0 = sum(everything[name][1] for name in gone) / len(gone)
     y0 = sum(everything[name][2] for name in gone) / len(gone)
@@ -76,7 +76,7 @@ def test_between_two_stages_lies_what_the_earlier_one_lacks(tmp_path):
         structures_in(load_world(folder / f"stage_{stage}.sdf"))
         for stage in ("02", "04")
     )
-    # What is found on lots before they are built on is no part of the city.
+    # Objects on lots before building are no part of the city.
     first = {name for name in first if "_lot_" not in name}
     gone = {m.name.split("_", 2)[2]: set(m.without) for m in members}
     assert gone["m000_s0"] == gone["m000_s1"] == set()
@@ -86,7 +86,7 @@ def test_between_two_stages_lies_what_the_earlier_one_lacks(tmp_path):
         assert len(gone[name]) == round(0.4 * len(last - first))
     assert gone["m400_s0"] != gone["m400_s1"]
     assert members[2].title == "40.0 % of what stage 02 lacks missing"
-    # All of it missing: what stands at the stage that it goes towards.
+    # If all is missing, the structures are those of the target stage.
     (whole,) = [m for m in members if m.name.endswith("m1000_s0")]
     world = load_world(world_file(whole), without=whole.without)
     assert structures_in(world) == first
@@ -124,7 +124,7 @@ def test_all_members_ride_and_measure_alike(tmp_path):
         assert member.imu.xyz == (0.5, 0.0, 1.0)
         update = {"ride": other.ride, "imu": other.imu}
         assert member.model_copy(update=update) == other
-    # Their drives also do so, those through the city of the drive that asks.
+    # Their drives through the city of the query drive do so, too.
     asking = load_scenario("metropolis_04")
     controls = family_controls(rough, asking)
     assert controls[rough[0].name].ride == rough[0].ride
@@ -178,7 +178,7 @@ def test_a_member_is_a_scenario_file_of_its_own(tmp_path):
 )
 def test_faults_are_named(tmp_path, values, fault):
     with pytest.raises(InputError, match=fault) as error:
-        # Nothing that takes long is done before they are found.
+        # Errors are found before any long work.
         family(tmp_path, redraw=lambda *_: pytest.fail("drawn"), **values)
     assert "\n" not in str(error.value)
 
@@ -219,7 +219,7 @@ def town(tmp_path):
 
 
 class Redrawing:
-    """Draws cities with a row of trees, ten times its seed, and no more."""
+    """Draws cities with a row of trees, ten times the seed of them."""
 
     def __init__(self, town, output):
         self.town, self.output = town, output
@@ -328,7 +328,7 @@ def test_structures_missing_here_and_there(tmp_path):
         assert [len(g) for g in gone] == [round(part * len(names))] * 2
         assert gone[0] != gone[1]
     assert {kinds[name] for name in one.without} == set(parts)
-    # More of one class: all that less lacks of it, whatever else is missing.
+    # A greater share of a class includes all that a smaller share lacks.
     poles = {name for name in one.without if kinds[name] == "pole"}
     assert poles < set(more.without)
 

@@ -1,4 +1,4 @@
-"""The shipped worlds come out of a wheel's archive as they went in."""
+"""The shipped worlds survive a wheel's archive unchanged."""
 
 from concurrent.futures import ThreadPoolExecutor
 

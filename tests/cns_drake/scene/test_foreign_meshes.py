@@ -1,4 +1,4 @@
-"""Meshes that Open3D reads, and what it crashes on."""
+"""Meshes that Open3D reads, and meshes that crash it."""
 
 from helpers.small_map import world_text
 import numpy as np
@@ -22,7 +22,7 @@ PLY = (
 DEADLY = PLY.replace("float z", "float " + "9" * 5000)
 
 
-def test_a_crash_is_told_and_the_next_mesh_read(tmp_path, capfd):
+def test_a_crash_is_reported_and_the_next_mesh_read(tmp_path, capfd):
     for name, text in [("good", PLY), ("deadly", DEADLY), ("torn", PLY[:-20])]:
         (tmp_path / f"{name}.ply").write_text(text)
     with ForeignMeshes() as meshes:

@@ -1,4 +1,4 @@
-"""Worlds as people write them for Gazebo."""
+"""Worlds that people write for Gazebo."""
 
 from helpers.mesh_texts import obj_text
 import numpy as np
@@ -43,7 +43,7 @@ def include(uri, extra=""):
 
 @pytest.fixture
 def models(tmp_path):
-    """A folder of models that is not beside the world."""
+    """A folder of models away from the world."""
     folder = tmp_path / "elsewhere" / "models"
     (folder / "crate").mkdir(parents=True)
     (folder / "crate" / "model.sdf").write_text(CRATE)
@@ -118,7 +118,7 @@ def test_models_are_looked_for_where_gazebo_does(
     assert ranges(load_world(path)) == {"ahead": pytest.approx(4.5)}
 
 
-def test_what_is_not_there_is_told_and_left_out(tmp_path, models):
+def test_missing_models_are_noted_and_left_out(tmp_path, models):
     mesh = "<geometry><mesh><uri>model://crate/lost.dae</uri></mesh></geometry>"
     path = write(
         tmp_path,
@@ -163,7 +163,7 @@ def test_a_dae_mesh_stands_upright_in_metres(tmp_path, models, up, corner):
 
 
 def test_many_models_with_endless_collisions(tmp_path, models):
-    """Among eleven more, Drake ends the process at one of these."""
+    """Drake ends the process at one of these among eleven other models."""
     ground = "<geometry><plane><normal>0 0 1</normal></plane></geometry>"
     (models / "crate" / "mesh.obj").write_text(obj_text())
     path = write(

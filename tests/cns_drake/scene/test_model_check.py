@@ -1,4 +1,4 @@
-"""Models and meshes that Drake's readers would crash on, or would change."""
+"""Models and meshes that would crash Drake's readers, or be changed."""
 
 from pathlib import Path
 
@@ -50,15 +50,15 @@ def read_geometry(path: Path):
     "value",
     ["nan", "inf", "-inf", "0", "-3", "abc", "1,5", "1.5m", "1e400", "", "0x3"],
 )
-def test_what_is_no_size(tmp_path, shape, value):
+def test_sizes_that_are_none(tmp_path, shape, value):
     path = write(tmp_path, _SHAPES[shape].format(value))
     with pytest.raises(InputError) as refusal:
         load_world(path)
-    told = str(refusal.value)
-    assert told.startswith(f"{path}: line ")
-    assert f"{shape.split(chr(39))[0]}: " in told
-    assert value in told
-    assert "\n" not in told
+    message = str(refusal.value)
+    assert message.startswith(f"{path}: line ")
+    assert f"{shape.split(chr(39))[0]}: " in message
+    assert value in message
+    assert "\n" not in message
 
 
 @pytest.mark.parametrize("shape", _SHAPES)
@@ -186,13 +186,13 @@ def test_faces_that_drake_reads(tmp_path, face):
     assert ReadObjToTriangleSurfaceMesh(path).num_triangles() >= 1
 
 
-def test_rows_that_match_nothing_are_told(tmp_path):
+def test_rows_that_match_nothing_are_noted(tmp_path):
     path = write(tmp_path, _SHAPES["box"].format(1))
     text = path.read_text()
     table = tmp_path / "structures.csv"
     table.write_text("instance,name,class\n1,a,building\n2,ground,terrain\n")
     assert load_world(path).notes == ()
-    # Rows of what stands in another stage.
+    # Rows of structures in another stage.
     table.write_text(table.read_text() + "3,tower,building\n")
     assert load_world(path).notes == ()
     path.write_text(text.replace("a/b", "a").replace("ground/x", "ground"))

@@ -24,7 +24,7 @@ CURVED = {
 
 
 def volume(surface):
-    """Returns the volume that faces wound outwards enclose."""
+    """Returns the volume inside faces that are wound outwards."""
     a, b, c = surface.p_GVset[surface.triangles].transpose(1, 0, 2)
     return np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0
 
@@ -104,7 +104,7 @@ def test_merging_applies_both_poses_and_keeps_vertices_shared():
     np.testing.assert_array_equal(
         merged.triangles[-2:], quad.triangles + 4 + num_ball
     )
-    # The ball is where its pose puts it, undistorted.
+    # The ball is at its pose, undistorted.
     X_TG = X_TFs[frames[1]] @ X_FG
     p_G = X_TG.inverse() @ merged.p_GVset[4 : 4 + num_ball].T
     np.testing.assert_allclose(outside(ball, p_G.T), 0.0, atol=1e-12)

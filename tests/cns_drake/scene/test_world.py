@@ -1,4 +1,4 @@
-"""Loading SDF worlds, and the faults they may have."""
+"""Loading SDF worlds, and their possible faults."""
 
 from pathlib import Path
 
@@ -77,7 +77,7 @@ def test_files_that_are_no_world(tmp_path, text):
         ("body", "b\udca5dy", "not UTF-8"),
     ],
 )
-def test_faults_that_drake_tells_in_several_ways(
+def test_faults_that_drake_reports_in_several_ways(
     tmp_path, capfd, old, new, fault
 ):
     text = world_text([box_visual("body", (1, 2, 3, 0, 0, 0), (4, 5, 6))])
@@ -96,9 +96,11 @@ def test_a_fault_names_the_file_once(tmp_path, monkeypatch):
         (tmp_path / "x").mkdir(exist_ok=True)
         with pytest.raises(InputError) as refusal:
             load_world(path)
-        told = str(refusal.value)
-        assert told.startswith(f"{path}: cannot be parsed: line 8: At XML path")
-        assert told.count("a.sdf") == 1
+        message = str(refusal.value)
+        assert message.startswith(
+            f"{path}: cannot be parsed: line 8: At XML path"
+        )
+        assert message.count("a.sdf") == 1
 
 
 def test_a_mesh_that_changes_is_read_anew(tmp_path):
@@ -145,8 +147,8 @@ def test_table_beside_the_world_is_optional(tmp_path):
     ]
 
 
-def test_what_is_left_out_is_neither_seen_nor_in_the_way(small_map):
-    """The last stage without what it adds is the first stage."""
+def test_omitted_structures_are_neither_seen_nor_in_the_way(small_map):
+    """The last stage without its new structures is the first stage."""
     added = [f"tower_{k:03d}" for k in range(19, 40)]
     later = load_world(small_map / "stage_04.sdf", without=added)
     earlier = load_world(small_map / "stage_01.sdf")
@@ -167,7 +169,7 @@ def test_what_is_left_out_is_neither_seen_nor_in_the_way(small_map):
     np.testing.assert_array_equal(scans[0], scans[1])
 
 
-def test_leaving_out_what_is_not_there_is_an_error(small_map):
+def test_omitting_missing_structures_is_an_error(small_map):
     with pytest.raises(InputError, match=r"stage_01\.sdf: no structure spire"):
         load_world(small_map / "stage_01.sdf", without=["tower_001", "spire"])
 

@@ -1,4 +1,4 @@
-"""Every shape that a SceneGraph has, as SceneGraph itself sees it."""
+"""Every shape of a SceneGraph, against SceneGraph's own measurements."""
 
 from helpers.drake_distances import marched_range
 from helpers.lidar_stage import (
@@ -70,7 +70,7 @@ def points(count=20):
     return np.random.default_rng(5).normal(size=(3, count))
 
 
-# What SceneGraph can measure the distance to.
+# Shapes to which SceneGraph measures distances.
 SHAPES = {
     "box": lambda meshes: Box(1.0, 2.0, 3.0),
     "sphere": lambda meshes: Sphere(1.2),
@@ -120,7 +120,7 @@ def test_a_shape_is_where_drake_measures_it(name, meshes):
         expected = marched_range(
             query_object, X_WS.translation(), d_Wset[beam], 60.0
         )
-        # Tracing stops short of what it grazes.
+        # Tracing stops before surfaces that it grazes.
         differing += not np.isclose(expected, measured[beam], atol=2e-3)
     assert differing <= 1
 
@@ -183,7 +183,7 @@ def test_a_gltf_mesh_is_where_drake_renders_it(scale, meshes):
     cast = (hits.ranges / scale_of_d[:, 0]).reshape(depth.shape)
     rendered, seen = np.isfinite(depth), np.isfinite(cast)
     assert seen.sum() > 500
-    # A pixel at an edge may go either way.
+    # A pixel at an edge may show either side.
     assert (rendered != seen).mean() < 0.01
     error = np.abs(depth[rendered & seen] - cast[rendered & seen])
     assert np.median(error) < 1e-5
@@ -276,7 +276,7 @@ def test_deformable_geometry_is_refused_by_name():
     assert ahead(stage.eval()) == pytest.approx(20.0, abs=1e-5)
 
 
-def test_it_sees_the_role_that_it_is_told():
+def test_it_sees_the_chosen_role():
     stage = Stage()
     for distance, role, properties in (
         (5, "proximity", ProximityProperties()),

@@ -1,4 +1,4 @@
-"""Beam patterns: fields of view, rates, and what they see, exactly."""
+"""Beam patterns: fields of view, rates, and exact ranges."""
 
 from helpers.closed_forms import box
 from helpers.lidar_stage import Stage, positions
@@ -75,7 +75,7 @@ def test_no_preset_of_that_name():
 
 
 def test_hokuyo():
-    """From the specification: 1081 steps of 0.25 deg, in 3/4 of 25 ms."""
+    """The specification has 1081 steps of 0.25 deg, in 3/4 of 25 ms."""
     beams = make_beam_pattern("hokuyo-ust-20lx").beams(0)
     azimuth, elevation = angles_deg(beams.d_Sset)
     expected = -135.0 + 0.25 * np.arange(1081)
@@ -103,7 +103,7 @@ def test_livox_fields_of_view_and_rates(preset, rate, across, up):
 
 
 def test_a_mid_70_sees_a_disc():
-    """No beam farther than half the angle from x; most in the middle."""
+    """Beams are at most half the angle from x, and most in the middle."""
     d = many(make_beam_pattern("mid-70"), 10)
     off_axis = np.rad2deg(np.arccos(d[:, 0]))
     assert off_axis.max() == pytest.approx(35.2, abs=0.1)
@@ -116,7 +116,7 @@ def test_a_mid_70_sees_a_disc():
 
 @pytest.mark.parametrize("preset", LIVOX)
 def test_frame_after_frame_fills_the_gaps(preset):
-    """What does not repeat covers more the longer it looks."""
+    """A pattern that does not repeat covers more with each frame."""
     pattern = make_beam_pattern(preset)
 
     def cells(num_frames):
@@ -192,7 +192,7 @@ def test_beams_in_any_directions():
         ([[1, 0, 0]], {"times": [0.1]}, "not within the turn of 0.1 s"),
     ],
 )
-def test_what_is_no_pattern(directions, options, fault):
+def test_patterns_that_are_none(directions, options, fault):
     with pytest.raises(ValueError, match=fault):
         DirectionPattern(
             directions, min_range=0.1, max_range=9.0, period=0.1, **options

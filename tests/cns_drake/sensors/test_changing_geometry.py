@@ -1,7 +1,7 @@
 """Geometry that changes between two scans, against fresh LiDARs.
 
-What a LiDAR sees after a change is what one that never saw anything else
-sees, bit for bit, and what SceneGraph's own signed distance tells of it.
+After a change a LiDAR measures, bit for bit, the same as a fresh LiDAR.
+SceneGraph's own signed distances agree with it.
 """
 
 from helpers.drake_distances import marched_range
@@ -120,7 +120,7 @@ def move_on_its_frame(site):
 
 
 def exchange_roles(site):
-    """As many geometries have the role afterwards."""
+    """The number of geometries with the role stays the same."""
     graph, source = site.stage.scene_graph, site.stage.source
     twin = graph.RegisterGeometry(
         site.context,
@@ -153,7 +153,7 @@ def test_a_change_is_seen(change, connected, roles):
 
 
 @pytest.mark.parametrize("how", ["removed", "without its role"])
-def test_what_is_gone_is_not_seen(how):
+def test_removed_geometry_is_not_seen(how):
     site = Site(True)
     assert site.ahead() == pytest.approx(9.0, abs=1e-5)
     graph, source = site.stage.scene_graph, site.stage.source
@@ -189,7 +189,7 @@ def test_an_anchored_frame_may_move_after_all():
     assert ahead(stage.eval()) == pytest.approx(12.0, abs=1e-5)
 
 
-def test_the_revision_tells_of_geometry_only():
+def test_the_revision_counts_geometry_only():
     site = Site(True)
     port = geometry_revision_port(site.stage.scene_graph)
     first = port.Eval(site.context)
@@ -297,7 +297,7 @@ def compare_with_distances(stage, scan, rng):
         marched_range(query_object, np.zeros(3), pattern.d_Sset[k], 100.0)
         for k in some
     ]
-    # Within a shape, distances are negative, and no ray gets anywhere.
+    # Within a shape distances are negative, and rays do not advance.
     outside = np.array(expected) > 0.0
     close = np.isclose(expected, measured[some], atol=2e-3)
     assert (close | ~outside).mean() > 0.9
@@ -305,7 +305,7 @@ def compare_with_distances(stage, scan, rng):
 
 
 def test_what_did_not_change_is_not_built_anew(monkeypatch):
-    """One crate of many changes: the others' hierarchies are kept."""
+    """One of many crates changes; the hierarchies of the others stay."""
     stage = Stage()
     frames = [
         stage.add_frame(f"f{k}", k, RigidTransform([10.0, 3.0 * k, 0.0]))

@@ -1,4 +1,4 @@
-"""The IMU against closed forms and against the drive that it measures."""
+"""The IMU against closed forms and against the drive itself."""
 
 from helpers.drives import (
     CAREFUL,
@@ -25,7 +25,7 @@ GRAVITY = 9.81
 
 
 class Station:
-    """A vehicle with an IMU and odometry, to be read at any time."""
+    """A vehicle with an IMU and odometry, with readings at any time."""
 
     def __init__(self, trajectory, X_BI):
         plant = MultibodyPlant(time_step=0.0)
@@ -120,7 +120,7 @@ def test_odometry_is_the_pose_and_the_twist_in_the_body():
     assert odometry.X_WB.IsNearlyEqualTo(trajectory.pose(time), 1e-12)
     V_WB = trajectory.spatial_velocity(time)
     speed = np.linalg.norm(V_WB.translational())
-    # Along x only, whatever the heading.
+    # The acceleration is along x at any heading.
     np.testing.assert_allclose(
         odometry.V_WB_B.translational(), [speed, 0, 0], atol=1e-9
     )

@@ -21,7 +21,7 @@ WALK = ImuNoise(
 
 
 def stand(noise, duration=HOURS):
-    """Returns what an IMU at rest measures wrongly, (N, 6)."""
+    """Returns the errors (N, 6) of an IMU at rest."""
     errors = ImuErrors(noise, RATE)
     blocks = int(duration * RATE) // BLOCK
     return np.concatenate([errors.of_block(k) for k in range(blocks)])
@@ -115,7 +115,7 @@ def test_turn_on_bias_stays_and_differs_between_runs():
     np.testing.assert_allclose(spread, [0.2, 0.01], rtol=0.07)
 
 
-def test_what_is_measured_ends_at_the_range():
+def test_measurements_end_at_the_range():
     noise = ImuNoise(accelerometer_range=20.0, gyroscope_range=0.5)
     exact = np.array([19.999, 20.001, -25.0, 0.499, -0.501, 3.0])
     measured = ImuErrors(noise, RATE).measure(5, exact[None])

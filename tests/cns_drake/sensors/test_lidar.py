@@ -106,7 +106,7 @@ def test_range_limits(distance, seen):
         assert measured == pytest.approx(distance, abs=1e-5)
 
 
-def test_what_is_too_near_hides_what_is_behind():
+def test_too_near_surfaces_hide_those_behind():
     stage = Stage()
     stage.add("film", Box(0.01, 1.0, 1.0), RigidTransform([0.5, 0.0, 0.0]))
     stage.add("wall", Box(1.0, 9.0, 9.0), RigidTransform([8.0, 0.0, 0.0]))

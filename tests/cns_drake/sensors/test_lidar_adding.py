@@ -1,4 +1,4 @@
-"""LiDARs in Diagrams with a MultibodyPlant: what they see and hide."""
+"""LiDARs in Diagrams with a MultibodyPlant: visible and hidden bodies."""
 
 from helpers.lidar_stage import FORWARD, ahead
 from helpers.plates import facing, plate
@@ -57,7 +57,7 @@ class Yard:
         )
 
     def ahead(self, place=None, **options):
-        """What a LiDAR in the robot's middle meets first."""
+        """The nearest range of a LiDAR in the robot's middle."""
         self.plant.Finalize()
         pattern = options.pop("pattern", FORWARD)
         lidar = add_lidar(
@@ -82,8 +82,8 @@ def test_bodies_of_the_default_model_are_seen():
     assert yard.ahead() == pytest.approx(9.5)
 
 
-def test_what_is_welded_to_the_body_is_not_seen():
-    """In whatever models, and by way of others."""
+def test_bodies_welded_to_the_robot_are_not_seen():
+    """This holds for bodies of any model, also if welded through others."""
     yard = Yard()
     arm, tower = yard.add("arm", 0.0), yard.add("tower", 10.0)
     mast = yard.add("mast", 0.0, "mast")
@@ -93,8 +93,8 @@ def test_what_is_welded_to_the_body_is_not_seen():
     assert yard.ahead() == pytest.approx(9.5)
 
 
-def test_what_is_welded_to_the_world_is_seen_from_there():
-    """A robot that is itself welded to the world has no part of it."""
+def test_bodies_welded_to_the_world_are_seen_from_there():
+    """The world is no part of a robot that is welded to it."""
     yard = Yard()
     yard.plant.WeldFrames(yard.plant.world_frame(), yard.robot.body_frame())
     pillar = yard.add("pillar", 0.0)
@@ -109,7 +109,7 @@ def test_the_world_sees_everything():
     assert unmoved == pytest.approx(0.5)
 
 
-def test_what_is_hidden_can_be_told():
+def test_hidden_bodies_can_be_chosen():
     yard = Yard()
     near, far = yard.add("near", 5.0), yard.add("far", 10.0)
     yard.add("last", 20.0)
@@ -129,7 +129,7 @@ def make_near():
 
 
 def test_bodies_of_another_source():
-    """A frame that no plant knows carries the LiDAR; another is seen."""
+    """The LiDAR's frame belongs to no plant; another such frame is visible."""
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
     plant.Finalize()

@@ -1,4 +1,4 @@
-"""What noise, losses and rounding do to ranges, by their statistics."""
+"""Noise, losses and rounding of ranges, by their statistics."""
 
 import numpy as np
 import pytest
@@ -49,8 +49,8 @@ def test_noise_leaves_intensity_alone():
 
 
 @pytest.mark.parametrize("limit", LIMITS)
-def test_limits_hold_for_what_is_measured(limit):
-    """At a limit, noise makes half of the beams return, and keeps it."""
+def test_limits_hold_for_measured_ranges(limit):
+    """At a limit, noise makes half of the beams return, within the limit."""
     model = MeasurementModel(range_noise=0.1)
     returns = model.measure(constant(limit), *LIMITS, 0)
     assert abs(len(returns.beams) / NUM_BEAMS - 0.5) < 0.006

@@ -1,4 +1,4 @@
-"""Motion during a turn: of the LiDAR, and of all that it sees.
+"""Motion during a turn: of the LiDAR, and of visible bodies.
 
 Oracle: closed forms, ray by ray, in the frame of each body at the time of
 that ray.
@@ -46,7 +46,7 @@ SHAPES = {
 SENSOR_V = SpatialVelocity(w=[0.4, -0.3, 2.0], v=[9.0, -4.0, 1.0])
 STILL = SpatialVelocity(w=[0.0, 0.0, 0.0], v=[0.0, 0.0, 0.0])
 SWUNG = SpatialVelocity(w=[1.0, 0.5, -4.0], v=[-12.0, 7.0, 2.0])
-# Two and a half turns while the LiDAR does one.
+# The body turns two and a half times during one turn of the LiDAR.
 WHIRLING = SpatialVelocity(w=[0.0, 157.0, 0.0], v=[3.0, 0.0, 0.0])
 
 
@@ -138,11 +138,11 @@ def compare(meeting, closed_form, least, tolerance=2e-3):
     measured = measured_ranges(meeting)
     both = np.isfinite(expected) & np.isfinite(measured)
     assert both.sum() >= least
-    # At its outline, a ray may go either way.
+    # A ray at the outline may hit or miss.
     assert (np.isfinite(expected) != np.isfinite(measured)).sum() <= 4
     error = np.abs(expected - measured)[both]
     assert np.median(error) < 1e-4
-    # Where rays graze it, little turns into much.
+    # Small errors become large where rays graze the shape.
     assert (error > tolerance).mean() < 0.03
 
 
@@ -172,7 +172,7 @@ def test_a_pattern_that_does_not_repeat():
 
 
 def test_motion_comes_and_goes():
-    """What stopped is seen as if it had never moved."""
+    """A body that has stopped is seen as if it had never moved."""
     meeting = Meeting(SHAPES["box"][0])
     meeting.move(STILL, STILL)
     still = meeting.eval().copy()
@@ -186,7 +186,7 @@ def test_motion_comes_and_goes():
 
 
 def test_points_in_the_world_lie_where_they_were_met():
-    """On a still box, however the LiDAR moved."""
+    """The points lie on a still box for any motion of the LiDAR."""
     meeting = Meeting(SHAPES["box"][0])
     meeting.move(SENSOR_V, STILL)
     p_W = meeting.eval("point_cloud_W").xyzs().astype(float)

@@ -1,4 +1,4 @@
-"""Points from what beams measured, against numpy's arithmetic."""
+"""Points from the ranges of beams, against NumPy's arithmetic."""
 
 import numpy as np
 import pytest

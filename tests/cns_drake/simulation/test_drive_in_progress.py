@@ -21,7 +21,7 @@ def scenario(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def recorded(scenario, tmp_path_factory):
-    """Folder of a recording that nobody read meanwhile."""
+    """Folder of a recording that was not read meanwhile."""
     return simulate(scenario, tmp_path_factory.mktemp("output")).folder
 
 
@@ -30,9 +30,7 @@ def contents(folder):
 
 
 @pytest.mark.parametrize("num_read", [0, 1, 7, FRAMES])
-def test_what_is_read_is_what_is_recorded(
-    scenario, recorded, tmp_path, num_read
-):
+def test_scans_read_are_those_recorded(scenario, recorded, tmp_path, num_read):
     scans, drives = [], []
 
     def read(drive):
@@ -68,7 +66,7 @@ def test_what_was_recorded_before_is_not_read(scenario, recorded, tmp_path):
 
 
 def test_a_fault_of_the_simulation_is_not_lost(scenario, tmp_path, monkeypatch):
-    """Though the reader takes it for a fault of its own."""
+    """It is raised even if the reader catches it."""
     write = bag_writer.BagWriter.write
 
     def fail(bag, topic, stamp_ns, *rest):

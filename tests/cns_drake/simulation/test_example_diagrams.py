@@ -10,8 +10,8 @@ import pytest
 
 DIAGRAMS = Path(__file__).parents[3] / "diagrams"
 pytestmark = pytest.mark.slow
-# Name -> for how long, the path of the points on its page, and how many
-# there must be at least.
+# Name -> its duration, the path of the points on its page, and their least
+# number.
 EXAMPLES = {
     "warehouse_robot": (0.5, "/drake/lidar", 50_000),
     "wrist_scanner": (0.2, "/drake/cloud", 3_000),

@@ -1,9 +1,9 @@
-"""Runs that are killed, and what the next one makes of what they leave.
+"""Runs that are killed, and the next run on the files that they leave.
 
 The runs are real processes, forked from a server that has imported the
-simulator once. Each is killed when it has told of a random number of frames;
-it does not wait for that, so that the blow falls anywhere: while a world is
-loaded, frames are taken over, a chunk is compressed or files get their names.
+simulator once. Each is killed after it has reported a random number of frames.
+It does not wait, so the kill comes at any moment: while a world is loaded,
+frames are taken over, a chunk is compressed or files get their names.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -40,10 +40,10 @@ class Runner:
         )
 
     def run(self, output, kill_signal=None, kill_frame=0):
-        """Runs to the end, or till so many frames are told and a kill.
+        """Runs to the end, or to a kill after some reported frames.
 
         Returns:
-            The last frame told, and whether the kill came before the end.
+            The last reported frame, and whether the kill came before the end.
         """
         receiver, sender = self._context.Pipe(duplex=False)
         process = self._context.Process(
@@ -51,11 +51,11 @@ class Runner:
         )
         process.start()
         sender.close()
-        told = 0
+        frame = 0
         with contextlib.suppress(EOFError):
             while True:
-                told = receiver.recv()
-                if kill_signal is not None and told >= kill_frame:
+                frame = receiver.recv()
+                if kill_signal is not None and frame >= kill_frame:
                     with contextlib.suppress(ProcessLookupError):
                         os.kill(process.pid, kill_signal)
                     kill_signal = None
@@ -66,11 +66,11 @@ class Runner:
             -signal.SIGKILL,
             -signal.SIGTERM,
         )
-        return told, process.exitcode != 0
+        return frame, process.exitcode != 0
 
 
 def readable_frames(folder):
-    """Counts complete frames with a reader that did not write them."""
+    """Counts complete frames with an independent reader."""
     topics = {}
     for path in folder.glob("*.mcap*"):
         with path.open("rb") as stream, contextlib.suppress(McapError):
@@ -91,7 +91,8 @@ def runner(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def uninterrupted(runner, tmp_path_factory):
-    # As deep as the others: the way to the world is recorded.
+    # The folder is as deep as the others, because the path to the world is
+    # recorded.
     output = tmp_path_factory.mktemp("uninterrupted") / "0" / "0"
     assert runner.run(output) == (FRAMES, False)
     return contents(output / "tiny_01")
@@ -112,14 +113,14 @@ def kill_often(runner, output, seed, uninterrupted):
             kill_signal = None
             if kills < KILLS_EACH:
                 kill_signal = (signal.SIGKILL, signal.SIGTERM)[rng.integers(2)]
-            told, killed = runner.run(
+            frame, killed = runner.run(
                 folder.parent, kill_signal, rng.integers(FRAMES + 1)
             )
             kills += killed
-            # A kill may come when all is done but the end of the process.
+            # A kill may come after the work, just before the process ends.
             killed = not (folder / "metadata.yaml").exists()
             if killed:
-                recorded = max(told, readable)
+                recorded = max(frame, readable)
                 readable = readable_frames(folder)
                 most_lost = max(most_lost, recorded - readable)
         assert contents(folder) == uninterrupted
@@ -141,5 +142,5 @@ def test_twenty_kills_lose_a_second_at_most_and_change_no_byte(
             )
         )
     assert max(most_lost) <= FRAMES_A_SECOND
-    # If nothing was ever lost, the blows fell where nothing can be.
+    # If no frame was ever lost, all kills came between frames.
     assert max(most_lost) > 0

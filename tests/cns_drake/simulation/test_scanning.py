@@ -1,4 +1,4 @@
-"""Single scans of worlds, and the files they are saved in."""
+"""Single scans of worlds, and their files."""
 
 from helpers.small_map import box_visual, world_text
 import numpy as np

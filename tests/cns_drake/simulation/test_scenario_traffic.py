@@ -1,4 +1,4 @@
-"""Traffic that a scenario asks for and its map cannot hold."""
+"""More traffic in a scenario than its map can hold."""
 
 import re
 
@@ -28,7 +28,7 @@ def scenario_of(town, **traffic):
 
 
 def fault(scenario, **traffic):
-    """Returns the one line by which so much traffic is refused."""
+    """Returns the one line that refuses so much traffic."""
     wanted = TrafficConfig(**traffic)
     with pytest.raises(InputError) as error:
         load_drive(scenario.model_copy(update={"traffic": wanted}))
@@ -40,7 +40,7 @@ def test_a_world_has_no_roads(tmp_path):
     scenario = tiny_scenario(tmp_path)
     expected = "tiny_01: traffic: a world has no roads; give a map with some"
     assert fault(scenario, vehicles=1) == expected
-    # Not even where a file of that name lies beside the world.
+    # This holds even with a file of that name beside the world.
     (tmp_path / "roads.yaml").write_text(ROADS)
     assert fault(scenario, vehicles=1) == expected
     with pytest.raises(InputError, match=re.escape(expected)):
@@ -74,7 +74,7 @@ def test_a_map_without_sidewalks(town):
     ("who", "where"), [("vehicles", "roads"), ("walkers", "sidewalks")]
 )
 def test_too_many_and_as_many_as_possible(town, who, where):
-    """What the line says there is room for is really accepted."""
+    """The numbers that the line offers are accepted."""
     text = fault(scenario_of(town), **{who: 2000})
     found = re.fullmatch(
         rf"tiny_01: traffic: {who}: 2000 are too many; the {where} hold (\d+)",

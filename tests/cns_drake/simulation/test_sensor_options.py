@@ -48,7 +48,7 @@ def positions(scan):
 
 
 def to_world(scan, trajectory, X_BS, time):
-    """Returns points in the world: each by the pose at its own time."""
+    """Returns points in the world, each by the pose at its own time."""
     t_ns, column = np.unique(scan["t"], return_inverse=True)
     X_WS = [trajectory.pose(time + t * 1e-9) @ X_BS for t in t_ns]
     R = np.array([X.rotation().matrix() for X in X_WS])
@@ -58,7 +58,7 @@ def to_world(scan, trajectory, X_BS, time):
 
 
 def distance_to_geometry(scenario, p_W):
-    """Returns how far points are off the nearest of the small map's boxes."""
+    """Returns the distances of points from the small map's nearest box."""
     world = load_stage(scenario)
     inspector = world.scene_graph.model_inspector()
     nearest = np.full(len(p_W), np.inf)
@@ -92,11 +92,11 @@ def test_the_vehicle_is_turning(bend):
 
 
 def test_deskewed_points_lie_on_the_geometry(bend):
-    """Each with the pose at its own time; with the stamp's, they do not."""
+    """Each point has the pose at its own time; that at the stamp is wrong."""
     scenario, trajectory, scan = bend
     X_BS = sensor_pose(scenario.lidars["lidar"])
     time = BEND_FRAME * FRAME_PERIOD
-    # Half a step of rounding along each axis, and float32 of the casting.
+    # Half a step of rounding along each axis, and the error of float32.
     rounding = np.sqrt(3.0) * 2.0**-11 + 1e-4
     p_W = to_world(scan, trajectory, X_BS, time)
     assert distance_to_geometry(scenario, p_W).max() < rounding
@@ -104,7 +104,7 @@ def test_deskewed_points_lie_on_the_geometry(bend):
     assert distance_to_geometry(scenario, at_stamp.T).max() > 0.2
 
 
-def test_every_column_tells_its_true_time(bend):
+def test_every_column_has_its_true_time(bend):
     scenario, _, scan = bend
     pattern = make_pattern(scenario.lidars["lidar"])
     azimuth = np.arctan2(scan["y"], scan["x"]).astype(float)
@@ -114,14 +114,14 @@ def test_every_column_tells_its_true_time(bend):
     column_ns = FRAME_PERIOD * 1e9 / pattern.num_columns
     late = scan["t"] - expected
     late -= np.rint(late / (FRAME_PERIOD * 1e9)) * FRAME_PERIOD * 1e9
-    # Far enough away that rounding does not turn the beam.
+    # The points are so far away that rounding hardly turns the beam.
     far = np.hypot(scan["x"], scan["y"]) > 5.0
     assert np.abs(late[far]).max() < 0.1 * column_ns
     assert len(np.unique(scan["t"])) > 1000
 
 
 def test_the_first_column_is_that_of_a_deskewed_scan(small_map, bend):
-    """Both cast it from the pose at the stamp."""
+    """Both scans cast this column from the pose at the stamp."""
     _, _, swept = bend
     still = scans_at(scenario_of(small_map, lidar={}), BEND_FRAME)["lidar"]
     first = [positions(scan[scan["t"] == 0]) for scan in (swept, still)]
@@ -130,7 +130,7 @@ def test_the_first_column_is_that_of_a_deskewed_scan(small_map, bend):
 
 
 def test_at_rest_nothing_is_distorted(small_map):
-    """The drive starts at rest, and has hardly moved a turn later."""
+    """The drive starts at rest and hardly moves within a turn."""
     swept = scenario_of(small_map, lidar={"motion_distortion": True})
     still = scenario_of(small_map, lidar={})
     first, second = (scans_at(s, 0)["lidar"] for s in (swept, still))
@@ -196,7 +196,7 @@ def test_noise_does_not_depend_on_where_a_run_begins(small_map):
 
 
 def test_noise_of_standing_vehicle_changes_from_frame_to_frame(small_map):
-    """The cached scan is not taken for the next frame's."""
+    """The cached scan is not reused for the next frame."""
     scenario = scenario_of(small_map, lidar={"range_noise": 0.02})
     diagram = make_station(scenario)
     end = plan_drive(scenario).duration
@@ -226,7 +226,7 @@ def swept_recording(small_map, tmp_path_factory):
 
 @pytest.mark.parametrize("frame", [0, 60, 128, 129])
 def test_recorded_poses_deskew(swept_recording, frame):
-    """What `deskew` finds is what the trajectory says."""
+    """`deskew` finds the poses of the trajectory."""
     scenario, folder = swept_recording
     sequence = open_sequence(folder)
     trajectory = plan_drive(scenario)
@@ -246,7 +246,7 @@ def test_recorded_poses_deskew(swept_recording, frame):
     assert frame == 0 or moved > 0.05
 
 
-def test_readers_are_told_of_distortion(swept_recording, short_recording):
+def test_files_state_their_distortion(swept_recording, short_recording):
     (note,) = open_sequence(swept_recording[1]).notes
     assert "taken while the LiDAR moved" in note
     assert open_sequence(short_recording).notes == ()
@@ -264,7 +264,7 @@ def test_swept_pose_is_where_the_vehicle_is(small_map):
 
 
 def test_all_lidars_feel_the_same_weather(small_map):
-    """In fog, each of two units sees no farther than the fog lets it."""
+    """Fog limits the range of both LiDARs."""
     units = {
         "front": {"preset": "vlp-16", "columns": 128},
         "back": {"preset": "os1-32", "columns": 128},
@@ -278,8 +278,8 @@ def test_all_lidars_feel_the_same_weather(small_map):
     scattered = CLASS_IDS["outlier"]
     alpha = np.log(20.0) / visibility
     for name, unit in units.items():
-        # What a white target that faces the unit is seen at in clear air,
-        # where even the SNR of the least part of echoes suffices.
+        # Range of a white target that faces the unit in clear air, where even
+        # the least part of an echo suffices.
         budget = UNIT_SHEETS[unit["preset"]].budget
         reach = np.sqrt(budget.scale / HOPELESS_SNR)
         farthest = lambertw(alpha * reach).real / alpha

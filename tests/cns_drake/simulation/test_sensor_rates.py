@@ -164,7 +164,7 @@ def test_a_shorter_run_begins_alike(scenario, recording, tmp_path):
     short = scenario.model_copy(update={"frames": 5})
     cut = McapSequence(simulate(short, tmp_path).folder)
     whole = McapSequence(recording)
-    # Until the longest of its scans is complete.
+    # The recording ends when the longest of its scans is complete.
     assert len(cut.imu) == round(0.6 * 400) + 1
     np.testing.assert_array_equal(cut.imu, whole.imu[: len(cut.imu)])
     np.testing.assert_array_equal(
@@ -173,7 +173,7 @@ def test_a_shorter_run_begins_alike(scenario, recording, tmp_path):
 
 
 def test_errors_are_those_of_kalibrs_file(recording, tmp_path):
-    """Against the same drive without noise, within three standard errors."""
+    """Differences from the drive without noise have Kalibr's statistics."""
     imu = {"rate": 400}
     ideal = simulate(make(tmp_path, imu=imu), tmp_path / "out").folder
     noisy, exact = (McapSequence(p).imu for p in (recording, ideal))
@@ -187,7 +187,7 @@ def test_errors_are_those_of_kalibrs_file(recording, tmp_path):
         assert np.abs(axes).max() < 0.15
 
 
-def test_messages_tell_their_variances(recording):
+def test_messages_have_their_variances(recording):
     with AnyReader([recording]) as reader:
         imu = [one for one in reader.connections if one.topic == "/imu/data"]
         connection, _, data = next(reader.messages(imu))

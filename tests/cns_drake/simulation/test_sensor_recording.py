@@ -1,4 +1,4 @@
-"""A robot of a plant's, recorded with all its sensors, read by ROS tools."""
+"""A robot of a plant, recorded with all its sensors, read by ROS tools."""
 
 import numpy as np
 from pydrake.geometry import (
@@ -39,7 +39,7 @@ PATTERN = make_beam_pattern("vlp-16", PERIOD, num_columns=90)
 
 
 class Carousel:
-    """An arm that turns at a constant rate, and what it carries."""
+    """An arm that turns at a constant rate, with its sensors."""
 
     def __init__(self):
         self.builder = DiagramBuilder()
@@ -136,7 +136,7 @@ def test_odometry_of_a_frame_on_a_body(ride):
 
 
 def test_imu_of_a_frame_on_a_body(ride):
-    """Centripetal acceleration and gravity, where it sits."""
+    """The IMU measures centripetal acceleration and gravity at its place."""
     R_PI = X_PL.rotation().matrix()
     p_PI = np.array([RADIUS, 0.0, 0.0]) + X_PL.translation()
     a_P = -(RATE**2) * np.array([p_PI[0], p_PI[1], 0.0])
@@ -212,7 +212,7 @@ def test_a_lidar_alone(tmp_path):
     np.testing.assert_allclose([v.x, v.y, v.z], expected, atol=1e-3)
 
 
-def test_an_imu_without_odometry_knows_no_orientation(tmp_path):
+def test_an_imu_without_odometry_has_no_orientation(tmp_path):
     made = Carousel()
     imu = add_imu(made.builder, made.arm, X_PL)
     bag = add_mcap_recorder(

@@ -36,7 +36,7 @@ def test_scans_and_poses_are_those_of_a_recording(short_recording):
     assert [simulated.scenario[k] for k in keys] == [
         recorded.scenario[k] for k in keys
     ]
-    # All maps made from them are equal as well.
+    # All maps of these scans are equal as well.
     ours, theirs = (
         survey_recording(s, set(), []) for s in (source(), recorded)
     )
@@ -47,7 +47,7 @@ def test_scans_and_poses_are_those_of_a_recording(short_recording):
 
 
 def test_noise_and_motion_distortion_too(tmp_path):
-    """Also where a frame's noise depends on its number, in any order."""
+    """A frame's noise depends on its number only, in any order."""
     scenario = tiny_scenario(tmp_path)
     recorded = open_sequence(simulate(scenario, tmp_path / "out").folder)
     simulated = SimulatedDrive(scenario)()
@@ -75,7 +75,7 @@ def test_calibrated_returns_in_fog_too(tmp_path):
     assert len(SimulatedDrive(clear)().scan(0)) != len(simulated.scan(0))
 
 
-def test_identity_tells_scenarios_and_worlds_apart(tmp_path):
+def test_identity_differs_by_scenario_and_world(tmp_path):
     scenario = tiny_scenario(tmp_path)
     source = SimulatedDrive(scenario)
     other = SimulatedDrive(scenario.model_copy(update={"seed": 5}))

@@ -1,4 +1,4 @@
-"""Runs from a scenario to a recording, and what may stop them."""
+"""Runs from a scenario to a recording, and their errors."""
 
 from helpers.bag_recordings import contents
 from helpers.small_map import scenario_values, write_small_map
@@ -35,16 +35,16 @@ def test_every_topic_has_every_frame(short_recording):
     assert stamps["/tf_static"] == expected[:1]
 
 
-def test_progress_is_told_to_the_last_frame(scenario, tmp_path):
-    told = []
-    run = simulate(scenario, tmp_path, on_frame=lambda *a: told.append(a))
-    assert told[-1] == (7, 7)
+def test_progress_is_reported_to_the_last_frame(scenario, tmp_path):
+    frames = []
+    run = simulate(scenario, tmp_path, on_frame=lambda *a: frames.append(a))
+    assert frames[-1] == (7, 7)
     assert run.num_frames == 7
     assert run.simulated_s == pytest.approx(0.3)
 
 
 def test_same_scenario_same_bytes(scenario, tmp_path):
-    """However many threads cast the rays."""
+    """The number of threads that cast rays has no effect."""
     recordings = [
         simulate(scenario, tmp_path / name, num_threads=threads).folder
         for name, threads in (("a", 1), ("b", 3))
@@ -101,7 +101,7 @@ def test_existing_recording_is_kept_unless_overwritten(scenario, tmp_path):
 def test_a_world_that_changes_under_its_reader_is_refused(
     tmp_path, monkeypatch
 ):
-    """Else the recording would bear the name of a world it does not show."""
+    """The recording would otherwise name a world that it does not show."""
     folder = write_small_map(tmp_path / "map")
     scenario = make_scenario(scenario_values(folder) | {"frames": 2}, "test")
 
@@ -134,7 +134,7 @@ def test_unwritable_page_is_found_before_the_drive(scenario, tmp_path):
     assert not (tmp_path / "metropolis_04").exists()
 
 
-def test_jobs_record_side_by_side_and_skip_what_is_there(small_map, tmp_path):
+def test_jobs_record_side_by_side_and_skip_finished_ones(small_map, tmp_path):
     scenarios = [
         make_scenario(
             scenario_values(small_map)
@@ -147,7 +147,7 @@ def test_jobs_record_side_by_side_and_skip_what_is_there(small_map, tmp_path):
     record_all(scenarios[:1], tmp_path, Cluster(1))
     alone = contents(simulate(scenarios[0], tmp_path / "alone").folder)
     beside = contents(tmp_path / "drive_0")
-    # They differ in the way from there to the map.
+    # They differ in the path from there to the map.
     assert alone.pop("scenario.yaml") != beside.pop("scenario.yaml")
     assert alone == beside
     first = tmp_path / "drive_0" / "drive_0_0.mcap"

@@ -1,4 +1,4 @@
-"""Stages of scenarios to which something came, or from which it went."""
+"""Stages of scenarios with added and removed structures."""
 
 import json
 import re
@@ -80,7 +80,7 @@ def test_recordings_and_surveys_see_the_same_changes(scenario, tmp_path):
 
 
 def test_the_change_of_a_cause_is_that_of_its_instances_alone(scenario):
-    """TCR of a cause is that of replacing what met its instances alone."""
+    """TCR of a cause is that of replacing the points on its instances alone."""
     changed = SimulatedSequence(scenario.with_transient(parked_cars=1.0))
     plain = SimulatedSequence(scenario)
     causes = np.array(
@@ -120,12 +120,12 @@ def test_the_change_of_a_cause_is_that_of_its_instances_alone(scenario):
 
 
 def keys_of(scan):
-    """Which beam each point is of."""
+    """Returns the beam of each point."""
     return list(zip(scan["ring"].tolist(), scan["t"].tolist(), strict=True))
 
 
 def test_what_came_is_absent_in_another_stage(tmp_path):
-    """`--absent-in` marks new cars, and not what stands in both."""
+    """`--absent-in` marks new cars, and not structures of both stages."""
     town = tmp_path / "town"
     town.mkdir()
     world = write_transient_town(town)
@@ -146,7 +146,7 @@ def test_what_came_is_absent_in_another_stage(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "expected"),
     [
         ({"leaves": 1.1}, "leaves: .*less than or equal to 1"),
         ({"parked_cars": -0.1}, "parked_cars: .*greater than or equal to 0"),
@@ -154,7 +154,9 @@ def test_what_came_is_absent_in_another_stage(tmp_path):
         ({"snowmen": 3}, "snowmen"),
     ],
 )
-def test_bad_values_are_one_line(scenario, changes, told):
-    with pytest.raises(InputError, match=f"^tiny_01: transient: .*{told}") as e:
+def test_bad_values_are_one_line(scenario, changes, expected):
+    with pytest.raises(
+        InputError, match=f"^tiny_01: transient: .*{expected}"
+    ) as e:
         scenario.with_transient(**changes)
     assert not re.search("\n", str(e.value))

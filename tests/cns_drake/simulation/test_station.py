@@ -1,4 +1,4 @@
-"""The wired Diagram: names, ports, and what its sensors add up to."""
+"""The wired Diagram: names, ports, and agreement of its sensors."""
 
 from helpers.small_map import scenario_values
 import numpy as np
@@ -18,7 +18,7 @@ GRAVITY_W = np.array([0.0, 0.0, -9.81])
 @pytest.fixture(scope="module")
 def scenario(small_map):
     values = scenario_values(small_map)
-    # Few beams: this module looks at everything but the points.
+    # Few beams suffice, because this module hardly tests points.
     values["lidars"] = {"lidar": {"columns": 4}}
     return make_scenario(values, "test")
 
@@ -76,7 +76,7 @@ def test_vehicle_is_invisible_and_on_the_ground(small_map):
 
 
 def test_imu_adds_up_to_the_trajectory(scenario):
-    """Twice integrated, the IMU leads where the odometry says.
+    """The IMU, integrated twice, gives the positions of the odometry.
 
     The only information is the IMU at 20 Hz and the first odometry. Between
     samples the signals are interpolated by cubic splines, since integrating

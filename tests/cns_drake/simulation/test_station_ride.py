@@ -44,7 +44,7 @@ def test_points_on_the_ground_lie_on_the_ground(small_map, drive):
         np.testing.assert_allclose(p_WP[2], 0.0, atol=1e-3)
         heights.append(odometry.X_WB.translation()[2])
         tilts.append(odometry.X_WB.rotation().matrix()[2, 2])
-    # It does ride.
+    # The body does move on its springs.
     assert np.ptp(heights) > 0.01
     assert np.degrees(np.arccos(min(tilts))) > 0.5
 
@@ -81,7 +81,7 @@ def test_the_imu_integrates_to_the_odometry(small_map, drive):
     expected = np.array([X_WI.translation() for X_WI in X_WIs])
     assert np.linalg.norm(expected[-1] - expected[0]) > 30.0
     drift = np.linalg.norm(found - expected, axis=1)
-    # The trapezoidal rule is in error, by less the shorter the step.
+    # The trapezoidal rule has an error that falls with the step.
     assert drift.max() < 0.001
 
 
@@ -99,6 +99,6 @@ def test_motion_distortion_takes_each_column_from_its_own_pose(small_map):
         p_SP = np.stack([column[axis] for axis in "xyz"], dtype=float)
         heights = (odometry.X_WB @ X_BS).multiply(p_SP)[2]
         np.testing.assert_allclose(heights, 0.0, atol=1e-3)
-    # What is simulated for the evaluation is the same.
+    # The drive simulated for the evaluation is the same.
     simulated = SimulatedDrive(scenario)()
     np.testing.assert_array_equal(simulated.scan(180), scan)

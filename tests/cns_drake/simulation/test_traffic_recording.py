@@ -19,7 +19,7 @@ from cns_drake.simulation.simulation import simulate
 
 pytestmark = pytest.mark.slow
 
-# More than a chunk of the recording holds.
+# More than fits into a chunk of the recording.
 FRAMES = 30
 UNIT = {
     "preset": "vlp-16",
@@ -56,7 +56,7 @@ def recording(scenario, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def moving(recording):
-    """Instance -> label of what moves in any scan of the recording."""
+    """Instance -> label of the moving objects in all scans."""
     found = {}
     for scan in McapSequence(recording):
         rows = scan[scan["label"] >= min(MOVING_IDS.values())]
@@ -105,7 +105,7 @@ def test_a_shorter_recording_begins_alike(scenario, recording, tmp_path):
 
 
 def test_a_page_moves_vehicles_and_walkers(scenario, tmp_path):
-    """As the boxes of the recording do, which are fixed to vehicles."""
+    """They move like the recorded boxes, which are fixed to vehicles."""
     short = scenario.model_copy(update={"frames": 12})
     page = tmp_path / "page.html"
     folder = simulate(short, tmp_path, page_file=page).folder
@@ -159,7 +159,7 @@ def read_boxes(folder):
 
 
 def test_kitti_has_moving_labels_and_instances(recording, moving, tmp_path):
-    # Cars and people are seen, and a class that needs more than a byte.
+    # Scans show cars, people, and a class that needs more than a byte.
     assert {252, 254} < set(moving.values())
     assert max(moving.values()) > 255
     assert min(moving) > 300

@@ -1,4 +1,4 @@
-"""Recordings of what came and went: interrupted, and gone on with."""
+"""Recordings of added and removed objects: interrupted and resumed."""
 
 import shutil
 
@@ -11,7 +11,7 @@ from cns_drake.simulation.simulation import simulate
 
 pytestmark = pytest.mark.slow
 
-# More than a chunk of the recording holds.
+# More than fits into a chunk of the recording.
 FRAMES = 30
 UNIT = {"preset": "vlp-16", "columns": 256, "range_noise": 0.02}
 

@@ -1,4 +1,4 @@
-"""`cns-drake generate`: what it skips, resumes, refuses and leaves behind."""
+"""`cns-drake generate`: skipping, resuming, errors and remaining files."""
 
 import json
 import os
@@ -59,8 +59,8 @@ def test_interrupted_killed_and_run_again(scenarios, files, tmp_path):
     os.killpg(run.process.pid, signal.SIGINT)
     status, results = run.end()
     assert (status, results) == (130, [])
-    assert run.told[-1] == "cns-drake: interrupted\n"
-    assert not [line for line in run.told if "Traceback" in line]
+    assert run.lines[-1] == "cns-drake: interrupted\n"
+    assert not [line for line in run.lines if "Traceback" in line]
     assert not (output / "long" / "metadata.yaml").exists()
 
     # A parent that is killed cannot end its processes; they do so themselves.
@@ -69,18 +69,18 @@ def test_interrupted_killed_and_run_again(scenarios, files, tmp_path):
     run.process.kill()
     status, _ = run.end()
     assert status == -signal.SIGKILL
-    assert not [line for line in run.told if "Traceback" in line]
+    assert not [line for line in run.lines if "Traceback" in line]
 
     run = Generation(files, output, "--jobs", "2")
     status, results = run.end()
-    assert status == 0, run.told
+    assert status == 0, run.lines
     assert results == [str(output / "short"), str(output / "long")]
     for scenario in scenarios:
         folder = simulate(scenario, tmp_path / "whole").folder
         assert contents(output / scenario.name) == contents(folder)
 
 
-def test_what_is_finished_and_what_is_another(scenarios, tmp_path, capsys):
+def test_finished_and_other_recordings(scenarios, tmp_path, capsys):
     short, _ = scenarios
     folder = simulate(short, tmp_path).folder
     before = contents(folder)
@@ -180,23 +180,23 @@ def test_families_on_other_cities_share_them(town, tmp_path, monkeypatch):
         family.write_text(yaml.safe_dump(base | values))
         run = Generation([], output, "--vary", family, "--jobs", "2")
         status, results = run.end()
-        assert status == 0, run.told
-        return [Path(result) for result in results], "".join(run.told)
+        assert status == 0, run.lines
+        return [Path(result) for result in results], "".join(run.lines)
 
-    databases, told = generate("01", city_seeds=[7], missing=[0.0, 0.6])
+    databases, printed = generate("01", city_seeds=[7], missing=[0.0, 0.6])
     names = [path.name for path in databases]
     assert names == ["town_01_c7_m000_s0", "town_01_c7_m600_s0"]
-    assert "city town_c7: done" in told
+    assert "city town_c7: done" in printed
     stage = output / "cities" / "town_c7" / "stage_02.sdf"
     drawn = stage.stat()
 
-    (other, query), told = generate("02", city_seeds=[8, 7])
+    (other, query), printed = generate("02", city_seeds=[8, 7])
     assert query == output / "town_02_c7_m000_s0"
-    assert "city town_c8: done" in told
-    assert "city town_c7" not in told
+    assert "city town_c8: done" in printed
+    assert "city town_c7" not in printed
     assert stage.stat() == drawn
 
-    # Other cities are other places.
+    # Each city is another place.
     with pytest.raises(InputError, match=r"through town_c8, .* town_c7"):
         compare(survey(query), survey(other))
     monkeypatch.setattr(
@@ -208,7 +208,7 @@ def test_families_on_other_cities_share_them(town, tmp_path, monkeypatch):
     assert changes[names[0]] == 0.0  # The very same drive.
     assert changes[names[1]] > 0.1
 
-    # Each member stands on its own, also at another place.
+    # Each member is complete, also after it has been moved.
     moved = tmp_path / "moved"
     output.rename(moved)
     member = load_scenario(moved / "scenarios" / f"{names[1]}.yaml")

@@ -78,7 +78,7 @@ def test_each_knob_is_taken_back(town):
     assert f"{as_it_is:.4f}" in rows[0]
 
 
-def test_what_is_not_there_is_not_taken_back(town):
+def test_absent_knobs_are_not_taken_back(town):
     stages = town / "stages.yaml"
     text = stages.read_text()
     stages.write_text(text.replace("absent: {a house: [office_001]}\n", "\n"))

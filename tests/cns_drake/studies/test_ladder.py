@@ -1,4 +1,4 @@
-"""`cns-drake ladder`: what its rungs change, and what it writes."""
+"""`cns-drake ladder`: the changes of its rungs, and its files."""
 
 import csv
 from pathlib import Path
@@ -24,7 +24,7 @@ from cns_drake.traffic.lane_file import lane_text
 from evaluation.study.chosen_methods import MethodChoice
 
 METHODS = (MethodChoice("solid"), MethodChoice("layered-overlap"))
-# Where each cause may make a difference, apart from the drive's name.
+# Fields that a cause may change, apart from the drive's name.
 CHANGED = {
     "parked_cars": ("query", {"transient"}),
     "leaves": ("query", {"transient"}),
@@ -230,7 +230,7 @@ def test_a_ladder_from_end_to_end(town, tmp_path, monkeypatch):
     queries = list(csv.DictReader((tmp_path / "queries.csv").open()))
     assert len(queries) == sum(int(row["queries"]) for row in rows)
     assert (tmp_path / "ladder.png").is_file()
-    # What is done is not done again.
+    # Finished rungs do not run again.
     assert climb_ladder(*arguments) == (path, text)
     assert [len(run) for run in runs] == [5, 0]
 

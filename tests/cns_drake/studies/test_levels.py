@@ -1,4 +1,4 @@
-"""The frozen levels, and the check of what others found on them."""
+"""The frozen levels, and the check of others' results on them."""
 
 import csv
 
@@ -47,7 +47,7 @@ def test_the_levels_are_as_they_were_frozen():
     assert {level for _, level in frozen_levels()} == {0, 1, 2, 3, 4}
 
 
-def test_maps_and_what_is_solved(tmp_path):
+def test_maps_and_solved_levels(tmp_path):
     ours = write(tmp_path / "ours.csv", rows("solid", HARD))
     easy = EASY | {("city", 1): 0.985}
     theirs = write(tmp_path / "theirs.csv", rows("theirs", easy))

@@ -1,4 +1,4 @@
-"""Cities drawn anew: another city on the same streets, whole or not there."""
+"""Cities drawn anew on the same streets: complete, or not written."""
 
 import os
 import shutil
@@ -93,7 +93,7 @@ def test_with_its_own_seed_a_city_is_as_it_was(drawn):
     assert last.replace(f"town_c{SEED}", "town") == (
         before.pop("stage_02.sdf").decode()
     )
-    # What only stage 01 has: things on lots, and buildings that are lower.
+    # Structures of stage 01 alone: objects on lots, and lower buildings.
     table = before.pop("structures.csv").decode().splitlines()
     assert after.pop("structures.csv").decode().splitlines() == [
         row for row in table if "_lot_" not in row
@@ -150,21 +150,21 @@ def test_drawn_by_processes_or_here_the_bytes_are_the_same(drawn, tmp_path):
     assert list(again) == [4, SEED]
     for seed, folder in again.items():
         assert contents(folder) == contents(cities[seed])
-    # And nothing else: no lock, nothing unfinished.
+    # The folder has nothing else: no lock, no unfinished file.
     assert sorted(p.name for p in again[4].parent.iterdir()) == [
         "town_c3",
         "town_c4",
     ]
 
 
-def test_what_is_drawn_already_is_left(town, drawn, tmp_path, monkeypatch):
+def test_finished_cities_are_kept(town, drawn, tmp_path, monkeypatch):
     output = tmp_path / "cities"
     folder = copied(drawn, output)
     monkeypatch.setattr(
         generate, "generate_city", lambda *_: pytest.fail("drawn again")
     )
     assert redraw_here(town, [4], output) == {4: folder}
-    # Neither what the map's own stages lack nor where it lies matters.
+    # Neither the gaps of the map's own stages nor its folder matters.
     (town / "stages.yaml").write_text(STAGES.replace("tree_002", "tree_003"))
     moved = tmp_path / "elsewhere"
     moved.mkdir()
@@ -222,7 +222,7 @@ def test_anything_else_of_that_name_is_left_alone(town, tmp_path, other):
         InputError, match=r"town_c4: this folder is there already"
     ):
         redraw_here(town, [5, 4], folder.parent)
-    # Nor does the job take it, if it comes up meanwhile.
+    # The job does not use it either if it appears meanwhile.
     with pytest.raises(
         InputError, match=r"town_c4: this folder is there already"
     ):
@@ -248,7 +248,7 @@ def test_an_interrupted_run_leaves_nothing_and_goes_on(
         with pytest.raises(KeyboardInterrupt):
             redraw_here(town, [4], output)
     assert list(output.iterdir()) == []
-    # One that was killed could not clean up.
+    # A killed process could not clean up.
     (output / "town_c4.part" / "town_c4" / "meshes").mkdir(parents=True)
     (output / "town_c4.part" / "town_c4" / "meshes" / "old.obj").touch()
     folder = redraw_here(town, [4], output)[4]

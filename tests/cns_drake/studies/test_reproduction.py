@@ -58,7 +58,7 @@ def planned(monkeypatch):
     return runs
 
 
-def test_what_is_known_before_is_what_is_found_after(sequences, tmp_path):
+def test_planned_files_are_the_written_ones(sequences, tmp_path):
     scenarios = [*sequences, *control_drives(sequences)]
     for scenario in scenarios:
         simulate(scenario, tmp_path)
@@ -100,11 +100,11 @@ def test_everything_is_planned_before_anything_runs(
     assert "town 01 > 04" in jobs
     for job in jobs.values():
         assert jobs.keys() >= set(job.needs)
-    # Each writes a place of its own, which workers anywhere find.
+    # Each job has its own path, which workers on any machine find.
     outputs = [job.step.output for job in jobs.values()]
     assert len(set(outputs)) == len(outputs)
     assert all(output.is_absolute() for output in outputs)
-    # What is recorded is not recorded again; sequences want their pages.
+    # Finished recordings are kept; sequences still need their pages.
     for scenario in (*sequences, *control_drives(sequences)):
         simulate(scenario, tmp_path)
     page = tmp_path / "pages" / "town_01.html"
@@ -137,7 +137,7 @@ def test_a_world_is_no_stage(tmp_path):
 
 
 def test_quick_gives_the_same_tables(tmp_path):
-    """Controls included, from simulation alone."""
+    """The tables include controls, and come from simulation alone."""
     routes = {"01": "metropolis_04", "04": "metropolis_04"}
     town = write_town(tmp_path / "town", routes, 40)
     cluster = Cluster(2)
@@ -163,7 +163,7 @@ def test_quick_gives_the_same_tables(tmp_path):
     assert {row["control"] for row in rows} == {"town_01_stage_04"}
 
 
-def test_quick_reads_what_is_recorded(town, sequences, planned, tmp_path):
+def test_quick_reads_existing_recordings(town, sequences, planned, tmp_path):
     simulate(sequences[0], tmp_path)
     reproduction.reproduce_maps([str(town)], tmp_path, Cluster(), quick=True)
     (jobs,) = planned

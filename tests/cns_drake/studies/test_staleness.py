@@ -1,4 +1,4 @@
-"""`cns-drake reproduce` makes anew what is stale, and nothing else."""
+"""`cns-drake reproduce` remakes stale results, and nothing else."""
 
 import shutil
 
@@ -26,7 +26,7 @@ PICTURES = {"picture town drives"}
 
 @pytest.fixture
 def code(tmp_path, monkeypatch):
-    """A copy of the code, which stands for that which runs."""
+    """A copy of the code, in place of the running code."""
     for name in ("cns_drake", "evaluation"):
         shutil.copytree(
             ROOT / name,
@@ -41,11 +41,11 @@ def code(tmp_path, monkeypatch):
 
 @pytest.fixture
 def reproduce(tmp_path, monkeypatch):
-    """Reproduces a town; returns the names of the jobs that did anything."""
+    """Reproduces a town; returns the names of the jobs that ran."""
     routes = {"01": "metropolis_04", "04": "metropolis_04"}
     town = write_town(tmp_path / "town", routes, 30)
     done = []
-    # Two methods are enough to change one of.
+    # Two methods suffice: one changes.
     monkeypatch.setattr(
         chosen_methods, "shipped_methods", lambda: ("scan-context++", "solid")
     )
@@ -74,19 +74,19 @@ def change(file, old, new):
 def test_a_quick_study(reproduce, code, tmp_path):
     assert reproduce(quick=True) == STUDY
     assert reproduce(quick=True) == set()
-    # What draws the report's page measures nothing.
+    # The code of the report's page measures nothing.
     change(code / "evaluation/report/page_template/page.css", "{", "{ ")
     assert reproduce(quick=True) == set()
     change(code / "cns_drake/sensors/lidar_presets.py", "120.0", "10.0")
     assert reproduce(quick=True) == STUDY
     change(code / "evaluation/report/figures.py", "def ", "def  ")
     assert reproduce(quick=True) == DRAWN
-    # What one method makes of all drives, and their surveys as far as that.
+    # Results of one method on all drives, and its part of their surveys.
     options = {"quick": True, "settings": ["solid.sensor_height=1.7"]}
     assert reproduce(**options) == SURVEYS | COMPARED | CONTROL
     assert reproduce(**options) == set()
     assert reproduce(quick=True) == SURVEYS | COMPARED | CONTROL
-    # One drive, and all that is compared with it.
+    # One drive, and all comparisons with it.
     stage = tmp_path / "town" / "stage_01.sdf"
     change(stage, "</world>", "<!-- Changed. --></world>")
     assert reproduce(quick=True) == {"survey town_01"} | DRAWN | COMPARED
@@ -97,7 +97,7 @@ def test_recordings_pages_and_pictures(reproduce, code, tmp_path):
     everything = DRIVES | STUDY - SURVEYS | PICTURES
     assert reproduce() == everything
     assert reproduce() == set()
-    # A page is made anew, without the recording.
+    # The page is made again, the recording is not.
     change(code / "cns_drake/pictures/page_template/drive.css", "{", "{ ")
     assert reproduce() == PAGES
     assert not list((tmp_path / "out").glob("*.part"))

@@ -14,7 +14,7 @@ from cns_drake.traffic.car_following import (
     ("v", "gap"), [(5.0, 9.58), (10.0, 19.87), (13.0, 44.36)]
 )
 def test_keeps_the_equilibrium_gap(v, gap):
-    """At (s0 + v T) / sqrt(1 - (v / v0)^4) nobody accelerates."""
+    """At (s0 + v T) / sqrt(1 - (v / v0)^4) the acceleration is 0."""
     s0, T, v0, a, b = 2.0, 1.5, 13.9, 1.5, 2.0
     expected = (s0 + v * T) / np.sqrt(1 - (v / v0) ** 4)
     assert expected == pytest.approx(gap, abs=0.005)
@@ -26,7 +26,7 @@ def test_keeps_the_equilibrium_gap(v, gap):
 
 
 def test_integrates_to_the_equilibrium_gap():
-    """A follower whom the model drives ends at that gap within 1 %."""
+    """A following car ends at that gap within 1 %."""
     s0, T, v0, a, b, dt = 2.0, 1.5, 13.9, 1.5, 2.0, 0.1
     leader, x, v = 60.0, 0.0, 4.0
     for _ in range(6000):

@@ -1,4 +1,4 @@
-"""Traces of SUMO, played: places, headings and velocities in closed form."""
+"""Replayed traces of SUMO: places, headings, velocities in closed form."""
 
 import re
 
@@ -38,7 +38,7 @@ def far_away(times):
 
 
 def front_of_bus(t, length):
-    """Its middle goes round a circle; so does its front, turned by as much."""
+    """The bus's middle follows a circle; its front follows a turned one."""
     angle = RATE * t
     yaw = angle + np.pi / 2
     middle = RADIUS * np.array([np.cos(angle), np.sin(angle)])
@@ -46,7 +46,7 @@ def front_of_bus(t, length):
 
 
 def write_trace(path, count=80, change=lambda text: text):
-    """A bus goes round, a car comes at 2 s and goes at 4 s, one walks."""
+    """A bus on a circle, a car from 2 s to 4 s, and a walker."""
     length = 11.26
     rows = ['<?xml version="1.0"?>', "<fcd-export>"]
     for k in range(count):
@@ -125,7 +125,7 @@ def test_velocities_are_continuous(trace):
         np.testing.assert_allclose(before[there], after[there], atol=1e-5)
 
 
-def test_who_comes_and_goes(trace):
+def test_objects_that_come_and_go(trace):
     plan = play(trace)
     for t, there in ((1.95, False), (2.05, True), (3.95, True), (4.05, False)):
         assert plan.vehicles.is_present(t).tolist() == [True, there]
@@ -144,9 +144,9 @@ def test_the_same_trace_gives_the_same_plan(trace):
     assert len(kinds) > 2
 
 
-def test_who_would_meet_the_ego_car_is_left_out(trace):
+def test_objects_that_would_meet_the_ego_car_are_left_out(trace):
     def ego(times):
-        # It stands where the car passes at 3.5 s.
+        # The ego car stands where the traced car passes at 3.5 s.
         return np.tile((-RADIUS, 4.0), (len(times), 1)), np.zeros(len(times))
 
     plan = play(trace, ego=ego)
@@ -199,7 +199,7 @@ def test_a_trace_of_another_map(tmp_path):
         ("<fcd-export>", '<!DOCTYPE a [<!ENTITY b "c">]><fcd-export>', "line"),
     ],
 )
-def test_what_is_no_trace(tmp_path, old, new, expected):
+def test_traces_that_are_none(tmp_path, old, new, expected):
     path = write_trace(
         tmp_path / "bad.xml", change=lambda text: re.sub(old, new, text)
     )

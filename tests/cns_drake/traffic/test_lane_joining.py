@@ -1,4 +1,4 @@
-"""Lanes of other maps: what follows what, and files of them."""
+"""Lanes of other maps: their successors, and their files."""
 
 import copy
 from dataclasses import replace
@@ -19,8 +19,9 @@ def straight(start, end, limit=10.0, connects=False):
     return DirectedLane(points, limit, connects)
 
 
-# A ring of two streets, each cut in two, and two ways through junctions; from
-# the first street a dead end leads away, and a short lane back to its start.
+# A ring of two streets, each cut in two, with two ways through junctions. A
+# dead end leads away from the first street, and a short lane leads back to its
+# start.
 LANES = [
     straight((0, 0), (20, 0)),
     straight((20, 0), (50, 0), 8.0),
@@ -44,7 +45,7 @@ def test_a_ring_without_its_dead_end(graph):
     assert not first.is_way
     assert not second.is_way
     assert [way.is_way for way in ways] == [True, True]
-    # Lanes that go on alone are one, without a metre at each end.
+    # A lane and its only successor are one, less a metre at each end.
     assert first.length == pytest.approx(50.0 - 2.0, abs=0.1)
     assert first.limit == 8.0
     following = [graph.pieces[k] for k in first.after]
@@ -160,7 +161,7 @@ def test_a_file_keeps_signals_and_crossings(graph, tmp_path):
         ("more", 1, "more"),
     ],
 )
-def test_what_is_no_file_of_lanes(graph, tmp_path, field, value, fault):
+def test_files_of_lanes_that_are_none(graph, tmp_path, field, value, fault):
     path = tmp_path / "lanes.json"
     content = json.loads(lane_text(graph, []))
     content["lanes"][0][field] = value

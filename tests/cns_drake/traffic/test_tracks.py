@@ -13,7 +13,7 @@ def tracks():
 
 
 def test_values_are_the_integrals_of_rates(tracks):
-    """By Gauss and Legendre's rule, which is exact for cubics."""
+    """Gauss and Legendre's rule, which is exact for cubics, is the oracle."""
     nodes, weights = np.polynomial.legendre.leggauss(4)
     for k in range(19):
         for low, high in ((0.0, 0.1), (0.03, 0.08)):
@@ -40,12 +40,12 @@ def test_rests_before_and_after(tracks):
         assert not rate.any()
 
 
-def test_who_comes_and_goes():
+def test_objects_that_come_and_go():
     values = np.arange(6.0).reshape(6, 1, 1)
     present = np.array([[0], [0], [1], [1], [1], [0]], bool)
     tracks = Tracks(1.0, values, present)
     seen = [bool(tracks.is_present(t)[0]) for t in (0.5, 1.5, 2.0, 3.9, 4.5)]
     assert seen == [False, False, True, True, False]
-    # Its motion does not begin where it was not.
+    # The motion is not continued before its begin.
     values[:2] = 1e6
     assert tracks.at(2.5)[0] == pytest.approx(2.5)

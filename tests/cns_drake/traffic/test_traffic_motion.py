@@ -27,7 +27,7 @@ T = 2.0
 
 
 def make_plan():
-    """A bus that turns, a slow car, a bicycle; one walks and one stands."""
+    """A bus that turns, a slow car, a bicycle, a walker and one who stands."""
     t = 0.1 * np.arange(60)
     zero = np.zeros_like(t)
     kinds = [
@@ -83,7 +83,7 @@ def scanned(request):
 
 
 def test_labels_and_instances(scanned):
-    """Only what is faster than the threshold has a moving class."""
+    """Only objects faster than the threshold have a moving class."""
     scan = scanned[0]
     expected = {101: 257, 102: 10, 103: 253, 104: 254, 105: 30}
     found = {
@@ -94,7 +94,7 @@ def test_labels_and_instances(scanned):
 
 
 def test_points_lie_on_the_bodies_at_their_own_time(scanned):
-    """Put back by the pose of its limb, each point is on a surface of it."""
+    """In the frame of its limb, each point is on a surface of the limb."""
     scan, traffic, scene_graph, X_WS, _, _, goes_on = scanned
     inspector = scene_graph.model_inspector()
     by_frame = {}
@@ -126,7 +126,7 @@ def test_points_lie_on_the_bodies_at_their_own_time(scanned):
 
 
 def _distance(geometry, p_F):
-    """Returns how far a place of F is from a geometry's surface."""
+    """Returns the distance of a place in F from a geometry's surface."""
     p_G = geometry.X_FG.inverse() @ p_F
     surface = geometry.surface
     if hasattr(surface, "triangles"):
@@ -183,7 +183,7 @@ def test_points_in_boxes_are_those_of_instances(scanned):
 
 
 def test_poses_as_one_array_are_those_of_the_scene_graph(scanned):
-    """And a LiDAR sees the same with either of them."""
+    """A LiDAR measures the same with either of them."""
     scan, traffic, scene_graph, _, _, context, goes_on = scanned
     query_object = scene_graph.get_query_output_port().Eval(
         scene_graph.GetMyContextFromRoot(context)

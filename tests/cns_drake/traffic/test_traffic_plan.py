@@ -1,4 +1,4 @@
-"""Planned traffic: nobody meets anybody, and everybody obeys the roads."""
+"""Planned traffic: no boxes overlap, and all traffic obeys the roads."""
 
 from functools import cache
 
@@ -75,7 +75,7 @@ def boxes(centres, yaw, size):
 
 
 def all_boxes(traffic, path, t):
-    """Returns everybody's box at a time, the ego car's first."""
+    """Returns all boxes at a time, the ego car's first."""
     xy, yaw = path(np.array([t]))
     ahead = np.column_stack([np.cos(yaw), np.sin(yaw)])
     middle = xy + (BOX.rear + BOX.front) / 2 * ahead
@@ -91,7 +91,7 @@ def all_boxes(traffic, path, t):
 
 
 def meetings(traffic, path, times):
-    """Returns how many pairs overlap at any of the times."""
+    """Returns the number of pairs that overlap at any of the times."""
     count = 0
     for t in times:
         found = all_boxes(traffic, path, t)
@@ -101,7 +101,7 @@ def meetings(traffic, path, times):
 
 
 @pytest.mark.slow
-def test_nobody_meets_anybody_for_ten_minutes():
+def test_no_boxes_overlap_for_ten_minutes():
     traffic = plan("downtown_03", 100, 600.0)
     assert len(traffic.kinds) == traffic.walkers.values.shape[1] == 100
     assert meetings(traffic, ego("downtown_03"), np.arange(0, 600, 0.7)) == 0
@@ -112,7 +112,7 @@ def short():
     return plan("metropolis_04", 40, 60.0)
 
 
-def test_nobody_meets_anybody(short):
+def test_no_boxes_overlap(short):
     assert short.left_out == 0
     assert meetings(short, ego("metropolis_04"), np.arange(0, 60, 0.05)) == 0
 
@@ -144,7 +144,7 @@ def test_moves_plausibly(short):
     assert speed.max() < 1.1 * 22.4
     assert np.abs(np.diff(speed, axis=0)).max() < 0.1 * 9.0
     assert (speed > 0.5).mean() > 0.3
-    # They go where they look.
+    # Walkers face their direction of motion.
     yaw = short.vehicles.values[:-1, :, 3]
     ahead = np.cos(yaw) * velocity[..., 0] + np.sin(yaw) * velocity[..., 1]
     assert (ahead[speed > 2] > 0.97 * speed[speed > 2]).all()

@@ -1,4 +1,4 @@
-"""What came and went: parked cars, leaves, poles."""
+"""Objects that change between drives: parked cars, leaves, poles."""
 
 from helpers.transient_town import ORIGIN, change_maker, write_transient_town
 import numpy as np
@@ -30,7 +30,7 @@ def sdf(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def changed(sdf):
-    """Returns the world after changes, and what stands in it; once for each."""
+    """Returns the world after changes and its structures, cached."""
     return change_maker(sdf, DRIVE, LANES)
 
 
@@ -44,7 +44,7 @@ def of(things, prefixes):
 
 
 def same(first, second, but=()):
-    """Tells whether two towns are the same but for some names."""
+    """Returns whether two towns are equal except for some names."""
     first = {n: p for n, p in first.items() if not n.startswith(but)}
     second = {n: p for n, p in second.items() if not n.startswith(but)}
     return first.keys() == second.keys() and all(
@@ -67,7 +67,7 @@ def test_at_one_no_parked_car_stays(changed):
     assert not cars.keys() & after.keys()
     parked = {n: t for n, t in after.items() if t.semantic_class == "car"}
     assert parked.keys() <= {f"parked_{name}" for name in cars}
-    # Some left; of the others some are the same, most are not.
+    # Some cars left. A few of the others are the same, most are not.
     assert 20 <= len(parked) < 36
     moved = [
         name
@@ -107,7 +107,7 @@ def test_cars_keep_to_their_bays_and_touch_nothing(changed):
                 assert bay.buffer(0.01).contains(hull)
                 assert not any(hull.intersects(one) for one in others)
                 assert not hull.intersects(LANES)
-                # It stands where the other stood, neither higher nor lower.
+                # The new car stands at the old one's place and height.
                 old = before[name.removeprefix("parked_")]
                 assert car.bottom == pytest.approx(old.bottom, abs=0.01)
                 seen += 1
@@ -123,7 +123,7 @@ def test_a_part_changes_by_the_seed_and_by_nothing_else(changed):
     # 160 draws: five standard deviations.
     assert abs(sum(counts) - 48) < 5 * np.sqrt(160 * 0.3 * 0.7)
     assert len(set(counts)) > 1
-    # Those that change are among those that change at more, and alike.
+    # The cars that change also change, in the same way, at a greater share.
     _, some = changed(parked_cars=0.3)
     fresh = {n: t for n, t in some.items() if n.startswith("parked")}
     assert fresh
@@ -197,7 +197,7 @@ def test_leaves_that_are_left_hang_where_they_hung(changed, part):
             for corners in np.round(old.p_GVset[old.triangles], 4) + 0.0
         }
         found = np.round(new.p_GVset[new.triangles], 4) + 0.0
-        # Rounding may go either way for the odd one.
+        # Rounding may differ for a few.
         count = sum(corners.tobytes() in known for corners in found)
         assert count > 0.97 * len(found)
 
@@ -224,7 +224,7 @@ def test_furniture_goes_at_most_2_m(changed):
 
 
 def test_points_that_no_changed_thing_could_hide_are_identical(sdf):
-    """A beam that meets no changed thing before or after meets the same."""
+    """Beams that meet no changed object before or after have equal points."""
     pattern = make_beam_pattern("vlp-16")
     X_WS = X_WT @ RigidTransform(RollPitchYaw(0, 0, 1.0), [20.0, 0.0, 1.6])
     config = TransientConfig(parked_cars=0.5, leaves=0.5, furniture=0.5)
@@ -262,8 +262,8 @@ def test_what_a_world_lacks_is_said(tmp_path):
     world = change_world(
         load_world(tmp_path / "plain.sdf"), config, DRIVE, LANES
     )
-    told = [note.split(":")[:2] for note in world.notes]
-    assert told == [
+    noted = [note.split(":")[:2] for note in world.notes]
+    assert noted == [
         ["transient", f" {name}"]
         for name in ("parked_cars", "leaves", "furniture")
     ]

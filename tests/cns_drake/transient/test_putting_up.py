@@ -1,4 +1,4 @@
-"""What is put up between drives: scaffolds, roadworks, snow."""
+"""Objects added between drives: scaffolds, roadworks, snow."""
 
 from helpers.transient_town import ORIGIN, change_maker, write_transient_town
 import numpy as np
@@ -36,12 +36,12 @@ def sdf(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def changed(sdf):
-    """Returns the world after changes, and what stands in it; once for each."""
+    """Returns the world after changes and its structures, cached."""
     return change_maker(sdf, DRIVE, LANES)
 
 
 def new_things(changed, **switches):
-    """What stands that did not, by name; all that did stays as it was."""
+    """New structures by name; all others must be unchanged."""
     _, before = changed()
     world, after = changed(**switches)
     for name, thing in before.items():
@@ -79,7 +79,7 @@ def test_fronts_are_drawn_one_by_one(changed):
     counts = [
         len(new_things(changed, scaffolds=0.5, seed=seed)) for seed in range(4)
     ]
-    # 20 draws: five standard deviations; they differ.
+    # 20 draws that differ: five standard deviations.
     assert abs(sum(counts) - 10) < 5 * np.sqrt(20 * 0.25)
     assert len(set(counts)) > 1
     some = new_things(changed, scaffolds=0.5)
@@ -88,7 +88,7 @@ def test_fronts_are_drawn_one_by_one(changed):
         assert np.array_equal(thing.p_WPs, whole[name].p_WPs)
 
 
-def test_roadworks_are_in_nobodys_way(changed):
+def test_roadworks_leave_the_lanes_free(changed):
     fresh = new_things(changed, works=1.0)
     kinds = {name.split("_", 3)[3].rsplit("_", 1)[0] for name in fresh}
     assert {"fence", "kerb"} <= kinds
@@ -120,7 +120,7 @@ def test_a_part_of_the_works(changed):
 
 
 def test_over_slits_of_the_ground_there_are_no_works(sdf, monkeypatch):
-    """A thing at a height of NaN would hide the whole world from rays."""
+    """An object at a height of NaN would hide the whole world from rays."""
 
     def heights(ground, xy, *, of_road):
         return np.full(len(xy), np.nan)
@@ -202,14 +202,14 @@ def test_banks_lie_along_kerbs_and_nowhere_else(changed):
     assert y.min() == pytest.approx(2.7, abs=0.01)
     assert y.max() == pytest.approx(4.1, abs=0.01)
     z = p_TPs[along, 2]
-    # They rise from the road, above the snow beside them.
+    # Snow banks rise from the road, above the snow beside them.
     assert z.min() == pytest.approx(0.0, abs=1e-3)
     assert 0.35 < z.max() < 0.6
     assert shapely.MultiPoint(banks.p_WPs[:, :2]).distance(DRIVE) > 1.3
 
 
 def test_points_that_no_changed_thing_could_hide_are_identical(sdf):
-    """A beam that meets no changed thing before or after meets the same."""
+    """Beams that meet no changed object before or after have equal points."""
     pattern = make_beam_pattern("vlp-16")
     X_WS = X_WT @ RigidTransform(RollPitchYaw(0, 0, 1.0), [20.0, 0.0, 1.6])
     config = TransientConfig(scaffolds=0.6, works=0.6, snow=0.15)
@@ -241,7 +241,7 @@ def test_what_a_world_lacks_is_said(tmp_path):
     config = TransientConfig(snow=0.1, works=0.9, scaffolds=0.1)
     plain = load_world(tmp_path / "plain.sdf")
     world = change_world(plain, config, DRIVE, LANES)
-    told = [note.split(":")[:2] for note in world.notes]
-    assert told == [
+    noted = [note.split(":")[:2] for note in world.notes]
+    assert noted == [
         ["transient", f" {name}"] for name in ("scaffolds", "works", "snow")
     ]

@@ -80,8 +80,8 @@ def apart(X, Y):
 
 def test_a_wrong_datum(drives, truth):
     """The datum is wrong by tens of metres and more than a quarter turn."""
-    told = ELSEWHERE @ drives.X_second
-    first, second = drives.first(), drives.second(told, frame="odom")
+    recorded = ELSEWHERE @ drives.X_second
+    first, second = drives.first(), drives.second(recorded, frame="odom")
     assert in_one_world(first, second, "never") is None
     result = in_one_world(first, second, "auto")
     assert apart(result.second.X_WS, drives.X_second) < 0.03
@@ -98,23 +98,23 @@ def test_a_wrong_datum(drives, truth):
     assert report.distance_median < 0.03
     assert report.angle_median_deg < 0.1
     assert report.turn_deg == pytest.approx(-115.0, abs=0.1)
-    middle = len(told) // 2
+    middle = len(recorded) // 2
     np.testing.assert_allclose(
-        report.move, (drives.X_second - told)[middle, :3, 3], atol=0.03
+        report.move, (drives.X_second - recorded)[middle, :3, 3], atol=0.03
     )
     assert report.bend < 1e-6
     assert report.straightened == (0.0, 0.0)
 
 
 def test_a_small_error_in_a_common_frame(drives, truth):
-    told = rigid([1.5, -2.0, 0.8], 1.5) @ drives.X_second
-    first, second = drives.first(), drives.second(told)
+    recorded = rigid([1.5, -2.0, 0.8], 1.5) @ drives.X_second
+    first, second = drives.first(), drives.second(recorded)
     assert in_one_world(first, second, "auto") is None
     assert in_one_world(first, second, "never") is None
     result = in_one_world(first, second, "always")
     assert result.report.guess == "the common frame"
     assert result.report.candidates is None
-    assert len(result.second) == len(told)
+    assert len(result.second) == len(recorded)
     np.testing.assert_array_equal(result.second.scan(3), second.scan(3))
     np.testing.assert_array_equal(result.second.stamps_ns, second.stamps_ns)
     assert apart(result.second.X_WS, drives.X_second) < 0.03
@@ -123,18 +123,18 @@ def test_a_small_error_in_a_common_frame(drives, truth):
 
 def test_a_common_frame_that_is_none(drives):
     """The poses name one frame but are far off: places must be recognised."""
-    told = ELSEWHERE @ drives.X_second
-    result = align(drives.first(), drives.second(told))
+    recorded = ELSEWHERE @ drives.X_second
+    result = align(drives.first(), drives.second(recorded))
     assert result.report.guess == "places that look alike"
     assert apart(result.second.X_WS, drives.X_second) < 0.03
 
 
 def test_a_drive_that_drifts(drives, truth):
-    told = ELSEWHERE @ drifted(drives.X_second, scale=1.02, turn_deg=5.0)
+    recorded = ELSEWHERE @ drifted(drives.X_second, scale=1.02, turn_deg=5.0)
     # The trajectory is bent so strongly that no rigid pose fits.
-    rigidly = drives.X_second[25] @ poses.inverse(told[25]) @ told
+    rigidly = drives.X_second[25] @ poses.inverse(recorded[25]) @ recorded
     assert apart(rigidly, drives.X_second) > 1.5
-    result = align(drives.first(), drives.second(told, frame="odom"))
+    result = align(drives.first(), drives.second(recorded, frame="odom"))
     assert result.report.model == "pose graph"
     assert result.report.bend > 1.5
     assert apart(result.second.X_WS, drives.X_second) < 0.3
@@ -146,8 +146,8 @@ def test_the_drive_that_drifts_gives_way(drives):
     X = np.concatenate([route(lane=-1.75), route(lane=1.75, reverse=True)])
     town = make_town()
     scans = make_scans(town, X)
-    told = ELSEWHERE @ drifted(X, scale=1.01, turn_deg=4.0)
-    bad = TownDrive("bad", scans, told, frame="odom")
+    recorded = ELSEWHERE @ drifted(X, scale=1.01, turn_deg=4.0)
+    bad = TownDrive("bad", scans, recorded, frame="odom")
     result = align(bad, drives.second())
     assert (result.report.held, result.report.moved) == ("second", "bad")
     assert result.report.frames == ("map", "odom")
@@ -160,12 +160,12 @@ def test_the_drive_that_drifts_gives_way(drives):
     # This does not hold if others are aligned to it already.
     held = align(bad, drives.second(), hold_first=True)
     assert held.report.held == "bad"
-    np.testing.assert_array_equal(held.first.X_WS, told)
+    np.testing.assert_array_equal(held.first.X_WS, recorded)
 
 
 def test_heights_start_at_the_ground(drives):
-    told = rigid([0.0, 0.0, 61.3], 0.0) @ drives.X_first
-    result = align(drives.first(told, frame="utm"), drives.second())
+    recorded = rigid([0.0, 0.0, 61.3], 0.0) @ drives.X_first
+    result = align(drives.first(recorded, frame="utm"), drives.second())
     assert result.report.ground == pytest.approx(61.3, abs=0.05)
     for sequence in (result.first, result.second):
         # Other drives in the frame of the first one keep their heights.

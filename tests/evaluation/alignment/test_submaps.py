@@ -58,18 +58,20 @@ def test_ground_height():
 
 def test_bending_follows_the_keyframes():
     X = route()
-    told = drifted(X, scale=1.03, turn_deg=8.0)
-    drive = make_drive(told)
+    recorded = drifted(X, scale=1.03, turn_deg=8.0)
+    drive = make_drive(recorded)
     # All frames move as one piece.
     Y = rigid([10.0, -5.0, 2.0], 77.0)
-    np.testing.assert_allclose(drive.bend(Y @ drive.X_WK), Y @ told, atol=1e-9)
+    np.testing.assert_allclose(
+        drive.bend(Y @ drive.X_WK), Y @ recorded, atol=1e-9
+    )
     # With true poses at the keyframes, the frames between are nearly right.
     bent = drive.bend(X[drive.frames])
     np.testing.assert_allclose(bent[drive.frames], X[drive.frames], atol=1e-9)
     inside = slice(0, drive.frames[-1])
     off = np.linalg.norm((bent - X)[inside, :3, 3], axis=1)
     assert off.max() < 0.05
-    assert np.linalg.norm((told - X)[inside, :3, 3], axis=1).max() > 3.0
+    assert np.linalg.norm((recorded - X)[inside, :3, 3], axis=1).max() > 3.0
 
 
 def test_an_anchor_is_found_among_wrong_loops():

@@ -99,7 +99,7 @@ def test_tcr_undefined_is_null_with_a_reason(capsys, towns, tmp_path):
     assert "undefined" in out
 
 
-def test_tcr_tells_of_points_that_are_not_finite(capsys, towns, tmp_path):
+def test_tcr_notes_points_that_are_not_finite(capsys, towns, tmp_path):
     points = np.load(towns / "town_01.npy")
     points[3] = np.nan
     np.save(tmp_path / "a.npy", points)

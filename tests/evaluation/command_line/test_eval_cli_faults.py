@@ -64,7 +64,7 @@ def test_bad_input(capsys, towns, tmp_path):
     )
 
 
-def test_points_that_are_not_finite_are_told(capsys, towns, tmp_path):
+def test_points_that_are_not_finite_are_noted(capsys, towns, tmp_path):
     scan = make_scan(make_block_scene(0))
     scan["y"][:7] = np.nan
     write_recording(tmp_path / "holes", [scan], [yaw_pose(0.0, 0.0, 0.0, 0.0)])
@@ -165,7 +165,7 @@ def test_a_protocol_that_cannot_be(capsys, towns):
     )
 
 
-def test_a_drive_that_finds_itself_is_told(capsys, towns):
+def test_a_drive_that_finds_itself_gets_a_note(capsys, towns):
     town = towns / "town_01"
     _, out, err = run(capsys, "pr", town, town, "--method", "solid")
     assert "every scan finds itself (--exclude-recent" in err

@@ -17,7 +17,7 @@ def drive(tmp_path):
 
 
 @pytest.mark.parametrize("asked", [[], [0], [5, 6, 7, 6, 2], [11, 0]])
-def test_same_map_and_scans_whoever_asks(drive, asked):
+def test_same_map_and_scans_for_every_reader(drive, asked):
     mapped = MappedSequence(drive, kept=3)
     for index in asked:
         np.testing.assert_array_equal(mapped.scan(index), drive.scan(index))

@@ -83,13 +83,13 @@ def test_it_is_run_only_where_it_is_named(method):
     assert NAME in {one.name for one in choose_methods([NAME])}
 
 
-def test_without_its_package_one_line_says_how_to_get_it(monkeypatch):
+def test_without_its_package_one_line_names_the_command(monkeypatch):
     monkeypatch.setitem(sys.modules, PACKAGE, None)
     with pytest.raises(
         InputError, match=r"'cns-drake\[map-closures\]'"
-    ) as told:
+    ) as refusal:
         make_method(NAME, {})
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(refusal.value)
     with pytest.raises(InputError, match="not installed"):
         choose_methods([NAME])
 

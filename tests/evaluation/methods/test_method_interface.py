@@ -123,7 +123,7 @@ def test_places_described_in_another_way_stay_apart(drives):
     )  # fmt: skip
 
 
-def test_queries_before_are_known(drives):
+def test_earlier_queries_are_passed(drives):
     class Sequences(Highest):
         def score_in_sequence(self, queries, database, *, exhaustive=False):
             seen.append(len(queries))
@@ -160,7 +160,7 @@ def test_a_second_stage_sees_points(drives):
         assert np.isnan(np.delete(other, best)).all()
 
 
-def test_folders_of_scans_know_both_stages(drives, tmp_path):
+def test_folders_of_scans_use_both_stages(drives, tmp_path):
     for name, heights in (("db", [1.0, 2.0, 3.0, 4.0]), ("q", [1.2])):
         (tmp_path / name).mkdir()
         for k, height in enumerate(heights):

@@ -237,7 +237,7 @@ def test_relative_pose_of_a_turned_sensor(yaw_deg):
 
 
 @pytest.mark.parametrize("side", [-2.0, 2.0])
-def test_augmented_place_knows_its_neighbouring_lanes(side):
+def test_augmented_place_matches_neighbouring_lanes(side):
     scene = make_scene(4)
     m, plain = method(), method(variant="polar")
     # The query's sensor is moved to one side; its points move to the other.
@@ -271,7 +271,7 @@ def test_cart_context_finds_the_lane(lanes):
     np.testing.assert_allclose(X_PQ[:3, 3], [0.0, offset, 0.0], atol=1e-12)
 
 
-def test_augmented_cart_context_knows_the_other_direction():
+def test_augmented_cart_context_matches_the_opposite_direction():
     m = method(variant="augmented-cart")
     scene = make_scene(7)
     query = m.describe(turned(scene, 180.0))

@@ -62,7 +62,7 @@ def test_change_is_judged_by_its_limit(offset, verdict):
     assert f"on {8 if verdict == MET else 0}." in found[0].evidence
 
 
-def test_who_is_best_and_near():
+def test_best_method_and_near_values():
     cities = [("suburbia", "01", "02"), ("suburbia", "02", "01")]
 
     def falls(key):

@@ -96,7 +96,7 @@ def test_too_few_pairs_are_said_to_be_too_few():
     assert "1 pair of drives" in found[-1].evidence
 
 
-def test_nothing_is_said_of_what_is_not_there():
+def test_missing_data_gives_no_finding():
     assert findings([], []) == []
     assert verdicts(make_results(solid=[0.5]), []) == []
     undefined = make_changes([float("nan")])

@@ -53,7 +53,7 @@ def test_only_its_own_protocol_is_compared():
     assert not reference.covers(result("solid", usual, ("town", "01", "02")))
 
 
-def test_which_pairs_are_asked_both_ways():
+def test_pairs_compared_both_ways():
     reference = reference_for({"suburbia"})
     assert reference.asks_back("suburbia", "01", "02")
     assert not reference.asks_back("metropolis", "01", "04")

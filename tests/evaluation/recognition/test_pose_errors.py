@@ -118,7 +118,7 @@ def record(folder, places):
     return open_sequence(write_recording(folder, scans, X_WBs))
 
 
-def test_a_method_that_knows_its_pose(tmp_path):
+def test_a_method_with_exact_poses(tmp_path):
     database = record(tmp_path / "a", [(10 * k, 0, k) for k in range(6)])
     query = record(tmp_path / "b", [(10 * k + 3, 2, -7 * k) for k in range(6)])
     method = Poses()

@@ -132,7 +132,7 @@ def test_what_is_not_positive_is_refused(name, value):
         RetrievalProtocol(**{name: value})
 
 
-def test_it_is_told_with_every_number():
+def test_it_is_part_of_every_number():
     protocol = RetrievalProtocol(radius=3.0, scans_per_place=4)
     values = dict(zip(PROTOCOL_COLUMNS, protocol_values(protocol), strict=True))
     assert values | {"overlap": None} == protocol.to_json()

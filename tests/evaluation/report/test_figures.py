@@ -20,7 +20,7 @@ from evaluation.report.figures import (
 )
 
 
-def test_change_picture_asks_the_metric():
+def test_change_picture_has_the_colours_of_the_metric():
     other = np.array(
         [[x, y, z] for x in (0, 20) for y in (0, 20) for z in (0, 20)], float
     )
@@ -88,7 +88,7 @@ def test_no_line_through_fewer_than_five_points(
         assert entry.get_linestyle() == ("--" if has_line else "None")
 
 
-def test_points_of_pictures_know_their_voxels():
+def test_points_of_pictures_have_their_voxels():
     accumulator = VoxelAccumulator(5.0, 10)
     rng = np.random.default_rng(8)
     accumulator.add(from_xyz(rng.uniform(-40, 40, (3000, 3))))
@@ -101,7 +101,7 @@ def test_points_of_pictures_know_their_voxels():
 
 
 @pytest.mark.parametrize("side", [-np.inf, 0.0, np.inf])
-def test_points_on_a_border_know_a_voxel_beside_it(side):
+def test_points_on_a_border_have_a_voxel_beside_them(side):
     """This holds even if the voxel that seems to contain them is empty."""
     indices = np.array([[-9, 0, 0], [2, 4, 3], [2, 4, 5], [9, 9, 9]], np.int32)
     coarse = VoxelMap(indices, indices * 5.0, np.ones(4, np.int64), 5.0)

@@ -21,13 +21,13 @@ from evaluation.report.ladder_tables import ladder_query_table, ladder_table
 from evaluation.report.ladder_text import ladder_text
 
 
-def answered(method, told, is_right, scores=None):
+def answered(method, gated, is_right, scores=None):
     """An outcome; all queries have a match."""
     right = np.array(is_right, dtype=bool)
     number = len(right)
     return RungOutcome(
         method,
-        told,
+        gated,
         QueryOutcomes(
             np.ones(number) if scores is None else scores,
             right,
@@ -65,8 +65,8 @@ def climbed():
             cause,
             level,
             [
-                answered("solid", told, part(60, kept + 6 * told))
-                for told in (False, True)
+                answered("solid", gated, part(60, kept + 6 * gated))
+                for gated in (False, True)
             ],
             seed,
         )

@@ -30,7 +30,7 @@ def read_all(path):
 
 
 @pytest.mark.parametrize("name", CONTRADICTIONS)
-def test_a_lie_is_refused_by_what_it_says(recording, name):
+def test_a_contradiction_is_refused_by_name(recording, name):
     path, messages, attachments = recording
     change, fault = CONTRADICTIONS[name]
     # Scan 3 has no point that could be changed.
@@ -51,7 +51,7 @@ def test_all_channels_of_a_topic_are_one_stream(recording):
     assert read_all(path) == whole
 
 
-def test_what_is_said_again_says_nothing_new(recording):
+def test_repeated_messages_change_nothing(recording):
     path, messages, attachments = recording
     whole = open_sequence(path)
     X_WS, mount = whole.X_WS, whole.X_BS
@@ -79,7 +79,7 @@ def test_two_attachments_of_a_name_that_differ(recording):
         _ = open_sequence(path).scenario
 
 
-def test_messages_of_a_channel_that_nobody_names(recording, monkeypatch):
+def test_messages_of_an_unnamed_channel(recording, monkeypatch):
     path, messages, attachments = recording
     data = write_messages(messages, attachments)
     path.write_bytes(data)
@@ -107,7 +107,7 @@ try:
     print("read")
 except InputError as error:
     print(error)
-# What getrusage tells counts the process that this one was forked from.
+# getrusage counts the process from which this one was forked, too.
 (peak,) = (row for row in open("/proc/self/status") if "VmHWM" in row)
 print(peak.split()[1])
 """

@@ -418,7 +418,7 @@ def test_a_scan_of_many_gigabytes(tmp_path):
     assert len(next(read_blocks(path))) < 1_000_000
 
 
-def test_what_is_no_file(tmp_path):
+def test_files_that_are_none(tmp_path):
     path = tmp_path / "a.bin"
     os.mkfifo(path)
     with pytest.raises(InputError, match=f"^{path}: not a regular file"):

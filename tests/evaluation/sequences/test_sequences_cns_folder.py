@@ -69,7 +69,7 @@ def test_reads_what_was_written(tmp_path, folder):
         np.testing.assert_array_equal(scan["intensity"], np.arange(60))
 
 
-def test_the_folders_tell_map_and_stage(tmp_path):
+def test_the_folders_name_map_and_stage(tmp_path):
     def sequence(*place):
         return open_sequence(write_drive(tmp_path, place=place)[0])
 

@@ -364,7 +364,7 @@ def test_a_chunk_that_claims_to_be_huge(tmp_path, compression):
 
 
 @pytest.mark.parametrize("compression", ["zstd", "lz4"])
-def test_a_chunk_that_unpacks_to_more_than_it_says(tmp_path, compression):
+def test_a_chunk_that_unpacks_to_more_than_its_size(tmp_path, compression):
     path, _, _ = record(
         tmp_path / "s", compression=CompressionType[compression.upper()]
     )
@@ -373,7 +373,7 @@ def test_a_chunk_that_unpacks_to_more_than_it_says(tmp_path, compression):
         open_sequence(path).scan(0)
 
 
-def test_what_is_no_recording(tmp_path):
+def test_folders_without_a_recording(tmp_path):
     with pytest.raises(InputError, match="no such file or folder"):
         open_sequence(tmp_path / "missing")
     with pytest.raises(InputError, match="not a recorded sequence"):

@@ -96,7 +96,7 @@ def test_points_without_a_return_are_left_out(tmp_path):
     assert len(scan) == 47
 
 
-def test_only_a_whole_scan_knows_rings_and_times(tmp_path):
+def test_only_a_whole_scan_has_rings_and_times(tmp_path):
     write_drive(tmp_path / "s")
     path = tmp_path / "s/sensor_data/Ouster" / f"{T0_NS}.bin"
     points = make_points(65536)

@@ -20,7 +20,7 @@ from evaluation.sequences.text_tables import read_numbers, read_stamped_rows
         (b"1 2\n3\n", "columns"),
     ],
 )
-def test_what_is_no_table(tmp_path, text, fault):
+def test_tables_that_are_none(tmp_path, text, fault):
     path = tmp_path / "times.txt"
     path.write_bytes(text)
     if not fault:

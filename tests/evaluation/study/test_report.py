@@ -95,10 +95,10 @@ def test_what_cannot_be_placed_is_left_out(tmp_path):
     with pytest.raises(InputError, match="unnamed: map and stage are unknown"):
         find_cities(tmp_path)
     drive(tmp_path / "town_1", "01", "a", scenario=False)
-    told = []
-    (found,) = find_recordings(tmp_path, told.append)
+    notes = []
+    (found,) = find_recordings(tmp_path, notes.append)
     assert found.name == "town_1"
-    (note,) = told
+    (note,) = notes
     assert note.startswith(f"{tmp_path / 'unnamed'}: left out: map and")
 
 
@@ -195,7 +195,9 @@ def test_figures_for_print_and_page(report):
         assert f"](figures/{stem}.png)" in text
 
 
-def test_report_is_the_same_whoever_works(recordings, report, tmp_path):
+def test_report_is_the_same_for_any_number_of_workers(
+    recordings, report, tmp_path
+):
     write_report(
         recordings,
         tmp_path,
@@ -207,7 +209,7 @@ def test_report_is_the_same_whoever_works(recordings, report, tmp_path):
     assert files == studies.report_files(report)
 
 
-def test_what_is_done_needs_no_process(recordings, report, monkeypatch):
+def test_finished_jobs_start_no_process(recordings, report, monkeypatch):
     jobs = plan_study(find_recordings(recordings), report)
     monkeypatch.setattr(Cluster, "connect", None)
     run_jobs(jobs, Cluster())
@@ -250,11 +252,11 @@ def test_report_of_a_single_stage(tmp_path):
     said = "metropolis: nothing to compare: all drives are through stage 01"
     for name in ("report.md", "report.html"):
         assert said in path.with_name(name).read_text()
-    told = []
+    notes = []
     write_report(
-        tmp_path / "in", tmp_path / "out", Cluster(1), on_note=told.append
+        tmp_path / "in", tmp_path / "out", Cluster(1), on_note=notes.append
     )
-    (note,) = told
+    (note,) = notes
     assert note.startswith(said)
     assert "--years" in note
     assert "Temporal change ratio" not in text

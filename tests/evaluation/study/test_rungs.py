@@ -88,7 +88,7 @@ def test_the_numbers_are_those_of_the_single_command(folder, tmp_path):
     assert step.is_done()
     found = read_part(step.part)
     assert [(one.method, one.radius_told) for one in found] == [
-        (choice.name, told) for choice in METHODS for told in (False, True)
+        (choice.name, gated) for choice in METHODS for gated in (False, True)
     ]
     database, query = (
         open_sequence(folder / name)
@@ -116,9 +116,7 @@ def test_the_numbers_are_those_of_the_single_command(folder, tmp_path):
         )
 
 
-def test_the_best_match_shows_what_the_matrix_of_overlaps_says(
-    folder, tmp_path
-):
+def test_the_best_match_agrees_with_the_matrix_of_overlaps(folder, tmp_path):
     database, query = (
         open_sequence(folder / name)
         for name in ("metropolis_01", "metropolis_04")

@@ -118,7 +118,7 @@ def files(tmp_path):
     return SurveyFiles(tmp_path / "survey")
 
 
-def test_what_is_kept_is_what_was_found(recorded, source, files):
+def test_stored_surveys_equal_computed_ones(recorded, source, files):
     choices = choose_methods()
     survey(source, choices, files)
     methods = [choice.make() for choice in choices]
@@ -141,7 +141,7 @@ def test_maps_are_those_of_which_the_tcr_is_measured(folder, recorded, roles):
     assert_equal(found.drive.coarse, drive_change.survey(folder).voxels)
 
 
-def test_only_what_is_missing_or_of_something_else_is_found(source, files):
+def test_only_missing_or_stale_parts_are_computed(source, files):
     *others, btc = sorted(choose_methods(), key=lambda one: one.name == "btc")
     survey(source, others, files)
     stamps = {path: path.stat().st_mtime_ns for path in files.folder.iterdir()}
@@ -160,7 +160,7 @@ def test_only_what_is_missing_or_of_something_else_is_found(source, files):
     assert len(source.opened) == 4
 
 
-def test_a_recording_is_known_by_its_files(tmp_path):
+def test_a_recording_is_identified_by_its_files(tmp_path):
     folder = tmp_path / "metropolis_01"
     drive(folder, "01", "a")
     first = RecordedDrive(folder).identity()

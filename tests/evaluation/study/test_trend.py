@@ -97,7 +97,7 @@ def test_processes_change_nothing_and_are_not_needed_twice(
     assert measure_trend(*arguments, Cluster()) == points
 
 
-def test_what_is_kept_is_told_by_the_control(folder, tmp_path, monkeypatch):
+def test_the_kept_share_comes_from_the_control(folder, tmp_path, monkeypatch):
     monkeypatch.setattr(
         trend_databases, "run_jobs", lambda jobs, cluster: studies.do(jobs)
     )
@@ -161,7 +161,7 @@ def test_points_at_one_place_give_their_mean():
     np.testing.assert_allclose(smooth(x, y, np.array([0.2, 0.3])), 3.0)
 
 
-def test_the_band_holds_the_truth_about_as_often_as_it_says():
+def test_the_band_covers_the_truth_at_its_level():
     rng = np.random.default_rng(8)
     grid = np.array([0.2, 0.5, 0.8])
     held = []

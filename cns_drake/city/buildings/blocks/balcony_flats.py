@@ -135,8 +135,7 @@ def _outline(sections: list[np.ndarray]) -> tuple[np.ndarray, list[int]]:
 
 
 class _Front:
-    """The front of a section: its bays, the stair's bay, bays with
-    balconies."""
+    """The front of a section: bays, the stair's bay, and balcony bays."""
 
     def __init__(self, p: Parameters, plan: np.ndarray, edge: int) -> None:
         self.edge = edge

@@ -1,5 +1,4 @@
-"""The sports hall: a wide roof on outer frames, a low front with changing
-rooms, bands of high windows."""
+"""The sports hall: a wide roof on outer frames, a low front, high windows."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""The banded office tower: rounded corners, bands of glass and sunshades,
-gardens between stacks of storeys."""
+"""The banded office tower: round corners, bands of glass, gardens between."""
 
 from __future__ import annotations
 

@@ -67,8 +67,7 @@ class Parameters:
 
     @property
     def margin(self) -> float:
-        """Wall at the corners, where the recesses of two walls must not
-        meet [m]."""
+        """Width of solid wall at corners, which keeps recesses apart [m]."""
         return self.recess + 0.15
 
 

@@ -1,5 +1,4 @@
-"""The tower under construction: a concrete frame around its core, scaffolds,
-cladding on the lower storeys only."""
+"""The tower under construction: core, concrete frame, scaffolds, cladding."""
 
 from __future__ import annotations
 

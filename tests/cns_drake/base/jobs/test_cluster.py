@@ -58,7 +58,7 @@ def test_a_worker_that_is_killed_costs_nothing(
     worker, job = dask.job_processes()[0]
     worker.send_signal(signal.SIGKILL)
     status, results = run.end()
-    assert status == 0, run.told
+    assert status == 0, run.lines
     assert results == [str(output / "first"), str(output / "second")]
     for scenario in scenarios[:2]:
         folder = simulate(scenario, tmp_path / "whole").folder
@@ -77,10 +77,10 @@ def test_a_job_that_cannot_be_done_and_the_address_in_the_environment(
         [files[2], files[0]], output, DASK_SCHEDULER_ADDRESS=dask.address
     )
     status, results = run.end()
-    assert (status, results) == (1, []), run.told
-    assert run.told[-1].startswith("cns-drake: error: endless: ")
-    assert "frames: 1000000 is too many" in run.told[-1]
-    assert not [line for line in run.told if "Traceback" in line]
+    assert (status, results) == (1, []), run.lines
+    assert run.lines[-1].startswith("cns-drake: error: endless: ")
+    assert "frames: 1000000 is too many" in run.lines[-1]
+    assert not [line for line in run.lines if "Traceback" in line]
     assert (output / "first" / "metadata.yaml").is_file()
 
 
@@ -201,7 +201,7 @@ def test_a_scheduler_that_asks_for_certificates(certificates, tmp_path):
         assert "--scheduler: tls://" in result.stderr
 
 
-def test_a_scheduler_that_says_nothing(monkeypatch):
+def test_a_silent_scheduler(monkeypatch):
     monkeypatch.setattr(dask_workers, "_ANSWER_TIMEOUT", 0.5)
     with socket.create_server(("127.0.0.1", 0)) as server:
         address = f"tcp://127.0.0.1:{server.getsockname()[1]}"

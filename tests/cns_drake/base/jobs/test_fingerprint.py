@@ -87,7 +87,7 @@ def differs(file, module, change="\nchanged = True\n", **options):
     return after != before
 
 
-def test_what_is_imported_in_any_way_counts(packages):
+def test_every_kind_of_import_counts(packages):
     for name, text in (SOURCES | COUNTED | NOT_COUNTED).items():
         path = packages / name
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -189,7 +189,7 @@ def test_what_python_imports_is_found_in_the_sources(module, monkeypatch):
     assert {f"{name}.py" for name in loaded} <= found.keys()
 
 
-def test_a_script_counts_with_what_lies_beside_it(tmp_path):
+def test_a_script_counts_with_the_modules_beside_it(tmp_path):
     path = tmp_path / "own.py"
     path.write_text("import own_help\nfrom evaluation.methods import Method\n")
     (tmp_path / "own_help.py").write_text("from own_parts import one\n")

@@ -9,7 +9,7 @@ from cns_drake.base.jobs import job_progress
 from cns_drake.base.jobs.job_progress import JobProgress, TimeLeft
 
 
-def test_before_anything_is_known_costs_count():
+def test_expected_costs_count_before_the_first_result():
     left = TimeLeft({"a": 30.0, "b": 10.0, "c": 20.0})
     assert left.seconds() == pytest.approx(60.0)
     assert left.share() == 0.0
@@ -41,7 +41,7 @@ def test_a_slow_machine_takes_longer():
     assert left.share() == pytest.approx(1.0)
 
 
-def test_what_an_earlier_run_did_tells_no_pace():
+def test_results_of_an_earlier_run_give_no_pace():
     left = TimeLeft({"drive": 100.0, "done": 400.0})
     left.start("done", now=0.0)
     left.end("done", now=1.0)

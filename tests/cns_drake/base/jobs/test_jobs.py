@@ -38,7 +38,7 @@ def job(
     return Job(name, step, tuple(needs), cost)
 
 
-def test_what_is_done_starts_no_process(tmp_path, monkeypatch, capsys):
+def test_finished_steps_start_no_process(tmp_path, monkeypatch, capsys):
     """No cluster starts if all is done; jobs that need other work do start."""
     old, path = tmp_path / "old", tmp_path / "path"
     old.write_text("old")
@@ -71,7 +71,7 @@ def test_what_is_done_starts_no_process(tmp_path, monkeypatch, capsys):
     assert "of 3 jobs" in capsys.readouterr().err
 
 
-def test_a_job_asks_again_when_it_has_its_output(tmp_path):
+def test_a_job_checks_again_before_its_output(tmp_path):
     """Another copy of the job may have written its output first."""
     output = tmp_path / "output"
     output.write_text("of the other")
@@ -88,7 +88,7 @@ def test_a_job_asks_again_when_it_has_its_output(tmp_path):
         assert output.read_text() == expected
 
 
-def test_what_is_needed_is_there_and_faults_stay_alone(tmp_path, capsys):
+def test_needs_come_first_and_faults_stay_alone(tmp_path, capsys):
     first, second, both, last = (tmp_path / name for name in "abcd")
     process, tries, survivor = (tmp_path / name for name in "ptu")
     jobs = [
@@ -131,10 +131,10 @@ def test_what_is_needed_is_there_and_faults_stay_alone(tmp_path, capsys):
     pid, session, *parents = map(int, process.read_text().split())
     assert pid == session
     assert os.getpid() in parents
-    told = capsys.readouterr().err
-    assert "here I am" in told
-    assert "ZeroDivisionError" in told
-    assert "last: done" in told
+    reports = capsys.readouterr().err
+    assert "here I am" in reports
+    assert "ZeroDivisionError" in reports
+    assert "last: done" in reports
 
 
 class ScriptedCluster:
@@ -163,7 +163,7 @@ class ScriptedCluster:
 DIED = ProcessDiedError("its worker died")
 
 
-def test_what_is_lost_with_its_worker_is_asked_for_again(capsys):
+def test_results_lost_with_a_worker_are_computed_again(capsys):
     cluster = ScriptedCluster(DIED, DIED, None)
     run_jobs([job("a", job_functions.refuse)], cluster)
     assert cluster.names == ["a"] * 3
@@ -176,7 +176,7 @@ def test_what_is_lost_with_its_worker_is_asked_for_again(capsys):
     ("slots", "order"),
     [(1, "b first; c needs b; a; d"), (None, "b first; a; d; c needs b")],
 )
-def test_a_free_worker_gets_what_is_most_urgent_then(slots, order):
+def test_a_free_worker_gets_the_most_urgent_job(slots, order):
     """The most urgent job may have changed since its last job began."""
     jobs = [
         job("a", job_functions.refuse, cost=3.0),
@@ -200,7 +200,7 @@ def test_a_fault_makes_room_for_the_next(capsys):
 
 def test_a_scheduler_that_is_lost():
     """The client reports the loss; finished keys are not fetched again."""
-    told, keys = [], []
+    reports, keys = [], []
     statuses = iter(["cancelled", "lost", "finished"])
 
     def submit(function, *arguments, key, **options):
@@ -215,10 +215,10 @@ def test_a_scheduler_that_is_lost():
         subscribe_topic=lambda topic, handler: None,
         submit=submit,
     )
-    workers = DaskWorkers(client, lambda *message: told.append(message))
+    workers = DaskWorkers(client, lambda *message: reports.append(message))
     for _ in range(3):
         workers.submit("a", b"", 1.0)
-    note, lost, died, done = told
+    note, lost, died, done = reports
     assert note == ("note", "", "tcp://scripted:1: no workers yet, waiting")
     assert isinstance(lost[2], LostSchedulerError)
     assert str(lost[2]).startswith("tcp://scripted:1: the connection")
@@ -229,7 +229,7 @@ def test_a_scheduler_that_is_lost():
         run_jobs([job("a", job_functions.refuse)], ScriptedCluster(lost[2]))
 
 
-def test_nobody_else_can_reach_local_jobs(tmp_path):
+def test_local_jobs_open_no_port(tmp_path):
     """Neither this process nor that of a job opens a port."""
     path = tmp_path / "ports"
     script = (
@@ -288,11 +288,11 @@ def start(request):
 def test_a_job_that_is_not_wanted_ends(tmp_path, start):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
-    told = []
+    reports = []
 
     def is_wanted():
-        if not told:
-            told.append(job_functions.read_holder(pipe))
+        if not reports:
+            reports.append(job_functions.read_holder(pipe))
             return True
         return False
 
@@ -303,7 +303,7 @@ def test_a_job_that_is_not_wanted_ends(tmp_path, start):
             is_wanted,
             start,
         )
-    assert not psutil.pid_exists(told[0])
+    assert not psutil.pid_exists(reports[0])
 
 
 @pytest.mark.parametrize(
@@ -408,18 +408,18 @@ def test_a_lock_that_cannot_be_written(tmp_path):
         pass
 
 
-def test_progress_is_told_now_and_then(monkeypatch):
+def test_progress_is_reported_now_and_then(monkeypatch):
     now = [100.0]
     monkeypatch.setattr("time.monotonic", lambda: now[0])
-    told = []
-    reporter = Reporter(lambda *message: told.append(message))
+    reports = []
+    reporter = Reporter(lambda *message: reports.append(message))
     for done in range(11):
         reporter.progress(done, 10)
         now[0] += 0.2
     # The first and the last one are shown, and one in half a second.
-    assert [done for _, done, _ in told] == [0, 3, 6, 9, 10]
+    assert [done for _, done, _ in reports] == [0, 3, 6, 9, 10]
     reporter.note(3)
-    assert told[-1] == ("note", "3")
+    assert reports[-1] == ("note", "3")
     Reporter().progress(1, 2)
 
 

@@ -38,7 +38,7 @@ def test_the_share_of_an_edge_is_that_of_the_beams_profile(part):
     # The far plate is so near that both are one echo, whose energy gives the
     # share.
     far = plate("far", 0.0, facing(distance + 0.3))
-    # A neighbour beyond the edge, so that the beam counts as next to one.
+    # A neighbour beyond the edge makes the beam count as next to one.
     off = 3.0 * sheet.divergence
     pattern = beside(5_000, off if part >= 0.0 else -off)
     points = scan([near, far], pattern, unit("os0-128"))
@@ -102,7 +102,7 @@ def test_panes_share_light_by_fresnel():
     assert through[0] == pytest.approx(0.918, abs=5e-4)
     assert through[0] ** 2 == pytest.approx(0.843, abs=5e-4)
     np.testing.assert_allclose(reflected + through, 1.0)
-    # Brewster's angle: the light along the plane of incidence all gets in.
+    # At Brewster's angle all light in the plane of incidence enters.
     brewster = np.array([np.cos(np.arctan(1.52))])
     reflected, _ = pane_shares(brewster)
     inner = np.sqrt(1.0 - (1.0 - brewster**2) / 1.52**2)
@@ -125,7 +125,7 @@ def test_a_pane_mirrors_with_the_whole_way_as_range():
     angle = np.deg2rad(75.0)
     X_WG = RigidTransform(RollPitchYaw(0.0, 0.0, angle), [6.0, 0.0, 0.0])
     pane = plate("house/glass", None, X_WG, (1e-5, 30.0, 30.0))
-    # Light goes on at twice the rest to a right angle, to a wall aside.
+    # The pane mirrors light to a wall aside.
     wall = plate(
         "side", None, RigidTransform([0.0, 5.05, 0.0]), (400.0, 0.1, 400.0)
     )
@@ -184,8 +184,8 @@ def test_markings_shine_however_flat_they_are_seen(above_deg):
     assert bright["asphalt"] == np.rint(15.0 * np.sin(np.deg2rad(above_deg)))
 
 
-def test_every_class_is_made_of_something():
-    """Also those of traffic: a bright coat sends back more than a dark one."""
+def test_every_class_has_a_material():
+    """This includes traffic: a bright coat returns more than a dark one."""
     for name in CLASS_IDS:
         table = StructureTable([StructureEntry(1, "thing", name)])
         things = [
@@ -208,7 +208,7 @@ def test_every_class_is_made_of_something():
 
 @pytest.mark.parametrize("echoes", list(Echoes))
 def test_which_echoes_are_reported(echoes):
-    """Half of each beam meets a dark plate, the rest a bright one behind."""
+    """Half of each beam meets a dark plate, the rest a bright plate behind."""
     sheet = UNIT_SHEETS["os1-64"]
     near = plate("near", 0.2, facing(10.0, -4.9999), (0.1, 10.0, 40.0))
     far = plate("far", 0.9, facing(13.0))

@@ -21,7 +21,7 @@ ROWS = [(name, row) for name, s in UNIT_SHEETS.items() for row in s.rows]
 
 
 def share(distance, reflectivity, returns, num_beams=12_000, **options):
-    """Returns which part of the beams a plate at a distance returns."""
+    """Returns the part of beams that a plate at a distance returns."""
     target = plate("target", reflectivity, facing(distance))
     points = scan([target], ahead(num_beams), returns, **options)
     return np.count_nonzero(points["label"] != CLASS_IDS["outlier"]) / num_beams
@@ -40,7 +40,7 @@ def test_sheets_are_reproduced(preset, row):
 def test_a_tilted_plate_is_as_dark_as_its_cosine():
     row = UNIT_SHEETS["os1-64"].rows[1]
     tilt = np.arccos(0.5)
-    # It stands so that the beams meet its middle at the sheet's range.
+    # The beams meet the middle of the plate at the sheet's range.
     X_WG = RigidTransform(RollPitchYaw(0.0, 0.0, tilt), [row.range, 0.0, 0.0])
     X_WG = X_WG @ RigidTransform([0.05, 0.0, 0.0])
     target = plate("target", 2.0 * row.reflectivity, X_WG)
@@ -63,7 +63,7 @@ def test_detection_rises_from_nothing_to_certainty():
     assert probability[0] == 0.0
     assert probability[-1] == 1.0
     assert detection_probability(9.0) == pytest.approx(0.5)
-    # No step where the certain ones begin.
+    # There is no step where the probability becomes 1.
     below, above = (detection_probability(81.0 + e) for e in (-1e-9, 1e-9))
     assert above - below < 1e-12
 
@@ -97,14 +97,14 @@ def test_intensity_is_reflectivity_times_cosine(tilt_deg, distance):
     ("visibility", "farthest"),
     [(50.0, 25.7), (100.0, 38.2), (200.0, 53.7), (500.0, 76.1)],
 )
-def test_fog_ends_sight_where_lamberts_function_says(visibility, farthest):
+def test_fog_ends_sight_by_lamberts_function(visibility, farthest):
     row = UNIT_SHEETS["vlp-16"].rows[0]
     weather = Weather(visibility)
     alpha = weather.extinction
     distance = float(np.real(lambertw(alpha * row.range)) / alpha)
     found = share(distance, row.reflectivity, unit("vlp-16", weather=weather))
     assert found == pytest.approx(row.probability, abs=0.02)
-    # The closed form at the figures that are known for 120 m.
+    # The closed form with the known figures for 120 m.
     known = float(np.real(lambertw(alpha * 120.0)) / alpha)
     assert known == pytest.approx(farthest, abs=0.05)
 

@@ -1,4 +1,4 @@
-"""Weather: counts of drops, and what must not depend on what."""
+"""Weather: counts of drops, and independence of sensors and frames."""
 
 from helpers.plates import ahead, facing, plate, scan, unit
 import numpy as np
@@ -53,7 +53,7 @@ def test_the_water_in_the_air_falls_as_fast_as_measured(
     assert slowest < rate * 1e3 / 3600.0 / grams < fastest
 
 
-def test_flakes_send_back_what_their_lidar_ratio_says():
+def test_flakes_send_back_by_their_lidar_ratio():
     weather = Weather(snowfall=1.0)
     ((number, rho),) = weather.drops(DIAMETERS_MM)
     area = np.pi / 4.0 * (DIAMETERS_MM * 1e-3) ** 2
@@ -159,13 +159,13 @@ def test_each_beam_has_a_draw_of_its_own():
     first = scan([wall], pattern, returns, frame=7)
     assert first.tobytes() == scan([wall], pattern, returns, 7).tobytes()
     assert first.tobytes() != scan([wall], pattern, returns, 8).tobytes()
-    # Something else that half of the beams meet changes none of the others.
+    # Other surfaces for half of the beams change none of the other beams.
     near = plate("z_near", 0.5, facing(5.0, 20.0 + 0.5), (0.1, 40.0, 40.0))
     other = scan([wall, near], pattern, returns, 7)
     kept, same = other[other["y"] < -0.2], first[first["y"] < -0.2]
     assert len(same) > 500
     np.testing.assert_array_equal(kept, same)
-    # Nor does the name or the seed of another sensor give the same.
+    # Another sensor's name or seed gives other drops, too.
     for change in ({"seed": 6}, {"sensor_name": "rear"}):
         others = scan([wall], pattern, unit(weather=weather, **change), 7)
         assert others.tobytes() != first.tobytes()
