@@ -59,8 +59,8 @@ def gather(
     Args:
         sequence: the drive.
         frame: of the described place.
-        num_scans: number of consecutive scans that are merged; fewer at the ends
-            of the drive.
+        num_scans: number of consecutive scans that are merged; fewer at the
+            ends of the drive.
         max_range: see `within_range`.
         fields: of the points, beside their coordinates.
         num_before: how many of the scans come before the frame.
