@@ -130,8 +130,16 @@ def feet_of(solids: Sequence[np.ndarray]) -> np.ndarray:
     return np.array(found).reshape(-1, 3)
 
 
-def ground_of(structures: Sequence[Imported]) -> Ground:
-    """Returns the ground of a city: its terrain, or one below its feet."""
+def ground_of(
+    structures: Sequence[Imported], below_bridges: bool = False
+) -> Ground:
+    """Returns the ground of a city: its terrain, or one below its feet.
+
+    Args:
+        structures: of the city.
+        below_bridges: whether bridges and tunnels do not count as feet, unless
+            there is nothing else.
+    """
     corners = np.concatenate(
         [one.triangles.reshape(-1, 3) for one in structures]
     )
@@ -139,13 +147,20 @@ def ground_of(structures: Sequence[Imported]) -> Ground:
     if terrain:
         feet = [one.triangles.reshape(-1, 3) for one in terrain]
     else:
-        feet = [feet_of([o.triangles for o in structures if not o.is_ground])]
+        low = structures
+        if below_bridges:
+            low = [one for one in structures if not _is_span(one)] or structures
+        feet = [feet_of([o.triangles for o in low if not o.is_ground])]
         feet += [
             one.triangles.reshape(-1, 3)[::_EVERY_CORNER]
-            for one in structures
+            for one in low
             if one.is_ground
         ]
     return guess_ground(np.concatenate(feet), corners)
+
+
+def _is_span(one: Imported) -> bool:
+    return one.kind.startswith(("Bridge", "Tunnel"))
 
 
 def bottom_of(

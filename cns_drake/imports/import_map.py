@@ -74,12 +74,12 @@ def import_city(
     if options.grow is not None:
         staged, growth = grow(staged, options.grow, options.seed)
     progress(f"{len(staged.kept)} structures; looking for streets")
-    ground = ground_of(staged.kept)
+    ground = ground_of(staged.kept, options.dressed)
     space = find_free_space(staged.kept, ground)
     drives = own or _find_drives(city, space, options)
     if options.within is not None:
         staged = staged.near(drives, options.within, city.faults)
-        ground = ground_of(staged.kept)
+        ground = ground_of(staged.kept, options.dressed)
     drives = _lifted(drives, ground, city.faults)
     bare, dressing = staged.kept, None
     added: list[Imported] = []

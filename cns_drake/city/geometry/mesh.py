@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 import itertools
 
 import numpy as np
@@ -33,14 +34,15 @@ class Mesh:
 
     def triangles(self) -> np.ndarray:
         """Returns the (M, 3) int32 vertex indices after fan triangulation."""
-        corners = self._corners()
+        corners = self._corners
         is_there = np.ones((len(corners), 2), dtype=bool)
         is_there[:, 1] = corners[:, 2] != corners[:, 3]
         halves = corners[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 2, 3)
         return halves[is_there].astype(np.int32)
 
+    @cached_property
     def _corners(self) -> np.ndarray:
-        """Returns the faces as (F, 4) vertex indices.
+        """The faces as (F, 4) vertex indices.
 
         Triangles have their last one twice.
         """
@@ -66,7 +68,7 @@ class Mesh:
         values, index = np.unique(unique, return_inverse=True)
         texts = [_number(value) for value in values.tolist()]
         vertices = tuple(texts[k] for k in index.reshape(-1).tolist())
-        corners = inverse[self._corners()] + 1
+        corners = inverse[self._corners] + 1
         is_kept = corners != np.roll(corners, 1, axis=1)
         numbers = is_kept.sum(axis=1)
         is_kept[numbers < 3] = False

@@ -17,8 +17,6 @@ from shapely.geometry import LinearRing, Polygon
 from cns_drake.base.compiled import compiled
 
 _MM = 1000.0
-# Edges that are compared with all corners at a time.
-_EDGES_AT_ONCE = 256
 # A corner or point as whole millimetres.
 _Point = tuple[int, int]
 
@@ -67,24 +65,41 @@ def _with_corners_on_edges(
     points = np.array(corners, dtype=np.int64)
     starts = np.array(ring, dtype=np.int64)
     ways = np.roll(starts, -1, axis=0) - starts
+    touched = _touched(starts, ways, points).tolist()
     result = []
-    for first in range(0, len(ring), _EDGES_AT_ONCE):
-        start = starts[first : first + _EDGES_AT_ONCE, None]
-        along = ways[first : first + _EDGES_AT_ONCE, None]
-        offset = points - start
-        on_line = along[..., 0] * offset[..., 1] == (
-            along[..., 1] * offset[..., 0]
-        )
-        part = (offset * along).sum(axis=2)
-        inside = on_line & (part > 0) & (part < (along * along).sum(axis=2))
-        has_some = inside.any(axis=1).tolist()
-        for k, corner in enumerate(ring[first : first + _EDGES_AT_ONCE]):
-            result.append(corner)
-            if has_some[k]:
-                those = np.flatnonzero(inside[k])
-                order = np.argsort(part[k, those], kind="stable")
-                result += [corners[i] for i in those[order]]
+    for k, corner in enumerate(ring):
+        result.append(corner)
+        if touched[k]:
+            offset = points - starts[k]
+            part = offset @ ways[k]
+            inside = ways[k, 0] * offset[:, 1] == ways[k, 1] * offset[:, 0]
+            inside &= (part > 0) & (part < ways[k] @ ways[k])
+            those = np.flatnonzero(inside)
+            order = np.argsort(part[those], kind="stable")
+            result += [corners[i] for i in those[order]]
     return result
+
+
+@compiled
+def _touched(
+    starts: np.ndarray, ways: np.ndarray, points: np.ndarray
+) -> np.ndarray:
+    """Returns which edges (N,) have a point within them.
+
+    Args:
+        starts, ways: (N, 2) their starts, and from there to their ends.
+        points: (P, 2).
+    """
+    found = np.zeros(len(starts), dtype=np.bool_)
+    for k in range(len(starts)):
+        x, y = ways[k, 0], ways[k, 1]
+        whole = x * x + y * y
+        for i in range(len(points)):
+            u, v = points[i, 0] - starts[k, 0], points[i, 1] - starts[k, 1]
+            if x * v == y * u and 0 < u * x + v * y < whole:
+                found[k] = True
+                break
+    return found
 
 
 def _edges(ring: list[_Point]) -> Iterator[tuple[_Point, _Point]]:

@@ -29,7 +29,7 @@ from cns_drake.imports.waypoint_drives import Drive
 # Within this distance of drives, sidewalks get kerbs, and missing ones are
 # added [m].
 _WITHIN = 80.0
-_KERB_HEIGHT, _KERB_DEPTH = 0.12, 0.25
+KERB_HEIGHT, _KERB_DEPTH = 0.12, 0.25
 _KERB: Rgb = (0.60, 0.60, 0.58)
 _PAVED: Rgb = (0.57, 0.56, 0.53)
 _SIDEWALK = 2.0
@@ -165,10 +165,10 @@ def missing_sidewalks(
             *(area for area in made if area.intersects(strip)),
         ]
         covered = shapely.union_all(others, grid_size=1.0 / _MM)
-        area = _areas(shapely.difference(strip, covered, grid_size=1.0 / _MM))
+        area = areas_of(shapely.difference(strip, covered, grid_size=1.0 / _MM))
         made.append(area)
         surface = [
-            flat_surface(part, _KERB_HEIGHT, street.name, ImportFaults())
+            flat_surface(part, KERB_HEIGHT, street.name, ImportFaults())
             for part in parts_of(area)
             if not part.buffer(-0.3).is_empty
         ]
@@ -182,6 +182,6 @@ def missing_sidewalks(
             )
 
 
-def _areas(geometry: BaseGeometry) -> MultiPolygon:
+def areas_of(geometry: BaseGeometry) -> MultiPolygon:
     """Returns the polygons of a geometry, without its lines and points."""
     return MultiPolygon(list(parts_of(geometry)))

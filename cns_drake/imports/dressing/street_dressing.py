@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from shapely.geometry import LineString, MultiLineString
 
 from cns_drake.city.plan.weighted import pick
+from cns_drake.imports.dressing.guessed_streets import HALF_STREET
 from cns_drake.imports.dressing.roadside import (
     FROM_EDGE,
     beside_street,
@@ -47,8 +49,6 @@ _SMALL = {
     "sign_round": 2.0,
     "sign_rectangular": 1.0,
 }
-# Half of the width of a street of unknown width [m].
-_HALF_STREET = 3.9
 
 
 def dress_streets(
@@ -76,6 +76,9 @@ def dress_streets(
     near = [s for s in streets if placing.is_near(s.line, _THINGS_WITHIN)]
     courses = [LineString(street.line) for street in near]
     lines = MultiLineString(courses)
+    for one in structures:
+        if one.kind == "Tree":
+            placing.keep_tree(_off_carriageway(placing, one, near, courses))
     for number, thing in enumerate(things):
         if placing.is_near(np.array([thing.xy] * 2), _THINGS_WITHIN):
             _place_thing(placing, thing, number, near, courses, seed)
@@ -107,7 +110,32 @@ def _rows(
     if not streets:
         for number, drive in enumerate(drives):
             line = LineString(drive.path)
-            yield f"drive_{number}", line, _HALF_STREET, (True, True)
+            yield f"drive_{number}", line, HALF_STREET, (True, True)
+
+
+def _off_carriageway(
+    placing: StreetRoom,
+    tree: Imported,
+    streets: Sequence[Street],
+    courses: Sequence[LineString],
+) -> Imported:
+    """Returns a tree beside the carriageway, if it was on it or its kerb."""
+    structure = tree.structure
+    xy = np.array(structure.xyz[:2])
+    if not streets or not placing.is_near(np.array([xy] * 2), _THINGS_WITHIN):
+        return tree
+    beside, _ = beside_street(xy, streets, courses)
+    if np.array_equal(beside, xy) or not placing.has_tree_pit(beside):
+        return tree
+    x, y = np.round(beside, 3).tolist()
+    z = structure.xyz[2]
+    moved = replace(
+        tree,
+        structure=replace(structure, xyz=(x, y, z)),
+        triangles=tree.triangles + np.array([x - xy[0], y - xy[1], 0.0]),
+    )
+    placing.found.moved[tree] = moved
+    return moved
 
 
 def _place_thing(

@@ -25,6 +25,8 @@ from cns_drake.imports.waypoint_drives import Drive
 # Least distance of all objects from the middle of a drive [m].
 _FROM_DRIVE = 1.7
 _FROM_WALL, _BETWEEN = 0.25, 0.2
+# Radius about the middle of a trunk that nothing else takes [m].
+_TRUNK = 0.4
 
 
 @dataclass
@@ -34,6 +36,7 @@ class StreetThings:
     Attributes:
         structures: in the world.
         from_file: names of structures from the file.
+        moved: trees of the file -> the same beside the carriageway.
         sources: sources of the file's things that were placed.
         by_file, by_lot: kind -> how many.
         no_room: how many of the file's things would stand in the way of a
@@ -42,6 +45,7 @@ class StreetThings:
 
     structures: list[Imported] = field(default_factory=list)
     from_file: set[str] = field(default_factory=set)
+    moved: dict[Imported, Imported] = field(default_factory=dict)
     sources: set[str] = field(default_factory=set)
     by_file: Counter[str] = field(default_factory=Counter)
     by_lot: Counter[str] = field(default_factory=Counter)
@@ -79,16 +83,28 @@ class StreetRoom:
         self._roads = UpperSides(turned_up(np.concatenate([empty, *roads])))
         self._paved = UpperSides(turned_up(np.concatenate([empty, *paved])))
         self._taken = Occupancy()
-        for one in structures:
-            if one.kind == "Tree":
-                x, y, _ = one.structure.xyz
-                self._taken.add(Point(x, y).buffer(0.4, 4))
         self._names = {one.structure.name for one in structures}
         self.lamps: list[tuple[float, float]] = []
 
     def is_near(self, line: np.ndarray, distance: float) -> bool:
         """Returns whether a line (N, 2) is near a drive."""
         return bool(shapely.dwithin(LineString(line), self.paths, distance))
+
+    def keep_tree(self, tree: Imported) -> None:
+        """Keeps the place of a tree's trunk free."""
+        x, y, _ = tree.structure.xyz
+        self._taken.add(Point(x, y).buffer(_TRUNK, 4))
+
+    def has_tree_pit(self, xy: np.ndarray) -> bool:
+        """Returns whether a trunk at (2,) stands off carriageways, walls and
+        drives."""
+        pit = Point(xy).buffer(_TRUNK, 2)
+        around = shapely.get_coordinates(pit)
+        return not (
+            np.isfinite(self._roads.heights(around)).any()
+            or self.paths.distance(pit) < _FROM_DRIVE
+            or self._is_built(pit)
+        )
 
     def place(
         self,

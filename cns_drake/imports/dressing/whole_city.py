@@ -18,7 +18,9 @@ from cns_drake.imports.dressing.grounds import (
     paved,
     with_kerb,
 )
+from cns_drake.imports.dressing.guessed_streets import guessed_streets
 from cns_drake.imports.dressing.lane_marks import lane_marks
+from cns_drake.imports.dressing.paved_gaps import paved_gaps
 from cns_drake.imports.dressing.street_dressing import dress_streets
 from cns_drake.imports.foreign_city import ForeignCity, Imported
 from cns_drake.imports.import_ground import Ground
@@ -53,6 +55,10 @@ class Dressing:
 def _has_ground_kind(one: Imported) -> bool:
     """Returns whether the file has a ground's kind, not only its height."""
     return one.is_ground and one.kind != _TERRAIN
+
+
+def _is_street(one: Imported) -> bool:
+    return one.structure.semantic_class in ("road", "sidewalk")
 
 
 def dress_city(
@@ -92,15 +98,22 @@ def dress_city(
     if drives:
         walks = [one for one in staged.kept if one.kind == "Sidewalk"]
         changed |= {one: with_kerb(one) for one in near_drives(walks, drives)}
-        missing = missing_sidewalks(staged.kept, city.streets, drives)
-        added = [with_kerb(one) for one in missing]
-        by_lot["Sidewalk"] += len(added)
+        laid = list(missing_sidewalks(staged.kept, city.streets, drives))
+        if is_paved and city.streets:
+            laid += paved_gaps([*staged.kept, *laid], drives)
+        elif is_paved and not any(map(_is_street, staged.kept)):
+            laid += guessed_streets(staged.kept, drives, ground)
+        by_lot += Counter(one.kind for one in laid)
         marks = list(lane_marks(city.streets, drives))
         by_lot["Lane mark"] += len(marks)
+        added = [
+            with_kerb(one) if one.kind == "Sidewalk" else one for one in laid
+        ]
         added += marks
     things = dress_streets(
         [*staged.kept, *added], city.things, city.streets, drives, ground, seed
     )
+    changed |= things.moved
     added += things.structures
     for thing in city.things:
         if thing.source in things.sources:

@@ -198,6 +198,7 @@ class ImportedRoad:
         keeps_left: whether its traffic keeps left.
         limits: pairs of start and value of a speed limit [m, m/s].
         things: beside it.
+        spans: `bridge` or `tunnel` for each of them that the file has on it.
     """
 
     name: str
@@ -211,6 +212,7 @@ class ImportedRoad:
     keeps_left: bool = False
     limits: tuple[tuple[float, float], ...] = ()
     things: tuple[Thing, ...] = field(default=())
+    spans: tuple[str, ...] = ()
 
     def reference(self, s: np.ndarray, inside: np.ndarray) -> np.ndarray:
         """Returns (N, 5) x, y, z, heading and roll of the reference line.

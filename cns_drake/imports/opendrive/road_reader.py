@@ -36,6 +36,7 @@ _KNOWN = frozenset(
         "OpenDRIVE",
         "arc",
         "border",
+        "bridge",
         "center",
         "connection",
         "cornerLocal",
@@ -74,6 +75,7 @@ _KNOWN = frozenset(
         "spiral",
         "successor",
         "superelevation",
+        "tunnel",
         "type",
         "width",
     )
@@ -208,6 +210,11 @@ def _road(
         keeps_left=element.text("rule", "RHT").upper() == "LHT",
         limits=tuple(_limits(element)),
         things=tuple(read_things(element, name, faults)),
+        spans=tuple(
+            one.tag
+            for tag in ("bridge", "tunnel")
+            for one in element.all("objects", tag)
+        ),
     )
 
 

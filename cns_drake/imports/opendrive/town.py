@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -143,6 +143,7 @@ def _build(
     surface = RoadHeights(ground)
     marks: list[Structure] = []
     if dressed:
+        _count_spans(roads, {band.road.name for band in raised}, faults)
         marks += road_marks("marks", ground, surface.heights)
         marks += road_marks("bridge_marks", raised)
     progress(
@@ -194,6 +195,25 @@ def _build(
         _kinds(roads, things, decks, marks, generated),
         faults,
     )
+
+
+def _count_spans(
+    roads: RoadMap, raised: Set[str], faults: ImportFaults
+) -> None:
+    """Counts the bridges and tunnels of a file that are not built.
+
+    Args:
+        roads: of the file.
+        raised: names of the roads that pass over others on decks.
+        faults: takes the counts.
+    """
+    for road in roads.roads:
+        for span in road.spans:
+            if span == "tunnel":
+                faults.add("tunnel, its road left open", road.name)
+            elif road.name not in raised:
+                kind = "bridge over no other road, laid on the ground"
+                faults.add(kind, road.name)
 
 
 def _kerb(bands: Sequence[LaneBand]) -> float:

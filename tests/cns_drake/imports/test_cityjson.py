@@ -8,6 +8,8 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.imports.cityjson import read_cityjson
+from cns_drake.imports.free_space import find_free_space
+from cns_drake.imports.import_ground import ground_of
 from cns_drake.imports.import_structures import import_structures
 
 ORIGIN = np.array([85000.0, 446000.0, 3.0])
@@ -387,3 +389,31 @@ def test_coordinates_beyond_the_area_of_their_system_are_counted(tmp_path):
         counts = {kind: count for kind, count, _ in found.faults.rows()}
         kind = "coordinates beyond the area of their reference system"
         assert counts.get(kind, 0) == number
+
+
+def test_a_bridge_stands_above_the_ground(tmp_path):
+    """A road, houses on both sides, and a deck 6 m above them all."""
+    city = CityWriter()
+    for x in (-40.0, -20.0, 10.0, 30.0):
+        for y in (-20.0, 10.0):
+            city.box(f"house{x}{y}", x, y, (10.0, 10.0, 9.0), z=1.0)
+    deck = city.box_faces(-5, -30, 7.0, (10, 60, 1))
+    tube = city.box_faces(-60, -2, -9.0, (120, 4, 3))
+    for name, kind, faces in (
+        ("deck", "Bridge", deck), ("tube", "Tunnel", tube)
+    ):  # fmt: skip
+        solid = {"type": "Solid", "lod": 2, "boundaries": [faces]}
+        city.add(name, kind, solid)
+    _, found = structures(city.write(tmp_path / "city.json"))
+    for name, low, high in (("deck", 7.0, 8.0), ("tube", -9.0, -6.0)):
+        z = found[name].triangles[..., 2]
+        assert (z.min(), z.max()) == pytest.approx((low, high))
+        assert found[name].structure.semantic_class == "other-structure"
+    xy = np.array([[0.0, 0.0], [0.0, 25.0], [-30.0, 0.0]])
+    ground = ground_of(list(found.values()), below_bridges=True)
+    np.testing.assert_allclose(ground.height(xy), 1.0, atol=1e-9)
+    # A car passes below the deck.
+    space = find_free_space(list(found.values()), ground)
+    assert space.clearance_at(np.array([[0.0, 0.0]])) > 2.5
+    alone = ground_of([found["deck"]], below_bridges=True)
+    np.testing.assert_allclose(alone.height(xy[:1]), 7.0)

@@ -112,3 +112,24 @@ def test_a_road_over_another_is_a_bridge(tmp_path):
     ]
     assert all(one.disjoint(below) for one in walls)
     assert all(one.disjoint(box(-5, -20, 5, 20)) for one in walls)
+
+
+def test_bridges_and_tunnels_that_are_not_built_are_counted(tmp_path):
+    rise = cubic("elevation", 0, 6.0, 0, 0, 0, "s")
+    spans = "".join(
+        f'<{tag} id="{tag}" s="90" length="20" type="concrete"/>'
+        for tag in ("bridge", "tunnel")
+    )
+    more = f"<objects>{spans}</objects>"
+    path = write_roads(
+        tmp_path / "a.xodr",
+        straight("1", -100, 0, 100, 0, more=more),
+        straight("2", 0, -100, 0, 100, elevation=rise, more=more),
+    )
+    rows = build_town(path, 0, dressed=True).faults.rows()
+    assert {kind: number for kind, number, _ in rows} == {
+        "tunnel, its road left open": 2,
+        # Road 2 has a deck above road 1.
+        "bridge over no other road, laid on the ground": 1,
+    }
+    assert not build_town(path, 0).faults.rows()

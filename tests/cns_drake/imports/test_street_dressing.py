@@ -296,3 +296,33 @@ def test_terrain_of_a_dense_city_is_paved_by_default(tmp_path):
         (before,) = (o for o in staged.kept if o.kind == "TINRelief")
         same = terrain.structure.model.parts == before.structure.model.parts
         assert same is is_told
+
+
+def test_trees_on_carriageways_and_kerbs_are_moved_beside_them(tmp_path):
+    osm = OsmWriter()
+    write_street(osm, sidewalk="both")
+    crossing = [osm.node(10, -40), osm.node(10, 40)]
+    osm.way_of(crossing, highway="residential", width="8")
+    places = {
+        "lane": (30, 3.5), "kerb": (-50, -4.6), "verge": (60, 7.0),
+        "corner": (12, 4.2), "wall": (70, 11.0),
+    }  # fmt: skip
+    numbers = {
+        name: osm.node(*place, natural="tree", height="7")
+        for name, place in places.items()
+    }
+    city = read(osm, tmp_path)
+    found = dressed(city)
+    moved = {old.structure.name: (old, new) for old, new in found.moved.items()}
+    for name, y in (("lane", WIDTH / 2 + 0.6), ("kerb", -WIDTH / 2 - 0.6)):
+        old, new = moved.pop(f"tree_n{numbers[name]}")
+        expected = origin(city) + np.array([places[name][0], y])
+        np.testing.assert_allclose(new.structure.xyz[:2], expected, atol=0.01)
+        offset = np.subtract(new.structure.xyz, old.structure.xyz)
+        np.testing.assert_allclose(
+            new.triangles - old.triangles,
+            np.broadcast_to(offset, new.triangles.shape),
+            atol=1e-9,
+        )
+    # Beside the one street is on the other one.
+    assert not moved
