@@ -60,6 +60,8 @@ def lanes_of_streets(
         for street, line in zip(streets, lines, strict=True)
         if line.dwithin(paths, _WITHIN)
     ]
+    if not near:
+        return None
     walks = StreetWalkways(
         near,
         places.paths,

@@ -251,6 +251,21 @@ def test_no_lane_without_a_round_trip(tmp_path):
     assert found is None
 
 
+def test_no_lanes_without_streets_near_the_drives(tmp_path):
+    city = import_openstreetmap(write_blocks(tmp_path / "a.osm"), None)
+    drive = Drive(ROUTE + 5000.0, ROUTE + 5000.0)
+    for streets in ((), city.streets):
+        found = lanes_of_streets(
+            streets,
+            city.street_places,
+            city.structures,
+            (),
+            [drive],
+            DriveOn.RIGHT,
+        )
+        assert found is None
+
+
 def boxes(places, yaw, size):
     c, s = np.cos(yaw), np.sin(yaw)
     reach = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)]) * np.array(size) / 2
