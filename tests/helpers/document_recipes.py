@@ -475,15 +475,15 @@ RECIPES = {
         after=("start a city",),
         prints=("stress/town_01", "AUC"),
     ),
-    "asking family": Recipe(
+    "query family": Recipe(
         "base: riverside_02",
         changes=(("riverside_02", "town/sequence_02.yaml"), ("1, 2, 3", "1")),
-        file="asking.yaml",
+        file="queries.yaml",
     ),
     "other cities": Recipe(
-        ".venv/bin/cns-drake generate --vary asking.yaml",
+        ".venv/bin/cns-drake generate --vary queries.yaml",
         changes=(("--vary", "--frames 3 --vary"),),
-        after=("asking family", "start a city"),
+        after=("query family", "start a city"),
         prints=("family/town_02_c1_m000_s0",),
         makes=("family/cities/town_c1/stage_02.sdf",),
     ),
