@@ -42,6 +42,14 @@ def cities_of_this_run(tmp_path_factory, pytestconfig):
         yield
 
 
+@pytest.fixture
+def unrendered_figures(monkeypatch):
+    """See `studies.leave_figures_unrendered`."""
+    from helpers.studies import leave_figures_unrendered
+
+    leave_figures_unrendered(monkeypatch)
+
+
 @pytest.fixture(scope="session")
 def small_map(tmp_path_factory):
     """Folder of a map that loads at once, with stages 01 and 04."""

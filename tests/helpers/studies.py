@@ -4,6 +4,10 @@ Tests of `cns_drake.base.jobs` cover other processes, which would only slow
 these tests.
 """
 
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
 from cns_drake.base.jobs.job_process import nothing_left
 from cns_drake.base.jobs.step import Reporter
 from evaluation.paper import reference_for
@@ -35,6 +39,19 @@ def report(recordings, output, methods=None, protocol=PAPER_PROTOCOL):
     return assemble(
         found, output, methods, protocol=protocol, reference=reference
     )
+
+
+def leave_figures_unrendered(patch):
+    """Has figures made but not rendered, which takes half of a study's time.
+
+    For tests of other results than what figures show.
+    """
+
+    def write(figure, file, **options):
+        Path(file).write_text("a figure")
+
+    patch.setattr(Figure, "draw_without_rendering", lambda figure: None)
+    patch.setattr(Figure, "savefig", write)
 
 
 def report_files(output):

@@ -11,7 +11,10 @@ from cns_drake.city.generation.generate import generate_city
 from cns_drake.command_line.cli import app
 from evaluation.command_line.cli import app as evaluation_app
 
-pytestmark = pytest.mark.slow
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.usefixtures("unrendered_figures"),
+]
 
 # Members and their control have scenario files; the query drive has none.
 RIDE, IMU = {"roughness": "C"}, {"rate": 100}

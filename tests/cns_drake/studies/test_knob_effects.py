@@ -1,5 +1,6 @@
 """Calibration: the pair as it is, and with each knob taken back."""
 
+from helpers import studies
 from helpers.small_city import write_small_city
 import pytest
 
@@ -8,6 +9,7 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.city.generation.generate import generate_city
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.studies.knob_effects import effect_lines, knob_effects
+from evaluation.study import trend_databases
 
 pytestmark = pytest.mark.slow
 
@@ -51,11 +53,18 @@ def town(tmp_path_factory):
     return folder
 
 
+@pytest.fixture(autouse=True)
+def in_this_process(monkeypatch):
+    monkeypatch.setattr(
+        trend_databases, "run_jobs", lambda jobs, cluster: studies.do(jobs)
+    )
+
+
 def test_each_knob_is_taken_back(town):
     effects = knob_effects(
         drive(town, "01", aside=0.6, frames=60),
         drive(town, "02", frames=60),
-        Cluster(num_workers=2),
+        Cluster(),
     )
     change = {e.title: e.points[0].tcr_sym for e in effects}
     as_it_is, centred, present, high, unchanged = change.values()
@@ -84,9 +93,9 @@ def test_absent_knobs_are_not_taken_back(town):
     stages.write_text(text.replace("absent: {a house: [office_001]}\n", "\n"))
     try:
         effects = knob_effects(
-            drive(town, "01", frames=30),
-            drive(town, "02", frames=30),
-            Cluster(num_workers=1),
+            drive(town, "01", frames=5),
+            drive(town, "02", frames=5),
+            Cluster(),
         )
     finally:
         stages.write_text(text)

@@ -207,6 +207,7 @@ def test_many_distracting_drives_have_twin_blocks(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unrendered_figures")
 def test_a_ladder_from_end_to_end(town, tmp_path, monkeypatch):
     runs = []
     monkeypatch.setattr(

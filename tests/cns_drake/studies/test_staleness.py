@@ -12,7 +12,11 @@ from cns_drake.base.jobs.cluster import Cluster
 from cns_drake.studies import reproduction
 from evaluation.study import chosen_methods
 
-pytestmark = pytest.mark.slow
+pytestmark = [
+    pytest.mark.slow,
+    # The tests ask which figures are made, not what they show.
+    pytest.mark.usefixtures("unrendered_figures"),
+]
 
 DRIVES = {"town_01", "town_04", "town_01_stage_04"}
 PAGES = {"town_01", "town_04"}

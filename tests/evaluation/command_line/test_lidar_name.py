@@ -37,6 +37,7 @@ def test_pairs(capsys, roofs, command):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unrendered_figures")
 def test_folders(capsys, roofs, tmp_path):
     output = tmp_path / "out"
     report = ["report", roofs, "--output", output, "--no-costs", "--jobs", "1"]

@@ -18,6 +18,7 @@ from evaluation.study.study_layout import StudyFiles
 pytestmark = pytest.mark.slow
 
 
+@pytest.mark.usefixtures("unrendered_figures")
 def test_costs_in_the_report(tmp_path, monkeypatch):
     # A clock that advances by 1 ms whenever it is read.
     ticks = iter(range(0, 10**12, 10**6))

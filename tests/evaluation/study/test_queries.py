@@ -22,7 +22,9 @@ def report(tmp_path_factory):
     drive(folder / "riverside_02", "02", "b", city="riverside")
     drive(folder / "riverside_01_stage_02", "02", "a", city="riverside")
     output = tmp_path_factory.mktemp("report")
-    studies.report(folder, output)
+    with pytest.MonkeyPatch.context() as patch:
+        studies.leave_figures_unrendered(patch)
+        studies.report(folder, output)
     return output
 
 

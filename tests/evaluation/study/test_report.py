@@ -222,6 +222,7 @@ def test_finished_jobs_start_no_process(recordings, report, monkeypatch):
         (report / "aside").rename(report / "figures/routes_metropolis.webp")
 
 
+@pytest.mark.usefixtures("unrendered_figures")
 def test_own_method_beside_the_others(recordings, tmp_path, monkeypatch):
     # Other tests do not find the method registered.
     monkeypatch.setattr(method, "_METHODS", dict(method._METHODS))
@@ -243,6 +244,7 @@ def test_own_method_beside_the_others(recordings, tmp_path, monkeypatch):
         assert "counting" in (tmp_path / "out" / name).read_text()
 
 
+@pytest.mark.usefixtures("unrendered_figures")
 def test_report_of_a_single_stage(tmp_path):
     drive(tmp_path / "in" / "metropolis_01", "01", "a")
     path = studies.report(tmp_path / "in", tmp_path / "out")
@@ -267,6 +269,7 @@ def test_report_of_a_single_stage(tmp_path):
         assert read_csv(tmp_path / "out" / f"{name}.csv") == []
 
 
+@pytest.mark.usefixtures("unrendered_figures")
 def test_a_city_of_one_s_own_without_a_control(tmp_path):
     for stage, route in (("01", "a"), ("02", "b")):
         drive(tmp_path / "in" / f"town_{stage}", stage, route, city="town")
@@ -287,6 +290,7 @@ def test_a_city_of_one_s_own_without_a_control(tmp_path):
     assert not (path.parent / "figures" / "survival.png").exists()
 
 
+@pytest.mark.usefixtures("unrendered_figures")
 def test_several_cities(tmp_path):
     for stage in ("01", "02"):
         drive(

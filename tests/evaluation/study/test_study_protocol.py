@@ -11,7 +11,10 @@ import pytest
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.study.chosen_methods import choose_methods
 
-pytestmark = pytest.mark.slow
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.usefixtures("unrendered_figures"),
+]
 
 SOLID = tuple(one for one in choose_methods() if one.name == "solid")
 
