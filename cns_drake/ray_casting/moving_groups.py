@@ -30,6 +30,16 @@ class KnownPoses(NamedTuple):
     rows: Mapping[FrameId, int]
     X_WFs: np.ndarray
 
+    def find(
+        self, frame: FrameId, calc_X_WF: Callable[[FrameId], RigidTransform]
+    ) -> RigidTransform:
+        """Returns the pose of a frame, which is calculated if it is not
+        known."""
+        row = self.rows.get(frame)
+        if row is None:
+            return calc_X_WF(frame)
+        return RigidTransform(self.X_WFs[row])
+
 
 class Ball(NamedTuple):
     """A ball in the world.

@@ -14,7 +14,7 @@ from pydrake.perception import PointCloud
 from pydrake.systems.framework import Context, LeafSystem, ValueProducer
 
 from cns_drake.ray_casting.group_motion import Motion
-from cns_drake.ray_casting.moving_groups import Ball, KnownPoses
+from cns_drake.ray_casting.moving_groups import NOTHING_KNOWN, Ball, KnownPoses
 from cns_drake.scene.structure_table import MAX_INSTANCE, StructureTable
 from cns_drake.sensors.beam_pattern import POINT_DTYPE, BeamPattern, Beams
 from cns_drake.sensors.measurement import IDEAL, MeasurementModel, Returns
@@ -72,6 +72,8 @@ class Lidar(LeafSystem):
 
     `frame_poses` (abstract, an (M, 4, 4) array) has poses X_WF that the
     SceneGraph has as well; a LiDAR takes many of them from an array faster.
+    If all frames have theirs there, the SceneGraph computes none (see
+    `FramePoses`).
 
     Drake cannot cast rays, so the system reads shapes and poses from the
     QueryObject and casts on its own hierarchy, whose changed parts are built
@@ -246,11 +248,13 @@ class Lidar(LeafSystem):
         if self._frame_poses is None:
             seen.update(query_object, revision, motions)
         else:
-            known = KnownPoses(
-                self._posed_frames, self._frame_poses.Eval(context)
-            )
-            ball = self._calc_ball(context)
+            known, ball = self._known_poses(context), self._calc_ball(context)
             seen.update(query_object, revision, motions, known, ball)
+
+    def _known_poses(self, context: Context) -> KnownPoses:
+        if self._frame_poses is None:
+            return NOTHING_KNOWN
+        return KnownPoses(self._posed_frames, self._frame_poses.Eval(context))
 
     def _calc_ball(self, context: Context) -> Ball:
         """Returns the ball in which beams can meet geometry."""
@@ -369,9 +373,8 @@ class Lidar(LeafSystem):
     def _pose_prerequisites(self) -> set:
         if self._sweep is not None:
             return {self._sweep.ticket()}
-        if self._velocities is not None:
-            return {self._geometry_query.ticket(), self._velocities.ticket()}
-        return {self._geometry_query.ticket()}
+        ports = (self._geometry_query, self._velocities, self._frame_poses)
+        return {port.ticket() for port in ports if port is not None}
 
     def _scan_prerequisites(self) -> set:
         prerequisites = {
@@ -394,7 +397,9 @@ class Lidar(LeafSystem):
             sweep = self._sweep.Eval(context).of_frame(self._X_PS)
             return sweep.p_WPset, sweep.R_WPset
         query_object = self._geometry_query.Eval(context)
-        X_WP = query_object.GetPoseInWorld(self._parent_frame_id)
+        X_WP = self._known_poses(context).find(
+            self._parent_frame_id, query_object.GetPoseInWorld
+        )
         X_WS = X_WP @ self._X_PS
         motion = self._calc_motions(context).get(self._parent_frame_id)
         if motion is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from operator import is_
 from typing import NamedTuple
 
@@ -104,18 +104,21 @@ class SeenGeometry:
         Raises:
             InputError: see `GeometryReader.read`.
         """
+        inspector = query_object.inspector()
+
+        def calc_X_WF(frame: FrameId) -> RigidTransform:
+            return known.find(frame, query_object.GetPoseInWorld)
+
         if self.scene is None or revision is None or revision != self._revision:
-            self._read(query_object.inspector())
-        if self.scene is None or not self._is_built(query_object):
-            self._build(query_object)
+            self._read(inspector)
+        if self.scene is None or not self._is_built(calc_X_WF):
+            self._build(inspector.world_frame_id(), calc_X_WF)
             is_placed = not motions and known is NOTHING_KNOWN
         else:
             is_placed = False
         assert self.scene is not None
         if not is_placed:
-            self.scene.set_frame_poses(
-                query_object.GetPoseInWorld, motions, known, seen
-            )
+            self.scene.set_frame_poses(calc_X_WF, motions, known, seen)
         self._revision = revision
 
     def materials(self, *, is_wet: bool) -> Materials:
@@ -143,7 +146,7 @@ class SeenGeometry:
                 )
         self._geometries = self._reader.read(inspector, hidden)
 
-    def _is_built(self, query_object: QueryObject) -> bool:
+    def _is_built(self, calc_X_WF: Callable[[FrameId], RigidTransform]) -> bool:
         """Returns whether the scene is up to date."""
         if self._built is not self._geometries and (
             len(self._built) != len(self._geometries)
@@ -151,11 +154,13 @@ class SeenGeometry:
         ):
             return False
         return all(
-            X_WA.IsExactlyEqualTo(query_object.GetPoseInWorld(frame_id))
+            X_WA.IsExactlyEqualTo(calc_X_WF(frame_id))
             for frame_id, X_WA in self._X_WAs.items()
         )
 
-    def _build(self, query_object: QueryObject) -> None:
+    def _build(
+        self, world: FrameId, calc_X_WF: Callable[[FrameId], RigidTransform]
+    ) -> None:
         names = [geometry.structure for geometry in self._geometries]
         table = self._sight.structures.completed(names)
         self._table, self._materials = table, None
@@ -164,18 +169,17 @@ class SeenGeometry:
             [moving_id(table[n].semantic_class) for n in names], np.uint16
         )
         self.instance = np.array([table[n].instance for n in names], np.uint16)
-        world = query_object.inspector().world_frame_id()
         anchored = self._sight.anchored_frames | {world}
         # Copies: Drake's references go on changing.
         self._X_WAs = {
-            frame_id: RigidTransform(query_object.GetPoseInWorld(frame_id))
+            frame_id: RigidTransform(calc_X_WF(frame_id))
             for frame_id in {g.frame_id for g in self._geometries}
             if frame_id in anchored and frame_id != world
         }
         self.scene = RayCastingScene(
             self._geometries,
             anchored,
-            query_object.GetPoseInWorld,
+            calc_X_WF,
             num_threads=self._sight.num_threads,
             previous=self.scene,
         )

@@ -15,6 +15,7 @@ from cns_drake.scenarios.sensor_making import (
 )
 from cns_drake.scenarios.weather_config import WeatherConfig
 from cns_drake.scene.world import World
+from cns_drake.sensors.frame_poses import FramePoses
 from cns_drake.sensors.lidar import Lidar
 from cns_drake.sensors.lidar_adding import add_lidar
 from cns_drake.traffic.traffic_adding import connect_traffic
@@ -28,6 +29,7 @@ def apply_lidar_config(
     builder: DiagramBuilder,
     world: World,
     trajectory: Trajectory,
+    poses: FramePoses,
     *,
     name: str,
     weather: WeatherConfig = CLEAR,
@@ -44,6 +46,7 @@ def apply_lidar_config(
         builder: of the Diagram that holds the world's SceneGraph.
         world: the stage with the vehicle.
         trajectory: of the vehicle.
+        poses: of all frames that have geometry.
         name: of the LiDAR.
         weather: of the drive.
         traffic: other moving objects.
@@ -69,11 +72,12 @@ def apply_lidar_config(
         unseen=[plant.get_body(k) for k in plant.GetBodyIndices(world.vehicle)],
         with_sweep=distorts,
         moving_bodies=moving,
-        posed_frames=None if traffic is None else traffic.moving_frames,
+        posed_frames=poses.rows,
         structures=world.structures,
         anchored_frames=world.anchored_frames(),
         num_threads=num_threads,
     )
+    builder.Connect(poses.get_output_port(), lidar.GetInputPort("frame_poses"))
     if traffic is not None:
         connect_traffic(builder, traffic, lidar, distorts)
     if distorts:

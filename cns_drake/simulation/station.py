@@ -24,6 +24,7 @@ from cns_drake.scenarios.recording_schedule import (
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.sensor_making import sensor_pose
 from cns_drake.scene.world import World
+from cns_drake.sensors.frame_poses import FramePoses
 from cns_drake.sensors.odometry import add_odometry
 from cns_drake.simulation.imu_applying import apply_imu_config
 from cns_drake.simulation.lidar_applying import apply_lidar_config
@@ -50,11 +51,12 @@ def make_station(
 
     Systems: `scene_graph` holds the stage and the vehicle, `vehicle_motion`
     prescribes the vehicle's pose, `geometry_pose` passes it on to the
-    SceneGraph; `traffic` moves other objects; a `Lidar` for each entry of
-    `scenario.lidars` under its name (with a `<lidar>_sweep` if it moves while
-    it turns), an accelerometer and a gyroscope (or `imu`, if the IMU has a
-    rate or errors of its own), and `odometry` measure; `mcap_recorder` and
-    `meshcat_recorder` record the measurements.
+    SceneGraph; `traffic` moves other objects, and `frame_poses` has the poses
+    of all frames; a `Lidar` for each entry of `scenario.lidars` under its name
+    (with a `<lidar>_sweep` if it moves while it turns), an accelerometer and a
+    gyroscope (or `imu`, if the IMU has a rate or errors of its own), and
+    `odometry` measure; `mcap_recorder` and `meshcat_recorder` record the
+    measurements.
 
     Exported output ports: `<lidar>_scan`, `specific_force`,
     `angular_velocity`, `odometry`, `geometry_query`; `imu_samples` of such
@@ -115,6 +117,18 @@ def make_station(
             structures=world.structures,
             turn=frame_period(scenario.lidars),
         )
+    poses = builder.AddNamedSystem(
+        "frame_poses",
+        FramePoses(plant, None if moving is None else moving.moving_frames),
+    )
+    builder.Connect(
+        motion.GetOutputPort("body_poses"), poses.GetInputPort("body_poses")
+    )
+    if moving is not None:
+        builder.Connect(
+            moving.GetOutputPort("frame_poses"),
+            poses.GetInputPort("more_poses"),
+        )
     # Measurements by name, which is also the name of the exported port.
     measured = {"geometry_query": scene_graph.get_query_output_port()}
     for name, config in scenario.lidars.items():
@@ -123,6 +137,7 @@ def make_station(
             builder,
             world,
             trajectory,
+            poses,
             name=name,
             weather=scenario.weather,
             traffic=moving,

@@ -171,15 +171,18 @@ def connect_traffic(
         builder: of the diagram.
         traffic: the traffic.
         lidar: labels moving bodies as moving; made with the `moving_frames` of
-            `traffic` as `posed_frames`.
+            `traffic` as `posed_frames`, unless its port `frame_poses` is
+            connected already.
         goes_on: whether traffic moves during its turn; then it was made with
             them as `moving_bodies`, too.
     """
     wanted = ["moving_instances"]
     wanted += ["frame_poses"] if lidar.HasInputPort("frame_poses") else []
     wanted += ["body_spatial_velocities"] if goes_on else []
-    for port in wanted:
-        builder.Connect(traffic.GetOutputPort(port), lidar.GetInputPort(port))
+    for name in wanted:
+        port = lidar.GetInputPort(name)
+        if not builder.IsConnectedOrExported(port):
+            builder.Connect(traffic.GetOutputPort(name), port)
 
 
 def _register(
