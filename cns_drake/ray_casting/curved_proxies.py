@@ -56,11 +56,10 @@ def circumscribe(surface: CurvedSurface) -> TriangleSurface:
 
 
 class NearCurvedShapes:
-    """Finds the rays that start near curved shapes of groups."""
+    """Finds the rays that start near curved shapes of groups that stay."""
 
     def __init__(self, groups: Sequence[RayGroup]):
-        """Takes the curved shapes of groups."""
-        self._groups = groups
+        """Takes the curved shapes of groups, which are placed."""
         rows, X_LGs, sizes = [], [], []
         for row, group in enumerate(groups):
             for _, X_LG, surface in group.members:
@@ -81,18 +80,17 @@ class NearCurvedShapes:
         self._stretches = np.array(
             [np.linalg.norm(group.X_FL[:3, :3], 2) for group in groups]
         )
+        self._X_OLs = np.tile(np.eye(4), (len(groups), 1, 1))
+        for row, group in enumerate(groups):
+            self._X_OLs[row, :3] = group.X_OL
         self._near: _Sorted | None = None
         # The box in O whose shapes are placed.
         self._box = (np.full(3, np.inf), np.full(3, -np.inf))
 
-    def forget_places(self) -> None:
-        """Marks the shapes to be placed anew with their groups."""
-        self._near = None
-
     def contain(self, p_OSset: np.ndarray) -> np.ndarray:
         """Returns which of (K, 3) places are near a shape, (K,) bool.
 
-        A place is near if the shape's polyhedron sweeps it during the turn.
+        A place is near if it is in the shape's polyhedron.
         """
         result = np.zeros(len(p_OSset), bool)
         if len(self._rows) and len(p_OSset):
@@ -109,54 +107,26 @@ class NearCurvedShapes:
 
     def _place(self) -> _Sorted:
         """Returns the shapes that reach into the box, at their places."""
-        in_sight = np.array([group.in_sight for group in self._groups])
-        seen = [k for k, group in enumerate(self._groups) if group.in_sight]
-        X_OLs = np.tile(np.eye(4), (len(self._groups), 1, 1))
-        X_OLs[seen, :3] = np.reshape(
-            [self._groups[k].X_OL for k in seen], (-1, 3, 4)
-        )
-        shapes = np.flatnonzero(in_sight[self._rows])
-        rows = self._rows[shapes]
-        places = (X_OLs[rows] @ self._p_LGs[shapes])[:, :3, 0]
-        reaches = self._stretches[rows] * self._sizes[shapes].sum(axis=1)
-        travels = self._travels(rows, places, reaches)
-        reaches += travels
+        places = (self._X_OLs[self._rows] @ self._p_LGs)[:, :3, 0]
+        reaches = self._stretches[self._rows] * self._sizes.sum(axis=1)
         inside = np.flatnonzero(
             (places + reaches[:, None] >= self._box[0]).all(axis=1)
             & (places - reaches[:, None] <= self._box[1]).all(axis=1)
         )
-        shapes, rows = shapes[inside], rows[inside]
-        X_GOs = self._X_GLs[shapes] @ np.linalg.inv(X_OLs[rows])
-        # This norm bounds the largest singular value.
-        shrink = np.linalg.norm(X_GOs[:, :3, :3], axis=(1, 2))
+        X_LOs = np.linalg.inv(self._X_OLs[self._rows[inside]])
+        X_GOs = self._X_GLs[inside] @ X_LOs
         places, reaches = places[inside], reaches[inside]
-        sizes, travels = self._sizes[shapes], travels[inside]
+        sizes = self._sizes[inside]
         order = np.argsort(places[:, 0] - reaches)
         return _Sorted(
             places[order],
             reaches[order],
             X_GOs[order],
             sizes[order, 0],
-            (sizes[:, 1] + shrink * travels)[order],
+            sizes[order, 1],
             (places[:, 0] - reaches)[order],
             2.0 * reaches.max(initial=0.0),
         )
-
-    def _travels(
-        self, rows: np.ndarray, places: np.ndarray, reaches: np.ndarray
-    ) -> np.ndarray:
-        """Returns the greatest motion of groups' shapes during a turn [m]."""
-        ways, angles = np.zeros((2, len(self._groups)))
-        p_OFs = np.zeros((len(self._groups), 3))
-        for row, group in enumerate(self._groups):
-            if group.motion is None or not group.in_sight:
-                continue
-            angle = np.linalg.norm(group.motion.w) * group.motion.duration
-            angles[row] = min(float(angle), 2.0)
-            ways[row] = np.linalg.norm(group.motion.v) * group.motion.duration
-            p_OFs[row] = group.X_OL @ np.linalg.inv(group.X_FL)[:, 3]
-        arms = np.linalg.norm(places - p_OFs[rows], axis=1) + reaches
-        return ways[rows] + angles[rows] * arms
 
 
 class _Sorted(NamedTuple):

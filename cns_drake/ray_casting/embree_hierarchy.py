@@ -19,7 +19,7 @@ from cns_drake.ray_casting.embree_packets import (
 )
 from cns_drake.ray_casting.embree_placing import place_instances
 from cns_drake.ray_casting.embree_primitives import ALL, Primitives
-from cns_drake.ray_casting.ray_groups import Member, RayGroup
+from cns_drake.ray_casting.ray_groups import RayGroup
 from cns_drake.ray_casting.rays import Hits, Rays
 
 
@@ -47,7 +47,7 @@ class EmbreeHierarchy:
     def __init__(
         self,
         groups: Sequence[RayGroup],
-        merge: Callable[[Sequence[Member]], Iterable[Primitives]],
+        merge: Callable[[RayGroup], Iterable[Primitives]],
         num_threads: int = 1,
         previous: EmbreeHierarchy | None = None,
     ):
@@ -55,8 +55,7 @@ class EmbreeHierarchy:
 
         Args:
             groups: all groups, placed.
-            merge: makes primitives from the members of a group; it may make
-                none.
+            merge: makes primitives of a group; it may make none.
             num_threads: number of threads that share the rays of a cast.
             previous: a hierarchy of the same primitives, whose scenes of
                 unchanged groups are reused.
@@ -86,7 +85,7 @@ class EmbreeHierarchy:
             if built is None and group.is_copy:
                 built = copied.get(id(group.members[0][2]))
             if built is None:
-                built = self._build(list(merge(group.members)))
+                built = self._build(list(merge(group)))
                 if group.is_copy:
                     copied[id(group.members[0][2])] = built
             elif built.scene:

@@ -12,7 +12,7 @@ from pydrake.math import RigidTransform
 
 from cns_drake.ray_casting import embree
 from cns_drake.ray_casting.curved_proxies import circumscribe
-from cns_drake.ray_casting.ray_groups import Member
+from cns_drake.ray_casting.ray_groups import Member, RayGroup
 from cns_drake.scene.surface_merging import merge_triangles
 from cns_drake.scene.surfaces import (
     CapsuleSurface,
@@ -50,21 +50,37 @@ class Primitives(NamedTuple):
     mask: int = SOLID
 
 
-def merge_flat(members: Sequence[Member]) -> Iterator[Primitives]:
-    """Yields the triangles of surfaces, and of polyhedra about curved ones."""
+def merge_first(group: RayGroup) -> Iterator[Primitives]:
+    """Yields the primitives of a group on which all rays are cast.
+
+    They are its triangles, and polyhedra about its curved shapes; or the curved
+    shapes themselves, if the group can move.
+    """
+    members = group.members
     flat = [
         (index, X_LG, surface)
         for index, X_LG, surface in members
         if isinstance(surface, TriangleSurface)
     ]
+    if flat:
+        yield _as_primitives(flat, SOLID)
+    if group.frame_id is not None:
+        yield from merge_curved(members)
+        return
     curved = [
         (PROXY_OWNER, X_LG, circumscribe(surface))
         for _, X_LG, surface in members
         if not isinstance(surface, TriangleSurface | HalfSpaceSurface)
     ]
-    for surfaces, mask in ((flat, SOLID), (curved, PROXY)):
-        if surfaces:
-            yield _as_primitives(surfaces, mask)
+    if curved:
+        yield _as_primitives(curved, PROXY)
+
+
+def merge_second(group: RayGroup) -> Iterator[Primitives]:
+    """Yields the primitives of a group on which few rays are cast: its curved
+    shapes, if it cannot move."""
+    if group.frame_id is None:
+        yield from merge_curved(group.members)
 
 
 def _as_primitives(

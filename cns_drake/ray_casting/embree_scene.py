@@ -3,9 +3,10 @@
 Curved shapes are not tessellated: Embree intersects spheres, cones, discs
 and rounded segments exactly (in float32), and an ellipsoid is an instance of
 the unit sphere. A curved shape in a scene slows down all its rays by a third
-(measured), even those that meet only triangles. Curved shapes therefore have
-their own hierarchy. Polyhedra about them in the hierarchy of triangles select
-the few rays to cast on it.
+(measured), even those that meet only triangles. Curved shapes that stay
+therefore have a second hierarchy. Polyhedra about them in the first one select
+the few rays to cast on it. Those that move are instances, which few rays enter:
+they are in the first hierarchy themselves.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ from cns_drake.ray_casting.embree_hierarchy import EmbreeHierarchy
 from cns_drake.ray_casting.embree_primitives import (
     PROXY_OWNER,
     SOLID,
-    merge_curved,
-    merge_flat,
+    merge_first,
+    merge_second,
 )
 from cns_drake.ray_casting.ray_groups import RayGroup
 from cns_drake.ray_casting.rays import Hits, Rays
@@ -46,54 +47,47 @@ class EmbreeScene:
         Raises:
             MemoryError: Embree cannot build it.
         """
-        flat, curved = None, None
+        first, second = None, None
         if previous is not None:
-            flat, curved = previous._flat, previous._curved
-        self._flat: EmbreeHierarchy = EmbreeHierarchy(
-            groups, merge_flat, num_threads, flat
+            first, second = previous._first, previous._second
+        self._first: EmbreeHierarchy = EmbreeHierarchy(
+            groups, merge_first, num_threads, first
         )
-        self._curved: EmbreeHierarchy = EmbreeHierarchy(
-            groups, merge_curved, 1, curved
+        self._second: EmbreeHierarchy = EmbreeHierarchy(
+            groups, merge_second, 1, second
         )
-        curved_groups = [groups[row] for row in self._curved.rows]
-        self._near_fixed = NearCurvedShapes(
-            [group for group in curved_groups if group.is_merged_world]
-        )
-        self._near_moving = NearCurvedShapes(
-            [group for group in curved_groups if not group.is_merged_world]
+        self._near = NearCurvedShapes(
+            [groups[row] for row in self._second.rows]
         )
 
     def place(self, rows: Collection[int]) -> None:
         """Moves groups to their `X_OL`."""
-        self._flat.place(rows)
-        self._curved.place(rows)
-        self._near_moving.forget_places()
+        self._first.place(rows)
 
     def cast_rays(self, rays: Rays, with_normals: bool) -> Hits:
         """Casts rays."""
-        hits = self._flat.cast(rays, with_normals=with_normals)
-        if not self._curved.rows:
+        hits = self._first.cast(rays, with_normals=with_normals)
+        if not self._second.rows:
             return hits
-        is_near = self._near_fixed.contain(rays.p_OSset)
-        is_near |= self._near_moving.contain(rays.p_OSset)
+        is_near = self._near.contain(rays.p_OSset)
         again = np.empty(len(hits.owner), np.int64)
         again = again[: _find_unsure(hits.owner, is_near, again)]
         if len(again):
             rest = rays.select(again, rays.max_ranges_of(again))
-            on_curved = self._curved.cast(rest, with_normals=with_normals)
+            in_second = self._second.cast(rest, with_normals=with_normals)
             # Nearer hits can only be in the other hierarchy.
-            reach = np.minimum(on_curved.ranges, rest.max_ranges)
-            on_flat = self._flat.cast(
+            reach = np.minimum(in_second.ranges, rest.max_ranges)
+            in_first = self._first.cast(
                 rest._replace(max_ranges=reach),
                 mask=SOLID,
                 with_normals=with_normals,
             )
-            is_flat = on_flat.owner >= 0
-            for result, flat, curved in zip(
-                hits, on_flat, on_curved, strict=True
+            is_first = in_first.owner >= 0
+            for result, first, second in zip(
+                hits, in_first, in_second, strict=True
             ):
-                curved[is_flat] = flat[is_flat]
-                result[again] = curved
+                second[is_first] = first[is_first]
+                result[again] = second
         return hits
 
 
@@ -104,7 +98,7 @@ def _find_unsure(
     """Fills in the rays that may meet curved shapes; returns how many.
 
     Args:
-        owner: (N,) of what each has met in the hierarchy of triangles.
+        owner: (N,) of what each has met in the first hierarchy.
         is_near: (K,) whether the origins, taken in turn, are near a shape.
         rows: (N,) to fill.
     """

@@ -34,8 +34,8 @@ from stages import (
 from cns_drake.ray_casting.embree_hierarchy import EmbreeHierarchy
 from cns_drake.ray_casting.embree_primitives import (
     SOLID,
-    merge_curved,
-    merge_flat,
+    merge_first,
+    merge_second,
 )
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.ray_casting.ray_groups import group_geometries
@@ -100,7 +100,7 @@ def benchmark(sequence: str, rounds: int, folder: Path) -> None:
         kept = _all_in_one(geometries, stands)
         for name, hierarchy in (
             ("limit (C), same shapes", kept),
-            ("limit (C), triangles only", scene._scene._flat),
+            ("limit (C), triangles only", scene._scene._first),
         ):
             variants[name] = _limit_variant(
                 limit, hierarchy, scene._p_WO, poses, d_S, reach
@@ -128,9 +128,9 @@ def _all_in_one(geometries, stands):
     for group in groups:
         group.place(np.zeros(3), still)
 
-    def merge(members):
-        solid = [part for part in merge_flat(members) if part.mask == SOLID]
-        return [*solid, *merge_curved(members)]
+    def merge(group):
+        solid = [part for part in merge_first(group) if part.mask == SOLID]
+        return [*solid, *merge_second(group)]
 
     return EmbreeHierarchy(groups, merge, 1)
 

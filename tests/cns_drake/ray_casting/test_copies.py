@@ -67,7 +67,7 @@ def make_scene(shapes, most, monkeypatch, **arguments):
 
 def scenes_of_copies(scene):
     """The Embree scene of each copy."""
-    hierarchy = scene._scene._flat
+    hierarchy = scene._scene._first
     return [
         hierarchy._built[row].scene
         for row, group in enumerate(hierarchy._groups)

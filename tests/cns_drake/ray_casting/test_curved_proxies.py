@@ -10,7 +10,6 @@ from cns_drake.ray_casting.curved_proxies import (
     NearCurvedShapes,
     circumscribe,
 )
-from cns_drake.ray_casting.group_motion import Motion
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.ray_casting.ray_groups import RayGroup
 from cns_drake.scene.perception_geometry import PerceptionGeometry
@@ -87,29 +86,13 @@ def test_nearness_of_many_shapes_is_that_of_each():
         member = (k, RigidTransform([0.1, 0.0, 0.2]), surface)
         group = RayGroup(FrameId.get_new_id(), X_FL, [member])
         group.place(np.array([1.0, 2.0, 3.0]), lambda frame, X=X_WF: X)
-        if k % 3 == 0:
-            group.motion = Motion(rng.normal(size=3), rng.normal(size=3), 0.3)
         groups.append(group)
-    places = rng.uniform(-12.0, 12.0, (500, 3))
+    places = rng.uniform(-10.0, 10.0, (3000, 3))
     near = NearCurvedShapes(groups)
     each = [NearCurvedShapes([group]).contain(places) for group in groups]
     expected = np.any(each, axis=0)
-    assert 50 < expected.sum() < 450
+    assert 100 < expected.sum() < 2000
     np.testing.assert_array_equal(near.contain(places), expected)
-
-
-def test_nearness_holds_for_all_of_a_turn():
-    """Points of a hull stay within reach while its frame moves."""
-    surface = SHAPES[3]
-    member = (0, RigidTransform([0.4, 0.3, 0.0]), surface)
-    group = RayGroup(FrameId.get_new_id(), np.eye(4), [member])
-    group.place(np.zeros(3), lambda frame: X_WG)
-    w, v = np.array([0.5, 2.0, 1.0]), np.array([9.0, 0.0, 1.0])
-    group.motion = Motion(w, v, 0.1)
-    corners = member[1].multiply(circumscribe(surface).p_GVset.T).T
-    near = NearCurvedShapes([group])
-    for X_OL in group.X_OL_at(np.linspace(0.0, 1.0, 5)):
-        assert near.contain(corners @ X_OL[:, :3].T + X_OL[:, 3]).all()
 
 
 @pytest.mark.parametrize(("excess", "expected"), [(-1e-6, True), (1e-6, False)])
