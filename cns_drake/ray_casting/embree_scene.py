@@ -11,7 +11,7 @@ they are in the first hierarchy themselves.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from cns_drake.ray_casting.embree_primitives import (
     merge_first,
     merge_second,
 )
+from cns_drake.ray_casting.moving_groups import Placed
 from cns_drake.ray_casting.ray_groups import RayGroup
 from cns_drake.ray_casting.rays import Hits, Rays
 
@@ -60,9 +61,9 @@ class EmbreeScene:
             [groups[row] for row in self._second.rows]
         )
 
-    def place(self, rows: Collection[int]) -> None:
-        """Moves groups to their `X_OL`."""
-        self._first.place(rows)
+    def place(self, placed: Placed) -> None:
+        """Moves groups to their places."""
+        self._first.place(placed)
 
     def cast_rays(self, rays: Rays, with_normals: bool) -> Hits:
         """Casts rays."""

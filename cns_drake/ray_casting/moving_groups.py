@@ -53,6 +53,33 @@ class Ball(NamedTuple):
     radius: float
 
 
+class Placed(NamedTuple):
+    """P groups of a scene that were placed anew.
+
+    Attributes:
+        rows: (P,) of the groups.
+        X_OLs: (P, 3, 4) their `X_OL`.
+        in_sight: (P,) whether each is in sight.
+        moves: (P,) whether each has a `motion`.
+    """
+
+    rows: np.ndarray
+    X_OLs: np.ndarray
+    in_sight: np.ndarray
+    moves: np.ndarray
+
+    @classmethod
+    def of(cls, groups: Sequence[RayGroup], rows: Sequence[int]) -> Placed:
+        """Returns groups as they are placed now."""
+        chosen = [groups[row] for row in rows]
+        return cls(
+            np.array(rows, int),
+            np.reshape([group.X_OL for group in chosen], (-1, 3, 4)),
+            np.array([group.in_sight for group in chosen], bool),
+            np.array([group.motion is not None for group in chosen], bool),
+        )
+
+
 NOTHING_KNOWN = KnownPoses({}, np.zeros((0, 4, 4)))
 EVERYWHERE = Ball(np.zeros(3), np.inf)
 
@@ -69,15 +96,21 @@ class MovingGroups:
         """
         self._groups = groups
         self._p_WO = p_WO
-        self._rows = [
-            row
-            for row, group in enumerate(groups)
-            if group.frame_id is not None
-        ]
+        self._rows = np.array(
+            [
+                row
+                for row, group in enumerate(groups)
+                if group.frame_id is not None
+            ],
+            int,
+        )
         moving = [groups[row] for row in self._rows]
         self._frames = [group.frame_id for group in moving]
         self._X_FLs = np.array([group.X_FL for group in moving])
+        # Groups have parts of this array, so that all are placed at once.
         self._X_OLs = np.array([group.X_OL for group in moving])
+        for group, X_OL in zip(moving, self._X_OLs, strict=True):
+            group.X_OL = X_OL
         self._radii = np.array([_radius_about_F(group) for group in moving])
         self._known: Mapping[FrameId, int] = NOTHING_KNOWN.rows
         self._known_rows = np.full(len(moving), -1)
@@ -90,7 +123,7 @@ class MovingGroups:
         motions: Mapping[FrameId, Motion] = NO_MOTIONS,
         known: KnownPoses = NOTHING_KNOWN,
         seen: Ball = EVERYWHERE,
-    ) -> list[int]:
+    ) -> Placed:
         """Sets `X_OL`, `motion` and `in_sight` of groups.
 
         Groups that are out of sight stay where they are, and so do those
@@ -103,10 +136,10 @@ class MovingGroups:
             seen: the ball in which rays can meet geometry.
 
         Returns:
-            The rows of the groups that were placed.
+            The groups that were placed.
         """
-        if not self._rows:
-            return []
+        if not len(self._rows):
+            return Placed.of(self._groups, ())
         frames = self._frames
         X_WFs = self._find_poses(calc_X_WF, known)
         X_OLs = (X_WFs @ self._X_FLs)[:, :3]
@@ -121,18 +154,18 @@ class MovingGroups:
         in_sight = _meets(seen, X_WFs[:, :3, 3], reaches)
         differs = (X_OLs != self._X_OLs).any(axis=(1, 2))
         differs |= moves | self._was_in_motion
-        placed = np.flatnonzero(
-            (in_sight & differs) | (in_sight != self._in_sight)
-        )
-        for k in placed:
+        shown = in_sight != self._in_sight
+        placed = np.flatnonzero((in_sight & differs) | shown)
+        self._X_OLs[placed] = X_OLs[placed]
+        for k in placed[(shown | moves | self._was_in_motion)[placed]]:
             group = self._groups[self._rows[k]]
-            group.X_OL = X_OLs[k]
             group.motion = motions[frames[k]] if moves[k] else None
             group.in_sight = bool(in_sight[k])
-        self._X_OLs[placed] = X_OLs[placed]
         self._was_in_motion[placed] = moves[placed]
         self._in_sight = in_sight
-        return [self._rows[k] for k in placed]
+        return Placed(
+            self._rows[placed], X_OLs[placed], in_sight[placed], moves[placed]
+        )
 
     def _find_poses(
         self,

@@ -6,12 +6,13 @@ Open3D has triangles only.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 import functools
 import sys
 
 import numpy as np
 
+from cns_drake.ray_casting.moving_groups import Placed
 from cns_drake.ray_casting.ray_groups import RayGroup
 from cns_drake.ray_casting.rays import Hits, Rays
 from cns_drake.scene.surface_merging import merge_triangles, tessellate
@@ -48,7 +49,7 @@ class Open3dScene:
             self._scenes.append(scene)
             self._owners.append(owners)
 
-    def place(self, rows: Collection[int]) -> None:
+    def place(self, placed: Placed) -> None:
         """Does nothing: rays are brought to the groups when they are cast."""
 
     def cast_rays(self, rays: Rays, with_normals: bool) -> Hits:

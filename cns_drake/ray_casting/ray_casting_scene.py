@@ -136,7 +136,7 @@ class RayCastingScene:
             seen: the ball in which the next rays can meet geometry.
         """
         placed = self._moving.place(calc_X_WF, motions, known, seen)
-        if placed:
+        if len(placed.rows):
             self._scene.place(placed)
             self._normal_maps = None
 

@@ -87,7 +87,7 @@ class BoxMessages:
             make: `marked_detections` or `marked_boxes`.
         """
         self._make = make
-        self._who: list[tuple[int, str]] | None = None
+        self._who: tuple[bytes, tuple[str, ...]] | None = None
         self._template: MessageTemplate | None = None
 
     def encode(self, objects: RecordedObjects, stamp_ns: int) -> bytes:
@@ -97,15 +97,16 @@ class BoxMessages:
             objects: all present objects.
             stamp_ns: the time of all of them [ns].
         """
-        who = list(
-            zip(
+        who = (objects.instance.tobytes(), objects.semantic_classes)
+        if self._template is None or who != self._who:
+            named = zip(
                 objects.instance.tolist(), objects.semantic_classes, strict=True
             )
-        )
-        if self._template is None or who != self._who:
-            count = _NUMBERS * len(who)
+            count = _NUMBERS * len(objects.instance)
             marks = number_marks(count).reshape(-1, _NUMBERS)
-            self._template = MessageTemplate(self._make(who, marks), count)
+            self._template = MessageTemplate(
+                self._make(list(named), marks), count
+            )
             self._who = who
         numbers = np.column_stack(
             [objects.p_WO, objects.quat_xyzw, objects.sizes]

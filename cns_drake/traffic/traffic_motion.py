@@ -115,6 +115,8 @@ class TrafficMotion(LeafSystem):
         self._plant_context = plant.CreateDefaultContext()
         self._turn = turn
         self._instances = np.array([b.instance for b in bodies], np.uint16)
+        self._names = np.array([b.name for b in bodies], object)
+        self._classes = np.array([b.semantic_class for b in bodies], object)
         self._sizes = np.array(
             [kind.size for kind in plan.kinds]
             + [WALKER_SIZE] * (len(bodies) - len(plan.kinds))
@@ -199,14 +201,14 @@ class TrafficMotion(LeafSystem):
     def _calc_objects(self, context: Context, output: AbstractValue) -> None:
         states: BodyStates = self._states.Eval(context)
         rows = np.flatnonzero(states.present)
-        R_WOs, sizes = states.R_WB[rows], self._sizes[rows]
-        bodies = [self._bodies[k] for k in rows]
+        sizes = self._sizes[rows]
+        up = states.R_WB[rows, :, 2]
         output.set_value(
             TrafficObjects(
                 self._instances[rows],
-                tuple(body.name for body in bodies),
-                tuple(body.semantic_class for body in bodies),
-                states.p_WB[rows] + R_WOs[:, :, 2] * sizes[:, 2:] / 2,
+                tuple(self._names[rows].tolist()),
+                tuple(self._classes[rows].tolist()),
+                states.p_WB[rows] + up * sizes[:, 2:] / 2,
                 states.quat_xyzw[rows],
                 sizes,
                 states.v_WB[rows],

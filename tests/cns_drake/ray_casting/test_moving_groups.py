@@ -118,7 +118,8 @@ def test_only_what_moves_in_sight_is_placed():
     near = Ball(np.zeros(3), 5.0)
 
     def place():
-        return set(moving.place(X_WF_of.get, known=known, seen=near))
+        placed = moving.place(X_WF_of.get, known=known, seen=near)
+        return set(placed.rows.tolist())
 
     # All are at their first poses, and few are in sight.
     hidden = {row_of[FRAMES[k]] for k in range(1, len(FRAMES))}
