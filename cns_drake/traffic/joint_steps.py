@@ -18,12 +18,8 @@ from cns_drake.traffic.vehicle_steps import (
     advance,
     write_poses,
 )
-from cns_drake.traffic.walker_steps import (
-    Walkers,
-    WalkwayArrays,
-    step_walkers,
-    write_walkers,
-)
+from cns_drake.traffic.walker_steps import step_walkers, write_walkers
+from cns_drake.traffic.walker_ways import Walkers, WalkwayArrays
 
 # A driver considers a change of lane only at every such step.
 _THINKS = 10

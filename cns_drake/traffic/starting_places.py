@@ -12,13 +12,8 @@ from cns_drake.traffic.presence import Presence
 from cns_drake.traffic.right_of_way import Permits, is_ego_far
 from cns_drake.traffic.vehicle_kinds import KINDS, VehicleKind
 from cns_drake.traffic.vehicle_state import CURRENT, NUM_PIECES, Vehicles
-from cns_drake.traffic.walker_steps import (
-    APART,
-    SPEED,
-    SPREAD,
-    Walkers,
-    WalkwayArrays,
-)
+from cns_drake.traffic.walker_steps import APART, SPEED, SPREAD
+from cns_drake.traffic.walker_ways import Walkers, WalkwayArrays
 from cns_drake.traffic.walkways import Walkway
 
 # Length of lane that a vehicle needs besides its own [m].

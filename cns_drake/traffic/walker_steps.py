@@ -7,15 +7,22 @@ from the edges of their walkway.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from cns_drake.base.compiled import compiled
-from cns_drake.traffic.counted_random import uniform
 from cns_drake.traffic.lane_graph import SPACING
 from cns_drake.traffic.overlaps import boxes_overlap
 from cns_drake.traffic.right_of_way import WALK_GROUP, Permits
+from cns_drake.traffic.walker_ways import (
+    Walkers,
+    WalkwayArrays,
+    begin,
+    draw_next,
+    height_of,
+    may_begin,
+    row_of,
+    tangent_of,
+)
 
 # The model's wanted speed, and its spread [m/s]; relaxation [s]; strength
 # [m/s^2] and reach [m] of the repulsion by walkers, and by edges.
@@ -41,138 +48,10 @@ _AHEAD = 2.0
 _TURN_RATE, _GOING = 2.5, 0.2
 # Distance of a waiting walker from the crossing [m].
 _AT_NODE = 1.0
-# Walkers that cross, for each one that goes straight on, if both are possible.
-_CROSSES = 0.25
 # Greatest speed of the return to a walkway [m/s].
 _BACK = 0.6
 # A walker turns back after being blocked for this time [s].
 _PATIENCE = 4.0
-
-
-class WalkwayArrays(NamedTuple):
-    """W walkways, and N places where they begin and end.
-
-    Attributes:
-        first, num_points: (W,) rows of a walkway in `points`, and their number.
-        points: (M, 3) [m].
-        half_width: (W,) [m].
-        start, end: (W,) places.
-        crossing: (W,) number of the crossing, -1 for none.
-        node_first, node_count: (N,) rows in `node_ways`, and their number.
-        node_ways: walkways that begin or end in a place.
-    """
-
-    first: np.ndarray
-    num_points: np.ndarray
-    points: np.ndarray
-    half_width: np.ndarray
-    start: np.ndarray
-    end: np.ndarray
-    crossing: np.ndarray
-    node_first: np.ndarray
-    node_count: np.ndarray
-    node_ways: np.ndarray
-
-
-class Walkers(NamedTuple):
-    """N walkers.
-
-    Attributes:
-        xy, velocity: (N, 2) [m, m/s].
-        yaw: of their heading [rad].
-        phase: of their gait [rad].
-        way: their walkway.
-        forward: whether they go from its start to its end.
-        at: row of the walkway's points that they have reached, from its start.
-        speed: wanted [m/s].
-        aside: offset to the right of the middle, as a part of the half width.
-        next_way: the next walkway, -1 if not drawn yet.
-        stuck: time for which they have been blocked [s].
-        draws: number of random numbers that each has drawn.
-    """
-
-    xy: np.ndarray
-    velocity: np.ndarray
-    yaw: np.ndarray
-    phase: np.ndarray
-    way: np.ndarray
-    forward: np.ndarray
-    at: np.ndarray
-    speed: np.ndarray
-    aside: np.ndarray
-    next_way: np.ndarray
-    stuck: np.ndarray
-    draws: np.ndarray
-
-
-@compiled
-def _row(ways: WalkwayArrays, way: int, forward: bool, at: int) -> int:
-    """Returns the row of a point that is counted in walking direction."""
-    at = min(max(at, 0), ways.num_points[way] - 1)
-    return ways.first[way] + (at if forward else ways.num_points[way] - 1 - at)
-
-
-@compiled
-def _tangent(
-    ways: WalkwayArrays, way: int, forward: bool, at: int
-) -> np.ndarray:
-    at = min(max(at, 0), ways.num_points[way] - 2)
-    a = ways.points[_row(ways, way, forward, at), :2]
-    b = ways.points[_row(ways, way, forward, at + 1), :2]
-    step = b - a
-    return step / np.sqrt(np.sum(step**2))
-
-
-@compiled
-def _draw_next(
-    ways: WalkwayArrays, walkers: Walkers, i: int, seed: int
-) -> None:
-    """Draws the next walkway; the same one back only if there is no other."""
-    way = walkers.way[i]
-    node = ways.end[way] if walkers.forward[i] else ways.start[way]
-    first, count = ways.node_first[node], ways.node_count[node]
-    if count == 1:
-        walkers.next_way[i] = way
-        return
-    walkers.draws[i] += 1
-    total = 0.0
-    for k in range(count):
-        total += _liking(ways, ways.node_ways[first + k], way)
-    pick = uniform(seed, i, walkers.draws[i]) * total
-    for k in range(count):
-        other = ways.node_ways[first + k]
-        pick -= _liking(ways, other, way)
-        if pick < 0.0:
-            break
-    walkers.next_way[i] = other
-
-
-@compiled
-def _liking(ways: WalkwayArrays, way: int, last: int) -> float:
-    """Returns the weight of a way: few walkers cross, none goes back."""
-    if way == last:
-        return 0.0
-    return 1.0 if ways.crossing[way] < 0 else _CROSSES
-
-
-@compiled
-def _may_begin(
-    ways: WalkwayArrays,
-    permits: Permits,
-    waited: np.ndarray,
-    num_pieces: int,
-    way: int,
-    t: float,
-) -> bool:
-    """Returns whether a walker may begin a walkway, or has to wait."""
-    c = ways.crossing[way]
-    if c < 0:
-        return True
-    if permits.small[num_pieces + c] > 0:
-        return t < permits.opened[c] + WALK_GROUP
-    permits.waits[c] = min(permits.waits[c], t)
-    waited[c] = True
-    return False
 
 
 @compiled
@@ -209,16 +88,16 @@ def step_walkers(
         way, forward = walkers.way[i], walkers.forward[i]
         # The walker's progress along its walkway.
         while walkers.at[i] < ways.num_points[way] - 2:
-            tangent = _tangent(ways, way, forward, walkers.at[i])
-            here = ways.points[_row(ways, way, forward, walkers.at[i]), :2]
+            tangent = tangent_of(ways, way, forward, walkers.at[i])
+            here = ways.points[row_of(ways, way, forward, walkers.at[i]), :2]
             if np.sum((walkers.xy[i] - here) * tangent) < SPACING:
                 break
             walkers.at[i] += 1
         last = ways.points[
-            _row(ways, way, forward, ways.num_points[way] - 1), :2
+            row_of(ways, way, forward, ways.num_points[way] - 1), :2
         ]
         to_end = last - walkers.xy[i]
-        tangent = _tangent(ways, way, forward, walkers.at[i])
+        tangent = tangent_of(ways, way, forward, walkers.at[i])
         is_near = (
             walkers.at[i] >= ways.num_points[way] - 3
             and np.sum(to_end * tangent) < _AT_NODE
@@ -226,12 +105,12 @@ def step_walkers(
         waits = False
         if is_near:
             if walkers.next_way[i] < 0:
-                _draw_next(ways, walkers, i, seed)
+                draw_next(ways, walkers, i, seed)
             after = walkers.next_way[i]
-            if _may_begin(ways, permits, waited, num_pieces, after, t):
-                _begin(ways, walkers, permits, num_pieces, i, t)
+            if may_begin(ways, permits, waited, num_pieces, after, t):
+                begin(ways, walkers, permits, num_pieces, i, t)
                 way, forward = walkers.way[i], walkers.forward[i]
-                tangent = _tangent(ways, way, forward, walkers.at[i])
+                tangent = tangent_of(ways, way, forward, walkers.at[i])
             else:
                 waits = is_waiting[i] = True
         right = np.array([tangent[1], -tangent[0]])
@@ -240,7 +119,7 @@ def step_walkers(
             wanted = np.zeros(2)
         else:
             ahead = walkers.at[i] + int(_AHEAD / SPACING)
-            target = ways.points[_row(ways, way, forward, ahead), :2]
+            target = ways.points[row_of(ways, way, forward, ahead), :2]
             step = target + walkers.aside[i] * half * right - walkers.xy[i]
             wanted = (
                 walkers.speed[i] * step / max(np.sqrt(np.sum(step**2)), 1e-6)
@@ -248,7 +127,7 @@ def step_walkers(
         for k in range(2):
             lacking = wanted[k] - walkers.velocity[i, k]
             force[i, k] += lacking / _RELAXATION
-        here = ways.points[_row(ways, way, forward, walkers.at[i]), :2]
+        here = ways.points[row_of(ways, way, forward, walkers.at[i]), :2]
         off = np.sum((walkers.xy[i] - here) * right)
         for side in (-1.0, 1.0):
             room = half - side * off
@@ -335,18 +214,6 @@ def gait_rate(speed: float) -> float:
 
 
 @compiled
-def height_of(ways: WalkwayArrays, walkers: Walkers, i: int) -> float:
-    """Returns the height of the walkway at a walker [m]."""
-    way, forward, at = walkers.way[i], walkers.forward[i], walkers.at[i]
-    at = min(at, ways.num_points[way] - 2)
-    a = ways.points[_row(ways, way, forward, at)]
-    b = ways.points[_row(ways, way, forward, at + 1)]
-    step = b[:2] - a[:2]
-    share = np.sum((walkers.xy[i] - a[:2]) * step) / np.sum(step**2)
-    return a[2] + min(max(share, 0.0), 1.0) * (b[2] - a[2])
-
-
-@compiled
 def write_walkers(
     ways: WalkwayArrays, walkers: Walkers, poses: np.ndarray
 ) -> None:
@@ -357,32 +224,6 @@ def write_walkers(
         poses[i, 2] = height_of(ways, walkers, i)
         poses[i, 3] = walkers.yaw[i]
         poses[i, 4] = walkers.phase[i]
-
-
-@compiled
-def _begin(
-    ways: WalkwayArrays,
-    walkers: Walkers,
-    permits: Permits,
-    num_pieces: int,
-    i: int,
-    t: float,
-) -> None:
-    """Lets a walker begin its next walkway."""
-    way, after = walkers.way[i], walkers.next_way[i]
-    node = ways.end[way] if walkers.forward[i] else ways.start[way]
-    for other, change in ((way, -1), (after, 1)):
-        c = ways.crossing[other]
-        if c >= 0:
-            permits.small[num_pieces + c] += change
-            permits.closed[c] = t
-    is_back = way == after
-    walkers.forward[i] = (
-        not walkers.forward[i] if is_back else ways.start[after] == node
-    )
-    walkers.way[i] = after
-    walkers.at[i] = 0
-    walkers.next_way[i] = -1
 
 
 @compiled
@@ -451,12 +292,12 @@ def _keep_on_way(
     best, nearest = np.inf, 0
     low = max(walkers.at[i] - 3, 0)
     for at in range(low, min(walkers.at[i] + 4, ways.num_points[way])):
-        place = ways.points[_row(ways, way, forward, at), :2]
+        place = ways.points[row_of(ways, way, forward, at), :2]
         distance = np.sum((walkers.xy[i] - place) ** 2)
         if distance < best:
             best, nearest = distance, at
-    place = ways.points[_row(ways, way, forward, nearest), :2]
-    tangent = _tangent(ways, way, forward, nearest)
+    place = ways.points[row_of(ways, way, forward, nearest), :2]
+    tangent = tangent_of(ways, way, forward, nearest)
     right = np.array([tangent[1], -tangent[0]])
     along = np.sum((walkers.xy[i] - place) * tangent)
     off = np.sum((walkers.xy[i] - place) * right)
