@@ -13,10 +13,10 @@ from cns_drake.base.installed_versions import installed_versions
 from cns_drake.base.jobs.fingerprint import code_digest, fingerprint
 from cns_drake.base.version import __version__
 from cns_drake.scenarios.imu_making import KALIBR_FILE, describe_kalibr
-from cns_drake.scenarios.referenced_files import FileWatch, referenced_files
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder, world_file
 from cns_drake.scenarios.shipped import suspension_file, vehicle_file
+from cns_drake.scene.referenced_files import FileWatch, referenced_files
 
 # Packages that can influence a message's bytes.
 _PACKAGES = (

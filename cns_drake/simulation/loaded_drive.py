@@ -15,12 +15,12 @@ from cns_drake.scenarios.provenance import (
     recording_fingerprint,
 )
 from cns_drake.scenarios.rates import frame_period
-from cns_drake.scenarios.referenced_files import FileWatch
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import (
     check_files,
 )
 from cns_drake.scenarios.sensor_making import sensor_pose
+from cns_drake.scene.referenced_files import FileWatch
 from cns_drake.scene.world import World
 from cns_drake.simulation.scenario_traffic import (
     plan_scenario_traffic,

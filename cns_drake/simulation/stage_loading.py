@@ -15,6 +15,7 @@ from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import map_folder, world_file
 from cns_drake.scenarios.shipped import vehicle_file
+from cns_drake.scene.kept_worlds import keep_world
 from cns_drake.scene.world import World, load_world
 from cns_drake.traffic.lane_file import read_lanes
 from cns_drake.transient.changing import change_world
@@ -56,6 +57,18 @@ def load_stage(
     return change_world(
         world, scenario.transient, drive, _driven(scenario, drive)
     )
+
+
+def keep_stage(scenario: Scenario) -> None:
+    """Parses the stage of a scenario for processes that are forked from here.
+
+    See `cns_drake.scene.kept_worlds`.
+
+    Raises:
+        InputError: the scenario's files cannot be used.
+    """
+    without = (*scenario.without, *_in_the_way(scenario))
+    keep_world(world_file(scenario), without=without)
 
 
 def _in_the_way(scenario: Scenario) -> Sequence[str]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import abc
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +13,7 @@ from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.map_folder import MapFolder
 from cns_drake.scenarios.provenance import digest_file, digest_inputs
 from cns_drake.scenarios.scenario import Scenario
+from cns_drake.scenarios.scenario_files import world_file
 from cns_drake.scenarios.scenario_loading import load_scenario
 from evaluation.study.parts import PartStep
 
@@ -66,6 +69,21 @@ class _Picture(PartStep):
     def figures(self) -> tuple[Path, ...]:
         return (self.picture,)
 
+    @property
+    def group(self) -> str:
+        return str(self.folder.resolve())
+
+    def load(self) -> None:
+        with uninterrupted():
+            from cns_drake.scene.kept_worlds import keep_world
+
+        for world in self.worlds():
+            keep_world(world)
+
+    @abc.abstractmethod
+    def worlds(self) -> Sequence[Path]:
+        """Returns the worlds that it shows."""
+
 
 class DrawDrives(_Picture):
     """Draws the drives of a map from above."""
@@ -90,6 +108,9 @@ class DrawDrives(_Picture):
             self.picture,
         )
 
+    def worlds(self) -> Sequence[Path]:
+        return [world_file(one) for one in self._scenarios() if not one.without]
+
     def _scenarios(self) -> list[Scenario]:
         return [
             load_scenario(file)
@@ -101,7 +122,7 @@ class DrawStages(_Picture):
     """Draws a street of a map in its first and its last stage."""
 
     def inputs(self) -> dict[str, object]:
-        files = [*self._two_stages(), MapFolder(self.folder).views]
+        files = [*self.worlds(), MapFolder(self.folder).views]
         return {file.name: digest_file(file) for file in files}
 
     def prepare(self) -> None:
@@ -116,10 +137,10 @@ class DrawStages(_Picture):
                 load_views,
             )
 
-        stages = {f.stem.replace("_", " "): f for f in self._two_stages()}
+        stages = {f.stem.replace("_", " "): f for f in self.worlds()}
         views = load_views(MapFolder(self.folder).views)
         draw_stages(stages, views["street"], self.picture)
 
-    def _two_stages(self) -> tuple[Path, Path]:
+    def worlds(self) -> Sequence[Path]:
         files = list(MapFolder(self.folder).stages().values())
         return files[0], files[-1]

@@ -23,7 +23,7 @@ from cns_drake.scenarios.provenance import (
     recording_fingerprint,
 )
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import world_file
+from cns_drake.scenarios.scenario_files import stage_group, world_file
 from evaluation.study.parts import is_current, write_part
 from evaluation.study.recording_survey import RecordingSurvey
 from evaluation.study.surveys import Survey
@@ -62,6 +62,21 @@ class Record(Step):
             self.survey.prepare()
         with uninterrupted():
             import cns_drake.simulation.simulation  # noqa: F401
+
+    @property
+    def group(self) -> str | None:
+        return stage_group(self.scenario)
+
+    def load(self) -> None:
+        with uninterrupted():
+            from cns_drake.simulation.stage_loading import keep_stage
+
+        scenarios = [self.scenario]
+        if self.page is not None:
+            beside, _ = shown_beside(self.scenario)
+            scenarios += [beside] if beside else []
+        for scenario in scenarios:
+            keep_stage(scenario)
 
     def run(self, reporter: Reporter) -> None:
         with uninterrupted():

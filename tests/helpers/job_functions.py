@@ -150,3 +150,34 @@ def note_ports(path, reporter):
         for connection in process.net_connections("inet")
     ]
     path.write_text(f"processes {len(processes)}, ports {ports}")
+
+
+@dataclass(frozen=True)
+class Grouped(Step):
+    """Writes by which process it was started, and which ones have loaded."""
+
+    name: str
+    path: Path
+    is_deadly: bool = False
+
+    @property
+    def output(self):
+        return self.path
+
+    @property
+    def group(self):
+        return self.name
+
+    def is_done(self):
+        return self.path.is_file()
+
+    def load(self):
+        if self.is_deadly:
+            os.kill(os.getpid(), signal.SIGKILL)
+        _loaded.append(os.getpid())
+
+    def run(self, reporter):
+        self.path.write_text(" ".join(map(str, [os.getppid(), *_loaded])))
+
+
+_loaded: list[int] = []

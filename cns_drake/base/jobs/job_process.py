@@ -46,6 +46,12 @@ _ALLOCATION = {
     "MALLOC_TRIM_THRESHOLD_": str(1 << 28),
 }
 
+# As many jobs run as there are cores. More threads of linear algebra would wait
+# for each other, which takes processor time.
+_ONE_CORE = dict.fromkeys(
+    ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"), "1"
+)
+
 
 class JobError(Exception):
     """A job cannot be done; the message gives the reason in one line."""
@@ -101,7 +107,7 @@ def start_interpreter(
         number = theirs.fileno()
         process = subprocess.Popen(
             [sys.executable, "-c", code, str(number), *sys.path],
-            env={**os.environ, **_ALLOCATION},
+            env={**_ONE_CORE, **os.environ, **_ALLOCATION},
             pass_fds=[number],
             stdin=subprocess.DEVNULL,
             stdout=_STDERR,

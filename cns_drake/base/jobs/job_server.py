@@ -3,12 +3,12 @@
 A job of a study takes a few seconds, and a new interpreter takes one or two to
 import what the job needs. A forked process has the modules already. The
 imported modules start no threads but those of linear algebra, which survive a
-fork.
+fork. Steps of one group also share what they load.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import contextlib
 import gc
 from multiprocessing import Pipe
@@ -24,9 +24,11 @@ import time
 
 from cns_drake.base.jobs.job_process import (
     ProcessDiedError,
+    StartedProcess,
     start_interpreter,
     work,
 )
+from cns_drake.base.jobs.step import Step
 
 # How often the server checks whether a process has ended [s].
 _LOOK_INTERVAL = 0.01
@@ -35,12 +37,14 @@ _LOOK_INTERVAL = 0.01
 class JobServer:
     """Starts the processes of jobs on this machine.
 
-    Threads may use it side by side.
+    The steps of a group have a server of their own, which is forked from the
+    first one. Threads may use it side by side.
     """
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._server: _Server | None = None
+        # Group -> its server; the first one has no group.
+        self._servers: dict[str | None, _Server] = {}
 
     def start(self, job: bytes) -> tuple[Connection, _Forked]:
         """Starts the process of a pickled job; see `job_process.Start`.
@@ -48,36 +52,58 @@ class JobServer:
         Raises:
             ProcessDiedError: the server ends whenever it loads the job.
         """
+        group = _group(job)
         with self._lock:
-            if self._server is None or not self._server.is_alive():
-                self._server = _Server()
-            server = self._server
+            server = self._server(None, lambda: start_interpreter(serve))
+            if group is not None:
+                first = server
+                server = self._server(group, lambda: first.start(job, "serve"))
         return server.start(job)
 
     def stop(self) -> None:
-        """Ends the server; processes that it has started go on."""
+        """Ends the servers; processes that they have started go on."""
         with self._lock:
-            if self._server is not None:
-                self._server.stop()
+            for server in reversed(self._servers.values()):
+                server.stop()
+
+    def _server(
+        self,
+        group: str | None,
+        start: Callable[[], tuple[Connection, StartedProcess]],
+    ) -> _Server:
+        """Returns the server of a group, started anew if it has ended."""
+        server = self._servers.get(group)
+        if server is None or not server.is_alive():
+            server = self._servers[group] = _Server(*start())
+        return server
 
 
 class _Server:
     """The server's process, as its parent sees it."""
 
-    def __init__(self) -> None:
+    def __init__(self, connection: Connection, process: StartedProcess):
         self._lock = threading.Lock()
-        self._connection, self._process = start_interpreter(serve)
+        self._connection, self._process = connection, process
 
     def is_alive(self) -> bool:
-        return self._process.poll() is None
+        try:
+            self._process.wait(0.0)
+        except subprocess.TimeoutExpired:
+            return True
+        except ProcessDiedError:  # So has the one that has started it.
+            pass
+        return False
 
-    def start(self, job: bytes) -> tuple[Connection, _Forked]:
+    def start(
+        self, job: bytes, kind: str = "start"
+    ) -> tuple[Connection, _Forked]:
+        """Starts the process of a job, or with "serve" a server for it."""
         ours, theirs = Pipe()
         try:
             with theirs, self._server_errors(), self._lock:
-                self._connection.send(("start", job))
+                self._connection.send((kind, job))
                 send_handle(
-                    self._connection, theirs.fileno(), self._process.pid
+                    self._connection, theirs.fileno(), destination_pid=None
                 )
                 number = self._connection.recv()
         except ProcessDiedError:
@@ -94,7 +120,8 @@ class _Server:
     def stop(self) -> None:
         with self._lock:
             self._connection.close()
-        self._process.wait()
+        with contextlib.suppress(ProcessDiedError):
+            self._process.wait()
 
     @contextlib.contextmanager
     def _server_errors(self) -> Iterator[None]:
@@ -130,6 +157,14 @@ class _Forked:
         return status
 
 
+def _group(job: bytes) -> str | None:
+    """Returns the group of a job; the job's process reports failures."""
+    try:
+        return pickle.loads(job).group
+    except Exception:
+        return None
+
+
 def serve(number: int) -> None:
     """Starts processes until the parent has gone; the server's process.
 
@@ -141,8 +176,15 @@ def serve(number: int) -> None:
         work(*forked)
 
 
-def _serve(parent: Connection) -> tuple[Connection, bytes] | None:
-    """Answers a parent; returns what a forked process has to do."""
+def _serve(
+    parent: Connection, *, loads: bool = False
+) -> tuple[Connection, bytes] | None:
+    """Answers a parent; returns what a forked process has to do.
+
+    Args:
+        parent: sends requests.
+        loads: whether the steps of jobs are loaded, too.
+    """
     statuses: dict[int, int | None] = {}
     while True:
         try:
@@ -150,14 +192,16 @@ def _serve(parent: Connection) -> tuple[Connection, bytes] | None:
         except (EOFError, ConnectionError):
             return None
         answer: int | None = None
-        if kind == "start":
+        if kind in ("start", "serve"):
             (job,) = values
             connection = Connection(recv_handle(parent))
-            _prepare_for(job)
+            _prepare_for(job, loads=loads)
             answer = os.fork()
             if answer == 0:
-                os.setsid()
                 parent.close()
+                if kind == "serve":
+                    return _serve(connection, loads=True)
+                os.setsid()
                 return connection, job
             connection.close()
             statuses[answer] = None
@@ -174,10 +218,14 @@ def _serve(parent: Connection) -> tuple[Connection, bytes] | None:
             parent.send(answer)
 
 
-def _prepare_for(job: bytes) -> None:
+def _prepare_for(job: bytes, *, loads: bool) -> None:
     """Prepares for a job; the job's process reports failures."""
     with contextlib.suppress(Exception):
-        pickle.loads(job).prepare()
+        step: Step = pickle.loads(job)
+        step.prepare()
+        if loads:
+            step.load()
+    with contextlib.suppress(Exception):
         if compiling := sys.modules.get("cns_drake.base.compiled"):
             compiling.start_compiler()
     # Garbage collection would write to memory that the processes share.

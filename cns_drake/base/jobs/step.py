@@ -95,6 +95,24 @@ class Step(abc.ABC):
         """
         code_digest(type(self).__module__)
 
+    @property
+    def group(self) -> str | None:
+        """The name of the steps that share what they `load`, if any do.
+
+        Their processes are forked from one that has loaded what each of them
+        needs.
+        """
+        return None
+
+    def load(self) -> None:  # noqa: B027  # Most steps load nothing.
+        """Loads what the run begins with, for the steps of its group.
+
+        It starts no thread, since forked processes lack them.
+
+        Raises:
+            InputError: it cannot be loaded; the run raises it again.
+        """
+
     def made_of(self, inputs: Mapping[str, object]) -> dict[str, object]:
         """Returns inputs with the digest of the code of this step."""
         return {**inputs, "code": code_digest(type(self).__module__)}
@@ -122,6 +140,15 @@ class Steps(Step):
     def prepare(self) -> None:
         for step in self.steps:
             step.prepare()
+
+    @property
+    def group(self) -> str | None:
+        return next((s.group for s in self.steps if s.group), None)
+
+    def load(self) -> None:
+        for step in self.steps:
+            if step.group == self.group and not step.is_done():
+                step.load()
 
     def run(self, reporter: Reporter) -> None:
         for step in self.steps:

@@ -361,6 +361,40 @@ def test_a_job_survives_the_process_that_it_was_forked_from(tmp_path, capsys):
     assert "it starts again" in capsys.readouterr().err
 
 
+def test_jobs_of_a_group_are_forked_from_one_that_has_loaded(tmp_path):
+    paths = {name: tmp_path / name for name in ("a1", "b1", "a2")}
+    run_jobs(
+        [
+            Job(name, job_functions.Grouped(name[0], path))
+            for name, path in paths.items()
+        ],
+        Cluster(num_workers=1),
+    )
+    found = {
+        name: list(map(int, path.read_text().split()))
+        for name, path in paths.items()
+    }
+    first, other = found["a1"][0], found["b1"][0]
+    assert first != other
+    assert found["a1"] == [first] * 2
+    assert found["b1"] == [other] * 2
+    assert found["a2"] == [first] * 3
+
+
+def test_a_process_that_dies_while_it_loads_harms_its_group_alone(tmp_path):
+    jobs = [
+        Job("dies", job_functions.Grouped("a", tmp_path / "a", True)),
+        Job("lives", job_functions.Grouped("b", tmp_path / "b")),
+        job("alone", job_functions.leave_a_trace, tmp_path / "c"),
+    ]
+    with pytest.raises(
+        FailedJobsError,
+        match=r"^dies: the process that starts jobs ended with status -9$",
+    ):
+        run_jobs(jobs, Cluster(num_workers=1))
+    assert {path.name for path in tmp_path.iterdir()} == {"b", "c"}
+
+
 def test_freed_memory_is_kept_whatever_dask_has_its_workers_do(
     tmp_path, monkeypatch
 ):
