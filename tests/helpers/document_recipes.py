@@ -582,6 +582,8 @@ NOT_RUN = {
     "of it",
     "cns-drake simulate metropolis_03 --returns calibrated": "records two "
     "drives, for minutes; test_cli scans with calibrated returns",
+    "cns-drake simulate metropolis_04 --traffic 60 --frames 80": "needs a "
+    "script of another project; test_traffic_recording records traffic",
     "cns-drake levels mine": "needs these hours; test_levels has such tables",
     "cns-drake levels ours": "likewise",
     "cns-eval pr --method map-closures": "needs an extra",
