@@ -66,12 +66,12 @@ def trend(
 
     cluster = choose_cluster(jobs, scheduler)
     methods = choose_methods(method or (), parameter or ())
-    asking = load_scenario(query)
+    query_drive = load_scenario(query)
     members = family_members(vary, output, cluster)
-    controls = family_controls(members, asking)
+    controls = family_controls(members, query_drive)
     points = measure_drives(
-        asking.name,
-        SimulatedDrive(asking),
+        query_drive.name,
+        SimulatedDrive(query_drive),
         {
             member.name: TrendDatabase(
                 SimulatedDrive(member), controls[member.name].name
@@ -88,7 +88,7 @@ def trend(
 
 
 def family_controls(
-    members: Sequence[Scenario], asking: Scenario
+    members: Sequence[Scenario], query_drive: Scenario
 ) -> dict[str, Scenario]:
     """Returns member -> its drive through the city of the query drive.
 
@@ -96,10 +96,10 @@ def family_controls(
 
     Args:
         members: of a family.
-        asking: the query drive.
+        query_drive: drive of the queries.
     """
     city = {
-        name: getattr(asking, name)
+        name: getattr(query_drive, name)
         for name in ("map", "stage", "world", "without")
     }
     kinds: list[dict] = []
@@ -109,6 +109,6 @@ def family_controls(
         kind = drive.model_dump()
         if kind not in kinds:
             kinds.append(kind)
-        name = f"{asking.name}_unchanged_{kinds.index(kind) + 1}"
+        name = f"{query_drive.name}_unchanged_{kinds.index(kind) + 1}"
         controls[member.name] = drive.model_copy(update={"name": name})
     return controls

@@ -113,8 +113,8 @@ def unit_quaternions(sequence: McapSequence) -> np.ndarray:
             f" {position[row]} and the quaternion {quat_xyzw[row]}"
         )
     # A length of one, up to rounding, stays as it is.
-    off = np.abs(length - 1.0) > _ROUNDING
-    return np.where(off, quat_xyzw / length, quat_xyzw)
+    is_wrong = np.abs(length - 1.0) > _ROUNDING
+    return np.where(is_wrong, quat_xyzw / length, quat_xyzw)
 
 
 def seconds(stamp_ns: int) -> str:

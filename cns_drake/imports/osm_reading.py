@@ -19,7 +19,7 @@ Tags = Mapping[str, str]
 _LETTERS = {"Node": "n", "Way": "w", "Relation": "r"}
 # Tags that give the kind of a thing, the more specific first
 # (https://wiki.openstreetmap.org/wiki/Map_features).
-_TELLING = (
+_KIND_KEYS = (
     "building",
     "building:part",
     "highway",
@@ -199,7 +199,7 @@ def _polygons(area: Any) -> list[Polygon]:
 
 def thing_kind(tags: Tags) -> str:
     """Returns the kind of a thing, by its first tag that gives one."""
-    for key in _TELLING:
+    for key in _KIND_KEYS:
         if has_tag(tags, key):
             return f"{key}={tags[key]}"
     if any(key.startswith("addr:") for key in tags):

@@ -135,8 +135,8 @@ def find_loop(
         left = np.array([-np.sin(heading), np.cos(heading)])
         along = np.array([left[1], -left[0]])
         middle = np.array([x, y]) + _ahead(width) * along + width / 2 * left
-        off = (shapely.get_coordinates(swept) - middle) @ left
-        needed = min(needed, 2 * np.abs(off).max())
+        sideways = (shapely.get_coordinates(swept) - middle) @ left
+        needed = min(needed, 2 * np.abs(sideways).max())
         place = Point(middle)
         if area.covers(place):
             widest = max(widest, 2 * area.boundary.distance(place))

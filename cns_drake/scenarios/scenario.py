@@ -192,8 +192,8 @@ class Scenario(Section):
             update: dict = {"returns": returns, "echoes": Echoes.STRONGEST}
             weather = WeatherConfig()
         else:
-            off = ("range_noise", "dropout", "faint_dropout")
-            update = {"returns": returns, **dict.fromkeys(off, 0.0)}
+            ideal_fields = ("range_noise", "dropout", "faint_dropout")
+            update = {"returns": returns, **dict.fromkeys(ideal_fields, 0.0)}
         lidars = {
             name: config.model_copy(update=update)
             for name, config in self.lidars.items()

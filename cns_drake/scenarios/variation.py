@@ -207,10 +207,10 @@ def vary(
     stage = family.stage or last
     if family.city_seeds:
         _check_redrawable(base, family, last, source)
-    what = "buildings and plants"
+    text = "buildings and plants"
     removable = None
     if family.towards is not None:
-        what = f"what stage {family.towards} lacks"
+        text = f"what stage {family.towards} lacks"
         removable = _difference(base, stage, family.towards, source)
     routes = _routes(base, family)
     units: list[tuple[str | None, dict[str, LidarConfig]]]
@@ -250,7 +250,7 @@ def vary(
         preset, lidars = unit
         labels = [base.name, f"m{round(1000 * part):03d}", f"s{seed}"]
         labels += [label for label in (route_label, preset) if label]
-        title = f"{100 * part:.1f} % of {what} missing"
+        title = f"{100 * part:.1f} % of {text} missing"
         if family.scattered:
             title += f", others at random with seed {seed}"
         if city_seed is not None:

@@ -19,7 +19,7 @@ PARSER_ERRORS = (
 
 
 @contextlib.contextmanager
-def told_by_drake() -> Iterator[list[str]]:
+def collected_errors() -> Iterator[list[str]]:
     """Collects errors that Drake logs, which would otherwise be printed.
 
     Warnings are passed on at the end, unless an exception was raised: beside an

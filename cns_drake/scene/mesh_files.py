@@ -16,7 +16,7 @@ from pydrake.geometry import (
 )
 
 from cns_drake.base.errors import InputError
-from cns_drake.scene.drake_errors import PARSER_ERRORS, told_by_drake
+from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
 from cns_drake.scene.foreign_meshes import ForeignMeshes
 from cns_drake.scene.obj_check import check_obj
 from cns_drake.scene.surfaces import LARGEST_SIZE, TriangleSurface
@@ -55,7 +55,7 @@ class MeshFiles:
         if key in self._surfaces:
             return self._surfaces[key]
         try:
-            with told_by_drake():  # The error is enough.
+            with collected_errors():  # The error is enough.
                 surface = _check_size(
                     _read_hull(shape)
                     if isinstance(shape, Convex)

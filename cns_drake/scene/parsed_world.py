@@ -14,7 +14,7 @@ from pydrake.multibody.tree import ModelInstanceIndex
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import read_bytes
-from cns_drake.scene.drake_errors import PARSER_ERRORS, told_by_drake
+from cns_drake.scene.drake_errors import PARSER_ERRORS, collected_errors
 from cns_drake.scene.gazebo_models import read_xml
 from cns_drake.scene.gazebo_worlds import is_gazebo_world, simplify_world
 from cns_drake.scene.model_check import check_model
@@ -86,7 +86,7 @@ def parse_models(parser: Parser, path: Path) -> list[ModelInstanceIndex]:
     """
     _check_file(path)
     check_model(path)
-    with told_by_drake() as errors:
+    with collected_errors() as errors:
         try:
             models = parser.AddModels(str(path))
         except PARSER_ERRORS as error:
@@ -133,7 +133,7 @@ def _parse_world(
         parse_models(parser, path)
         return ()
     text, notes = simplify_world(path, root, model_paths)
-    with told_by_drake() as errors:
+    with collected_errors() as errors:
         try:
             parser.AddModelsFromString(text, "sdf")
         except PARSER_ERRORS as error:

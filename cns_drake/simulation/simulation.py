@@ -106,7 +106,7 @@ def simulate(
             if page is None:
                 resumed_frames = resume_recording(bag, drive, on_frame, on_note)
 
-            def tell_frames(done: int) -> None:
+            def report_frames(done: int) -> None:
                 strike()
                 on_frame(done, drive.num_frames)
 
@@ -124,7 +124,7 @@ def simulate(
             strike()
             loaded = time.perf_counter()
             simulated_s = _advance(
-                diagram, writer, drive, resumed_frames, tell_frames, reader
+                diagram, writer, drive, resumed_frames, report_frames, reader
             )
         finished = time.perf_counter()
         if page is not None and page_file is not None:

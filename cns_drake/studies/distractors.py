@@ -23,7 +23,7 @@ _STAGE = "01"
 
 
 def distracting_drives(
-    asking: Scenario,
+    query: Scenario,
     number: int,
     spacing: float,
     output: Path,
@@ -37,7 +37,7 @@ def distracting_drives(
     through those cities drawn anew.
 
     Args:
-        asking: a drive through the city whose places are not to stand among
+        query: a drive through the city whose places are not to stand among
             these; its LiDARs measure the others, too.
         number: of places.
         spacing: between two places [m].
@@ -48,10 +48,10 @@ def distracting_drives(
         InputError: a shipped map cannot be used.
     """
     drives: list[Scenario] = []
-    for drive in _drives(asking, output, cluster):
+    for drive in _drives(query, output, cluster):
         if number <= 0:
             break
-        drive = drive.model_copy(update={"lidars": asking.lidars})
+        drive = drive.model_copy(update={"lidars": query.lidars})
         drives.append(drive)
         number -= _num_places(drive, spacing)
     return drives
@@ -67,7 +67,7 @@ def _num_places(scenario: Scenario, spacing: float) -> int:
 
 
 def _drives(
-    asking: Scenario, output: Path, cluster: Cluster
+    query: Scenario, output: Path, cluster: Cluster
 ) -> Iterator[Scenario]:
     """Yields an endless series of drives."""
     maps = {name: MapFolder(path) for name, path in shipped_maps().items()}
@@ -75,7 +75,7 @@ def _drives(
         name: [load_scenario(path) for path in folder.recordable_sequences()]
         for name, folder in maps.items()
     }
-    own = Path(str(asking.map)).name
+    own = Path(str(query.map)).name
     others = [name for name in maps if name != own]
 
     def redrawn(name: str, seed: int) -> Iterator[Scenario]:

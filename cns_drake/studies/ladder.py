@@ -84,12 +84,12 @@ def climb_ladder(
         InputError: a map is unknown, the folder cannot be made, or a step
             failed.
     """
-    asking = _asking_drives(maps or shipped_maps())
+    query_drives = _query_drives(maps or shipped_maps())
     make_folder(output)
     files = StudyFiles(output.absolute())
     jobs: dict[str, Job] = {}
     climbed: list[tuple[Scenario, Rung, Path]] = []
-    for drive in asking:
+    for drive in query_drives:
         rungs, notes = plan_rungs(drive, extent)
         for text in notes:
             on_note(f"{drive.source}: {text}")
@@ -121,7 +121,7 @@ def climb_ladder(
     return _write(measured, output, protocol)
 
 
-def _asking_drives(maps: Iterable[str]) -> list[Scenario]:
+def _query_drives(maps: Iterable[str]) -> list[Scenario]:
     """Returns the last drive of each map.
 
     Raises:
@@ -143,14 +143,14 @@ class _Plan:
 
     def __init__(
         self,
-        asking: Scenario,
+        query_scenario: Scenario,
         methods: tuple[MethodChoice, ...],
         protocol: RetrievalProtocol,
         files: StudyFiles,
     ):
         self.jobs: dict[str, Job] = {}
-        self._asking = asking
-        self._plain = plain_drives(asking)
+        self._query = query_scenario
+        self._plain = plain_drives(query_scenario)
         self._methods = methods
         self._protocol = protocol
         self._files = files
@@ -163,7 +163,7 @@ class _Plan:
         """Adds the jobs of a rung; returns the file that they write."""
         needs: list[str] = []
         others = self._distractors if rung.drives.num_distractors else ()
-        name = f"{self._asking.name} {rung.cause} {rung.level} {rung.seed}"
+        name = f"{self._query.name} {rung.cause} {rung.level} {rung.seed}"
         part = self._files.rung(name)
         step = MeasureRung(
             database=self._drive(rung, "database", "places", needs),
@@ -213,11 +213,11 @@ class _Plan:
         return files
 
 
-def _labelled(asking: Scenario, rung: Rung) -> LadderRung:
+def _labelled(query_scenario: Scenario, rung: Rung) -> LadderRung:
     # The database has the route of the query, at any stage.
-    route = str(asking.stage)
+    route = str(query_scenario.stage)
     return LadderRung(
-        map_folder(asking).name,
+        map_folder(query_scenario).name,
         route,
         route,
         rung.cause,

@@ -70,9 +70,9 @@ def planned_levels() -> dict[tuple[str, int], str]:
     """Returns the levels as this version of the program simulates them."""
     found = {}
     for name, folder in shipped_maps().items():
-        asking = load_scenario(MapFolder(folder).recordable_sequences()[-1])
+        query = load_scenario(MapFolder(folder).recordable_sequences()[-1])
         drives: dict[int, list[str]] = {}
-        for rung in plan_rungs(asking, LEVELS_EXTENT)[0]:
+        for rung in plan_rungs(query, LEVELS_EXTENT)[0]:
             drives.setdefault(rung.level, []).append(rung.fingerprint())
         for level, prints in drives.items():
             found[name, level] = fingerprint({"drives": prints})
@@ -133,7 +133,7 @@ def _read_file(file: Path, levels: Levels) -> Iterable[LevelResult]:
             continue
         where = f"{file}: line {line}"
         try:
-            level, told = int(row["level"]), int(row["radius_told"])
+            level, is_gated = int(row["level"]), int(row["radius_told"])
             auc, low, high = (float(row[name]) for name in _NUMBERS)
         except ValueError:
             raise InputError(f"{where}: not a number") from None
@@ -149,7 +149,7 @@ def _read_file(file: Path, levels: Levels) -> Iterable[LevelResult]:
                 f"{where}: auc, auc_low, auc_high: impossible values"
             )
         yield LevelResult(
-            row["map"], level, row["method"], bool(told), auc, low, high
+            row["map"], level, row["method"], bool(is_gated), auc, low, high
         )
 
 
@@ -162,12 +162,12 @@ def _check_complete(
 ) -> None:
     there = [(one.level, one.radius_told) for one in found]
     for name, level in levels:
-        for told in (False, True):
-            number = there.count((level, told))
+        for is_gated in (False, True):
+            number = there.count((level, is_gated))
             if name == map_name and number != 1:
                 raise InputError(
                     f"{file}: {method}: level {level} of {name}, radius_told "
-                    f"{int(told)}: {number} rows instead of 1"
+                    f"{int(is_gated)}: {number} rows instead of 1"
                 )
 
 
@@ -188,9 +188,9 @@ def level_table(results: Iterable[LevelResult]) -> Table:
         }
         methods = in_table_order(method for method, _, _ in of_map)
         for method in methods:
-            for told in (False, True):
-                found = [of_map[method, told, n].auc for n in numbers]
-                word = "yes" if told else "no"
+            for is_gated in (False, True):
+                found = [of_map[method, is_gated, n].auc for n in numbers]
+                word = "yes" if is_gated else "no"
                 rows.append((name, title(method), word, *found))
         solved = [
             any(of_map[one, False, n].low > _SOLVED for one in methods)

@@ -85,7 +85,7 @@ class RedrawCity(Step):
 
     Attributes:
         map_folder: the map, with `roads.yaml` and `city.yaml`.
-        stage: what to call the only stage, the whole city.
+        stage: name of the only stage, the whole city.
         seed: of the city.
         folder: the map folder to write; an older redrawn city of this name is
             replaced, anything else is refused.
@@ -153,7 +153,7 @@ def redrawn_inputs(map_folder: Path, stage: str, seed: int) -> dict[str, bytes]:
 
     Args:
         map_folder: the map, with `roads.yaml` and `city.yaml`.
-        stage: what to call the only stage, the whole city. The map's own
+        stage: name of the only stage, the whole city. The map's own
             stages name structures that another draw need not have.
         seed: of the city.
 
@@ -180,9 +180,9 @@ def redrawn_inputs(map_folder: Path, stage: str, seed: int) -> dict[str, bytes]:
     }
 
 
-def _to_yaml(what: str, values: dict) -> bytes:
+def _to_yaml(title: str, values: dict) -> bytes:
     comment = (
-        f"{_MARK.decode()} {__version__}: {what}.\n"
+        f"{_MARK.decode()} {__version__}: {title}.\n"
         "# `cns-drake generate --vary` writes it anew when the map changes.\n"
     )
     text = yaml.safe_dump(

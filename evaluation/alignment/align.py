@@ -139,7 +139,7 @@ def align(
     else:
         held = make_consistent(first, track)
     moving = make_consistent(second, track)
-    swapped = held.off > moving.off and not hold_first
+    swapped = held.disagreement > moving.disagreement and not hold_first
     if swapped:
         held, moving = moving, held
     target, source = held.drive, moving.drive
@@ -167,7 +167,7 @@ def align(
         ground = 0.0
     X_TS = source.bend(X_TK)
     frame = target.sequence.world_frame
-    if ground != 0.0 or held.off > 0.0:
+    if ground != 0.0 or held.disagreement > 0.0:
         # The result is no longer in the world that the name stands for.
         frame = f"{frame}, corrected by {target.name}"
     held_drive = _lowered(target.sequence, target.X_WS, ground, frame, target)
@@ -188,7 +188,7 @@ def align(
             distance_95=float(np.quantile(distances[is_inlier], 0.95)),
             angle_median_deg=float(np.degrees(np.median(angles[is_inlier]))),
             model=model,
-            straightened=(held.off, moving.off),
+            straightened=(held.disagreement, moving.disagreement),
             ground=ground,
             **_motion((first if swapped else second).X_WS, X_TS),
         ),

@@ -187,8 +187,10 @@ def _agrees(
 ) -> np.ndarray:
     """Returns (M,) bool, which pairs a guess brings together."""
     p_T = _turned(candidates.p_S, turn) + move
-    off = np.linalg.norm((p_T - candidates.p_T)[:, :2], axis=1)
-    return (off < _NEAR) & (np.abs(wrapped(candidates.turn - turn)) < _TURN)
+    distances = np.linalg.norm((p_T - candidates.p_T)[:, :2], axis=1)
+    return (distances < _NEAR) & (
+        np.abs(wrapped(candidates.turn - turn)) < _TURN
+    )
 
 
 def _fit(candidates: Candidates, pairs: np.ndarray) -> tuple[float, np.ndarray]:

@@ -23,7 +23,7 @@ from evaluation.sequences.moved import MovedSequence
 _NUM_LOOPS = 30
 _FEWEST_LOOPS = 3
 _ROUNDS = 3
-# A drive has drifted if a quarter of the loops are off by more [m].
+# A drive has drifted if a quarter of its loops have a greater error [m].
 _DRIFT = 0.3
 
 
@@ -33,11 +33,11 @@ class Straightened:
 
     Attributes:
         drive: with new poses, if it had drifted.
-        off: its disagreement before, see `AlignmentReport`.
+        disagreement: of the drive with itself before, see `AlignmentReport`.
     """
 
     drive: Submaps
-    off: float
+    disagreement: float
 
 
 def make_consistent(sequence: Sequence, track: Track) -> Straightened:
@@ -56,10 +56,10 @@ def make_consistent(sequence: Sequence, track: Track) -> Straightened:
         if len(loops) < _FEWEST_LOOPS:
             break
         distances, _ = loop_errors(loops, drive.X_WK, drive.X_WK)
-        off = float(np.quantile(distances, 0.75))
-        if off < _DRIFT:
+        disagreement = float(np.quantile(distances, 0.75))
+        if disagreement < _DRIFT:
             break
-        worst = max(worst, off)
+        worst = max(worst, disagreement)
         X_WS = drive.bend(straighten(loops, drive))
         drive = Submaps(
             MovedSequence(sequence, X_WS, sequence.world_frame, sequence.datum)

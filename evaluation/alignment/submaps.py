@@ -123,8 +123,8 @@ class Submaps:
         None if it has too few points.
         """
         frame = self.frames[index]
-        off = np.abs(self.travelled[self._scans] - self.travelled[frame])
-        chosen = {int(frame), *self._scans[off <= _HALF_LENGTH].tolist()}
+        apart = np.abs(self.travelled[self._scans] - self.travelled[frame])
+        chosen = {int(frame), *self._scans[apart <= _HALF_LENGTH].tolist()}
         X_KW = poses.inverse(self.X_WS[frame])
         accumulator = VoxelAccumulator(_VOXEL_SIZE)
         for other in sorted(chosen):

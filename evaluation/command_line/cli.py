@@ -154,7 +154,7 @@ def tcr(
     )
     for one in surveys:
         if isinstance(one.sequence, Sequence):
-            _tell_notes(one.sequence)
+            _print_notes(one.sequence)
         ignored = one.voxels.num_ignored
         if ignored:
             terminal.note(
@@ -235,22 +235,24 @@ def pr(
             f"is not {database}"
         )
     chosen = _make_method(method, parameter, sensor_height)
-    places, asking = (open_sequence(path, lidar) for path in (database, query))
-    for drive in (places, asking):
-        _tell_notes(drive)
+    places, query_drive = (
+        open_sequence(path, lidar) for path in (database, query)
+    )
+    for drive in (places, query_drive):
+        _print_notes(drive)
     alignment = in_one_world(
         places,
-        asking,
+        query_drive,
         align.value,
         terminal.track,
         across_maps=across_maps,
     )
     if alignment is not None:
-        places, asking = alignment.first, alignment.second
+        places, query_drive = alignment.first, alignment.second
         terminal.note(alignment.report.to_text())
     result = place_recognition.run(
         places,
-        asking,
+        query_drive,
         chosen,
         mode.value,
         protocol,
@@ -412,7 +414,7 @@ def main() -> None:
     terminal.run(app, "cns-eval")
 
 
-def _tell_notes(sequence: Sequence) -> None:
+def _print_notes(sequence: Sequence) -> None:
     for note in sequence.notes:
         terminal.note(note)
 

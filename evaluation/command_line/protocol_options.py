@@ -139,7 +139,7 @@ def with_protocol(command: Callable[..., None]) -> Callable[..., None]:
     """
 
     @functools.wraps(command)
-    def asking(**values: Any) -> None:
+    def with_options(**values: Any) -> None:
         chosen = {name: values.pop(name) for name in _OPTIONS}
         command(**values, protocol=RetrievalProtocol(**chosen))
 
@@ -157,6 +157,8 @@ def with_protocol(command: Callable[..., None]) -> Callable[..., None]:
     parameters = [
         one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in own
     ] + added
-    asking.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
-    asking.__annotations__ = {one.name: one.annotation for one in parameters}
-    return asking
+    with_options.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+    with_options.__annotations__ = {
+        one.name: one.annotation for one in parameters
+    }
+    return with_options

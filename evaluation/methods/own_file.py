@@ -71,11 +71,13 @@ def load_method(path: Path) -> type[Method]:
         )
     for name in _CALLED:
         if name in vars(method):
-            setattr(method, name, _telling(getattr(method, name), path))
+            setattr(
+                method, name, _with_named_faults(getattr(method, name), path)
+            )
     return method
 
 
-def _telling(function: Callable, path: Path) -> Callable:
+def _with_named_faults(function: Callable, path: Path) -> Callable:
     """Returns a function whose exceptions become one line."""
 
     @functools.wraps(function)

@@ -35,7 +35,7 @@ class PaperReference(Reference):
         "the paper (RING++ filtered, others all)",
     )
 
-    def asks_back(self, map_name: str, earlier: str, last: str) -> bool:
+    def compares_back(self, map_name: str, earlier: str, last: str) -> bool:
         return any(
             key[:3] == (map_name, last, earlier)
             for key in printed.recognition_values()

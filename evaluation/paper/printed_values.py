@@ -28,8 +28,8 @@ def is_protocol(method: str, protocol: RetrievalProtocol) -> bool:
         protocol: of the run, its number of scans included.
     """
     scans = 10 if method == "btc" else 1
-    asked = replace(protocol, exclude_recent=None)
-    return asked == RetrievalProtocol(scans_per_place=scans)
+    compared = replace(protocol, exclude_recent=None)
+    return compared == RetrievalProtocol(scans_per_place=scans)
 
 
 def is_printed(result: RecognitionResult) -> bool:

@@ -81,14 +81,14 @@ def measure_cost(
             best = int(ranking(found)[0])
             method.relative_pose(queries.descriptors[row], indexed, best)
 
-    asking = [_cpu_ms(ask, row) for row in rows.tolist()]
+    query_times = [_cpu_ms(ask, row) for row in rows.tolist()]
     sizes = [len(pickle.dumps(one, protocol=5)) for one in places.descriptors]
     return Cost(
         method=method.name,
         scans_per_place=scans_per_place,
         points=float(np.mean([len(cloud) for cloud in clouds])),
         describe_ms=float(np.median(describing[1:])),
-        query_ms=float(np.median(asking[1:])),
+        query_ms=float(np.median(query_times[1:])),
         places=len(places.frames),
         place_bytes=float(np.mean(sizes)),
     )

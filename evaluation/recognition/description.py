@@ -174,12 +174,14 @@ class _Describing:
         waiting, self._waiting = self._waiting, []
         described = self._describe(waiting, self._members["places"], True)
         self._keep(self._drive.places, described, waiting)
-        asking = self._members["queries"]
+        query_frames = self._members["queries"]
         shared = described if self._method.describes_alike else {}
         described = shared | self._describe(
-            waiting, asking - set(shared), False
+            waiting, query_frames - set(shared), False
         )
-        described = {f: one for f, one in described.items() if f in asking}
+        described = {
+            f: one for f, one in described.items() if f in query_frames
+        }
         self._keep(self._drive.queries, described, waiting)
 
     def _describe(

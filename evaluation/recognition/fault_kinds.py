@@ -83,7 +83,7 @@ def fault_kinds(result: RecognitionResult, evidence: PairEvidence) -> list[str]:
     little = evidence.overlaps < _ENOUGH
     unseen = 1.0 - evidence.overlaps
     is_hidden = little & (evidence.hidden >= 0.5 * unseen)
-    asked = [
+    conditions = [
         ~outcome.outcomes.has_match,
         best < 0,
         distances <= NEARLY * outcome.protocol.radius,
@@ -95,5 +95,5 @@ def fault_kinds(result: RecognitionResult, evidence: PairEvidence) -> list[str]:
     return np.where(
         outcome.outcomes.is_right,
         "",
-        np.select(asked, FAULT_KINDS[:-1], FAULT_KINDS[-1]),
+        np.select(conditions, FAULT_KINDS[:-1], FAULT_KINDS[-1]),
     ).tolist()

@@ -46,7 +46,7 @@ def overlap_matrix(
         InputError: if a sequence cannot be read.
     """
     placed = sample_frames(database.X_WS[:, :3, 3], protocol.place_spacing)
-    asking = sample_frames(query.X_WS[:, :3, 3], protocol.query_spacing)
+    query_frames = sample_frames(query.X_WS[:, :3, 3], protocol.query_spacing)
     seen = [
         SeenSurfaces.of(gather(database, frame, 1, protocol.max_range))
         for frame in track(
@@ -55,16 +55,18 @@ def overlap_matrix(
     ]
     X_WPs = database.X_WS[placed]
     reaches = np.array([one.reach for one in seen])
-    result = np.zeros((len(asking), len(placed)))
+    result = np.zeros((len(query_frames), len(placed)))
     rows = track(
-        range(len(asking)), f"overlap: comparing {query.name}", len(asking)
+        range(len(query_frames)),
+        f"overlap: comparing {query.name}",
+        len(query_frames),
     )
     for row in rows:
-        points = gather(query, int(asking[row]), 1, protocol.max_range)
+        points = gather(query, int(query_frames[row]), 1, protocol.max_range)
         if len(points) == 0:
             result[row] = math.nan
             continue
-        X_WQ = query.X_WS[asking[row]]
+        X_WQ = query.X_WS[query_frames[row]]
         reach = np.linalg.norm(points, axis=1).max()
         apart = np.linalg.norm(X_WPs[:, :3, 3] - X_WQ[:3, 3], axis=1)
         p_W = sampled(points) @ X_WQ[:3, :3].T + X_WQ[:3, 3]
@@ -95,8 +97,8 @@ def best_overlaps(
     Returns:
         NaN for a query without a point or without a match.
     """
-    asked = np.flatnonzero(matches.any(axis=0)).tolist()
-    seen = {k: SeenSurfaces.of(place_scans[k].astype(float)) for k in asked}
+    matched = np.flatnonzero(matches.any(axis=0)).tolist()
+    seen = {k: SeenSurfaces.of(place_scans[k].astype(float)) for k in matched}
     result = np.full(len(query_scans), math.nan)
     for row, scan in enumerate(query_scans):
         X_WQ = X_WQs[row]

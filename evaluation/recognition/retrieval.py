@@ -186,13 +186,13 @@ def _compare(
     scores = [np.empty(is_known.shape) for _ in gate_radii]
     errors = [PoseErrors.unknown(len(queries.frames)) for _ in gate_radii]
     distances = np.empty(is_known.shape)
-    asking = track(
+    rows = track(
         range(len(queries.frames)),
         f"querying {query.name}",
         len(queries.frames),
     )
-    for row in asking:
-        asked = queries.descriptors[row]
+    for row in rows:
+        descriptor = queries.descriptors[row]
         offsets = queries.p_WSs[row] - places.p_WSs
         distances[row] = np.linalg.norm(offsets, axis=1)
         ungated = score_places(
@@ -206,13 +206,13 @@ def _compare(
         for radius, kept, error in zip(gate_radii, scores, errors, strict=True):
             found = ungated
             if radius is not None:
-                found = gated(method, asked, indexed, ungated, radius)
+                found = gated(method, descriptor, indexed, ungated, radius)
             kept[row] = found
             if np.isnan(found).all():
                 continue
             best = int(ranking(found)[0])
             X_PQ = checked_pose(
-                method, method.relative_pose(asked, indexed, best)
+                method, method.relative_pose(descriptor, indexed, best)
             )
             if X_PQ is not None:
                 error.translation[row], error.rotation_deg[row] = pose_error(

@@ -197,14 +197,14 @@ def _length(p: np.ndarray) -> float:
 
 @compiled
 def _classify(
-    asked: np.ndarray, seen: np.ndarray, angles: np.ndarray, starts: np.ndarray
+    others: np.ndarray, seen: np.ndarray, angles: np.ndarray, starts: np.ndarray
 ) -> np.ndarray:
     """Returns whether each of M points is shown, hidden, or neither."""
-    kinds = np.full(len(asked), _UNKNOWN, np.int8)
+    kinds = np.full(len(others), _UNKNOWN, np.int8)
     corners = np.empty(4, np.int64)
     away = np.empty(4)
-    for i in range(len(asked)):
-        p = asked[i]
+    for i in range(len(others)):
+        p = others[i]
         distance = _length(p)
         _find_corners(p, angles, starts, corners, away)
         farthest, nearest, count, is_shown = 0.0, math.inf, 0, False

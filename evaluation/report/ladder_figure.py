@@ -48,11 +48,11 @@ def draw_ladder(rows: Sequence[LadderRow], stem: Path) -> None:
     figure = Figure(figsize=size, layout="constrained")
     panels = figure.subplots(len(maps), 2, squeeze=False, sharey=True)
     for name, line in zip(maps, panels, strict=True):
-        for axes, (told, words) in zip(line, _TITLES.items(), strict=True):
+        for axes, (is_gated, words) in zip(line, _TITLES.items(), strict=True):
             shown = [
                 row
                 for row in rows
-                if row.rung.map_name == name and row.radius_told == told
+                if row.rung.map_name == name and row.radius_told == is_gated
             ]
             _draw_panel(axes, shown, methods, causes)
             axes.set_title(plain(f"{name}, {words}"), fontsize=_FONT_SIZE + 1)

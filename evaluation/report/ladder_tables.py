@@ -134,7 +134,7 @@ def _query_rows(
             )
 
 
-def _keys(rung: LadderRung, method: str, told: bool) -> tuple[object, ...]:
+def _keys(rung: LadderRung, method: str, is_gated: bool) -> tuple[object, ...]:
     return (
         rung.map_name,
         rung.database,
@@ -142,7 +142,7 @@ def _keys(rung: LadderRung, method: str, told: bool) -> tuple[object, ...]:
         rung.cause,
         rung.level,
         method,
-        int(told),
+        int(is_gated),
     )
 
 

@@ -36,18 +36,18 @@ def _paragraph(rows: Sequence[LadderRow]) -> str:
         f" {first.query}: what each cause of change, at its strongest level,"
         " leaves of the AUC without a change (95 % intervals)."
     ]
-    untold, told = (
+    ungated, gated = (
         _strongest([row for row in rows if row.radius_told == is_told])
         for is_told in (False, True)
     )
     sentences = [
-        _sentence([row for row in untold if row.method == method])
-        for method in in_table_order(row.method for row in untold)
+        _sentence([row for row in ungated if row.method == method])
+        for method in in_table_order(row.method for row in ungated)
     ]
     if any(sentences):
         parts.append(f"Without the gate: {'; '.join(filter(None, sentences))}.")
-        parts.append(_mildest(untold))
-        parts.append(_difference(untold, told))
+        parts.append(_mildest(ungated))
+        parts.append(_difference(ungated, gated))
     return " ".join(filter(None, parts))
 
 
@@ -89,13 +89,15 @@ def _mildest(rows: Sequence[LadderRow]) -> str:
     return f"To every method {much} are left by {', '.join(mild)}."
 
 
-def _difference(untold: Sequence[LadderRow], told: Sequence[LadderRow]) -> str:
+def _difference(
+    ungated: Sequence[LadderRow], gated: Sequence[LadderRow]
+) -> str:
     """Returns the sentence on causes whose cost depends on the gate."""
-    before = {(row.rung.cause, row.method): row for row in untold}
+    before = {(row.rung.cause, row.method): row for row in ungated}
     changed = [
         f"{title(row.method)} under {_cause(row)} keeps"
         f" {_percent(row.kept.share)} instead of {_percent(other.kept.share)}"
-        for row in told
+        for row in gated
         if (other := before.get((row.rung.cause, row.method))) is not None
         and abs(row.kept.share - other.kept.share) >= _DIFFERENT
     ]

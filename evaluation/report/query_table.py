@@ -100,7 +100,10 @@ def _rows(
     best_places = retrieval.best_places.tolist()
     errors = retrieval.pose_errors
     protocol = protocol_values(outcome.protocol)
-    asking, known = tracks[outcome.query], tracks[outcome.database]
+    query_track, database_track = (
+        tracks[outcome.query],
+        tracks[outcome.database],
+    )
     nothing = (None,) * (2 + len(_POSE))
     kinds = fault_kinds(result, evidence) if evidence else []
     for query, frame in enumerate(retrieval.query_frames.tolist()):
@@ -110,7 +113,9 @@ def _rows(
         distance = math.nan
         place = best_places[query]
         if place >= 0:
-            match = _moment(known, int(retrieval.database_frames[place]))
+            match = _moment(
+                database_track, int(retrieval.database_frames[place])
+            )
             distance = float(retrieval.distances[query, place])
         yield (
             *pair,
@@ -121,7 +126,7 @@ def _rows(
             int(rank) if math.isfinite(rank) else None,
             outcomes.num_places,
             outcome.query,
-            *_moment(asking, frame),
+            *_moment(query_track, frame),
             outcome.database,
             *match,
             distance,

@@ -60,7 +60,7 @@ class Reference:
     title: str = ""
     counting: tuple[str, str] = ("", "")
 
-    def asks_back(self, map_name: str, earlier: str, last: str) -> bool:
+    def compares_back(self, map_name: str, earlier: str, last: str) -> bool:
         """Returns whether the earlier stage also asks the last one."""
         del map_name, earlier, last
         return False

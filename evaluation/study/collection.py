@@ -85,7 +85,9 @@ class City:
         pairs = []
         for earlier, last in self.change_pairs():
             pairs.append((earlier, last))
-            if self.reference.asks_back(self.name, earlier.stage, last.stage):
+            if self.reference.compares_back(
+                self.name, earlier.stage, last.stage
+            ):
                 pairs.append((last, earlier))
         if with_itself:
             pairs += [(one, one) for one in self.stages.values()]

@@ -122,14 +122,14 @@ def find_evidence(
     changed_classes = [""] * number
     fits = {method: np.full(number, math.nan) for method in wrong}
     aligner = _Aligner()
-    for row in track(range(number), f"why: asking {query.name}", number):
+    for row in track(range(number), f"why: comparing {query.name}", number):
         frame = int(first.query_frames[row])
-        asking = _Shown.of(query, frame, protocol.max_range)
+        query_scan = _Shown.of(query, frame, protocol.max_range)
         matches = np.flatnonzero(first.matches[row]).tolist()
         right = None
-        if matches and len(asking.points):
+        if matches and len(query_scan.points):
             seen = [
-                shown[k].seen.shares_of(asking.seen_from(shown[k]))
+                shown[k].seen.shares_of(query_scan.seen_from(shown[k]))
                 for k in matches
             ]
             best = int(np.argmax([one.shown for one in seen]))
@@ -137,13 +137,13 @@ def find_evidence(
             overlaps[row], hidden[row] = seen[best]
             if classes:
                 changed[row], changed_classes[row] = _change(
-                    right, asking, classes
+                    right, query_scan, classes
                 )
         answers = sorted({int(places[row]) for places in wrong.values()} - {-1})
         compared = [shown[k] for k in answers]
         if answers and right is not None:
             compared.append(right)
-        found = aligner.fits(asking, compared)
+        found = aligner.fits(query_scan, compared)
         if len(found) > len(answers):
             right_fits[row] = found[-1]
         fit_of = dict(zip(answers, found, strict=False))

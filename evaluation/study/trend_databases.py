@@ -82,8 +82,8 @@ def measure_trend(
             no place with the query.
     """
     methods = choose_methods(own_methods, settings)
-    asking = open_sequence(query, lidar)
-    names = {asking.name}
+    query_drive = open_sequence(query, lidar)
+    names = {query_drive.name}
     if protocol.exclude_recent is not None:
         # For loop closure a drive may be its own database.
         names = set()
@@ -93,10 +93,10 @@ def measure_trend(
         if sequence.name in names:
             raise InputError(f"{path}: {sequence.name} is there twice")
         names.add(sequence.name)
-        check_same_world(sequence, asking)
+        check_same_world(sequence, query_drive)
         opened[path] = sequence
     serving = [opened[path] for path in controls]
-    asked = {}
+    searched = {}
     for path in databases:
         way = driven_way(opened[path].scenario)
         same = [
@@ -104,17 +104,17 @@ def measure_trend(
             for control in serving
             if way is not None and driven_way(control.scenario) == way
         ]
-        asked[opened[path].name] = TrendDatabase(
+        searched[opened[path].name] = TrendDatabase(
             _recorded(path, lidar), same[0] if same else None
         )
-    used = {one.control for one in asked.values()}
+    used = {one.control for one in searched.values()}
     for path in controls:
         if opened[path].name not in used:
             raise InputError(f"--control: {path}: no database has its route")
     return measure_drives(
-        asking.name,
+        query_drive.name,
         _recorded(query, lidar),
-        asked,
+        searched,
         {opened[path].name: _recorded(path, lidar) for path in controls},
         output,
         cluster,
@@ -124,7 +124,7 @@ def measure_trend(
 
 
 def measure_drives(
-    asking: str,
+    query_name: str,
     query: DriveSource,
     databases: Mapping[str, TrendDatabase],
     controls: Mapping[str, DriveSource],
@@ -136,7 +136,7 @@ def measure_drives(
     """Returns the points of drives that need not be recorded.
 
     Args:
-        asking: name of the query drive.
+        query_name: name of the query drive.
         query: opens it.
         databases: name -> drive whose places are searched.
         controls: name -> source of a control of databases.
@@ -150,11 +150,13 @@ def measure_drives(
     """
     files = StudyFiles(output.absolute())
     make_folder(output)
-    survey = files.survey(asking)
-    jobs = [survey_job(asking, query, {"queries"}, methods, protocol, survey)]
+    survey = files.survey(query_name)
+    jobs = [
+        survey_job(query_name, query, {"queries"}, methods, protocol, survey)
+    ]
     sources = {name: one.source for name, one in databases.items()}
     sources |= controls
-    parts = {name: files.trend_points(name, asking) for name in sources}
+    parts = {name: files.trend_points(name, query_name) for name in sources}
     jobs += [
         Job(
             name=f"measure {name}",

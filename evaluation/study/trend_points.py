@@ -88,10 +88,10 @@ class MeasureDatabase(PartStep):
         database = survey_recording(
             self.source(), {"places"}, running, self.protocol, reporter.track
         )
-        asking = read_part(self.query.drive)
-        check_same_world(database.drive.placed, asking.placed)
+        query_track = read_part(self.query.drive)
+        check_same_world(database.drive.placed, query_track.placed)
         change = temporal_change(
-            database.drive.coarse.centroids_W, asking.coarse.centroids_W
+            database.drive.coarse.centroids_W, query_track.coarse.centroids_W
         )
         points = []
         for choice, method in zip(self.methods, running, strict=True):

@@ -48,7 +48,7 @@ def yes(*arguments):
     return True
 
 
-def cannot_tell(*arguments):
+def cannot_check(*arguments):
     raise InputError("FILE: cannot be read")
 
 

@@ -67,7 +67,7 @@ def write_scenario(scenario, folder):
     return file
 
 
-def run_and_tell(scenario, output, sender):
+def run_and_report(scenario, output, sender):
     """Simulates in a process of its own and prints each frame.
 
     Exits with INTERRUPTED if SIGTERM has ended the run in good order.

@@ -45,7 +45,7 @@ _USES = (
         "house detached semidetached_house terrace bungalow villa farm",
     ),
 )
-_TELLING = (
+_USE_KEYS = (
     "building",
     "building:use",
     "amenity",
@@ -215,7 +215,7 @@ def building_use(
         area: of its footprint, about [m^2].
         height: of its walls [m].
     """
-    words = [tags.get(key, "") for key in _TELLING]
+    words = [tags.get(key, "") for key in _USE_KEYS]
     if "shop" in tags:
         words.append("shop")
     if "office" in tags:
@@ -233,7 +233,7 @@ def building_use(
     return Use.FLATS, False
 
 
-def told_colour(tags: Mapping[str, str], part: str) -> Rgb | None:
+def tagged_colour(tags: Mapping[str, str], part: str) -> Rgb | None:
     """Returns the colour that a tag gives a part, such as `building`."""
     for key in (f"{part}:colour", f"{part}:color"):
         text = tags.get(key, "").strip().lower()
@@ -287,7 +287,7 @@ def make_style(
         by_tag.add("levels")
     storey = max(height / numbered, _STOREYS[0])
     window = min(window, 0.58 * storey)
-    wall, roof = told_colour(tags, "building"), told_colour(tags, "roof")
+    wall, roof = tagged_colour(tags, "building"), tagged_colour(tags, "roof")
     by_tag |= {"wall"} if wall else set()
     by_tag |= {"roof"} if roof else set()
     wall = wall or _tinted(drawn_wall, tint)

@@ -53,10 +53,10 @@ def test_simulated_and_recorded_families_agree(tmp_path):
     values = {"base": "town/sequence_01.yaml", "missing": [0.0, 0.5]}
     family.write_text(yaml.safe_dump(values | {"ride": RIDE, "imu": IMU}))
     recorded, simulated = tmp_path / "recorded", tmp_path / "simulated"
-    asking = town / "sequence_02.yaml"
+    query_drive = town / "sequence_02.yaml"
     varied = "--vary", family
-    run(app, "trend", *varied, "--query", asking, "--output", simulated)
-    run(app, "generate", asking, *varied, "--output", recorded)
+    run(app, "trend", *varied, "--query", query_drive, "--output", simulated)
+    run(app, "generate", query_drive, *varied, "--output", recorded)
     run(app, "simulate", town / "unchanged.yaml", "--output", recorded)
     members = sorted(recorded.glob("town_01_m*"))
     run(

@@ -16,7 +16,7 @@ from cns_drake.city.geometry.object_parts import part_triangles
 from cns_drake.command_line.cli import app
 from cns_drake.imports.dressing.dressed_city import dress_buildings
 from cns_drake.imports.dressing.reliefs import Openings, framed, open_wall
-from cns_drake.imports.dressing.styles import Use, building_use, told_colour
+from cns_drake.imports.dressing.styles import Use, building_use, tagged_colour
 from cns_drake.imports.dressing.wall_panels import find_panels, is_upright
 from cns_drake.imports.extrusions import extruded
 from cns_drake.imports.grown_city import grow
@@ -177,9 +177,9 @@ def test_uses(tags, use):
      ("nonsense", None)],
 )  # fmt: skip
 def test_colours(value, rgb):
-    told = told_colour({"roof:colour": value}, "roof")
+    told = tagged_colour({"roof:colour": value}, "roof")
     assert told == (rgb if rgb is None else pytest.approx(rgb))
-    assert told_colour({"building:material": "wood"}, "building") is not None
+    assert tagged_colour({"building:material": "wood"}, "building") is not None
 
 
 def test_a_house_is_the_same_whatever_else_the_file_holds(row, tmp_path):

@@ -125,8 +125,8 @@ def test_all_members_ride_and_measure_alike(tmp_path):
         update = {"ride": other.ride, "imu": other.imu}
         assert member.model_copy(update=update) == other
     # Their drives through the city of the query drive do so, too.
-    asking = load_scenario("metropolis_04")
-    controls = family_controls(rough, asking)
+    query_drive = load_scenario("metropolis_04")
+    controls = family_controls(rough, query_drive)
     assert controls[rough[0].name].ride == rough[0].ride
     (path, _) = write_scenarios(rough, tmp_path / "written")
     assert load_scenario(path) == rough[0]

@@ -13,7 +13,7 @@ import os
 import signal
 
 from helpers.bag_recordings import contents
-from helpers.tiny_drive import FRAMES, run_and_tell, tiny_scenario
+from helpers.tiny_drive import FRAMES, run_and_report, tiny_scenario
 from mcap.exceptions import McapError
 from mcap.reader import NonSeekingReader
 import numpy as np
@@ -47,7 +47,7 @@ class Runner:
         """
         receiver, sender = self._context.Pipe(duplex=False)
         process = self._context.Process(
-            target=run_and_tell, args=(self._scenario, output, sender)
+            target=run_and_report, args=(self._scenario, output, sender)
         )
         process.start()
         sender.close()

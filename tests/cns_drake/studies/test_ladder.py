@@ -54,7 +54,7 @@ def town(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def asking(town):
+def query_drive(town):
     return load_scenario(town / "sequence_04.yaml")
 
 
@@ -71,27 +71,29 @@ def test_traffic_climbs_on_imported_lanes(town, tmp_path):
     """A map whose lanes are in lanes.json has the rungs of its roads.yaml."""
     extent = Extent(causes=("traffic",))
     folder = Path(shutil.copytree(town, tmp_path / "imported"))
-    asking = load_scenario(folder / "sequence_04.yaml")
-    graph, walkways, _ = load_ways(map_folder(asking))
-    before, _ = plan_rungs(asking, extent)
+    query_drive = load_scenario(folder / "sequence_04.yaml")
+    graph, walkways, _ = load_ways(map_folder(query_drive))
+    before, _ = plan_rungs(query_drive, extent)
     (folder / "lanes.json").write_text(lane_text(graph, walkways))
     (folder / "roads.yaml").unlink()
-    after, notes = plan_rungs(asking, extent)
+    after, notes = plan_rungs(query_drive, extent)
     wanted = [rung.drives.query.traffic for rung in after]
     assert wanted == [rung.drives.query.traffic for rung in before]
     assert max(traffic.vehicles for traffic in wanted) > 0
     assert not [note for note in notes if "traffic" in note]
     (folder / "lanes.json").unlink()
-    bare, notes = plan_rungs(asking, extent)
+    bare, notes = plan_rungs(query_drive, extent)
     assert [rung.cause for rung in bare] == ["none"]
     assert "neither roads.yaml nor lanes.json: no traffic" in notes
 
 
-def test_one_cause_changes_one_drive(asking):
-    (plain, *rungs), notes = plan_rungs(asking, Extent(levels=(1, 2, 3, 4)))
+def test_one_cause_changes_one_drive(query_drive):
+    (plain, *rungs), notes = plan_rungs(
+        query_drive, Extent(levels=(1, 2, 3, 4))
+    )
     assert plain.cause == "none"
-    assert plain.drives.query == asking
-    assert differences(plain.drives.database, asking) == {"name", "lidars"}
+    assert plain.drives.query == query_drive
+    assert differences(plain.drives.database, query_drive) == {"name", "lidars"}
     assert not notes
     for rung in rungs:
         found = {
@@ -110,8 +112,8 @@ def test_one_cause_changes_one_drive(asking):
             assert list(found.values()) == [set()]
 
 
-def test_all_is_everything_at_its_level(asking):
-    rungs, _ = plan_rungs(asking, Extent(levels=(2, 4)))
+def test_all_is_everything_at_its_level(query_drive):
+    rungs, _ = plan_rungs(query_drive, Extent(levels=(2, 4)))
     strongest = {rung.cause: rung for rung in rungs if rung.cause != "none"}
     assert set(strongest) == set(CAUSES) - {"none"}
     both = strongest["all"].drives
@@ -132,31 +134,31 @@ def test_all_is_everything_at_its_level(asking):
     assert both.database.lidars["lidar"].rpy_deg[2] == 180.0
 
 
-def test_levels_and_seeds(asking):
-    rungs, _ = plan_rungs(asking, Extent(levels=(4,), seeds=(1, 2, 3)))
+def test_levels_and_seeds(query_drive):
+    rungs, _ = plan_rungs(query_drive, Extent(levels=(4,), seeds=(1, 2, 3)))
     climbed = [(r.cause, r.level, r.seed) for r in rungs]
     # The earlier of two stages is the stronger change; returns have one level.
     assert ("construction", 4, 1) in climbed
     assert ("returns", 1, 3) in climbed
     assert ("ride", 4, 3) in climbed
     assert ("sensor", 4, 2) not in climbed
-    rungs, _ = plan_rungs(asking, Extent(causes={"construction"}))
+    rungs, _ = plan_rungs(query_drive, Extent(causes={"construction"}))
     stages = {r.level: r.drives.database.stage for r in rungs}
     assert stages == {0: "04", 3: "02", 4: "01"}
-    rungs, _ = plan_rungs(asking, Extent(causes={"size"}, most_places=500))
+    rungs, _ = plan_rungs(query_drive, Extent(causes={"size"}, most_places=500))
     assert [r.drives.num_distractors for r in rungs] == [0, 300]
 
 
-def test_what_a_map_lacks(asking, town):
-    lonely = asking.model_copy(update={"stage": "01"})
+def test_what_a_map_lacks(query_drive, town):
+    lonely = query_drive.model_copy(update={"stage": "01"})
     rungs, notes = plan_rungs(lonely, Extent())
     assert "construction" not in {rung.cause for rung in rungs}
     assert notes == ["no stage before 01: no construction"]
 
 
 @pytest.mark.slow
-def test_queries_lie_at_the_same_places_on_every_rung(asking):
-    (plain, *rungs), _ = plan_rungs(asking, Extent(levels=(4,)))
+def test_queries_lie_at_the_same_places_on_every_rung(query_drive):
+    (plain, *rungs), _ = plan_rungs(query_drive, Extent(levels=(4,)))
     expected = SimulatedDrive(plain.drives.query)().X_WS
     for rung in rungs:
         if rung.cause in ("weather", "returns", "sensor"):
@@ -165,9 +167,9 @@ def test_queries_lie_at_the_same_places_on_every_rung(asking):
             )
 
 
-def test_the_other_carriageway(asking):
+def test_the_other_carriageway(query_drive):
     (plain, rung), _ = plan_rungs(
-        asking, Extent(causes={"viewpoint"}, levels=(4,))
+        query_drive, Extent(causes={"viewpoint"}, levels=(4,))
     )
     query = SimulatedDrive(plain.drives.query)().X_WS
     database = SimulatedDrive(rung.drives.database)().X_WS
@@ -177,13 +179,13 @@ def test_the_other_carriageway(asking):
 
 
 def test_distracting_drives_are_of_other_cities(tmp_path, monkeypatch):
-    asking = load_scenario("metropolis_04")
-    drives = distracting_drives(asking, 1000, 5.0, tmp_path, Cluster())
+    query_drive = load_scenario("metropolis_04")
+    drives = distracting_drives(query_drive, 1000, 5.0, tmp_path, Cluster())
     # Some 250 to 350 places each.
     assert 3 <= len(drives) <= 5
     assert all("metropolis" not in drive.name for drive in drives)
     assert len({drive.name for drive in drives}) == len(drives)
-    assert distracting_drives(asking, 0, 5.0, tmp_path, Cluster()) == []
+    assert distracting_drives(query_drive, 0, 5.0, tmp_path, Cluster()) == []
 
 
 def test_many_distracting_drives_have_twin_blocks(tmp_path, monkeypatch):
@@ -195,8 +197,8 @@ def test_many_distracting_drives_have_twin_blocks(tmp_path, monkeypatch):
 
     monkeypatch.setattr(distractors, "redraw_cities", redraw)
     monkeypatch.setattr(distractors, "_num_places", lambda *_: 1)
-    asking = load_scenario("suburbia_02")
-    drives = distracting_drives(asking, 40, 5.0, tmp_path, Cluster())
+    query_drive = load_scenario("suburbia_02")
+    drives = distracting_drives(query_drive, 40, 5.0, tmp_path, Cluster())
     maps = [Path(drive.map).name for drive in drives]
     # Ten shipped drives of the others, two of the same streets, and so on.
     assert maps.index("suburbia_c1") == 10

@@ -63,7 +63,7 @@ def test_finished_steps_start_no_process(tmp_path, monkeypatch, capsys):
     )  # fmt: skip
     unknown = job(
         "unknown", job_functions.join, [], tmp_path / "unknown",
-        is_done=job_functions.cannot_tell,
+        is_done=job_functions.cannot_check,
     )  # fmt: skip
     run_jobs([done, new, again, unknown], Cluster(num_workers=1))
     assert (tmp_path / "unknown").is_file()
@@ -77,7 +77,7 @@ def test_a_job_checks_again_before_its_output(tmp_path):
     output.write_text("of the other")
     for is_done, expected in (
         (job_functions.is_there, "of the other"),
-        (job_functions.cannot_tell, "output"),
+        (job_functions.cannot_check, "output"),
     ):
         arguments = ([], output)
         run_process(
