@@ -99,7 +99,7 @@ class EmbreeHierarchy:
         fixed = [row for row in self.rows if groups[row].is_merged_world]
         moving = [row for row in self.rows if row not in fixed]
         self._top = 0
-        # Of each group: its instance, if it has one, and the state of that.
+        # Instances of groups, if they have one, and the states of these.
         self._instances = np.zeros(len(groups), np.uintp)
         self._is_disabled = np.zeros(len(groups), bool)
         self._in_motion = np.zeros(len(groups), bool)

@@ -77,8 +77,7 @@ def merge_first(group: RayGroup) -> Iterator[Primitives]:
 
 
 def merge_second(group: RayGroup) -> Iterator[Primitives]:
-    """Yields the primitives of a group on which few rays are cast: its curved
-    shapes, if it cannot move."""
+    """Yields the primitives for few rays: curved shapes that cannot move."""
     if group.frame_id is None:
         yield from merge_curved(group.members)
 

@@ -33,8 +33,7 @@ class KnownPoses(NamedTuple):
     def find(
         self, frame: FrameId, calc_X_WF: Callable[[FrameId], RigidTransform]
     ) -> RigidTransform:
-        """Returns the pose of a frame, which is calculated if it is not
-        known."""
+        """Returns the pose of a frame, calculated if it is not stored."""
         row = self.rows.get(frame)
         if row is None:
             return calc_X_WF(frame)

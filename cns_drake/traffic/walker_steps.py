@@ -128,9 +128,9 @@ def step_walkers(
             lacking = wanted[k] - walkers.velocity[i, k]
             force[i, k] += lacking / _RELAXATION
         here = ways.points[row_of(ways, way, forward, walkers.at[i]), :2]
-        off = np.sum((walkers.xy[i] - here) * right)
+        across = np.sum((walkers.xy[i] - here) * right)
         for side in (-1.0, 1.0):
-            room = half - side * off
+            room = half - side * across
             push = side * _EDGE_STRENGTH * np.exp(-max(room, 0.0) / _EDGE_REACH)
             force[i, 0] -= push * right[0]
             force[i, 1] -= push * right[1]
@@ -300,13 +300,13 @@ def _keep_on_way(
     tangent = tangent_of(ways, way, forward, nearest)
     right = np.array([tangent[1], -tangent[0]])
     along = np.sum((walkers.xy[i] - place) * tangent)
-    off = np.sum((walkers.xy[i] - place) * right)
+    across = np.sum((walkers.xy[i] - place) * right)
     if nearest == ways.num_points[way] - 1:
         along = min(along, half)
     if nearest == 0:
         along = max(along, -_AT_NODE - half)
-    off = min(max(off, -half), half)
-    back = place + along * tangent + off * right - walkers.xy[i]
+    across = min(max(across, -half), half)
+    back = place + along * tangent + across * right - walkers.xy[i]
     distance = np.sqrt(np.sum(back**2))
     if distance > most:
         back *= most / distance

@@ -90,7 +90,7 @@ class _Server:
             self._process.wait(0.0)
         except subprocess.TimeoutExpired:
             return True
-        except ProcessDiedError:  # So has the one that has started it.
+        except ProcessDiedError:  # Its parent has died, too.
             pass
         return False
 

@@ -26,8 +26,11 @@ NAMES = ("carrier", "capsule", "anchor")
 
 
 class Scanned:
-    """A LiDAR on a floating body sees another one, one that is welded to the
-    world, and a plant of its own that is known by its poses alone."""
+    """A LiDAR on a floating body, and three kinds of bodies that it sees.
+
+    These are a floating body, one that is welded to the world, and one of a
+    second plant that has nothing but poses.
+    """
 
     def __init__(self, is_posed):
         builder = DiagramBuilder()
