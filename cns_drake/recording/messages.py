@@ -42,11 +42,14 @@ def make_point_cloud(points: np.ndarray, frame_id: str, stamp_ns: int) -> Any:
         An unordered (height 1) and dense cloud: rays without a return have no
         record.
     """
-    packed = np.zeros(len(points), dtype=points.dtype)
+    size = points.dtype.itemsize
+    # A copy of bytes is several times as fast as one of records.
+    rows = np.ascontiguousarray(points).view(np.uint8)
+    packed = rows.reshape(-1, size).copy()
     point_field = message_class("sensor_msgs/msg/PointField")
-    fields = []
+    fields, padding = [], set(range(size))
     for name, (dtype, offset, *_) in (points.dtype.fields or {}).items():
-        packed[name] = points[name]
+        padding.difference_update(range(offset, offset + dtype.itemsize))
         fields.append(
             point_field(
                 name=name,
@@ -55,15 +58,17 @@ def make_point_cloud(points: np.ndarray, frame_id: str, stamp_ns: int) -> Any:
                 count=1,
             )
         )
+    for column in sorted(padding):
+        packed[:, column] = 0
     return message_class(POINT_CLOUD)(
         header=make_header(frame_id, stamp_ns),
         height=1,
         width=len(packed),
         fields=fields,
         is_bigendian=False,
-        point_step=packed.itemsize,
+        point_step=size,
         row_step=packed.nbytes,
-        data=packed.view(np.uint8),
+        data=packed.reshape(-1),
         is_dense=True,
     )
 
