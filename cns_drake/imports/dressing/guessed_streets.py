@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 import shapely
-from shapely.geometry import MultiLineString
+from shapely.geometry import MultiLineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.imports.dressing.grounds import (
@@ -115,13 +115,32 @@ def _laid(area: BaseGeometry, ground: np.ndarray, above: float) -> np.ndarray:
     shapely.prepare(area)
     hit = np.flatnonzero(shapely.intersects(area, outlines))
     pieces = shapely.intersection(outlines[hit], area, grid_size=_MM)
+    whole = np.isclose(
+        shapely.area(pieces), shapely.area(shapely.convex_hull(pieces)), 1e-6
+    )
     found = [np.zeros((0, 3, 3))]
-    for triangle, piece in zip(ground[hit], pieces, strict=True):
+    for triangle, piece, is_convex in zip(
+        ground[hit], pieces, whole, strict=True
+    ):
         a, b, c = triangle
         normal = np.cross(b - a, c - a)
         for part in parts_of(piece):
-            flat = flat_surface(part, 0.0, "street", ImportFaults())
+            flat = _fan(part) if is_convex else _filled(part)
             aside = (flat - a)[..., :2] @ normal[:2]
             flat[..., 2] = a[2] - aside / normal[2] + above
             found.append(flat)
     return turned_up(np.concatenate(found))
+
+
+def _filled(area: Polygon) -> np.ndarray:
+    return flat_surface(area, 0.0, "street", ImportFaults())
+
+
+def _fan(area: Polygon) -> np.ndarray:
+    """Returns a convex area as triangles (N, 3, 3) at height 0 [m]."""
+    corners = np.array(area.exterior.coords)[:-1, :2]
+    fan = np.zeros((len(corners) - 2, 3, 3))
+    fan[:, 0, :2] = corners[0]
+    fan[:, 1, :2], fan[:, 2, :2] = corners[1:-1], corners[2:]
+    sides = fan[:, 1:, :2] - fan[:, :1, :2]
+    return fan[np.abs(np.linalg.det(sides)) > _MM * _MM]

@@ -105,8 +105,7 @@ def find_panels(
     building = np.repeat(np.arange(len(walls)), [len(w) for w in walls])
     if not len(triangles):
         return []
-    normals = unit_normals(triangles)
-    component = _connected(triangles, normals, building)
+    component = _connected(triangles, unit_normals(triangles), building)
     order = np.argsort(component, kind="stable")
     begins = np.flatnonzero(np.diff(component[order], prepend=-1))
     groups = np.split(order, begins[1:])
@@ -121,8 +120,13 @@ def find_panels(
         )
         wanted = is_wanted(limits)
         groups = [some for k, some in enumerate(groups) if wanted[k]]
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    normals = np.cross(b - a, c - a) / 2.0
+    areas = np.linalg.norm(normals, axis=1)
     return [
-        _panel(int(building[some[0]]), triangles[some], normals[some])
+        _panel(
+            int(building[some[0]]), triangles[some], normals[some], areas[some]
+        )
         for some in groups
     ]
 
@@ -149,12 +153,22 @@ def _connected(
     return np.asarray(component)
 
 
-def _panel(building: int, triangles: np.ndarray, normals: np.ndarray) -> Panel:
+def _panel(
+    building: int,
+    triangles: np.ndarray,
+    normals: np.ndarray,
+    areas: np.ndarray,
+) -> Panel:
+    """Returns the panel of connected triangles.
+
+    Args:
+        building: its number.
+        triangles: (M, 3, 3) [m].
+        normals, areas: (M, 3) as long as the areas, and these (M,) [m^2].
+    """
     corners = triangles.reshape(-1, 3)
     # The mean over areas: small triangles have imprecise normals.
-    a, b, c = np.moveaxis(triangles, 1, 0)
-    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2.0
-    outward = (normals * areas[:, None]).sum(axis=0)[:2]
+    outward = normals.sum(axis=0)[:2]
     outward /= np.hypot(*outward)
     along = np.array([-outward[1], outward[0]])
     x = (corners[:, :2] - corners[0, :2]) @ along
