@@ -113,7 +113,6 @@ def dress_city(
     things = dress_streets(
         [*staged.kept, *added], city.things, city.streets, drives, ground, seed
     )
-    changed |= things.moved
     added += things.structures
     for thing in city.things:
         if thing.source in things.sources:
@@ -135,7 +134,7 @@ def dress_city(
         "by_lot": dict(sorted((+by_lot + things.by_lot).items())),
         "without_room": things.no_room,
     }
-    dressed = staged.replaced(changed).joined(added)
+    dressed = staged.replaced({**changed, **things.moved}).joined(added)
     if len(dressed.kept) >= MAX_STRUCTURES:
         raise InputError(
             f"--plain: without it the city has {len(dressed.kept)} structures,"
