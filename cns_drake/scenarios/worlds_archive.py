@@ -42,7 +42,11 @@ def _unpack(archive: Path, folder: Path) -> None:
     part = Path(tempfile.mkdtemp(prefix=f"{folder.name}.", dir=folder.parent))
     try:
         with tarfile.open(archive) as tar:
-            tar.extractall(part, filter="data")
+            # Python 3.11.2, which Debian 12 has, lacks filters.
+            tar.extraction_filter = getattr(
+                tarfile, "data_filter", lambda member, _: member
+            )
+            tar.extractall(part)
         part.chmod(0o755)
         try:
             part.rename(folder)
