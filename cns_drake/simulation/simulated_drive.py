@@ -18,9 +18,7 @@ from cns_drake.motion.sweep import Sweep
 from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.provenance import digest_inputs
 from cns_drake.scenarios.scenario import Scenario
-from cns_drake.scenarios.scenario_files import (
-    check_files,
-)
+from cns_drake.scenarios.scenario_files import check_files, stage_group
 from cns_drake.scenarios.sensor_making import (
     make_measurement,
     make_pattern,
@@ -32,7 +30,7 @@ from cns_drake.simulation.scenario_traffic import (
     plan_scenario_traffic,
     with_traffic,
 )
-from cns_drake.simulation.stage_loading import load_stage
+from cns_drake.simulation.stage_loading import keep_stage, load_stage
 from cns_drake.simulation.still_world import make_still_world
 from cns_drake.simulation.structure_list import structure_list
 from cns_drake.traffic.traffic_adding import make_traffic
@@ -50,6 +48,13 @@ class SimulatedDrive:
 
     def __call__(self) -> SimulatedSequence:
         return SimulatedSequence(self.scenario)
+
+    @property
+    def group(self) -> str | None:
+        return stage_group(self.scenario)
+
+    def load(self) -> None:
+        keep_stage(self.scenario)
 
     def identity(self) -> dict:
         """Returns the scenario, and digests of its files and of the code."""

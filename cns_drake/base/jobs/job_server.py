@@ -32,6 +32,9 @@ from cns_drake.base.jobs.step import Step
 
 # How often the server checks whether a process has ended [s].
 _LOOK_INTERVAL = 0.01
+# Greatest number of groups that load, since what they load stays in memory. The
+# jobs of further ones load by themselves.
+_MOST_GROUPS = 8
 
 
 class JobServer:
@@ -55,7 +58,9 @@ class JobServer:
         group = _group(job)
         with self._lock:
             server = self._server(None, lambda: start_interpreter(serve))
-            if group is not None:
+            if group is not None and (
+                group in self._servers or len(self._servers) <= _MOST_GROUPS
+            ):
                 first = server
                 server = self._server(group, lambda: first.start(job, "serve"))
         return server.start(job)

@@ -147,7 +147,7 @@ class Steps(Step):
 
     def load(self) -> None:
         for step in self.steps:
-            if step.group == self.group and not step.is_done():
+            if step.group == self.group:
                 step.load()
 
     def run(self, reporter: Reporter) -> None:

@@ -381,6 +381,20 @@ def test_jobs_of_a_group_are_forked_from_one_that_has_loaded(tmp_path):
     assert found["a2"] == [first] * 3
 
 
+def test_few_groups_load(tmp_path, monkeypatch):
+    monkeypatch.setattr("cns_drake.base.jobs.job_server._MOST_GROUPS", 1)
+    paths = {name: tmp_path / name for name in "ab"}
+    run_jobs(
+        [
+            Job(name, job_functions.Grouped(name, path))
+            for name, path in paths.items()
+        ],
+        Cluster(num_workers=1),
+    )
+    loaders = [len(path.read_text().split()) - 1 for path in paths.values()]
+    assert loaders == [1, 0]
+
+
 def test_a_process_that_dies_while_it_loads_harms_its_group_alone(tmp_path):
     jobs = [
         Job("dies", job_functions.Grouped("a", tmp_path / "a", True)),
