@@ -111,8 +111,10 @@ def _speeds(piece: Piece) -> np.ndarray:
 
 
 @compiled
-def place_on(lanes: LaneArrays, piece: int, s: float) -> np.ndarray:
-    """Returns the (3,) place at a distance along a piece [m].
+def place_on(
+    lanes: LaneArrays, piece: int, s: float
+) -> tuple[float, float, float]:
+    """Returns the place at a distance along a piece [m].
 
     Before its beginning and after its end it goes straight on.
     """
@@ -120,8 +122,11 @@ def place_on(lanes: LaneArrays, piece: int, s: float) -> np.ndarray:
     k = int(min(max(np.floor(at), 0.0), lanes.num_points[piece] - 2.0))
     row = lanes.first[piece] + k
     share = at - k
-    return lanes.points[row] + share * (
-        lanes.points[row + 1] - lanes.points[row]
+    x, y, z = lanes.points[row, 0], lanes.points[row, 1], lanes.points[row, 2]
+    return (
+        x + share * (lanes.points[row + 1, 0] - x),
+        y + share * (lanes.points[row + 1, 1] - y),
+        z + share * (lanes.points[row + 1, 2] - z),
     )
 
 

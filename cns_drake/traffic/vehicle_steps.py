@@ -143,8 +143,8 @@ def advance(
 @compiled
 def place_of(
     lanes: LaneArrays, vehicles: Vehicles, i: int, back: float
-) -> np.ndarray:
-    """Returns a (3,) place on a vehicle's path.
+) -> tuple[float, float, float]:
+    """Returns a place on a vehicle's path.
 
     Args:
         lanes: all of them.
@@ -165,7 +165,11 @@ def place_of(
         share = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
         scale = lanes.length[other] / lanes.length[piece]
         before = place_on(lanes, other, vehicles.s[i] * scale - back)
-        place = before + share * (place - before)
+        place = (
+            before[0] + share * (place[0] - before[0]),
+            before[1] + share * (place[1] - before[1]),
+            before[2] + share * (place[2] - before[2]),
+        )
     return place
 
 
@@ -187,9 +191,11 @@ def write_poses(
         half = 0.5 * vehicles.length[i]
         front = place_of(lanes, vehicles, i, half - vehicles.front_axle[i])
         rear = place_of(lanes, vehicles, i, half - vehicles.rear_axle[i])
-        ahead = front - rear
-        ahead /= np.sqrt(np.sum(ahead**2))
-        for axis in range(3):
-            poses[i, axis] = rear[axis] - vehicles.rear_axle[i] * ahead[axis]
-        poses[i, 3] = np.arctan2(ahead[1], ahead[0])
-        poses[i, 4] = -np.arcsin(ahead[2])
+        x, y, z = front[0] - rear[0], front[1] - rear[1], front[2] - rear[2]
+        length = np.sqrt(x * x + y * y + z * z)
+        x, y, z = x / length, y / length, z / length
+        poses[i, 0] = rear[0] - vehicles.rear_axle[i] * x
+        poses[i, 1] = rear[1] - vehicles.rear_axle[i] * y
+        poses[i, 2] = rear[2] - vehicles.rear_axle[i] * z
+        poses[i, 3] = np.arctan2(y, x)
+        poses[i, 4] = -np.arcsin(z)

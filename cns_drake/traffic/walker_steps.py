@@ -17,6 +17,7 @@ from cns_drake.traffic.walker_ways import (
     Walkers,
     WalkwayArrays,
     begin,
+    distance_along,
     draw_next,
     height_of,
     may_begin,
@@ -89,18 +90,15 @@ def step_walkers(
         # The walker's progress along its walkway.
         while walkers.at[i] < ways.num_points[way] - 2:
             tangent = tangent_of(ways, way, forward, walkers.at[i])
-            here = ways.points[row_of(ways, way, forward, walkers.at[i]), :2]
-            if np.sum((walkers.xy[i] - here) * tangent) < SPACING:
+            here = row_of(ways, way, forward, walkers.at[i])
+            if -distance_along(ways, here, walkers, i, tangent) < SPACING:
                 break
             walkers.at[i] += 1
-        last = ways.points[
-            row_of(ways, way, forward, ways.num_points[way] - 1), :2
-        ]
-        to_end = last - walkers.xy[i]
+        last = row_of(ways, way, forward, ways.num_points[way] - 1)
         tangent = tangent_of(ways, way, forward, walkers.at[i])
         is_near = (
             walkers.at[i] >= ways.num_points[way] - 3
-            and np.sum(to_end * tangent) < _AT_NODE
+            and distance_along(ways, last, walkers, i, tangent) < _AT_NODE
         )
         waits = False
         if is_near:
@@ -113,22 +111,22 @@ def step_walkers(
                 tangent = tangent_of(ways, way, forward, walkers.at[i])
             else:
                 waits = is_waiting[i] = True
-        right = np.array([tangent[1], -tangent[0]])
+        right = (tangent[1], -tangent[0])
         half = ways.half_width[way]
-        if waits:
-            wanted = np.zeros(2)
-        else:
+        wanted_x = wanted_y = 0.0
+        if not waits:
             ahead = walkers.at[i] + int(_AHEAD / SPACING)
-            target = ways.points[row_of(ways, way, forward, ahead), :2]
-            step = target + walkers.aside[i] * half * right - walkers.xy[i]
-            wanted = (
-                walkers.speed[i] * step / max(np.sqrt(np.sum(step**2)), 1e-6)
-            )
-        for k in range(2):
-            lacking = wanted[k] - walkers.velocity[i, k]
-            force[i, k] += lacking / _RELAXATION
-        here = ways.points[row_of(ways, way, forward, walkers.at[i]), :2]
-        across = np.sum((walkers.xy[i] - here) * right)
+            target = row_of(ways, way, forward, ahead)
+            aside = walkers.aside[i] * half
+            x = ways.points[target, 0] + aside * right[0] - walkers.xy[i, 0]
+            y = ways.points[target, 1] + aside * right[1] - walkers.xy[i, 1]
+            distance = max(np.sqrt(x * x + y * y), 1e-6)
+            wanted_x = walkers.speed[i] * x / distance
+            wanted_y = walkers.speed[i] * y / distance
+        force[i, 0] += (wanted_x - walkers.velocity[i, 0]) / _RELAXATION
+        force[i, 1] += (wanted_y - walkers.velocity[i, 1]) / _RELAXATION
+        here = row_of(ways, way, forward, walkers.at[i])
+        across = -distance_along(ways, here, walkers, i, right)
         for side in (-1.0, 1.0):
             room = half - side * across
             push = side * _EDGE_STRENGTH * np.exp(-max(room, 0.0) / _EDGE_REACH)
@@ -156,13 +154,16 @@ def step_walkers(
                 _step_aside(walkers, force, i, -x, -y, distance)
                 _step_aside(walkers, force, j, x, y, distance)
     for i in range(count):
-        velocity = walkers.velocity[i] + force[i] * dt
-        speed = np.sqrt(np.sum(velocity**2))
+        x = walkers.velocity[i, 0] + force[i, 0] * dt
+        y = walkers.velocity[i, 1] + force[i, 1] * dt
+        speed = np.sqrt(x * x + y * y)
         fastest = _HURRY * walkers.speed[i]
         if speed > fastest:
-            velocity *= fastest / speed
-        _move(ways, walkers, i, velocity, dt)
-        speed = np.sqrt(np.sum(walkers.velocity[i] ** 2))
+            x *= fastest / speed
+            y *= fastest / speed
+        _move(ways, walkers, i, x, y, dt)
+        x, y = walkers.velocity[i, 0], walkers.velocity[i, 1]
+        speed = np.sqrt(x * x + y * y)
         walkers.phase[i] += gait_rate(speed) * dt
         way = walkers.way[i]
         is_stuck = speed < _GOING and not is_waiting[i]
@@ -247,7 +248,8 @@ def _move(
     ways: WalkwayArrays,
     walkers: Walkers,
     i: int,
-    velocity: np.ndarray,
+    velocity_x: float,
+    velocity_y: float,
     dt: float,
 ) -> None:
     """Moves a walker as far as its way is free.
@@ -255,14 +257,14 @@ def _move(
     All begin apart, and no step makes two overlap.
     """
     x, y = walkers.xy[i, 0], walkers.xy[i, 1]
-    speed = np.sqrt(np.sum(velocity**2))
+    speed = np.sqrt(velocity_x * velocity_x + velocity_y * velocity_y)
     yaw = walkers.yaw[i]
     if speed > _GOING:
-        heading = np.arctan2(velocity[1], velocity[0])
+        heading = np.arctan2(velocity_y, velocity_x)
         turn = (heading - yaw + np.pi) % (2 * np.pi) - np.pi
         yaw += min(max(turn, -_TURN_RATE * dt), _TURN_RATE * dt)
-    walkers.xy[i, 0] += velocity[0] * dt
-    walkers.xy[i, 1] += velocity[1] * dt
+    walkers.xy[i, 0] += velocity_x * dt
+    walkers.xy[i, 1] += velocity_y * dt
     _keep_on_way(ways, walkers, i, _BACK * dt)
     new_x, new_y = walkers.xy[i, 0], walkers.xy[i, 1]
     walkers.xy[i, 0], walkers.xy[i, 1] = x, y
@@ -292,23 +294,29 @@ def _keep_on_way(
     best, nearest = np.inf, 0
     low = max(walkers.at[i] - 3, 0)
     for at in range(low, min(walkers.at[i] + 4, ways.num_points[way])):
-        place = ways.points[row_of(ways, way, forward, at), :2]
-        distance = np.sum((walkers.xy[i] - place) ** 2)
+        row = row_of(ways, way, forward, at)
+        x = walkers.xy[i, 0] - ways.points[row, 0]
+        y = walkers.xy[i, 1] - ways.points[row, 1]
+        distance = x * x + y * y
         if distance < best:
             best, nearest = distance, at
-    place = ways.points[row_of(ways, way, forward, nearest), :2]
+    row = row_of(ways, way, forward, nearest)
     tangent = tangent_of(ways, way, forward, nearest)
-    right = np.array([tangent[1], -tangent[0]])
-    along = np.sum((walkers.xy[i] - place) * tangent)
-    across = np.sum((walkers.xy[i] - place) * right)
+    right = (tangent[1], -tangent[0])
+    along = -distance_along(ways, row, walkers, i, tangent)
+    across = -distance_along(ways, row, walkers, i, right)
     if nearest == ways.num_points[way] - 1:
         along = min(along, half)
     if nearest == 0:
         along = max(along, -_AT_NODE - half)
     across = min(max(across, -half), half)
-    back = place + along * tangent + across * right - walkers.xy[i]
-    distance = np.sqrt(np.sum(back**2))
+    x = ways.points[row, 0] + along * tangent[0] + across * right[0]
+    y = ways.points[row, 1] + along * tangent[1] + across * right[1]
+    x -= walkers.xy[i, 0]
+    y -= walkers.xy[i, 1]
+    distance = np.sqrt(x * x + y * y)
     if distance > most:
-        back *= most / distance
-    walkers.xy[i, 0] += back[0]
-    walkers.xy[i, 1] += back[1]
+        x *= most / distance
+        y *= most / distance
+    walkers.xy[i, 0] += x
+    walkers.xy[i, 1] += y

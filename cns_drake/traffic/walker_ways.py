@@ -80,12 +80,29 @@ def row_of(ways: WalkwayArrays, way: int, forward: bool, at: int) -> int:
 @compiled
 def tangent_of(
     ways: WalkwayArrays, way: int, forward: bool, at: int
-) -> np.ndarray:
+) -> tuple[float, float]:
+    """Returns the unit vector along a walkway in walking direction."""
     at = min(max(at, 0), ways.num_points[way] - 2)
-    a = ways.points[row_of(ways, way, forward, at), :2]
-    b = ways.points[row_of(ways, way, forward, at + 1), :2]
-    step = b - a
-    return step / np.sqrt(np.sum(step**2))
+    a = row_of(ways, way, forward, at)
+    b = row_of(ways, way, forward, at + 1)
+    x = ways.points[b, 0] - ways.points[a, 0]
+    y = ways.points[b, 1] - ways.points[a, 1]
+    length = np.sqrt(x * x + y * y)
+    return x / length, y / length
+
+
+@compiled
+def distance_along(
+    ways: WalkwayArrays,
+    row: int,
+    walkers: Walkers,
+    i: int,
+    direction: tuple[float, float],
+) -> float:
+    """Returns how far a walkway's point is ahead of a walker [m]."""
+    x = ways.points[row, 0] - walkers.xy[i, 0]
+    y = ways.points[row, 1] - walkers.xy[i, 1]
+    return x * direction[0] + y * direction[1]
 
 
 @compiled
@@ -143,11 +160,13 @@ def height_of(ways: WalkwayArrays, walkers: Walkers, i: int) -> float:
     """Returns the height of the walkway at a walker [m]."""
     way, forward, at = walkers.way[i], walkers.forward[i], walkers.at[i]
     at = min(at, ways.num_points[way] - 2)
-    a = ways.points[row_of(ways, way, forward, at)]
-    b = ways.points[row_of(ways, way, forward, at + 1)]
-    step = b[:2] - a[:2]
-    share = np.sum((walkers.xy[i] - a[:2]) * step) / np.sum(step**2)
-    return a[2] + min(max(share, 0.0), 1.0) * (b[2] - a[2])
+    a = row_of(ways, way, forward, at)
+    b = row_of(ways, way, forward, at + 1)
+    x = ways.points[b, 0] - ways.points[a, 0]
+    y = ways.points[b, 1] - ways.points[a, 1]
+    share = -distance_along(ways, a, walkers, i, (x, y)) / (x * x + y * y)
+    low, high = ways.points[a, 2], ways.points[b, 2]
+    return low + min(max(share, 0.0), 1.0) * (high - low)
 
 
 @compiled
