@@ -59,35 +59,39 @@ def plan(sequence, number, duration, seed=1):
     )
 
 
-def boxes(centres, yaw, size):
-    """Returns polygons of boxes (N, 2), (N,)."""
+def boxes(centres, yaw, sizes):
+    """Returns polygons of boxes (N, 2), (N,), (N, 2)."""
     c, s = np.cos(yaw), np.sin(yaw)
     corners = [
         (
             centres[:, 0] + x * c - y * s,
             centres[:, 1] + x * s + y * c,
         )
-        for x, y in np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)])
-        * np.array(size[:2])
-        / 2
+        for x, y in (
+            (sizes / 2 * signs).T
+            for signs in ((1, 1), (-1, 1), (-1, -1), (1, -1))
+        )
     ]
     return shapely.polygons(np.array(corners).transpose(2, 0, 1))
 
 
 def all_boxes(traffic, path, t):
-    """Returns all boxes at a time, the ego car's first."""
+    """Returns everybody's box at a time, the ego car's first."""
     xy, yaw = path(np.array([t]))
     ahead = np.column_stack([np.cos(yaw), np.sin(yaw)])
     middle = xy + (BOX.rear + BOX.front) / 2 * ahead
-    found = [boxes(middle, yaw, (BOX.front - BOX.rear, 2 * BOX.half_width))]
-    where = traffic.vehicles.at(t)[0]
-    found += [
-        boxes(row[None, :2], row[None, 3], kind.size)
-        for row, kind in zip(where, traffic.kinds, strict=True)
-    ]
-    where = traffic.walkers.at(t)[0]
-    found.append(boxes(where[:, :2], where[:, 3], WALKER_SIZE))
-    return np.concatenate(found)
+    vehicles, walkers = traffic.vehicles.at(t)[0], traffic.walkers.at(t)[0]
+    return boxes(
+        np.concatenate([middle, vehicles[:, :2], walkers[:, :2]]),
+        np.concatenate([yaw, vehicles[:, 3], walkers[:, 3]]),
+        np.array(
+            [
+                (BOX.front - BOX.rear, 2 * BOX.half_width),
+                *(kind.size[:2] for kind in traffic.kinds),
+                *[WALKER_SIZE[:2]] * len(walkers),
+            ]
+        ),
+    )
 
 
 def meetings(traffic, path, times):
