@@ -78,6 +78,11 @@ class Placed(NamedTuple):
             np.array([group.motion is not None for group in chosen], bool),
         )
 
+    def below(self, row: int) -> Placed:
+        """Returns those of the first groups, up to a row."""
+        kept = self.rows < row
+        return Placed(*(one[kept] for one in self))
+
 
 NOTHING_KNOWN = KnownPoses({}, np.zeros((0, 4, 4)))
 EVERYWHERE = Ball(np.zeros(3), np.inf)

@@ -137,6 +137,8 @@ class RayCastingScene:
         """
         placed = self._moving.place(calc_X_WF, motions, known, seen)
         if len(placed.rows):
+            if self._planes:  # They are the last groups, beyond the scene's.
+                placed = placed.below(min(self._planes))
             self._scene.place(placed)
             self._normal_maps = None
 

@@ -11,6 +11,7 @@ import contextlib
 import multiprocessing
 import os
 import signal
+import threading
 
 from helpers.bag_recordings import contents
 from helpers.tiny_drive import FRAMES, run_and_report, tiny_scenario
@@ -38,6 +39,9 @@ class Runner:
         self._context.set_forkserver_preload(
             ["cns_drake.simulation.simulation"]
         )
+        # A start polls all processes. Two threads that poll one that has just
+        # ended would both read its only status.
+        self._polling = threading.Lock()
 
     def run(self, output, kill_signal=None, kill_frame=0):
         """Runs to the end, or to a kill after some reported frames.
@@ -49,7 +53,8 @@ class Runner:
         process = self._context.Process(
             target=run_and_report, args=(self._scenario, output, sender)
         )
-        process.start()
+        with self._polling:
+            process.start()
         sender.close()
         frame = 0
         with contextlib.suppress(EOFError):
@@ -59,7 +64,8 @@ class Runner:
                     with contextlib.suppress(ProcessLookupError):
                         os.kill(process.pid, kill_signal)
                     kill_signal = None
-        process.join()
+        with self._polling:
+            process.join()
         assert process.exitcode in (
             0,
             INTERRUPTED,
