@@ -255,6 +255,26 @@ def test_a_half_space_that_moves():
         np.testing.assert_allclose(measured, expected[beams], rtol=1e-5)
 
 
+def test_a_half_space_and_a_box_that_move():
+    stage = Stage()
+    plate = stage.add_frame("plate", 5, RigidTransform())
+    cart = stage.add_frame("cart", 6, RigidTransform())
+    stage.add("plane", HalfSpace(), frame=plate)
+    stage.add("box", Box(2.0, 2.0, 2.0), frame=cart)
+    stage.finish(X_PS=RigidTransform(), pattern=FORWARD)
+    towards_sensor = RollPitchYaw(0.0, -np.pi / 2, 0.0)
+    for plane, box, expected in (
+        (30.0, 12.0, 11.0),
+        (25.0, 40.0, 25.0),
+        (20.0, 14.0, 13.0),
+        (15.0, -12.0, 15.0),
+    ):
+        stage.poses[plate] = RigidTransform(towards_sensor, [plane, 0.0, 0.0])
+        stage.poses[cart] = RigidTransform([box, 0.0, 0.0])
+        stage.set_poses()
+        assert ahead(stage.eval()) == pytest.approx(expected, rel=1e-5)
+
+
 def test_deformable_geometry_is_refused_by_name():
     def add_jelly():
         instance = GeometryInstance(RigidTransform(), Sphere(1.0), "jelly")
