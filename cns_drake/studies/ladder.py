@@ -111,7 +111,7 @@ def climb_ladder(
     run_jobs(jobs.values(), cluster)
     measured = [
         MeasuredRung(
-            _labelled(drive, rung),
+            _labelled(drive, rung, protocol),
             rung.seed,
             rung.fingerprint(),
             read_part(part),
@@ -174,7 +174,10 @@ class _Plan:
             ),
             num_distractors=rung.drives.num_distractors,
             methods=self._methods,
-            protocol=self._protocol,
+            protocol=replace(
+                self._protocol,
+                radius=rung.drives.radius(self._protocol.radius),
+            ),
             part=part,
         )
         self.jobs[name] = Job(name, step, tuple(needs), _RUNG_COST)
@@ -213,7 +216,9 @@ class _Plan:
         return files
 
 
-def _labelled(query_scenario: Scenario, rung: Rung) -> LadderRung:
+def _labelled(
+    query_scenario: Scenario, rung: Rung, protocol: RetrievalProtocol
+) -> LadderRung:
     # The database has the route of the query, at any stage.
     route = str(query_scenario.stage)
     return LadderRung(
@@ -223,17 +228,16 @@ def _labelled(query_scenario: Scenario, rung: Rung) -> LadderRung:
         rung.cause,
         rung.level,
         rung.strength,
+        rung.drives.radius(protocol.radius),
     )
 
 
 def _write(
     measured: Sequence[MeasuredRung], output: Path, protocol: RetrievalProtocol
 ) -> tuple[Path, str]:
-    rows = ladder_rows(measured, protocol.radius)
+    rows = ladder_rows(measured)
     text = ladder_text(rows)
-    _write_text(
-        output / "queries.csv", ladder_query_table(measured, protocol).to_csv()
-    )
+    _write_text(output / "queries.csv", ladder_query_table(measured).to_csv())
     draw_ladder(rows, output / "ladder")
     _write_text(output / "findings.txt", text + "\n")
     table = output / "ladder.csv"

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+import math
 from typing import Any
 
 from cns_drake.scenarios.ride_config import RideConfig
@@ -41,9 +42,12 @@ CAUSES = (
     "ride",
     "sensor",
     "viewpoint",
+    "lateral",
     "size",
     ALL,
 )
+# Causes that take no part in `all`.
+APART = frozenset({"lateral"})
 # Causes that another seed draws anew.
 RANDOM_CAUSES = frozenset(
     {*_TRANSIENT, "traffic", "weather", "returns", "ride", ALL}
@@ -72,9 +76,10 @@ STRENGTHS: Mapping[str, Mapping[int, Any]] = {
     "ride": {1: "A", 2: "B", 3: "C", 4: "D"},
     # Preset.
     "sensor": {1: "os1-64", 2: "hdl-64e", 3: "vlp-16", 4: "avia"},
-    # Offset to the left [m], and heading [deg]. An offset beyond the radius of
-    # a match would leave no right place.
+    # Offset to the left [m], and heading [deg].
     "viewpoint": {1: (2.0, 0), 2: (4.0, 0), 3: (6.0, 0), 4: (6.0, 180)},
+    # Offset to the left [m].
+    "lateral": {1: 5.0, 2: 10.0, 3: 15.0},
     # Number of places of other cities.
     "size": {1: 300, 2: 1000, 3: 3000, 4: 10000},
 }
@@ -93,6 +98,7 @@ _WORDS = {
     "ride": "mapped on a road of class {}",
     "sensor": "the query measures with {}",
     "viewpoint": "mapped {0[0]:g} m to the left, heading {0[1]} deg",
+    "lateral": "mapped {:g} m to the left",
     "size": "{} more places",
 }
 
@@ -105,11 +111,23 @@ class RungDrives:
         database: drive of the mapped places.
         query: drive of the queries.
         num_distractors: places of other cities in the database.
+        lateral: distance between the two ways that a match has to bridge [m].
     """
 
     database: Scenario
     query: Scenario
     num_distractors: int = 0
+    lateral: float = 0.0
+
+    def radius(self, along: float) -> float:
+        """Returns the radius of a match [m].
+
+        On a straight road, as many places match at any lateral distance.
+
+        Args:
+            along: greatest distance of a match along the way [m].
+        """
+        return math.hypot(along, self.lateral)
 
 
 def plain_drives(scenario: Scenario) -> RungDrives:
@@ -189,6 +207,10 @@ def _viewpoint(
     return replace(drives, database=moved)
 
 
+def _lateral(drives: RungDrives, left: float, seed: int) -> RungDrives:
+    return replace(_viewpoint(drives, (left, 0.0), seed), lateral=left)
+
+
 def _size(drives: RungDrives, number: int, _: int) -> RungDrives:
     return replace(drives, num_distractors=number)
 
@@ -202,6 +224,7 @@ _CHANGES: Mapping[str, Callable[[RungDrives, Any, int], RungDrives]] = {
     "construction": _construction,
     "ride": _ride,
     "viewpoint": _viewpoint,
+    "lateral": _lateral,
     "size": _size,
 }
 

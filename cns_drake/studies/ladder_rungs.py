@@ -12,6 +12,7 @@ from cns_drake.scenarios.scenario_files import map_folder
 from cns_drake.simulation.scenario_traffic import load_ways
 from cns_drake.studies.ladder_causes import (
     ALL,
+    APART,
     CAUSES,
     NONE,
     RANDOM_CAUSES,
@@ -98,9 +99,10 @@ def plan_rungs(
     for cause in CAUSES[1:]:
         if cause not in extent.causes or cause not in (*known, ALL):
             continue
+        members = set(known) - APART if cause == ALL else {cause}
         found = {
             level: _strengths_at(
-                known if cause == ALL else {cause: known[cause]}, level
+                {one: known[one] for one in known if one in members}, level
             )
             for level in _levels(known.get(cause), extent.levels)
         }

@@ -31,6 +31,7 @@ class LadderRung:
         cause: of the change; `none` without one.
         level: its strength, from 1 to 4; 0 without a change.
         strength: in words.
+        radius: of a match [m].
     """
 
     map_name: str
@@ -39,6 +40,7 @@ class LadderRung:
     cause: str
     level: int
     strength: str
+    radius: float
 
 
 @dataclass(frozen=True)
@@ -107,14 +109,11 @@ class LadderRow:
         return self.kept.changed
 
 
-def ladder_rows(
-    measured: Iterable[MeasuredRung], radius: float
-) -> list[LadderRow]:
+def ladder_rows(measured: Iterable[MeasuredRung]) -> list[LadderRow]:
     """Returns a row for each rung, method and gate.
 
     Args:
         measured: of all maps; the rung `none` of a map comes first.
-        radius: of a match [m].
     """
     groups: dict[tuple[LadderRung, str, bool], list[RungOutcome]] = {}
     drives: dict[LadderRung, list[str]] = {}
@@ -128,7 +127,7 @@ def ladder_rows(
     for (rung, method, told), draws in groups.items():
         unchanged = plain.setdefault((rung.map_name, method, told), draws)
         drawn = fingerprint({"drives": drives[rung]})
-        rows.append(_row(rung, drawn, unchanged, draws, radius))
+        rows.append(_row(rung, drawn, unchanged, draws))
     return rows
 
 
@@ -137,7 +136,6 @@ def _row(
     drives: str,
     unchanged: Sequence[RungOutcome],
     draws: Sequence[RungOutcome],
-    radius: float,
 ) -> LadderRow:
     first = draws[0]
     num_queries = len(first.outcomes)
@@ -159,7 +157,7 @@ def _row(
                 [(one.outcomes.is_right, right) for one in draws],
             )
         )
-    faults = [fault for one in draws for fault in one.faults(radius)]
+    faults = [fault for one in draws for fault in one.faults(rung.radius)]
     return LadderRow(
         rung=rung,
         method=first.method,

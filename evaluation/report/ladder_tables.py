@@ -12,8 +12,8 @@ from evaluation.report.ladder_rows import LadderRow, LadderRung, MeasuredRung
 from evaluation.report.tables import Table
 
 _KEYS = ("map", "db", "query", "cause", "level", "method", "radius_told")
-# The options of the protocol that all methods share.
-_OPTIONS = ("radius", "query_spacing", "place_spacing", "max_range")
+# The options of the protocol that all rungs share.
+_OPTIONS = ("query_spacing", "place_spacing", "max_range")
 
 
 def ladder_table(
@@ -42,6 +42,7 @@ def ladder_table(
             "overlap",
             *FAULTS,
             "strength",
+            "radius",
             *_OPTIONS,
         ),
         tuple(
@@ -66,6 +67,7 @@ def ladder_table(
                 one.overlap,
                 *(one.faults[name] for name in FAULTS),
                 one.rung.strength,
+                one.rung.radius,
                 *_options(protocol),
             )
             for one in rows
@@ -73,9 +75,7 @@ def ladder_table(
     )
 
 
-def ladder_query_table(
-    measured: Iterable[MeasuredRung], protocol: RetrievalProtocol
-) -> Table:
+def ladder_query_table(measured: Iterable[MeasuredRung]) -> Table:
     """Returns one row for each rung, draw, method, gate and query."""
     return Table(
         (
@@ -98,19 +98,15 @@ def ladder_query_table(
             "rotation_error_deg",
             "overlap",
         ),
-        tuple(
-            row for one in measured for row in _query_rows(one, protocol.radius)
-        ),
+        tuple(row for one in measured for row in _query_rows(one)),
     )
 
 
-def _query_rows(
-    measured: MeasuredRung, radius: float
-) -> Iterator[tuple[object, ...]]:
+def _query_rows(measured: MeasuredRung) -> Iterator[tuple[object, ...]]:
     for one in measured.outcomes:
         keys = _keys(measured.rung, one.method, one.radius_told)
         judged = one.outcomes
-        faults = one.faults(radius)
+        faults = one.faults(measured.rung.radius)
         for k in range(len(judged)):
             rank = float(judged.first_right_ranks[k])
             frame = int(one.match_frames[k])

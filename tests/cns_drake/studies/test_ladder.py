@@ -39,6 +39,7 @@ CHANGED = {
     "ride": ("database", {"ride"}),
     "sensor": ("query", {"lidars"}),
     "viewpoint": ("database", {"lidars"}),
+    "lateral": ("database", {"lidars"}),
 }
 
 
@@ -131,7 +132,11 @@ def test_all_is_everything_at_its_level(query_drive):
             assert getattr(getattr(both, side), field) == getattr(alone, field)
     config = both.query.lidars["lidar"]
     assert (config.preset, config.returns) == ("avia", "calibrated")
-    assert both.database.lidars["lidar"].rpy_deg[2] == 180.0
+    moved = both.database.lidars["lidar"]
+    assert moved.rpy_deg[2] == 180.0
+    # The lateral offset takes no part.
+    assert moved.xyz[1] == 6.0
+    assert both.radius(7.5) == 7.5
 
 
 def test_levels_and_seeds(query_drive):
@@ -178,6 +183,21 @@ def test_the_other_carriageway(query_drive):
     np.testing.assert_allclose(X_QD[:, 0, 0], -1.0, atol=1e-9)
 
 
+@pytest.mark.parametrize(("level", "left"), [(1, 5.0), (2, 10.0), (3, 15.0)])
+def test_lateral_offsets_widen_the_radius(query_drive, level, left):
+    """On a straight road, places match up to 7.5 m along it at any offset."""
+    (plain, rung), _ = plan_rungs(
+        query_drive, Extent(causes={"lateral"}, levels=(level,))
+    )
+    query = SimulatedDrive(plain.drives.query)().X_WS
+    database = SimulatedDrive(rung.drives.database)().X_WS
+    X_QD = np.linalg.inv(query) @ database
+    np.testing.assert_allclose(X_QD[:, :3, 3] - [[1.25, left, 0]], 0, atol=1e-9)
+    radius = rung.drives.radius(7.5)
+    assert np.hypot(7.5 - 1e-6, left) < radius < np.hypot(7.5 + 1e-6, left)
+    assert plain.drives.radius(7.5) == 7.5
+
+
 def test_distracting_drives_are_of_other_cities(tmp_path, monkeypatch):
     query_drive = load_scenario("metropolis_04")
     drives = distracting_drives(query_drive, 1000, 5.0, tmp_path, Cluster())
@@ -217,7 +237,7 @@ def test_a_ladder_from_end_to_end(town, tmp_path, monkeypatch):
         "run_jobs",
         lambda jobs, cluster: runs.append(studies.do(jobs)),
     )
-    extent = Extent(causes={"construction", "viewpoint"}, levels=(4,))
+    extent = Extent(causes={"construction", "lateral"}, levels=(4,))
     arguments = [[str(town)], tmp_path, Cluster(), METHODS, extent]
     path, text = climb_ladder(*arguments)
     assert path == tmp_path / "ladder.csv"
@@ -226,8 +246,16 @@ def test_a_ladder_from_end_to_end(town, tmp_path, monkeypatch):
     assert [(r["cause"], r["level"]) for r in rows[::4]] == [
         ("none", "0"),
         ("construction", "4"),
-        ("viewpoint", "4"),
+        ("lateral", "3"),
     ]
+    radii = {row["cause"]: float(row["radius"]) for row in rows}
+    assert radii == {
+        "none": 7.5,
+        "construction": 7.5,
+        "lateral": pytest.approx(np.hypot(7.5, 15.0)),
+    }
+    # The places lie 15 m to the side, and still are matches.
+    assert all(int(row["with_match"]) > 0 for row in rows)
     assert {r["method"] for r in rows} == {"solid", "layered-overlap"}
     assert {r["db"] for r in rows} == {r["query"] for r in rows} == {"04"}
     queries = list(csv.DictReader((tmp_path / "queries.csv").open()))

@@ -48,7 +48,7 @@ def answered(method, gated, is_right, scores=None):
 
 def measured(cause, level, answers, seed=1):
     """A rung of the ladder of a town."""
-    rung = LadderRung("town", "02", "02", cause, level, f"much {cause}")
+    rung = LadderRung("town", "02", "02", cause, level, f"much {cause}", 7.5)
     return MeasuredRung(rung, seed, f"{cause} {seed}", answers)
 
 
@@ -86,7 +86,7 @@ def test_the_share_of_auc_that_is_kept(climbed):
     # precision.
     found = {
         (row.rung.cause, row.rung.level): row
-        for row in ladder_rows(climbed, 7.5)
+        for row in ladder_rows(climbed)
         if not row.radius_told
     }
     assert found["none", 0].kept.share == 1.0
@@ -101,7 +101,7 @@ def test_the_share_of_auc_that_is_kept(climbed):
 
 
 def test_draws_are_averaged(climbed):
-    rows = [row for row in ladder_rows(climbed, 7.5) if not row.radius_told]
+    rows = [row for row in ladder_rows(climbed) if not row.radius_told]
     (works,) = (
         row for row in rows if (row.rung.cause, row.rung.level) == ("works", 4)
     )
@@ -115,14 +115,12 @@ def test_every_number_follows_from_the_queries(climbed):
     rows = list(
         csv.DictReader(
             io.StringIO(
-                ladder_table(ladder_rows(climbed, 7.5), PAPER_PROTOCOL).to_csv()
+                ladder_table(ladder_rows(climbed), PAPER_PROTOCOL).to_csv()
             )
         )
     )
     queries = list(
-        csv.DictReader(
-            io.StringIO(ladder_query_table(climbed, PAPER_PROTOCOL).to_csv())
-        )
+        csv.DictReader(io.StringIO(ladder_query_table(climbed).to_csv()))
     )
     keys = ("map", "db", "query", "cause", "level", "method", "radius_told")
     assert list(rows[0])[:12] == [
@@ -165,7 +163,7 @@ def test_what_is_wrong_with_each_answer():
     ]
     before = answered("btc", False, [1, 0, 1, 1, 0, 0, 0])
     rungs = [measured("none", 0, [before]), measured("snow", 1, [one])]
-    _, row = ladder_rows(rungs, 7.5)
+    _, row = ladder_rows(rungs)
     assert (row.lost, row.found) == (2.0, 1.0)
     # Three of the seven shares of 0.2 to 0.8 are below a half; the third has a
     # wrong best place.
@@ -174,16 +172,16 @@ def test_what_is_wrong_with_each_answer():
 
 
 def test_the_words_name_the_worst_cause(climbed):
-    text = ladder_text(ladder_rows(climbed, 7.5))
+    text = ladder_text(ladder_rows(climbed))
     assert "SOLiD loses most by works (much works), which leaves 28 %" in text
     assert "and keeps 0 % (0 to 0) under all causes together" in text
     assert "No cause leaves 95 % or more to every method" in text
     # With the gate 6 of 60 are right instead of none.
     assert "With the gate, SOLiD under all keeps 10 % instead of 0 %;" in text
-    text = ladder_text(ladder_rows([climbed[0], climbed[-1]], 7.5))
+    text = ladder_text(ladder_rows([climbed[0], climbed[-1]]))
     assert "SOLiD keeps 0 % (0 to 0) under all causes together" in text
     mild = [climbed[0], measured("ride", 4, climbed[0].outcomes)]
-    text = ladder_text(ladder_rows(mild, 7.5))
+    text = ladder_text(ladder_rows(mild))
     assert "SOLiD keeps 100 % (100 to 100) whatever the cause" in text
     assert "To every method 95 % or more are left by ride" in text
 
@@ -193,7 +191,7 @@ def test_without_anything_to_keep(climbed):
         measured(cause, 0, [answered("btc", False, part(9, 0))])
         for cause in ("none", "snow")
     ]
-    plain, row = ladder_rows(nothing, 7.5)
+    plain, row = ladder_rows(nothing)
     assert np.isnan(row.kept.share)
     assert np.isnan(row.kept.interval.low)
     assert "BTC" not in ladder_text([plain, row])
@@ -201,7 +199,7 @@ def test_without_anything_to_keep(climbed):
 
 def test_the_figure_is_the_same_each_time(climbed, tmp_path):
     for name in ("one", "other"):
-        draw_ladder(ladder_rows(climbed, 7.5), tmp_path / name)
+        draw_ladder(ladder_rows(climbed), tmp_path / name)
     for ending in ("png", "pdf", "svg"):
         one, other = (
             (tmp_path / f"{name}.{ending}").read_bytes()
