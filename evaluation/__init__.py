@@ -22,13 +22,9 @@ if TYPE_CHECKING:
         make_method,
         register,
     )
-    from evaluation.recognition.metrics import (
-        PlaceRecognitionMetrics,
-        QueryOutcomes,
-        evaluate,
-        judge,
-    )
+    from evaluation.recognition.metrics import PlaceRecognitionMetrics, evaluate
     from evaluation.recognition.protocol import RetrievalProtocol
+    from evaluation.recognition.query_outcomes import QueryOutcomes, judge
     from evaluation.recognition.retrieval import Retrieval, retrieve
     from evaluation.sequences import Sequence, open_sequence
 
@@ -68,13 +64,9 @@ _HOMES = {
         "make_method",
         "register",
     ),
-    "evaluation.recognition.metrics": (
-        "PlaceRecognitionMetrics",
-        "QueryOutcomes",
-        "evaluate",
-        "judge",
-    ),
+    "evaluation.recognition.metrics": ("PlaceRecognitionMetrics", "evaluate"),
     "evaluation.recognition.protocol": ("RetrievalProtocol",),
+    "evaluation.recognition.query_outcomes": ("QueryOutcomes", "judge"),
     "evaluation.recognition.retrieval": ("Retrieval", "retrieve"),
     "evaluation.sequences": ("Sequence", "open_sequence"),
 }

@@ -10,8 +10,8 @@ from cns_drake.base import terminal
 
 if TYPE_CHECKING:
     from evaluation.change.drive_change import ChangeReport
-    from evaluation.recognition.metrics import Interval
     from evaluation.recognition.place_recognition import PlaceRecognition
+    from evaluation.recognition.resampling import Interval
 
 
 def change_rows(report: ChangeReport) -> Iterator[tuple[str, str]]:

@@ -13,19 +13,18 @@ from cns_drake.base.progress import Track, silent
 from cns_drake.base.recordings.sequence import Sequence
 from evaluation.methods.method import Method
 from evaluation.recognition.metrics import (
-    Interval,
     Mode,
     PlaceRecognitionMetrics,
-    QueryOutcomes,
-    area,
     evaluate,
-    judge,
 )
 from evaluation.recognition.pose_errors import PoseMetrics, pose_metrics
+from evaluation.recognition.pr_curve import pr_curve
 from evaluation.recognition.protocol import (
     PAPER_PROTOCOL,
     RetrievalProtocol,
 )
+from evaluation.recognition.query_outcomes import QueryOutcomes, judge
+from evaluation.recognition.resampling import Interval
 from evaluation.recognition.retrieval import Retrieval, retrieve
 
 # Radii of a match for which AUC is computed as well [m].
@@ -74,7 +73,7 @@ class PlaceRecognition:
                 self.retrieval.scores, matches & self.retrieval.is_known
             )
             known = outcomes.has_match.any()
-            found[radius] = area(outcomes) if known else math.nan
+            found[radius] = pr_curve(outcomes).auc if known else math.nan
         return found
 
     def to_json(self) -> dict:

@@ -10,10 +10,8 @@ import numpy as np
 from cns_drake.base import poses
 from cns_drake.base.errors import InputError
 from evaluation.methods.method import Method
-from evaluation.recognition.metrics import (
-    PlaceRecognitionMetrics,
-    QueryOutcomes,
-)
+from evaluation.recognition.metrics import PlaceRecognitionMetrics
+from evaluation.recognition.query_outcomes import QueryOutcomes
 
 # Greatest errors of a localised query's pose.
 SUCCESS_TRANSLATION = 2.0

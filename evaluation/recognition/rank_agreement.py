@@ -17,10 +17,10 @@ from scipy.stats import kendalltau
 
 from cns_drake.base.csv_files import read_records
 from cns_drake.base.errors import InputError
-from evaluation.recognition.metrics import (
+from evaluation.recognition.pr_curve import pr_curve
+from evaluation.recognition.query_outcomes import QueryOutcomes
+from evaluation.recognition.resampling import (
     Interval,
-    QueryOutcomes,
-    area,
     percentile_interval,
     resampled_metrics,
     resampled_weights,
@@ -158,7 +158,7 @@ def _areas(
             raise InputError("methods of one pair have different queries")
         seed = int(rng.integers(1 << 31))
         weights = resampled_weights(number, seed)
-        means.append([area(pair[method]) for method in methods])
+        means.append([pr_curve(pair[method]).auc for method in methods])
         samples.append(
             [resampled_metrics(pair[method], weights)[0] for method in methods]
         )

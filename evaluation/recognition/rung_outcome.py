@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from evaluation.recognition.description import DescribedDrive
-from evaluation.recognition.metrics import QueryOutcomes, judge
 from evaluation.recognition.pose_errors import PoseErrors
+from evaluation.recognition.query_outcomes import QueryOutcomes, judge
 from evaluation.recognition.retrieval import Retrieval
 
 # Kinds of wrong best places, in order of precedence.

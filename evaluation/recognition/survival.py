@@ -12,15 +12,15 @@ import math
 
 import numpy as np
 
-from evaluation.recognition.metrics import (
+from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition.query_outcomes import QueryOutcomes
+from evaluation.recognition.recognition_result import RecognitionResult
+from evaluation.recognition.resampling import (
     Interval,
-    QueryOutcomes,
     percentile_interval,
     resampled_metrics,
     resampled_weights,
 )
-from evaluation.recognition.protocol import RetrievalProtocol
-from evaluation.recognition.recognition_result import RecognitionResult
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 import numpy as np
 
-from evaluation.recognition.metrics import (
-    MODES,
-    PlaceRecognitionMetrics,
-)
+from evaluation.recognition.metrics import MODES, PlaceRecognitionMetrics
 from evaluation.recognition.recognition_result import RecognitionResult
 from evaluation.report.drawing import (
     method_entry,

@@ -9,9 +9,9 @@ import math
 import numpy as np
 
 from cns_drake.base.jobs.fingerprint import fingerprint
-from evaluation.recognition.metrics import (
+from evaluation.recognition.pr_curve import pr_curve
+from evaluation.recognition.resampling import (
     Interval,
-    area,
     percentile_interval,
     resampled_metrics,
     resampled_weights,
@@ -179,7 +179,7 @@ def _row(
 
 
 def _auc(draws: Sequence[RungOutcome]) -> float:
-    return _mean([area(one.outcomes) for one in draws])
+    return _mean([pr_curve(one.outcomes).auc for one in draws])
 
 
 def _sampled_auc(

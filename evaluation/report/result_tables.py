@@ -6,10 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from evaluation.change.change_result import ChangeResult, symmetric_changes
-from evaluation.recognition.metrics import (
-    MODES,
-    Mode,
-)
+from evaluation.recognition.metrics import MODES, Mode
 from evaluation.recognition.protocol import (
     PROTOCOL_COLUMNS,
     protocol_values,

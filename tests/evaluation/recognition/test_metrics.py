@@ -4,7 +4,8 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from evaluation.recognition.metrics import evaluate, judge
+from evaluation.recognition.metrics import evaluate
+from evaluation.recognition.query_outcomes import judge
 from evaluation.recognition.ranking import ranking
 
 NAN = np.nan

@@ -7,13 +7,14 @@ from scipy.spatial.transform import Rotation
 
 from cns_drake.base.errors import InputError
 from evaluation.methods import Method, MethodConfig
-from evaluation.recognition.metrics import QueryOutcomes, evaluate
+from evaluation.recognition.metrics import evaluate
 from evaluation.recognition.place_recognition import run
 from evaluation.recognition.pose_errors import (
     PoseErrors,
     pose_error,
     pose_metrics,
 )
+from evaluation.recognition.query_outcomes import QueryOutcomes
 from evaluation.sequences import open_sequence
 
 

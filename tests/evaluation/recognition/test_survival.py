@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from evaluation.recognition.metrics import QueryOutcomes
+from evaluation.recognition.query_outcomes import QueryOutcomes
 from evaluation.recognition.survival import Kept, paired_intervals
 
 

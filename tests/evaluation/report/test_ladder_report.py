@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from evaluation.recognition.metrics import QueryOutcomes
 from evaluation.recognition.pose_errors import PoseErrors
 from evaluation.recognition.protocol import PAPER_PROTOCOL
+from evaluation.recognition.query_outcomes import QueryOutcomes
 from evaluation.recognition.rung_outcome import RungOutcome
 from evaluation.report.ladder_figure import draw_ladder
 from evaluation.report.ladder_rows import (

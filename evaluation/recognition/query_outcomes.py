@@ -1,0 +1,148 @@
+"""The outcome of each query of place recognition."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class QueryOutcomes:
+    """The outcomes of Q queries.
+
+    Attributes:
+        best_scores: (Q,) score of the best place; NaN without a candidate.
+        is_right: (Q,) bool, whether the best place is a true match.
+        has_match: (Q,) bool, whether the database holds a true match.
+        first_right_ranks: (Q,) rank of the best true match, from 1 on;
+            infinite if no candidate is one.
+        num_places: size of the database.
+
+    Example:
+        from evaluation import judge
+
+        print(judge(scores, matches).recall_at(5))
+    """
+
+    best_scores: np.ndarray
+    is_right: np.ndarray
+    has_match: np.ndarray
+    first_right_ranks: np.ndarray
+    num_places: int
+
+    def __len__(self) -> int:
+        return len(self.best_scores)
+
+    def subset(self, kept: np.ndarray) -> QueryOutcomes:
+        """Returns the outcomes of some of the queries, (Q,) bool."""
+        return QueryOutcomes(
+            self.best_scores[kept],
+            self.is_right[kept],
+            self.has_match[kept],
+            self.first_right_ranks[kept],
+            self.num_places,
+        )
+
+    def recall_at(self, rank: int) -> float:
+        """Returns R@N; NaN if no query has a match."""
+        return _mean(self.first_right_ranks[self.has_match] <= rank)
+
+    @property
+    def mean_reciprocal_rank(self) -> float:
+        """Mean of 1 / rank of the best true match, over queries with one.
+
+        A query without a match among its candidates counts 0. NaN if no query
+        has a match.
+        """
+        return _mean(1.0 / self.first_right_ranks[self.has_match])
+
+    @property
+    def match_auroc(self) -> float:
+        """The best score's power to separate queries with a match from others.
+
+        The area under the receiver operating characteristic: the chance that
+        a query with a match has a higher best score than one without; equal
+        scores count half, and no candidate is the lowest score. NaN if all or
+        none of the queries have a match.
+        """
+        num_with = int(self.has_match.sum())
+        num_without = len(self) - num_with
+        if num_with == 0 or num_without == 0:
+            return math.nan
+        scores = np.where(np.isnan(self.best_scores), -np.inf, self.best_scores)
+        # This is the sum of ranks of Mann and Whitney's U test; equal scores
+        # share the mean of their ranks.
+        _, of_score, counts = np.unique(
+            scores, return_inverse=True, return_counts=True
+        )
+        mean_ranks = np.cumsum(counts) - 0.5 * (counts - 1)
+        ranks = mean_ranks[of_score][self.has_match].sum()
+        wins = ranks - 0.5 * num_with * (num_with + 1)
+        return float(wins / (num_with * num_without))
+
+    @property
+    def one_percent_rank(self) -> int:
+        """The N of R@1%: a hundredth of the database, at least 1."""
+        return max(1, round(0.01 * self.num_places))
+
+
+def judge(scores: np.ndarray, matches: np.ndarray) -> QueryOutcomes:
+    """Reduces the scores of all pairs to the outcome of each query.
+
+    If two places have equal scores, the first one in the database is better.
+
+    Args:
+        scores: (Q, D), higher is more similar; NaN is no candidate.
+        matches: (Q, D) bool, the truth.
+
+    Raises:
+        ValueError: scores are complex, masked or not numbers, or the two shapes
+            differ.
+
+    Example:
+        from evaluation import judge, retrieve
+
+        found = retrieve(database, query, method)
+        outcomes = judge(found.scores, found.matches)
+    """
+    values = np.asarray(scores)
+    if isinstance(scores, np.ma.MaskedArray) or values.dtype.kind not in "biuf":
+        raise ValueError(
+            f"scores are {type(scores).__name__} of {values.dtype}, not plain"
+            " numbers with NaN where a place is no candidate"
+        )
+    if values.ndim != 2 or values.shape != np.shape(matches):
+        raise ValueError(
+            f"scores of shape {values.shape}, matches of {np.shape(matches)}"
+        )
+    scores = np.asarray(values, dtype=np.float64)
+    num_queries, num_places = scores.shape
+    first_right = np.full(num_queries, np.inf)
+    best_scores = np.full(num_queries, np.nan)
+    # One row at a time: a second array of all pairs of long drives could fill
+    # the memory.
+    for query, (row, is_match) in enumerate(zip(scores, matches, strict=True)):
+        candidates = np.flatnonzero(~np.isnan(row))
+        if len(candidates) == 0:
+            continue
+        found = row[candidates]
+        best_scores[query] = found.max()
+        right = np.flatnonzero(is_match[candidates])
+        if len(right):
+            first = right[found[right].argmax()]
+            better = found > found[first]
+            better[:first] |= found[:first] == found[first]
+            first_right[query] = 1.0 + np.count_nonzero(better)
+    return QueryOutcomes(
+        best_scores=best_scores,
+        is_right=first_right == 1.0,
+        has_match=np.any(matches, axis=1),
+        first_right_ranks=first_right,
+        num_places=num_places,
+    )
+
+
+def _mean(values: np.ndarray) -> float:
+    return float(values.mean()) if len(values) else math.nan

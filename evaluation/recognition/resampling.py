@@ -1,0 +1,101 @@
+"""Confidence intervals by bootstrap over queries."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+import numpy as np
+
+from evaluation.recognition.pr_curve import (
+    areas_under,
+    recall_of,
+    weighted_counts,
+)
+from evaluation.recognition.query_outcomes import QueryOutcomes
+
+_SAMPLES = 1000
+_CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A confidence interval."""
+
+    low: float
+    high: float
+
+
+def resampled_weights(num_queries: int, seed: int = 0) -> np.ndarray:
+    """Returns how often each query counts in each sample of a bootstrap.
+
+    Args:
+        num_queries: Q, one or more.
+        seed: of the drawing; equal ones draw the same queries.
+
+    Returns:
+        (B, Q) float64 counts, each row of sum Q.
+    """
+    rng = np.random.default_rng([seed, num_queries])
+    draws = rng.integers(num_queries, size=(_SAMPLES, num_queries))
+    return np.stack(
+        [np.bincount(draw, minlength=num_queries) for draw in draws]
+    ).astype(np.float64)
+
+
+def resampled_metrics(
+    outcomes: QueryOutcomes, weights: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns AUC (B,) and R@1 (B,) of samples of the queries.
+
+    Args:
+        outcomes: of Q queries, all of which count.
+        weights: (B, Q) how often each does in each sample.
+    """
+    _, tp, fp, fn = weighted_counts(outcomes, weights)
+    # Nothing is accepted before a sample's first query; there the curve keeps
+    # the precision of its first point.
+    with np.errstate(invalid="ignore"):
+        precision = tp / (tp + fp)
+    areas = areas_under(_filled_from_right(precision), recall_of(tp, fn))
+    with np.errstate(invalid="ignore"):
+        recalls = (weights * outcomes.is_right).sum(axis=1) / (
+            weights * outcomes.has_match
+        ).sum(axis=1)
+    return areas, recalls
+
+
+def percentile_interval(samples: np.ndarray) -> Interval:
+    """Returns the interval of 95 % of the samples; NaN do not count."""
+    known = samples[~np.isnan(samples)]
+    if len(known) == 0:
+        return Interval(math.nan, math.nan)
+    tail = 0.5 * (1.0 - _CONFIDENCE)
+    low, high = np.quantile(known, [tail, 1.0 - tail])
+    return Interval(float(low), float(high))
+
+
+def bootstrap_intervals(
+    outcomes: QueryOutcomes, seed: int
+) -> tuple[Interval, Interval]:
+    """Returns percentile intervals of AUC and R@1 over resampled queries."""
+    if len(outcomes) == 0:
+        nothing = Interval(math.nan, math.nan)
+        return nothing, nothing
+    weights = resampled_weights(len(outcomes), seed)
+    areas, recalls = resampled_metrics(outcomes, weights)
+    return percentile_interval(areas), percentile_interval(recalls)
+
+
+def _filled_from_right(values: np.ndarray) -> np.ndarray:
+    """Returns rows whose leading NaNs are replaced by the first number.
+
+    A row without any number becomes zeros.
+    """
+    if values.shape[1] == 0:
+        return values
+    known = ~np.isnan(values)
+    first = known.argmax(axis=1)
+    rows = np.arange(len(values))
+    start = np.where(known.any(axis=1), values[rows, first], 0.0)
+    return np.where(known, values, start[:, None])
