@@ -127,7 +127,7 @@ def write_facts(
     """Writes the source of the map, its place, and counts of drawn parts."""
     facts = {
         "source": source.name,
-        "reference_system": city.reference_system or "not told",
+        "reference_system": city.reference_system or "unknown",
         **({"axes": list(city.axes)} if city.axes else {}),
         "origin": list(city.origin),
         "lod": options.lod if options.lod is not None else "highest",

@@ -53,14 +53,14 @@ class LevelResult:
         map_name: of the city.
         level: from 0 to 4.
         method: its name.
-        radius_told: whether the gate was used (the method had the radius).
+        is_gated: whether the gate was used (the method had the radius).
         auc, low, high: with its 95 % interval.
     """
 
     map_name: str
     level: int
     method: str
-    radius_told: bool
+    is_gated: bool
     auc: float
     low: float
     high: float
@@ -115,11 +115,11 @@ def read_results(files: Iterable[Path], levels: Levels) -> list[LevelResult]:
 
 
 def _are_equal(some: list[LevelResult], others: list[LevelResult]) -> bool:
-    numbers = {(one.level, one.radius_told): one.auc for one in others}
+    numbers = {(one.level, one.is_gated): one.auc for one in others}
     return all(
         math.isclose(
             one.auc,
-            numbers[one.level, one.radius_told],
+            numbers[one.level, one.is_gated],
             abs_tol=_EQUAL,
         )
         for one in some
@@ -160,7 +160,7 @@ def _check_complete(
     found: Iterable[LevelResult],
     levels: Levels,
 ) -> None:
-    there = [(one.level, one.radius_told) for one in found]
+    there = [(one.level, one.is_gated) for one in found]
     for name, level in levels:
         for is_gated in (False, True):
             number = there.count((level, is_gated))
@@ -182,7 +182,7 @@ def level_table(results: Iterable[LevelResult]) -> Table:
     rows: list[tuple[object, ...]] = []
     for name in sorted({one.map_name for one in results}):
         of_map = {
-            (one.method, one.radius_told, one.level): one
+            (one.method, one.is_gated, one.level): one
             for one in results
             if one.map_name == name
         }

@@ -26,7 +26,7 @@ class RungOutcome:
 
     Attributes:
         method: its name.
-        radius_told: whether the gate was used.
+        is_gated: whether the gate was used.
         outcomes: of Q queries.
         query_frames: (Q,) of the query drive.
         stamps_ns: (Q,) int64.
@@ -42,7 +42,7 @@ class RungOutcome:
     """
 
     method: str
-    radius_told: bool
+    is_gated: bool
     outcomes: QueryOutcomes
     query_frames: np.ndarray
     stamps_ns: np.ndarray
@@ -57,7 +57,7 @@ class RungOutcome:
     def of(
         cls,
         method: str,
-        radius_told: bool,
+        is_gated: bool,
         retrieval: Retrieval,
         query: DescribedDrive,
         drives: Sequence[str],
@@ -67,7 +67,7 @@ class RungOutcome:
 
         Args:
             method: that made the scores.
-            radius_told: whether they were gated.
+            is_gated: whether they were gated.
             retrieval: of Q queries and D places.
             query: the drive of the queries.
             drives: D names of the drives of the places; that of the query's
@@ -80,7 +80,7 @@ class RungOutcome:
         at_home = np.array([name == drives[0] for name in names])
         return cls(
             method=method,
-            radius_told=radius_told,
+            is_gated=is_gated,
             outcomes=judge(retrieval.scores, retrieval.matches),
             query_frames=retrieval.query_frames,
             stamps_ns=query.queries.stamps_ns,

@@ -52,7 +52,7 @@ def draw_ladder(rows: Sequence[LadderRow], stem: Path) -> None:
             shown = [
                 row
                 for row in rows
-                if row.rung.map_name == name and row.radius_told == is_gated
+                if row.rung.map_name == name and row.is_gated == is_gated
             ]
             _draw_panel(axes, shown, methods, causes)
             axes.set_title(plain(f"{name}, {words}"), fontsize=_FONT_SIZE + 1)

@@ -68,7 +68,7 @@ class LadderRow:
     Attributes:
         rung: which.
         method: its name.
-        radius_told: whether it was gated by the radius.
+        is_gated: whether it was gated by the radius.
         auc_interval: 95 % interval of AUC by bootstrap over queries; a sample
             has the same queries in each draw.
         r1: R@1.
@@ -89,7 +89,7 @@ class LadderRow:
 
     rung: LadderRung
     method: str
-    radius_told: bool
+    is_gated: bool
     auc_interval: Interval
     r1: float
     kept: Kept
@@ -120,12 +120,12 @@ def ladder_rows(measured: Iterable[MeasuredRung]) -> list[LadderRow]:
     for one in measured:
         drives.setdefault(one.rung, []).append(one.drives)
         for outcome in one.outcomes:
-            key = one.rung, outcome.method, outcome.radius_told
+            key = one.rung, outcome.method, outcome.is_gated
             groups.setdefault(key, []).append(outcome)
     plain: dict[tuple[str, str, bool], list[RungOutcome]] = {}
     rows = []
-    for (rung, method, told), draws in groups.items():
-        unchanged = plain.setdefault((rung.map_name, method, told), draws)
+    for (rung, method, is_gated), draws in groups.items():
+        unchanged = plain.setdefault((rung.map_name, method, is_gated), draws)
         drawn = fingerprint({"drives": drives[rung]})
         rows.append(_row(rung, drawn, unchanged, draws))
     return rows
@@ -161,7 +161,7 @@ def _row(
     return LadderRow(
         rung=rung,
         method=first.method,
-        radius_told=first.radius_told,
+        is_gated=first.is_gated,
         auc_interval=percentile_interval(samples),
         r1=_mean([one.outcomes.recall_at(1) for one in draws]),
         kept=Kept(_auc(unchanged), _auc(draws), share),

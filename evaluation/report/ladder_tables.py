@@ -47,7 +47,7 @@ def ladder_table(
         ),
         tuple(
             (
-                *_keys(one.rung, one.method, one.radius_told),
+                *_keys(one.rung, one.method, one.is_gated),
                 one.auc,
                 one.r1,
                 one.kept.share,
@@ -104,7 +104,7 @@ def ladder_query_table(measured: Iterable[MeasuredRung]) -> Table:
 
 def _query_rows(measured: MeasuredRung) -> Iterator[tuple[object, ...]]:
     for one in measured.outcomes:
-        keys = _keys(measured.rung, one.method, one.radius_told)
+        keys = _keys(measured.rung, one.method, one.is_gated)
         judged = one.outcomes
         faults = one.faults(measured.rung.radius)
         for k in range(len(judged)):

@@ -37,8 +37,8 @@ def _paragraph(rows: Sequence[LadderRow]) -> str:
         " leaves of the AUC without a change (95 % intervals)."
     ]
     ungated, gated = (
-        _strongest([row for row in rows if row.radius_told == is_told])
-        for is_told in (False, True)
+        _strongest([row for row in rows if row.is_gated == is_gated])
+        for is_gated in (False, True)
     )
     sentences = [
         _sentence([row for row in ungated if row.method == method])

@@ -99,14 +99,16 @@ class MeasureRung(PartStep):
                 read_part(one.described(choice)) for one in self.distractors
             ]
             known = [database, *others]
-            asked = replace(
+            searched = replace(
                 database,
                 places=joined_places(
                     [one.places for one in known], self.num_distractors
                 ),
             )
             drives = [one.name for one in known for _ in one.places.frames]
-            both = compare_both_ways(choice.make(), asked, query, self.protocol)
+            both = compare_both_ways(
+                choice.make(), searched, query, self.protocol
+            )
             if overlaps is None:
                 overlaps = best_overlaps(
                     place_scans,
@@ -116,8 +118,10 @@ class MeasureRung(PartStep):
                     both[0].matches[:, : len(place_scans)],
                 )
             found += [
-                RungOutcome.of(choice.name, told, one, query, drives, overlaps)
-                for told, one in zip((False, True), both, strict=True)
+                RungOutcome.of(
+                    choice.name, is_gated, one, query, drives, overlaps
+                )
+                for is_gated, one in zip((False, True), both, strict=True)
             ]
         return found
 

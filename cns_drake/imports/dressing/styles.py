@@ -265,8 +265,8 @@ def make_style(
         is_flat: whether its roof is.
         rng: of the building; the number of draws does not depend on the tags.
     """
-    use, is_told = building_use(tags, area, height)
-    by_tag = {"use"} if is_told else set()
+    use, is_tagged = building_use(tags, area, height)
+    by_tag = {"use"} if is_tagged else set()
     storeys, pitches, widths, tall = _SIZES[use]
     storey, pitch, width, window = (
         float(rng.uniform(*limits))
@@ -293,7 +293,7 @@ def make_style(
     wall = wall or _tinted(drawn_wall, tint)
     shops = use is Use.RETAIL or (
         is_block
-        and not is_told
+        and not is_tagged
         and storey * numbered > 6.0
         and chances[0] < 0.4
     )

@@ -109,7 +109,7 @@ def write_town(
 def _write_facts(draft: Path, source: Path, town: Town) -> None:
     facts = {
         "source": source.name,
-        "reference_system": town.roads.reference_system or "not told",
+        "reference_system": town.roads.reference_system or "unknown",
         "origin": list(town.roads.origin),
         "seed": town.seed,
         "stages": {

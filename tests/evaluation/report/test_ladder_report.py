@@ -87,7 +87,7 @@ def test_the_share_of_auc_that_is_kept(climbed):
     found = {
         (row.rung.cause, row.rung.level): row
         for row in ladder_rows(climbed)
-        if not row.radius_told
+        if not row.is_gated
     }
     assert found["none", 0].kept.share == 1.0
     assert found["none", 0].kept.interval.low == 1.0
@@ -101,7 +101,7 @@ def test_the_share_of_auc_that_is_kept(climbed):
 
 
 def test_draws_are_averaged(climbed):
-    rows = [row for row in ladder_rows(climbed) if not row.radius_told]
+    rows = [row for row in ladder_rows(climbed) if not row.is_gated]
     (works,) = (
         row for row in rows if (row.rung.cause, row.rung.level) == ("works", 4)
     )

@@ -87,7 +87,7 @@ def test_the_numbers_are_those_of_the_single_command(folder, tmp_path):
     step.run(Reporter())
     assert step.is_done()
     found = read_part(step.part)
-    assert [(one.method, one.radius_told) for one in found] == [
+    assert [(one.method, one.is_gated) for one in found] == [
         (choice.name, gated) for choice in METHODS for gated in (False, True)
     ]
     database, query = (
@@ -99,7 +99,7 @@ def test_the_numbers_are_those_of_the_single_command(folder, tmp_path):
             database,
             query,
             make_method(one.method, {}),
-            protocol=RetrievalProtocol(gate=one.radius_told),
+            protocol=RetrievalProtocol(gate=one.is_gated),
         )
         for name in ("best_scores", "is_right", "first_right_ranks"):
             np.testing.assert_array_equal(
