@@ -12,6 +12,7 @@ from cns_drake.command_line.city import city
 from cns_drake.command_line.importing import import_city
 from cns_drake.command_line.laddering import ladder, levels
 from cns_drake.command_line.listing import list_sequences
+from cns_drake.command_line.overlapping import overlap
 from cns_drake.command_line.recorded import export, repair
 from cns_drake.command_line.reproducing import reproduce
 from cns_drake.command_line.simulating import (
@@ -60,6 +61,12 @@ app.command(
         "    --query riverside_02 --output trend",
     )
 )(trend)
+app.command(
+    epilog=example(
+        "cns-drake overlap metropolis_01 metropolis_04 \\",
+        "    --output overlaps.csv",
+    )
+)(overlap)
 app.command(
     epilog=example("cns-drake ladder metropolis --output ladder --quick")
 )(ladder)

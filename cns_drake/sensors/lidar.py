@@ -15,6 +15,7 @@ from pydrake.systems.framework import Context, LeafSystem, ValueProducer
 
 from cns_drake.ray_casting.group_motion import Motion
 from cns_drake.ray_casting.moving_groups import NOTHING_KNOWN, Ball, KnownPoses
+from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.scene.structure_table import MAX_INSTANCE, StructureTable
 from cns_drake.sensors.beam_pattern import POINT_DTYPE, BeamPattern, Beams
 from cns_drake.sensors.measurement import IDEAL, MeasurementModel, Returns
@@ -236,6 +237,18 @@ class Lidar(LeafSystem):
     def X_PS(self) -> RigidTransform:
         return self._X_PS
 
+    def EvalScene(self, context: Context) -> RayCastingScene:
+        """Returns what the LiDAR sees in a Context, to cast other rays on."""
+        scene = self._eval_seen(context).scene
+        assert scene is not None
+        return scene
+
+    def _eval_seen(self, context: Context) -> SeenGeometry:
+        seen = self._seen.Eval(context)
+        if seen.scene is None:  # In a cloned Context.
+            self._update(context, seen)
+        return seen
+
     def _calc_seen(self, context: Context, value: AbstractValue) -> None:
         self._update(context, value.get_value())
 
@@ -283,9 +296,7 @@ class Lidar(LeafSystem):
         return {f: m for f, m in motions.items() if m.w.any() or m.v.any()}
 
     def _calc_scan(self, context: Context, output: AbstractValue) -> None:
-        seen = self._seen.Eval(context)
-        if seen.scene is None:  # In a cloned Context.
-            self._update(context, seen)
+        seen = self._eval_seen(context)
         frame = self._frame(context)
         turn = self._get_turn(frame)
         p_WSset, R_WSset = self._calc_poses(context)

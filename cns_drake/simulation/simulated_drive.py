@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context
 
 from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.recordings.sequence import index_instances
@@ -24,6 +25,7 @@ from cns_drake.scenarios.sensor_making import (
     make_pattern,
     make_returns,
 )
+from cns_drake.sensors.beam_pattern import BeamPattern
 from cns_drake.sensors.lidar import Lidar
 from cns_drake.simulation.planned_sequence import PlannedSequence
 from cns_drake.simulation.scenario_traffic import (
@@ -126,14 +128,46 @@ class SimulatedSequence(PlannedSequence):
     def instances(self) -> Mapping[int, Mapping]:
         return self._instances
 
+    @property
+    def pattern(self) -> BeamPattern:
+        return self._lidar.pattern
+
     def scan(self, index: int) -> np.ndarray:
+        context = self._place_lidar(index)
+        return self._lidar.GetOutputPort("scan").Eval(context)
+
+    def first_ranges(self, index: int, d_Sset: np.ndarray) -> np.ndarray:
+        """Returns how far a scan's sensor sees in any directions.
+
+        The sensor is where it was at the scan's stamp.
+
+        Args:
+            index: of the scan.
+            d_Sset: (N, 3) unit directions in the sensor's frame.
+
+        Returns:
+            (N,) distance to the first surface [m]; inf where there is none
+            within the LiDAR's range.
+        """
+        scene = self._lidar.EvalScene(self._place_lidar(index))
+        X_WS = self.X_WBs[index] @ self.X_BS
+        hits = scene.cast_rays(
+            X_WS.translation(),
+            d_Sset,
+            self.pattern.max_range,
+            R_WSset=X_WS.rotation().matrix(),
+        )
+        return hits.ranges
+
+    def _place_lidar(self, index: int) -> Context:
+        """Moves the LiDAR to a scan; returns its Context."""
         context = self._lidar.GetMyMutableContextFromRoot(self._context)
         if self._is_random or self._has_traffic:
             # The time is set only for noise and traffic, which depend on it:
             # the SceneGraph computes everything anew at a new time.
             self._context.SetTime(index * self.period)
         self._lidar.GetInputPort("sweep").FixValue(context, self._sweep(index))
-        return self._lidar.GetOutputPort("scan").Eval(context)
+        return context
 
     def _sweep(self, index: int) -> Sweep:
         """Returns the poses of the sensor during a frame."""

@@ -210,6 +210,14 @@ def pr(
             help="Write the overlap of each query with each place.",
         ),
     ] = None,
+    exact_overlaps: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.csv",
+            help="Read these overlaps from a table of cns-drake overlap; by "
+            "default they are found from the scans.",
+        ),
+    ] = None,
     json: _Json = False,
     *,
     protocol: RetrievalProtocol,
@@ -223,11 +231,20 @@ def pr(
     from cns_drake.base.errors import InputError
     from evaluation.alignment import in_one_world
     from evaluation.recognition import place_recognition
+    from evaluation.recognition.overlap_table import (
+        read_overlaps,
+        write_overlaps,
+    )
+    from evaluation.recognition.overlap_truth import compared_frames
     from evaluation.sequences import open_sequence
 
     protocol = replace(protocol, overlap=overlap_of(truth))
-    if overlaps is not None and protocol.overlap is None:
-        raise InputError("--overlaps: add --truth overlap:PART")
+    for option, file in (
+        ("--overlaps", overlaps),
+        ("--exact-overlaps", exact_overlaps),
+    ):
+        if file is not None and protocol.overlap is None:
+            raise InputError(f"{option}: add --truth overlap:PART")
     is_itself = database.resolve() == query.resolve()
     if protocol.exclude_recent is not None and not is_itself:
         raise InputError(
@@ -250,6 +267,10 @@ def pr(
     if alignment is not None:
         places, query_drive = alignment.first, alignment.second
         terminal.note(alignment.report.to_text())
+    exact = None
+    if exact_overlaps is not None:
+        frames = compared_frames(places, query_drive, protocol)
+        exact = read_overlaps(exact_overlaps, *frames)
     result = place_recognition.run(
         places,
         query_drive,
@@ -258,9 +279,14 @@ def pr(
         protocol,
         terminal.track,
         across_maps=across_maps,
+        overlaps=exact,
     )
     if overlaps is not None:
-        place_recognition.write_overlaps(result, overlaps)
+        found = result.retrieval
+        assert found.overlaps is not None
+        write_overlaps(
+            overlaps, found.query_frames, found.database_frames, found.overlaps
+        )
         terminal.note(f"wrote {overlaps}")
     if protocol.exclude_recent is None and is_itself:
         terminal.note(

@@ -29,38 +29,27 @@ Gate = Annotated[
         "poses.",
     ),
 ]
+QuerySpacing = Annotated[
+    float,
+    typer.Option(help="Distance between two queries along the path [m]."),
+]
+PlaceSpacing = Annotated[
+    float,
+    typer.Option(
+        help="Distance between two places of the database [m].",
+    ),
+]
+MaxRange = Annotated[
+    float,
+    typer.Option(
+        help="Leave out points farther than this along an axis [m].",
+    ),
+]
 _OPTIONS: dict[str, tuple[object, object]] = {
-    "radius": (
-        Radius,
-        PAPER_PROTOCOL.radius,
-    ),
-    "query_spacing": (
-        Annotated[
-            float,
-            typer.Option(
-                help="Distance between two queries along the path [m]."
-            ),
-        ],
-        PAPER_PROTOCOL.query_spacing,
-    ),
-    "place_spacing": (
-        Annotated[
-            float,
-            typer.Option(
-                help="Distance between two places of the database [m]."
-            ),
-        ],
-        PAPER_PROTOCOL.place_spacing,
-    ),
-    "max_range": (
-        Annotated[
-            float,
-            typer.Option(
-                help="Leave out points farther than this along an axis [m]."
-            ),
-        ],
-        PAPER_PROTOCOL.max_range,
-    ),
+    "radius": (Radius, PAPER_PROTOCOL.radius),
+    "query_spacing": (QuerySpacing, PAPER_PROTOCOL.query_spacing),
+    "place_spacing": (PlaceSpacing, PAPER_PROTOCOL.place_spacing),
+    "max_range": (MaxRange, PAPER_PROTOCOL.max_range),
     "scans_per_place": (
         Annotated[
             int | None,

@@ -11,10 +11,13 @@ images pixel by pixel.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import math
+from typing import Protocol
 
 import numpy as np
 
+from cns_drake.base import poses
 from cns_drake.base.progress import Track, silent
 from cns_drake.base.recordings.sequence import Sequence
 from evaluation.recognition.protocol import RetrievalProtocol
@@ -25,11 +28,27 @@ from evaluation.sequences.sampling import gather, sample_frames
 _NUM_POINTS = 8192
 
 
+class Seen(Protocol):
+    """The surfaces that a sensor sees from a place.
+
+    Attributes:
+        reach: of its farthest surface [m].
+    """
+
+    @property
+    def reach(self) -> float: ...
+
+    def share_of(self, points: np.ndarray) -> float:
+        """Returns the visible part of points (N, 3), in the sensor's frame."""
+        ...
+
+
 def overlap_matrix(
     database: Sequence,
     query: Sequence,
     protocol: RetrievalProtocol,
     track: Track = silent,
+    see: Callable[[int], Seen] | None = None,
 ) -> np.ndarray:
     """Returns the overlap of every query with every place, (Q, D) float64.
 
@@ -41,41 +60,60 @@ def overlap_matrix(
         query: the drive of the queries, in the same world frame.
         protocol: for the frames of queries and places.
         track: reports progress.
+        see: frame of the database -> the surfaces that its sensor sees there;
+            by default those of its scan, compared with at most 8192 points of a
+            query.
 
     Raises:
         InputError: if a sequence cannot be read.
     """
-    placed = sample_frames(database.X_WS[:, :3, 3], protocol.place_spacing)
-    query_frames = sample_frames(query.X_WS[:, :3, 3], protocol.query_spacing)
-    seen = [
-        SeenSurfaces.of(gather(database, frame, 1, protocol.max_range))
+
+    def see_scan(frame: int) -> Seen:
+        return SeenSurfaces.of(gather(database, frame, 1, protocol.max_range))
+
+    query_frames, placed = compared_frames(database, query, protocol)
+    clouds = [
+        gather(query, frame, 1, protocol.max_range)
         for frame in track(
-            placed.tolist(), f"overlap: seeing {database.name}", len(placed)
+            query_frames.tolist(),
+            f"overlap: reading {query.name}",
+            len(query_frames),
         )
     ]
-    X_WPs = database.X_WS[placed]
-    reaches = np.array([one.reach for one in seen])
-    result = np.zeros((len(query_frames), len(placed)))
-    rows = track(
-        range(len(query_frames)),
-        f"overlap: comparing {query.name}",
-        len(query_frames),
+    if see is None:
+        see = see_scan
+        clouds = [sampled(points) for points in clouds]
+    X_WQs = query.X_WS[query_frames]
+    reaches = np.array(
+        [np.linalg.norm(points, axis=1).max(initial=0.0) for points in clouds]
     )
-    for row in rows:
-        points = gather(query, int(query_frames[row]), 1, protocol.max_range)
-        if len(points) == 0:
-            result[row] = math.nan
-            continue
-        X_WQ = query.X_WS[query_frames[row]]
-        reach = np.linalg.norm(points, axis=1).max()
-        apart = np.linalg.norm(X_WPs[:, :3, 3] - X_WQ[:3, 3], axis=1)
-        p_W = sampled(points) @ X_WQ[:3, :3].T + X_WQ[:3, 3]
+    result = np.zeros((len(query_frames), len(placed)))
+    result[[len(points) == 0 for points in clouds]] = math.nan
+    columns = track(
+        range(len(placed)), f"overlap: seeing {database.name}", len(placed)
+    )
+    for column in columns:
+        seen = see(int(placed[column]))
+        X_PW = poses.inverse(database.X_WS[placed[column]])
+        X_PQs = X_PW @ X_WQs
+        apart = np.linalg.norm(X_PQs[:, :3, 3], axis=1)
         # Scans farther apart have no common points.
-        for place in np.flatnonzero(apart <= reach + reaches + TOLERANCE):
-            X_WP = X_WPs[place]
-            p_P = (p_W - X_WP[:3, 3]) @ X_WP[:3, :3]
-            result[row, place] = seen[place].share_of(p_P)
+        is_near = apart <= reaches + seen.reach + TOLERANCE
+        for row in np.flatnonzero(is_near & ~np.isnan(result[:, column])):
+            X_PQ = X_PQs[row]
+            p_P = clouds[row] @ X_PQ[:3, :3].T + X_PQ[:3, 3]
+            result[row, column] = seen.share_of(p_P)
     return result
+
+
+def compared_frames(
+    database: Sequence, query: Sequence, protocol: RetrievalProtocol
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the frames of the queries (Q,), and of the places (D,)."""
+    return (
+        sample_frames(query.X_WS[:, :3, 3], protocol.query_spacing),
+        sample_frames(database.X_WS[:, :3, 3], protocol.place_spacing),
+    )
 
 
 def best_overlaps(

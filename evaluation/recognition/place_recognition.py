@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import asdict, dataclass, replace
 import math
-from pathlib import Path
+
+import numpy as np
 
 from cns_drake.base.errors import InputError
-from cns_drake.base.files import completing
 from cns_drake.base.progress import Track, silent
 from cns_drake.base.recordings.sequence import Sequence
 from evaluation.methods.method import Method
@@ -127,6 +126,7 @@ def run(
     track: Track = silent,
     *,
     across_maps: bool = False,
+    overlaps: np.ndarray | None = None,
 ) -> PlaceRecognition:
     """Runs a method on a pair of drives.
 
@@ -138,43 +138,24 @@ def run(
         protocol: of the comparison.
         track: reports progress.
         across_maps: the two may be of maps of different names.
+        overlaps: (Q, D) for matches by overlap; by default those of the scans.
 
     Raises:
         InputError: if a sequence cannot be read, the two are not of the same
             world, the method fails, or no query has a match.
     """
     retrieval = retrieve(
-        database, query, method, protocol, track, across_maps=across_maps
+        database,
+        query,
+        method,
+        protocol,
+        track,
+        across_maps=across_maps,
+        overlaps=overlaps,
     )
     return judge_retrieval(
         method, database.name, query.name, retrieval, protocol, mode
     )
-
-
-def write_overlaps(result: PlaceRecognition, path: Path) -> None:
-    """Writes the overlap of each query with each place as CSV.
-
-    Columns `query_frame`, `database_frame` and `overlap`.
-
-    Raises:
-        InputError: if the file cannot be written.
-    """
-    retrieval = result.retrieval
-    assert retrieval.overlaps is not None
-    with (
-        completing(path) as part,
-        open(part, "w", newline="", encoding="utf-8") as stream,
-    ):
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(["query_frame", "database_frame", "overlap"])
-        for frame, row in zip(
-            retrieval.query_frames, retrieval.overlaps, strict=True
-        ):
-            for place, value in zip(
-                retrieval.database_frames, row, strict=True
-            ):
-                text = "" if math.isnan(value) else f"{value:.6f}"
-                writer.writerow([frame, place, text])
 
 
 def judge_retrieval(

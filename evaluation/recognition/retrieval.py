@@ -81,6 +81,7 @@ def retrieve(
     track: Track = silent,
     *,
     across_maps: bool = False,
+    overlaps: np.ndarray | None = None,
 ) -> Retrieval:
     """Scores every query of a drive against all places of the database.
 
@@ -91,6 +92,7 @@ def retrieve(
         protocol: of the comparison.
         track: reports progress.
         across_maps: the two may be of maps of different names.
+        overlaps: (Q, D) for matches by overlap; by default those of the scans.
 
     Raises:
         InputError: if a sequence cannot be read, the two are not of the same
@@ -103,8 +105,7 @@ def retrieve(
         found = retrieve(database, query, make_method("solid", {}))
     """
     check_same_world(database, query, across_maps=across_maps)
-    overlaps = None
-    if protocol.overlap is not None:
+    if protocol.overlap is not None and overlaps is None:
         overlaps = overlap_matrix(database, query, protocol, track)
     (places,) = describe_drive(database, [method], {"places"}, protocol, track)
     (queries,) = describe_drive(query, [method], {"queries"}, protocol, track)

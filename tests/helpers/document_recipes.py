@@ -535,6 +535,30 @@ RECIPES = {
         prints=("a match shows 50% of the query's scan",),
         makes=("overlaps.csv",),
     ),
+    "exact overlap": Recipe(
+        ".venv/bin/cns-drake overlap",
+        changes=(
+            (
+                "metropolis_01 metropolis_04",
+                "town/sequence_01.yaml town/sequence_02.yaml",
+            ),
+        ),
+        after=("own city",),
+        prints=("exact.csv",),
+        makes=("exact.csv",),
+    ),
+    "help: overlap": Recipe(
+        "cns-drake overlap metropolis_01",
+        changes=(
+            (
+                "metropolis_01 metropolis_04",
+                "town/sequence_01.yaml town/sequence_02.yaml",
+            ),
+            ("overlaps.csv", "exact.csv"),
+        ),
+        after=("own city",),
+        prints=("exact.csv",),
+    ),
     "own data": Recipe(
         ".venv/bin/cns-eval tcr kitti",
         changes=(("sequences/04", "sequences/02"),),

@@ -1,0 +1,101 @@
+"""Exact overlap of the scans of two simulated drives.
+
+Where the world is at hand, rays decide what a place's sensor sees of a query's
+scan, see `evaluation.recognition.overlap_truth`. A point is seen if
+
+- it is within the LiDAR's ranges and the protocol's,
+- the place's beams cover its direction,
+- the straight line to it is free, and meets a surface within `TOLERANCE` of it.
+
+The place's sensor sees the world as it was then: at its stage, with its
+traffic.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+import numpy as np
+
+from cns_drake.base.progress import Track, silent
+from cns_drake.sensors.beam_coverage import BeamCoverage
+from cns_drake.simulation.simulated_drive import SimulatedSequence
+from evaluation.recognition.overlap_truth import overlap_matrix
+from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.recognition.seen_surfaces import TOLERANCE
+from evaluation.sequences import Sequence, check_same_world
+from evaluation.sequences.sampling import within_range
+
+
+@dataclass(frozen=True)
+class VisibleSurfaces:
+    """The surfaces that a LiDAR sees from a place of a simulated drive.
+
+    Attributes:
+        drive: of the place.
+        frame: of the place.
+        coverage: of its beams.
+        max_range: greatest coordinate of a point in the sensor's frame [m].
+    """
+
+    drive: SimulatedSequence
+    frame: int
+    coverage: BeamCoverage
+    max_range: float
+
+    @property
+    def reach(self) -> float:
+        """Distance of the farthest surface [m]."""
+        return min(
+            self.drive.pattern.max_range, math.sqrt(3.0) * self.max_range
+        )
+
+    def share_of(self, points: np.ndarray) -> float:
+        """Returns the visible part of points (N, 3), in the sensor's frame."""
+        if len(points) == 0:
+            return math.nan
+        kept = points[within_range(points, self.max_range)]
+        distances = np.linalg.norm(kept, axis=1)
+        pattern = self.drive.pattern
+        reached = (distances >= pattern.min_range) & (
+            distances <= pattern.max_range
+        )
+        kept, distances = kept[reached], distances[reached]
+        d_Sset = kept / distances[:, None]
+        covered = self.coverage.covers(d_Sset)
+        ranges = self.drive.first_ranges(self.frame, d_Sset[covered])
+        is_seen = np.abs(ranges - distances[covered]) <= TOLERANCE
+        return float(is_seen.sum() / len(points))
+
+
+def exact_overlaps(
+    database: SimulatedSequence,
+    query: Sequence,
+    protocol: RetrievalProtocol,
+    track: Track = silent,
+) -> np.ndarray:
+    """Returns the exact overlap of every query with every place, (Q, D).
+
+    NaN for a query without a point.
+
+    Args:
+        database: the drive of the places.
+        query: the drive of the queries, through the same map.
+        protocol: for the frames of queries and places.
+        track: reports progress.
+
+    Raises:
+        InputError: the two are of different maps.
+    """
+    check_same_world(database, query)
+    pattern = database.pattern
+    first = BeamCoverage(pattern.beams(0).d_Sset)
+
+    def see(frame: int) -> VisibleSurfaces:
+        coverage = first
+        if not pattern.repeats:
+            coverage = BeamCoverage(pattern.beams(frame).d_Sset)
+        return VisibleSurfaces(database, frame, coverage, protocol.max_range)
+
+    return overlap_matrix(database, query, protocol, track, see)
