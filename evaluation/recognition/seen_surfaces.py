@@ -5,9 +5,9 @@ direction, one in each quadrant, say where the surface lies there: in the plane
 of the three nearest ones, or, at edges and where the beams graze it, between
 the nearest and the farthest of them.
 
-Rays cast in the sensor's world showed the error. For points of scans that were
-taken up to 30 m away, 3 % more points count as shown than are visible, and at
-most 7 % (Metropolis, 32 pairs of scans).
+Rays cast in the sensor's world show the error: it is some hundredths for points
+of scans that were taken up to 30 m away, and more beyond
+(docs/notes/fitting.md).
 """
 
 from __future__ import annotations
