@@ -8,7 +8,8 @@ from scipy.spatial import ConvexHull, QhullError
 # Tolerance of the boundary and of flatness, relative to the extent of the
 # cloud. Without it, rounding would put the hull's own corners outside.
 _TOLERANCE = 1e-9
-_CHUNK = 1 << 12
+# The distances of so many points to all facets stay in the cache.
+_CHUNK = 1 << 8
 
 
 def in_convex_hull(points: np.ndarray, vertices: np.ndarray) -> np.ndarray:
