@@ -20,7 +20,8 @@ from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario import Scenario
 from cns_drake.scenarios.scenario_files import world_file
 
-_WIDTH, _HEIGHT = 800, 800
+# As many pixels as a panel has.
+_WIDTH, _HEIGHT = 600, 600
 # Margin around the routes [m].
 _MARGIN = 40.0
 # From far up, so that towers lean little [m].

@@ -22,7 +22,8 @@ from cns_drake.pictures.stage_scene import StageScene, View
 from cns_drake.recording.frame_clock import FRAME_PERIOD
 from cns_drake.sensors.lidar_presets import make_beam_pattern
 
-_WIDTH, _HEIGHT = 960, 540
+# As many pixels as a panel has.
+_WIDTH, _HEIGHT = 704, 396
 # Height of the LiDAR below the camera's mast [m].
 _SENSOR_HEIGHT = 1.6
 

@@ -56,7 +56,7 @@ def draw_pr_curves(
         row[0].set_ylabel("precision")
     for axes in grid[-1]:
         axes.set_xlabel("recall")
-    save(figure, stem, "svg")
+    save(figure, stem)
 
 
 def draw_auc_over_change(
@@ -114,7 +114,7 @@ def draw_auc_over_change(
         fontsize=7,
         framealpha=0.8,
     )
-    save(figure, stem, "svg")
+    save(figure, stem)
 
 
 def _draw_curve(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import matplotlib
@@ -29,9 +30,10 @@ _OTHER_STYLES = (
 # Colours (red, green, blue) and what they mean.
 Legend = tuple[tuple[tuple[int, int, int], str], ...]
 
-# The formats of figures. On the page they are SVG where they consist of lines,
-# WebP where they consist of pixels.
-PRINTED = ("pdf", "png")
+# The formats of figures, first those for print. Figures of lines stay lines in
+# PDF, and on the page in SVG.
+LINES = ("pdf", "png", "svg")
+PIXELS = ("png", "webp")
 _DPI = 200
 _PAGE_DPI = 130
 _WEBP_QUALITY = 82
@@ -70,8 +72,8 @@ def plain(text: str) -> str:
     return text.replace("$", r"\$")
 
 
-def save(figure: Figure, stem: Path, page_kind: str) -> None:
-    """Writes a figure as PDF, as PNG, and for the page.
+def save(figure: Figure, stem: Path, kinds: Sequence[str] = LINES) -> None:
+    """Writes a figure for print and, last, for the page.
 
     Equal figures give equal bytes: no time of creation, no random ids. The
     page's has no legend of the whole figure: the page writes it below, in
@@ -80,7 +82,7 @@ def save(figure: Figure, stem: Path, page_kind: str) -> None:
     Args:
         figure: to write.
         stem: path without ending.
-        page_kind: "svg" or "webp".
+        kinds: the formats, `LINES` or `PIXELS`.
 
     Raises:
         InputError: if a file cannot be written.
@@ -89,10 +91,10 @@ def save(figure: Figure, stem: Path, page_kind: str) -> None:
     # The layout is computed once for all formats.
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
-    for kind in (*PRINTED, page_kind):
+    for kind in kinds:
         path = stem.with_name(f"{stem.name}.{kind}")
         for legend in figure.legends:
-            legend.set_visible(kind in PRINTED)
+            legend.set_visible(kind != kinds[-1])
         options: dict = {"dpi": _DPI}
         if kind in ("pdf", "svg"):
             dated = "CreationDate" if kind == "pdf" else "Date"

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 from evaluation.change.tcr import TAU, TemporalChange
 from evaluation.geometry.hull import in_convex_hull
 from evaluation.maps.voxel_maps import VoxelMap
-from evaluation.report.drawing import Legend, plain, save, unit
+from evaluation.report.drawing import PIXELS, Legend, plain, save, unit
 from evaluation.report.point_rendering import (
     Picture,
     View,
@@ -144,7 +144,7 @@ def draw_routes(map_name: str, routes: Sequence[SeenRoute], stem: Path) -> None:
         _show(axes, route.view)
         _draw_route(axes, route.view.project(route.positions))
         axes.set_title(plain(f"{map_name} {route.name}"), fontsize=9)
-    save(figure, stem, "webp")
+    save(figure, stem, PIXELS)
 
 
 def draw_change(
@@ -215,7 +215,7 @@ def _draw_absent(
         _show(axes, picture)
         axes.set_title(plain(text), fontsize=9)
     _show_legend(figure, CHANGE_LEGEND)
-    save(figure, stem, "webp")
+    save(figure, stem, PIXELS)
 
 
 def _draw_sets(
@@ -250,7 +250,7 @@ def _draw_sets(
         _show(axes, picture)
         axes.set_title(plain(f"{map_name} {text}"), fontsize=9)
     _show_legend(figure, SETS_LEGEND)
-    save(figure, stem, "webp")
+    save(figure, stem, PIXELS)
 
 
 def _render_shaded(points: np.ndarray, rgb: np.ndarray, view: View) -> Picture:

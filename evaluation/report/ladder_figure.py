@@ -64,7 +64,7 @@ def draw_ladder(rows: Sequence[LadderRow], stem: Path) -> None:
     )
     bar.set_label("part of AUC that is kept", fontsize=_FONT_SIZE)
     bar.ax.tick_params(labelsize=_FONT_SIZE)
-    save(figure, stem, "svg")
+    save(figure, stem)
 
 
 def _draw_panel(

@@ -87,7 +87,7 @@ def draw_survival(survivals: Sequence[Survival], stem: Path) -> None:
         handletextpad=0.2,
         columnspacing=1.0,
     )
-    save(figure, stem, "svg")
+    save(figure, stem)
 
 
 def _draw_row(axes: Axes, one: Survival, height: float) -> None:

@@ -108,7 +108,7 @@ def draw_trend(points: Sequence[TrendPoint], stem: Path) -> None:
         fontsize=8,
         framealpha=0.8,
     )
-    save(figure, stem, "svg")
+    save(figure, stem)
 
 
 def _draw_panel(

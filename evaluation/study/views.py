@@ -8,7 +8,7 @@ from pathlib import Path
 
 from cns_drake.base.files import make_folder
 from cns_drake.base.jobs.step import Reporter
-from evaluation.report.drawing import PRINTED
+from evaluation.report.drawing import PIXELS
 from evaluation.report.figures import (
     SeenRoute,
     Stage,
@@ -21,7 +21,7 @@ from evaluation.study.parts import PartStep, part_digest, read_part
 from evaluation.study.study_layout import SurveyFiles
 
 # Format of pictures on the page.
-PAGE_KIND = "webp"
+PAGE_KIND = PIXELS[-1]
 
 
 @dataclass(frozen=True)
@@ -120,5 +120,5 @@ def _files_of(*stems: Path) -> tuple[Path, ...]:
     return tuple(
         stem.with_name(f"{stem.name}.{kind}")
         for stem in stems
-        for kind in (*PRINTED, PAGE_KIND)
+        for kind in PIXELS
     )

@@ -12,7 +12,7 @@ from evaluation.paper import reference_for
 from evaluation.recognition.protocol import RetrievalProtocol
 from evaluation.report import curve_figures
 from evaluation.report.curve_figures import draw_auc_over_change
-from evaluation.report.drawing import save
+from evaluation.report.drawing import PIXELS, save
 from evaluation.report.figures import (
     judge_points,
     top_view,
@@ -58,7 +58,7 @@ def test_no_line_through_fewer_than_five_points(
 ):
     drawn = []
     monkeypatch.setattr(
-        curve_figures, "save", lambda figure, stem, kind: drawn.append(figure)
+        curve_figures, "save", lambda figure, stem: drawn.append(figure)
     )
     protocol = RetrievalProtocol(scans_per_place=10)
     around = SimpleNamespace(low=0.4, high=0.6)
@@ -114,7 +114,7 @@ def test_points_on_a_border_have_a_voxel_beside_them(side):
 def test_legend_of_a_figure_is_not_in_the_picture_of_the_page(tmp_path):
     figure = Figure(figsize=(2, 1))
     figure.legend(handles=[Patch(color="red", label="gone")], loc="center")
-    save(figure, tmp_path / "figure", "webp")
+    save(figure, tmp_path / "figure", PIXELS)
     printed = imread(tmp_path / "figure.png")[..., :3]
     on_page = imread(tmp_path / "figure.webp")[..., :3] / 255.0
     red = [1.0, 0.0, 0.0]
