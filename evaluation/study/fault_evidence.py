@@ -30,7 +30,8 @@ from evaluation.sequences.sampling import within_range
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.drive_source import DriveSource
 from evaluation.study.parts import PartStep, part_digest, read_part
-from evaluation.study.study_layout import RecognitionFiles
+from evaluation.study.study_layout import RecognitionFiles, SurveyFiles
+from evaluation.study.surveys import open_surveyed
 
 # Points at least this high above the ground count as standing [m].
 _STANDING = 0.5
@@ -46,6 +47,7 @@ class FindEvidence(PartStep):
 
     Attributes:
         drives: database, and query.
+        surveys: likewise.
         methods: the methods.
         results: their results on the two drives.
         protocol: of these results.
@@ -53,6 +55,7 @@ class FindEvidence(PartStep):
     """
 
     drives: tuple[DriveSource, DriveSource]
+    surveys: tuple[SurveyFiles, SurveyFiles]
     methods: tuple[MethodChoice, ...]
     results: RecognitionFiles
     protocol: RetrievalProtocol
@@ -82,7 +85,7 @@ class FindEvidence(PartStep):
             results.append(read_part(self.results.result(choice)))
         if None in results or not results:
             return None
-        database, query = (source() for source in self.drives)
+        database, query = map(open_surveyed, self.drives, self.surveys)
         return find_evidence(
             database, query, results, self.protocol, reporter.track
         )

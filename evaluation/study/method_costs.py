@@ -16,6 +16,7 @@ from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.drive_source import DriveSource
 from evaluation.study.parts import PartStep, part_digest, read_part
 from evaluation.study.study_layout import SurveyFiles
+from evaluation.study.surveys import open_surveyed
 
 # Number of clouds and of queries; the time of the first does not count.
 _NUM_TRIALS = 12
@@ -52,7 +53,8 @@ class MeasureCosts(PartStep):
         }
 
     def make(self, reporter: Reporter) -> list[Cost]:
-        sequence, protocol = self.source(), self.protocol
+        sequence = open_surveyed(self.source, self.surveys[1])
+        protocol = self.protocol
         costs = []
         with threadpool_limits(limits=1):
             for choice in reporter.track(self.methods, "", len(self.methods)):

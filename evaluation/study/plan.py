@@ -219,12 +219,13 @@ def _recognition_job(
         _RECOGNITION_COST.get(method.name, _OTHER_RECOGNITION_COST)
         for method in methods
     )
+    surveys = files.survey(database.name), files.survey(query.name)
     results = files.recognition(database.name, query.name)
     steps: tuple[PartStep, ...] = tuple(
         RecognisePlaces(
             city.name,
             (database.stage, query.stage),
-            (files.survey(database.name), files.survey(query.name)),
+            surveys,
             method,
             protocol,
             results.result(method),
@@ -235,6 +236,7 @@ def _recognition_job(
         cost += _EVIDENCE_COST
         evidence = FindEvidence(
             (database.source, query.source),
+            surveys,
             methods,
             results,
             protocol,

@@ -10,10 +10,15 @@ from cns_drake.base.jobs.step import Reporter, Step
 from cns_drake.base.recordings.sequence import Sequence
 from evaluation.recognition.description import Role
 from evaluation.recognition.protocol import RetrievalProtocol
+from evaluation.sequences.moved import MovedSequence
 from evaluation.study.chosen_methods import MethodChoice
 from evaluation.study.drive_source import DriveSource
-from evaluation.study.parts import is_current, write_part
-from evaluation.study.recording_survey import RecordingSurvey, survey_recording
+from evaluation.study.parts import is_current, read_part, write_part
+from evaluation.study.recording_survey import (
+    RecordingSurvey,
+    SurveyedDrive,
+    survey_recording,
+)
 from evaluation.study.study_layout import SurveyFiles
 
 
@@ -131,3 +136,17 @@ class Survey(Step):
                 if not is_current(getattr(self.files, name), inputs)
             },
         )
+
+
+def open_surveyed(source: DriveSource, files: SurveyFiles) -> Sequence:
+    """Opens a drive that has been surveyed.
+
+    Its poses are those of the survey: a recording would be unpacked as a whole
+    for them.
+
+    Raises:
+        InputError: if it cannot be opened.
+    """
+    drive = source()
+    known: SurveyedDrive = read_part(files.drive)
+    return MovedSequence(drive, known.X_WS, drive.world_frame, drive.datum)
