@@ -31,9 +31,6 @@ _SIDES = 16
 # a part of the radius, and [m].
 _MARGIN = 0.005
 _GAP = 1e-3
-# Radius around places in which shapes are searched, so that the next places
-# find theirs already there [m].
-_NEARBY = 10.0
 
 
 @lru_cache(maxsize=1000)
@@ -60,7 +57,8 @@ class NearCurvedShapes:
 
     def __init__(self, groups: Sequence[RayGroup]):
         """Takes the curved shapes of groups, which are placed."""
-        rows, X_LGs, sizes = [], [], []
+        rows: list[int] = []
+        X_LGs, sizes = [], []
         for row, group in enumerate(groups):
             for _, X_LG, surface in group.members:
                 if isinstance(surface, TriangleSurface | HalfSpaceSurface):
@@ -72,20 +70,28 @@ class NearCurvedShapes:
                 rows.append(row)
                 X_LGs.append(X_LG.GetAsMatrix4())
                 sizes.append((half, 1.1 * radius + 2.0 * _GAP))
-        self._rows = np.array(rows, int)
         X_LGset = np.reshape(X_LGs, (-1, 4, 4))
-        self._p_LGs, self._X_GLs = X_LGset[:, :, 3:], np.linalg.inv(X_LGset)
-        self._sizes = np.reshape(sizes, (-1, 2))
+        halves, radii = np.reshape(sizes, (-1, 2)).T
         # Greatest stretch of a vector from G to O.
-        self._stretches = np.array(
+        stretches = np.array(
             [np.linalg.norm(group.X_FL[:3, :3], 2) for group in groups]
         )
-        self._X_OLs = np.tile(np.eye(4), (len(groups), 1, 1))
+        X_OLs = np.tile(np.eye(4), (len(groups), 1, 1))
         for row, group in enumerate(groups):
-            self._X_OLs[row, :3] = group.X_OL
-        self._near: _Sorted | None = None
-        # The box in O whose shapes are placed.
-        self._box = (np.full(3, np.inf), np.full(3, -np.inf))
+            X_OLs[row, :3] = group.X_OL
+        places = (X_OLs[rows] @ X_LGset[:, :, 3:])[:, :3, 0]
+        reaches = stretches[rows] * (halves + radii)
+        X_GOs = np.linalg.inv(X_LGset) @ np.linalg.inv(X_OLs[rows])
+        order = np.argsort(places[:, 0] - reaches)
+        self._near = _Sorted(
+            places[order],
+            reaches[order],
+            X_GOs[order],
+            halves[order],
+            radii[order],
+            (places[:, 0] - reaches)[order],
+            2.0 * reaches.max(initial=0.0),
+        )
 
     def contain(self, p_OSset: np.ndarray) -> np.ndarray:
         """Returns which of (K, 3) places are near a shape, (K,) bool.
@@ -93,40 +99,8 @@ class NearCurvedShapes:
         A place is near if it is in the shape's polyhedron.
         """
         result = np.zeros(len(p_OSset), bool)
-        if len(self._rows) and len(p_OSset):
-            low, high = _find_box(p_OSset)
-            if (
-                self._near is None
-                or (low < self._box[0]).any()
-                or (high > self._box[1]).any()
-            ):
-                self._box = (low - _NEARBY, high + _NEARBY)
-                self._near = self._place()
-            _find_near(self._near, p_OSset, result)
+        _find_near(self._near, p_OSset, result)
         return result
-
-    def _place(self) -> _Sorted:
-        """Returns the shapes that reach into the box, at their places."""
-        places = (self._X_OLs[self._rows] @ self._p_LGs)[:, :3, 0]
-        reaches = self._stretches[self._rows] * self._sizes.sum(axis=1)
-        inside = np.flatnonzero(
-            (places + reaches[:, None] >= self._box[0]).all(axis=1)
-            & (places - reaches[:, None] <= self._box[1]).all(axis=1)
-        )
-        X_LOs = np.linalg.inv(self._X_OLs[self._rows[inside]])
-        X_GOs = self._X_GLs[inside] @ X_LOs
-        places, reaches = places[inside], reaches[inside]
-        sizes = self._sizes[inside]
-        order = np.argsort(places[:, 0] - reaches)
-        return _Sorted(
-            places[order],
-            reaches[order],
-            X_GOs[order],
-            sizes[order, 0],
-            sizes[order, 1],
-            (places[:, 0] - reaches)[order],
-            2.0 * reaches.max(initial=0.0),
-        )
 
 
 class _Sorted(NamedTuple):
@@ -150,17 +124,6 @@ class _Sorted(NamedTuple):
     radii: np.ndarray
     begins: np.ndarray
     width: float
-
-
-@compiled
-def _find_box(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the least and the greatest coordinates of (K, 3) places."""
-    low, high = places[0].copy(), places[0].copy()
-    for i in range(1, len(places)):
-        for axis in range(3):
-            low[axis] = min(low[axis], places[i, axis])
-            high[axis] = max(high[axis], places[i, axis])
-    return low, high
 
 
 @compiled

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from functools import cached_property
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
@@ -16,15 +15,13 @@ from pydrake.systems.framework import Context, LeafSystem, ValueProducer
 from cns_drake.ray_casting.group_motion import Motion
 from cns_drake.ray_casting.moving_groups import NOTHING_KNOWN, Ball, KnownPoses
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.scene.structure_table import MAX_INSTANCE, StructureTable
-from cns_drake.sensors.beam_pattern import POINT_DTYPE, BeamPattern, Beams
+from cns_drake.scene.structure_table import StructureTable
+from cns_drake.sensors.beam_pattern import POINT_DTYPE, BeamPattern
 from cns_drake.sensors.measurement import IDEAL, MeasurementModel, Returns
-from cns_drake.sensors.point_assembly import BeamTable, assemble_points
-from cns_drake.sensors.returns.calibrated import (
-    CalibratedReturns,
-    CalibratedTurn,
-)
+from cns_drake.sensors.point_assembly import assemble_points, points_in_world
+from cns_drake.sensors.returns.calibrated import CalibratedReturns
 from cns_drake.sensors.seen_geometry import SeenGeometry, Sight
+from cns_drake.sensors.turns import Turn, Turns
 
 
 class Lidar(LeafSystem):
@@ -144,9 +141,7 @@ class Lidar(LeafSystem):
             frozenset(anchored_frames),
             num_threads,
         )
-        self._first = _Turn(0, pattern.beams(0))
-        self._turn = self._first
-        self._times = self._first.beams.column_t_ns / (pattern.period * 1e9)
+        self._turns = Turns(pattern)
 
         self._geometry_query = self.DeclareAbstractInputPort(
             "geometry_query", Value(QueryObject())
@@ -297,11 +292,10 @@ class Lidar(LeafSystem):
 
     def _calc_scan(self, context: Context, output: AbstractValue) -> None:
         seen = self._eval_seen(context)
-        frame = self._frame(context)
-        turn = self._get_turn(frame)
+        frame, turn = self._turns.at(context.get_time())
         p_WSset, R_WSset = self._calc_poses(context)
         columns = turn.beams.cast_columns
-        times = self._times
+        times = self._turns.times
         if columns is not None:
             times = times[columns]
             if len(p_WSset) > 1:
@@ -309,6 +303,9 @@ class Lidar(LeafSystem):
         met, (beams, ranges, intensity) = self._measure(
             seen, turn, p_WSset, R_WSset, times, frame
         )
+        labels = seen.label
+        if self._moving.HasValue(context):
+            labels = seen.labels(self._moving.Eval(context))
         # Zeros, so that the padding between fields is defined, too.
         scan = np.zeros(len(beams), POINT_DTYPE)
         assemble_points(
@@ -318,7 +315,7 @@ class Lidar(LeafSystem):
             ranges,
             intensity,
             met,
-            self._labels(context, seen),
+            labels,
             seen.instance,
             np.float32(self._measurement.resolution),
         )
@@ -327,7 +324,7 @@ class Lidar(LeafSystem):
     def _measure(
         self,
         seen: SeenGeometry,
-        turn: _Turn,
+        turn: Turn,
         p_WSset: np.ndarray,
         R_WSset: np.ndarray,
         times: np.ndarray,
@@ -362,25 +359,6 @@ class Lidar(LeafSystem):
         )
         return hits.geometry[turn.table.place[returns.beams]], returns
 
-    def _labels(self, context: Context, seen: SeenGeometry) -> np.ndarray:
-        """Returns the class of each geometry, moving classes included."""
-        if not self._moving.HasValue(context):
-            return seen.label
-        moves = np.zeros(MAX_INSTANCE + 1, bool)
-        moves[self._moving.Eval(context)] = True
-        return np.where(moves[seen.instance], seen.moving_label, seen.label)
-
-    def _frame(self, context: Context) -> int:
-        return round(context.get_time() / self._pattern.period)
-
-    def _get_turn(self, frame: int) -> _Turn:
-        """Returns the beams of a frame; the latest are kept."""
-        if self._pattern.repeats:
-            return self._first
-        if self._turn.frame != frame:
-            self._turn = _Turn(frame, self._pattern.beams(frame))
-        return self._turn
-
     def _pose_prerequisites(self) -> set:
         if self._sweep is not None:
             return {self._sweep.ticket()}
@@ -414,7 +392,7 @@ class Lidar(LeafSystem):
         X_WS = X_WP @ self._X_PS
         motion = self._calc_motions(context).get(self._parent_frame_id)
         if motion is not None:
-            R_WW0, way_P = motion.at(self._times)
+            R_WW0, way_P = motion.at(self._turns.times)
             p_PS_W = X_WS.translation() - X_WP.translation()
             return (
                 X_WP.translation() + way_P + R_WW0 @ p_PS_W,
@@ -438,32 +416,9 @@ class Lidar(LeafSystem):
     ) -> None:
         scan = self._scan.Eval(context)
         p_WSset, R_WSset = self._calc_poses(context)
-        # One pose for each column, or one for all.
-        column = np.searchsorted(self._first.beams.column_t_ns, scan["t"])
-        p_SRset = np.stack([scan["x"], scan["y"], scan["z"]], axis=1)
-        p_WRset = p_WSset[column % len(p_WSset)] + np.einsum(
-            "nij,nj->ni", R_WSset[column % len(R_WSset)], p_SRset
-        )
+        column_t_ns = self._turns.first.beams.column_t_ns
+        p_WRset = points_in_world(scan, column_t_ns, p_WSset, R_WSset)
         _fill(output.get_mutable_value(), p_WRset.T)
-
-
-class _Turn:
-    """The beams of a turn, ready for casting and assembling."""
-
-    def __init__(self, frame: int, beams: Beams):
-        self.frame = frame
-        self.beams = beams
-        self.d_Sset_cast = beams.d_Sset[beams.packet_order]
-        self.table = BeamTable(
-            beams.d_Sset.astype(np.float32),
-            beams.ring,
-            beams.t_ns,
-            np.argsort(beams.packet_order),
-        )
-
-    @cached_property
-    def calibrated(self) -> CalibratedTurn:
-        return CalibratedTurn(self.beams)
 
 
 def _fill(point_cloud: PointCloud, p_FRset: np.ndarray) -> None:

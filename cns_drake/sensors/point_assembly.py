@@ -79,3 +79,24 @@ def assemble_points(
         else:
             point.label = label[met[k]]
             point.instance = instance[met[k]]
+
+
+def points_in_world(
+    scan: np.ndarray,
+    column_t_ns: np.ndarray,
+    p_WSset: np.ndarray,
+    R_WSset: np.ndarray,
+) -> np.ndarray:
+    """Returns the places of a scan's points in the world, (N, 3) [m].
+
+    Args:
+        scan: (N,) records of `POINT_DTYPE`.
+        column_t_ns: (T,) rising firing times of the columns [ns].
+        p_WSset: (K, 3) positions of S: one, or each column's.
+        R_WSset: (K, 3, 3) its orientations.
+    """
+    column = np.searchsorted(column_t_ns, scan["t"])
+    p_SRset = np.stack([scan["x"], scan["y"], scan["z"]], axis=1)
+    return p_WSset[column % len(p_WSset)] + np.einsum(
+        "nij,nj->ni", R_WSset[column % len(R_WSset)], p_SRset
+    )

@@ -30,7 +30,7 @@ from cns_drake.scene.perception_geometry import (
     PerceptionGeometry,
 )
 from cns_drake.scene.semantics import moving_id
-from cns_drake.scene.structure_table import StructureTable
+from cns_drake.scene.structure_table import MAX_INSTANCE, StructureTable
 from cns_drake.sensors.returns.materials import Materials, find_materials
 
 
@@ -120,6 +120,12 @@ class SeenGeometry:
         if not is_placed:
             self.scene.set_frame_poses(calc_X_WF, motions, known, seen)
         self._revision = revision
+
+    def labels(self, moving: np.ndarray) -> np.ndarray:
+        """Returns the class of each geometry while some instances move."""
+        moves = np.zeros(MAX_INSTANCE + 1, bool)
+        moves[moving] = True
+        return np.where(moves[self.instance], self.moving_label, self.label)
 
     def materials(self, *, is_wet: bool) -> Materials:
         """Returns the materials of the geometries of `scene`.

@@ -8,34 +8,30 @@ from typing import NamedTuple
 import numpy as np
 
 from cns_drake.base.compiled import compiled
-from cns_drake.sensors.returns.counter_random import normal, uniform
 from cns_drake.sensors.returns.echo_choice import Echoes
+from cns_drake.sensors.returns.echo_detection import (
+    FIRST_ECHO_DRAW,
+    MOST_ECHOES,
+    detect,
+    is_detected,
+    measured_range,
+    merge,
+    reported_intensity,
+)
 from cns_drake.sensors.returns.light import Light
 from cns_drake.sensors.returns.link_budget import (
-    CERTAIN_SNR,
-    HOPELESS_SNR,
     LinkBudget,
-    detection_probability,
     echo_energy,
-    range_deviation,
     target_snr,
 )
 from cns_drake.sensors.returns.weather import Scattering
-
-# The index of the weather, in place of a geometry's.
-SCATTERED = -2
-# Numbers of a beam's draws; lower ones serve the sub-rays and the leaves.
-_FIRST_ECHO_DRAW = 128
-_DRAWS_PER_ECHO = 4
-_FIRST_DROP_DRAW = 200
-# The most echoes and drops of a beam that are processed.
-_MOST_ECHOES = 12
-_MOST_DROPS = 8
-# Energy of a retro-reflector that makes the intensity full: 10,000 times that
-# of a white target.
-_FULL_RETRO = 1e4
-_FULL_INTENSITY = 255.0
-
+from cns_drake.sensors.returns.weather_echoes import (
+    MOST_DROPS,
+    SCATTERED,
+    add_drops,
+    first_drop,
+    fog_echo,
+)
 
 _CHOICE = {one: number for number, one in enumerate(Echoes)}
 _FIRST, _STRONGEST, _LAST, _DUAL = range(4)
@@ -127,15 +123,11 @@ def _report(
     reported: Reported,
 ) -> int:
     """Fills in the reported points; returns their number."""
-    echo = np.zeros((_MOST_ECHOES + _MOST_DROPS + 1, 3))
+    echo = np.zeros((MOST_ECHOES + MOST_DROPS + 1, 3))
     source = np.zeros(len(echo), np.int32)
     # All parts of the light of one beam: distance and energy, and from where.
     most = _longest_run(others.beam) + 1
     light, origin = np.zeros((most, 2)), np.zeros(most, np.int32)
-    table = receiver.scattering
-    is_clear = len(table.distances) == 0
-    is_fog = not is_clear and table.fog_energies[-1] > 0.0
-    all_drops = 0.0 if is_clear else table.counts[-1]
     budget, extinction = receiver.budget, receiver.extinction
     min_range, max_range = receiver.min_range, receiver.max_range
     resolution, choice = receiver.resolution, receiver.choice
@@ -147,6 +139,10 @@ def _report(
     axis_geometry, other_geometry = axes.geometry, others.geometry
     to_beam, to_distance = reported.beam, reported.distance
     to_intensity, to_geometry = reported.intensity, reported.geometry
+    distances, counts, energies, fog_energies, fog_counts = receiver.scattering
+    is_clear = len(distances) == 0
+    is_fog = not is_clear and fog_energies[-1] > 0.0
+    all_drops = 0.0 if is_clear else counts[-1]
     count, axis, other = 0, 0, 0
     for beam in range(num_beams):
         first_axis, first_other = axis, other
@@ -154,42 +150,66 @@ def _report(
             axis += 1
         while other < len(other_beam) and other_beam[other] == beam:
             other += 1
-        is_alone = is_clear
-        if not is_clear and not is_fog:
-            # The first drop is beyond the farthest end of a beam.
-            arrived = -np.log(1.0 - uniform(key, beam, _FIRST_DROP_DRAW))
-            is_alone = arrived >= all_drops
-        if is_alone and axis - first_axis + other - first_other <= 1:
-            # Most beams have at most a single echo.
+        number = axis - first_axis + other - first_other
+        # Most beams have at most a single echo: the first drop is beyond the
+        # farthest end of a beam.
+        if number <= 1 and (
+            all_drops == 0.0 or first_drop(key, beam) >= all_drops
+        ):
+            near, energy, geometry = math.inf, 0.0, SCATTERED
             if axis > first_axis:
-                distance = axis_distance[first_axis]
+                near = axis_distance[first_axis]
                 energy = axis_energy[first_axis]
                 geometry = axis_geometry[first_axis]
             elif other > first_other:
-                distance = other_distance[first_other]
+                near = other_distance[first_other]
                 energy = other_energy[first_other]
                 geometry = other_geometry[first_other]
-            else:
+            elif not is_fog:
                 continue
-            if not min_range <= distance <= max_range:
+            snr = target_snr(budget, extinction, energy, near)
+            distance = near
+            if is_fog:
+                # Rounded like the mean of several parts.
+                distance = snr * near / snr if snr > 0.0 else 0.0
+            is_seen = min_range <= distance <= max_range and is_detected(
+                key, beam, FIRST_ECHO_DRAW, snr
+            )
+            if is_fog and not is_seen:
+                # A unit reports the broad echo of fog only without any other.
+                distance, snr = fog_echo(
+                    budget,
+                    extinction,
+                    distances,
+                    fog_energies,
+                    fog_counts,
+                    key,
+                    beam,
+                )
+                geometry = SCATTERED
+                is_seen = (
+                    distance <= near
+                    and min_range <= distance <= max_range
+                    and is_detected(key, beam, FIRST_ECHO_DRAW, snr)
+                )
+            if not is_seen:
                 continue
-            snr = target_snr(budget, extinction, energy, distance)
-            if not _is_detected(key, beam, _FIRST_ECHO_DRAW, snr):
-                continue
-            if extinction > 0.0:
+            if is_fog:
+                energy = echo_energy(budget, snr, distance)
+            elif extinction > 0.0:
                 energy *= np.exp(-2.0 * extinction * distance)
             to_beam[count] = beam
-            to_distance[count] = _measured(
+            to_distance[count] = measured_range(
                 budget,
                 min_range,
                 max_range,
                 key,
                 beam,
-                _FIRST_ECHO_DRAW,
+                FIRST_ECHO_DRAW,
                 distance,
                 snr,
             )
-            to_intensity[count] = _intensity(retro_from, energy)
+            to_intensity[count] = reported_intensity(retro_from, energy)
             to_geometry[count] = geometry
             count += 1
             continue
@@ -209,22 +229,42 @@ def _report(
                 origin[number] = other_geometry[first_other]
                 first_other += 1
             number += 1
-        size = _merge(
+        size = merge(
             light, origin, number, budget, extinction, resolution, echo, source
         )
         if not is_clear:
-            size = _scatter(receiver, key, beam, echo, source, size)
-        size = _detect(
+            size = add_drops(
+                budget,
+                extinction,
+                max_range,
+                distances,
+                counts,
+                energies,
+                key,
+                beam,
+                echo,
+                source,
+                size,
+            )
+        size = detect(
             budget, min_range, max_range, key, beam, echo, source, size
         )
         if size == 0 and is_fog:
-            # A unit reports the broad echo of fog only without any other.
-            nearest = light[0, 0] if number > 0 else math.inf
-            size = _add_fog(receiver, key, beam, nearest, echo)
-            source[0] = SCATTERED
-            size = _detect(
-                budget, min_range, max_range, key, beam, echo, source, size
+            distance, snr = fog_echo(
+                budget,
+                extinction,
+                distances,
+                fog_energies,
+                fog_counts,
+                key,
+                beam,
             )
+            if number == 0 or distance <= light[0, 0]:
+                echo[0, 0], echo[0, 1], echo[0, 2] = distance, snr, 0.0
+                source[0] = SCATTERED
+                size = detect(
+                    budget, min_range, max_range, key, beam, echo, source, 1
+                )
         if size == 0:
             continue
         best, first, farthest = 0, 0, 0
@@ -241,7 +281,7 @@ def _report(
             best = farthest
         to_beam[count] = beam
         to_distance[count] = echo[best, 0]
-        to_intensity[count] = _intensity(retro_from, echo[best, 2])
+        to_intensity[count] = reported_intensity(retro_from, echo[best, 2])
         to_geometry[count] = source[best]
         count += 1
         if choice == _DUAL and size > 1:
@@ -255,7 +295,9 @@ def _report(
                         second = i
             to_beam[count] = beam
             to_distance[count] = echo[second, 0]
-            to_intensity[count] = _intensity(retro_from, echo[second, 2])
+            to_intensity[count] = reported_intensity(
+                retro_from, echo[second, 2]
+            )
             to_geometry[count] = source[second]
             count += 1
     return count
@@ -269,207 +311,3 @@ def _longest_run(numbers: np.ndarray) -> int:
         length = length + 1 if i and numbers[i] == numbers[i - 1] else 1
         longest = max(longest, length)
     return longest
-
-
-@compiled
-def _merge(
-    light: np.ndarray,
-    origin: np.ndarray,
-    number: int,
-    budget: LinkBudget,
-    extinction: float,
-    resolution: float,
-    echo: np.ndarray,
-    source: np.ndarray,
-) -> int:
-    """Fills in distance and SNR of each echo; returns their number."""
-    size, begin, most = -1, -math.inf, 0.0
-    for part in range(number):
-        distance = light[part, 0]
-        snr = target_snr(budget, extinction, light[part, 1], distance)
-        if distance - begin > resolution:
-            if size + 1 == _MOST_ECHOES:
-                break
-            size += 1
-            begin, most = distance, 0.0
-            echo[size, 0] = echo[size, 1] = echo[size, 2] = 0.0
-        # A sum weighted by the SNR, divided by it below.
-        echo[size, 0] += snr * distance
-        echo[size, 1] += snr
-        if snr > most:
-            most = snr
-            source[size] = origin[part]
-    for i in range(size + 1):
-        if echo[i, 1] > 0.0:
-            echo[i, 0] /= echo[i, 1]
-    return size + 1
-
-
-@compiled
-def _scatter(
-    receiver: Receiver,
-    key: np.uint64,
-    beam: int,
-    echo: np.ndarray,
-    source: np.ndarray,
-    size: int,
-) -> int:
-    """Adds echoes of the weather; returns the number of echoes."""
-    table = receiver.scattering
-    # Fog alone has no drops.
-    if table.counts[-1] == 0.0:
-        return size
-    # No drop is beyond the end of the beam.
-    end = receiver.max_range
-    for i in range(size):
-        end = min(end, echo[i, 0])
-    draw = _FIRST_DROP_DRAW
-    mean = interpolate(end, table.distances, table.counts)
-    # A Poisson number, as arrivals in an interval of this length.
-    arrived = 0.0
-    for _ in range(_MOST_DROPS):
-        arrived -= np.log(1.0 - uniform(key, beam, draw))
-        if arrived >= mean:
-            break
-        distance = interpolate(arrived, table.counts, table.distances)
-        row = np.searchsorted(table.distances, distance)
-        if row == len(table.distances):
-            row -= 1
-        column = int(uniform(key, beam, draw + 1) * table.energies.shape[1])
-        echo[size, 0] = distance
-        # Drops in the table are detected already.
-        echo[size, 1] = target_snr(
-            receiver.budget,
-            receiver.extinction,
-            table.energies[row, column],
-            distance,
-        )
-        echo[size, 2] = 1.0
-        source[size] = SCATTERED
-        size += 1
-        draw += 2
-    return size
-
-
-@compiled
-def _add_fog(
-    receiver: Receiver,
-    key: np.uint64,
-    beam: int,
-    nearest: float,
-    echo: np.ndarray,
-) -> int:
-    """Fills in the echo of fog, unless something is nearer; returns how many.
-
-    Args:
-        receiver, key, beam: see `report_echoes`.
-        nearest: distance of the nearest light [m].
-        echo: to fill.
-    """
-    table = receiver.scattering
-    share = uniform(key, beam, _FIRST_DROP_DRAW + 2 * _MOST_DROPS)
-    distance = interpolate(share, table.fog_counts, table.distances)
-    if nearest < distance:
-        return 0
-    energy = interpolate(distance, table.distances, table.fog_energies)
-    echo[0, 0] = distance
-    echo[0, 1] = target_snr(
-        receiver.budget, receiver.extinction, energy, distance
-    )
-    echo[0, 2] = 0.0
-    return 1
-
-
-@compiled
-def interpolate(x: float, xs: np.ndarray, ys: np.ndarray) -> float:
-    """Returns y at x on the line through points whose x rise."""
-    above = np.searchsorted(xs, x)
-    if above == 0:
-        return ys[0]
-    if above == len(xs):
-        return ys[-1]
-    step = xs[above] - xs[above - 1]
-    part = (x - xs[above - 1]) / step if step > 0.0 else 0.0
-    return ys[above - 1] + part * (ys[above] - ys[above - 1])
-
-
-@compiled
-def _detect(
-    budget: LinkBudget,
-    min_range: float,
-    max_range: float,
-    key: np.uint64,
-    beam: int,
-    echo: np.ndarray,
-    source: np.ndarray,
-    size: int,
-) -> int:
-    """Keeps the echoes that are detected, with noise; returns their number."""
-    kept = 0
-    for i in range(size):
-        snr = echo[i, 1]
-        draw = _FIRST_ECHO_DRAW + _DRAWS_PER_ECHO * min(i, _MOST_ECHOES)
-        is_sure = echo[i, 2] > 0.0
-        echo[i, 2] = 0.0
-        if not is_sure and not _is_detected(key, beam, draw, snr):
-            continue
-        # Where a surface lies decides; an error of its range does not.
-        if not min_range <= echo[i, 0] <= max_range:
-            continue
-        distance = _measured(
-            budget,
-            min_range,
-            max_range,
-            key,
-            beam,
-            draw,
-            echo[i, 0],
-            snr,
-        )
-        # The unit corrects for the true distance; the error is too small.
-        energy = echo_energy(budget, snr, echo[i, 0])
-        echo[kept, 0], echo[kept, 1] = distance, snr
-        echo[kept, 2] = energy
-        source[kept] = source[i]
-        kept += 1
-    for i in range(kept, size):
-        echo[i, 2] = 0.0
-    return kept
-
-
-@compiled
-def _is_detected(key: np.uint64, beam: int, draw: int, snr: float) -> bool:
-    if snr > CERTAIN_SNR:
-        return True
-    if snr < HOPELESS_SNR:
-        return False
-    return uniform(key, beam, draw) < detection_probability(snr)
-
-
-@compiled
-def _measured(
-    budget: LinkBudget,
-    min_range: float,
-    max_range: float,
-    key: np.uint64,
-    beam: int,
-    draw: int,
-    distance: float,
-    snr: float,
-) -> float:
-    """Returns the distance with its error."""
-    distance += range_deviation(budget, snr) * normal(key, beam, draw + 1)
-    return min(max(distance, min_range), max_range)
-
-
-@compiled
-def _intensity(retro_from: float, energy: float) -> float:
-    """Returns the calibrated reflectivity in the scale of the unit.
-
-    It is a whole number: linear up to a reflectivity of 1, logarithmic above.
-    """
-    if energy <= 1.0:
-        return np.rint(retro_from * energy)
-    rest = _FULL_INTENSITY - retro_from
-    part = np.log(energy) / np.log(_FULL_RETRO)
-    return np.rint(min(retro_from + rest * part, _FULL_INTENSITY))
