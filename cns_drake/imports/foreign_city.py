@@ -7,9 +7,9 @@ from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 
 import numpy as np
-from shapely.geometry import MultiPoint
 
 from cns_drake.city.geometry.mesh import Mesh
+from cns_drake.city.geometry.polygons import hull_of
 from cns_drake.city.geometry.structures import (
     MeshShape,
     Model,
@@ -168,7 +168,7 @@ def make_imported(
             for part in filled
         ),
         {f"{name}_{part}": _to_mesh(some) for part, some in filled.items()},
-        MultiPoint(triangles.reshape(-1, 3)[:, :2]).convex_hull,
+        hull_of(triangles.reshape(-1, 3)[:, :2]),
     )
     structure = Structure(name, semantic_class, model, (0.0, 0.0, 0.0))
     return Imported(structure, kind, year, triangles, until, tags or {}, lod)

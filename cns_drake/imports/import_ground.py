@@ -8,9 +8,10 @@ import numpy as np
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 from scipy.ndimage import gaussian_filter
 import shapely
-from shapely.geometry import MultiPoint, Point
+from shapely.geometry import Point
 
 from cns_drake.city.geometry.mesh import Mesh
+from cns_drake.city.geometry.polygons import hull_of
 from cns_drake.city.geometry.structures import (
     MeshShape,
     Model,
@@ -106,7 +107,7 @@ def guess_ground(feet: np.ndarray, corners: np.ndarray) -> Ground:
     z = np.full(x.shape, np.nan)
     if len(feet) >= 4 and np.linalg.matrix_rank(feet[:, :2] - feet[0, :2]) == 2:
         # SciPy looks long for places outside of the convex hull.
-        hull = MultiPoint(feet[:, :2]).convex_hull.buffer(_BESIDE_HULL)
+        hull = hull_of(feet[:, :2]).buffer(_BESIDE_HULL)
         near = shapely.contains_xy(hull, x, y)
         z[near] = LinearNDInterpolator(feet[:, :2], feet[:, 2])(
             x[near], y[near]

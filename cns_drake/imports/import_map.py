@@ -165,8 +165,8 @@ def _import_roads(
 ) -> ImportReport:
     town = build_town(source, options.seed, progress, options.dressed)
     with map_draft(output) as draft:
-        report = write_town(draft, source, town, progress)
-        finish(draft, {})
+        report, sizes = write_town(draft, source, town, progress)
+        finish(draft, sizes)
     return report
 
 

@@ -25,7 +25,7 @@ from cns_drake.imports.grown_city import Growth
 from cns_drake.imports.import_report import ImportOptions
 from cns_drake.imports.staged_city import StagedCity
 
-_OF_BOX = 12  # triangles
+OF_BOX = 12  # triangles
 
 
 @contextmanager
@@ -90,14 +90,14 @@ def write_world(
     for name, mesh in meshes.items():
         text = mesh.to_obj()
         (draft / MESH_FOLDER / f"{name}.obj").write_text(text, "utf-8")
-        triangles[name] = _triangles_in(text)
+        triangles[name] = triangles_in(text)
     return {
         stage: _size([*bottom, *(one.structure for one in some)], triangles)
         for stage, some in city.standing.items()
     }
 
 
-def _triangles_in(obj: str) -> int:
+def triangles_in(obj: str) -> int:
     """Returns the number of triangles of a mesh's faces."""
     faces = obj[obj.find("\nf ") :].split()
     return len(faces) - 3 * faces.count("f")
@@ -109,7 +109,7 @@ def _size(
     """Returns the numbers of structures with a surface, and of triangles."""
     shapes = [p.shape for one in structures for p in one.model.parts]
     return sum(bool(one.model.parts) for one in structures), sum(
-        triangles[shape.mesh] if isinstance(shape, MeshShape) else _OF_BOX
+        triangles[shape.mesh] if isinstance(shape, MeshShape) else OF_BOX
         for shape in shapes
         if isinstance(shape, MeshShape | BoxShape)
     )

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from shapely.geometry import MultiPoint, Polygon
+from shapely.geometry import Polygon
 
 from cns_drake.city.geometry.mesh import Mesh, box_mesh
 from cns_drake.city.geometry.object_meshes import object_mesh
+from cns_drake.city.geometry.polygons import hull_of
 from cns_drake.city.geometry.structures import (
     BoxShape,
     CylinderShape,
@@ -150,11 +151,13 @@ def ground_footprint(
     """Returns the convex hull, in S, of the parts below `HEADROOM`."""
     corners: list[np.ndarray] = [np.zeros((0, 2))]
     for part in parts:
-        p, triangles = part_triangles(part, meshes)
+        mesh = part_mesh(part, meshes)
+        p = mesh.vertices
         is_low = p[:, 2] <= HEADROOM
         corners.append(p[is_low, :2])
         if is_low.all():
             continue
+        triangles = mesh.triangles()
         for i, j in ((0, 1), (1, 2), (2, 0)):
             a, b = p[triangles[:, i]], p[triangles[:, j]]
             cut = (a[:, 2] - HEADROOM) * (b[:, 2] - HEADROOM) < 0
@@ -162,7 +165,7 @@ def ground_footprint(
             t = (HEADROOM - a[:, 2]) / (b[:, 2] - a[:, 2])
             corners.append(a[:, :2] + t[:, None] * (b - a)[:, :2])
     # Rounded to millimetres: the last bits of a sine differ between machines.
-    hull = MultiPoint(np.round(np.concatenate(corners), 3)).convex_hull
+    hull = hull_of(np.round(np.concatenate(corners), 3))
     return hull.buffer(_FOOTPRINT_MARGIN, join_style="mitre")
 
 

@@ -31,6 +31,14 @@ def snap(geometry: BaseGeometry) -> BaseGeometry:
     return shapely.set_precision(geometry, _GRID)
 
 
+def hull_of(xy: np.ndarray) -> BaseGeometry:
+    """Returns the convex hull of places (N, 2)."""
+    # `MultiPoint` makes a point at a time, which takes far longer.
+    hull = shapely.convex_hull(shapely.multipoints(xy))
+    assert isinstance(hull, BaseGeometry)
+    return hull
+
+
 def placed(shape: Shape, xy: Sequence[float], yaw: float) -> Shape:
     """Returns a shape turned about the origin [rad], then moved by xy [m]."""
     c, s = math.cos(yaw), math.sin(yaw)

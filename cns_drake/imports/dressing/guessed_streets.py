@@ -73,12 +73,16 @@ def guessed_streets(
         below = mesh.vertices[mesh.triangles()]
         heights = ground.height(below.reshape(-1, 3)[:, :2])
         below[..., 2] = heights.reshape(below.shape[:2])
+    below = below[looks_up(below)]
+    outlines = np.asarray(shapely.polygons(below[:, [0, 1, 2, 0], :2]))
+    tree = shapely.STRtree(outlines)
     for name, kind, semantic_class, area, above in (
         ("carriageway", "Road", "road", street, _ABOVE),
         ("sidewalk", "Sidewalk", "sidewalk", sidewalks, KERB_HEIGHT),
     ):
         for number, part in enumerate(parts_of(area)):
-            surface = _laid(part, below[looks_up(below)], above)
+            hit = np.sort(tree.query(part, "intersects"))
+            surface = _laid(part, below[hit], outlines[hit], above)
             if len(surface):
                 yield make_imported(
                     f"{name}_{number}",
@@ -103,25 +107,23 @@ def _area(structures: Sequence[Imported], near: BaseGeometry) -> BaseGeometry:
     )
 
 
-def _laid(area: BaseGeometry, ground: np.ndarray, above: float) -> np.ndarray:
+def _laid(
+    area: BaseGeometry, ground: np.ndarray, outlines: np.ndarray, above: float
+) -> np.ndarray:
     """Returns an area laid on a ground, as triangles (N, 3, 3) [m].
 
     Args:
         area: from above.
-        ground: triangles (M, 3, 3) that look upwards [m].
+        ground: triangles (M, 3, 3) that look upwards and meet it [m].
+        outlines: (M,) theirs from above.
         above: height above it [m].
     """
-    outlines = np.asarray(shapely.polygons(ground[:, [0, 1, 2, 0], :2]))
-    shapely.prepare(area)
-    hit = np.flatnonzero(shapely.intersects(area, outlines))
-    pieces = shapely.intersection(outlines[hit], area, grid_size=_MM)
+    pieces = shapely.intersection(outlines, area, grid_size=_MM)
     whole = np.isclose(
         shapely.area(pieces), shapely.area(shapely.convex_hull(pieces)), 1e-6
     )
     found = [np.zeros((0, 3, 3))]
-    for triangle, piece, is_convex in zip(
-        ground[hit], pieces, whole, strict=True
-    ):
+    for triangle, piece, is_convex in zip(ground, pieces, whole, strict=True):
         a, b, c = triangle
         normal = np.cross(b - a, c - a)
         for part in parts_of(piece):

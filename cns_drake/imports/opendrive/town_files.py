@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 import re
 
@@ -17,10 +17,10 @@ from cns_drake.city.geometry.structures import MeshShape, Structure
 from cns_drake.imports.drive_files import write_drives
 from cns_drake.imports.foreign_city import Imported
 from cns_drake.imports.import_report import ImportReport
+from cns_drake.imports.map_files import OF_BOX, triangles_in
 from cns_drake.imports.opendrive.town import Town
 from cns_drake.imports.overview import draw_overview
 
-_FACES_OF_A_BOX = 12
 _CROWN = 1.5  # [m]
 # Limits of the speed of a drive [m/s].
 _SPEEDS = (3.0, 12.0)
@@ -40,7 +40,7 @@ def write_town(
     source: Path,
     town: Town,
     progress: Callable[[str], None],
-) -> ImportReport:
+) -> tuple[ImportReport, dict[str, tuple[int, int]]]:
     """Writes all files of a town.
 
     Args:
@@ -48,6 +48,9 @@ def write_town(
         source: the file of the roads.
         town: to write.
         progress: takes one line at a time.
+
+    Returns:
+        What was imported; stage -> its numbers of structures and triangles.
 
     Raises:
         InputError: if it has more structures than instance ids can count.
@@ -86,24 +89,44 @@ def write_town(
         None,
         town.drives,
     )
-    return ImportReport(
+    sizes = _sizes(files, stages)
+    report = ImportReport(
         kinds=town.kinds,
         triangles=sum(map(_triangles, town.city.structures)),
-        stages={
-            stage: len(
-                set(
-                    re.findall(
-                        'visual name="([^"/]+)', files[stage_name(stage)]
-                    )
-                )
-            )
-            for stage in stages
-        },
+        stages={stage: size[0] for stage, size in sizes.items()},
         undated=0,
         dated=0,
         drives=tuple(drive.length for drive in town.drives),
         faults=town.faults.rows(),
     )
+    return report, sizes
+
+
+def _sizes(
+    files: Mapping[str, str], stages: Iterable[str]
+) -> dict[str, tuple[int, int]]:
+    """Returns stage -> its numbers of structures and triangles.
+
+    Args:
+        files: path -> text, of the stages and their meshes.
+        stages: their names.
+    """
+    triangles = {
+        name: triangles_in(text)
+        for name, text in files.items()
+        if name.endswith(".obj")
+    }
+    sizes = {}
+    for stage in stages:
+        text = files[stage_name(stage)]
+        structures = set(re.findall('visual name="([^"/]+)', text))
+        meshes = re.findall("<uri>([^<]+)</uri>", text)
+        boxes = OF_BOX * text.count("<box>")
+        sizes[stage] = (
+            len(structures),
+            boxes + sum(map(triangles.__getitem__, meshes)),
+        )
+    return sizes
 
 
 def _write_facts(draft: Path, source: Path, town: Town) -> None:
@@ -133,7 +156,7 @@ def _triangles(structure: Structure) -> int:
         if isinstance(part.shape, MeshShape):
             count += structure.model.meshes[part.shape.mesh].num_triangles
         else:
-            count += _FACES_OF_A_BOX
+            count += OF_BOX
     return count
 
 

@@ -34,6 +34,7 @@ from cns_drake.imports.opendrive.road_reader import read_roads
 from cns_drake.imports.opendrive.town import build_town
 from cns_drake.scenarios.planning import plan_drive
 from cns_drake.scenarios.scenario_loading import load_scenario
+from cns_drake.scenarios.sequence_table import write_table
 from evaluation.sequences import open_sequence
 
 ARM = 12.0
@@ -291,6 +292,12 @@ def test_the_command_from_end_to_end(source, tmp_path):
         if path.is_file():
             twin = again / path.relative_to(output)
             assert twin.read_bytes() == path.read_bytes(), path
+    # The table equals the worlds, though no world was loaded for it.
+    table = output / "sequences.csv"
+    counted = table.read_text()
+    table.unlink()
+    write_table(output)
+    assert table.read_text() == counted
     facts = yaml.safe_load((output / "import.yaml").read_text())
     assert facts["source"] == "town.xodr"
     assert facts["seed"] == 1
