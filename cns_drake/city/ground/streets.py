@@ -107,13 +107,7 @@ def street_surfaces(
     medians = snap(areas.medians())
     paved = snap(areas.carriageway()).difference(medians)
     covered = unary_union([one.area for one in coverings])
-    kerbs = MultiPolygon(
-        polygons_of(
-            snap(
-                paved.buffer(_KERB_WIDTH, join_style="mitre").difference(paved)
-            )
-        )
-    )
+    kerbs = kerb_area(paved)
     if kerbless is not None:
         kerbs = MultiPolygon(polygons_of(snap(kerbs.difference(kerbless))))
     sidewalks = snap(areas.sidewalks()).difference(kerbs)
@@ -135,6 +129,12 @@ def street_surfaces(
         ),
     ]
     return [structure for structure in structures if structure.model.parts]
+
+
+def kerb_area(paved: BaseGeometry) -> MultiPolygon:
+    """Returns the kerb stones along a carriageway, both in W [m]."""
+    grown = paved.buffer(_KERB_WIDTH, join_style="mitre")
+    return MultiPolygon(polygons_of(snap(grown.difference(paved))))
 
 
 def _heights(

@@ -11,7 +11,11 @@ from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry.polygons import polygons_of, snap
-from cns_drake.city.ground.streets import Covering, parking_bays
+from cns_drake.city.ground.streets import (
+    Covering,
+    kerb_area,
+    parking_bays,
+)
 from cns_drake.imports.opendrive.lane_bands import LaneBand
 from cns_drake.imports.opendrive.lane_kinds import is_raised, lane_class
 
@@ -24,6 +28,7 @@ _SIMPLIFY = 0.005
 _LARGEST_GAP = 60.0
 _LEVEL = ("road", "parking", "sidewalk", "other-ground")
 _LEAST_AREA = 1e-6
+_NOWHERE = Polygon()
 _ISLAND_RGB = (0.55, 0.53, 0.50)
 _PATH_RGB = (0.52, 0.42, 0.38)
 
@@ -40,8 +45,15 @@ class ImportedStreets:
         margins: lanes without a use, which stay free.
     """
 
-    def __init__(self, bands: Sequence[LaneBand]):
-        """Takes the lanes."""
+    def __init__(
+        self, bands: Sequence[LaneBand], kerbless: BaseGeometry = _NOWHERE
+    ):
+        """Takes the lanes.
+
+        Args:
+            bands: the lanes.
+            kerbless: area without kerbs [m].
+        """
         alike: dict[str, list[BaseGeometry]] = defaultdict(list)
         in_junctions: list[BaseGeometry] = []
         for band in bands:
@@ -80,7 +92,11 @@ class ImportedStreets:
         self._medians = _multi(medians.difference(self._carriageway))
         walks = _simple(shapely.union_all(alike["walk"]))
         taken = self._carriageway.union(self._medians)
-        self._sidewalks = _multi(walks.difference(taken))
+        # Where a carriageway has no sidewalk, as in junctions, its kerb takes
+        # ground as well.
+        kerbs = kerb_area(self._carriageway.difference(self._medians))
+        walks = walks.union(snap(kerbs.difference(kerbless)))
+        self._sidewalks = _multi(snap(walks.difference(taken)))
         self.junctions = shapely.union_all([junctions, *gaps])
         self.coverings = [
             parking_bays(parking),

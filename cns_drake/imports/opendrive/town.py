@@ -120,7 +120,8 @@ def _build(
     except ValueError as error:
         raise InputError(f"{source}: {error}") from error
     ground, raised = split_levels(bands)
-    streets = ImportedStreets(ground)
+    ends = bridge_ends(raised)
+    streets = ImportedStreets(ground, ends)
     if streets.carriageway().is_empty:
         raise InputError(f"{source}: no lane in it has an area")
     x0, y0, x1, y1 = streets.carriageway().bounds
@@ -169,7 +170,7 @@ def _build(
                     surface,
                     kerb,
                     streets.coverings,
-                    bridge_ends(raised),
+                    ends,
                 ),
                 *decks,
                 *things,

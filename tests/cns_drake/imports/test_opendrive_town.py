@@ -176,6 +176,16 @@ def test_buildings_stand_apart_from_streets_and_each_other(source, town):
             assert one.intersection(other).area < 0.2
 
 
+def test_no_ground_lies_on_kerbs(town):
+    areas = {one.name: one.footprint_W for one in town.city.structures}
+    kerbs = areas.pop("kerbs")
+    assert kerbs.area > 10.0
+    grounds = [name for name in areas if name.startswith("ground_")]
+    assert grounds
+    for name in grounds:
+        assert areas[name].intersection(kerbs).area < 0.01, name
+
+
 def test_everything_has_its_class(town):
     classes = {s.name: s.semantic_class for s in town.city.structures}
     assert classes["carriageway"] == "road"
