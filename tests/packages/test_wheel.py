@@ -2,6 +2,7 @@
 
 import os
 from pathlib import Path
+import re
 import subprocess
 import sys
 import venv
@@ -10,6 +11,13 @@ import zipfile
 import pytest
 
 ROOT = Path(__file__).parents[2]
+# As in a workflow of a repository.
+REPOSITORY = {
+    "GITHUB_SERVER_URL": "https://example.org",
+    "GITHUB_REPOSITORY": "owner/project",
+    "GITHUB_SHA": "0123abcd",
+}
+PAGE = "https://example.org/owner/project"
 
 
 @pytest.fixture(scope="module")
@@ -18,6 +26,7 @@ def wheel(tmp_path_factory):
     run(
         *(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps"),
         *("--no-build-isolation", "--wheel-dir", folder, ROOT),
+        env=os.environ | REPOSITORY,
     )
     (wheel,) = folder.glob("*.whl")
     return wheel
@@ -41,6 +50,14 @@ def test_it_is_small_and_has_its_notices(wheel):
     assert {"LICENSE", "NOTICE.md", "py.typed"} <= names
     assert "\nLicense-Expression: BSD-3-Clause\n" in said
     assert "\nVersion: 1.0.0\n" in said
+    assert f"\nProject-URL: Source, {PAGE}\n" in said
+    assert "\nProject-URL: Paper, https://arxiv.org/" in said
+    pictures = re.findall(r"!\[[^]]*\]\((.*?)\)", said)
+    assert pictures
+    for address in pictures:
+        assert address.startswith(f"{PAGE}/raw/0123abcd/docs/pictures/")
+    assert f"({PAGE}/blob/0123abcd/docs/tutorial.md)" in said
+    assert "](docs/" not in said
 
 
 @pytest.mark.slow
