@@ -36,6 +36,7 @@ def overlap(
     the second drive's scans. Nothing is recorded.
     """
     with uninterrupted():
+        from cns_drake.base.files import make_folder
         from cns_drake.scenarios.scenario_loading import load_scenario
         from cns_drake.simulation.simulated_drive import SimulatedDrive
         from cns_drake.studies.exact_overlap import exact_overlaps
@@ -47,6 +48,8 @@ def overlap(
         place_spacing=place_spacing,
         max_range=max_range,
     )
+    # Before minutes of work.
+    make_folder(output.parent)
     places, queries = (
         SimulatedDrive(load_scenario(name))() for name in (database, query)
     )

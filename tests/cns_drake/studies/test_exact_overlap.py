@@ -136,6 +136,16 @@ def test_its_table_is_the_truth(short_recording, tmp_path, capsys):
     assert_refused(capsys, [*pr, *truth[2:], table], "add --truth")
 
 
+def test_a_folder_that_cannot_be_is_refused_at_once(tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    output = tmp_path / "file/exact.csv"
+    command = ("overlap", "metropolis_01", "metropolis_04", "--output", output)
+    status, out, err = run_program(capsys, "cns-drake", main, *command)
+    assert (status, out) == (2, "")
+    (line,) = err.splitlines()
+    assert line.startswith(f"cns-drake: error: {tmp_path / 'file'}")
+
+
 @pytest.mark.parametrize(
     ("value", "fault"), [("x", "not a number"), ("1.5", "between 0 and 1")]
 )
