@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
 
 import numpy as np
 import shapely
-from shapely.geometry import MultiPolygon, Polygon
+from shapely.geometry import LinearRing, MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry.polygons import polygons_of, snap
 from cns_drake.city.ground.streets import (
+    TILE,
     Covering,
     kerb_area,
     parking_bays,
@@ -86,7 +88,7 @@ class ImportedStreets:
         other = _simple(
             shapely.union_all(alike["other-ground"]).difference(paved)
         )
-        self._carriageway = _multi(_closed([paved, other]))
+        self._carriageway = _cut_at_tiles(_multi(_closed([paved, other])))
         self._lanes = _multi(road)
         medians = _simple(shapely.union_all(alike["median"]))
         self._medians = _multi(medians.difference(self._carriageway))
@@ -164,6 +166,32 @@ def _closed(parts: Iterable[BaseGeometry]) -> BaseGeometry:
 
 def _simple(area: BaseGeometry) -> BaseGeometry:
     return snap(snap(area).simplify(_SIMPLIFY))
+
+
+def _cut_at_tiles(area: MultiPolygon) -> MultiPolygon:
+    """Returns an area with a corner wherever an edge leaves a tile.
+
+    Tiles of different slopes have meshes of different spacing. An edge across
+    two of them would get the wall of a kerb in part only.
+    """
+
+    def cut(ring: LinearRing) -> np.ndarray:
+        xy = shapely.get_coordinates(ring)
+        pieces = []
+        for a, b in pairwise(xy):
+            low, high = np.sort([a, b], axis=0)
+            parts = [0.0]
+            for k in range(2):
+                lines = np.arange(np.ceil(low[k] / TILE) * TILE, high[k], TILE)
+                parts += ((lines - a[k]) / (b[k] - a[k])).tolist()
+            pieces.append(a + np.unique(parts)[:, None] * (b - a))
+        return np.concatenate([*pieces, xy[-1:]])
+
+    cut_open = [
+        Polygon(cut(one.exterior), [cut(hole) for hole in one.interiors])
+        for one in area.geoms
+    ]
+    return _multi(snap(MultiPolygon(cut_open)))
 
 
 def _multi(area: BaseGeometry) -> MultiPolygon:

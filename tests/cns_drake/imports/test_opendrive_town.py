@@ -263,6 +263,26 @@ def test_heights_follow_grade_and_roll(tmp_path):
     assert not surface.is_level
 
 
+def test_kerbs_are_closed_where_a_slope_begins(tmp_path):
+    # The slope begins within a tile; the road's edges cross several.
+    rise = cubic("elevation", 0, 0.0, 0, 0, 0, "s") + cubic(
+        "elevation", 150, 0.0, 0.05, 0, 0, "s"
+    )
+    path = write_roads(
+        tmp_path / "a.xodr", straight("1", 10, 5, 210, 45, elevation=rise)
+    )
+    built = build_town(path, 0)
+    (kerbs,) = (one for one in built.city.structures if one.name == "kerbs")
+    upright = 0.0
+    for mesh in kerbs.model.meshes.values():
+        a, b, c = np.moveaxis(mesh.vertices[mesh.triangles()], 1, 0)
+        normals = np.cross(b - a, c - a) / 2.0
+        areas = np.linalg.norm(normals, axis=1)
+        upright += areas[np.abs(normals[:, 2]) < 1e-3 * areas].sum()
+    rim = built.streets.carriageway().length
+    assert upright == pytest.approx(0.1 * rim, rel=2e-3)
+
+
 def test_parking_lanes_are_parking(tmp_path):
     lanes = (
         lane(1, "driving", 3.5), lane(-1, "driving", 3.5),
