@@ -321,7 +321,10 @@ def memory_mesh(
         scale: (3,) along the axes; none by default.
     """
     used, corners = np.unique(triangles, return_inverse=True)
-    lines = [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in vertices[used]]
+    # Numbers of Python are formatted several times as fast as those of NumPy.
+    lines = [
+        f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in vertices[used].tolist()
+    ]
     lines += [
         f"f {a} {b} {c}" for a, b, c in (corners.reshape(-1, 3) + 1).tolist()
     ]

@@ -10,6 +10,20 @@ import pytest
 FOLDER = Path(__file__).parents[1] / "benchmarks"
 # Program -> arguments, and a word of what it prints.
 RUNS = {
+    "effects.py": (
+        (
+            "{drive}",
+            "--rounds",
+            1,
+            "--frames",
+            2,
+            "--loads",
+            1,
+            "--only",
+            "imu",
+        ),
+        "of ideal",
+    ),
     "ray_casting_rates.py": (("{drive}", "--rounds", 1), "Mrays/s"),
     "recording.py": (
         ("{drive}", "--rounds", 1, "--frames", 2),
