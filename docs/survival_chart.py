@@ -47,7 +47,7 @@ def draw(
     methods: list[str], pairs: list[str], values: np.ndarray, path: Path
 ) -> None:
     """Draws a field for each pair and method."""
-    figure = Figure(figsize=(8.0, 4.6), layout="constrained")
+    figure = Figure(figsize=(9.2, 4.6), layout="constrained")
     axes = figure.subplots()
     colours = matplotlib.colormaps["viridis"].with_extremes(bad="#d8d8d8")
     image = axes.imshow(

@@ -70,7 +70,7 @@ def lay_snow(
             continue
         changed = False
         for part in thing.parts:
-            if is_ground and not _lies_below_road(part, ground):
+            if is_ground and not _is_below_road(part, ground):
                 editing.cover_part(part, np.array([0.0, 0.0, depth]), _LOOK)
                 changed = True
             else:
@@ -86,7 +86,7 @@ def lay_snow(
         _lay_banks(editing, drive, ground, depth, seed)
 
 
-def _lies_below_road(part: StandingPart, ground: GroundSurface) -> bool:
+def _is_below_road(part: StandingPart, ground: GroundSurface) -> bool:
     """Returns whether ground continues below a carriageway."""
     corners = faced_up(triangle_corners(part))
     corners = corners[upwardness(corners) > 0.0]

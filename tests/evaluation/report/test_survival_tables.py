@@ -102,7 +102,7 @@ def test_section_of_the_page(tmp_path):
 def test_figure_shows_the_pairs_that_have_a_control(monkeypatch, tmp_path):
     drawn = []
     monkeypatch.setattr(
-        survival_figure, "save", lambda figure, stem, kind: drawn.append(figure)
+        survival_figure, "save", lambda figure, stem: drawn.append(figure)
     )
     draw_survival([*SOME, NO_CONTROL], tmp_path / "survival")
     (axes,) = drawn[0].axes
