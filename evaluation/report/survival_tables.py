@@ -156,7 +156,7 @@ def survival_summary(survivals: Sequence[Survival]) -> str:
         over = f"median of {number} pairs" if number > 1 else "one pair"
         if listed:
             parts.append(
-                f"Of its AUC without change each method keeps ({over}):"
+                f"Each method keeps part of its AUC without change ({over}):"
                 f" {listed}."
             )
     if without:

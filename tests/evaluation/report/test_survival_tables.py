@@ -76,7 +76,7 @@ def test_table_for_print():
 
 def test_summary():
     assert survival_summary(SOME) == (
-        "Of its AUC without change each method keeps (median of 2 pairs):"
+        "Each method keeps part of its AUC without change (median of 2 pairs):"
         " BTC 62 %, SOLiD 10 %."
     )
     assert survival_summary(SOME[:1]).endswith("(one pair): BTC 50 %.")
