@@ -16,6 +16,7 @@ from pydrake.systems.framework import Context
 from cns_drake.base.jobs.fingerprint import code_digest
 from cns_drake.base.recordings.sequence import index_instances
 from cns_drake.motion.sweep import Sweep
+from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.scenarios.planning import count_frames, plan_drive
 from cns_drake.scenarios.provenance import digest_inputs
 from cns_drake.scenarios.scenario import Scenario
@@ -136,28 +137,16 @@ class SimulatedSequence(PlannedSequence):
         context = self._place_lidar(index)
         return self._lidar.GetOutputPort("scan").Eval(context)
 
-    def first_ranges(self, index: int, d_Sset: np.ndarray) -> np.ndarray:
-        """Returns how far a scan's sensor sees in any directions.
+    def look(self, index: int) -> tuple[RayCastingScene, RigidTransform]:
+        """Returns what a scan's sensor sees, and its pose X_WS at the stamp.
 
-        The sensor is where it was at the scan's stamp.
+        The scene casts any rays, until the next scan or look moves it.
 
         Args:
             index: of the scan.
-            d_Sset: (N, 3) unit directions in the sensor's frame.
-
-        Returns:
-            (N,) distance to the first surface [m]; inf where there is none
-            within the LiDAR's range.
         """
         scene = self._lidar.EvalScene(self._place_lidar(index))
-        X_WS = self.X_WBs[index] @ self.X_BS
-        hits = scene.cast_rays(
-            X_WS.translation(),
-            d_Sset,
-            self.pattern.max_range,
-            R_WSset=X_WS.rotation().matrix(),
-        )
-        return hits.ranges
+        return scene, self.X_WBs[index] @ self.X_BS
 
     def _place_lidar(self, index: int) -> Context:
         """Moves the LiDAR to a scan; returns its Context."""

@@ -17,9 +17,12 @@ from dataclasses import dataclass
 import math
 
 import numpy as np
+from pydrake.math import RigidTransform
 
 from cns_drake.base.progress import Track, silent
+from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.sensors.beam_coverage import BeamCoverage
+from cns_drake.sensors.beam_pattern import BeamPattern
 from cns_drake.simulation.simulated_drive import SimulatedSequence
 from evaluation.recognition.overlap_truth import overlap_matrix
 from evaluation.recognition.protocol import RetrievalProtocol
@@ -33,23 +36,23 @@ class VisibleSurfaces:
     """The surfaces that a LiDAR sees from a place of a simulated drive.
 
     Attributes:
-        drive: of the place.
-        frame: of the place.
-        coverage: of its beams.
+        scene: of the world as it was then.
+        X_WS: pose of the sensor.
+        pattern: of its beams.
+        coverage: of their directions.
         max_range: greatest coordinate of a point in the sensor's frame [m].
     """
 
-    drive: SimulatedSequence
-    frame: int
+    scene: RayCastingScene
+    X_WS: RigidTransform
+    pattern: BeamPattern
     coverage: BeamCoverage
     max_range: float
 
     @property
     def reach(self) -> float:
         """Distance of the farthest surface [m]."""
-        return min(
-            self.drive.pattern.max_range, math.sqrt(3.0) * self.max_range
-        )
+        return min(self.pattern.max_range, math.sqrt(3.0) * self.max_range)
 
     def share_of(self, points: np.ndarray) -> float:
         """Returns the visible part of points (N, 3), in the sensor's frame."""
@@ -57,15 +60,19 @@ class VisibleSurfaces:
             return math.nan
         kept = points[within_range(points, self.max_range)]
         distances = np.linalg.norm(kept, axis=1)
-        pattern = self.drive.pattern
-        reached = (distances >= pattern.min_range) & (
-            distances <= pattern.max_range
+        reached = (distances >= self.pattern.min_range) & (
+            distances <= self.pattern.max_range
         )
         kept, distances = kept[reached], distances[reached]
         d_Sset = kept / distances[:, None]
         covered = self.coverage.covers(d_Sset)
-        ranges = self.drive.first_ranges(self.frame, d_Sset[covered])
-        is_seen = np.abs(ranges - distances[covered]) <= TOLERANCE
+        hits = self.scene.cast_rays(
+            self.X_WS.translation(),
+            d_Sset[covered],
+            self.pattern.max_range,
+            R_WSset=self.X_WS.rotation().matrix(),
+        )
+        is_seen = np.abs(hits.ranges - distances[covered]) <= TOLERANCE
         return float(is_seen.sum() / len(points))
 
 
@@ -96,6 +103,8 @@ def exact_overlaps(
         coverage = first
         if not pattern.repeats:
             coverage = BeamCoverage(pattern.beams(frame).d_Sset)
-        return VisibleSurfaces(database, frame, coverage, protocol.max_range)
+        return VisibleSurfaces(
+            *database.look(frame), pattern, coverage, protocol.max_range
+        )
 
     return overlap_matrix(database, query, protocol, track, see)
