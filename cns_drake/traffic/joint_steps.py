@@ -37,23 +37,25 @@ def run_steps(
     seed: int,
     vehicle_poses: np.ndarray,
     walker_poses: np.ndarray,
+    steps: range,
 ) -> None:
-    """Moves all road users for K steps, and stores their poses.
+    """Moves all road users for some of K steps, and stores their poses.
 
     Args:
         lanes: of the vehicles.
-        vehicles: all of them, at the start.
+        vehicles: all of them, before the first of the steps.
         occupants: room for their entries.
         presence: of the ego car at K times.
-        permits: the users of ways and crossings; none so far.
+        permits: the users of ways and crossings; none before step 0.
         ways: of the walkers.
-        walkers: all of them, at the start.
+        walkers: all of them, before the first of the steps.
         dt: the step [s].
         seed: of draws during the motion.
         vehicle_poses: (K, N, 5) takes x, y, z [m], yaw, pitch [rad].
         walker_poses: (K, M, 5) takes x, y, z [m], yaw, phase [rad].
+        steps: numbers of the steps, which follow those made so far.
     """
-    for k in range(len(presence.until)):
+    for k in steps:
         write_poses(lanes, vehicles, vehicle_poses[k])
         write_walkers(ways, walkers, walker_poses[k])
         find_occupants(occupants, lanes, vehicles, presence, k)

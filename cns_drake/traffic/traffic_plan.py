@@ -10,7 +10,7 @@ import numpy as np
 from cns_drake.traffic.joint_steps import run_steps
 from cns_drake.traffic.lane_arrays import LaneArrays, make_lane_arrays
 from cns_drake.traffic.lane_graph import LaneGraph
-from cns_drake.traffic.overlaps import find_overlaps, whom_to_leave_out
+from cns_drake.traffic.planning_trial import PlanningTrial, WantedBodies
 from cns_drake.traffic.presence import EgoBox, Presence, find_presence
 from cns_drake.traffic.starting_places import (
     make_permits,
@@ -29,11 +29,11 @@ from cns_drake.traffic.walkways import Walkway
 STEP = 0.1
 # A walker's box, with limbs that swing [m].
 WALKER_SIZE = (WALKER_LENGTH, WALKER_WIDTH, 1.8)
-# Boxes keep this distance, since they are compared only now and then [m].
-_APART = 0.1
 # Share of vehicles and walkers that are planned in excess, since some are left
 # out; and number of trials.
 _SPARE, _TRIES = 0.06, 4
+# Steps after which a trial is given up if it has to leave out too many.
+_PART = 600
 
 # The ego car's motion: (K,) times -> (K, 2) places [m], (K,) headings [rad].
 EgoPath = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -87,25 +87,21 @@ def plan_traffic(
     presence = find_presence(graph, ego_box, xy, yaw, STEP)
     lanes = make_lane_arrays(graph)
     ego_track = _box_track(ego, ego_box, num_steps)
+    wanted = WantedBodies(vehicles, walkers)
     best: TrafficPlan | None = None
     for attempt in range(_TRIES):
         rng = np.random.default_rng([seed, attempt])
-        with_spare = int(np.ceil(vehicles * (1 + _SPARE)))
-        room = room_for_vehicles(graph)
-        number = min(with_spare, max(vehicles, room))
-        kinds = [KINDS[k] for k in draw_kinds(number, rng)]
-        plan = _try(
+        best = _try(
             graph,
             lanes,
             walkways,
             presence,
-            kinds,
-            int(np.ceil(walkers * (1 + _SPARE))),
+            ego_track,
+            ego_box,
+            wanted,
             rng,
+            best,
         )
-        plan = _without_overlaps(plan, ego_track, ego_box, vehicles, walkers)
-        if best is None or plan.left_out < best.left_out:
-            best = plan
         if best.left_out == 0:
             break
     assert best is not None
@@ -117,34 +113,62 @@ def _try(
     lanes: LaneArrays,
     walkways: Sequence[Walkway],
     presence: Presence,
-    kinds: Sequence[VehicleKind],
-    walkers: int,
+    ego_track: np.ndarray,
+    ego_box: EgoBox,
+    wanted: WantedBodies,
     rng: np.random.Generator,
+    best: TrafficPlan | None,
 ) -> TrafficPlan:
+    """Returns a new plan, or the best so far as soon as that is no worse."""
+    number = min(
+        _with_spare(wanted.vehicles),
+        max(wanted.vehicles, room_for_vehicles(graph)),
+    )
+    kinds = [KINDS[k] for k in draw_kinds(number, rng)]
     state, found = place_vehicles(kinds, graph, lanes, presence, rng)
-    on_foot = place_walkers(walkers, walkways, rng)
+    on_foot = place_walkers(_with_spare(wanted.walkers), walkways, rng)
+    trial = PlanningTrial(
+        [kinds[k] for k in found],
+        len(on_foot.speed),
+        ego_track,
+        ego_box,
+        wanted,
+    )
+    occupants = make_occupants(len(graph.pieces), len(found))
+    permits, ways = make_permits(graph), make_walkway_arrays(walkways)
+    seed = int(rng.integers(2**31))
     num_steps = len(presence.until)
-    vehicle_poses = np.zeros((num_steps, len(found), 5))
-    walker_poses = np.zeros((num_steps, len(on_foot.speed), 5))
-    run_steps(
-        lanes,
-        state,
-        make_occupants(len(graph.pieces), len(found)),
-        presence,
-        make_permits(graph),
-        make_walkway_arrays(walkways),
-        on_foot,
-        STEP,
-        int(rng.integers(2**31)),
-        vehicle_poses,
-        walker_poses,
-    )
-    vehicle_poses[:, :, 3] = np.unwrap(vehicle_poses[:, :, 3], axis=0)
+    for first in range(0, num_steps, _PART):
+        steps = range(first, min(first + _PART, num_steps))
+        run_steps(
+            lanes,
+            state,
+            occupants,
+            presence,
+            permits,
+            ways,
+            on_foot,
+            STEP,
+            seed,
+            trial.vehicles,
+            trial.walkers,
+            steps,
+        )
+        trial.look_for_overlaps(steps)
+        if best is not None and trial.left_out() >= best.left_out:
+            return best
+    trial.vehicles[:, :, 3] = np.unwrap(trial.vehicles[:, :, 3], axis=0)
+    kept_vehicles, kept_walkers = trial.kept()
     return TrafficPlan(
-        tuple(kinds[k] for k in found),
-        Tracks(STEP, vehicle_poses),
-        Tracks(STEP, walker_poses),
+        tuple(trial.kinds[k] for k in kept_vehicles),
+        Tracks(STEP, trial.vehicles).select(np.array(kept_vehicles, int)),
+        Tracks(STEP, trial.walkers).select(np.array(kept_walkers, int)),
+        trial.left_out(),
     )
+
+
+def _with_spare(number: int) -> int:
+    return int(np.ceil(number * (1 + _SPARE)))
 
 
 def _box_track(ego: EgoPath, box: EgoBox, num_steps: int) -> np.ndarray:
@@ -154,57 +178,3 @@ def _box_track(ego: EgoPath, box: EgoBox, num_steps: int) -> np.ndarray:
     middle = (box.rear + box.front) / 2
     ahead = np.column_stack([np.cos(yaw), np.sin(yaw)])
     return np.column_stack([xy + middle * ahead, yaw])
-
-
-def _without_overlaps(
-    plan: TrafficPlan,
-    ego_track: np.ndarray,
-    ego_box: EgoBox,
-    vehicles: int,
-    walkers: int,
-) -> TrafficPlan:
-    """Returns a plan without bodies that would collide, or exceed the number.
-
-    Args:
-        plan: to thin out.
-        ego_track: (2 K - 1, 3) of the ego car, at half steps.
-        ego_box: its size.
-        vehicles, walkers: wanted numbers.
-    """
-    num = len(plan.kinds)
-    num_walkers = plan.walkers.values.shape[1]
-    poses = np.concatenate(
-        [
-            ego_track[:, None],
-            _at_half_steps(plan.vehicles.values)[:, :, [0, 1, 3]],
-            _at_half_steps(plan.walkers.values)[:, :, [0, 1, 3]],
-        ],
-        axis=1,
-    )
-    half = np.array(
-        [
-            ((ego_box.front - ego_box.rear) / 2, ego_box.half_width),
-            *((k.size[0] / 2, k.size[1] / 2) for k in plan.kinds),
-            *([(WALKER_LENGTH / 2, WALKER_WIDTH / 2)] * num_walkers),
-        ]
-    )
-    overlaps = np.zeros((len(half), len(half)), bool)
-    find_overlaps(poses, half + _APART / 2, overlaps)
-    out = set(whom_to_leave_out(overlaps, 1))
-    kept = [k for k in range(num) if k + 1 not in out][:vehicles]
-    walking = [k for k in range(num_walkers) if k + 1 + num not in out]
-    walking = walking[:walkers]
-    return TrafficPlan(
-        tuple(plan.kinds[k] for k in kept),
-        plan.vehicles.select(np.array(kept, int)),
-        plan.walkers.select(np.array(walking, int)),
-        vehicles - len(kept) + walkers - len(walking),
-    )
-
-
-def _at_half_steps(values: np.ndarray) -> np.ndarray:
-    """Returns the values (2 K - 1, N, D) of tracks at and between K times."""
-    result = np.empty((2 * len(values) - 1, *values.shape[1:]))
-    result[::2] = values
-    result[1::2] = (values[1:] + values[:-1]) / 2
-    return result

@@ -10,6 +10,7 @@ from cns_drake.roads.network import load_road_network
 from cns_drake.roads.route import make_lane_path
 from cns_drake.scenarios.scenario_loading import load_scenario
 from cns_drake.scenarios.shipped import shipped_maps
+from cns_drake.traffic import traffic_plan
 from cns_drake.traffic.lane_arrays import make_lane_arrays
 from cns_drake.traffic.presence import EgoBox
 from cns_drake.traffic.road_lanes import make_lane_graph
@@ -128,6 +129,47 @@ def test_equal_arguments_give_an_equal_plan(short):
     assert (again.walkers.values == short.walkers.values).all()
     other = plan("metropolis_04", 40, 60.0, seed=2)
     assert other.kinds != short.kinds
+
+
+def test_a_trial_given_up_early_changes_no_plan(monkeypatch):
+    _, graph, walkways = roads("suburbia")
+    low, high = (
+        f([f(p.points[:, :2], axis=0) for p in graph.pieces], axis=0)
+        for f in (np.min, np.max)
+    )
+
+    def across(t):
+        """Crosses the city and its lanes, through whatever is there."""
+        xy = low + (t[:, None] / 30.0) * (high - low)
+        return xy, np.full(len(t), np.arctan2(*(high - low)[::-1]))
+
+    found, calls = [], []
+    run_steps = traffic_plan.run_steps
+    monkeypatch.setattr(
+        traffic_plan, "run_steps", lambda *a: calls.append(a) or run_steps(*a)
+    )
+    for part in (20, 10**6):
+        monkeypatch.setattr(traffic_plan, "_PART", part)
+        found.append(
+            plan_traffic(
+                graph,
+                walkways,
+                vehicles=60,
+                walkers=60,
+                seed=1,
+                duration=30.0,
+                ego=across,
+                ego_box=BOX,
+            )
+        )
+    early, whole = found
+    assert early.left_out == whole.left_out > 0
+    assert early.kinds == whole.kinds
+    assert (early.vehicles.values == whole.vehicles.values).all()
+    assert (early.walkers.values == whole.walkers.values).all()
+    # All trials of the second plan run to their end, and not all of the first.
+    steps = [len(arguments[-1]) for arguments in calls]
+    assert 0 < sum(steps[:-4]) < sum(steps[-4:])
 
 
 def test_keeps_to_lanes_and_walkways(short):
