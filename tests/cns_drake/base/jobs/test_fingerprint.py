@@ -1,5 +1,6 @@
 """Fingerprints: the code that a result depends on."""
 
+import ast
 import importlib.metadata
 import shutil
 import subprocess
@@ -109,6 +110,39 @@ def test_every_kind_of_import_counts(packages):
         "evaluation.top",
         without=("evaluation.inner",),
     )
+
+
+@pytest.mark.parametrize(
+    "end",
+    [
+        "",
+        "import b",
+        "import b\n",
+        "import b; c = 1\n",
+        "if a: import b\n",
+        "try:\n    import b\nexcept ImportError:\n    c = 1\n",
+        "from b import (\nc,\n)\nd = 1\n",
+        "import b, \\\nc\nd = 1\n",
+        "from b \\\nimport c\nd = 1\n",
+        "def b():\n    import c\n\n    return 'import'\n",
+        'b = """\nimport c\nd\n"""\nimport e\nf = """\nimport\ng"""\n',
+        "import b\r\nc = 1\r\n",
+        "import b\rimport c\rd = 1\r",
+        "# import\nb = 1\n",
+    ],
+)
+@pytest.mark.parametrize("start", ["", "import a\n", "a = 1\n"])
+def test_every_import_of_a_source_is_found(start, end):
+    found = fingerprints._find_imports((start + end).encode(), "evaluation")
+    expected = [
+        (node.module, name.name)
+        if isinstance(node, ast.ImportFrom)
+        else (name.name, "")
+        for node in ast.walk(ast.parse(start + end))
+        if isinstance(node, (ast.Import, ast.ImportFrom))
+        for name in node.names
+    ]
+    assert sorted(found.names) == sorted(expected)
 
 
 def test_line_ends_do_not_count(packages):
