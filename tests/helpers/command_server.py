@@ -8,6 +8,7 @@ server. The server forks, and the fork runs the program.
 
 from __future__ import annotations
 
+import gc
 import importlib
 import json
 import os
@@ -88,13 +89,15 @@ def _serve(listener: socket.socket) -> None:
             if "map_closures" not in found.name:  # It needs an extra.
                 importlib.import_module(found.name)
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+    # Forks would take most of their time to look for garbage in all this.
+    gc.freeze()
     while listener in select.select([listener, sys.stdin], [], [])[0]:
         client, _ = listener.accept()
         if os.fork() == 0:
             signal.signal(signal.SIGCHLD, signal.SIG_DFL)
             listener.close()
             _answer(client)
-            return
+            os._exit(0)
         client.close()
 
 
