@@ -227,7 +227,7 @@ def test_any_outline_gets_closed_walls(name):
 @pytest.mark.parametrize(
     ("name", "blind"),
     # Each building gets one of the three in turn.
-    zip(NAMES, cycle([(1,), (3,), (1, 3)]), strict=False),
+    list(zip(NAMES, cycle([(1,), (3,), (1, 3)]), strict=False)),
 )
 def test_nothing_crosses_blind_edges(name, blind):
     footprint, height = typical_request(name, 2)

@@ -2,6 +2,7 @@
 
 from helpers.allan import allan_deviation
 import numpy as np
+from pydrake.geometry import HalfSpace
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.multibody.tree import SpatialInertia
@@ -30,6 +31,10 @@ class Falling:
         plant, scene_graph = AddMultibodyPlantSceneGraph(self.builder, 0.0)
         inertia = SpatialInertia.SolidBoxWithDensity(1.0, 1.0, 1.0, 1.0)
         self.body = plant.AddRigidBody("stone", inertia)
+        far_below = RigidTransform([0.0, 0.0, -100.0])
+        plant.RegisterVisualGeometry(
+            plant.world_body(), far_below, HalfSpace(), "ground", np.ones(4)
+        )
         plant.Finalize()
         self.lidars = [
             add_lidar(
