@@ -166,12 +166,6 @@ def test_sheds_hold_their_section(profile, section):
     assert_closed(mesh)
 
 
-def test_gable_roof_is_closed():
-    roof = massing.gable_roof(0, 0, 10, 6, 3.0, 2.0)
-    assert is_closed(roof)
-    assert volume(roof) == pytest.approx(10 * 6 * 2 / 2)
-
-
 def test_clockwise_outline_is_refused():
     with pytest.raises(ValueError, match="clockwise"):
         massing.flat(TURNED[::-1], 0.0)

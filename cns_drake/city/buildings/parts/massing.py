@@ -334,26 +334,6 @@ def roof_pan(
     return merge_meshes(coping, wall, flat(inner, z_floor))
 
 
-def gable_roof(
-    x0: float, y0: float, x1: float, y1: float, z0: float, rise: float
-) -> Mesh:
-    """Returns a pitched roof, ridge along x, with its gables and underside."""
-    y = (y0 + y1) / 2
-    z1 = z0 + rise
-    vertices = np.array(
-        [
-            (x0, y0, z0),
-            (x1, y0, z0),
-            (x1, y1, z0),
-            (x0, y1, z0),
-            (x0, y, z1),
-            (x1, y, z1),
-        ]
-    )
-    faces = ((0, 1, 5, 4), (2, 3, 4, 5), (1, 2, 5), (3, 0, 4), (0, 3, 2, 1))
-    return Mesh(vertices, faces)
-
-
 def box(
     x0: float,
     x1: float,
