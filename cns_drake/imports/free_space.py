@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy.ndimage import (
@@ -15,6 +16,7 @@ from scipy.ndimage import (
 import shapely
 from shapely import STRtree
 
+from cns_drake.base.jobs.side_by_side import mapped
 from cns_drake.imports.foreign_city import Imported
 from cns_drake.imports.import_ground import Ground
 from cns_drake.imports.surface_sampling import surface_samples
@@ -172,24 +174,33 @@ def _blocked(
 
     The insides of buildings are blocked too.
     """
+    solid = [
+        one
+        for one in structures
+        if not (one.is_ground or one.kind.startswith("Water"))
+    ]
     blocked = grid.empty()
     walls = [np.zeros((0, 3, 3))]
-    for one in structures:
-        if one.is_ground or one.kind.startswith("Water"):
-            continue
-        corners = one.triangles.reshape(-1, 3)
-        above = corners[:, 2] - ground.height(corners[:, :2])
-        if above.max() < _KERB:
-            continue
-        lowest = above.reshape(-1, 3).min(axis=1)
-        highest = above.reshape(-1, 3).max(axis=1)
-        is_low = lowest < _HEADROOM
-        walls.append(one.triangles[is_low & (highest > _KERB)])
-        row, column = grid.cells(one.triangles[is_low], ground)
-        if one.structure.semantic_class == "building" and len(row):
-            row, column = _filled(row, column)
+    blocks = partial(_blocked_by, ground=ground, grid=grid)
+    for (row, column), triangles in mapped(blocks, solid):
         blocked[row, column] = True
+        walls.append(triangles)
     return blocked, np.concatenate(walls)
+
+
+def _blocked_by(
+    one: Imported, ground: Ground, grid: _Grid
+) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
+    """Returns the cells that a structure blocks, and with which triangles."""
+    corners = one.triangles.reshape(-1, 3)
+    above = corners[:, 2] - ground.height(corners[:, :2])
+    lowest = above.reshape(-1, 3).min(axis=1)
+    highest = above.reshape(-1, 3).max(axis=1)
+    is_low = (lowest < _HEADROOM) & (above.max() >= _KERB)
+    cells = grid.cells(one.triangles[is_low], ground)
+    if one.structure.semantic_class == "building" and len(cells[0]):
+        cells = _filled(*cells)
+    return cells, one.triangles[is_low & (highest > _KERB)]
 
 
 def _filled(

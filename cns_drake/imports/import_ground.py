@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
@@ -69,14 +69,15 @@ class Ground:
             + u * v * z[r + 1, c + 1]
         )
 
-    def below(self, points: np.ndarray) -> Ground:
-        """Returns a ground that is nowhere above some points (N, 3) [m]."""
+    def below(self, places: Iterable[np.ndarray]) -> Ground:
+        """Returns a ground nowhere above places, some (N, 3) at a time [m]."""
         z = self.z.copy()
-        c = ((points[:, 0] - self.xs[0]) // self.cell).astype(int)
-        r = ((points[:, 1] - self.ys[0]) // self.cell).astype(int)
-        for row in (r, r + 1):
-            for column in (c, c + 1):
-                np.minimum.at(z, (row, column), points[:, 2])
+        for points in places:
+            c = ((points[:, 0] - self.xs[0]) // self.cell).astype(int)
+            r = ((points[:, 1] - self.ys[0]) // self.cell).astype(int)
+            for row in (r, r + 1):
+                for column in (c, c + 1):
+                    np.minimum.at(z, (row, column), points[:, 2])
         return Ground(self.xs, self.ys, z)
 
     def to_mesh(self) -> Mesh:
@@ -175,12 +176,9 @@ def bottom_of(
     while name in taken:
         name += "_"
     # The guessed ground must not cover streets and water.
-    lowered = ground
-    spacing = ground.cell / 2.0
-    for one in structures:
-        if one.is_ground:
-            for points in _lattice(one.triangles, spacing):
-                lowered = lowered.below(points)
+    laid = [one.triangles for one in structures if one.is_ground]
+    covered = np.concatenate([np.zeros((0, 3, 3)), *laid])
+    lowered = ground.below(_lattice(covered, ground.cell / 2.0))
     model = Model(
         (Part("surface", MeshShape(name)),),
         {name: lowered.to_mesh()},

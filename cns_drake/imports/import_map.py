@@ -10,6 +10,7 @@ from pathlib import Path
 import re
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.map_folder import LANES_NAME
@@ -31,7 +32,6 @@ from cns_drake.imports.opendrive.town import build_town
 from cns_drake.imports.opendrive.town_files import write_town
 from cns_drake.imports.openstreetmap import import_openstreetmap
 from cns_drake.imports.osm_traffic import lanes_of_streets
-from cns_drake.imports.overview import draw_overview
 from cns_drake.imports.staged_city import StagedCity, stage_city
 from cns_drake.imports.street_drives import StreetGraph
 from cns_drake.imports.waypoint_drives import Drive, steerable_drive
@@ -63,6 +63,20 @@ def import_city(
         InputError: if the file or the options cannot be used, or the folder
             is there or cannot be written.
     """
+    # Threads of linear algebra would only wait for each other: the matrices are
+    # small, and several processes work here.
+    with threadpool_limits(limits=1):
+        return _import_city(source, output, options, progress, finish)
+
+
+def _import_city(
+    source: Path,
+    output: Path,
+    options: ImportOptions,
+    progress: Progress,
+    finish: Finish,
+) -> ImportReport:
+    """Writes a map folder of a file; see `import_city`."""
     _check(source, output, options)
     own = None if options.along is None else [drive_along(options.along)]
     progress(f"reading {source}")
@@ -89,20 +103,33 @@ def import_city(
         staged = dressing.city
         names = {one.structure.name for one in bare}
         added = [one for one in staged.kept if one.structure.name not in names]
-    lanes = lanes_of_streets(
-        city.streets,
-        city.street_places,
-        [*bare, *added],
-        [one for one in added if one.kind not in ("Sidewalk", "Lane mark")],
-        drives,
-        _side(city, options),
-    )
     progress(f"writing {output}")
     with map_draft(output) as draft:
+
+        def write_lanes() -> None:
+            text = lanes_of_streets(
+                city.streets,
+                city.street_places,
+                [*bare, *added],
+                [o for o in added if o.kind not in ("Sidewalk", "Lane mark")],
+                drives,
+                _side(city, options),
+            )
+            if text is not None:
+                (draft / LANES_NAME).write_text(text, "utf-8")
+
+        def draw() -> None:
+            # Slow to import.
+            from cns_drake.imports.overview import draw_overview
+
+            draw_overview(draft / "from_above.png", bare, space, drives)
+
         bottom = bottom_of(bare, ground)
         if dressing is not None:
             bottom = dressing.ground(bottom)
-        sizes = write_world(draft, source, staged, bottom, dressing)
+        sizes = write_world(
+            draft, source, staged, bottom, dressing, (write_lanes, draw)
+        )
         write_facts(
             draft,
             source,
@@ -117,9 +144,6 @@ def import_city(
             _titles(staged, options),
             [drive.waypoints for drive in drives],
         )
-        if lanes is not None:
-            (draft / LANES_NAME).write_text(lanes, "utf-8")
-        draw_overview(draft / "from_above.png", bare, space, drives)
         finish(draft, sizes)
     return _report(staged, drives, city.faults)
 

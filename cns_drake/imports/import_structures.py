@@ -8,6 +8,7 @@ import re
 
 import numpy as np
 
+from cns_drake.base.jobs.side_by_side import mapped
 from cns_drake.imports.building_years import construction_year
 from cns_drake.imports.cityjson import (
     CityFile,
@@ -25,6 +26,7 @@ from cns_drake.imports.foreign_city import (
     Rgb,
     make_imported,
 )
+from cns_drake.imports.import_faults import ImportFaults
 
 # Beginning of a type -> class, and a colour if the class's would mislead.
 _CLASSES: tuple[tuple[str, str, Rgb | None], ...] = (
@@ -87,11 +89,23 @@ def import_structures(
     """
     groups = _families(city)
     names = _unique_names(list(groups))
-    found = []
-    for root, members in groups.items():
+
+    def make(root: str) -> tuple[Imported | None, ImportFaults]:
+        faults = ImportFaults()
         one = _make(
-            names[root], root, members, city, origin, lod, year_attribute
+            names[root],
+            city.objects[root],
+            groups[root],
+            faults,
+            origin,
+            lod,
+            year_attribute,
         )
+        return one, faults
+
+    found = []
+    for one, faults in mapped(make, list(groups)):
+        city.faults.extend(faults)
         if one is not None:
             found.append(one)
     return found
@@ -141,9 +155,9 @@ def _unique_names(ids: list[str]) -> dict[str, str]:
 
 def _make(
     name: str,
-    root: str,
+    first: CityObject,
     members: list[CityObject],
-    city: CityFile,
+    faults: ImportFaults,
     origin: np.ndarray,
     lod: float | None,
     year_attribute: str | None,
@@ -153,20 +167,19 @@ def _make(
         kind = "object without a surface"
         if any(one.geometries for one in members):
             kind = f"object without level of detail {lod:g}"
-        city.faults.add(f"{kind}, left out", root)
+        faults.add(f"{kind}, left out", first.name)
         return None
     surfaces: dict[str, list[np.ndarray]] = {}
     for geometry in chosen:
-        for kind, triangles in _triangles(geometry, root, city, origin):
+        for kind, triangles in _triangles(geometry, first.name, faults, origin):
             surfaces.setdefault(kind, []).append(triangles)
     whole = {kind: np.concatenate(surfaces[kind]) for kind in sorted(surfaces)}
     if not any(len(triangles) for triangles in whole.values()):
-        city.faults.add("object without a surface, left out", root)
+        faults.add("object without a surface, left out", first.name)
         return None
-    first = city.objects[root]
     semantic_class, rgb = _class_of(first.kind)
     years = [
-        construction_year(one.attributes, year_attribute, name, city.faults)
+        construction_year(one.attributes, year_attribute, name, faults)
         for one in members
     ]
     known = [year for year in years if year is not None]
@@ -204,16 +217,19 @@ def _geometries(
 
 
 def _triangles(
-    geometry: CityGeometry, name: str, city: CityFile, origin: np.ndarray
+    geometry: CityGeometry,
+    name: str,
+    faults: ImportFaults,
+    origin: np.ndarray,
 ) -> list[tuple[str, np.ndarray]]:
     """Returns type of surface -> its triangles in the world."""
     found = []
     for face, kind in zip(geometry.faces, geometry.kinds, strict=True):
         rings = [ring - origin for ring in face]
-        triangles = face_triangles(rings, name, city.faults)
+        triangles = face_triangles(rings, name, faults)
         found.append(("roof" if kind == "RoofSurface" else "body", triangles))
     if geometry.is_solid and _volume([t for _, t in found]) < -1e-3:
-        city.faults.add("solid turned inside out, reversed", name)
+        faults.add("solid turned inside out, reversed", name)
         found = [(kind, triangles[:, ::-1]) for kind, triangles in found]
     return found
 

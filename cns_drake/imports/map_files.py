@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
+from itertools import chain
 import os
 from pathlib import Path
 import shutil
@@ -11,9 +13,11 @@ import shutil
 import yaml
 
 from cns_drake.base.files import part_path, user_errors
+from cns_drake.base.jobs.side_by_side import side_by_side
 from cns_drake.base.map_folder import MESH_FOLDER, STRUCTURES_NAME, stage_name
 from cns_drake.city.generation.generate import structure_table
 from cns_drake.city.generation.sdf import stage_sdf
+from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.structures import (
     BoxShape,
     MeshShape,
@@ -26,6 +30,8 @@ from cns_drake.imports.import_report import ImportOptions
 from cns_drake.imports.staged_city import StagedCity
 
 OF_BOX = 12  # triangles
+# Meshes are written in this many parts, side by side.
+_PARTS = 12
 
 
 @contextmanager
@@ -53,6 +59,7 @@ def write_world(
     city: StagedCity,
     bottom: Sequence[Structure],
     dressing: Dressing | None = None,
+    others: Sequence[Callable[[], None]] = (),
 ) -> dict[str, tuple[int, int]]:
     """Writes the stages, their meshes and the table of structures.
 
@@ -62,39 +69,61 @@ def write_world(
         city: all structures.
         bottom: the ground below them, at all stages.
         dressing: the added details, if the city was dressed.
+        others: write further files, side by side with these.
 
     Returns:
         Stage -> its numbers of structures and triangles.
     """
     structures = [*bottom, *(one.structure for one in city.kept)]
-    table = structure_table(structures)
-    if dressing is not None:
-        names = [one.structure.name for one in city.kept]
-        origins = [dressing.origins.get(name, "file") for name in names]
-        table = with_column(table, "origin", ["guess"] * len(bottom) + origins)
-    (draft / STRUCTURES_NAME).write_text(table, "utf-8")
-    for stage, some in city.standing.items():
-        text = stage_sdf(
-            f"{draft.name}_{stage}",
-            [*bottom, *(one.structure for one in some)],
-            comment=f"Imported by cns-drake from {source.name}.",
-        )
-        (draft / stage_name(stage)).write_text(text, "utf-8")
+
+    def write_stages() -> None:
+        table = structure_table(structures)
+        if dressing is not None:
+            names = [one.structure.name for one in city.kept]
+            origins = [dressing.origins.get(name, "file") for name in names]
+            table = with_column(
+                table, "origin", ["guess"] * len(bottom) + origins
+            )
+        (draft / STRUCTURES_NAME).write_text(table, "utf-8")
+        for stage, some in city.standing.items():
+            text = stage_sdf(
+                f"{draft.name}_{stage}",
+                [*bottom, *(one.structure for one in some)],
+                comment=f"Imported by cns-drake from {source.name}.",
+            )
+            (draft / stage_name(stage)).write_text(text, "utf-8")
+
     # Trees of a kind share their meshes.
     meshes = {
         name: mesh
         for structure in structures
         for name, mesh in structure.model.meshes.items()
     }
-    triangles = {}
-    for name, mesh in meshes.items():
-        text = mesh.to_obj()
-        (draft / MESH_FOLDER / f"{name}.obj").write_text(text, "utf-8")
-        triangles[name] = triangles_in(text)
+    parts = [list(meshes.items())[k::_PARTS] for k in range(_PARTS)]
+    written = side_by_side(
+        [
+            *others,
+            write_stages,
+            *(partial(_write_meshes, draft / MESH_FOLDER, p) for p in parts),
+        ]
+    )
+    triangles = dict(chain.from_iterable(written[len(others) + 1 :]))
     return {
         stage: _size([*bottom, *(one.structure for one in some)], triangles)
         for stage, some in city.standing.items()
     }
+
+
+def _write_meshes(
+    folder: Path, meshes: Iterable[tuple[str, Mesh]]
+) -> list[tuple[str, int]]:
+    """Writes meshes; returns their names and numbers of triangles."""
+    found = []
+    for name, mesh in meshes:
+        text = mesh.to_obj()
+        (folder / f"{name}.obj").write_text(text, "utf-8")
+        found.append((name, triangles_in(text)))
+    return found
 
 
 def triangles_in(obj: str) -> int:

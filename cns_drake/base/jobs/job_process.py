@@ -220,7 +220,7 @@ def work(connection: Connection, job: bytes) -> None:
 
     try:
         threading.Thread(
-            target=_end_with_parent, args=(connection,), daemon=True
+            target=end_with_parent, args=(connection,), daemon=True
         ).start()
         last = _run(job, Reporter(send))
     except KeyboardInterrupt:
@@ -269,7 +269,7 @@ def nothing_left(step: Step) -> bool:
         return False
 
 
-def _end_with_parent(connection: Connection) -> None:
+def end_with_parent(connection: Connection) -> None:
     """Ends this process when its parent has ended, even if killed."""
     # The parent sends nothing more: the next read returns at its end.
     with contextlib.suppress(OSError):

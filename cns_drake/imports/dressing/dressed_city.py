@@ -11,6 +11,7 @@ import shapely
 from shapely.geometry import MultiLineString
 from shapely.geometry.base import BaseGeometry
 
+from cns_drake.base.jobs.side_by_side import mapped
 from cns_drake.city.geometry.structures import (
     MeshShape,
     Model,
@@ -119,38 +120,51 @@ def dress_buildings(
         views = DriveViews(drives, ground, solids)
         plans, distances = _plans(bare, drives, streets, ground, views)
     paths = MultiLineString([drive.path for drive in drives])
+
+    def make(number: int) -> tuple[Model, Counter[str]]:
+        walls = zip(
+            plans.get(number, ()), distances.get(number, ()), strict=True
+        )
+        return _dressed(bare[number], list(walls), paths, seed)
+
     dressed = {}
-    for number, some in enumerate(bare):
-        faces = Faces()
-        if number in plans:
-            walls = _undressed_walls(some, plans[number])
-            for material, triangles in (
-                ("body", walls),
-                ("body", some.rest),
-                ("roof", some.roof),
-            ):
-                faces.add(material, triangles)
-            for plan, distance in zip(
-                plans[number], distances[number], strict=True
-            ):
-                rng = lot_generator(
-                    seed, _wall_name(plan.panel), some.one.lot_name
-                )
-                add_facade(faces, plan, distance, rng)
-        else:
-            for material, triangles in (
-                ("body", some.walls),
-                ("body", some.rest),
-                ("roof", some.roof),
-            ):
-                faces.add(material, triangles)
-        roof = _roof(some, paths)
-        faces.counts["roof equipment and chimneys"] += len(roof.parts)
-        by_lot += faces.counts
-        dressed[some.one] = _assembled(some, faces, roof)
+    for some, (model, counts) in zip(
+        bare, mapped(make, range(len(bare))), strict=True
+    ):
+        by_lot += counts
+        structure = replace(some.one.structure, model=model)
+        dressed[some.one] = replace(some.one, structure=structure)
     return DressedBuildings(
         dressed, dict(sorted(by_lot.items())), dict(sorted(by_file.items()))
     )
+
+
+def _dressed(
+    some: _Bare,
+    plans: Sequence[tuple[FacadePlan, float]],
+    paths: BaseGeometry,
+    seed: int,
+) -> tuple[Model, Counter[str]]:
+    """Returns the model of a building, and counts of details added by lot.
+
+    Args:
+        some: the building.
+        plans: of its dressed walls, with their distances to the drives [m].
+        paths: of the drives.
+        seed: of the lot.
+    """
+    faces = Faces()
+    walls = _undressed_walls(some, [plan for plan, _ in plans])
+    faces.add("body", walls)
+    faces.add("body", some.rest)
+    faces.add("roof", some.roof)
+    for plan, distance in plans:
+        name = _wall_name(plan.panel)
+        rng = lot_generator(seed, name, some.one.lot_name)
+        add_facade(faces, plan, distance, rng)
+    roof = _roof(some, paths)
+    faces.counts["roof equipment and chimneys"] += len(roof.parts)
+    return _assembled(some, faces, roof), faces.counts
 
 
 def _all_laid_bare(
@@ -307,6 +321,8 @@ def _front(
 
 def _undressed_walls(some: _Bare, plans: Sequence[FacadePlan]) -> np.ndarray:
     """Returns the walls (M, 3, 3) of a building without those planned."""
+    if not plans:
+        return some.walls
     taken = {one.tobytes() for plan in plans for one in plan.panel.triangles}
     kept = [one for one in some.walls if one.tobytes() not in taken]
     return np.array(kept).reshape(-1, 3, 3)
@@ -331,7 +347,7 @@ def _wall_name(panel: Panel) -> str:
     return f"wall {panel.length:.1f} {heading:.0f}"
 
 
-def _assembled(some: _Bare, faces: Faces, roof: Model) -> Imported:
+def _assembled(some: _Bare, faces: Faces, roof: Model) -> Model:
     style, structure = some.style, some.one.structure
     colours = {
         "body": style.wall,
@@ -354,9 +370,8 @@ def _assembled(some: _Bare, faces: Faces, roof: Model) -> Imported:
         )
         for name in meshes
     )
-    model = Model(
+    return Model(
         parts + roof.parts,
         {**meshes, **roof.meshes},
         structure.model.footprint,
     )
-    return replace(some.one, structure=replace(structure, model=model))

@@ -19,7 +19,6 @@ from cns_drake.imports.foreign_city import Imported
 from cns_drake.imports.import_report import ImportReport
 from cns_drake.imports.map_files import OF_BOX, triangles_in
 from cns_drake.imports.opendrive.town import Town
-from cns_drake.imports.overview import draw_overview
 
 _CROWN = 1.5  # [m]
 # Limits of the speed of a drive [m/s].
@@ -83,6 +82,9 @@ def write_town(
             for drive in town.drives
         ],
     )
+    # Slow to import.
+    from cns_drake.imports.overview import draw_overview
+
     draw_overview(
         draft / "from_above.png",
         list(_seen_from_above(town.city.structures)),
