@@ -79,6 +79,11 @@ class PathSection:
         values = values.reshape(-1, len(self.WEIGHTS))
         return values @ self.WEIGHTS * self.length / 2
 
+    def integrate_each(self, values: np.ndarray) -> np.ndarray:
+        """Returns the same, rounded alike with any number of sections."""
+        rows = values.reshape(-1, 1, len(self.WEIGHTS))
+        return (rows @ self.WEIGHTS)[:, 0] * self.length / 2
+
 
 class SmoothPath:
     """A quintic B-spline along the points of a lane path.
@@ -229,6 +234,6 @@ class PathIntegral:
 
     def evaluate(self, section: PathSection) -> np.ndarray:
         """Returns the (N,) integrals up to the ends of N sections."""
-        return self._table[section.knot] + section.integrate(
+        return self._table[section.knot] + section.integrate_each(
             self._integrand(section.jet)
         )

@@ -148,11 +148,13 @@ class Trajectory:
 
     def spatial_velocity(self, t: float) -> SpatialVelocity:
         """Returns V_WB, expressed in the world [rad/s, m/s]."""
-        return motion_at(self.at(t))[1]
+        motion = self.body_motion(t)
+        return SpatialVelocity(motion.w[0], motion.v[0])
 
     def spatial_acceleration(self, t: float) -> SpatialAcceleration:
         """Returns A_WB, expressed in the world [rad/s^2, m/s^2]."""
-        return motion_at(self.at(t))[2]
+        motion = self.body_motion(t)
+        return SpatialAcceleration(motion.alpha[0], motion.a[0])
 
 
 def pose_at(moments: Moments, row: int = 0) -> RigidTransform:
@@ -167,21 +169,19 @@ def pose_at(moments: Moments, row: int = 0) -> RigidTransform:
     return X_WF @ RigidTransform(RotationMatrix(ride.R[row]), ride.p[row])
 
 
-def motion_at(
-    moment: Moments,
-) -> tuple[RigidTransform, SpatialVelocity, SpatialAcceleration]:
-    """Returns X_WB, V_WB and A_WB at one time, expressed in the world."""
-    motion = _path_motion(moment.jet, moment.rate, moment.acceleration)
-    if moment.ride is None:
-        X_WB = pose_at(moment)
-    else:
-        motion = motion.of_frame(ride_motion(moment.ride))
-        X_WB = RigidTransform(RotationMatrix(motion.R[0]), motion.p[0])
-    return (
-        X_WB,
-        SpatialVelocity(motion.w[0], motion.v[0]),
-        SpatialAcceleration(motion.alpha[0], motion.a[0]),
-    )
+def poses_and_motion(
+    moments: Moments,
+) -> tuple[list[RigidTransform], FrameMotion]:
+    """Returns X_WB at N times, and the motion of B in the world."""
+    motion = _path_motion(moments.jet, moments.rate, moments.acceleration)
+    if moments.ride is None:
+        return [pose_at(moments, k) for k in range(len(moments.u))], motion
+    motion = motion.of_frame(ride_motion(moments.ride))
+    X_WBs = [
+        RigidTransform(RotationMatrix(R), p)
+        for R, p in zip(motion.R, motion.p, strict=True)
+    ]
+    return X_WBs, motion
 
 
 def _rotations(jet: PathJet) -> np.ndarray:
@@ -285,7 +285,13 @@ class WheelMotion:
             still = np.zeros_like(moments.u)
             return JointMotion(still, still, still)
         down = np.array([-1.0, -self._y, self._x - ride.pivot])
-        return JointMotion(ride.q @ down, ride.dq @ down, ride.ddq @ down)
+        # One product of all rows would round by their number.
+        return JointMotion(
+            *(
+                (one[:, None] @ down)[:, 0]
+                for one in (ride.q, ride.dq, ride.ddq)
+            )
+        )
 
     def _ground_motion(self, jet: PathJet) -> tuple[np.ndarray, ...]:
         """Returns the ground's velocity and its two derivatives by u."""

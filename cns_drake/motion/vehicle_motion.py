@@ -28,15 +28,20 @@ from cns_drake.motion.trajectory import (
     Moments,
     Trajectory,
     WheelMotion,
-    motion_at,
+    poses_and_motion,
 )
 
 # Two directions are equal if the cosine of their angle is at least this.
 _PARALLEL = 1 - 1e-9
+# States computed at a time.
+_BLOCK = 64
 
 
 class _State(NamedTuple):
-    """Positions, velocities and accelerations of the whole plant."""
+    """Positions, velocities and accelerations of the whole plant.
+
+    Arrays of one more dimension are those of many times.
+    """
 
     q: np.ndarray
     v: np.ndarray
@@ -76,6 +81,8 @@ class VehicleMotion(LeafSystem):
         plant: MultibodyPlant,
         vehicle: ModelInstanceIndex,
         trajectory: Trajectory,
+        *,
+        period: float | None = None,
     ):
         """Prepares the motion.
 
@@ -83,6 +90,8 @@ class VehicleMotion(LeafSystem):
             plant: a finalized plant; only its model is used.
             vehicle: the model instance that moves.
             trajectory: of its base.
+            period: at multiples of it many states are computed at a time, in a
+                tenth of the time [s].
 
         Raises:
             ValueError: a joint of the vehicle is of another kind.
@@ -90,6 +99,9 @@ class VehicleMotion(LeafSystem):
         super().__init__()
         self._plant = plant
         self._trajectory = trajectory
+        self._period = period
+        # The block of the last state, and its number.
+        self._block: tuple[int, _State] | None = None
         self._base = plant.GetUniqueFloatingBaseBodyOrThrow(vehicle)
         # Scratch to compute the motion of bodies from q and v; every use sets
         # all values that it reads.
@@ -137,12 +149,8 @@ class VehicleMotion(LeafSystem):
 
     def _describe(
         self, joint: Joint
-    ) -> tuple[
-        Callable[[Context, float], None],
-        Callable[[Moments], JointMotion],
-        float,
-    ]:
-        """Returns the driver of a joint, its kind of motion, and its sign."""
+    ) -> tuple[Callable[[Moments], JointMotion], float]:
+        """Returns the kind of motion of a joint, and its sign."""
         context = self._plant_context
         frame = joint.frame_on_child()
         X_BJ = frame.CalcPose(context, self._base.body_frame())
@@ -151,42 +159,54 @@ class VehicleMotion(LeafSystem):
         if isinstance(joint, RevoluteJoint):
             axis_B = R_BJ @ joint.revolute_axis()
             if abs(axis_B[1]) > _PARALLEL:
-                return joint.set_angle, wheel.rolling, np.sign(axis_B[1])
+                return wheel.rolling, np.sign(axis_B[1])
             if abs(axis_B[2]) > _PARALLEL:
-                return joint.set_angle, wheel.steering, np.sign(axis_B[2])
+                return wheel.steering, np.sign(axis_B[2])
         if isinstance(joint, PrismaticJoint):
             axis_B = R_BJ @ joint.translation_axis()
             if abs(axis_B[2]) > _PARALLEL:
-                return joint.set_translation, wheel.travel, np.sign(axis_B[2])
+                return wheel.travel, np.sign(axis_B[2])
         raise ValueError(
             f"joint {joint.name()} neither turns about the vehicle's y (a "
             "wheel) or z (its steering) nor slides along z (its spring)"
         )
 
     def _calc_state(self, context: Context, value: AbstractValue) -> None:
-        plant, plant_context, base = (
-            self._plant,
-            self._plant_context,
-            self._base,
-        )
-        plant.SetPositions(plant_context, self._default_q)
-        moment = self._trajectory.at(context.get_time())
-        X_WB, V_WB, A_WB = motion_at(moment)
-        plant.SetFreeBodyPose(plant_context, base, X_WB)
-        v = np.zeros(plant.num_velocities())
+        time = context.get_time()
+        tick = 0 if self._period is None else round(time / self._period)
+        if self._period is None or tick * self._period != time:
+            states, row = self._states(np.array([time])), 0
+        else:
+            number, row = divmod(tick, _BLOCK)
+            if self._block is None or self._block[0] != number:
+                ticks = number * _BLOCK + np.arange(_BLOCK)
+                self._block = number, self._states(ticks * self._period)
+            states = self._block[1]
+        value.set_value(_State(*(values[row] for values in states)))
+
+    def _states(self, times: np.ndarray) -> _State:
+        """Returns the states at (N,) times."""
+        plant, base = self._plant, self._base
+        moments = self._trajectory.at(times)
+        X_WBs, motion = poses_and_motion(moments)
+        q = np.empty((len(times), plant.num_positions()))
+        plant.SetPositions(self._plant_context, self._default_q)
+        for k, X_WB in enumerate(X_WBs):
+            plant.SetFreeBodyPose(self._plant_context, base, X_WB)
+            q[k] = plant.GetPositions(self._plant_context)
+        v = np.zeros((len(times), plant.num_velocities()))
         vdot = np.zeros_like(v)
         # A floating base's velocities are V_WB, expressed in the world.
         start = base.floating_velocities_start_in_v()
-        rows = slice(start, start + 6)
-        v[rows] = V_WB.get_coeffs()
-        vdot[rows] = A_WB.get_coeffs()
-        for joint, set_position, move, sign in self._joints:
-            motion = move(moment)
-            set_position(plant_context, sign * motion.position[0])
-            v[joint.velocity_start()] = sign * motion.rate[0]
-            vdot[joint.velocity_start()] = sign * motion.acceleration[0]
-        q = plant.GetPositions(plant_context).copy()
-        value.set_value(_State(q, v, vdot))
+        columns = slice(start, start + 6)
+        v[:, columns] = np.hstack([motion.w, motion.v])
+        vdot[:, columns] = np.hstack([motion.alpha, motion.a])
+        for joint, move, sign in self._joints:
+            wheel = move(moments)
+            q[:, joint.position_start()] = sign * wheel.position
+            v[:, joint.velocity_start()] = sign * wheel.rate
+            vdot[:, joint.velocity_start()] = sign * wheel.acceleration
+        return _State(q, v, vdot)
 
     def _set_plant_context(self, context: Context) -> _State:
         state = self._state.Eval(context)

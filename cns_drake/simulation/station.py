@@ -96,7 +96,13 @@ def make_station(
     builder = DiagramBuilder()
     scene_graph = builder.AddNamedSystem("scene_graph", world.scene_graph)
     motion = builder.AddNamedSystem(
-        "vehicle_motion", VehicleMotion(plant, world.vehicle, trajectory)
+        "vehicle_motion",
+        VehicleMotion(
+            plant,
+            world.vehicle,
+            trajectory,
+            period=frame_period(scenario.lidars),
+        ),
     )
     to_pose = builder.AddNamedSystem(
         "geometry_pose", MultibodyPositionToGeometryPose(plant)

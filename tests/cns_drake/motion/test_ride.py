@@ -20,7 +20,11 @@ from cns_drake.motion.suspension import (
     load_car_masses,
     load_suspension_rates,
 )
-from cns_drake.motion.trajectory import Trajectory, WheelMotion
+from cns_drake.motion.trajectory import (
+    Trajectory,
+    WheelMotion,
+    poses_and_motion,
+)
 from cns_drake.scenarios.shipped import suspension_file, vehicle_file
 
 
@@ -193,3 +197,22 @@ def test_the_drive_without_a_ride_is_as_it_was():
     np.testing.assert_array_equal(rigid.pose(9.0).GetAsMatrix4(), before)
     assert (riding.duration, riding.length) == (rigid.duration, rigid.length)
     assert not np.array_equal(riding.pose(9.0).GetAsMatrix4(), before)
+
+
+def test_motion_at_many_times_is_that_at_each():
+    trajectory = ride(wavy_points(2), RoadProfile("C", 1))
+    wheel = WheelMotion(trajectory, (2.8, 0.79, 0.33))
+    times = np.linspace(0.0, trajectory.duration, 50)
+    moments = trajectory.at(times)
+    X_WBs, motion = poses_and_motion(moments)
+    for k, time in enumerate(times):
+        moment = trajectory.at(time)
+        (X_WB,), at_once = poses_and_motion(moment)
+        assert X_WB.IsExactlyEqualTo(X_WBs[k])
+        for many, one in zip(motion, at_once, strict=True):
+            np.testing.assert_array_equal(many[k], one[0])
+        for move in (wheel.steering, wheel.rolling, wheel.travel):
+            many, one = move(moments), move(moment)
+            assert many.position[k] == one.position[0]
+            assert many.rate[k] == one.rate[0]
+            assert many.acceleration[k] == one.acceleration[0]
