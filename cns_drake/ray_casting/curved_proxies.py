@@ -82,15 +82,16 @@ class NearCurvedShapes:
         places = (X_OLs[rows] @ X_LGset[:, :, 3:])[:, :3, 0]
         reaches = stretches[rows] * (halves + radii)
         X_GOs = np.linalg.inv(X_LGset) @ np.linalg.inv(X_OLs[rows])
-        order = np.argsort(places[:, 0] - reaches)
+        begins = places[:, 0] - reaches
+        order = np.argsort(begins)
         self._near = _Sorted(
             places[order],
             reaches[order],
             X_GOs[order],
             halves[order],
             radii[order],
-            (places[:, 0] - reaches)[order],
-            2.0 * reaches.max(initial=0.0),
+            begins[order],
+            np.maximum.accumulate((begins + 2.0 * reaches)[order]),
         )
 
     def contain(self, p_OSset: np.ndarray) -> np.ndarray:
@@ -114,7 +115,7 @@ class _Sorted(NamedTuple):
         halves: (M,) half of the length along z.
         radii: (M,) around that line.
         begins: (M,) starts of their balls along x [m].
-        width: of the widest ball [m].
+        ends: (M,) the farthest end along x of this ball and those before [m].
     """
 
     places: np.ndarray
@@ -123,7 +124,7 @@ class _Sorted(NamedTuple):
     halves: np.ndarray
     radii: np.ndarray
     begins: np.ndarray
-    width: float
+    ends: np.ndarray
 
 
 @compiled
@@ -135,7 +136,7 @@ def _find_near(near: _Sorted, p_OSset: np.ndarray, result: np.ndarray) -> None:
         k = np.searchsorted(near.begins, p[0], side="right")
         while k > 0 and not result[i]:
             k -= 1
-            if near.begins[k] + near.width < p[0]:
+            if near.ends[k] < p[0]:
                 break
             square = 0.0
             for axis in range(3):
