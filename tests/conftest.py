@@ -4,9 +4,13 @@ Slow modules are imported inside the fixtures, because the process that
 distributes the tests needs none of them.
 """
 
+import gc
 import signal
 
 import pytest
+
+# What is imported is there to stay: nobody looks for garbage in it.
+gc.disable()
 
 # A process started in the background ignores Ctrl-C, and so do its children.
 # Tests of interrupts need the signal.
@@ -29,6 +33,11 @@ def pytest_collection_modifyitems(items):
     """Puts files with slow tests first, so that none is left at the end."""
     slow = {item.path for item in items if item.get_closest_marker("slow")}
     items.sort(key=lambda item: item.path not in slow)
+
+
+def pytest_collection_finish():
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(scope="session", autouse=True)
