@@ -191,15 +191,13 @@ def _parse_small_obj(
 
 
 def _parse_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    corners = check_obj(path)
+    check_obj(path)
     mesh = ReadObjToTriangleSurfaceMesh(path)
-    p_GVset = np.asarray(mesh.vertices(), dtype=float).reshape(-1, 3)
-    # Drake's triangles are the faces, unless it has divided larger ones.
-    if len(corners) != 3 * mesh.num_triangles() or (corners < 0).any():
-        corners = np.array(
-            [[1 + t.vertex(k) for k in range(3)] for t in mesh.triangles()]
-        )
-    return p_GVset, (corners - 1).astype(np.int32).reshape(-1, 3)
+    triangles = [[t.vertex(k) for k in range(3)] for t in mesh.triangles()]
+    return (
+        np.asarray(mesh.vertices(), dtype=float).reshape(-1, 3),
+        np.asarray(triangles, dtype=np.int32).reshape(-1, 3),
+    )
 
 
 _READERS = {".obj": _read_obj, ".vtk": read_vtk}

@@ -21,15 +21,11 @@ _OTHER_INDICES = re.compile(rb"/[^\s]*")
 _NO_INDICES = re.compile(rb"[^-\d\s]|\d-|\d{10}")
 
 
-def check_obj(path: Path) -> np.ndarray:
+def check_obj(path: Path) -> None:
     """Refuses an OBJ file with a face that names missing vertices.
 
     Args:
         path: an existing file.
-
-    Returns:
-        The vertices of all faces, one face after the other, as they are
-        numbered in the file.
 
     Raises:
         ValueError: if so; it names the line.
@@ -41,29 +37,23 @@ def check_obj(path: Path) -> np.ndarray:
     faces = b" \n".join(_FACE.findall(content))
     if b"/" in faces:
         faces = _OTHER_INDICES.sub(b"", faces)
-    values = _indices(faces)
-    if _are_indices(values, num_vertices):
-        return values
+    if _are_indices(faces, num_vertices):
+        return
     for number, line in enumerate(content.split(b"\n"), start=1):
         face = _FACE.match(line)
         indices = _OTHER_INDICES.sub(b"", face[1]) if face else b""
-        if not _are_indices(_indices(indices), num_vertices):
+        if not _are_indices(indices, num_vertices):
             raise ValueError(
                 f"line {number}: a face has a vertex that is not there (of"
                 f" {num_vertices})"
             )
-    return values
 
 
-def _indices(text: bytes) -> np.ndarray:
-    """Returns the numbers of a text; a single 0 if it has anything else."""
+def _are_indices(text: bytes, num_vertices: int) -> bool:
+    """Returns whether a text has valid vertex numbers, from 1 or from -1."""
     if not text.strip():
-        return np.zeros(0, dtype=np.int64)
+        return True
     if _NO_INDICES.search(text):
-        return np.zeros(1, dtype=np.int64)
-    return np.fromstring(text, dtype=np.int64, sep=" ")
-
-
-def _are_indices(values: np.ndarray, num_vertices: int) -> bool:
-    """Returns whether numbers are those of vertices, from 1 or from -1."""
+        return False
+    values = np.fromstring(text, dtype=np.int64, sep=" ")
     return bool(((values != 0) & (np.abs(values) <= num_vertices)).all())
