@@ -41,6 +41,7 @@ _BAND = 0.5
 # and stands out of them by this [m].
 _BAND_REACH = 0.04
 _ROOF_ITEMS = ("stair_house", "ac_unit", "vents", "skylight")
+_Point = list[float]
 
 
 def lowered(model: Model, height: float, name: str, seed: int) -> Model:
@@ -112,45 +113,57 @@ def cut_at(mesh: Mesh, height: float) -> tuple[Mesh, np.ndarray]:
         The lower part, open at the cut; (N, 2, 2) starts and ends of the
         edges in which the cut meets faces, whose backs are on the left [m].
     """
-    corners: list[np.ndarray] = []
+    corners: list[_Point] = []
     faces: list[tuple[int, ...]] = []
     edges = []
-    z = mesh.vertices[:, 2]
+    # Numbers of Python: an array of a few is slow.
+    vertices = mesh.vertices.tolist()
     for face in mesh.faces:
-        ring = mesh.vertices[list(face)]
-        if z[list(face)].max() > height:
-            normal = np.cross(ring[1] - ring[0], ring[2] - ring[0])
+        ring = [vertices[k] for k in face]
+        heights = [z for _, _, z in ring]
+        if min(heights) > height:
+            continue
+        if max(heights) > height:
+            normal = _normal_of(ring)
             ring, crossing = _clipped(ring, height)
             if len(crossing) == 2:
-                along = np.subtract(*crossing[::-1])
+                (x0, y0), (x1, y1) = crossing
                 # The inside of a wall is on the left of an edge that faces
                 # right.
-                right = along[1] * normal[0] - along[0] * normal[1]
+                right = (y1 - y0) * normal[0] - (x1 - x0) * normal[1]
                 edges.append(crossing if right > 0 else crossing[::-1])
         # The lower part of a quadrilateral may have five corners.
         while len(ring) >= 3:
-            piece, ring = ring[:4], np.delete(ring, (1, 2), axis=0)
+            piece, ring = ring[:4], [ring[0], *ring[3:]]
             faces.append(tuple(range(len(corners), len(corners) + len(piece))))
             corners.extend(piece)
-    below = Mesh(np.array(corners).reshape(-1, 3), tuple(faces))
+    below = Mesh(np.array(corners, dtype=float).reshape(-1, 3), tuple(faces))
     return below, np.array(edges).reshape(-1, 2, 2)
 
 
+def _normal_of(ring: list[_Point]) -> tuple[float, float]:
+    """Returns x and y of a face's normal."""
+    (x0, y0, z0), (x1, y1, z1), (x2, y2, z2) = ring[:3]
+    return (
+        (y1 - y0) * (z2 - z0) - (z1 - z0) * (y2 - y0),
+        (z1 - z0) * (x2 - x0) - (x1 - x0) * (z2 - z0),
+    )
+
+
 def _clipped(
-    ring: np.ndarray, height: float
-) -> tuple[np.ndarray, list[np.ndarray]]:
+    ring: list[_Point], height: float
+) -> tuple[list[_Point], list[list[float]]]:
     """Returns the corners of a face below a height, and where it is cut."""
     kept, crossing = [], []
-    for p, q in zip(ring, np.roll(ring, -1, axis=0), strict=True):
+    for p, q in zip(ring, [*ring[1:], ring[0]], strict=True):
         if p[2] <= height:
             kept.append(p)
         if (p[2] - height) * (q[2] - height) < 0:
             share = (height - p[2]) / (q[2] - p[2])
-            cut = p + share * (q - p)
-            cut[2] = height
-            kept.append(cut)
-            crossing.append(cut[:2])
-    return np.array(kept).reshape(-1, 3), crossing
+            cut = [p[k] + share * (q[k] - p[k]) for k in range(2)]
+            kept.append([*cut, height])
+            crossing.append(cut)
+    return kept, crossing
 
 
 def enclosed(edges: np.ndarray) -> MultiPolygon:

@@ -65,6 +65,12 @@ def growing(name, stages):
     return GrowingCity(city(name).structures, stages, city(name).cars)
 
 
+@pytest.fixture(scope="module")
+def standing(stages, growing):
+    """Stage -> its structures."""
+    return {stage: growing.at(stage) for stage in stages.stages}
+
+
 def lot_of(structure: str) -> str:
     """Returns the building that later stands on the lot of a structure."""
     return structure.partition("_lot_")[0] if "_lot_" in structure else ""
@@ -104,13 +110,13 @@ def test_stages_differ_by_the_listed_names_only(name, stages):
         previous = standing - on_lots
 
 
-def test_an_earlier_stage_lies_within_the_later_one(name, stages, growing):
+def test_an_earlier_stage_lies_within_the_later_one(name, stages, standing):
     """Parts below a temporary roof belong to the last city, and grow."""
     whole = {s.name: s for s in city(name).structures}
     later: dict[str, float] = {}
     for stage in reversed(list(stages.stages)):
         heights, sites = stages.heights(stage), stages.sites(stage)
-        for low in growing.at(stage):
+        for low in standing[stage]:
             if lot_of(low.name) or low.name in sites:
                 continue
             high = whole[low.name]
@@ -136,13 +142,13 @@ def check_walls_are_those_of(low, high, height):
         assert mesh.to_obj() in (below, whole.to_obj())
 
 
-def test_nothing_stands_in_another_or_in_a_lane(name, stages, growing):
+def test_nothing_stands_in_another_or_in_a_lane(name, standing):
     network = network_of(name)
-    for stage in stages.stages:
-        standing = [s for s in growing.at(stage) if not is_ground(s)]
-        check_no_structure_stands_in_another(standing)
-        check_no_structure_stands_in_a_lane(standing, network)
-        lots = [s for s in standing if lot_of(s.name)]
+    for structures in standing.values():
+        above = [s for s in structures if not is_ground(s)]
+        check_no_structure_stands_in_another(above)
+        check_no_structure_stands_in_a_lane(above, network)
+        lots = [s for s in above if lot_of(s.name)]
         check_nothing_low_reaches_far_out_of_its_footprint(lots, network)
 
 
