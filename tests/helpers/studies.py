@@ -7,9 +7,11 @@ these tests.
 from pathlib import Path
 
 from matplotlib.figure import Figure
+import numpy as np
 
 from cns_drake.base.jobs.job_process import nothing_left
 from cns_drake.base.jobs.step import Reporter
+from cns_drake.pictures.stage_scene import StageScene
 from evaluation.paper import reference_for
 from evaluation.recognition.protocol import PAPER_PROTOCOL
 from evaluation.study.assembly import assemble
@@ -44,14 +46,20 @@ def report(recordings, output, methods=None, protocol=PAPER_PROTOCOL):
 def leave_figures_unrendered(patch):
     """Has figures made but not rendered, which takes half of a study's time.
 
+    Drives are drawn on a blank picture of their stage.
+
     For tests of other results than what figures show.
     """
 
     def write(figure, file, **options):
         Path(file).write_text("a figure")
 
+    def blank(scene, view, width, height, **options):
+        return np.zeros((height, width, 3), dtype=np.uint8)
+
     patch.setattr(Figure, "draw_without_rendering", lambda figure: None)
     patch.setattr(Figure, "savefig", write)
+    patch.setattr(StageScene, "photograph", blank)
 
 
 def report_files(output):
