@@ -55,8 +55,8 @@ class StreetWalkways:
         lines = [*_beside(streets), *map(shapely.LineString, paths)]
         self._strips = [
             strip
-            for line in lines
-            for strip in shapely.get_parts(line.intersection(walked))
+            for piece in _pieces(lines, walked)
+            for strip in shapely.get_parts(piece)
             if strip.geom_type == "LineString" and strip.length >= _SHORTEST
         ]
         self._tree = shapely.STRtree(self._strips)
@@ -180,6 +180,18 @@ class StreetWalkways:
             self._node(b),
             crossing,
         )
+
+
+def _pieces(
+    lines: Sequence[BaseGeometry], area: BaseGeometry
+) -> Iterator[BaseGeometry]:
+    """Yields the part of each line that is in an area."""
+    parts = shapely.get_parts(area)
+    tree = shapely.STRtree(parts)
+    for line in lines:
+        # With the whole area, each intersection would look at all its edges.
+        near = np.sort(tree.query(line, "intersects"))
+        yield line.intersection(shapely.MultiPolygon(list(parts[near])))
 
 
 def _beside(streets: Iterable[Street]) -> Iterator[BaseGeometry]:
