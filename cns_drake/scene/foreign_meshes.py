@@ -12,6 +12,7 @@ from pathlib import Path
 import pickle
 import subprocess
 import sys
+from types import ModuleType
 
 import numpy as np
 
@@ -73,6 +74,9 @@ def _serve() -> None:
     # Messages of a parser must not mix with the answers.
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
+    # Its machine learning, which no mesh needs, takes longer to import than all
+    # the rest of it.
+    sys.modules["open3d.ml"] = ModuleType("open3d.ml")
     try:
         import open3d
     except ImportError as error:
