@@ -33,7 +33,7 @@ WALKER_SIZE = (WALKER_LENGTH, WALKER_WIDTH, 1.8)
 # out; and number of trials.
 _SPARE, _TRIES = 0.06, 4
 # Steps after which a trial is given up if it has to leave out too many.
-_PART = 600
+_PART = 200
 
 # The ego car's motion: (K,) times -> (K, 2) places [m], (K,) headings [rad].
 EgoPath = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]

@@ -293,13 +293,14 @@ def _keep_on_way(
     half = ways.half_width[way]
     best, nearest = np.inf, 0
     low = max(walkers.at[i] - 3, 0)
+    row, step = row_of(ways, way, forward, low), 1 if forward else -1
     for at in range(low, min(walkers.at[i] + 4, ways.num_points[way])):
-        row = row_of(ways, way, forward, at)
         x = walkers.xy[i, 0] - ways.points[row, 0]
         y = walkers.xy[i, 1] - ways.points[row, 1]
         distance = x * x + y * y
         if distance < best:
             best, nearest = distance, at
+        row += step
     row = row_of(ways, way, forward, nearest)
     tangent = tangent_of(ways, way, forward, nearest)
     right = (tangent[1], -tangent[0])

@@ -84,7 +84,7 @@ def tangent_of(
     """Returns the unit vector along a walkway in walking direction."""
     at = min(max(at, 0), ways.num_points[way] - 2)
     a = row_of(ways, way, forward, at)
-    b = row_of(ways, way, forward, at + 1)
+    b = a + 1 if forward else a - 1
     x = ways.points[b, 0] - ways.points[a, 0]
     y = ways.points[b, 1] - ways.points[a, 1]
     length = np.sqrt(x * x + y * y)
@@ -161,7 +161,7 @@ def height_of(ways: WalkwayArrays, walkers: Walkers, i: int) -> float:
     way, forward, at = walkers.way[i], walkers.forward[i], walkers.at[i]
     at = min(at, ways.num_points[way] - 2)
     a = row_of(ways, way, forward, at)
-    b = row_of(ways, way, forward, at + 1)
+    b = a + 1 if forward else a - 1
     x = ways.points[b, 0] - ways.points[a, 0]
     y = ways.points[b, 1] - ways.points[a, 1]
     share = -distance_along(ways, a, walkers, i, (x, y)) / (x * x + y * y)
