@@ -204,16 +204,18 @@ class EmbreeHierarchy:
         """
         num_rays = len(rays.d_Sset)
         hits = Hits.room_for(num_rays, with_normals)
-        parts = min(self._num_threads, -(-num_rays // BLOCK))
+        # All threads draw from one iterator, which gives each part once.
+        parts = iter(_divide(num_rays, self._num_threads))
 
-        def cast(part: int) -> None:
-            cast_packets(self._tree, mask, rays, hits, part, parts)
+        def cast() -> None:
+            for first, last in parts:
+                cast_packets(self._tree, mask, rays, hits, first, last)
 
-        others = [self._helpers.submit(cast, part) for part in range(1, parts)]
-        if parts > 0:
-            cast(0)
-        for other in others:
-            other.result()
+        num_helpers = min(self._num_threads, -(-num_rays // BLOCK)) - 1
+        helpers = [self._helpers.submit(cast) for _ in range(num_helpers)]
+        cast()
+        for helper in helpers:
+            helper.result()
         return hits
 
     def _new_scene(self) -> int:
@@ -249,6 +251,21 @@ class EmbreeHierarchy:
         self._lib.rtcAttachGeometry(self._top, handle)
         self._lib.rtcReleaseGeometry(handle)  # The scene owns it.
         return handle
+
+
+def _divide(num_rays: int, num_threads: int) -> list[tuple[int, int]]:
+    """Returns the ranges of rays that threads take, the largest first.
+
+    Some directions meet more geometry than others: a thread that ends early
+    takes another range. Ranges get shorter, so that all threads end together.
+    """
+    parts, first = [], 0
+    while first < num_rays:
+        share = (num_rays - first) // (2 * num_threads)
+        size = max(share // BLOCK, 1) * BLOCK if num_threads > 1 else num_rays
+        parts.append((first, min(first + size, num_rays)))
+        first += size
+    return parts
 
 
 def _list_owners(

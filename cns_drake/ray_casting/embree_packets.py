@@ -67,23 +67,26 @@ LANES = 16
 # Embree takes smaller components for positive, of either sign. A packet that
 # mixes such rays with truly positive ones loses hits.
 _TINY = 1e-18
-# Rays in a block of one thread: whole packets, and few enough that all threads
-# meet the same mixture of geometry.
+# The least rays that a thread takes at once: whole packets, and enough that the
+# call costs little.
 BLOCK = 1024
 
 
 @compiled
 def cast_packets(
-    tree: Tree, mask: int, rays: Rays, hits: Hits, part: int, num_parts: int
+    tree: Tree, mask: int, rays: Rays, hits: Hits, first: int, last: int
 ) -> None:
-    """Casts every `num_parts`-th block of rays, beginning with the `part`-th.
+    """Casts the rays from `first` to before `last`.
+
+    Directions are rotated here, in double precision and in a fixed order: the
+    result of a matrix library depends on the processor.
 
     Args:
         tree: a `Tree`.
         mask: the geometries that rays can hit.
         rays: `Rays`.
         hits: `Hits` to fill.
-        part, num_parts: select the blocks.
+        first, last: select the rays.
     """
     # A packet is an RTCRayHit16: 12 ray fields and 9 hit fields (10 with
     # room for the primitive of an instance array) of 16 lanes. It and the
@@ -92,28 +95,6 @@ def cast_packets(
     start = (-storage.ctypes.data % 64) // 4
     aligned = storage[start : start + 23 * LANES].reshape(23, LANES)
     packet, valid = aligned[:22], aligned[22].view(np.int32)
-    num_rays = len(rays.d_Sset)
-    for first in range(part * BLOCK, num_rays, num_parts * BLOCK):
-        last = min(first + BLOCK, num_rays)
-        _cast_block(tree, mask, rays, hits, first, last, packet, valid)
-
-
-@compiled
-def _cast_block(
-    tree: Tree,
-    mask: int,
-    rays: Rays,
-    hits: Hits,
-    first: int,
-    last: int,
-    packet: np.ndarray,
-    valid: np.ndarray,
-) -> None:
-    """Casts the rays from `first` to before `last`.
-
-    Directions are rotated here, in double precision and in a fixed order: the
-    result of a matrix library depends on the processor.
-    """
     packet_id = packet.view(np.uint32)
     num_origins, num_rotations = len(rays.p_OSset), len(rays.R_OSset)
     num_ranges = len(rays.max_ranges)
