@@ -230,7 +230,7 @@ def _parse_to_last_import(text: bytes) -> ast.Module:
     line_end = text.find(b"\n", max(text.rfind(b"import"), 0))
     following = _STATEMENT.search(text, line_end) if line_end >= 0 else None
     if following is not None:
-        # Of a statement that goes on there, the start alone is no Python.
+        # A statement may go on there: its start alone is no Python.
         with contextlib.suppress(SyntaxError):
             return ast.parse(text[: following.start()])
     return ast.parse(text)
