@@ -84,7 +84,7 @@ def import_openstreetmap(
     ]
     buildings = list(standing_buildings(buildings, faults, dressed))
     if not buildings:
-        raise InputError(f"{path}: the file has no buildings")
+        raise InputError(f"{path}: {_no_buildings(faults)}")
     low, high = _bounds(buildings)
     longitude, latitude = np.round((low + high) / 2.0, 6).tolist()
     local = Local(longitude, latitude)
@@ -127,6 +127,22 @@ def import_openstreetmap(
             make_things(features.nodes, features.ways, features.kinds, local)
         ),
     )
+
+
+def _no_buildings(faults: ImportFaults) -> str:
+    """Returns why a file gives no buildings.
+
+    Args:
+        faults: of the file.
+    """
+    unfit = [
+        f"{kind}: {number}, such as {example}"
+        for kind, number, example in faults.rows()
+        if "building" in kind
+    ]
+    if not unfit:
+        return "the file has no buildings"
+    return f"the file has no usable building; {'; '.join(unfit)}"
 
 
 def _made(

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.files import check_regular
+from cns_drake.city.geometry.polygons import hull_of
 from cns_drake.imports.import_faults import ImportFaults
 
 Tags = Mapping[str, str]
 
+# Less than the area of a point and its rounding, some 0.01 m^2 [deg^2].
+_NO_AREA = 1e-12
+_OPEN = "whose outline does not close"
 _LETTERS = {"Node": "n", "Way": "w", "Relation": "r"}
 # Tags that give the kind of a thing, the more specific first
 # (https://wiki.openstreetmap.org/wiki/Map_features).
@@ -130,6 +135,7 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
     features = OsmFeatures()
     check_regular(path)
     wanted: dict[str, None] = {}
+    flat: set[str] = set()
     try:
         reader = osmium.FileProcessor(str(path)).with_locations().with_areas()
         for one in reader:
@@ -139,9 +145,11 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
                 features.kinds[f"{letter}{one.id}"] = thing_kind(tags)
             if isinstance(one, osmium.osm.Area):
                 polygons = _polygons(one)
-                if polygons:
-                    kind = "w" if one.from_way() else "r"
-                    name = f"{kind}{one.orig_id()}"
+                kind = "w" if one.from_way() else "r"
+                name = f"{kind}{one.orig_id()}"
+                if polygons and is_building(tags) and _is_flat(polygons):
+                    flat.add(name)
+                elif polygons:
                     features.areas.append(OsmArea(name, tags, polygons))
             elif isinstance(one, osmium.osm.Way) and tags:
                 name = f"w{one.id}"
@@ -180,10 +188,12 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
         first = str(error).splitlines()[0] if str(error) else "unreadable"
         raise InputError(f"{path}: {first}") from error
     closed = {name for name, _, _ in features.areas}
-    for name in (name for name in wanted if name not in closed):
-        features.faults.add(
-            "building whose outline does not close, left out", name
-        )
+    shapeless = [name for name in wanted if name not in closed]
+    if shapeless:
+        flat.update(_closed_without_area(features.ways))
+    for name in shapeless:
+        fault = "without area" if name in flat else _OPEN
+        features.faults.add(f"building {fault}, left out", name)
     return features
 
 
@@ -195,6 +205,17 @@ def _polygons(area: Any) -> list[Polygon]:
         ]
         found.append(Polygon([(n.lon, n.lat) for n in outer], holes))
     return found
+
+
+def _closed_without_area(ways: Iterable[OsmWay]) -> Iterator[str]:
+    """Yields closed ways from which the reader makes no area."""
+    for way in ways:
+        if way.nodes[0] == way.nodes[-1] and _is_flat([hull_of(way.line)]):
+            yield way.name
+
+
+def _is_flat(outlines: Iterable[BaseGeometry]) -> bool:
+    return sum(outline.area for outline in outlines) < _NO_AREA
 
 
 def thing_kind(tags: Tags) -> str:

@@ -244,6 +244,53 @@ def test_files_that_are_none(tmp_path, text, fault):
     assert "\n" not in str(info.value)
 
 
+def building_of(*places):
+    """Returns a file with one building, a closed line through places."""
+    nodes = "".join(
+        f'<node id="{k + 1}" version="1" lat="{lat}" lon="{lon}"/>'
+        for k, (lat, lon) in enumerate(places)
+    )
+    refs = [*range(1, len(places) + 1), 1]
+    return (
+        f'<osm version="0.6">{nodes}<way id="9" version="1">'
+        + "".join(f'<nd ref="{k}"/>' for k in refs)
+        + '<tag k="building" v="yes"/></way></osm>'
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        (building_of((0, 0), (0, 0), (0, 0)), "without area"),
+        (building_of((52, 13), (52.001, 13), (52.002, 13)), "without area"),
+        (
+            building_of((52, 13), (52.0000001, 13), (52.0000001, 13.0000001)),
+            "without area",
+        ),
+        (
+            building_of((52, 13), (52.001, 13)).replace(
+                '<nd ref="1"/><tag', "<tag"
+            ), "whose outline does not close",
+        ),
+        (
+            building_of((52, 13), (52.001, 13), (52.001, 13.001)).replace(
+                "</way>", '<tag k="layer" v="-1"/></way>'
+            ),
+            "underground building, left out",
+        ),
+    ],
+)  # fmt: skip
+def test_why_no_building_is_usable_is_said(tmp_path, text, fault):
+    path = tmp_path / "city.osm"
+    path.write_text(text)
+    with pytest.raises(InputError) as info:
+        import_openstreetmap(path, None)
+    message = str(info.value)
+    assert message.startswith(f"{path}: the file has no usable building; ")
+    assert fault in message
+    assert message.endswith(", left out: 1, such as w9")
+
+
 def test_half_a_country_is_refused(tmp_path):
     osm = OsmWriter()
     osm.box(0, 0, 10, 10, building="yes")
