@@ -108,16 +108,15 @@ def read_roads(path: Path, faults: ImportFaults) -> RoadMap:
     """
     top = read_elements(path, "OpenDRIVE", _KNOWN)
     roads: list[ImportedRoad] = []
-    ids: set[str] = set()
     names: set[str] = set()
     together = 0.0
+    for kind in ("road", "junction"):
+        try:
+            _check_ids(top.all(kind))
+        except ValueError as error:
+            raise InputError(f"{path}: {error}") from error
     for element in top.all("road"):
-        own = element.attributes.get("id", "")
-        name = _plain(own, names)
-        if own in ids:
-            faults.add("road with the id of another one, left out", name)
-            continue
-        ids.add(own)
+        name = _plain(element.attributes.get("id", ""), names)
         names.add(name)
         try:
             road = _road(element, name, faults)
@@ -153,14 +152,36 @@ def read_roads(path: Path, faults: ImportFaults) -> RoadMap:
     )
 
 
+def _check_ids(elements: Iterable[Element]) -> None:
+    """Checks that elements of a kind have different ids.
+
+    Raises:
+        ValueError: naming id and lines, if two have the same.
+    """
+    lines: dict[str, int] = {}
+    for one in elements:
+        own = one.attributes.get("id", "")
+        if own in lines:
+            raise ValueError(
+                f"{one.tag} {_stem(own)}: line {one.line}: duplicate id, that"
+                f" of line {lines[own]}"
+            )
+        lines[own] = one.line
+
+
 def _plain(own: str, taken: set[str]) -> str:
     """Returns a new name of letters, digits, dots and dashes."""
-    stem = re.sub(r"[^0-9A-Za-z.-]+", "-", own)[:_LONGEST_NAME] or "unnamed"
+    stem = _stem(own)
     name, number = stem, 1
     while name in taken:
         number += 1
         name = f"{stem}-{number}"
     return name
+
+
+def _stem(own: str) -> str:
+    """Returns an id in letters, digits, dots and dashes."""
+    return re.sub(r"[^0-9A-Za-z.-]+", "-", own)[:_LONGEST_NAME] or "unnamed"
 
 
 def _moved(road: ImportedRoad, origin: np.ndarray) -> ImportedRoad:
@@ -313,10 +334,11 @@ def _sections(
                 if lane.number == 0:
                     continue
                 if lane.number in lanes:
-                    faults.add(
-                        "lane with the id of another one, left out", name
+                    raise ValueError(
+                        f"line {element.line}: lane {lane.number}: duplicate"
+                        " id, that of a lane before it"
                     )
-                lanes.setdefault(lane.number, lane)
+                lanes[lane.number] = lane
         middle = [
             mark
             for element in one.all("center", "lane")

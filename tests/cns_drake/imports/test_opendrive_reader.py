@@ -123,7 +123,6 @@ def test_what_cannot_be_used_is_counted(tmp_path):
     path = write_roads(
         tmp_path / "a.xodr",
         straight("1", 0, 0, 50, 0),
-        straight("1", 0, 9, 50, 9),
         road("2", 0.0, [], [LANES]),
         road("3", 50.0, [LINE], []),
         road("4", 49.5, [LINE, empty], [LANES]),
@@ -131,13 +130,36 @@ def test_what_cannot_be_used_is_counted(tmp_path):
     roads, faults = faults_of(path)
     assert [one.name for one in roads.roads] == ["1", "4"]
     assert faults == {
-        "road with the id of another one, left out": 1,
         "road without a course, left out": 1,
         "road without lanes, left out": 1,
         "geometry without length, left out": 1,
         "road whose length differs from its course's, cut": 1,
     }
     assert roads.roads[1].length == 49.5
+
+
+@pytest.mark.parametrize(
+    ("more", "fault"),
+    [
+        ((straight("17", 0, 9, 50, 9),), "road 17: line 4: duplicate id, that"),
+        (
+            ('<junction id="a b"/>\n', '<junction id="a b"/>\n'),
+            "junction a-b: line 5: duplicate id, that of line 4",
+        ),
+        (
+            (straight("2", 0, 9, 50, 9, lanes=(*TWO_LANES, TWO_LANES[2])),),
+            "road 2: line 4: lane -1: duplicate id",
+        ),
+    ],
+)  # fmt: skip
+def test_things_that_stand_twice_are_named(tmp_path, more, fault):
+    path = write_roads(
+        tmp_path / "a.xodr", straight("17", 0, 0, 50, 0) + "\n", *more
+    )
+    with pytest.raises(InputError) as info:
+        build_town(path, 0)
+    assert str(info.value).startswith(f"{path}: {fault}")
+    assert "\n" not in str(info.value)
 
 
 def test_networks_that_are_too_large(tmp_path):
