@@ -2,7 +2,8 @@
 
 ASAM OpenDRIVE 1.7, 11.9: a mark lies on the outer border of its lane, that of
 lane 0 on the middle; double lines are listed from the inside out, those of the
-middle from left to right.
+middle from left to right. On the border of a kerb the import moves it off the
+stones.
 """
 
 from __future__ import annotations
@@ -11,10 +12,17 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
 
 from cns_drake.city.geometry.structures import Structure
 from cns_drake.imports.foreign_city import Rgb, make_imported
 from cns_drake.imports.opendrive.lane_bands import LaneBand
+from cns_drake.imports.opendrive.marks_on_roads import (
+    as_triangles,
+    moved_off_kerbs,
+    on_carriageway,
+)
 from cns_drake.imports.opendrive.road_model import MarkLine, RoadMark
 
 # Default length of a dash and its gap; distance from the middle of a double
@@ -39,6 +47,7 @@ def road_marks(
     prefix: str,
     bands: Sequence[LaneBand],
     heights: Callable[[np.ndarray], np.ndarray] | None = None,
+    carriageway: BaseGeometry | None = None,
 ) -> Iterator[Structure]:
     """Yields the marks of each road.
 
@@ -47,7 +56,11 @@ def road_marks(
         bands: lanes of the roads.
         heights: of the ground at (N, 2) places [m]; the marks lie on the
             borders of lanes if None.
+        carriageway: with kerbs all around, which the marks do not leave; lanes
+            have no kerbs if None [m].
     """
+    if carriageway is not None:
+        shapely.prepare(carriageway)
     painted: dict[str, dict[str, list[np.ndarray]]] = defaultdict(
         lambda: defaultdict(list)
     )
@@ -59,19 +72,32 @@ def road_marks(
             lines.append((band.inner, section.middle_marks, -1.0))
         for border, marks, side in lines:
             for colour, quads in _painted(
-                border, band.s, band.heading, marks, side, section.end
+                border,
+                band.s,
+                band.heading,
+                marks,
+                side,
+                section.end,
+                carriageway,
             ):
                 painted[band.road.name][colour].append(quads)
     for road, colours in painted.items():
         surfaces = {}
         for colour, pieces in colours.items():
-            corners = np.concatenate(pieces)
+            quads = np.concatenate(pieces)
+            if carriageway is None:
+                corners = as_triangles(quads)
+            else:
+                corners = on_carriageway(quads, carriageway)
             z = corners[..., 2]
             if heights is not None:
                 ground = heights(corners[..., :2].reshape(-1, 2))
                 z = np.maximum(z, ground.reshape(z.shape))
             corners[..., 2] = z + _ABOVE
-            surfaces[colour] = corners[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3, 3)
+            if len(corners):
+                surfaces[colour] = corners
+        if not surfaces:
+            continue
         yield make_imported(
             f"{prefix}_{road}",
             "road",
@@ -88,6 +114,7 @@ def _painted(
     marks: Sequence[RoadMark],
     side: float,
     end: float,
+    carriageway: BaseGeometry | None,
 ) -> Iterator[tuple[str, np.ndarray]]:
     """Yields colours, and the quads (K, 4, 3) on a border [m].
 
@@ -97,15 +124,23 @@ def _painted(
         marks: along it.
         side: positive if outwards is to the left.
         end: of the last mark along the road [m].
+        carriageway: see `road_marks`.
     """
     left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
     ends = [*(mark.start for mark in marks[1:]), end][: len(marks)]
     for mark, last in zip(marks, ends, strict=True):
-        for line in _lines(mark, float(np.sign(side))):
+        lines = _lines(mark, float(np.sign(side)))
+        moved = np.zeros(len(s))
+        if lines and carriageway is not None:
+            reach = (
+                max(line.width / 2.0 + line.aside for line in lines),
+                max(line.width / 2.0 - line.aside for line in lines),
+            )
+            moved = moved_off_kerbs(border, left, reach, carriageway)
+        for line in lines:
+            aside = left * (line.aside + moved)[:, None]
             for a, b in _stretches(line, mark.start, last):
-                quads = _stripe(
-                    border, s, left, left * line.aside, (a, b), line.width
-                )
+                quads = _stripe(border, s, left, aside, (a, b), line.width)
                 if len(quads):
                     yield mark.colour_of(_COLOURS), quads
 

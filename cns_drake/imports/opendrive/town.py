@@ -145,7 +145,9 @@ def _build(
     marks: list[Structure] = []
     if dressed:
         _count_spans(roads, {band.road.name for band in raised}, faults)
-        marks += road_marks("marks", ground, surface.heights)
+        marks += road_marks(
+            "marks", ground, surface.heights, streets.carriageway()
+        )
         marks += road_marks("bridge_marks", raised)
     progress(
         f"{len(roads.roads)} roads, {len(things)} signals and objects;"
