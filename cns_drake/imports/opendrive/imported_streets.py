@@ -18,6 +18,7 @@ from cns_drake.city.ground.streets import (
     kerb_area,
     parking_bays,
 )
+from cns_drake.imports.opendrive.kerb_tapers import kerb_tapers
 from cns_drake.imports.opendrive.lane_bands import LaneBand
 from cns_drake.imports.opendrive.lane_kinds import is_raised, lane_class
 
@@ -88,7 +89,10 @@ class ImportedStreets:
         other = _simple(
             shapely.union_all(alike["other-ground"]).difference(paved)
         )
-        self._carriageway = _cut_at_tiles(_multi(_closed([paved, other])))
+        whole = _closed([paved, other])
+        tapers = kerb_tapers(whole)
+        whole = _closed([whole, *tapers])
+        self._carriageway = _cut_at_tiles(_multi(whole))
         self._lanes = _multi(road)
         medians = _simple(shapely.union_all(alike["median"]))
         self._medians = _multi(medians.difference(self._carriageway))
