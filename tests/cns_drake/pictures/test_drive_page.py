@@ -157,12 +157,25 @@ def browser(tmp_path_factory):
         yield browser
 
 
-@pytest.fixture(params=[DESKTOP, PHONE], ids=["desktop", "phone"])
-def reader(browser, page, request):
-    """The page at the drive's start, standing still."""
+@pytest.fixture(
+    scope="module", params=[DESKTOP, PHONE], ids=["desktop", "phone"]
+)
+def opened(browser, page, request):
+    """The page, standing still."""
     browser.open(page.as_uri(), *request.param)
+    # Nobody looks at the picture, which software draws pixel by pixel.
+    browser.evaluate("viewer.renderer.setPixelRatio(0.1)")
     browser.wait_for('!document.getElementById("loading")')
     browser.evaluate("viewer.animator.pause()")
+    browser.evaluate("viewer.controls.saveState()")
+    return browser
+
+
+@pytest.fixture
+def reader(opened):
+    """The page at the drive's start; tests leave its buttons as they were."""
+    browser = opened
+    browser.evaluate("viewer.controls.reset()")
     go_to(browser, 0.0)
     yield browser
     # Software renderers warn of their own slowness.
@@ -234,6 +247,8 @@ class TestInChromium:
             " \"<div id='loading'></div>\")"
         )
         assert reader.evaluate(is_seen) is False
+        reader.evaluate('document.getElementById("loading").remove()')
+        assert reader.evaluate(is_seen) is True
 
     def test_change_is_off_until_the_button_is_pressed(self, reader):
         legend = 'document.querySelector("dd.change").checkVisibility()'
@@ -244,7 +259,7 @@ class TestInChromium:
         additional = reader.evaluate(
             'document.getElementById("change").dataset.additional'
         )
-        for is_on in (False, True, False):
+        for is_on in (False, True, False, True):
             for layer in ("absent", "lower"):
                 assert is_visible(reader, "stage_difference", layer) is is_on
             assert is_visible(reader, "stage_difference", "additional")
@@ -323,11 +338,12 @@ class TestInChromium:
         click(reader, "play")
         reader.wait_for("viewer.animator.time > 0.02")
         click(reader, "play")
+        reader.evaluate("viewer.animator.mixer.timeScale = 1.0")
         label = reader.evaluate('document.getElementById("play").textContent')
         assert label == "Play"
         assert reader.evaluate("viewer.animator.playing") is False
 
     def test_points_can_be_hidden(self, reader):
-        for is_on in (True, False, True):
+        for is_on in (True, False, True, False):
             assert is_visible(reader, "scans") is is_on
             click(reader, "points")
