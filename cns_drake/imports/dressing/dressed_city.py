@@ -26,7 +26,11 @@ from cns_drake.imports.dressing.facade_plan import (
 )
 from cns_drake.imports.dressing.roof_pieces import is_flat_roof, roof_pieces
 from cns_drake.imports.dressing.styles import Style, make_style
-from cns_drake.imports.dressing.upper_sides import UpperSides, looks_up
+from cns_drake.imports.dressing.upper_sides import (
+    UpperSides,
+    looks_up,
+    turned_up,
+)
 from cns_drake.imports.dressing.visible_walls import DriveViews
 from cns_drake.imports.dressing.wall_panels import (
     Panel,
@@ -51,6 +55,7 @@ _SHOPS_WITHIN = 16.0
 _OWN_ROOF, _OWN_WINDOWS = 2.2, 3.0
 # A building whose feet are farther from the ground was sunk into it [m].
 _LET_IN = 2.0
+_NO_TRIANGLES = np.zeros((0, 3, 3))
 
 
 @dataclass(frozen=True)
@@ -89,6 +94,7 @@ def dress_buildings(
     ground: Ground,
     seed: int,
     always: Collection[Imported] | None = None,
+    paving: np.ndarray = _NO_TRIANGLES,
 ) -> DressedBuildings:
     """Dresses the buildings of a city.
 
@@ -104,6 +110,8 @@ def dress_buildings(
         seed: of the lot.
         always: structures of all stages, which hide what is behind them; all
             structures if None.
+        paving: triangles (M, 3, 3) of terrain, streets and sidewalks, above
+            which doors stand [m].
     """
     buildings = [one for one in structures if one.kind.startswith("Building")]
     bare = _all_laid_bare(buildings, ground, seed)
@@ -119,6 +127,7 @@ def dress_buildings(
         solids = np.concatenate([np.zeros((0, 3, 3)), *hiding])
         views = DriveViews(drives, ground, solids)
         plans, distances = _plans(bare, drives, streets, ground, views)
+        plans = _with_steps(plans, UpperSides(turned_up(paving)))
     paths = MultiLineString([drive.path for drive in drives])
 
     def make(number: int) -> tuple[Model, Counter[str]]:
@@ -272,6 +281,28 @@ def _plans(
             found.setdefault(number, []).append(plan)
             distances.setdefault(number, []).append(float(to_drive[k]))
     return found, distances
+
+
+def _with_steps(
+    plans: Mapping[int, list[FacadePlan]], paving: UpperSides
+) -> dict[int, list[FacadePlan]]:
+    """Returns the walls of buildings, with doors above the paving."""
+    every = [plan for some in plans.values() for plan in some]
+    places = [plan.thresholds() for plan in every]
+    heights = paving.heights(
+        np.concatenate(
+            [np.zeros((0, 2)), *(p[..., :2].reshape(-1, 2) for p in places)]
+        )
+    )
+    ends = np.cumsum([len(some) for some in places])[:-1]
+    highest = np.split(heights.reshape(-1, 9).max(axis=1), ends)
+    lifted = iter(
+        plan.standing_on(some)
+        for plan, some in zip(every, highest, strict=True)
+    )
+    return {
+        number: [next(lifted) for _ in some] for number, some in plans.items()
+    }
 
 
 def _seen(

@@ -19,9 +19,11 @@ _FROM_FOOT, _FROM_TOP, _FROM_GROUND = 0.3, 0.12, 0.4
 _LEAST_PART = 0.7
 # Probes are this far in front of a wall [m].
 _BEFORE = 0.4
+# The paving before a door is looked at this far from its wall [m].
+_STEP = 0.15
 # One door for each such length of a front [m].
 _DOOR_EVERY = 16.0
-_DOOR_HEIGHT = 2.2
+_DOOR_HEIGHT, _LEAST_DOOR = 2.2, 1.8
 _DOOR_WIDTH = 1.15
 _GATE_WIDTH = 2.5
 _SILL, _THRESHOLD = 0.45, 0.04
@@ -72,6 +74,31 @@ class FacadePlan:
         x = np.append((o.x0 + o.x1) / 2.0, panel.length / 2.0)
         z = np.append((o.z0 + o.z1) / 2.0, panel.height - _FROM_FOOT)
         return panel.place(x, z, _BEFORE)
+
+    def thresholds(self) -> np.ndarray:
+        """Returns places (D, 9, 3) before and in the recesses of its doors."""
+        o = self.openings.chosen(self.openings.is_door)
+        x = np.stack([o.x0, (o.x0 + o.x1) / 2.0, o.x1])[:, None]
+        deep = np.stack([np.full(len(o.depth), -_STEP), o.depth / 2, o.depth])
+        x, out = np.broadcast_arrays(x, -deep)
+        at = np.moveaxis(np.stack([x, out]).reshape(2, 9, -1), 2, 1)
+        return self.panel.place(at[0], np.zeros(at[0].shape), at[1])
+
+    def standing_on(self, heights: np.ndarray) -> FacadePlan:
+        """Returns the plan with doors a step above the paving before them.
+
+        Args:
+            heights: (D,) of the highest paving at each door; one far above or
+                below the ground does not count [m].
+        """
+        o = self.openings
+        z0, low = o.z0.copy(), heights - self.panel.origin[2]
+        is_near = np.abs(low - self.ground) < _ON_GROUND
+        low = np.where(is_near, np.maximum(low + _THRESHOLD, 0.0), -np.inf)
+        top = o.z1[o.is_door]
+        fits = is_near & (top - low > _LEAST_DOOR)
+        z0[o.is_door] = np.where(fits, low, z0[o.is_door])
+        return replace(self, openings=o._replace(z0=z0))
 
     def without(self, is_hidden: np.ndarray) -> FacadePlan:
         """Returns the plan without hidden openings.
@@ -137,7 +164,7 @@ def with_shops(plan: FacadePlan) -> FacadePlan:
     half = min(plan.spacing - _PIER, 4.0) / 2.0
     top = plan.floor + plan.style.storey - 0.75
     top = min(top, plan.ground + _SHOP_HEIGHT)
-    if not is_shop.any() or half < 0.6 or top < plan.ground + 1.8:
+    if not is_shop.any() or half < 0.6 or top < plan.ground + _LEAST_DOOR:
         return plan
     o = plan.openings
     middle = (o.x0 + o.x1) / 2.0
@@ -174,7 +201,7 @@ def with_doors(plan: FacadePlan) -> FacadePlan:
     # A door must not reach into the windows above.
     above = o.z0[o.row > 0]
     high = min(high, float(above.min(initial=np.inf)) - 0.2)
-    if high < low + 1.8:
+    if high < low + _LEAST_DOOR:
         return plan
     changed = o._replace(
         x0=np.where(is_door, middle - half, o.x0),

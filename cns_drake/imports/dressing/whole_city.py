@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from cns_drake.base.errors import InputError
 from cns_drake.city.generation.generate import MAX_STRUCTURES
 from cns_drake.city.geometry.structures import Structure
@@ -61,6 +63,24 @@ def _is_street(one: Imported) -> bool:
     return one.structure.semantic_class in ("road", "sidewalk")
 
 
+def _laid(
+    staged: StagedCity,
+    city: ForeignCity,
+    drives: Sequence[Drive],
+    ground: Ground,
+    is_paved: bool,
+) -> list[Imported]:
+    """Returns streets and sidewalks that the file lacks."""
+    if not drives:
+        return []
+    laid = list(missing_sidewalks(staged.kept, city.streets, drives))
+    if is_paved and city.streets:
+        laid += paved_gaps([*staged.kept, *laid], drives)
+    elif is_paved and not any(map(_is_street, staged.kept)):
+        laid += guessed_streets(staged.kept, drives, ground)
+    return laid
+
+
 def dress_city(
     staged: StagedCity,
     city: ForeignCity,
@@ -82,12 +102,24 @@ def dress_city(
         InputError: if there are more structures than a map may have.
     """
     always = set.intersection(*map(set, staged.standing.values()))
+    is_paved = is_dense(staged.kept)
+    laid = _laid(staged, city, drives, ground, is_paved)
+    paving = [
+        one.triangles
+        for one in [*staged.kept, *laid]
+        if one.is_ground or one.kind == "Sidewalk"
+    ]
     buildings = dress_buildings(
-        staged.kept, drives, city.streets, ground, seed, always
+        staged.kept,
+        drives,
+        city.streets,
+        ground,
+        seed,
+        always,
+        np.concatenate([np.zeros((0, 3, 3)), *paving]),
     )
     changed = dict(buildings.buildings)
     by_lot = Counter(buildings.by_lot)
-    is_paved = is_dense(staged.kept)
     if is_paved and not any(map(_has_ground_kind, staged.kept)):
         changed |= {
             one: replace(one, structure=paved(one.structure))
@@ -98,11 +130,6 @@ def dress_city(
     if drives:
         walks = [one for one in staged.kept if one.kind == "Sidewalk"]
         changed |= {one: with_kerb(one) for one in near_drives(walks, drives)}
-        laid = list(missing_sidewalks(staged.kept, city.streets, drives))
-        if is_paved and city.streets:
-            laid += paved_gaps([*staged.kept, *laid], drives)
-        elif is_paved and not any(map(_is_street, staged.kept)):
-            laid += guessed_streets(staged.kept, drives, ground)
         by_lot += Counter(one.kind for one in laid)
         marks = list(lane_marks(city.streets, drives))
         by_lot["Lane mark"] += len(marks)
