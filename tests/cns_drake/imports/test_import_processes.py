@@ -18,7 +18,10 @@ from cns_drake.base.jobs import side_by_side as module
 number = int(sys.argv.pop(1))
 module.num_cores = lambda: number
 forked = []
-os.register_at_fork(before=lambda: forked.append(1))
+os.register_at_fork(
+    before=lambda: forked.append(1),
+    after_in_child=lambda: print("helping", file=sys.stderr, flush=True),
+)
 from cns_drake.__main__ import main
 try:
     main()
@@ -76,3 +79,24 @@ def test_an_interrupted_import_leaves_nothing(tmp_path, line):
     assert process.returncode == 130
     assert errors.endswith("cns-drake: interrupted\n")
     assert [path.name for path in Path(tmp_path).iterdir()] == ["city.osm"]
+
+
+@pytest.mark.parametrize("line", ["reading", "dressing", "writing"])
+def test_nothing_outlives_a_killed_import(tmp_path, line):
+    write_corner(tmp_path / "city.osm")
+    output = tmp_path / "town"
+    process = start(3, tmp_path / "city.osm", output)
+    # Killed alone, while another process works for it.
+    for awaited in (line, "helping"):
+        while not (read := process.stderr.readline()).startswith(awaited):
+            assert read
+    process.kill()
+    # Other processes have the same pipe: it ends with the last of them.
+    process.communicate(timeout=60)
+    assert process.returncode == -signal.SIGKILL
+    left = {path.name for path in tmp_path.iterdir()}
+    assert left <= {"city.osm", "town.part"}
+    _, errors = start(3, tmp_path / "city.osm", output).communicate(timeout=120)
+    assert "Traceback" not in errors
+    assert {path.name for path in tmp_path.iterdir()} == {"city.osm", "town"}
+    assert len(contents(output)) > 10
