@@ -6,11 +6,17 @@ distributes the tests needs none of them.
 
 import gc
 import signal
+import sys
+from types import ModuleType
 
 import pytest
 
 # What is imported is there to stay: nobody looks for garbage in it.
 gc.disable()
+
+# Where Open3D is an oracle, nobody needs its machine learning, which takes
+# longer to import than all the rest of it.
+sys.modules["open3d.ml"] = ModuleType("open3d.ml")
 
 # A process started in the background ignores Ctrl-C, and so do its children.
 # Tests of interrupts need the signal.
