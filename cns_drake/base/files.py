@@ -33,8 +33,12 @@ def user_errors(path: Path | str) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        fault = error.strerror or str(error)
-        raise InputError(f"{path}: {fault}") from error
+        raise file_error(path, error) from error
+
+
+def file_error(path: Path | str, error: OSError) -> InputError:
+    """Returns an error of the file system as one line that names the file."""
+    return InputError(f"{path}: {error.strerror or error}")
 
 
 @contextlib.contextmanager

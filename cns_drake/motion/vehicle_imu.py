@@ -7,8 +7,9 @@ import math
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from scipy.spatial.transform import Rotation
 
 from cns_drake.base.recordings.motion import ImuSamples
 from cns_drake.motion.trajectory import Trajectory
@@ -127,10 +128,9 @@ class VehicleImu(LeafSystem):
         force = np.einsum("nji,nj->ni", R_WI, a_WI - self._gravity_W)
         turn = np.einsum("nji,nj->ni", R_WI, motion.w)
         measured = self._add_errors(first, np.hstack([force, turn]))
-        quat_wxyz = [RotationMatrix(R).ToQuaternion().wxyz() for R in R_WI]
         return ImuSamples(
             first,
-            np.roll(quat_wxyz, -1, axis=1),
+            Rotation.from_matrix(R_WI).as_quat(canonical=True),
             measured[:, 3:],
             measured[:, :3],
         )

@@ -67,7 +67,7 @@ class BackgroundWriter:
         """
         self._raise_error()
         self._held.append(message)
-        size = sum(len(one) for one in message if isinstance(one, bytes))
+        size = sum([len(one) for one in message if isinstance(one, bytes)])
         if 0 < size < _SMALL_BYTES and len(self._held) < _MOST_HELD:
             return
         self._messages.put(self._held)
