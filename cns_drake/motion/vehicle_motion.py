@@ -23,6 +23,7 @@ from pydrake.systems.framework import (
     ValueProducer,
 )
 
+from cns_drake.motion.tick_blocks import TickBlocks
 from cns_drake.motion.trajectory import (
     JointMotion,
     Moments,
@@ -99,9 +100,7 @@ class VehicleMotion(LeafSystem):
         super().__init__()
         self._plant = plant
         self._trajectory = trajectory
-        self._period = period
-        # The block of the last state, and its number.
-        self._block: tuple[int, _State] | None = None
+        self._blocks = TickBlocks(self._states, period, _BLOCK)
         self._base = plant.GetUniqueFloatingBaseBodyOrThrow(vehicle)
         # Scratch to compute the motion of bodies from q and v; every use sets
         # all values that it reads.
@@ -172,17 +171,7 @@ class VehicleMotion(LeafSystem):
         )
 
     def _calc_state(self, context: Context, value: AbstractValue) -> None:
-        time = context.get_time()
-        tick = 0 if self._period is None else round(time / self._period)
-        if self._period is None or tick * self._period != time:
-            states, row = self._states(np.array([time])), 0
-        else:
-            number, row = divmod(tick, _BLOCK)
-            if self._block is None or self._block[0] != number:
-                ticks = number * _BLOCK + np.arange(_BLOCK)
-                self._block = number, self._states(ticks * self._period)
-            states = self._block[1]
-        value.set_value(_State(*(values[row] for values in states)))
+        value.set_value(_State(*self._blocks.at(context.get_time())))
 
     def _states(self, times: np.ndarray) -> _State:
         """Returns the states at (N,) times."""

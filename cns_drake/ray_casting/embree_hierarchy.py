@@ -43,6 +43,9 @@ class EmbreeHierarchy:
     Rays are cast in packets marked as coherent, which makes a LiDAR's
     neighbouring beams cheap. Scenes are built robust, so that no ray passes
     through an edge that two triangles share.
+
+    Attributes:
+        rows: of the groups with primitives in this hierarchy.
     """
 
     def __init__(
@@ -96,6 +99,7 @@ class EmbreeHierarchy:
                 owner = np.array([group.members[0][0]], np.int32)
                 built = built._replace(owners=(owner,))
             self._built[row] = built
+        self.rows = [row for row, built in self._built.items() if built.scene]
         fixed = [row for row in self.rows if groups[row].is_merged_world]
         moving = [row for row in self.rows if row not in fixed]
         self._top = 0
@@ -130,11 +134,6 @@ class EmbreeHierarchy:
             np.array([row not in copies for row in rows], np.int64),
             np.array(rows, np.int32),
         )
-
-    @property
-    def rows(self) -> list[int]:
-        """The rows of the groups with primitives in this hierarchy."""
-        return [row for row, built in self._built.items() if built.scene]
 
     def _built_of(self) -> dict[int, _Built]:
         """Returns group's `id` -> its Embree scene."""

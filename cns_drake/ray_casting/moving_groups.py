@@ -146,8 +146,6 @@ class MovingGroups:
             return Placed.of(self._groups, ())
         frames = self._frames
         X_WFs = self._find_poses(calc_X_WF, known)
-        X_OLs = (X_WFs @ self._X_FLs)[:, :3]
-        X_OLs[:, :, 3] -= self._p_WO
         moves = np.zeros(len(frames), bool)
         if motions:
             moves = np.array([frame in motions for frame in frames])
@@ -156,11 +154,14 @@ class MovingGroups:
             motion = motions[frames[k]]
             reaches[k] += np.linalg.norm(motion.v) * motion.duration
         in_sight = _meets(seen, X_WFs[:, :3, 3], reaches)
-        differs = (X_OLs != self._X_OLs).any(axis=(1, 2))
-        differs |= moves | self._was_in_motion
         shown = in_sight != self._in_sight
-        placed = np.flatnonzero((in_sight & differs) | shown)
-        self._X_OLs[placed] = X_OLs[placed]
+        placed = np.flatnonzero(in_sight | shown)
+        X_OLs = X_WFs[placed, :3] @ self._X_FLs[placed]
+        X_OLs[:, :, 3] -= self._p_WO
+        differs = (X_OLs != self._X_OLs[placed]).any(axis=(1, 2))
+        differs |= (shown | moves | self._was_in_motion)[placed]
+        placed, X_OLs = placed[differs], X_OLs[differs]
+        self._X_OLs[placed] = X_OLs
         for k in placed[(shown | moves | self._was_in_motion)[placed]]:
             group = self._groups[self._rows[k]]
             group.motion = motions[frames[k]] if moves[k] else None
@@ -168,7 +169,7 @@ class MovingGroups:
         self._was_in_motion[placed] = moves[placed]
         self._in_sight = in_sight
         return Placed(
-            self._rows[placed], X_OLs[placed], in_sight[placed], moves[placed]
+            self._rows[placed], X_OLs, in_sight[placed], moves[placed]
         )
 
     def _find_poses(

@@ -7,6 +7,7 @@ happens here. Quaternions leave in ROS order (x, y, z, w).
 from __future__ import annotations
 
 from collections.abc import Sequence
+import functools
 from typing import Any
 
 import numpy as np
@@ -46,31 +47,38 @@ def make_point_cloud(points: np.ndarray, frame_id: str, stamp_ns: int) -> Any:
     # A copy of bytes is several times as fast as one of records.
     rows = np.ascontiguousarray(points).view(np.uint8)
     packed = rows.reshape(-1, size).copy()
-    point_field = message_class("sensor_msgs/msg/PointField")
-    fields, padding = [], set(range(size))
-    for name, (dtype, offset, *_) in (points.dtype.fields or {}).items():
-        padding.difference_update(range(offset, offset + dtype.itemsize))
-        fields.append(
-            point_field(
-                name=name,
-                offset=offset,
-                datatype=point_field_datatype(dtype),
-                count=1,
-            )
-        )
-    for column in sorted(padding):
+    fields, padding = _point_fields(points.dtype)
+    for column in padding:
         packed[:, column] = 0
     return message_class(POINT_CLOUD)(
         header=make_header(frame_id, stamp_ns),
         height=1,
         width=len(packed),
-        fields=fields,
+        fields=list(fields),
         is_bigendian=False,
         point_step=size,
         row_step=packed.nbytes,
         data=packed.reshape(-1),
         is_dense=True,
     )
+
+
+@functools.cache
+def _point_fields(dtype: np.dtype) -> tuple[tuple[Any, ...], list[int]]:
+    """Returns the PointFields of records, and the bytes that none has."""
+    point_field = message_class("sensor_msgs/msg/PointField")
+    fields, padding = [], set(range(dtype.itemsize))
+    for name, (scalar, offset, *_) in (dtype.fields or {}).items():
+        padding.difference_update(range(offset, offset + scalar.itemsize))
+        fields.append(
+            point_field(
+                name=name,
+                offset=offset,
+                datatype=point_field_datatype(scalar),
+                count=1,
+            )
+        )
+    return tuple(fields), sorted(padding)
 
 
 def make_imu(

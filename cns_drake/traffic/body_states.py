@@ -19,6 +19,8 @@ _AWAY = (0.0, 0.0, -10_000.0)
 class BodyStates(NamedTuple):
     """N bodies at a time: vehicles, then walkers.
 
+    At T times, each array has one more dimension, the first.
+
     Attributes:
         p_WB: (N, 3) of the middle of each box on the ground [m].
         v_WB: (N, 3) velocity [m/s].
@@ -49,28 +51,29 @@ class BodyStates(NamedTuple):
     @property
     def speed(self) -> np.ndarray:
         """The (N,) speeds [m/s]."""
-        return np.linalg.norm(self.v_WB, axis=1)
+        return np.linalg.norm(self.v_WB, axis=-1)
 
 
-def bodies_at(plan: TrafficPlan, t: float) -> BodyStates:
-    """Returns the bodies at a time [s]."""
+def bodies_at(plan: TrafficPlan, t: float | np.ndarray) -> BodyStates:
+    """Returns the bodies at a time, or at (T,) times [s]."""
     vehicles, vehicle_rates = plan.vehicles.at(t)
     walkers, walker_rates = plan.walkers.at(t)
-    both = np.concatenate([vehicles[:, :4], walkers[:, :4]])
-    rates = np.concatenate([vehicle_rates[:, :4], walker_rates[:, :4]])
-    none = np.zeros(len(walkers))
-    speed = np.hypot(*walker_rates[:, :2].T)
-    swing = np.sin(walkers[:, 4]) * np.minimum(speed / _FULL_SWING, 1.0)
+    both = np.concatenate([vehicles[..., :4], walkers[..., :4]], axis=-2)
+    rates = np.concatenate(
+        [vehicle_rates[..., :4], walker_rates[..., :4]], axis=-2
+    )
+    none = np.zeros_like(walkers[..., 0])
+    speed = np.hypot(walker_rates[..., 0], walker_rates[..., 1])
+    swing = np.sin(walkers[..., 4]) * np.minimum(speed / _FULL_SWING, 1.0)
+    present = [plan.vehicles.is_present(t), plan.walkers.is_present(t)]
     return BodyStates(
-        p_WB=both[:, :3],
-        v_WB=rates[:, :3],
-        yaw=both[:, 3],
-        pitch=np.concatenate([vehicles[:, 4], none]),
-        yaw_rate=rates[:, 3],
-        present=np.concatenate(
-            [plan.vehicles.is_present(t), plan.walkers.is_present(t)]
-        ),
-        swing=np.concatenate([np.zeros(len(vehicles)), swing]),
+        p_WB=both[..., :3],
+        v_WB=rates[..., :3],
+        yaw=both[..., 3],
+        pitch=np.concatenate([vehicles[..., 4], none], axis=-1),
+        yaw_rate=rates[..., 3],
+        present=np.concatenate(present, axis=-1),
+        swing=np.concatenate([np.zeros_like(vehicles[..., 0]), swing], axis=-1),
     )
 
 
@@ -85,12 +88,15 @@ class LimbTable:
         self._swing = np.array([limb.swing for limb in limbs])
 
     def poses(self, states: BodyStates) -> tuple[np.ndarray, np.ndarray]:
-        """Returns R_WL (M, 3, 3) and p_WL (M, 3) of all limbs [m]."""
+        """Returns R_WL (M, 3, 3) and p_WL (M, 3) of all limbs [m].
+
+        At T times, both have one more dimension, the first.
+        """
         yaw, pitch = self._angles(states)
-        p_WB = np.where(states.present[:, None], states.p_WB, _AWAY)
-        R_WB = states.R_WB[self.body]
-        p_WL = p_WB[self.body] + np.einsum("nij,nj->ni", R_WB, self._joint)
-        return _matrices(yaw, pitch), p_WL
+        p_WB = np.where(states.present[..., None], states.p_WB, _AWAY)
+        R_WB = states.R_WB[..., self.body, :, :]
+        p_BL_W = np.einsum("...nij,nj->...ni", R_WB, self._joint)
+        return _matrices(yaw, pitch), p_WB[..., self.body, :] + p_BL_W
 
     def quat_xyzw(self, states: BodyStates) -> np.ndarray:
         """Returns the (M, 4) orientations of all limbs."""
@@ -98,22 +104,25 @@ class LimbTable:
 
     def _angles(self, states: BodyStates) -> tuple[np.ndarray, np.ndarray]:
         """Returns yaw and pitch of all limbs [rad]."""
-        swing = self._swing * states.swing[self.body]
+        swing = self._swing * states.swing[..., self.body]
         # A forward swing turns about -y.
-        return states.yaw[self.body], states.pitch[self.body] - swing
+        return (
+            states.yaw[..., self.body],
+            states.pitch[..., self.body] - swing,
+        )
 
 
 def _matrices(yaw: np.ndarray, pitch: np.ndarray) -> np.ndarray:
-    """Returns (N, 3, 3) rotations about y, then about z [rad]."""
+    """Returns (..., 3, 3) rotations about y, then about z [rad]."""
     (cy, sy), (cp, sp) = ((np.cos(a), np.sin(a)) for a in (yaw, pitch))
-    R = np.zeros((len(yaw), 3, 3))
-    R[:, 0, 0], R[:, 0, 1], R[:, 0, 2] = cy * cp, -sy, cy * sp
-    R[:, 1, 0], R[:, 1, 1], R[:, 1, 2] = sy * cp, cy, sy * sp
-    R[:, 2, 0], R[:, 2, 2] = -sp, cp
+    R = np.zeros((*yaw.shape, 3, 3))
+    R[..., 0, 0], R[..., 0, 1], R[..., 0, 2] = cy * cp, -sy, cy * sp
+    R[..., 1, 0], R[..., 1, 1], R[..., 1, 2] = sy * cp, cy, sy * sp
+    R[..., 2, 0], R[..., 2, 2] = -sp, cp
     return R
 
 
 def _quaternions(yaw: np.ndarray, pitch: np.ndarray) -> np.ndarray:
-    """Returns the rotations of `_matrices` as (N, 4) quaternions, x y z w."""
+    """Returns the rotations of `_matrices` as (..., 4) quaternions, x y z w."""
     (cy, sy), (cp, sp) = ((np.cos(a / 2), np.sin(a / 2)) for a in (yaw, pitch))
-    return np.column_stack([-sy * sp, cy * sp, sy * cp, cy * cp])
+    return np.stack([-sy * sp, cy * sp, sy * cp, cy * cp], axis=-1)

@@ -31,41 +31,52 @@ class Tracks:
         """The last of the times [s]."""
         return self.dt * (len(self.values) - 1)
 
-    def at(self, t: float) -> tuple[np.ndarray, np.ndarray]:
-        """Returns coordinates and their rates at a time, (N, D) each."""
+    def at(self, t: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Returns coordinates and their rates.
+
+        Args:
+            t: a time, or (T,) times [s].
+
+        Returns:
+            (N, D) each; of several times (T, N, D).
+        """
         last = len(self.values) - 1
-        inside = min(max(t / self.dt, 0.0), float(last))
-        k = min(int(inside), last - 1)
-        u = inside - k
+        k, u = self._interval(t)
+        u = u[..., None, None]
+        first = (k == 0)[..., None, None]
+        final = (k + 2 > last)[..., None, None]
         p0, p1 = self.values[k], self.values[k + 1]
-        before = self.values[max(k - 1, 0)]
-        after = self.values[min(k + 2, last)]
+        before = self.values[np.maximum(k - 1, 0)]
+        after = self.values[np.minimum(k + 2, last)]
         # At both ends of the track a body is at rest.
-        m0 = (p1 - before) / 2 if k > 0 else np.zeros_like(p0)
-        m1 = (after - p0) / 2 if k + 2 <= last else np.zeros_like(p0)
+        m0 = np.where(first, 0.0, (p1 - before) / 2)
+        m1 = np.where(final, 0.0, (after - p0) / 2)
         if self.present is not None:
             # A place at which a body is absent does not count.
-            here = self.present
-            alone = ~here[max(k - 1, 0)][:, None]
+            alone = ~self.present[np.maximum(k - 1, 0)][..., None]
             m0 = np.where(alone, p1 - p0, m0)
-            alone = ~here[min(k + 2, last)][:, None]
+            alone = ~self.present[np.minimum(k + 2, last)][..., None]
             m1 = np.where(alone, p1 - p0, m1)
         a = 2 * p0 + m0 - 2 * p1 + m1
         b = -3 * p0 - 2 * m0 + 3 * p1 - m1
         value = ((a * u + b) * u + m0) * u + p0
         rate = ((3 * a * u + 2 * b) * u + m0) / self.dt
-        if not 0.0 <= t <= self.duration:
-            rate = np.zeros_like(rate)
-        return value, rate
+        rests = (np.asarray(t) < 0.0) | (np.asarray(t) > self.duration)
+        return value, np.where(rests[..., None, None], 0.0, rate)
 
-    def is_present(self, t: float) -> np.ndarray:
-        """Returns (N,) whether each is there at a time."""
+    def is_present(self, t: float | np.ndarray) -> np.ndarray:
+        """Returns whether each body is there at a time, (N,) or (T, N)."""
+        k, _ = self._interval(t)
         if self.present is None:
-            return np.ones(self.values.shape[1], bool)
-        last = len(self.values) - 1
-        inside = min(max(t / self.dt, 0.0), float(last))
-        k = min(int(inside), last - 1)
+            return np.ones((*k.shape, self.values.shape[1]), bool)
         return self.present[k] & self.present[k + 1]
+
+    def _interval(self, t: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Returns the interval of each time, and its place in there."""
+        last = len(self.values) - 1
+        inside = np.clip(np.asarray(t, float) / self.dt, 0.0, float(last))
+        k = np.minimum(inside.astype(int), last - 1)
+        return k, inside - k
 
     def select(self, chosen: np.ndarray) -> Tracks:
         """Returns the tracks of some bodies."""

@@ -13,12 +13,15 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, LeafSystem, ValueProducer
 from scipy.spatial.transform import Rotation
 
+from cns_drake.motion.tick_blocks import TickBlocks
 from cns_drake.traffic.body_shapes import Limb
-from cns_drake.traffic.body_states import BodyStates, LimbTable, bodies_at
+from cns_drake.traffic.body_states import LimbTable, bodies_at
 from cns_drake.traffic.traffic_plan import WALKER_SIZE, TrafficPlan
 
 # Faster bodies are labelled as moving, slower ones as standing [m/s].
 MOVING_SPEED = 0.5
+# Times at which bodies are computed together.
+_BLOCK = 16
 
 
 class TrafficObjects(NamedTuple):
@@ -63,6 +66,32 @@ class TrafficBody(NamedTuple):
     semantic_class: str
     limbs: tuple[Limb, ...]
     frames: tuple[FrameId, ...]
+
+
+class _Moment(NamedTuple):
+    """The N bodies and M limbs at a time.
+
+    At T times, each array has one more dimension, the first.
+
+    Attributes:
+        X_WLs: (M, 4, 4) poses of the limbs.
+        limb_quat_xyzw: (M, 4) their orientations.
+        p_WO: (N, 3) middles of the bodies' boxes [m].
+        quat_xyzw: (N, 4) their orientations.
+        v_WB: (N, 3) velocities [m/s].
+        yaw_rate: (N,) [rad/s].
+        is_moving: (N,) whether each is labelled as moving.
+        present: (N,) whether it is there.
+    """
+
+    X_WLs: np.ndarray
+    limb_quat_xyzw: np.ndarray
+    p_WO: np.ndarray
+    quat_xyzw: np.ndarray
+    v_WB: np.ndarray
+    yaw_rate: np.ndarray
+    is_moving: np.ndarray
+    present: np.ndarray
 
 
 class TrafficMotion(LeafSystem):
@@ -122,10 +151,11 @@ class TrafficMotion(LeafSystem):
             + [WALKER_SIZE] * (len(bodies) - len(plan.kinds))
         ).reshape(-1, 3)
         now = {self.time_ticket()}
-        self._states = self.DeclareCacheEntry(
+        self._blocks = TickBlocks(self._moments, turn, _BLOCK)
+        self._moment = self.DeclareCacheEntry(
             description="where bodies are",
             value_producer=ValueProducer(
-                allocate=lambda: Value(object()), calc=self._calc_states
+                allocate=lambda: Value(object()), calc=self._calc_moment
             ),
             prerequisites_of_calc=now,
         )
@@ -160,25 +190,38 @@ class TrafficMotion(LeafSystem):
         """Limb's frame -> its row in the ports of all limbs."""
         return {frame: k for k, frame in enumerate(self._frames)}
 
-    def _calc_states(self, context: Context, value: AbstractValue) -> None:
-        value.set_value(bodies_at(self._plan, context.get_time()))
+    def _calc_moment(self, context: Context, value: AbstractValue) -> None:
+        value.set_value(_Moment(*self._blocks.at(context.get_time())))
+
+    def _moments(self, times: np.ndarray) -> _Moment:
+        """Returns the bodies at (T,) times [s]."""
+        states = bodies_at(self._plan, times)
+        X_WLs = np.zeros((len(times), len(self._frames), 4, 4))
+        X_WLs[..., :3, :3], X_WLs[..., :3, 3] = self._limbs.poses(states)
+        X_WLs[..., 3, 3] = 1.0
+        up = states.R_WB[..., 2]
+        return _Moment(
+            X_WLs,
+            self._limbs.quat_xyzw(states),
+            states.p_WB + up * self._sizes[:, 2:] / 2,
+            states.quat_xyzw,
+            states.v_WB,
+            states.yaw_rate,
+            states.speed > MOVING_SPEED,
+            states.present,
+        )
 
     def _calc_frame_poses(
         self, context: Context, output: AbstractValue
     ) -> None:
-        X_WLs = np.tile(np.eye(4), (len(self._frames), 1, 1))
-        X_WLs[:, :3, :3], X_WLs[:, :3, 3] = self._limbs.poses(
-            self._states.Eval(context)
-        )
-        output.set_value(X_WLs)
+        output.set_value(self._moment.Eval(context).X_WLs)
 
     def _calc_pose(self, context: Context, output: AbstractValue) -> None:
-        X_WLs = self._poses.Eval(context)
+        moment: _Moment = self._moment.Eval(context)
         # Each free body has a quaternion (real part first) and a position.
-        q = np.empty((len(X_WLs), 7))
-        quat_xyzw = self._limbs.quat_xyzw(self._states.Eval(context))
-        q[:, :4] = quat_xyzw[:, [3, 0, 1, 2]]
-        q[:, 4:] = X_WLs[:, :3, 3]
+        q = np.empty((len(moment.X_WLs), 7))
+        q[:, :4] = moment.limb_quat_xyzw[:, [3, 0, 1, 2]]
+        q[:, 4:] = moment.X_WLs[:, :3, 3]
         self._plant.SetPositions(self._plant_context, q.ravel())
         port = self._plant.get_geometry_pose_output_port()
         output.SetFrom(port.EvalAbstract(self._plant_context))
@@ -195,24 +238,22 @@ class TrafficMotion(LeafSystem):
         output.set_value(list(map(SpatialVelocity, w, v)))
 
     def _calc_moving(self, context: Context, output: AbstractValue) -> None:
-        speed = self._states.Eval(context).speed
-        output.set_value(self._instances[speed > MOVING_SPEED])
+        is_moving = self._moment.Eval(context).is_moving
+        output.set_value(self._instances[is_moving])
 
     def _calc_objects(self, context: Context, output: AbstractValue) -> None:
-        states: BodyStates = self._states.Eval(context)
-        rows = np.flatnonzero(states.present)
-        sizes = self._sizes[rows]
-        up = states.R_WB[rows, :, 2]
+        moment: _Moment = self._moment.Eval(context)
+        rows = np.flatnonzero(moment.present)
         output.set_value(
             TrafficObjects(
                 self._instances[rows],
                 tuple(self._names[rows].tolist()),
                 tuple(self._classes[rows].tolist()),
-                states.p_WB[rows] + up * sizes[:, 2:] / 2,
-                states.quat_xyzw[rows],
-                sizes,
-                states.v_WB[rows],
-                states.yaw_rate[rows],
-                states.speed[rows] > MOVING_SPEED,
+                moment.p_WO[rows],
+                moment.quat_xyzw[rows],
+                self._sizes[rows],
+                moment.v_WB[rows],
+                moment.yaw_rate[rows],
+                moment.is_moving[rows],
             )
         )
