@@ -49,3 +49,18 @@ def test_objects_that_come_and_go():
     # The motion is not continued before its begin.
     values[:2] = 1e6
     assert tracks.at(2.5)[0] == pytest.approx(2.5)
+
+
+@pytest.mark.parametrize("comes_and_goes", [False, True])
+def test_many_times_give_what_each_gives(tracks, comes_and_goes):
+    if comes_and_goes:
+        here = np.random.default_rng(6).random((20, 3)) < 0.7
+        tracks = Tracks(tracks.dt, tracks.values, here)
+    t = np.concatenate([[-0.1, 0.0, 1.9, 2.5], np.arange(0.0, 2.0, 0.037)])
+    values, rates = tracks.at(t)
+    for k, one in enumerate(t):
+        np.testing.assert_array_equal(values[k], tracks.at(one)[0])
+        np.testing.assert_array_equal(rates[k], tracks.at(one)[1])
+        np.testing.assert_array_equal(
+            tracks.is_present(t)[k], tracks.is_present(one)
+        )
