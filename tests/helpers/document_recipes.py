@@ -178,7 +178,11 @@ RECIPES = {
     "diagram script": Recipe(
         ".venv/bin/python diagrams/metropolis_01.py",
         changes=(("--frames 200", "--frames 2"),),
-        makes=("recordings/metropolis_01/metadata.yaml", "drive.html"),
+        makes=(
+            "recordings/metropolis_01/metadata.yaml",
+            "recordings/metropolis_01/metropolis_01_0.mcap",
+            "drive.html",
+        ),
     ),
     "evaluation": Recipe(
         ".venv/bin/cns-eval tcr output/metropolis_01",

@@ -154,12 +154,9 @@ def test_weather_that_cannot_be(files, tmp_path, capfd, words, fault):
     assert line.startswith(f"cns-drake: error: {fault}")
 
 
-def test_diagram_script(tmp_path):
-    script = DIAGRAMS / "metropolis_04.py"
-    result = run("--output", tmp_path, "--frames", 2, script=script)
-    assert result.returncode == 0, result.stderr
-    assert (tmp_path / "metropolis_04" / "metropolis_04_0.mcap").is_file()
-    shown = run("--help", script=script)
+def test_diagram_script_has_options():
+    """Where the documents run one, `test_recipes` does."""
+    shown = run("--help", script=DIAGRAMS / "metropolis_04.py")
     assert shown.returncode == 0
     for option in ("frames", "output", "lidar", "recording", "graphviz"):
         assert f"--{option}" in shown.stdout
