@@ -194,7 +194,7 @@ def part_mesh(part: Part, meshes: Mapping[str, Mesh]) -> Mesh:
     else:
         mesh = _round_mesh(shape.radius, 2 * shape.radius)
     vertices = mesh.vertices * scale @ rotation(part.rpy).T + part.xyz
-    return Mesh(vertices, mesh.faces)
+    return mesh.with_vertices(vertices)
 
 
 def rotation(rpy: tuple[float, float, float]) -> np.ndarray:

@@ -33,8 +33,9 @@ def snap(geometry: BaseGeometry) -> BaseGeometry:
 
 def hull_of(xy: np.ndarray) -> BaseGeometry:
     """Returns the convex hull of places (N, 2)."""
-    # `MultiPoint` makes a point at a time, which takes far longer.
-    hull = shapely.convex_hull(shapely.multipoints(xy))
+    # Points are made one at a time, which takes far longer than a line.
+    make = shapely.linestrings if len(xy) > 1 else shapely.multipoints
+    hull = shapely.convex_hull(make(xy))
     assert isinstance(hull, BaseGeometry)
     return hull
 
