@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.garbage import uncollected
 from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.terminal import note, print_rows
 from cns_drake.imports.building_years import Undated
@@ -111,10 +112,6 @@ def import_city(
 
     Writes its stages, two drives along its streets and a picture from above.
     """
-    with uninterrupted():
-        from cns_drake.imports import import_map
-        from cns_drake.scenarios.sequence_table import write_table
-
     # The years that follow the first of --years come as arguments.
     paths = [word for word in source if not word.isdecimal()]
     more = [int(word) for word in source if word.isdecimal()]
@@ -138,16 +135,26 @@ def import_city(
         grow,
         dressed=not plain,
     )
-    report = import_map.import_city(
+    with uncollected():
+        report = _imported(path, output, options)
+    print_rows(_rows(report, options.years))
+    for line in _shortcomings(report, output, options):
+        note(f"{output}: {line}")
+
+
+def _imported(path: Path, output: Path, options: ImportOptions) -> ImportReport:
+    """Writes the map folder of a file."""
+    with uninterrupted():
+        from cns_drake.imports import import_map
+        from cns_drake.scenarios.sequence_table import write_table
+
+    return import_map.import_city(
         path,
         output,
         options,
         note,
         finish=lambda folder, sizes: write_table(folder, note, sizes),
     )
-    print_rows(_rows(report, options.years))
-    for line in _shortcomings(report, output, options):
-        note(f"{output}: {line}")
 
 
 def _shortcomings(

@@ -13,6 +13,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.interrupts import uninterrupted
 from cns_drake.base.map_folder import LANES_NAME
 from cns_drake.city.geometry.structures import MeshShape
 from cns_drake.imports.dressing.whole_city import dress_city
@@ -28,8 +29,6 @@ from cns_drake.imports.import_report import DriveOn, ImportOptions, ImportReport
 from cns_drake.imports.import_structures import import_cityjson
 from cns_drake.imports.map_files import map_draft, write_facts, write_world
 from cns_drake.imports.near_drives import drive_along
-from cns_drake.imports.opendrive.town import build_town
-from cns_drake.imports.opendrive.town_files import write_town
 from cns_drake.imports.openstreetmap import import_openstreetmap
 from cns_drake.imports.osm_traffic import lanes_of_streets
 from cns_drake.imports.staged_city import StagedCity, stage_city
@@ -187,6 +186,10 @@ def _import_roads(
     progress: Progress,
     finish: Finish,
 ) -> ImportReport:
+    with uninterrupted():  # They import the whole city generator.
+        from cns_drake.imports.opendrive.town import build_town
+        from cns_drake.imports.opendrive.town_files import write_town
+
     town = build_town(source, options.seed, progress, options.dressed)
     with map_draft(output) as draft:
         report, sizes = write_town(draft, source, town, progress)

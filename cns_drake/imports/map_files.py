@@ -15,8 +15,8 @@ import yaml
 from cns_drake.base.files import part_path, user_errors
 from cns_drake.base.jobs.side_by_side import side_by_side
 from cns_drake.base.map_folder import MESH_FOLDER, STRUCTURES_NAME, stage_name
-from cns_drake.city.generation.generate import structure_table
 from cns_drake.city.generation.sdf import stage_sdf
+from cns_drake.city.generation.structure_rows import structure_table
 from cns_drake.city.geometry.mesh import Mesh
 from cns_drake.city.geometry.structures import (
     BoxShape,
@@ -128,8 +128,9 @@ def _write_meshes(
 
 def triangles_in(obj: str) -> int:
     """Returns the number of triangles of a mesh's faces."""
-    faces = obj[obj.find("\nf ") :].split()
-    return len(faces) - 3 * faces.count("f")
+    faces = obj[obj.find("\nf ") :]
+    # A face of three corners has three spaces, and each further corner one.
+    return faces.count(" ") - 2 * faces.count("f")
 
 
 def _size(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cns_drake.base.errors import InputError
-from cns_drake.city.generation.generate import MAX_STRUCTURES
+from cns_drake.city.generation.structure_rows import MAX_STRUCTURES
 from cns_drake.imports.building_years import stage_names, stands_at
 from cns_drake.imports.foreign_city import ForeignCity, Imported
 from cns_drake.imports.gone_buildings import with_gone

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-import csv
-import io
 import os
 from pathlib import Path
 import tempfile
@@ -23,13 +21,13 @@ from cns_drake.city.generation.city_structures import (
 )
 from cns_drake.city.generation.renaming import find_renaming, renamed_text
 from cns_drake.city.generation.sdf import stage_sdf
+from cns_drake.city.generation.structure_rows import (
+    MAX_STRUCTURES,
+    structure_table,
+)
 from cns_drake.city.geometry.structures import MeshShape, Structure
 from cns_drake.city.growth.stage_structures import GrowingCity
 from cns_drake.city.plan.stages import Stages, load_stages
-from cns_drake.scene.semantics import CLASS_IDS
-
-# Instance ids are stored as uint16; 0 means no structure.
-MAX_STRUCTURES = 2**16 - 1
 
 
 def render_city(
@@ -116,28 +114,6 @@ def render_stages(
         )
     files.update(_mesh_files(used))
     return files
-
-
-def structure_table(structures: Iterable[Structure]) -> str:
-    """Returns the CSV that maps instance ids to names and classes."""
-    out = io.StringIO()
-    table = csv.writer(out, lineterminator="\n")
-    table.writerow(
-        ["instance", "name", "class", "label", "x", "y", "z", "yaw", "tags"]
-    )
-    for instance, structure in enumerate(structures, start=1):
-        table.writerow(
-            [
-                instance,
-                structure.name,
-                structure.semantic_class,
-                CLASS_IDS[structure.semantic_class],
-                *(f"{value:.3f}" for value in structure.xyz),
-                f"{structure.yaw:.5f}",
-                " ".join(structure.tags),
-            ]
-        )
-    return out.getvalue()
 
 
 def generate_city(
