@@ -7,7 +7,7 @@ and files is too much.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 import contextlib
 from functools import partial
 import gc
@@ -50,9 +50,7 @@ def side_by_side(calls: Sequence[Callable[[], Any]]) -> list[Any]:
     Raises:
         Exception: what the first of the failing calls raises.
     """
-    wanted = min(num_cores(), len(calls)) - 1
-    if not (sys.platform == "linux" and threading.active_count() == 1):
-        wanted = 0
+    wanted = min(num_cores(), len(calls)) - 1 if _can_fork() else 0
     found: dict[int, _Outcome] = {}
     with contextlib.ExitStack() as stack:
         numbers = _numbers(len(calls))
@@ -77,6 +75,41 @@ def side_by_side(calls: Sequence[Callable[[], Any]]) -> list[Any]:
     return results
 
 
+@contextlib.contextmanager
+def begun(call: Callable[[], _Result]) -> Iterator[Callable[[], _Result]]:
+    """Begins a call, by a forked process, and yields what waits for its result.
+
+    This process can make calls side by side meanwhile. Without a second core,
+    or where no process can be forked, it makes the call when it waits.
+
+    Args:
+        call: of which nothing but the result remains.
+
+    Yields:
+        What returns the result, or raises what the call raises; to be called
+        once.
+    """
+    with contextlib.ExitStack() as stack:
+        helper: _Helper | None = None
+        if _can_fork() and num_cores() > 1:
+            numbers = _numbers(1)
+            stack.callback(os.close, numbers)
+            with contextlib.suppress(OSError):
+                helper = _Helper([call], numbers, [])
+                stack.callback(helper.end)
+
+        def wait() -> _Result:
+            found = {} if helper is None else helper.found()
+            if not found:
+                return call()
+            result, error = found[0]
+            if error is not None:
+                raise error
+            return result
+
+        yield wait
+
+
 def mapped(
     function: Callable[[_Item], _Result], items: Sequence[_Item]
 ) -> list[_Result]:
@@ -85,6 +118,10 @@ def mapped(
     parts = [items[k : k + size] for k in range(0, len(items), size or 1)]
     calls = [partial(_of_part, function, part) for part in parts]
     return list(chain.from_iterable(side_by_side(calls)))
+
+
+def _can_fork() -> bool:
+    return sys.platform == "linux" and threading.active_count() == 1
 
 
 def _of_part(

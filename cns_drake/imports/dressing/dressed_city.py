@@ -17,6 +17,7 @@ from cns_drake.city.geometry.structures import (
     Model,
     Part,
 )
+from cns_drake.imports.dressing.bare_buildings import Bare, all_laid_bare
 from cns_drake.imports.dressing.facade_pieces import Faces, add_facade
 from cns_drake.imports.dressing.facade_plan import (
     FacadePlan,
@@ -24,18 +25,15 @@ from cns_drake.imports.dressing.facade_plan import (
     with_doors,
     with_shops,
 )
-from cns_drake.imports.dressing.roof_pieces import is_flat_roof, roof_pieces
-from cns_drake.imports.dressing.styles import Style, make_style
+from cns_drake.imports.dressing.roof_pieces import roof_pieces
 from cns_drake.imports.dressing.upper_sides import (
     UpperSides,
-    looks_up,
     turned_up,
 )
 from cns_drake.imports.dressing.visible_walls import DriveViews
 from cns_drake.imports.dressing.wall_panels import (
     Panel,
     find_panels,
-    is_upright,
 )
 from cns_drake.imports.foreign_city import Imported
 from cns_drake.imports.import_ground import Ground
@@ -53,8 +51,6 @@ _OF_OPENING, _OF_WALL = 30, 40
 _SHOPS_WITHIN = 16.0
 # From this level of detail on a model has its own roof, and windows.
 _OWN_ROOF, _OWN_WINDOWS = 2.2, 3.0
-# A building whose feet are farther from the ground was sunk into it [m].
-_LET_IN = 2.0
 _NO_TRIANGLES = np.zeros((0, 3, 3))
 
 
@@ -74,29 +70,68 @@ class DressedBuildings:
 
 
 @dataclass(frozen=True)
-class _Bare:
-    """A building by its surfaces, (M, 3, 3) each [m]."""
+class PlannedBuildings:
+    """Buildings with the plans of their walls.
 
-    one: Imported
-    walls: np.ndarray
-    roof: np.ndarray
-    rest: np.ndarray
-    base: float
-    style: Style
-    is_flat: bool
-    rng: np.random.Generator
+    Attributes:
+        bare: the buildings.
+        plans: number of a building -> its dressed walls.
+        distances: number of a building -> their distances to the drives [m].
+        paths: of the drives.
+        seed: of the lot.
+    """
+
+    bare: Sequence[Bare]
+    plans: Mapping[int, list[FacadePlan]]
+    distances: Mapping[int, list[float]]
+    paths: BaseGeometry
+    seed: int
+
+    def dressed(self, paving: np.ndarray = _NO_TRIANGLES) -> DressedBuildings:
+        """Dresses the buildings.
+
+        Args:
+            paving: triangles (M, 3, 3) of terrain, streets and sidewalks, above
+                which doors stand [m].
+        """
+        plans = self.plans
+        if plans:
+            plans = _with_steps(plans, UpperSides(turned_up(paving)))
+
+        def make(number: int) -> tuple[Model, Counter[str]]:
+            walls = zip(
+                plans.get(number, ()),
+                self.distances.get(number, ()),
+                strict=True,
+            )
+            return _dressed(
+                self.bare[number], list(walls), self.paths, self.seed
+            )
+
+        by_lot: Counter[str] = Counter()
+        by_file: Counter[str] = Counter()
+        dressed = {}
+        for some, (model, counts) in zip(
+            self.bare, mapped(make, range(len(self.bare))), strict=True
+        ):
+            by_lot += counts
+            by_file.update(some.style.by_tag)
+            structure = replace(some.one.structure, model=model)
+            dressed[some.one] = replace(some.one, structure=structure)
+        return DressedBuildings(
+            dressed, dict(sorted(by_lot.items())), dict(sorted(by_file.items()))
+        )
 
 
-def dress_buildings(
+def plan_buildings(
     structures: Sequence[Imported],
     drives: Sequence[Drive],
     streets: Sequence[Street],
     ground: Ground,
     seed: int,
     always: Collection[Imported] | None = None,
-    paving: np.ndarray = _NO_TRIANGLES,
-) -> DressedBuildings:
-    """Dresses the buildings of a city.
+) -> PlannedBuildings:
+    """Plans the look of the buildings of a city.
 
     A building looks the same in each stage and each import, since its random
     draws depend on its name. Only the choice of walls with windows depends on
@@ -110,15 +145,9 @@ def dress_buildings(
         seed: of the lot.
         always: structures of all stages, which hide what is behind them; all
             structures if None.
-        paving: triangles (M, 3, 3) of terrain, streets and sidewalks, above
-            which doors stand [m].
     """
     buildings = [one for one in structures if one.kind.startswith("Building")]
-    bare = _all_laid_bare(buildings, ground, seed)
-    by_lot: Counter[str] = Counter()
-    by_file: Counter[str] = Counter()
-    for some in bare:
-        by_file.update(some.style.by_tag)
+    bare = all_laid_bare(buildings, ground, seed)
     plans: Mapping[int, list[FacadePlan]] = {}
     distances: Mapping[int, list[float]] = {}
     if drives and bare:
@@ -127,29 +156,12 @@ def dress_buildings(
         solids = np.concatenate([np.zeros((0, 3, 3)), *hiding])
         views = DriveViews(drives, ground, solids)
         plans, distances = _plans(bare, drives, streets, ground, views)
-        plans = _with_steps(plans, UpperSides(turned_up(paving)))
     paths = MultiLineString([drive.path for drive in drives])
-
-    def make(number: int) -> tuple[Model, Counter[str]]:
-        walls = zip(
-            plans.get(number, ()), distances.get(number, ()), strict=True
-        )
-        return _dressed(bare[number], list(walls), paths, seed)
-
-    dressed = {}
-    for some, (model, counts) in zip(
-        bare, mapped(make, range(len(bare))), strict=True
-    ):
-        by_lot += counts
-        structure = replace(some.one.structure, model=model)
-        dressed[some.one] = replace(some.one, structure=structure)
-    return DressedBuildings(
-        dressed, dict(sorted(by_lot.items())), dict(sorted(by_file.items()))
-    )
+    return PlannedBuildings(bare, plans, distances, paths, seed)
 
 
 def _dressed(
-    some: _Bare,
+    some: Bare,
     plans: Sequence[tuple[FacadePlan, float]],
     paths: BaseGeometry,
     seed: int,
@@ -176,53 +188,8 @@ def _dressed(
     return _assembled(some, faces, roof), faces.counts
 
 
-def _all_laid_bare(
-    buildings: Sequence[Imported], ground: Ground, seed: int
-) -> list[_Bare]:
-    """Returns all buildings, lower variants in the style of the original."""
-    whole = [
-        _laid_bare(one, ground, seed) for one in buildings if not one.original
-    ]
-    styles = {some.one.lot_name: some.style for some in whole}
-    lower = [
-        _laid_bare(one, ground, seed, styles.get(one.original))
-        for one in buildings
-        if one.original
-    ]
-    return whole + lower
-
-
-def _laid_bare(
-    one: Imported, ground: Ground, seed: int, known: Style | None = None
-) -> _Bare:
-    surfaces = {"body": np.zeros((0, 3, 3)), "roof": np.zeros((0, 3, 3))}
-    for part in one.structure.model.parts:
-        if isinstance(part.shape, MeshShape):
-            mesh = one.structure.model.meshes[part.shape.mesh]
-            surfaces[part.name] = mesh.vertices[mesh.triangles()]
-    body = surfaces["body"]
-    upright, up = is_upright(body), looks_up(body)
-    roof = np.concatenate([surfaces["roof"], body[up]])
-    walls, rest = body[upright], body[~upright & ~up]
-    corners = one.triangles.reshape(-1, 3)
-    foot = float(corners[:, 2].min())
-    below = float(ground.height(corners[:, :2]).min())
-    base = foot if abs(foot - below) < _LET_IN else below
-    width, depth = np.ptp(corners[:, :2], axis=0)
-    top = walls if len(walls) else one.triangles
-    height = max(1.0, float(top[:, :, 2].max()) - base)
-    is_flat = bool(len(roof)) and is_flat_roof(roof)
-    rng = lot_generator(seed, "dressing", one.lot_name)
-    area = 0.8 * float(width * depth)
-    style = make_style(one.tags, one.year, area, height, is_flat, rng)
-    if known is not None:
-        storeys = max(1, round(height / known.storey))
-        style = replace(known, storey=height / storeys)
-    return _Bare(one, walls, roof, rest, base, style, is_flat, rng)
-
-
 def _plans(
-    bare: Sequence[_Bare],
+    bare: Sequence[Bare],
     drives: Sequence[Drive],
     streets: Sequence[Street],
     ground: Ground,
@@ -350,7 +317,7 @@ def _front(
     return min(possible, key=lambda k: (to_way[k], k)) if possible else None
 
 
-def _undressed_walls(some: _Bare, plans: Sequence[FacadePlan]) -> np.ndarray:
+def _undressed_walls(some: Bare, plans: Sequence[FacadePlan]) -> np.ndarray:
     """Returns the walls (M, 3, 3) of a building without those planned."""
     if not plans:
         return some.walls
@@ -359,7 +326,7 @@ def _undressed_walls(some: _Bare, plans: Sequence[FacadePlan]) -> np.ndarray:
     return np.array(kept).reshape(-1, 3, 3)
 
 
-def _roof(some: _Bare, paths: BaseGeometry) -> Model:
+def _roof(some: Bare, paths: BaseGeometry) -> Model:
     near = False
     if len(some.roof) and some.one.lod < _OWN_ROOF and not paths.is_empty:
         outline = some.one.structure.model.footprint
@@ -378,7 +345,7 @@ def _wall_name(panel: Panel) -> str:
     return f"wall {panel.length:.1f} {heading:.0f}"
 
 
-def _assembled(some: _Bare, faces: Faces, roof: Model) -> Model:
+def _assembled(some: Bare, faces: Faces, roof: Model) -> Model:
     style, structure = some.style, some.one.structure
     colours = {
         "body": style.wall,

@@ -134,7 +134,7 @@ def _off_carriageway(
         structure=replace(structure, xyz=(x, y, z)),
         triangles=tree.triangles + np.array([x - xy[0], y - xy[1], 0.0]),
     )
-    placing.found.moved[tree] = moved
+    placing.found.moved[structure.name] = moved
     return moved
 
 

@@ -36,7 +36,7 @@ class StreetThings:
     Attributes:
         structures: in the world.
         from_file: names of structures from the file.
-        moved: trees of the file -> the same beside the carriageway.
+        moved: name of a tree of the file -> the same beside the carriageway.
         sources: sources of the file's things that were placed.
         by_file, by_lot: kind -> how many.
         no_room: how many of the file's things would stand in the way of a
@@ -45,7 +45,7 @@ class StreetThings:
 
     structures: list[Imported] = field(default_factory=list)
     from_file: set[str] = field(default_factory=set)
-    moved: dict[Imported, Imported] = field(default_factory=dict)
+    moved: dict[str, Imported] = field(default_factory=dict)
     sources: set[str] = field(default_factory=set)
     by_file: Counter[str] = field(default_factory=Counter)
     by_lot: Counter[str] = field(default_factory=Counter)

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+import contextlib
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from cns_drake.base.errors import InputError
-from cns_drake.city.generation.generate import MAX_STRUCTURES
+from cns_drake.base.jobs.side_by_side import begun
+from cns_drake.city.generation.structure_rows import MAX_STRUCTURES
 from cns_drake.city.geometry.structures import Structure
-from cns_drake.imports.dressing.dressed_city import dress_buildings
+from cns_drake.imports.dressing.dressed_city import plan_buildings
 from cns_drake.imports.dressing.grounds import (
     is_dense,
     missing_sidewalks,
@@ -103,43 +105,52 @@ def dress_city(
     """
     always = set.intersection(*map(set, staged.standing.values()))
     is_paved = is_dense(staged.kept)
-    laid = _laid(staged, city, drives, ground, is_paved)
-    paving = [
-        one.triangles
-        for one in [*staged.kept, *laid]
-        if one.is_ground or one.kind == "Sidewalk"
-    ]
-    buildings = dress_buildings(
-        staged.kept,
-        drives,
-        city.streets,
-        ground,
-        seed,
-        always,
-        np.concatenate([np.zeros((0, 3, 3)), *paving]),
-    )
+    with contextlib.ExitStack() as stack:
+        laying = stack.enter_context(
+            begun(lambda: _laid(staged, city, drives, ground, is_paved))
+        )
+        planned = plan_buildings(
+            staged.kept, drives, city.streets, ground, seed, always
+        )
+        laid = laying()
+        marks = list(lane_marks(city.streets, drives)) if drives else []
+        added = [
+            with_kerb(one) if one.kind == "Sidewalk" else one for one in laid
+        ]
+        added += marks
+        dressing = stack.enter_context(
+            begun(
+                lambda: dress_streets(
+                    [*staged.kept, *added],
+                    city.things,
+                    city.streets,
+                    drives,
+                    ground,
+                    seed,
+                )
+            )
+        )
+        paving = [
+            one.triangles
+            for one in [*staged.kept, *laid]
+            if one.is_ground or one.kind == "Sidewalk"
+        ]
+        buildings = planned.dressed(
+            np.concatenate([np.zeros((0, 3, 3)), *paving])
+        )
+        things = dressing()
     changed = dict(buildings.buildings)
     by_lot = Counter(buildings.by_lot)
+    by_lot += Counter(one.kind for one in added)
     if is_paved and not any(map(_has_ground_kind, staged.kept)):
         changed |= {
             one: replace(one, structure=paved(one.structure))
             for one in staged.kept
             if one.kind == _TERRAIN
         }
-    added: list[Imported] = []
     if drives:
         walks = [one for one in staged.kept if one.kind == "Sidewalk"]
         changed |= {one: with_kerb(one) for one in near_drives(walks, drives)}
-        by_lot += Counter(one.kind for one in laid)
-        marks = list(lane_marks(city.streets, drives))
-        by_lot["Lane mark"] += len(marks)
-        added = [
-            with_kerb(one) if one.kind == "Sidewalk" else one for one in laid
-        ]
-        added += marks
-    things = dress_streets(
-        [*staged.kept, *added], city.things, city.streets, drives, ground, seed
-    )
     added += things.structures
     for thing in city.things:
         if thing.source in things.sources:
@@ -161,7 +172,12 @@ def dress_city(
         "by_lot": dict(sorted((+by_lot + things.by_lot).items())),
         "without_room": things.no_room,
     }
-    dressed = staged.replaced({**changed, **things.moved}).joined(added)
+    moved = {
+        one: things.moved[one.structure.name]
+        for one in staged.kept
+        if one.structure.name in things.moved
+    }
+    dressed = staged.replaced({**changed, **moved}).joined(added)
     if len(dressed.kept) >= MAX_STRUCTURES:
         raise InputError(
             f"--plain: without it the city has {len(dressed.kept)} structures,"

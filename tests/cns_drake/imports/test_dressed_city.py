@@ -14,7 +14,7 @@ import yaml
 
 from cns_drake.city.geometry.object_parts import part_triangles
 from cns_drake.command_line.cli import app
-from cns_drake.imports.dressing.dressed_city import dress_buildings
+from cns_drake.imports.dressing.dressed_city import plan_buildings
 from cns_drake.imports.dressing.reliefs import Openings, framed, open_wall
 from cns_drake.imports.dressing.styles import Use, building_use, tagged_colour
 from cns_drake.imports.dressing.wall_panels import find_panels, is_upright
@@ -57,7 +57,8 @@ def surfaces(one):
 def dressed(city, path=STREET, seed=0):
     drives = [Drive(path, path)]
     ground = ground_of(city.structures)
-    result = dress_buildings(city.structures, drives, (), ground, seed)
+    planned = plan_buildings(city.structures, drives, (), ground, seed)
+    result = planned.dressed()
     names = {one.structure.name: one for one in result.buildings}
     return {k: result.buildings[v] for k, v in names.items()}, result
 
@@ -208,7 +209,8 @@ def test_a_lower_house_has_the_colours_of_the_whole_one(row):
     staged, growth = grow(stage_city("f", city, ImportOptions()), 0.9, 4)
     assert growth.lower
     drives = [Drive(STREET, STREET)]
-    found = dress_buildings(staged.kept, drives, (), ground_of(staged.kept), 0)
+    ground = ground_of(staged.kept)
+    found = plan_buildings(staged.kept, drives, (), ground, 0).dressed()
     new = {o.structure.name: o for o in found.buildings.values()}
     for name in growth.lower:
         whole, low = new[name], new[f"{name}_lower"]
@@ -247,10 +249,10 @@ def test_a_house_behind_one_that_always_stands_has_no_windows(
     low = city.structures[0].triangles.min(axis=(0, 1))
     path = STREET * [0.2, 1.0] + low[:2] + [40.0, 6.0]
     always = city.structures if is_lasting else city.structures[1:]
-    result = dress_buildings(
+    result = plan_buildings(
         city.structures, [Drive(path, path)], (), ground_of(city.structures),
         0, always,
-    )  # fmt: skip
+    ).dressed()  # fmt: skip
     after = {o.structure.name: o for o in result.buildings.values()}
     has_glass = "glass" in surfaces(after[f"building_w{behind}"])
     assert has_glass is not is_lasting

@@ -11,7 +11,7 @@ import pytest
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs import side_by_side as module
-from cns_drake.base.jobs.side_by_side import mapped, side_by_side
+from cns_drake.base.jobs.side_by_side import begun, mapped, side_by_side
 
 # A test's process has threads, beside which nothing is forked.
 BEGIN = """
@@ -19,7 +19,7 @@ import os, signal, sys, time
 from pathlib import Path
 from cns_drake.base.errors import InputError
 from cns_drake.base.jobs import side_by_side as module
-from cns_drake.base.jobs.side_by_side import mapped, side_by_side
+from cns_drake.base.jobs.side_by_side import begun, mapped, side_by_side
 module.num_cores = lambda: 3
 
 def meet(place, number=3):
@@ -73,6 +73,52 @@ def test_beside_threads_one_process_makes_all_calls(monkeypatch):
     monkeypatch.setattr(module.threading, "active_count", lambda: 2)
     assert side_by_side([os.getpid] * 5) == [os.getpid()] * 5
     assert mapped(str, range(40)) == [str(k) for k in range(40)]
+
+
+def test_a_call_is_begun_beside_calls_side_by_side(tmp_path):
+    done = run(
+        """
+place, parent = Path(sys.argv[1]), os.getpid()
+with begun(lambda: meet(place, 4)) as wait:
+    pids = side_by_side([lambda: meet(place, 4)] * 3)
+    other = wait()
+assert parent in pids and len({other, *pids}) == 4, (pids, other)
+for pid in {other, *pids} - {parent}:
+    assert not Path(f"/proc/{pid}").exists()
+def die():
+    if os.getpid() != parent:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return "alive"
+with begun(die) as wait:
+    assert wait() == "alive"
+def fail():
+    raise InputError("its fault")
+with begun(fail) as wait:
+    try:
+        wait()
+    except InputError as error:
+        print(error)
+try:
+    with begun(lambda: meet(place, 100)):
+        raise InputError("another fault")
+except InputError as error:
+    print(error)
+""",
+        tmp_path,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "its fault\nanother fault\n"
+
+
+def test_without_a_second_core_a_call_is_made_when_it_is_waited_for(
+    monkeypatch,
+):
+    monkeypatch.setattr(module, "num_cores", lambda: 1)
+    made = []
+    with begun(lambda: made.append(os.getpid())) as wait:
+        assert not made
+        wait()
+    assert made == [os.getpid()]
 
 
 def test_the_first_fault_in_order_is_raised(tmp_path, monkeypatch):
