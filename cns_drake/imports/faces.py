@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+import math
 
 import numpy as np
 import shapely
@@ -31,11 +32,15 @@ def face_triangles(
         name: of the object, for the faults.
         faults: counts repaired faces and those left out.
     """
+    if len(rings) == 1 and len(rings[0]) in (3, 4):
+        plain = _plain_face(rings[0])
+        if plain is not None:
+            return plain
     rings = [_cleaned(ring, name, faults) for ring in rings]
     if len(rings[0]) < 3:
         faults.add("face without area, left out", name)
         return np.zeros((0, 3, 3))
-    normal = _newell(rings[0])
+    normal = np.array(_newell(rings[0].tolist()))
     if 0.5 * np.linalg.norm(normal) < _LEAST_AREA:
         # Both halves of a ring that crosses itself may be equally large.
         _, spread, axes = np.linalg.svd(rings[0] - rings[0].mean(axis=0))
@@ -50,9 +55,42 @@ def face_triangles(
     heights = (outer - outer[0]) @ normal
     if np.ptp(heights) > 2.0 * _BENT * np.linalg.norm(normal):
         faults.add("face that is not plane, folded between its corners", name)
-    if len(outer) == 4 and not holes and _is_convex(outer, normal):
+    if (
+        len(outer) == 4
+        and not holes
+        and _is_convex(outer.tolist(), normal.tolist())
+    ):
         return outer[[[0, 1, 2], [0, 2, 3]]]
     return _filled(_Plane(normal, rings), outer, holes, name, faults)
+
+
+def _plain_face(ring: np.ndarray) -> np.ndarray | None:
+    """Returns the triangles of a face that needs no repair.
+
+    Most faces of a city are triangles and convex quadrilaterals. None for all
+    others.
+
+    Args:
+        ring: (3, 3) or (4, 3) its corners [m].
+    """
+    corners = ring.tolist()
+    rounded = [[round(value * _MM) for value in corner] for corner in corners]
+    if any(rounded[k] == rounded[k - 1] for k in range(len(rounded))):
+        return None
+    nx, ny, nz = normal = _newell(corners)
+    size = math.sqrt(nx * nx + ny * ny + nz * nz)
+    if 0.5 * size < _LEAST_AREA:
+        return None
+    if len(corners) == 3:
+        return ring[None]
+    x, y, z = corners[0]
+    heights = [
+        (a - x) * nx + (b - y) * ny + (c - z) * nz for a, b, c in corners
+    ]
+    is_bent = max(heights) - min(heights) > 2.0 * _BENT * size
+    if is_bent or not _is_convex(corners, normal):
+        return None
+    return ring[[[0, 1, 2], [0, 2, 3]]]
 
 
 def _cleaned(ring: np.ndarray, name: str, faults: ImportFaults) -> np.ndarray:
@@ -69,17 +107,18 @@ def _cleaned(ring: np.ndarray, name: str, faults: ImportFaults) -> np.ndarray:
     return ring
 
 
-def _newell(ring: np.ndarray) -> np.ndarray:
+def _newell(corners: list[list[float]]) -> tuple[float, float, float]:
     """Returns the normal of a ring; its length is twice the area."""
-    normal = [0.0, 0.0, 0.0]
-    corners = (ring - ring[0]).tolist()
+    x, y, z = corners[0]
+    moved = [(a - x, b - y, c - z) for a, b, c in corners]
+    nx, ny, nz = 0.0, 0.0, 0.0
     for (ax, ay, az), (bx, by, bz) in zip(
-        corners, corners[1:] + corners[:1], strict=True
+        moved, moved[1:] + moved[:1], strict=True
     ):
-        normal[0] += ay * bz - az * by
-        normal[1] += az * bx - ax * bz
-        normal[2] += ax * by - ay * bx
-    return np.array(normal)
+        nx += ay * bz - az * by
+        ny += az * bx - ax * bz
+        nz += ax * by - ay * bx
+    return nx, ny, nz
 
 
 class _Plane:
@@ -123,11 +162,11 @@ class _Plane:
         return result
 
 
-def _is_convex(ring: np.ndarray, normal: np.ndarray) -> bool:
-    """Returns whether a quadrilateral (4, 3) is convex."""
-    # Plain numbers again: a city has thousands of these.
-    corners = ring.tolist()
-    nx, ny, nz = normal.tolist()
+def _is_convex(
+    corners: list[list[float]], normal: tuple[float, float, float]
+) -> bool:
+    """Returns whether a quadrilateral is convex."""
+    nx, ny, nz = normal
     for k in range(4):
         (x0, y0, z0), (x1, y1, z1), (x2, y2, z2) = (
             corners[(k + step) % 4] for step in (-1, 0, 1)

@@ -16,7 +16,10 @@ from cns_drake.city.buildings.parts.site import Assembly, Site
 from cns_drake.city.geometry.structures import Model
 from cns_drake.imports.dressing.styles import Style, Use
 from cns_drake.imports.dressing.upper_sides import UpperSides
-from cns_drake.imports.dressing.wall_panels import unit_normals
+from cns_drake.imports.dressing.wall_panels import (
+    long_normals,
+    unit_normals,
+)
 
 # A roof is level if the z of its unit normal is at least the first; level parts
 # of one height differ by less than the second [m].
@@ -44,9 +47,7 @@ _RIDGE = 0.15
 
 def is_flat_roof(roof: np.ndarray) -> bool:
     """Returns whether most of a roof (M, 3, 3) is level."""
-    a, b, c = np.moveaxis(roof, 1, 0)
-    normal = np.cross(b - a, c - a)
-    above = np.abs(normal[:, 2])
+    above = np.abs(long_normals(roof)[:, 2])
     level = np.abs(unit_normals(roof)[:, 2]) > _LEVEL
     return bool(above[level].sum() >= _FLAT_PART * above.sum())
 

@@ -75,10 +75,25 @@ class Panel:
         return box(0.0, 0.0, self.length, self.height)
 
 
+def long_normals(triangles: np.ndarray) -> np.ndarray:
+    """Returns normals (M, 3) twice as long as the areas of triangles [m^2].
+
+    As `np.cross`, which takes far longer for the few triangles of a wall.
+
+    Args:
+        triangles: (M, 3, 3) [m].
+    """
+    u = triangles[:, 1] - triangles[:, 0]
+    v = triangles[:, 2] - triangles[:, 0]
+    normal = np.empty(u.shape)
+    for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
+        normal[:, k] = u[:, i] * v[:, j] - u[:, j] * v[:, i]
+    return normal
+
+
 def unit_normals(triangles: np.ndarray) -> np.ndarray:
     """Returns the unit normals (M, 3) of triangles (M, 3, 3), or zeros."""
-    a, b, c = np.moveaxis(triangles, 1, 0)
-    normal = np.cross(b - a, c - a)
+    normal = long_normals(triangles)
     size = np.linalg.norm(normal, axis=1, keepdims=True)
     return normal / np.where(size > 1e-9, size, np.inf)
 
@@ -120,8 +135,7 @@ def find_panels(
         )
         wanted = is_wanted(limits)
         groups = [some for k, some in enumerate(groups) if wanted[k]]
-    a, b, c = np.moveaxis(triangles, 1, 0)
-    normals = np.cross(b - a, c - a) / 2.0
+    normals = long_normals(triangles) / 2.0
     areas = np.linalg.norm(normals, axis=1)
     return [
         _panel(
