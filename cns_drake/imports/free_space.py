@@ -104,16 +104,14 @@ def find_free_space(
     low, high = _window(structures)
     size = np.ceil((high - low) / CELL).astype(int) + 1
     grid = _Grid(low, high, (int(size[1]), int(size[0])))
-    roads, water = grid.empty(), grid.empty()
-    for one in structures:
-        if one.structure.semantic_class == "road":
-            roads[grid.cells(one.triangles)] = True
-        elif one.kind.startswith("Water"):
-            water[grid.cells(one.triangles)] = True
+    roads = [o for o in structures if o.structure.semantic_class == "road"]
+    waters = [o for o in structures if o.kind.startswith("Water")]
+    on_road = grid.covered([one.triangles for one in roads])
+    in_water = grid.covered([one.triangles for one in waters])
     blocked, walls = _blocked(structures, ground, grid)
-    free = ~(blocked | (water & ~roads))
+    free = ~(blocked | (in_water & ~on_road))
     on_roads = False
-    paved = binary_closing(roads, iterations=1) & ~blocked
+    paved = binary_closing(on_road, iterations=1) & ~blocked
     if _largest(_clearance(paved) >= _FROM_EDGE) * CELL**2 >= _LEAST_ROAD:
         free, on_roads = paved, True
     elif blocked.any():
@@ -144,6 +142,21 @@ class _Grid:
 
     def empty(self) -> np.ndarray:
         return np.zeros(self.shape, dtype=bool)
+
+    def covered(self, groups: Sequence[np.ndarray]) -> np.ndarray:
+        """Returns which cells (rows, columns) are covered by triangles.
+
+        Args:
+            groups: (M, 3, 3) each [m].
+        """
+        found = self.empty()
+        window = (self.low, self.high)
+        # All at once: thousands of small groups would take far longer.
+        triangles = np.concatenate([np.zeros((0, 3, 3)), *groups])
+        for points in surface_samples(triangles, _SAMPLE_SPACING, window):
+            column, row = ((points[:, :2] - self.low) / CELL).astype(int).T
+            found[row, column] = True
+        return found
 
     def cells(
         self, triangles: np.ndarray, ground: Ground | None = None

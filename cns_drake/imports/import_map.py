@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+import contextlib
 from dataclasses import replace
 import os
 from pathlib import Path
@@ -14,6 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from cns_drake.base.errors import InputError
 from cns_drake.base.interrupts import uninterrupted
+from cns_drake.base.jobs.side_by_side import begun
 from cns_drake.base.map_folder import LANES_NAME
 from cns_drake.city.geometry.structures import MeshShape
 from cns_drake.imports.dressing.whole_city import dress_city
@@ -96,14 +98,22 @@ def _import_city(
     drives = _lifted(drives, ground, city.faults)
     bare, dressing = staged.kept, None
     added: list[Imported] = []
-    if options.dressed:
-        progress("dressing buildings and streets")
-        dressing = dress_city(staged, city, drives, ground, options.seed)
-        staged = dressing.city
-        names = {one.structure.name for one in bare}
-        added = [one for one in staged.kept if one.structure.name not in names]
-    progress(f"writing {output}")
-    with map_draft(output) as draft:
+    with map_draft(output) as draft, contextlib.ExitStack() as stack:
+
+        def draw() -> None:
+            # Slow to import.
+            from cns_drake.imports.overview import draw_overview
+
+            draw_overview(draft / "from_above.png", bare, space, drives)
+
+        drawing = stack.enter_context(begun(draw))
+        if options.dressed:
+            progress("dressing buildings and streets")
+            dressing = dress_city(staged, city, drives, ground, options.seed)
+            staged = dressing.city
+            names = {one.structure.name for one in bare}
+            added = [o for o in staged.kept if o.structure.name not in names]
+        progress(f"writing {output}")
 
         def write_lanes() -> None:
             text = lanes_of_streets(
@@ -117,17 +127,11 @@ def _import_city(
             if text is not None:
                 (draft / LANES_NAME).write_text(text, "utf-8")
 
-        def draw() -> None:
-            # Slow to import.
-            from cns_drake.imports.overview import draw_overview
-
-            draw_overview(draft / "from_above.png", bare, space, drives)
-
         bottom = bottom_of(bare, ground)
         if dressing is not None:
             bottom = dressing.ground(bottom)
         sizes = write_world(
-            draft, source, staged, bottom, dressing, (write_lanes, draw)
+            draft, source, staged, bottom, dressing, (write_lanes,)
         )
         write_facts(
             draft,
@@ -143,6 +147,7 @@ def _import_city(
             _titles(staged, options),
             [drive.waypoints for drive in drives],
         )
+        drawing()
         finish(draft, sizes)
     return _report(staged, drives, city.faults)
 
