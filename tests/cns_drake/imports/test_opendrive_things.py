@@ -117,14 +117,14 @@ def test_a_road_over_another_is_a_bridge(tmp_path):
 def test_bridges_and_tunnels_that_are_not_built_are_counted(tmp_path):
     rise = cubic("elevation", 0, 6.0, 0, 0, 0, "s")
     spans = "".join(
-        f'<{tag} id="{tag}" s="90" length="20" type="concrete"/>'
+        f'<{tag} id="{tag}" s="50" length="20" type="concrete"/>'
         for tag in ("bridge", "tunnel")
     )
     more = f"<objects>{spans}</objects>"
     path = write_roads(
         tmp_path / "a.xodr",
-        straight("1", -100, 0, 100, 0, more=more),
-        straight("2", 0, -100, 0, 100, elevation=rise, more=more),
+        straight("1", -60, 0, 60, 0, more=more),
+        straight("2", 0, -60, 0, 60, elevation=rise, more=more),
     )
     rows = build_town(path, 0, dressed=True).faults.rows()
     assert {kind: number for kind, number, _ in rows} == {
