@@ -9,7 +9,12 @@ import numpy as np
 from pydrake.common.value import Value
 from pydrake.geometry import FrameId, QueryObject
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context, EventStatus, LeafSystem
+from pydrake.systems.framework import (
+    Context,
+    EventStatus,
+    InputPort,
+    LeafSystem,
+)
 
 from cns_drake.base.files import complete_part, write_part
 from cns_drake.pictures.drive_page import (
@@ -17,6 +22,7 @@ from cns_drake.pictures.drive_page import (
     make_drive_page,
     moving_frames,
 )
+from cns_drake.ray_casting.moving_groups import NOTHING_KNOWN, KnownPoses
 from cns_drake.scene.world import World
 
 # Together they keep the page of any drive below 25 MB.
@@ -39,6 +45,7 @@ class MeshcatRecorder(LeafSystem):
         - specific_force
         - angular_velocity
         - <lidar>_scan (one for each LiDAR)
+        - frame_poses (see `take_poses`)
 
     Frames: world W, vehicle B (`base_link`), LiDAR S, IMU I. `odometry` is
     an `Odometry`; `specific_force` [m/s^2] and `angular_velocity` w_WI_I
@@ -104,6 +111,8 @@ class MeshcatRecorder(LeafSystem):
             name: self.DeclareAbstractInputPort(f"{name}_scan", Value(object()))
             for name in self._X_BSs
         }
+        self._rows: Mapping[FrameId, int] = {}
+        self._frame_poses: InputPort | None = None
         self.DeclarePeriodicPublishEvent(
             period_sec=period, offset_sec=0.0, publish=self._publish
         )
@@ -120,6 +129,20 @@ class MeshcatRecorder(LeafSystem):
         self.drive.X_WFs[leading] = []
         self.drive.names[leading] = name
         self.drive.limbs[leading] = dict.fromkeys(frames, RigidTransform())
+
+    def take_poses(self, rows: Mapping[FrameId, int]) -> None:
+        """Declares the port `frame_poses`, that of a `FramePoses`.
+
+        Poses come from there then: the SceneGraph would compute those of all
+        geometry.
+
+        Args:
+            rows: frame -> its row in the port's (M, 4, 4) array.
+        """
+        self._rows = rows
+        self._frame_poses = self.DeclareAbstractInputPort(
+            "frame_poses", Value(np.zeros((0, 4, 4)))
+        )
 
     def save(self, path: Path, *, title: str = "cns-drake") -> None:
         """Writes the page of the drive up to now.
@@ -147,10 +170,14 @@ class MeshcatRecorder(LeafSystem):
         if len(self.drive.X_WBs) == self._num_frames:
             return EventStatus.DidNothing()
         query_object = self._geometry_query.Eval(context)
+        known = NOTHING_KNOWN
+        if self._frame_poses is not None:
+            known = KnownPoses(self._rows, self._frame_poses.Eval(context))
         for frame_id, X_WFs in self.drive.X_WFs.items():
+            X_WF = known.find(frame_id, query_object.GetPoseInWorld)
             # Copies: the values of the ports may be overwritten at the next
             # step.
-            X_WFs.append(RigidTransform(query_object.GetPoseInWorld(frame_id)))
+            X_WFs.append(RigidTransform(X_WF))
         if not self.drive.X_WBs:
             for leading, X_FLs in self.drive.limbs.items():
                 X_FW = self.drive.X_WFs[leading][0].inverse()
@@ -198,7 +225,12 @@ def _positions(X_WS: RigidTransform, scan: np.ndarray) -> np.ndarray:
 def _thinned(p_WRset: np.ndarray) -> np.ndarray:
     """Returns an evenly spread part of a point set."""
     cubes = np.floor(p_WRset / _THINNING_SIZE).astype(np.int64)
-    _, first = np.unique(cubes, axis=0, return_index=True)
+    # One number for each cube, in the order of x, y, z: it is sorted in a
+    # fraction of the time of three.
+    cubes -= cubes.min(axis=0, initial=0)
+    _, num_y, num_z = cubes.max(axis=0, initial=0) + 1
+    numbers = (cubes[:, 0] * num_y + cubes[:, 1]) * num_z + cubes[:, 2]
+    _, first = np.unique(numbers, return_index=True)
     count = min(len(first), _MAX_POINTS_PER_SCAN)
     # Points are dropped evenly over the sorted cubes, so on all sides alike.
     kept = first[np.linspace(0, len(first) - 1, count).astype(int)]

@@ -157,9 +157,10 @@ def make_station(
 
     if moving is not None:
         measured["objects"] = moving.GetOutputPort("objects")
-        if page is not None:
-            for body in moving.bodies:
-                page.show_too(body.name, body.frames)
+    if page is not None:
+        page.take_poses(poses.rows)
+        for body in () if moving is None else moving.bodies:
+            page.show_too(body.name, body.frames)
 
     recorders = {"meshcat_recorder": page}
     if bag is not None:
@@ -176,9 +177,10 @@ def make_station(
             with_imu_samples="imu_samples" in measured,
             start_ns=START_NS,
         )
+    recorded = measured | {"frame_poses": poses.GetOutputPort("frame_poses")}
     for name, recorder in recorders.items():
         if recorder is not None:
-            _connect(builder, name, recorder, measured)
+            _connect(builder, name, recorder, recorded)
     for name, port in measured.items():
         builder.ExportOutput(port, name)
     diagram = builder.Build()
