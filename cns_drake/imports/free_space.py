@@ -150,12 +150,8 @@ class _Grid:
             groups: (M, 3, 3) each [m].
         """
         found = self.empty()
-        window = (self.low, self.high)
         # All at once: thousands of small groups would take far longer.
-        triangles = np.concatenate([np.zeros((0, 3, 3)), *groups])
-        for points in surface_samples(triangles, _SAMPLE_SPACING, window):
-            column, row = ((points[:, :2] - self.low) / CELL).astype(int).T
-            found[row, column] = True
+        found[self.cells(np.concatenate([np.zeros((0, 3, 3)), *groups]))] = True
         return found
 
     def cells(
