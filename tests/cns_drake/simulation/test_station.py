@@ -2,14 +2,17 @@
 
 from helpers.small_map import scenario_values
 import numpy as np
+from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 import pytest
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
+from cns_drake.pictures.meshcat_recording import MeshcatRecorder
 from cns_drake.recording.frame_clock import FRAME_PERIOD
 from cns_drake.scenarios.scenario_loading import make_scenario
 from cns_drake.scenarios.sensor_making import sensor_pose
+from cns_drake.simulation.stage_loading import load_stage
 from cns_drake.simulation.station import make_station
 
 GRAVITY_W = np.array([0.0, 0.0, -9.81])
@@ -74,6 +77,27 @@ def test_vehicle_is_invisible_and_on_the_ground(small_map):
     # Coordinates are multiples of 1 / 1024 m.
     np.testing.assert_array_equal(lowest["z"], -1638 / 1024)
     assert set(lowest["instance"]) == {1}
+
+
+def test_a_page_has_the_poses_of_the_scene_graph(scenario):
+    world = load_stage(scenario)
+    page = MeshcatRecorder(
+        world, X_BSs={"lidar": RigidTransform()}, period=FRAME_PERIOD
+    )
+    simulator = Simulator(make_station(scenario, world=world, page=page))
+    simulator.AdvanceTo(8 * FRAME_PERIOD)
+    query = simulator.get_system().GetOutputPort("geometry_query")
+    query_object = query.Eval(simulator.get_context())
+    # The body and its wheels, which turn.
+    assert len(page.drive.X_WFs) > 1
+    for frame, X_WFs in page.drive.X_WFs.items():
+        assert len(X_WFs) == 9
+        np.testing.assert_allclose(
+            X_WFs[-1].GetAsMatrix4(),
+            query_object.GetPoseInWorld(frame).GetAsMatrix4(),
+            rtol=0.0,
+            atol=1e-12,
+        )
 
 
 def test_imu_adds_up_to_the_trajectory(scenario):
