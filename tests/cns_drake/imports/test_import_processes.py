@@ -13,14 +13,16 @@ import pytest
 # A test's process has threads, beside which nothing is forked. The number of
 # processes is the first argument.
 PROGRAM = """
-import os, sys
+import os
+import sys
 from cns_drake.base.jobs import side_by_side as module
 number = int(sys.argv.pop(1))
 module.num_cores = lambda: number
 forked = []
 os.register_at_fork(
     before=lambda: forked.append(1),
-    after_in_child=lambda: print("helping", file=sys.stderr, flush=True),
+    # In one call: lines of several processes do not mix.
+    after_in_child=lambda: os.write(2, b"helping\\n"),
 )
 from cns_drake.__main__ import main
 try:
@@ -39,6 +41,12 @@ def start(number, source, output, **options):
         start_new_session=True,
         **options,
     )
+
+
+def await_word(process, word):
+    # Without Python's buffer, a line may stand behind the start of another one.
+    while word not in (read := process.stderr.readline()):
+        assert read, f"{word} is never written"
 
 
 def contents(folder):
@@ -71,8 +79,7 @@ def test_bytes_do_not_depend_on_the_number_of_processes(tmp_path, name, write):
 def test_an_interrupted_import_leaves_nothing(tmp_path, line):
     write_corner(tmp_path / "city.osm")
     process = start(3, tmp_path / "city.osm", tmp_path / "town")
-    while not (read := process.stderr.readline()).startswith(line):
-        assert read
+    await_word(process, line)
     # Ctrl-C reaches every process of the terminal.
     os.killpg(process.pid, signal.SIGINT)
     _, errors = process.communicate(timeout=60)
@@ -88,8 +95,7 @@ def test_nothing_outlives_a_killed_import(tmp_path, line):
     process = start(3, tmp_path / "city.osm", output)
     # Killed alone, while another process works for it.
     for awaited in (line, "helping"):
-        while not (read := process.stderr.readline()).startswith(awaited):
-            assert read
+        await_word(process, awaited)
     process.kill()
     # Other processes have the same pipe: it ends with the last of them.
     process.communicate(timeout=60)
