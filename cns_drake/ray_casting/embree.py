@@ -23,6 +23,8 @@ FLOAT3X4_ROW_MAJOR = 0x9134
 ROBUST_SCENE = 1 << 2
 COHERENT_RAYS = 1 << 16
 INVALID_ID = 0xFFFFFFFF
+# Rays in a packet, and RTC_DEVICE_PROPERTY_NATIVE_RAY<rays>_SUPPORTED.
+_NATIVE_PACKETS = ((8, 33), (16, 34))
 
 
 class IntersectArguments(ctypes.Structure):
@@ -57,6 +59,7 @@ def load() -> ctypes.CDLL:
         ("rtcRetainDevice", None, [pointer]),
         ("rtcReleaseDevice", None, [pointer]),
         ("rtcGetDeviceError", integer, [pointer]),
+        ("rtcGetDeviceProperty", ctypes.c_ssize_t, [pointer, integer]),
         ("rtcNewScene", pointer, [pointer]),
         ("rtcSetSceneFlags", None, [pointer, integer]),
         ("rtcCommitScene", None, [pointer]),
@@ -89,3 +92,17 @@ def address_of(function: object) -> int:
     address = ctypes.cast(function, ctypes.c_void_p).value  # type: ignore[arg-type]  # A function is a pointer.
     assert address is not None
     return address
+
+
+def native_packet(embree: ctypes.CDLL, device: int) -> tuple[int, int]:
+    """Returns the number of rays in a packet, and the function that casts it.
+
+    The packet is the largest that fills the processor's vectors, such as 16
+    rays with AVX-512 and 8 with AVX2: Embree casts the rays of a larger one
+    one by one. The function is given by its address.
+    """
+    lanes = 4
+    for more, supported in _NATIVE_PACKETS:
+        if embree.rtcGetDeviceProperty(device, supported):
+            lanes = more
+    return lanes, address_of(getattr(embree, f"rtcIntersect{lanes}"))

@@ -123,8 +123,10 @@ class EmbreeHierarchy:
         )
         nothing = _Built(0, ())
         copies = {row for row, group in enumerate(groups) if group.is_copy}
+        lanes, intersect = embree.native_packet(self._lib, self._device)
         self._tree = Tree(
-            embree.address_of(self._lib.rtcIntersect16),
+            intersect,
+            lanes,
             self._built[fixed[0]].scene if fixed else 0,
             self._top,
             ctypes.addressof(self._arguments),

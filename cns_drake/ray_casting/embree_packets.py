@@ -1,4 +1,4 @@
-"""Rays through Embree in packets of 16.
+"""Rays through Embree in packets.
 
 numba compiles the loop that fills the packets: one Python call per packet would
 cost more than its rays.
@@ -25,7 +25,8 @@ class Tree(NamedTuple):
     """Scenes of Embree's, with the owners of their primitives.
 
     Attributes:
-        intersect16: address of the C function.
+        intersect: address of the C function that casts a packet.
+        lanes: the number of rays in a packet.
         fixed: address of the RTCScene of static geometry, or 0.
         instances: address of the RTCScene of I instances, or 0.
         arguments: address of the RTCIntersectArguments.
@@ -39,7 +40,8 @@ class Tree(NamedTuple):
             instance.
     """
 
-    intersect16: int
+    intersect: int
+    lanes: int
     fixed: int
     instances: int
     arguments: int
@@ -50,7 +52,7 @@ class Tree(NamedTuple):
 
 
 @intrinsic  # type: ignore[untyped-decorator]  # numba has no hints.
-def _call_intersect16(
+def _call_intersect(
     typing_context: Any,
     function: types.Type,
     valid: types.Type,
@@ -58,17 +60,16 @@ def _call_intersect16(
     rays: types.Type,
     arguments: types.Type,
 ) -> tuple[Any, Callable[..., Any]]:
-    """Calls rtcIntersect16."""
+    """Calls rtcIntersect4, rtcIntersect8 or rtcIntersect16."""
     signature = types.void(function, valid, scene, rays, arguments)
     return signature, void_call(POINTER, POINTER, POINTER, POINTER)
 
 
-LANES = 16
 # Embree takes smaller components for positive, of either sign. A packet that
 # mixes such rays with truly positive ones loses hits.
 _TINY = 1e-18
-# The least rays that a thread takes at once: whole packets, and enough that the
-# call costs little.
+# The least rays that a thread takes at once: whole packets of any size, and
+# enough that the call costs little.
 BLOCK = 1024
 
 
@@ -88,12 +89,13 @@ def cast_packets(
         hits: `Hits` to fill.
         first, last: select the rays.
     """
-    # A packet is an RTCRayHit16: 12 ray fields and 9 hit fields (10 with
-    # room for the primitive of an instance array) of 16 lanes. It and the
+    # A packet is an RTCRayHit16, or one of fewer lanes: 12 ray fields and 9 hit
+    # fields (10 with room for the primitive of an instance array). It and the
     # mask of lanes are aligned to 64 bytes, as Embree's vector loads demand.
-    storage = np.zeros((12 + 10 + 1 + 1) * LANES, np.float32)
+    lanes = tree.lanes
+    storage = np.zeros((12 + 10 + 1) * lanes + 16, np.float32)
     start = (-storage.ctypes.data % 64) // 4
-    aligned = storage[start : start + 23 * LANES].reshape(23, LANES)
+    aligned = storage[start : start + 23 * lanes].reshape(23, lanes)
     packet, valid = aligned[:22], aligned[22].view(np.int32)
     packet_id = packet.view(np.uint32)
     num_origins, num_rotations = len(rays.p_OSset), len(rays.R_OSset)
@@ -101,8 +103,8 @@ def cast_packets(
     # Indices are counted along: remainders would cost a tenth of the casting.
     origin, rotation = first % num_origins, first % num_rotations
     reach, time = first % num_ranges, first % len(rays.times)
-    for begin in range(first, last, LANES):
-        count = min(LANES, last - begin)
+    for begin in range(first, last, lanes):
+        count = min(lanes, last - begin)
         valid[:] = 0
         for lane in range(count):
             p = rays.p_OSset[origin]
@@ -129,8 +131,8 @@ def cast_packets(
         # keeps a hit unless it finds a nearer one.
         for scene in (tree.fixed, tree.instances):
             if scene != 0:
-                _call_intersect16(
-                    tree.intersect16,
+                _call_intersect(
+                    tree.intersect,
                     valid.ctypes.data,
                     scene,
                     packet.ctypes.data,

@@ -31,6 +31,7 @@ from stages import (
     still,
 )
 
+from cns_drake.ray_casting import embree
 from cns_drake.ray_casting.embree_hierarchy import EmbreeHierarchy
 from cns_drake.ray_casting.embree_primitives import (
     SOLID,
@@ -137,6 +138,7 @@ def _all_in_one(geometries, stands):
 
 def _limit_variant(limit, hierarchy, p_WO, poses, d_S, reach):
     tree = hierarchy._tree
+    intersect16 = embree.address_of(embree.load().rtcIntersect16)
     count = len(d_S)
     rows = np.ascontiguousarray(d_S.T, dtype=np.float32)
     ranges = np.empty(count, np.float32)
@@ -150,7 +152,7 @@ def _limit_variant(limit, hierarchy, p_WO, poses, d_S, reach):
             R = X_WS.rotation().matrix().astype(np.float32).ravel()
             p = (X_WS.translation() - p_WO).astype(np.float32)
             limit(
-                ctypes.c_void_p(tree.intersect16),
+                ctypes.c_void_p(intersect16),
                 ctypes.c_void_p(tree.fixed),
                 ctypes.c_void_p(tree.arguments),
                 pointer(R),
