@@ -11,8 +11,11 @@ from types import ModuleType
 
 import pytest
 
+from cns_drake.base.garbage import look_seldom
+
 # What is imported is there to stay: nobody looks for garbage in it.
 gc.disable()
+look_seldom()
 
 # Where Open3D is an oracle, nobody needs its machine learning, which takes
 # longer to import than all the rest of it.

@@ -14,6 +14,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from cns_drake.base.errors import InputError
+from cns_drake.base.garbage import look_seldom
 from cns_drake.base.interrupts import (
     INTERRUPTED,
     end_interrupted,
@@ -91,6 +92,7 @@ def run(app: typer.Typer, program: str) -> NoReturn:
         program: the name under which errors are reported.
     """
     message: str | None = None
+    look_seldom()
     _open_standard_streams()
     try:
         interrupt_on_termination()

@@ -21,6 +21,8 @@ import subprocess
 import sys
 import tempfile
 
+from cns_drake.base.garbage import look_seldom
+
 _CLIENT = """#!{python} -IS
 import json, os, socket, sys
 
@@ -83,6 +85,7 @@ def _link_all(source: Path, target: Path, but) -> None:
 
 def _serve(listener: socket.socket) -> None:
     """Forks for each client until stdin ends, without waiting for the forks."""
+    look_seldom()
     for package in map(importlib.import_module, ("cns_drake", "evaluation")):
         prefix = f"{package.__name__}."
         for found in pkgutil.walk_packages(package.__path__, prefix):

@@ -22,6 +22,7 @@ from typing import Protocol
 
 from cns_drake.base.errors import InputError, one_line
 from cns_drake.base.files import exclusive
+from cns_drake.base.garbage import look_seldom
 from cns_drake.base.interrupts import (
     end_interrupted,
     ignore_interrupts,
@@ -199,6 +200,7 @@ def main(number: int) -> None:
     Args:
         number: of the file descriptor that leads to the parent.
     """
+    look_seldom()
     connection = Connection(number)
     with contextlib.suppress(EOFError, ConnectionError):
         work(connection, connection.recv_bytes())

@@ -22,6 +22,7 @@ import sys
 import threading
 import time
 
+from cns_drake.base.garbage import look_seldom
 from cns_drake.base.jobs.job_process import (
     ProcessDiedError,
     StartedProcess,
@@ -176,6 +177,7 @@ def serve(number: int) -> None:
     Args:
         number: of the file descriptor that leads to the parent.
     """
+    look_seldom()
     forked = _serve(Connection(number))
     if forked is not None:  # This is the process of a job.
         work(*forked)
