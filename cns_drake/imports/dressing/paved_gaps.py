@@ -27,9 +27,11 @@ from cns_drake.imports.osm_places import parts_of
 from cns_drake.imports.waypoint_drives import Drive
 
 # Widest gap that is paved [m], and least area of one [m^2].
-_WIDEST, _LEAST_AREA = 3.0, 1.0
+_WIDEST, _LEAST_AREA = 3.0, 0.05
 # Narrower parts are left open; a gap is at most this far from a sidewalk [m].
-_NARROWEST, _BESIDE = 0.4, 0.1
+_NARROWEST, _BESIDE = 0.1, 0.1
+# Gaps in one square of this size are one structure [m].
+_SQUARE = 50.0
 _MM = 0.001
 
 
@@ -66,7 +68,7 @@ def paved_gaps(
         ]
     )
     other_tree = STRtree(other)
-    number = 0
+    surfaces: dict[tuple[int, int], list[np.ndarray]] = {}
     for part in parts_of(gaps):
         if (
             part.area < _LEAST_AREA
@@ -80,19 +82,23 @@ def paved_gaps(
         inside = free.buffer(-_NARROWEST / 2.0, 2)
         wide = areas_of(inside.buffer(_NARROWEST / 2.0, 2))
         open_ = shapely.intersection(wide, free, grid_size=_MM)
-        surface = [
+        square = (
+            int(part.centroid.x // _SQUARE),
+            int(part.centroid.y // _SQUARE),
+        )
+        surfaces.setdefault(square, []).extend(
             flat_surface(one, KERB_HEIGHT, "gap", ImportFaults())
             for one in parts_of(open_)
-        ]
-        if surface:
-            yield make_imported(
-                f"sidewalk_gap_{number}",
-                "sidewalk",
-                "Sidewalk",
-                {"surface": turned_up(np.concatenate(surface))},
-                {},
-            )
-            number += 1
+        )
+    found = [some for some in surfaces.values() if some]
+    for number, some in enumerate(found):
+        yield make_imported(
+            f"sidewalk_gap_{number}",
+            "sidewalk",
+            "Sidewalk",
+            {"surface": turned_up(np.concatenate(some))},
+            {},
+        )
 
 
 def _upper_sides(structures: Sequence[Imported]) -> np.ndarray:

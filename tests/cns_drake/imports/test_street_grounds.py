@@ -62,6 +62,28 @@ def test_narrow_gaps_between_walks_and_roads_are_paved(tmp_path):
     assert not list(paved_gaps(city.structures, [Drive(far, far)]))
 
 
+@pytest.mark.parametrize(("gap", "is_paved"), [(0.15, True), (0.06, False)])
+def test_joints_of_walks_are_paved(tmp_path, gap, is_paved):
+    osm = OsmWriter()
+    ends = [osm.node(-60, 0), osm.node(60, 0)]
+    osm.way_of(ends, highway="residential", width="9", sidewalk="separate")
+    osm.box(-20, 30, 20, 10, building="yes", height="9")
+    for y in (8.0, 10.0 + gap):
+        osm.way([(-60, y), (60, y)], highway="footway", width="2")
+    city = import_openstreetmap(osm.write(tmp_path / "a.osm"), None, True)
+    origin = city.streets[0].line.mean(axis=0)
+    path = straight_drive(start=-50.0, end=50.0).path + origin
+    found = list(paved_gaps(city.structures, [Drive(path, path)]))
+    area = shapely.union_all([outline(one) for one in found])
+    area = shapely.transform(area, lambda xy: xy - origin)
+    joint = box(-55, 9.0, 55, 9.0 + gap)
+    expected = joint.area if is_paved else 0.0
+    assert area.intersection(joint).area == pytest.approx(expected, abs=0.5)
+    # The strip beside the carriageway has its middle in the same square.
+    assert area.area > 200.0
+    assert len(found) == 1
+
+
 @pytest.mark.parametrize("has_terrain", [True, False])
 def test_streets_are_laid_on_the_ground_below_drives(tmp_path, has_terrain):
     def height(x, y):
