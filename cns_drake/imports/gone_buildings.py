@@ -25,7 +25,7 @@ def with_gone(
     later.
 
     Args:
-        gone: demolished buildings without a date.
+        gone: demolished buildings.
         others: present structures that may have stood then.
     """
     others = list(others)

@@ -27,7 +27,11 @@ from cns_drake.imports.foreign_city import (
 )
 from cns_drake.imports.import_faults import ImportFaults
 from cns_drake.imports.osm_bridges import Bridges, bridges_of, parapets
-from cns_drake.imports.osm_buildings import make_buildings, standing_buildings
+from cns_drake.imports.osm_buildings import (
+    TWICE,
+    make_buildings,
+    standing_buildings,
+)
 from cns_drake.imports.osm_grounds import coasts_of, ground_areas, sea
 from cns_drake.imports.osm_lengths import length
 from cns_drake.imports.osm_places import Local, parts_of, sound_parts
@@ -36,6 +40,7 @@ from cns_drake.imports.osm_reading import (
     OsmFeatures,
     OsmWay,
     Tags,
+    has_tag,
     is_building,
     read_openstreetmap,
     was_building,
@@ -83,6 +88,8 @@ def import_openstreetmap(
         if is_building(one.tags) or (dressed and was_building(one.tags))
     ]
     buildings = list(standing_buildings(buildings, faults, dressed))
+    if dressed:
+        buildings = list(_without_outers(buildings, features))
     if not buildings:
         raise InputError(f"{path}: {_no_buildings(faults)}")
     low, high = _bounds(buildings)
@@ -99,7 +106,9 @@ def import_openstreetmap(
     limits = local(np.array([low, high])) + _SEA * np.array([[-1.0], [1.0]])
     found = _made(
         faults,
-        lambda own: make_buildings(buildings, local, year_attribute, own),
+        lambda own: make_buildings(
+            buildings, local, year_attribute, own, once=dressed
+        ),
         lambda own: street_surfaces(features.ways, local, own, bridges),
         lambda own: crossing_stripes(
             features.crossings, features.ways, local, own
@@ -127,6 +136,24 @@ def import_openstreetmap(
             make_things(features.nodes, features.ways, features.kinds, local)
         ),
     )
+
+
+def _without_outers(
+    buildings: Iterable[OsmArea], features: OsmFeatures
+) -> Iterator[OsmArea]:
+    """Yields buildings without the outlines of multipolygons.
+
+    A way that is tagged like the multipolygon whose outline it is would fill
+    its courts.
+    """
+    buildings = list(buildings)
+    names = {one.name for one in buildings}
+    for one in buildings:
+        is_outline = features.outers.get(one.name) in names
+        if is_outline and not has_tag(one.tags, "building:part"):
+            features.faults.add(TWICE, one.name)
+        else:
+            yield one
 
 
 def _no_buildings(faults: ImportFaults) -> str:

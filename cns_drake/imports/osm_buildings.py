@@ -5,7 +5,7 @@ https://wiki.openstreetmap.org/wiki/Simple_3D_Buildings
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,6 +22,11 @@ from cns_drake.imports.osm_places import Local, parts_of, sound_parts
 from cns_drake.imports.osm_reading import OsmArea, Tags, has_tag
 from cns_drake.imports.osm_tags import heights, why_absent
 
+# What the report says about buildings that are not made as the file has them.
+TWICE = "building drawn twice, taken once"
+_NESTED = "building inside another one, taken as its part"
+# An outline lies in another one if so much of it does.
+_INSIDE = 0.9
 # If parts leave less of an outline than this, they are the whole building.
 _ALL_OF_IT = 0.9
 # Remainders of an outline narrower than this are dropped [m].
@@ -71,8 +76,17 @@ def make_buildings(
     local: Local,
     year_attribute: str | None,
     faults: ImportFaults,
+    once: bool = False,
 ) -> Iterator[Imported]:
-    """Yields buildings; parts replace the area that they cover."""
+    """Yields buildings; parts replace the area that they cover.
+
+    Args:
+        areas: of buildings and parts.
+        local: the map's coordinates.
+        year_attribute: see `construction_year`.
+        faults: counts what is not made as the file has it.
+        once: whether buildings that lie in each other are joined.
+    """
     outlines: list[_Block] = []
     parts: list[_Block] = []
     for name, tags, polygons in areas:
@@ -81,6 +95,9 @@ def make_buildings(
         for polygon in polygons:
             for one in sound_parts(local.polygon(polygon), name, faults):
                 group.append(_Block(name, tags, one, low, high, roof))
+    if once:
+        outlines, nested = _taken_once(outlines, faults)
+        parts += nested
     of_outline: dict[int, list[_Block]] = {}
     # Parts are not of what has stood in their place.
     outlines.sort(key=lambda one: _is_gone(one.tags))
@@ -132,6 +149,68 @@ def make_buildings(
             lod=1.0,
         )
         yield replace(made, is_gone=True) if _is_gone(whole.tags) else made
+
+
+def _taken_once(
+    outlines: Sequence[_Block], faults: ImportFaults
+) -> tuple[list[_Block], list[_Block]]:
+    """Sorts outlines that lie in another one's.
+
+    Walls of both would stand in the same place, each before the other's
+    windows.
+
+    Returns:
+        The outlines of buildings, each once, and those that are parts.
+    """
+    tree = STRtree([one.polygon for one in outlines])
+    whole: dict[int, _Block] = {}
+    nested = []
+    by_area = sorted(
+        range(len(outlines)), key=lambda k: -outlines[k].polygon.area
+    )
+    for number in by_area:
+        one = outlines[number]
+        around = [
+            k
+            for k in tree.query(one.polygon, "intersects").tolist()
+            if k in whole and _lies_in(one, whole[k])
+        ]
+        twins = [k for k in around if _lies_in(whole[k], one)]
+        dates = [_dates(whole[k].tags) for k in around]
+        if twins:
+            faults.add(TWICE, one.name)
+            twin = whole[twins[0]]
+            tags = {**one.tags, **twin.tags}
+            if twin.tags.get("building") == "yes":
+                tags |= {k: v for k, v in one.tags.items() if k == "building"}
+            whole[twins[0]] = replace(twin, tags=tags)
+        elif dates and _dates(one.tags) in ({}, *dates):
+            faults.add(_NESTED, one.name)
+            nested.append(one)
+        else:
+            whole[number] = one
+    return [whole[k] for k in sorted(whole)], nested
+
+
+def _lies_in(one: _Block, other: _Block) -> bool:
+    """Returns whether an outline lies in another one that may stand with it."""
+    if _is_gone(one.tags) or _is_gone(other.tags):
+        return False
+    dates, others = _dates(one.tags), _dates(other.tags)
+    # What has ended may have made room for the other one.
+    if dates.get("end_date") != others.get("end_date"):
+        return False
+    starts = {
+        tags["start_date"] for tags in (dates, others) if "start_date" in tags
+    }
+    if len(starts) > 1:
+        return False
+    shared = one.polygon.intersection(other.polygon).area
+    return bool(shared >= _INSIDE * one.polygon.area)
+
+
+def _dates(tags: Tags) -> dict[str, str]:
+    return {key: tags[key] for key in ("start_date", "end_date") if key in tags}
 
 
 def _is_gone(tags: Tags) -> bool:

@@ -106,6 +106,8 @@ class OsmFeatures:
         trees: id, tags and place.
         crossings: number of the node, and tags.
         nodes: id, tags and place of all other nodes that have tags.
+        outers: id of each way that is an outline of a building's multipolygon
+            -> id of that.
         kinds: id of each thing with tags -> its kind; nodes have `n` before
             their number, ways `w` and relations `r`.
         faults: counts of unreadable things.
@@ -120,6 +122,7 @@ class OsmFeatures:
     nodes: list[tuple[str, Tags, tuple[float, float]]] = field(
         default_factory=list
     )
+    outers: dict[str, str] = field(default_factory=dict)
     kinds: dict[str, str] = field(default_factory=dict)
     faults: ImportFaults = field(default_factory=ImportFaults)
 
@@ -170,6 +173,11 @@ def read_openstreetmap(path: Path) -> OsmFeatures:
             elif isinstance(one, osmium.osm.Relation):
                 if tags.get("type") == "multipolygon" and is_building(tags):
                     wanted[f"r{one.id}"] = None
+                    features.outers |= {
+                        f"w{member.ref}": f"r{one.id}"
+                        for member in one.members
+                        if member.type == "w" and member.role != "inner"
+                    }
             elif isinstance(one, osmium.osm.Node) and one.location.valid():
                 if tags.get("natural") == "tree":
                     place = (one.lon, one.lat)

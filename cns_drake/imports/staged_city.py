@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+import datetime
 
 import numpy as np
 
@@ -125,11 +126,11 @@ def stage_city(
     if options.grow is not None:
         (today,) = map(set, standing.values())
         gone = [one for one in found if one not in today]
-    elif any(one.is_gone for one in found):
+    elif options.dressed:
         standing = {
             stage: with_gone(
-                [one for one in some if one.is_gone],
-                [one for one in some if not one.is_gone],
+                [one for one in some if _is_past(one)],
+                [one for one in some if not _is_past(one)],
             )
             for stage, some in standing.items()
         }
@@ -152,6 +153,12 @@ def stage_city(
     years = [one.year for one in found if _has_years(one)]
     undated = years.count(None)
     return StagedCity(standing, kept, undated, len(years) - undated, gone)
+
+
+def _is_past(one: Imported) -> bool:
+    """Returns whether a building does not stand today."""
+    today = datetime.date.today().year
+    return one.is_gone or (one.until is not None and one.until <= today)
 
 
 def _stands(one: Imported, stage: int, options: ImportOptions) -> bool:
