@@ -16,11 +16,14 @@ from shapely.geometry.base import BaseGeometry
 _UPRIGHT = 0.02
 # Triangles of one wall have normals whose product is at least this (1 deg).
 _SAME_PLANE = float(np.cos(np.radians(1.0)))
+# A wall that bends is divided where normals differ by more (0.02 deg).
+_STRAIGHT = float(np.cos(np.radians(0.02)))
 _MM = 1000.0
 # A wall is a rectangle if at most this much of its area is missing [m^2].
 _NO_AREA = 0.01
-# A wall that is farther from its plane is left as it is [m].
-_BENT = 0.05
+# A wall that is farther from its plane bends, and so does a piece of one, which
+# must leave no gap to the next piece [m].
+_BENT, _PIECE_BENT = 0.05, 0.01
 
 
 @dataclass(frozen=True)
@@ -120,7 +123,8 @@ def find_panels(
     building = np.repeat(np.arange(len(walls)), [len(w) for w in walls])
     if not len(triangles):
         return []
-    component = _connected(triangles, unit_normals(triangles), building)
+    units = unit_normals(triangles)
+    component = _connected(triangles, units, building, _SAME_PLANE)
     order = np.argsort(component, kind="stable")
     begins = np.flatnonzero(np.diff(component[order], prepend=-1))
     groups = np.split(order, begins[1:])
@@ -137,18 +141,68 @@ def find_panels(
         groups = [some for k, some in enumerate(groups) if wanted[k]]
     normals = long_normals(triangles) / 2.0
     areas = np.linalg.norm(normals, axis=1)
-    return [
-        _panel(
-            int(building[some[0]]), triangles[some], normals[some], areas[some]
-        )
-        for some in groups
-    ]
+    found = []
+    for some in groups:
+        number = int(building[some[0]])
+        wall = triangles[some], normals[some], areas[some]
+        panel = _panel(number, *wall)
+        if panel.is_plane:
+            found.append(panel)
+        else:
+            facets = _connected(wall[0], units[some], building[some], _STRAIGHT)
+            found += _plane_pieces(panel, facets, *wall)
+    return found
+
+
+def _plane_pieces(
+    wall: Panel,
+    facets: np.ndarray,
+    triangles: np.ndarray,
+    normals: np.ndarray,
+    areas: np.ndarray,
+) -> list[Panel]:
+    """Divides a wall that bends into pieces, each as long as it is plane.
+
+    Args:
+        wall: the whole wall.
+        facets: (M,) number of the plane piece of each triangle.
+        triangles, normals, areas: see `_panel`.
+    """
+    x = (triangles[..., :2] - wall.origin[:2]).mean(axis=1) @ wall.along
+    starts = [x[facets == number].min() for number in range(facets.max() + 1)]
+
+    def of(members: Sequence[int]) -> Panel:
+        here = np.isin(facets, members)
+        one = triangles[here], normals[here], areas[here]
+        return _panel(wall.building, *one, _PIECE_BENT)
+
+    found: list[Panel] = []
+    members: list[int] = []
+    for number in np.argsort(starts, kind="stable").tolist():
+        longer = of([*members, number])
+        if members and longer.is_plane:
+            members.append(number)
+            found[-1] = longer
+        else:
+            members = [number]
+            found.append(of(members))
+    return found
 
 
 def _connected(
-    triangles: np.ndarray, normals: np.ndarray, building: np.ndarray
+    triangles: np.ndarray,
+    normals: np.ndarray,
+    building: np.ndarray,
+    least: float,
 ) -> np.ndarray:
-    """Returns the number (M,) of each triangle's panel."""
+    """Returns the number (M,) of each triangle's panel.
+
+    Args:
+        triangles: (M, 3, 3) [m].
+        normals: (M, 3), of unit length.
+        building: (M,) number of its building.
+        least: product of the normals of neighbours in one panel.
+    """
     corners = np.rint(triangles * _MM).astype(np.int64).reshape(-1, 3)
     keyed = np.column_stack([np.repeat(building, 3), corners])
     _, vertex = np.unique(keyed, axis=0, return_inverse=True)
@@ -159,7 +213,7 @@ def _connected(
     order = np.argsort(edge.reshape(-1), kind="stable")
     one, other = order[:-1] // 3, order[1:] // 3
     shared = edge.reshape(-1)[order[:-1]] == edge.reshape(-1)[order[1:]]
-    same = np.einsum("ij,ij->i", normals[one], normals[other]) >= _SAME_PLANE
+    same = np.einsum("ij,ij->i", normals[one], normals[other]) >= least
     one, other = one[shared & same], other[shared & same]
     count = len(triangles)
     links = coo_array((np.ones(len(one)), (one, other)), (count, count))
@@ -172,6 +226,7 @@ def _panel(
     triangles: np.ndarray,
     normals: np.ndarray,
     areas: np.ndarray,
+    bent: float = _BENT,
 ) -> Panel:
     """Returns the panel of connected triangles.
 
@@ -179,6 +234,7 @@ def _panel(
         building: its number.
         triangles: (M, 3, 3) [m].
         normals, areas: (M, 3) as long as the areas, and these (M,) [m^2].
+        bent: how far the triangles of a plane may lie apart across it [m].
     """
     corners = triangles.reshape(-1, 3)
     # The mean over areas: small triangles have imprecise normals.
@@ -199,7 +255,7 @@ def _panel(
             [Polygon(one) for one in np.round(flat, 3).reshape(-1, 3, 2)],
             grid_size=1.0 / _MM,
         )
-    is_plane = bool(np.ptp(aside) <= _BENT)
+    is_plane = bool(np.ptp(aside) <= bent)
     return Panel(
         building, origin, along, length, height, outline, triangles, is_plane
     )

@@ -8,7 +8,7 @@ from helpers.small_cityjson import CityWriter
 from helpers.small_osm import OsmWriter
 import numpy as np
 import pytest
-from shapely.geometry import LineString
+from shapely.geometry import LineString, Polygon
 from typer.testing import CliRunner
 import yaml
 
@@ -295,6 +295,36 @@ def test_models_with_windows_of_their_own_keep_them(tmp_path):
         12 * 12 * 9,
         atol=1e-6,
     )
+
+
+@pytest.mark.parametrize(
+    ("aside", "number"),
+    # A wall of 60 m with a corner in its middle, and one at 3/4.
+    [((0.0, 0.0), 1), ((0.049, 0.0), 1), ((0.2, 0.1), 2), ((0.2, 0.104), 2),
+     ((0.2, 0.18), 3)],
+)  # fmt: skip
+def test_walls_that_bend_are_divided(aside, number):
+    # Turned, and seen from outside in the direction of y.
+    x = np.array([-30.0, 0.0, 15.0, 30.0, 30.0, -30.0])
+    y = np.array([0.0, -aside[0], -aside[1], 0.0, 20.0, 20.0])
+    c, s = np.cos(0.6), np.sin(0.6)
+    outline = Polygon(np.column_stack([c * x - s * y, s * x + c * y]))
+    walls, _ = extruded(outline, 0.0, 9.0, "a", ImportFaults())
+    walls = walls[is_upright(walls)]
+    panels = find_panels([walls])
+    assert all(panel.is_plane for panel in panels)
+    assert len(panels) == number + 3
+    found = np.concatenate([panel.triangles for panel in panels])
+
+    assert {t.tobytes() for t in found} == {t.tobytes() for t in walls}
+    front = [p for p in panels if p.outward @ [s, -c] > 0.9]
+    assert len(front) == number
+    limit = 0.05 if number == 1 else 0.01
+    for panel in front:
+        off = (panel.triangles - panel.origin)[..., :2] @ panel.outward
+        assert np.abs(off).max() <= limit
+    length = np.hypot(np.diff(x[:4]), np.diff(y[:4])).sum()
+    assert sum(p.length for p in front) == pytest.approx(length, abs=0.01)
 
 
 def test_a_gable_keeps_its_slopes():
