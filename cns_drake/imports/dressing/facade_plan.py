@@ -26,6 +26,8 @@ _DOOR_EVERY = 16.0
 _DOOR_HEIGHT, _LEAST_DOOR = 2.2, 1.8
 _DOOR_WIDTH = 1.15
 _GATE_WIDTH = 2.5
+# Least wall between a door and the window beside it [m].
+_BESIDE_DOOR = 0.3
 _SILL, _THRESHOLD = 0.45, 0.04
 _SHOP_HEIGHT = 2.9
 _PIER = 0.5
@@ -195,6 +197,11 @@ def with_doors(plan: FacadePlan) -> FacadePlan:
     is_door[places[nearest]] = True
     is_gate = plan.style.use in (Use.SHED, Use.INDUSTRIAL)
     width = _GATE_WIDTH if is_gate else _DOOR_WIDTH
+    aside = 0.0
+    room = plan.spacing / 2.0 - _BESIDE_DOOR
+    if is_door[places].all() and room >= width:
+        # A house with a door only would have no window to the street.
+        aside = plan.spacing / 4.0
     half = min(width, plan.spacing - 0.3, plan.panel.length - 0.4) / 2.0
     low = max(plan.ground + _THRESHOLD, 0.0)
     high = min(low + _DOOR_HEIGHT, plan.panel.height - 0.2)
@@ -204,13 +211,20 @@ def with_doors(plan: FacadePlan) -> FacadePlan:
     if high < low + _LEAST_DOOR:
         return plan
     changed = o._replace(
-        x0=np.where(is_door, middle - half, o.x0),
-        x1=np.where(is_door, middle + half, o.x1),
+        x0=np.where(is_door, middle - aside - half, o.x0),
+        x1=np.where(is_door, middle - aside + half, o.x1),
         z0=np.where(is_door, low, o.z0),
         z1=np.where(is_door, high, o.z1),
         depth=np.where(is_door, o.depth + _DOOR_DEEPER, o.depth),
         is_door=o.is_door | is_door,
     )
+    if aside > 0.0:
+        narrow = np.minimum(o.x1 - o.x0, room)[is_door] / 2.0
+        windows = o.chosen(is_door)._replace(
+            x0=middle[is_door] + aside - narrow,
+            x1=middle[is_door] + aside + narrow,
+        )
+        changed = changed.joined(windows)
     return replace(plan, openings=changed)
 
 

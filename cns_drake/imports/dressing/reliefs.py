@@ -55,6 +55,10 @@ class Openings(NamedTuple):
         """Returns the openings of a mask or an index array (N,)."""
         return Openings(*(values[which] for values in self))
 
+    def joined(self, others: Openings) -> Openings:
+        """Returns these openings and others."""
+        return Openings(*map(np.concatenate, zip(self, others, strict=True)))
+
 
 class OpenedWall(NamedTuple):
     """A panel with openings.

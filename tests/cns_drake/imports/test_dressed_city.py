@@ -1,6 +1,7 @@
 """Walls of the file get details from tags and by lot."""
 
 import csv
+from dataclasses import replace
 import hashlib
 import re
 
@@ -15,8 +16,14 @@ import yaml
 from cns_drake.city.geometry.object_parts import part_triangles
 from cns_drake.command_line.cli import app
 from cns_drake.imports.dressing.dressed_city import plan_buildings
+from cns_drake.imports.dressing.facade_plan import plan_facade, with_doors
 from cns_drake.imports.dressing.reliefs import Openings, framed, open_wall
-from cns_drake.imports.dressing.styles import Use, building_use, tagged_colour
+from cns_drake.imports.dressing.styles import (
+    Use,
+    building_use,
+    make_style,
+    tagged_colour,
+)
 from cns_drake.imports.dressing.wall_panels import find_panels, is_upright
 from cns_drake.imports.extrusions import extruded
 from cns_drake.imports.grown_city import grow
@@ -420,3 +427,28 @@ def test_the_notes_count_details_of_the_file_and_by_lot(tmp_path):
         assert "/glass" in text
         for mesh in set(re.findall("meshes/[^<]+", text)):
             assert (folder / mesh).is_file()
+
+
+@pytest.mark.parametrize(
+    ("length", "number"),
+    # 2.9 m between the margins hold a door, a window and walls beside them.
+    [(3.85, 1), (3.95, 2), (6.0, 2)],
+)
+def test_a_house_with_one_bay_has_a_window_beside_its_door(length, number):
+    style = make_style(
+        {"building": "house"}, None, 60.0, 5.0, False, np.random.default_rng(1)
+    )
+    style = replace(style, pitch=4.0, width=1.3, storey=5.0)
+    wall = np.array([[0.0, 0.0], [length, 0.0]])
+    low, high = np.zeros(2), np.full(2, 4.0)
+    corners = [np.column_stack([wall, z]) for z in (low, high)]
+    (a, b), (d, c) = corners
+    (panel,) = find_panels([np.array([[a, b, c], [a, c, d]])])
+    o = with_doors(plan_facade(panel, style, 0.0, 0.0)).openings
+    assert len(o.x0) == number
+    assert o.is_door.sum() == 1
+    order = np.argsort(o.x0)
+    limits = np.column_stack([o.x0, o.x1])[order].ravel()
+    gaps = np.diff([0.0, *limits, length])
+    assert (gaps[::2] > 0.29).all()
+    assert (gaps[1::2] > 0.8).all()
