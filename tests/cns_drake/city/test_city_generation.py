@@ -24,7 +24,7 @@ import pytest
 import yaml
 
 from cns_drake.base.map_folder import STRUCTURES_NAME
-from cns_drake.city.generation.generate import render_city
+from cns_drake.city.generation import generate
 from cns_drake.city.geometry.object_parts import part_mesh
 from cns_drake.city.ground.streets import GROUND_TAG
 from cns_drake.city.growth.lowering import cut_at
@@ -60,15 +60,38 @@ def stages(name):
     )
 
 
-@pytest.fixture(scope="module")
-def growing(name, stages):
-    return GrowingCity(city(name).structures, stages, city(name).cars)
+class Kept(GrowingCity):
+    """A city whose stages are kept; to lower its buildings takes long."""
+
+    def __init__(self, *arguments):
+        super().__init__(*arguments)
+        self.standing = {}
+
+    def at(self, stage):
+        self.standing[stage] = super().at(stage)
+        return self.standing[stage]
 
 
 @pytest.fixture(scope="module")
-def standing(stages, growing):
+def rendered(name):
+    """The texts of the files, and the city that they are made of."""
+    cities = []
+
+    def grow(*arguments):
+        cities.append(Kept(*arguments))
+        return cities[-1]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(generate, "GrowingCity", grow)
+        texts = generate.render_city(world_of(name), city(name))
+    (growing,) = cities
+    return texts, growing
+
+
+@pytest.fixture(scope="module")
+def standing(rendered):
     """Stage -> its structures."""
-    return {stage: growing.at(stage) for stage in stages.stages}
+    return rendered[1].standing
 
 
 def lot_of(structure: str) -> str:
@@ -76,8 +99,8 @@ def lot_of(structure: str) -> str:
     return structure.partition("_lot_")[0] if "_lot_" in structure else ""
 
 
-def test_generating_anew_gives_the_committed_bytes(name):
-    new, old = render_city(world_of(name), city(name)), files(world_of(name))
+def test_generating_anew_gives_the_committed_bytes(name, rendered):
+    new, old = rendered[0], files(world_of(name))
     assert sorted(new) == sorted(old)
     changed = [name for name in new if new[name].encode() != old[name]]
     assert changed == []
@@ -173,10 +196,10 @@ def test_the_ground_is_there_at_all_stages(name, stages):
     assert not ground & (stages.absent("01") | stages.heights("01").keys())
 
 
-def test_the_table_names_every_structure_once(name, growing):
+def test_the_table_names_every_structure_once(name, rendered):
     with (world_of(name) / STRUCTURES_NAME).open(newline="") as file:
         rows = list(csv.DictReader(file))
-    structures = growing.structures
+    structures = rendered[1].structures
     assert [int(row["instance"]) for row in rows] == list(
         range(1, len(structures) + 1)
     )
