@@ -284,8 +284,9 @@ def _draw(
         means[row, column, 1] += near[i, 1]
     for row in range(shape[0]):
         for column in range(shape[1]):
-            if counts[row, column] > 0.0:
-                means[row, column] /= counts[row, column]
-            else:
-                means[row, column] = np.nan
+            for axis in range(2):
+                if counts[row, column] > 0.0:
+                    means[row, column, axis] /= counts[row, column]
+                else:
+                    means[row, column, axis] = np.nan
     return heights, means

@@ -242,7 +242,8 @@ def _moments(
         for i in members:
             for axis in range(3):
                 means[run, axis] += points[i, axis]
-        means[run] /= counts[run]
+        for axis in range(3):
+            means[run, axis] /= counts[run]
         for i in members:
             for axis in range(3):
                 offset = points[i, axis] - means[run, axis]
