@@ -5,6 +5,7 @@ reported as hit. Open3D reads the SDF's meshes and casts the same rays with its
 own code, which shows whether anything was in the way.
 """
 
+import functools
 from xml.etree import ElementTree
 
 import numpy as np
@@ -150,15 +151,21 @@ def _open3d_scene(stage_file):
 
 
 def _arrays(shape, folder):
-    import open3d
-
     if shape.tag != "mesh":
         mesh = _legacy(shape)
         return np.asarray(mesh.vertices), np.asarray(mesh.triangles)
-    mesh = open3d.t.io.read_triangle_mesh(str(folder / shape.findtext("uri")))
+    p_G, indices = _read(folder / shape.findtext("uri"))
     scale = np.array(shape.findtext("scale", "1 1 1").split(), float)
+    return p_G * scale, indices
+
+
+@functools.cache
+def _read(file):
+    import open3d
+
+    mesh = open3d.t.io.read_triangle_mesh(str(file))
     return (
-        mesh.vertex.positions.numpy().astype(float) * scale,
+        mesh.vertex.positions.numpy().astype(float),
         mesh.triangle.indices.numpy().astype(np.int64),
     )
 
