@@ -9,6 +9,7 @@ import numpy as np
 from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
 
+from cns_drake.base.compiled import compiled
 from cns_drake.ray_casting.group_motion import Motion
 from cns_drake.ray_casting.ray_groups import NO_MOTIONS, Member, RayGroup
 from cns_drake.scene.surfaces import (
@@ -118,6 +119,7 @@ class MovingGroups:
         self._radii = np.array([_radius_about_F(group) for group in moving])
         self._known: Mapping[FrameId, int] = NOTHING_KNOWN.rows
         self._known_rows = np.full(len(moving), -1)
+        self._unknown = np.arange(len(moving))
         self._in_sight = np.ones(len(moving), bool)
         self._was_in_motion = np.zeros(len(moving), bool)
 
@@ -145,7 +147,7 @@ class MovingGroups:
         if not len(self._rows):
             return Placed.of(self._groups, ())
         frames = self._frames
-        X_WFs = self._find_poses(calc_X_WF, known)
+        X_WFs, rows = self._find_poses(calc_X_WF, known)
         moves = np.zeros(len(frames), bool)
         if motions:
             moves = np.array([frame in motions for frame in frames])
@@ -153,48 +155,99 @@ class MovingGroups:
         for k in np.flatnonzero(moves):
             motion = motions[frames[k]]
             reaches[k] += np.linalg.norm(motion.v) * motion.duration
-        in_sight = _meets(seen, X_WFs[:, :3, 3], reaches)
-        shown = in_sight != self._in_sight
-        placed = np.flatnonzero(in_sight | shown)
-        X_OLs = X_WFs[placed, :3] @ self._X_FLs[placed]
-        X_OLs[:, :, 3] -= self._p_WO
-        differs = (X_OLs != self._X_OLs[placed]).any(axis=(1, 2))
-        differs |= (shown | moves | self._was_in_motion)[placed]
-        placed, X_OLs = placed[differs], X_OLs[differs]
-        self._X_OLs[placed] = X_OLs
-        for k in placed[(shown | moves | self._was_in_motion)[placed]]:
+        anew = moves | self._was_in_motion
+        differs = np.empty(len(frames), bool)
+        shown = np.empty(len(frames), bool)
+        _place_all(
+            X_WFs, rows, self._X_FLs, self._p_WO, seen, reaches, anew,
+            self._in_sight, self._X_OLs, shown, differs,
+        )  # fmt: skip
+        placed = np.flatnonzero(differs)
+        for k in placed[(shown | anew)[placed]]:
             group = self._groups[self._rows[k]]
             group.motion = motions[frames[k]] if moves[k] else None
-            group.in_sight = bool(in_sight[k])
+            group.in_sight = bool(self._in_sight[k])
         self._was_in_motion[placed] = moves[placed]
-        self._in_sight = in_sight
         return Placed(
-            self._rows[placed], X_OLs, in_sight[placed], moves[placed]
+            self._rows[placed],
+            self._X_OLs[placed],
+            self._in_sight[placed],
+            moves[placed],
         )
 
     def _find_poses(
         self,
         calc_X_WF: Callable[[FrameId], RigidTransform],
         known: KnownPoses,
-    ) -> np.ndarray:
-        """Returns the (G, 4, 4) poses of frames."""
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Returns (M, 4, 4) poses, and the (G,) rows of those of frames."""
         if known.rows is not self._known:
             self._known = known.rows
             self._known_rows = np.array(
                 [known.rows.get(frame, -1) for frame in self._frames]
             )
-        X_WFs = np.empty((len(self._frames), 4, 4))
-        rows = self._known_rows
-        X_WFs[rows >= 0] = known.X_WFs[rows[rows >= 0]]
-        for k in np.flatnonzero(rows < 0):
-            X_WFs[k] = calc_X_WF(self._frames[k]).GetAsMatrix4()
-        return X_WFs
+            self._unknown = np.flatnonzero(self._known_rows < 0)
+        if not len(self._unknown):
+            return known.X_WFs, self._known_rows
+        rows = self._known_rows.copy()
+        rows[self._unknown] = len(known.X_WFs) + np.arange(len(self._unknown))
+        others = [
+            calc_X_WF(self._frames[k]).GetAsMatrix4() for k in self._unknown
+        ]
+        return np.concatenate([known.X_WFs, others]), rows
 
 
-def _meets(ball: Ball, places: np.ndarray, radii: np.ndarray) -> np.ndarray:
-    """Returns which balls at places [m], of radii [m], meet a ball."""
-    distance = np.linalg.norm(places - ball.p_W, axis=1)
-    return distance <= ball.radius + radii
+@compiled
+def _place_all(
+    X_WFs: np.ndarray,
+    rows: np.ndarray,
+    X_FLs: np.ndarray,
+    p_WO: np.ndarray,
+    seen: Ball,
+    reaches: np.ndarray,
+    anew: np.ndarray,
+    in_sight: np.ndarray,
+    X_OLs: np.ndarray,
+    shown: np.ndarray,
+    differs: np.ndarray,
+) -> None:
+    """Places G groups that are in sight, or were.
+
+    NumPy takes five times as long, for passes over many small matrices.
+
+    Args:
+        X_WFs: (M, 4, 4) poses of frames.
+        rows: (G,) rows of those of the groups.
+        X_FLs: (G, 4, 4) places of the groups on their frames.
+        p_WO: the scene's origin.
+        seen: the ball in which rays can meet geometry.
+        reaches: (G,) radii of balls about the groups [m].
+        anew: (G,) whether each is placed even if it has not moved.
+        in_sight: (G,) whether each was in sight, to update.
+        X_OLs: (G, 3, 4) their places, to update.
+        shown: (G,) to fill: whether each has come in sight or left it.
+        differs: (G,) to fill: whether each is placed.
+    """
+    for k in range(len(rows)):
+        X_WF, X_FL = X_WFs[rows[k]], X_FLs[k]
+        square = 0.0
+        for i in range(3):
+            square += (X_WF[i, 3] - seen.p_W[i]) ** 2
+        sees = np.sqrt(square) <= seen.radius + reaches[k]
+        shown[k] = sees != in_sight[k]
+        in_sight[k] = sees
+        differs[k] = (sees and anew[k]) or shown[k]
+        if not (sees or shown[k]):
+            continue
+        for i in range(3):
+            for j in range(4):
+                value = 0.0
+                for n in range(4):
+                    value += X_WF[i, n] * X_FL[n, j]
+                if j == 3:
+                    value -= p_WO[i]
+                differs[k] |= value != X_OLs[k, i, j]
+                X_OLs[k, i, j] = value
 
 
 def _radius_about_F(group: RayGroup) -> float:
