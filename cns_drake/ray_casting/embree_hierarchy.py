@@ -72,6 +72,11 @@ class EmbreeHierarchy:
         # Threads start at their first use.
         self._helpers = ThreadPoolExecutor(max(1, num_threads - 1))
         self._lib = embree.load()
+        # Finding these addresses takes longer than placing ten instances.
+        self._set_transform = embree.address_of(
+            self._lib.rtcSetGeometryTransform
+        )
+        self._commit_geometry = embree.address_of(self._lib.rtcCommitGeometry)
         if previous is None:
             self._device = self._lib.rtcNewDevice(None)
         else:
@@ -171,8 +176,8 @@ class EmbreeHierarchy:
             self._lib.rtcSetGeometryTimeStepCount(int(self._instances[row]), 1)
         self._in_motion[rows[in_sight]] = moves[in_sight]
         place_instances(
-            embree.address_of(self._lib.rtcSetGeometryTransform),
-            embree.address_of(self._lib.rtcCommitGeometry),
+            self._set_transform,
+            self._commit_geometry,
             self._instances[rows[still]],
             X_OLs[still].astype(np.float32),
         )
