@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cns_drake.base.compiled import compiled
 from cns_drake.traffic.body_shapes import Limb
 from cns_drake.traffic.traffic_plan import TrafficPlan
 
@@ -87,16 +88,21 @@ class LimbTable:
         self._joint = np.array([limb.joint for limb in limbs]).reshape(-1, 3)
         self._swing = np.array([limb.swing for limb in limbs])
 
-    def poses(self, states: BodyStates) -> tuple[np.ndarray, np.ndarray]:
-        """Returns R_WL (M, 3, 3) and p_WL (M, 3) of all limbs [m].
+    def poses(self, states: BodyStates) -> np.ndarray:
+        """Returns X_WL (M, 4, 4) of all limbs.
 
-        At T times, both have one more dimension, the first.
+        At T times it has one more dimension, the first.
         """
-        yaw, pitch = self._angles(states)
+        angles = (states.yaw, states.pitch, self._angles(states)[1])
+        trig = [np.atleast_2d(f(a)) for a in angles for f in (np.cos, np.sin)]
         p_WB = np.where(states.present[..., None], states.p_WB, _AWAY)
-        R_WB = states.R_WB[..., self.body, :, :]
-        p_BL_W = np.einsum("...nij,nj->...ni", R_WB, self._joint)
-        return _matrices(yaw, pitch), p_WB[..., self.body, :] + p_BL_W
+        num_limbs = len(self.body)
+        X_WLs = np.empty((len(trig[0]), num_limbs, 4, 4))
+        _pose_limbs(
+            X_WLs, self.body, self._joint, p_WB.reshape(-1, *p_WB.shape[-2:]),
+            *trig,
+        )  # fmt: skip
+        return X_WLs.reshape(*states.yaw.shape[:-1], num_limbs, 4, 4)
 
     def quat_xyzw(self, states: BodyStates) -> np.ndarray:
         """Returns the (M, 4) orientations of all limbs."""
@@ -110,6 +116,45 @@ class LimbTable:
             states.yaw[..., self.body],
             states.pitch[..., self.body] - swing,
         )
+
+
+@compiled
+def _pose_limbs(
+    X_WLs: np.ndarray,
+    body: np.ndarray,
+    joint: np.ndarray,
+    p_WB: np.ndarray,
+    cos_yaw: np.ndarray,
+    sin_yaw: np.ndarray,
+    cos_pitch: np.ndarray,
+    sin_pitch: np.ndarray,
+    cos_limb: np.ndarray,
+    sin_limb: np.ndarray,
+) -> None:
+    """Fills in the poses of M limbs at T times; see `_matrices`.
+
+    Args:
+        X_WLs: (T, M, 4, 4) to fill.
+        body: (M,) of each limb.
+        joint: (M, 3) its origin in the frame of the body.
+        p_WB: (T, N, 3) of the bodies.
+        cos_yaw, sin_yaw, cos_pitch, sin_pitch: (T, N) of the bodies.
+        cos_limb, sin_limb: (T, M) of the pitches of limbs.
+    """
+    for k in range(X_WLs.shape[0]):
+        for m in range(X_WLs.shape[1]):
+            X, n, p = X_WLs[k, m], body[m], joint[m]
+            cy, sy = cos_yaw[k, n], sin_yaw[k, n]
+            cp, sp = cos_limb[k, m], sin_limb[k, m]
+            X[0, 0], X[0, 1], X[0, 2] = cy * cp, -sy, cy * sp
+            X[1, 0], X[1, 1], X[1, 2] = sy * cp, cy, sy * sp
+            X[2, 0], X[2, 1], X[2, 2] = -sp, 0.0, cp
+            X[3, 0], X[3, 1], X[3, 2], X[3, 3] = 0.0, 0.0, 0.0, 1.0
+            cp, sp = cos_pitch[k, n], sin_pitch[k, n]
+            p_W = p_WB[k, n]
+            X[0, 3] = p_W[0] + (cy * cp * p[0] - sy * p[1] + cy * sp * p[2])
+            X[1, 3] = p_W[1] + (sy * cp * p[0] + cy * p[1] + sy * sp * p[2])
+            X[2, 3] = p_W[2] + (cp * p[2] - sp * p[0])
 
 
 def _matrices(yaw: np.ndarray, pitch: np.ndarray) -> np.ndarray:

@@ -75,7 +75,6 @@ class _Moment(NamedTuple):
 
     Attributes:
         X_WLs: (M, 4, 4) poses of the limbs.
-        limb_quat_xyzw: (M, 4) their orientations.
         p_WO: (N, 3) middles of the bodies' boxes [m].
         quat_xyzw: (N, 4) their orientations.
         v_WB: (N, 3) velocities [m/s].
@@ -85,7 +84,6 @@ class _Moment(NamedTuple):
     """
 
     X_WLs: np.ndarray
-    limb_quat_xyzw: np.ndarray
     p_WO: np.ndarray
     quat_xyzw: np.ndarray
     v_WB: np.ndarray
@@ -196,13 +194,9 @@ class TrafficMotion(LeafSystem):
     def _moments(self, times: np.ndarray) -> _Moment:
         """Returns the bodies at (T,) times [s]."""
         states = bodies_at(self._plan, times)
-        X_WLs = np.zeros((len(times), len(self._frames), 4, 4))
-        X_WLs[..., :3, :3], X_WLs[..., :3, 3] = self._limbs.poses(states)
-        X_WLs[..., 3, 3] = 1.0
         up = states.R_WB[..., 2]
         return _Moment(
-            X_WLs,
-            self._limbs.quat_xyzw(states),
+            self._limbs.poses(states),
             states.p_WB + up * self._sizes[:, 2:] / 2,
             states.quat_xyzw,
             states.v_WB,
@@ -217,24 +211,25 @@ class TrafficMotion(LeafSystem):
         output.set_value(self._moment.Eval(context).X_WLs)
 
     def _calc_pose(self, context: Context, output: AbstractValue) -> None:
-        moment: _Moment = self._moment.Eval(context)
+        states = bodies_at(self._plan, context.get_time())
         # Each free body has a quaternion (real part first) and a position.
-        q = np.empty((len(moment.X_WLs), 7))
-        q[:, :4] = moment.limb_quat_xyzw[:, [3, 0, 1, 2]]
-        q[:, 4:] = moment.X_WLs[:, :3, 3]
+        q = np.empty((len(self._frames), 7))
+        q[:, :4] = self._limbs.quat_xyzw(states)[:, [3, 0, 1, 2]]
+        q[:, 4:] = self._limbs.poses(states)[:, :3, 3]
         self._plant.SetPositions(self._plant_context, q.ravel())
         port = self._plant.get_geometry_pose_output_port()
         output.SetFrom(port.EvalAbstract(self._plant_context))
 
     def _calc_velocities(self, context: Context, output: AbstractValue) -> None:
         t = context.get_time()
-        (R_0, p_0), (R_1, p_1) = (
+        X_0, X_1 = (
             self._limbs.poses(bodies_at(self._plan, time))
             for time in (t, t + self._turn)
         )
+        R_0, R_1 = X_0[:, :3, :3].copy(), X_1[:, :3, :3].copy()
         turned = Rotation.from_matrix(R_1 @ R_0.transpose(0, 2, 1))
         w = turned.as_rotvec() / self._turn
-        v = (p_1 - p_0) / self._turn
+        v = (X_1 - X_0)[:, :3, 3] / self._turn
         output.set_value(list(map(SpatialVelocity, w, v)))
 
     def _calc_moving(self, context: Context, output: AbstractValue) -> None:

@@ -109,7 +109,8 @@ def test_points_lie_on_the_bodies_at_their_own_time(scanned):
     worst = {}
     for row in np.random.default_rng(1).choice(len(scan), 300, replace=False):
         t = T + (scan["t"][row] * 1e-9 if goes_on else 0.0)
-        R_WL, p_WL = traffic._limbs.poses(bodies_at(make_plan(), t))
+        X_WLs = traffic._limbs.poses(bodies_at(make_plan(), t))
+        R_WL, p_WL = X_WLs[:, :3, :3], X_WLs[:, :3, 3]
         distances = [
             _distance(geometry, R_WL[k].T @ (p_WR[row] - p_WL[k]))
             for k, frame in enumerate(limbs)
@@ -211,7 +212,8 @@ def test_limbs_stay_in_the_walkers_box():
     half = np.array(WALKER_SIZE) / 2
     for t in np.linspace(1, 2, 21):
         states = bodies_at(plan, t)
-        R_WL, p_WL = traffic._limbs.poses(states)
+        X_WLs = traffic._limbs.poses(states)
+        R_WL, p_WL = X_WLs[:, :3, :3], X_WLs[:, :3, 3]
         for frame, k in traffic.moving_frames.items():
             body = traffic._limbs.body[k]
             if body < 3:
