@@ -74,12 +74,12 @@ class ScanPort:
         if scan is None:
             return {}
         outgoing = {
-            self.due_topic: messages.make_point_cloud(
+            self.due_topic: messages.encode_point_cloud(
                 to_layout(scan, self._layout), self._name, stamp_ns
             )
         }
         if self._layout != "cns":
-            outgoing[labels_topic(self._name)] = messages.make_point_cloud(
+            outgoing[labels_topic(self._name)] = messages.encode_point_cloud(
                 to_labels(scan), self._name, stamp_ns
             )
         return outgoing
@@ -134,7 +134,7 @@ class ObjectsPort:
         return {
             OBJECTS_TOPIC: self._detections.encode(objects, stamp_ns),
             BOXES_TOPIC: self._boxes.encode(objects, stamp_ns),
-            MOTION_TOPIC: messages.make_point_cloud(
+            MOTION_TOPIC: messages.encode_point_cloud(
                 motion_table(objects), messages.MAP_FRAME, stamp_ns
             ),
         }

@@ -60,7 +60,7 @@ STEPS = {
     "cast": ((RayCastingScene, "cast_rays"),),
     "points": ((Lidar, "_calc_scan"),),
     "messages": (
-        (messages, "make_point_cloud"),
+        (messages, "encode_point_cloud"),
         (messages, "make_imu"),
         (messages, "make_odometry"),
         (messages, "make_tf"),

@@ -12,9 +12,8 @@ from cns_drake.base.recordings.point_layouts import (
 from cns_drake.base.recordings.ros_types import (
     POINT_CLOUD,
     deserialize,
-    serialize,
 )
-from cns_drake.recording.messages import make_point_cloud
+from cns_drake.recording.messages import encode_point_cloud
 from cns_drake.sensors.beam_pattern import POINT_DTYPE
 
 # sensor_msgs/PointField: UINT8 2, UINT16 4, UINT32 6, FLOAT32 7.
@@ -71,8 +70,7 @@ def points():
 
 def sent(points):
     """Returns the message of points after a trip through its bytes."""
-    data = serialize(make_point_cloud(points, "lidar", 10**18))
-    return deserialize(data, POINT_CLOUD)
+    return deserialize(encode_point_cloud(points, "lidar", 10**18), POINT_CLOUD)
 
 
 @pytest.mark.parametrize("layout", FIELDS)
