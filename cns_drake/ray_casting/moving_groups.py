@@ -87,6 +87,7 @@ class Placed(NamedTuple):
 
 NOTHING_KNOWN = KnownPoses({}, np.zeros((0, 4, 4)))
 EVERYWHERE = Ball(np.zeros(3), np.inf)
+NOTHING_PLACED = Placed.of((), ())
 
 
 class MovingGroups:
@@ -145,7 +146,7 @@ class MovingGroups:
             The groups that were placed.
         """
         if not len(self._rows):
-            return Placed.of(self._groups, ())
+            return NOTHING_PLACED
         frames = self._frames
         X_WFs, rows = self._find_poses(calc_X_WF, known)
         moves = np.zeros(len(frames), bool)

@@ -269,8 +269,10 @@ class Lidar(LeafSystem):
         model = self._returns or self._measurement
         reach = model.reach(self._pattern.max_range)
         p_WSset, _ = self._calc_poses(context)
-        middle = p_WSset.mean(axis=0)
-        way = np.linalg.norm(p_WSset - middle, axis=1).max()
+        middle, way = p_WSset[0], 0.0
+        if len(p_WSset) > 1:
+            middle = p_WSset.mean(axis=0)
+            way = np.linalg.norm(p_WSset - middle, axis=1).max()
         # A metre of margin for rounding and merged beams.
         return Ball(middle, float(reach + way) + 1.0)
 
@@ -357,7 +359,8 @@ class Lidar(LeafSystem):
             self._pattern.max_range,
             frame,
         )
-        return hits.geometry[turn.table.place[returns.beams]], returns
+        places = turn.table.place.take(returns.beams)
+        return hits.geometry.take(places), returns
 
     def _pose_prerequisites(self) -> set:
         if self._sweep is not None:

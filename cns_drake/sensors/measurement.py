@@ -129,19 +129,24 @@ class MeasurementModel:
             )
             ranges = ranges + np.float32(self.range_noise) * error
         beams = np.flatnonzero((ranges >= min_range) & (ranges <= max_range))
+        measured = ranges.take(beams)
         # The brightness of a surface depends on its true distance.
-        intensity = np.exp(-_ATTENUATION_PER_M * true_ranges[beams])
+        distance = measured
+        if ranges is not true_ranges:
+            distance = true_ranges.take(beams)
+        intensity = np.exp(-_ATTENUATION_PER_M * distance)
         if self.dropout > 0.0 or self.faint_dropout > 0.0:
             draw = self._generator(_DROPOUT, frame).random(num_beams)[beams]
             survival = (1.0 - self.dropout) * (
                 1.0 - self.faint_dropout * (1.0 - intensity.astype(float))
             )
             kept = draw < survival
-            beams, intensity = beams[kept], intensity[kept]
+            beams, measured = beams[kept], measured[kept]
+            intensity = intensity[kept]
         if self.resolution > 0.0:
             step = np.float32(_INTENSITY_STEP)
             intensity = np.rint(intensity / step) * step
-        return Returns(beams, ranges[beams], intensity)
+        return Returns(beams, measured, intensity)
 
     def _generator(self, purpose: int, frame: int) -> np.random.Generator:
         return noise_generator(self.seed, self.sensor_name, purpose, frame)
