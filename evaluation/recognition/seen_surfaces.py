@@ -175,7 +175,14 @@ def _is_on_plane(
 
     That is, along its direction, within `TOLERANCE`.
     """
-    order = np.argsort(away)
+    # In place of `np.argsort`, which takes a second to compile.
+    order = np.empty(4, np.int64)
+    for quadrant in range(4):
+        rank = quadrant
+        while rank > 0 and away[quadrant] < away[order[rank - 1]]:
+            order[rank] = order[rank - 1]
+            rank -= 1
+        order[rank] = quadrant
     a = seen[corners[order[0]]]
     u = seen[corners[order[1]]] - a
     v = seen[corners[order[2]]] - a
