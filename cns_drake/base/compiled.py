@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+import contextlib
+import fcntl
 import functools
 import hashlib
 from pathlib import Path
@@ -22,7 +24,8 @@ def compiled(function: _Function) -> _Function:
     folder cannot be written, each process compiles anew. Numba notices a change
     only in the file of the function itself. A compiled function may therefore
     call compiled functions of its own folder and no others: a change in that
-    folder recompiles all of them.
+    folder recompiles all of them. One of several processes side by side
+    compiles a function, and the others wait for it.
 
     An array is best written number by number: where it is assigned to a part
     of another one, numba compiles a message about shapes, for seconds.
@@ -30,17 +33,44 @@ def compiled(function: _Function) -> _Function:
     # Numba reads the cache folder while it decorates, and only from here.
     before = numba.config.CACHE_DIR
     own_folder = Path(function.__code__.co_filename).parent
-    numba.config.CACHE_DIR = str(
-        Path(before or cache_folder() / "compiled") / _state_of(own_folder)
-    )
+    kept = Path(before or cache_folder() / "compiled") / _state_of(own_folder)
+    numba.config.CACHE_DIR = str(kept)
     # Nothing calls these functions as those of C.
     options = {"nogil": True, "no_cfunc_wrapper": True}
     try:
-        return numba.njit(cache=True, **options)(function)
+        dispatcher = numba.njit(cache=True, **options)(function)
+        name = f"{function.__module__}.{function.__qualname__}.lock"
+        dispatcher.compile = _one_at_a_time(dispatcher.compile, kept / name)
+        return dispatcher
     except RuntimeError:
         return numba.njit(**options)(function)
     finally:
         numba.config.CACHE_DIR = before
+
+
+def _one_at_a_time(
+    get_compiled: Callable[[tuple], object], file: Path
+) -> Callable[[tuple], object]:
+    """Returns a function that at most one process at a time is in."""
+
+    def get_alone(types: tuple) -> object:
+        with _locked(file):
+            return get_compiled(types)
+
+    return get_alone
+
+
+@contextlib.contextmanager
+def _locked(file: Path) -> Iterator[None]:
+    """Locks a file for this process, if that can be done."""
+    with contextlib.ExitStack() as stack:
+        # Such a lock binds processes and not threads, which numba lets compile
+        # one by one: theirs could wait for each other. It is not forked.
+        with contextlib.suppress(OSError):
+            file.parent.mkdir(parents=True, exist_ok=True)
+            stream = stack.enter_context(file.open("a"))
+            fcntl.lockf(stream, fcntl.LOCK_EX)
+        yield
 
 
 @functools.cache

@@ -52,3 +52,47 @@ def test_nothing_is_kept_beside_the_code(tmp_path, is_there):
     assert kept
     inside = Path("cache" if is_there else "home/.cache") / "cns-drake"
     assert all(path.is_relative_to(inside) for path in kept)
+
+
+_RACE = """
+import fcntl
+import os
+
+from cns_drake.base.compiled import compiled
+
+@compiled
+def twice(number):
+    return 2 * number
+
+lock = fcntl.lockf
+
+def wait(*arguments):
+    fcntl.lockf = lock
+    child = os.fork()
+    if child == 0:
+        twice(2)
+        os._exit(0)
+    os.waitpid(child, 0)
+    return lock(*arguments)
+
+fcntl.lockf = wait
+print(twice(2), twice.stats.cache_hits.total(), twice.stats.cache_misses)
+"""
+
+
+@pytest.mark.slow
+def test_what_another_process_compiles_is_not_compiled_again(tmp_path):
+    script = tmp_path / "race.py"
+    script.write_text(_RACE)
+    result = subprocess.run(
+        [sys.executable, script],
+        env={
+            **os.environ,
+            "PYTHONPATH": str(documents.ROOT),
+            "XDG_CACHE_HOME": str(tmp_path / "cache"),
+        },
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert result.stdout == "4 1 Counter()\n"
