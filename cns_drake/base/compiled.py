@@ -40,7 +40,7 @@ def compiled(function: _Function) -> _Function:
     try:
         dispatcher = numba.njit(cache=True, **options)(function)
         name = f"{function.__module__}.{function.__qualname__}.lock"
-        dispatcher.compile = _one_at_a_time(dispatcher.compile, kept / name)
+        dispatcher.compile = _for_all(dispatcher.compile, kept / name)
         return dispatcher
     except RuntimeError:
         return numba.njit(**options)(function)
@@ -48,16 +48,24 @@ def compiled(function: _Function) -> _Function:
         numba.config.CACHE_DIR = before
 
 
-def _one_at_a_time(
-    get_compiled: Callable[[tuple], object], file: Path
+def _for_all(
+    compile_for: Callable[[tuple], object], file: Path
 ) -> Callable[[tuple], object]:
-    """Returns a function that at most one process at a time is in."""
+    """Returns a function that compiles what others need not compile again.
 
-    def get_alone(types: tuple) -> object:
+    That is, processes side by side, and calls with a number that is written
+    out: numba would compile for that one number.
+
+    Args:
+        compile_for: compiles for types of arguments.
+        file: to lock meanwhile.
+    """
+
+    def compile_once(types: tuple) -> object:
         with _locked(file):
-            return get_compiled(types)
+            return compile_for(tuple(map(numba.types.unliteral, types)))
 
-    return get_alone
+    return compile_once
 
 
 @contextlib.contextmanager

@@ -54,7 +54,7 @@ def test_nothing_is_kept_beside_the_code(tmp_path, is_there):
     assert all(path.is_relative_to(inside) for path in kept)
 
 
-_RACE = """
+_TWICE = """
 import fcntl
 import os
 
@@ -63,6 +63,14 @@ from cns_drake.base.compiled import compiled
 @compiled
 def twice(number):
     return 2 * number
+
+@compiled
+def later(time, by):
+    return time + by
+
+@compiled
+def two_times(time):
+    return later(time, 1) + later(time, time)
 
 lock = fcntl.lockf
 
@@ -77,13 +85,15 @@ def wait(*arguments):
 
 fcntl.lockf = wait
 print(twice(2), twice.stats.cache_hits.total(), twice.stats.cache_misses)
+print(two_times(2), later.signatures)
 """
 
 
 @pytest.mark.slow
-def test_what_another_process_compiles_is_not_compiled_again(tmp_path):
-    script = tmp_path / "race.py"
-    script.write_text(_RACE)
+def test_nothing_is_compiled_twice(tmp_path):
+    """Neither by two processes, nor for numbers that are written out."""
+    script = tmp_path / "twice.py"
+    script.write_text(_TWICE)
     result = subprocess.run(
         [sys.executable, script],
         env={
@@ -95,4 +105,4 @@ def test_what_another_process_compiles_is_not_compiled_again(tmp_path):
         text=True,
         check=True,
     )
-    assert result.stdout == "4 1 Counter()\n"
+    assert result.stdout == "4 1 Counter()\n7 [(int64, int64)]\n"
