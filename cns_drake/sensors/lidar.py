@@ -401,7 +401,10 @@ class Lidar(LeafSystem):
                 X_WP.translation() + way_P + R_WW0 @ p_PS_W,
                 R_WW0 @ X_WS.rotation().matrix(),
             )
-        return X_WS.translation()[None], X_WS.rotation().matrix()[None]
+        # Copies are laid out like many poses: for Drake's views of its own
+        # memory, numba would compile all that takes poses once more.
+        p_WS, R_WS = X_WS.translation(), X_WS.rotation().matrix()
+        return np.array([p_WS]), np.array([R_WS])
 
     def _calc_X_WS(self, context: Context, output: AbstractValue) -> None:
         p_WSset, R_WSset = self._calc_poses(context)
