@@ -1,8 +1,9 @@
 """Polyhedra about curved shapes: around them, and close to them."""
 
 from helpers.closed_forms import capsule, cylinder, ellipsoid
+from helpers.surface_geometry import make_geometry
 import numpy as np
-from pydrake.geometry import FrameId, GeometryId
+from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
@@ -12,7 +13,6 @@ from cns_drake.ray_casting.curved_proxies import (
 )
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
 from cns_drake.ray_casting.ray_groups import RayGroup
-from cns_drake.scene.perception_geometry import PerceptionGeometry
 from cns_drake.scene.surfaces import (
     CapsuleSurface,
     CylinderSurface,
@@ -108,9 +108,7 @@ def test_nearness_ends_at_a_tenth_of_the_radius(excess, expected):
 
 
 def geometry(surface, X_FG):
-    return PerceptionGeometry(
-        GeometryId.get_new_id(), "m::v", WORLD, X_FG, surface, None
-    )
+    return make_geometry(surface, WORLD, X_FG)
 
 
 def plate(p, size=0.02):
@@ -180,10 +178,7 @@ def test_the_thinnest_shapes_are_never_missed(
     far = geometry(EllipsoidSurface((1.0,) * 3), RigidTransform([180.0, 0, 0]))
     X_WF = X_WG if moving else RigidTransform()
     frame = FrameId.get_new_id() if moving else WORLD
-    thin = PerceptionGeometry(
-        GeometryId.get_new_id(), "m::v", frame, X_WF.inverse() @ X_WG, surface,
-        None,
-    )  # fmt: skip
+    thin = make_geometry(surface, frame, X_WF.inverse() @ X_WG)
     scene = RayCastingScene(
         [far, thin], {WORLD}, lambda f: X_WF if f == frame else RigidTransform()
     )

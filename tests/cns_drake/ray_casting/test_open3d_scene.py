@@ -1,7 +1,8 @@
 """Without Embree's wheel, Open3D finds the same hits."""
 
+from helpers.surface_geometry import make_geometry
 import numpy as np
-from pydrake.geometry import FrameId, GeometryId
+from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
@@ -13,7 +14,6 @@ from cns_drake.ray_casting import (
 )
 from cns_drake.ray_casting.group_motion import Motion
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.scene.perception_geometry import PerceptionGeometry
 from cns_drake.scene.surfaces import (
     CapsuleSurface,
     CylinderSurface,
@@ -32,9 +32,7 @@ CURVED = [
 
 
 def geometry(surface, X_FG, frame_id):
-    return PerceptionGeometry(
-        GeometryId.get_new_id(), "model::visual", frame_id, X_FG, surface, None
-    )
+    return make_geometry(surface, frame_id, X_FG)
 
 
 def soup(rng, count):

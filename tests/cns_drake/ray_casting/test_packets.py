@@ -4,30 +4,19 @@ import ctypes
 from types import SimpleNamespace
 
 from helpers.closed_forms import ellipsoid
+from helpers.surface_geometry import make_geometry
 import numpy as np
-from pydrake.geometry import FrameId, GeometryId
+from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform
 import pytest
 
 from cns_drake.ray_casting import embree
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.scene.perception_geometry import PerceptionGeometry
 from cns_drake.scene.surfaces import EllipsoidSurface, TriangleSurface
 
 WORLD, CAR = FrameId.get_new_id(), FrameId.get_new_id()
 # From rtcore_device.h: RTC_DEVICE_PROPERTY_NATIVE_RAY<n>_SUPPORTED.
 NATIVE = {4: 32, 8: 33, 16: 34}
-
-
-def geometry(surface, frame_id):
-    return PerceptionGeometry(
-        geometry_id=GeometryId.get_new_id(),
-        name="model::visual",
-        frame_id=frame_id,
-        X_FG=RigidTransform(),
-        surface=surface,
-        rgb=None,
-    )
 
 
 @pytest.mark.parametrize("num_rays", [1, 5, 8, 23, 300])
@@ -46,8 +35,8 @@ def test_hits_of_packets_of_each_size(monkeypatch, lanes, num_rays):
     wall = np.array([[12, -90, -90], [12, 90, -90], [12, 0, 90]], float)
     scene = RayCastingScene(
         [
-            geometry(TriangleSurface(wall, np.array([[0, 1, 2]])), WORLD),
-            geometry(EllipsoidSurface(semi_axes), CAR),
+            make_geometry(TriangleSurface(wall, np.array([[0, 1, 2]])), WORLD),
+            make_geometry(EllipsoidSurface(semi_axes), CAR),
         ],
         {WORLD},
         lambda frame: RigidTransform(p_WFo if frame == CAR else np.zeros(3)),

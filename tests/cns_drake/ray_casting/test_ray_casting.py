@@ -1,13 +1,13 @@
 """The ray caster against closed forms and against Open3D."""
 
 from helpers.closed_forms import box, capsule, cylinder, ellipsoid
+from helpers.surface_geometry import make_geometry
 import numpy as np
-from pydrake.geometry import FrameId, GeometryId
+from pydrake.geometry import FrameId
 from pydrake.math import RigidTransform, RollPitchYaw
 import pytest
 
 from cns_drake.ray_casting.ray_casting_scene import RayCastingScene
-from cns_drake.scene.perception_geometry import PerceptionGeometry
 from cns_drake.scene.surfaces import (
     CapsuleSurface,
     CylinderSurface,
@@ -51,14 +51,7 @@ def box_surface(size):
 
 
 def geometry(surface, X_FG=None, frame_id=WORLD):
-    return PerceptionGeometry(
-        geometry_id=GeometryId.get_new_id(),
-        name="model::visual",
-        frame_id=frame_id,
-        X_FG=RigidTransform() if X_FG is None else X_FG,
-        surface=surface,
-        rgb=None,
-    )
+    return make_geometry(surface, frame_id, X_FG)
 
 
 def identity(frame_id):
