@@ -97,6 +97,11 @@ def stage_names(years: Sequence[int]) -> list[str]:
     return [f"{number:02d}" for number in range(1, max(len(years), 1) + 1)]
 
 
+def stands_today(until: int | None) -> bool:
+    """Returns whether an object stands, by the year of its demolition."""
+    return until is None or until > datetime.date.today().year
+
+
 def stands_at(
     year: int | None,
     until: int | None,
@@ -114,7 +119,7 @@ def stands_at(
         undated: the stage of objects without a year.
     """
     if not years:
-        return until is None or until > datetime.date.today().year
+        return stands_today(until)
     if until is not None and years[stage] >= until:
         return False
     if year is not None:

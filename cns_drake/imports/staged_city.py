@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-import datetime
 
 import numpy as np
 
 from cns_drake.base.errors import InputError
 from cns_drake.city.generation.structure_rows import MAX_STRUCTURES
-from cns_drake.imports.building_years import stage_names, stands_at
+from cns_drake.imports.building_years import (
+    stage_names,
+    stands_at,
+    stands_today,
+)
 from cns_drake.imports.foreign_city import ForeignCity, Imported
 from cns_drake.imports.gone_buildings import with_gone
 from cns_drake.imports.import_faults import ImportFaults
@@ -129,8 +132,8 @@ def stage_city(
     elif options.dressed:
         standing = {
             stage: with_gone(
-                [one for one in some if _is_past(one)],
-                [one for one in some if not _is_past(one)],
+                [one for one in some if not _is_here(one)],
+                [one for one in some if _is_here(one)],
             )
             for stage, some in standing.items()
         }
@@ -155,10 +158,9 @@ def stage_city(
     return StagedCity(standing, kept, undated, len(years) - undated, gone)
 
 
-def _is_past(one: Imported) -> bool:
-    """Returns whether a building does not stand today."""
-    today = datetime.date.today().year
-    return one.is_gone or (one.until is not None and one.until <= today)
+def _is_here(one: Imported) -> bool:
+    """Returns whether a structure stands today, if it was built."""
+    return not one.is_gone and stands_today(one.until)
 
 
 def _stands(one: Imported, stage: int, options: ImportOptions) -> bool:
