@@ -179,8 +179,7 @@ def _plane_pieces(
     found: list[Panel] = []
     members: list[int] = []
     for number in np.argsort(starts, kind="stable").tolist():
-        longer = of([*members, number])
-        if members and longer.is_plane:
+        if members and (longer := of([*members, number])).is_plane:
             members.append(number)
             found[-1] = longer
         else:

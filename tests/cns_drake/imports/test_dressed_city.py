@@ -322,7 +322,6 @@ def test_walls_that_bend_are_divided(aside, number):
     assert all(panel.is_plane for panel in panels)
     assert len(panels) == number + 3
     found = np.concatenate([panel.triangles for panel in panels])
-
     assert {t.tobytes() for t in found} == {t.tobytes() for t in walls}
     front = [p for p in panels if p.outward @ [s, -c] > 0.9]
     assert len(front) == number
