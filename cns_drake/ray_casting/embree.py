@@ -23,6 +23,11 @@ FLOAT3X4_ROW_MAJOR = 0x9134
 ROBUST_SCENE = 1 << 2
 COHERENT_RAYS = 1 << 16
 INVALID_ID = 0xFFFFFFFF
+# A setting of devices: room for more threads of the caller than a machine has.
+# `rtcJoinCommitScene` then builds a scene in the calling thread alone. Once
+# woken, Embree's own threads go on looking for work, and hundreds of instances
+# have none for them.
+ALONE = b"user_threads=65536"
 # Rays in a packet, and RTC_DEVICE_PROPERTY_NATIVE_RAY<rays>_SUPPORTED.
 _NATIVE_PACKETS = ((8, 33), (16, 34))
 
@@ -63,6 +68,7 @@ def load() -> ctypes.CDLL:
         ("rtcNewScene", pointer, [pointer]),
         ("rtcSetSceneFlags", None, [pointer, integer]),
         ("rtcCommitScene", None, [pointer]),
+        ("rtcJoinCommitScene", None, [pointer]),
         ("rtcRetainScene", None, [pointer]),
         ("rtcReleaseScene", None, [pointer]),
         ("rtcNewGeometry", pointer, [pointer, integer]),

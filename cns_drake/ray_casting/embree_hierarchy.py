@@ -78,7 +78,7 @@ class EmbreeHierarchy:
         )
         self._commit_geometry = embree.address_of(self._lib.rtcCommitGeometry)
         if previous is None:
-            self._device = self._lib.rtcNewDevice(None)
+            self._device = self._lib.rtcNewDevice(embree.ALONE)
         else:
             self._device = previous._device
             self._lib.rtcRetainDevice(self._device)
@@ -181,7 +181,7 @@ class EmbreeHierarchy:
             self._instances[rows[still]],
             X_OLs[still].astype(np.float32),
         )
-        self._lib.rtcCommitScene(self._top)
+        self._lib.rtcJoinCommitScene(self._top)
 
     def _set_motion(self, row: int) -> None:
         """Gives Embree the motion of a group during a cast."""
