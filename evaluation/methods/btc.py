@@ -36,8 +36,8 @@ from pydantic import (
     PositiveFloat,
     PositiveInt,
 )
-from scipy.spatial import cKDTree
 
+from evaluation.geometry.nearest import NearestPoints
 from evaluation.methods.btc_keypoints import (
     find_keypoints,
     height_image,
@@ -163,12 +163,12 @@ class BtcDatabase:
 
     Attributes:
         places: their descriptions.
-        trees: of the centers of the planes of each place.
+        centers: of the planes of each place.
         table: the triangles of all.
     """
 
     places: Sequence[BtcDescription]
-    trees: Sequence[cKDTree]
+    centers: Sequence[NearestPoints]
     table: TriangleTable
 
 
@@ -222,7 +222,7 @@ class Btc(Method[BtcDescription, BtcDatabase]):
     def build_database(self, places: Sequence[BtcDescription]) -> BtcDatabase:
         return BtcDatabase(
             places=places,
-            trees=[cKDTree(place.planes.centers) for place in places],
+            centers=[NearestPoints(place.planes.centers) for place in places],
             table=make_table(
                 [place.triangles for place in places],
                 self.config.side_resolution,
@@ -245,7 +245,7 @@ class Btc(Method[BtcDescription, BtcDatabase]):
             overlap = plane_overlap(
                 query.planes,
                 planes,
-                database.trees[place],
+                database.centers[place],
                 X_PQ,
                 self.config.normal_limit,
                 self.config.distance_limit,

@@ -6,10 +6,10 @@ Part of BTC (see `evaluation.methods.btc`).
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from cns_drake.base import poses
 from cns_drake.base.compiled import compiled
+from evaluation.geometry.nearest import NearestPoints
 from evaluation.methods.btc_planes import Planes
 
 # Fixed in the public program: how many pairs are tried at most (about), how
@@ -76,7 +76,7 @@ def find_motion(query: np.ndarray, place: np.ndarray) -> np.ndarray | None:
 def plane_overlap(
     query: Planes,
     place: Planes,
-    place_tree: cKDTree,
+    place_centers: NearestPoints,
     X_PQ: np.ndarray,
     normal_limit: float,
     distance_limit: float,
@@ -88,14 +88,14 @@ def plane_overlap(
     Args:
         query: patches of the query, at least one.
         place: patches of the place, at least one.
-        place_tree: of the centers of the latter.
+        place_centers: the centers of the latter.
         X_PQ: (4, 4) the query's frame in that of the place.
         normal_limit: upper limit of the difference of the two normals.
         distance_limit: of the center from the other's plane [m].
     """
     centers = poses.transform(X_PQ, query.centers)
     normals = query.normals @ X_PQ[:3, :3].T
-    _, nearest = place_tree.query(centers)
+    nearest, _ = place_centers.find(centers)
     # |n1 - n2| < d of unit vectors; either sign of a normal will do.
     cosines = np.abs((normals * place.normals[nearest]).sum(axis=1))
     offsets = ((centers - place.centers[nearest]) * place.normals[nearest]).sum(

@@ -10,13 +10,13 @@ import math
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from cns_drake.base.jobs.step import Reporter
 from cns_drake.base.points import xyz
 from cns_drake.base.poses import inverse, transform
 from cns_drake.base.progress import Track, silent
 from cns_drake.base.recordings.sequence import Sequence as Drive
+from evaluation.geometry.nearest import NearestPoints
 from evaluation.maps.voxel_maps import thin
 from evaluation.methods import MethodConfig
 from evaluation.methods.layered_overlap import LayeredOverlap
@@ -215,9 +215,9 @@ class _Shown:
         return thin(self.points[self.points[:, 2] > _standing()], _CELL)
 
     @cached_property
-    def tree(self) -> cKDTree:
+    def nearest(self) -> NearestPoints:
         """Finds the nearest of the standing points."""
-        return cKDTree(self.standing)
+        return NearestPoints(self.standing)
 
     @cached_property
     def some(self) -> np.ndarray:
@@ -293,8 +293,8 @@ class _Aligner:
                 moved = transform(X_PQ, query.standing)
                 place = places[k]
                 shared[k] = min(
-                    _met(moved, place.tree),
-                    _met(place.standing, cKDTree(moved)),
+                    _met(moved, place.nearest),
+                    _met(place.standing, NearestPoints(moved)),
                 )
         return shared
 
@@ -305,9 +305,9 @@ class _Aligner:
         return self._places[place]
 
 
-def _met(points: np.ndarray, others: cKDTree) -> float:
+def _met(points: np.ndarray, others: NearestPoints) -> float:
     """Returns the part of points that have a counterpart nearby."""
-    distances, _ = others.query(points, distance_upper_bound=_COINCIDENT)
+    _, distances = others.find(points, _COINCIDENT)
     return float(np.isfinite(distances).mean())
 
 
