@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -151,7 +151,10 @@ class _Grid:
         """
         found = self.empty()
         # All at once: thousands of small groups would take far longer.
-        found[self.cells(np.concatenate([np.zeros((0, 3, 3)), *groups]))] = True
+        for row, column in self._batches(
+            np.concatenate([np.zeros((0, 3, 3)), *groups])
+        ):
+            found[row, column] = True
         return found
 
     def cells(
@@ -164,16 +167,21 @@ class _Grid:
             ground: only triangles that a car on it could hit count; all if
                 None.
         """
-        found = [np.zeros((2, 0), dtype=int)]
+        found = [np.zeros((2, 0), dtype=int), *self._batches(triangles, ground)]
+        row, column = np.concatenate(found, axis=1)
+        return row, column
+
+    def _batches(
+        self, triangles: np.ndarray, ground: Ground | None = None
+    ) -> Iterator[np.ndarray]:
+        """Yields what `cells` returns, (2, N) at a time."""
         window = (self.low, self.high)
         for points in surface_samples(triangles, _SAMPLE_SPACING, window):
             if ground is not None:
                 above = points[:, 2] - ground.height(points[:, :2])
                 points = points[above < _HEADROOM]
             cells = ((points[:, :2] - self.low) / CELL).astype(int)
-            found.append(cells.T[::-1])
-        row, column = np.concatenate(found, axis=1)
-        return row, column
+            yield cells.T[::-1]
 
 
 def _blocked(
