@@ -14,7 +14,7 @@ from pydrake.geometry import Meshcat
 from cns_drake.base.files import complete_part, user_errors, write_part
 
 # Higher levels take many times as long for a few percent.
-_LEVEL = 6
+_LEVEL = 4
 # The quickest, a few percent larger; it decides about a sample of each command.
 _QUICK_LEVEL = 1
 _SAMPLE_BYTES = 1 << 16
