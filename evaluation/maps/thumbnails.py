@@ -31,14 +31,14 @@ def thumbnail(
         ground in steps of 0.1 m, at most 25.5 m. The order is random, so that
         the first points show the whole scan thinned.
     """
-    cells = np.floor(points[:, :2] / CELL).astype(np.int64) + _HALF_CELLS
+    x, y = np.floor(points[:, :2].T / CELL).astype(np.int64) + _HALF_CELLS
     heights = points[:, 2] + sensor_height
-    kept = ((cells >= 0) & (cells < 2 * _HALF_CELLS)).all(axis=1)
-    kept &= heights >= _LOWEST
-    cells, heights = cells[kept], heights[kept]
+    kept = heights >= _LOWEST
+    for cells in (x, y):
+        kept &= (cells >= 0) & (cells < 2 * _HALF_CELLS)
     highest = np.zeros((2 * _HALF_CELLS) ** 2)
-    flat = cells[:, 0] * 2 * _HALF_CELLS + cells[:, 1]
-    np.maximum.at(highest, flat, heights)
+    flat = x[kept] * 2 * _HALF_CELLS + y[kept]
+    np.maximum.at(highest, flat, heights[kept])
     filled = np.flatnonzero(highest)
     rng = np.random.default_rng([seed, len(filled)])
     chosen = rng.permutation(filled)[:MAX_POINTS]
