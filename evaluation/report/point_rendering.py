@@ -88,7 +88,7 @@ def render(
         size_px: side of the square that a point covers.
     """
     seen = points @ view.axes().T
-    # Of one column at a time: a minimum over rows takes many times as long.
+    # One column at a time: a minimum over rows takes many times as long.
     origin = np.array([seen[:, 0].min(), seen[:, 1].min()])
     column, up = (
         np.floor((seen[:, :2] - origin) * view.pixels_per_metre)
