@@ -156,7 +156,8 @@ def peaks(
         .reshape(rows * columns, _SEGMENT * _SEGMENT)
     )
     highest = segments.argmax(axis=1)
-    segment = np.flatnonzero(segments.max(axis=1) >= min_heights)
+    most = segments[np.arange(len(segments)), highest]
+    segment = np.flatnonzero(most >= min_heights)
     row = segment // columns * _SEGMENT + highest[segment] // _SEGMENT
     column = segment % columns * _SEGMENT + highest[segment] % _SEGMENT
     # At the other two sides, the image ends in empty cells.

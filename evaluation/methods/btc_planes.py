@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from cns_drake.base.compiled import compiled
-from evaluation.geometry.sorting import stable_order
 from evaluation.methods.btc_voxel_order import voxel_order
 
 
@@ -57,17 +56,10 @@ def voxel_planes(
         max_points: only voxels with more points are used.
         flatness: upper limit of the variance along the normal [m^2].
     """
-    index, numbers = _voxels(points, voxel_size)
-    order = stable_order(numbers)
-    starts = np.flatnonzero(np.diff(numbers[order], prepend=-1))
-    counts = np.diff(starts, append=len(points))
-    by_first_point = np.argsort(order[starts])
-    firsts = order[starts[by_first_point]]
-    visited = by_first_point[voxel_order(index[firsts])]
+    index, counts, centers, covariances = _moments(points, voxel_size)
+    visited = voxel_order(index)
     dense = visited[counts[visited] > max_points]
-    counts = counts[dense]
-    centers, covariances = _moments(points, order, starts[dense], counts)
-    planes, variances = _fit(centers, covariances, counts)
+    planes, variances = _fit(centers[dense], covariances[dense], counts[dense])
     return planes.take(variances < flatness)
 
 
@@ -156,106 +148,142 @@ def group_alike(
     num_planes = len(centers)
     labels = np.full(num_planes, -1)
     num_groups = 0
-    # |n1 - n2| < d of unit vectors; either sign of a normal will do.
-    min_cosine = 1.0 - 0.5 * normal_limit * normal_limit
+    # Those before `i` without a group: only they can join that of `i`.
+    single = np.arange(num_planes)
+    num_single = num_planes
     for i in range(num_planes - 1, 0, -1):
-        for j in range(i):
-            if labels[i] >= 0 and labels[j] >= 0:
+        first = -1
+        if labels[i] < 0:
+            first = 0
+            while first < i and not _are_alike(
+                centers, normals, i, first, normal_limit, distance_limit
+            ):
+                first += 1
+            if first == i:
                 continue
-            cosine = (
-                normals[i, 0] * normals[j, 0]
-                + normals[i, 1] * normals[j, 1]
-                + normals[i, 2] * normals[j, 2]
-            )
-            if abs(cosine) <= min_cosine:
-                continue
-            from_i = 0.0
-            from_j = 0.0
-            for axis in range(3):
-                offset = centers[j, axis] - centers[i, axis]
-                from_i += normals[i, axis] * offset
-                from_j += normals[j, axis] * offset
-            if abs(from_i) >= distance_limit or abs(from_j) >= distance_limit:
-                continue
-            if labels[i] < 0 and labels[j] < 0:
-                labels[i] = num_groups
-                labels[j] = num_groups
+            if labels[first] < 0:
+                labels[first] = num_groups
                 num_groups += 1
-            elif labels[i] < 0:
-                labels[i] = labels[j]
-            else:
+            labels[i] = labels[first]
+        kept = 0
+        for index in range(num_single):
+            j = single[index]
+            if j >= i:
+                break
+            if labels[j] >= 0:
+                continue
+            if j > first and _are_alike(
+                centers, normals, i, j, normal_limit, distance_limit
+            ):
                 labels[j] = labels[i]
+                continue
+            single[kept] = j
+            kept += 1
+        num_single = kept
     return labels
 
 
 @compiled
-def _voxels(
-    points: np.ndarray, voxel_size: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Returns (N, 3) int64 indices of voxels, and (N,) numbers >= 0 of them.
-
-    The numbers go by index along x, then y, then z.
-    """
-    num_points = len(points)
-    index = np.empty((num_points, 3), dtype=np.int64)
-    first = np.full(3, np.iinfo(np.int64).max)
-    last = np.full(3, np.iinfo(np.int64).min)
-    for i in range(num_points):
-        for axis in range(3):
-            scaled = points[i, axis] / voxel_size
-            # As in the public program: truncated, and one less below zero,
-            # so that a negative multiple belongs to the voxel below it.
-            voxel = int(scaled - 1.0) if scaled < 0.0 else int(scaled)
-            index[i, axis] = voxel
-            first[axis] = min(first[axis], voxel)
-            last[axis] = max(last[axis], voxel)
-    numbers = np.empty(num_points, dtype=np.int64)
-    for i in range(num_points):
-        number = 0
-        for axis in range(3):
-            number *= last[axis] - first[axis] + 1
-            number += index[i, axis] - first[axis]
-        numbers[i] = number
-    return index, numbers
+def _are_alike(
+    centers: np.ndarray,
+    normals: np.ndarray,
+    i: int,
+    j: int,
+    normal_limit: float,
+    distance_limit: float,
+) -> bool:
+    """Returns whether two patches are alike, see `base_plane`."""
+    cosine = (
+        normals[i, 0] * normals[j, 0]
+        + normals[i, 1] * normals[j, 1]
+        + normals[i, 2] * normals[j, 2]
+    )
+    # |n1 - n2| < d of unit vectors; either sign of a normal will do.
+    if abs(cosine) <= 1.0 - 0.5 * normal_limit * normal_limit:
+        return False
+    from_i = 0.0
+    from_j = 0.0
+    for axis in range(3):
+        offset = centers[j, axis] - centers[i, axis]
+        from_i += normals[i, axis] * offset
+        from_j += normals[j, axis] * offset
+    return abs(from_i) < distance_limit and abs(from_j) < distance_limit
 
 
 @compiled
 def _moments(
-    points: np.ndarray,
-    order: np.ndarray,
-    starts: np.ndarray,
-    counts: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the mean (V, 3) and covariance (V, 3, 3) of runs of points.
+    points: np.ndarray, voxel_size: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Returns the voxels of a cloud, in the order in which it meets them.
 
-    Args:
-        points: (N, 3).
-        order: (N,) of the points.
-        starts: (V,) where each run starts in that order.
-        counts: (V,) its length, > 0.
+    Returns:
+        (V, 3) int64 indices along x, y and z; (V,) number of points; (V, 3)
+        their mean; (V, 3, 3) their covariance.
     """
-    num_runs = len(starts)
-    means = np.zeros((num_runs, 3))
-    covariances = np.zeros((num_runs, 3, 3))
-    for run in range(num_runs):
-        members = order[starts[run] : starts[run] + counts[run]]
-        for i in members:
+    num_points = len(points)
+    places = np.empty(3 * num_points, dtype=np.int64)
+    for i, coordinate in enumerate(points.ravel()):
+        scaled = coordinate / voxel_size
+        # As in the public program: truncated, and one less below zero,
+        # so that a negative multiple belongs to the voxel below it.
+        places[i] = int(scaled - 1.0 if scaled < 0.0 else scaled)
+    members = np.empty(num_points, dtype=np.int32)
+    index = np.empty((num_points, 3), dtype=np.int64)
+    counts = np.empty(num_points, dtype=np.int64)
+    means = np.empty((num_points, 3))
+    num_voxels = 0
+    # A hash table of voxels, at most half full; -1 is a free slot.
+    size = 1
+    while size < 2 * num_points:
+        size *= 2
+    table = np.full(size, -1, dtype=np.int32)
+    for i in range(num_points):
+        x, y, z = places[3 * i], places[3 * i + 1], places[3 * i + 2]
+        # Large odd factors spread neighbouring voxels; products wrap around.
+        slot = (x * 73856093 ^ y * 19349669 ^ z * 83492791) & (size - 1)
+        voxel = table[slot]
+        while voxel >= 0 and not (
+            index[voxel, 0] == x
+            and index[voxel, 1] == y
+            and index[voxel, 2] == z
+        ):
+            slot = (slot + 1) & (size - 1)
+            voxel = table[slot]
+        if voxel < 0:
+            voxel = num_voxels
+            num_voxels += 1
+            table[slot] = voxel
+            index[voxel, 0], index[voxel, 1], index[voxel, 2] = x, y, z
+            counts[voxel] = 0
             for axis in range(3):
-                means[run, axis] += points[i, axis]
+                means[voxel, axis] = 0.0
+        members[i] = voxel
+        counts[voxel] += 1
         for axis in range(3):
-            means[run, axis] /= counts[run]
-        for i in members:
-            for axis in range(3):
-                offset = points[i, axis] - means[run, axis]
-                for other in range(axis + 1):
-                    covariances[run, axis, other] += offset * (
-                        points[i, other] - means[run, other]
-                    )
+            means[voxel, axis] += points[i, axis]
+    for voxel in range(num_voxels):
+        for axis in range(3):
+            means[voxel, axis] /= counts[voxel]
+    covariances = np.zeros((num_voxels, 3, 3))
+    for i in range(num_points):
+        voxel = members[i]
+        dx = points[i, 0] - means[voxel, 0]
+        dy = points[i, 1] - means[voxel, 1]
+        dz = points[i, 2] - means[voxel, 2]
+        covariances[voxel, 0, 0] += dx * dx
+        covariances[voxel, 1, 0] += dy * dx
+        covariances[voxel, 1, 1] += dy * dy
+        covariances[voxel, 2, 0] += dz * dx
+        covariances[voxel, 2, 1] += dz * dy
+        covariances[voxel, 2, 2] += dz * dz
+    for voxel in range(num_voxels):
         for axis in range(3):
             for other in range(axis + 1):
-                covariances[run, axis, other] /= counts[run]
-                covariances[run, other, axis] = covariances[run, axis, other]
-    return means, covariances
+                covariance = covariances[voxel, axis, other] / counts[voxel]
+                covariances[voxel, axis, other] = covariance
+                covariances[voxel, other, axis] = covariance
+    found = slice(num_voxels)
+    return index[found], counts[found], means[found], covariances
 
 
 def _fit(

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from cns_drake.base.compiled import compiled
+from evaluation.geometry.sorting import cell_order
 from evaluation.methods.btc_keypoints import Keypoints, count_bits
 
 # Fixed in the public program: how much longer the two short sides must be than
@@ -120,10 +121,10 @@ def make_triangles(
     kept &= detour >= _MIN_DETOUR
     sides, order, corners = sides[kept], order[kept], corners[kept]
     # Each triangle is seen from up to three corners; the first one counts.
-    _, first = np.unique(
-        (sides / _SAME).astype(np.int64), axis=0, return_index=True
-    )
-    first.sort()
+    lengths = (sides / _SAME).astype(np.int64)
+    by_length = cell_order(lengths)
+    differs = np.diff(lengths[by_length], axis=0, prepend=-1).any(axis=1)
+    first = np.sort(by_length[differs])
     sides, order, corners = sides[first], order[first], corners[first]
     # Sides 0, 1 and 2 lie between corners 0-1, 0-2 and 1-2.
     meeting = np.stack(

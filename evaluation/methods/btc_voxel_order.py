@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from evaluation.geometry.sorting import stable_order
+
 # The hash of a voxel's index, in the public program.
 _FACTOR = 116101
 _MODULUS = 10_000_000_000
@@ -60,12 +62,12 @@ def hash_table_order(codes: np.ndarray) -> np.ndarray:
     for num_buckets in _NUM_BUCKETS:
         added = np.arange(len(order), min(num_buckets, len(codes)))
         order = np.concatenate([order, added])
-        _, first, group = np.unique(
-            codes[order] % np.uint64(num_buckets),
-            return_index=True,
-            return_inverse=True,
-        )
-        order = order[np.lexsort((-np.arange(len(order)), -first[group]))]
+        buckets = codes[order] % np.uint64(num_buckets)
+        # Where each bucket is first met: the first of equal indices is
+        # assigned last.
+        first = np.empty(num_buckets, dtype=np.int64)
+        first[buckets[::-1]] = np.arange(len(order))[::-1]
+        order = order[stable_order(first[buckets])[::-1]]
         if len(order) == len(codes):
             break
     return order
