@@ -20,6 +20,9 @@ _GROUP_SIZE = 16
 _MEMORY = 32
 # Bounds are widened by this factor, against rounding.
 _MARGIN = 1.0 + 1e-9
+# Indices of the inner loops are unsigned: with others, compiled code asks each
+# time whether they count from the end.
+_ONE = np.uint64(1)
 
 
 def nearest_neighbours(points: np.ndarray, k: int) -> np.ndarray:
@@ -56,10 +59,10 @@ def _select(
     continues with one part only. It has no branches that depend on keys: half
     of them would be mispredicted.
     """
-    target = start + k - 1
-    low, high = start, stop - 1
+    target = np.uint64(start + k - 1)
+    low, high = np.uint64(start), np.uint64(stop - 1)
     while low < high:
-        middle = (low + high) // 2
+        middle = (low + high) >> _ONE
         pivot, pivot_item = keys[middle], items[middle]
         keys[middle], items[middle] = keys[high], items[high]
         smaller = low
@@ -67,27 +70,27 @@ def _select(
             key, item = keys[index], items[index]
             keys[index], items[index] = keys[smaller], items[smaller]
             keys[smaller], items[smaller] = key, item
-            smaller += key < pivot
+            smaller += np.uint64(key < pivot)
         keys[high], items[high] = keys[smaller], items[smaller]
         keys[smaller], items[smaller] = pivot, pivot_item
         if smaller == target:
             return
         if target < smaller:
-            high = smaller - 1
+            high = smaller - _ONE
             continue
         if smaller == low:
             # The pivot is the least key. All keys equal to it are passed over;
             # otherwise each would take a round.
-            for index in range(low, high + 1):
+            for index in range(low, high + _ONE):
                 key, item = keys[index], items[index]
                 keys[index], items[index] = keys[smaller], items[smaller]
                 keys[smaller], items[smaller] = key, item
-                smaller += key == pivot
+                smaller += np.uint64(key == pivot)
             if target < smaller:
                 return
             low = smaller
         else:
-            low = smaller + 1
+            low = smaller + _ONE
 
 
 @compiled
@@ -162,15 +165,18 @@ def _search(
     result = np.empty((num_points, k), np.int32)
     # Distance of each point's k-th neighbour.
     radius = np.empty(num_points)
-    near = np.empty(num_groups, np.int64)
-    # One slot more than points, for writes that are not kept.
+    all_groups = np.arange(num_groups).astype(np.uint64)
+    near_groups = np.empty(num_groups, np.uint64)
+    near_boxes = np.empty((6, num_groups))
+    own_box = np.empty(6)
+    gaps = np.empty(num_groups)
+    # One slot more than needed, for writes that are not kept.
+    within = np.empty(num_groups + 1, np.uint64)
     squared = np.empty(num_points + 1)
     found = np.empty(num_points + 1, np.int32)
     for group in range(num_groups):
         first, last = starts[group], starts[group + 1]
-        num_near = num_groups
-        for index in range(num_groups):
-            near[index] = index
+        others, other_boxes, num_others = all_groups, boxes, num_groups
         for point in range(first, last):
             px, py, pz = x[point], y[point], z[point]
             limit = np.inf
@@ -181,48 +187,84 @@ def _search(
             if point == first:
                 # Any k points are a bound, too.
                 begin = min(point, num_points - k)
-                farthest = _farthest(x, y, z, point, begin, begin + k)
-                limit = min(limit, farthest)
+                limit = min(limit, _farthest(x, y, z, point, begin, begin + k))
             limit = (limit * _MARGIN) ** 2
-            count = 0
-            for index in range(num_near):
-                other = near[index]
-                dx = max(boxes[other, 0] - px, px - boxes[other, 3], 0.0)
-                dy = max(boxes[other, 1] - py, py - boxes[other, 4], 0.0)
-                dz = max(boxes[other, 2] - pz, pz - boxes[other, 5], 0.0)
-                if dx * dx + dy * dy + dz * dz > limit:
-                    continue
-                for candidate in range(starts[other], starts[other + 1]):
+            for axis in range(3):
+                own_box[axis] = own_box[3 + axis] = cloud[axis, point]
+            _squared_gaps(own_box, other_boxes, num_others, gaps)
+            # Each group or point is written, and kept if it is near: a branch
+            # would often be predicted wrongly.
+            num_within = np.uint64(0)
+            for index in range(num_others):
+                within[num_within] = others[index]
+                num_within += np.uint64(gaps[index] <= limit)
+            count = np.uint64(0)
+            for index in range(num_within):
+                other = within[index]
+                for candidate in range(
+                    np.uint64(starts[other]), np.uint64(starts[other + _ONE])
+                ):
                     dx, dy = x[candidate] - px, y[candidate] - py
                     dz = z[candidate] - pz
                     distance = dx * dx + dy * dy + dz * dz
-                    # Each point is written, and kept if it is near: a branch
-                    # would often be predicted wrongly.
                     squared[count] = distance
                     found[count] = candidate
-                    count += distance <= limit
-            _select(squared, found, 0, count, k)
-            radius[point] = np.sqrt(squared[:k].max())
+                    count += np.uint64(distance <= limit)
+            _select(squared, found, 0, int(count), k)
+            farthest = 0.0
+            own = result[order[point]]
             for index in range(k):
-                result[order[point], index] = order[found[index]]
+                farthest = max(farthest, squared[index])
+                own[index] = order[np.uint64(found[index])]
+            radius[point] = np.sqrt(farthest)
             if point == first:
                 spread = _farthest(x, y, z, point, first, last)
-                num_near = _near_groups(
-                    boxes, group, (radius[point] + spread) * _MARGIN, near
-                )
+                reach = (radius[point] + spread) * _MARGIN
+                for side in range(6):
+                    own_box[side] = boxes[side, group]
+                _squared_gaps(own_box, boxes, num_groups, gaps)
+                num_others = 0
+                for other in range(num_groups):
+                    if gaps[other] <= reach * reach:
+                        near_groups[num_others] = other
+                        for side in range(6):
+                            near_boxes[side, num_others] = boxes[side, other]
+                        num_others += 1
+                others, other_boxes = near_groups, near_boxes
     return result
 
 
 @compiled
 def _boxes(cloud: np.ndarray, starts: np.ndarray) -> np.ndarray:
-    """Returns the bounding boxes of groups, (G, 6): least and greatest."""
-    boxes = np.empty((len(starts) - 1, 6))
-    for group in range(len(boxes)):
+    """Returns the bounding boxes of groups, (6, G): least and greatest."""
+    boxes = np.empty((6, len(starts) - 1))
+    for group in range(len(starts) - 1):
         for axis in range(3):
             values = cloud[axis, starts[group] : starts[group + 1]]
-            boxes[group, axis] = values.min()
-            boxes[group, 3 + axis] = values.max()
+            boxes[axis, group] = values.min()
+            boxes[3 + axis, group] = values.max()
     return boxes
+
+
+@compiled
+def _squared_gaps(
+    box: np.ndarray, others: np.ndarray, number: int, gaps: np.ndarray
+) -> None:
+    """Writes the squared distances of a box (6,) to some others.
+
+    Args:
+        box: least and greatest coordinates.
+        others: (6, G) likewise.
+        number: of the others to look at, the first ones.
+        gaps: (G,) to write to.
+    """
+    x0, y0, z0 = box[0], box[1], box[2]
+    x1, y1, z1 = box[3], box[4], box[5]
+    for index in range(number):
+        dx = max(others[0, index] - x1, x0 - others[3, index], 0.0)
+        dy = max(others[1, index] - y1, y0 - others[4, index], 0.0)
+        dz = max(others[2, index] - z1, z0 - others[5, index], 0.0)
+        gaps[index] = dx * dx + dy * dy + dz * dz
 
 
 @compiled
@@ -241,24 +283,3 @@ def _farthest(
         dx, dy, dz = x[other] - px, y[other] - py, z[other] - pz
         farthest = max(farthest, dx * dx + dy * dy + dz * dz)
     return np.sqrt(farthest)
-
-
-@compiled
-def _near_groups(
-    boxes: np.ndarray, group: int, reach: float, near: np.ndarray
-) -> int:
-    """Writes boxes within a group's reach to `near`; returns their number."""
-    count = 0
-    for other in range(len(boxes)):
-        gap = 0.0
-        for axis in range(3):
-            apart = max(
-                boxes[other, axis] - boxes[group, 3 + axis],
-                boxes[group, axis] - boxes[other, 3 + axis],
-                0.0,
-            )
-            gap += apart * apart
-        if gap <= reach * reach:
-            near[count] = other
-            count += 1
-    return count
