@@ -160,10 +160,11 @@ class VoxelAccumulator:
 
     def to_map(self) -> VoxelMap:
         """Returns the map of all points so far."""
-        cells = self._table[self._table["count"] > 0]
+        # NumPy takes records much faster this way than by an index.
+        cells = self._table.compress(self._table["count"] > 0)
         indices = np.stack([cells[name] for name in ("ix", "iy", "iz")], axis=1)
         order = cell_order(indices)
-        cells, indices = cells[order], indices[order]
+        cells, indices = cells.take(order), indices.take(order, axis=0)
         counts = cells["count"].astype(np.int64)
         sums = np.stack([cells[name] for name in ("sx", "sy", "sz")], axis=1)
         return VoxelMap(
