@@ -23,6 +23,7 @@ import scipy.fft
 from cns_drake.base.compiled import compiled
 from cns_drake.base.poses import make_pose
 from evaluation.geometry.neighbours import nearest_neighbours
+from evaluation.geometry.sorting import cell_order
 from evaluation.methods.local_features import (
     NUM_FEATURES,
     local_features,
@@ -142,7 +143,8 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         normalised = _normalise(magnitudes.transpose(2, 1, 0), num_cells)
         spectrum = np.fft.rfft(normalised, axis=2)
         flat = image.reshape(-1, NUM_FEATURES)
-        filled = np.flatnonzero(flat.any(axis=1))
+        # No feature is negative: they only add up to 0 where all are 0.
+        filled = np.flatnonzero(flat @ np.ones(NUM_FEATURES))
         return Ring(
             filled=filled,
             features=flat[filled].astype(np.float32),
@@ -254,15 +256,20 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
         """
         config = self.config
         ground = -config.sensor_height
-        x, y, z = points.T
-        within = points[
+        # One column at a time: NumPy reduces slowly along a short axis.
+        z = points[:, 2]
+        within = points.compress(
+            (z > ground + config.min_height) & (z < ground + config.max_height),
+            axis=0,
+        )
+        x, y, z = within.T
+        within = within.compress(
             (np.abs(x) < config.half_width)
             & (np.abs(y) < config.half_width)
-            & (z > ground + config.min_height)
-            & (z < ground + config.max_height)
-            # Some drivers report this for beams without a return.
-            & points.any(axis=1)
-        ]
+            # Some drivers report (0, 0, 0) for beams without a return.
+            & ((x != 0.0) | (y != 0.0) | (z != 0.0)),
+            axis=0,
+        )
         within = _without_duplicates(within)
         image = np.zeros((config.cells, config.cells, NUM_FEATURES))
         if len(within) < 2:
@@ -313,11 +320,20 @@ class RingPlusPlus(Method[Ring, RingDatabase]):
 
 
 def _without_duplicates(points: np.ndarray) -> np.ndarray:
-    """Returns the different ones of points (N, 3), sorted."""
-    ordered = points[np.lexsort(points.T)]
-    differs = np.ones(len(ordered), dtype=bool)
-    differs[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
-    return ordered[differs]
+    """Returns the different ones of points (N, 3), sorted by z, y and x."""
+    ranks = np.stack([_ranks(values) for values in points.T[::-1]], axis=1)
+    order = cell_order(ranks)
+    differs = np.diff(ranks[order], axis=0, prepend=-1).any(axis=1)
+    return points[order[differs]]
+
+
+def _ranks(values: np.ndarray) -> np.ndarray:
+    """Returns how many different ones of values (N,) are less than each."""
+    order = np.argsort(values)
+    ordered = values[order]
+    ranks = np.zeros(len(values), dtype=np.int64)
+    ranks[order[1:]] = np.cumsum(ordered[1:] != ordered[:-1])
+    return ranks
 
 
 @compiled
