@@ -148,66 +148,61 @@ def group_alike(
     num_planes = len(centers)
     labels = np.full(num_planes, -1)
     num_groups = 0
-    # Those before `i` without a group: only they can join that of `i`.
-    single = np.arange(num_planes)
-    num_single = num_planes
+    excesses = np.empty(num_planes)
+    # One more than needed, for a write that is not kept.
+    alike = np.empty(num_planes + 1, dtype=np.int64)
+    by_axis = np.ascontiguousarray(centers.T), np.ascontiguousarray(normals.T)
     for i in range(num_planes - 1, 0, -1):
-        first = -1
-        if labels[i] < 0:
-            first = 0
-            while first < i and not _are_alike(
-                centers, normals, i, first, normal_limit, distance_limit
-            ):
-                first += 1
-            if first == i:
-                continue
-            if labels[first] < 0:
-                labels[first] = num_groups
+        _compare(*by_axis, i, normal_limit, distance_limit, excesses)
+        num_alike = 0
+        for j in range(i):
+            alike[num_alike] = j
+            num_alike += excesses[j] < 0.0
+        for j in alike[:num_alike]:
+            if labels[i] < 0 and labels[j] < 0:
+                labels[i] = num_groups
+                labels[j] = num_groups
                 num_groups += 1
-            labels[i] = labels[first]
-        kept = 0
-        for index in range(num_single):
-            j = single[index]
-            if j >= i:
-                break
-            if labels[j] >= 0:
-                continue
-            if j > first and _are_alike(
-                centers, normals, i, j, normal_limit, distance_limit
-            ):
+            elif labels[i] < 0:
+                labels[i] = labels[j]
+            elif labels[j] < 0:
                 labels[j] = labels[i]
-                continue
-            single[kept] = j
-            kept += 1
-        num_single = kept
     return labels
 
 
 @compiled
-def _are_alike(
+def _compare(
     centers: np.ndarray,
     normals: np.ndarray,
     i: int,
-    j: int,
     normal_limit: float,
     distance_limit: float,
-) -> bool:
-    """Returns whether two patches are alike, see `base_plane`."""
-    cosine = (
-        normals[i, 0] * normals[j, 0]
-        + normals[i, 1] * normals[j, 1]
-        + normals[i, 2] * normals[j, 2]
-    )
+    excesses: np.ndarray,
+) -> None:
+    """Writes by how much patches before `i` are not like it; below 0 if alike.
+
+    The loop has no branch, so that it handles several patches at a time.
+
+    Args:
+        centers: (3, P) [m].
+        normals: (3, P) unit.
+        i: number of a patch.
+        normal_limit: see `base_plane`.
+        distance_limit: see `base_plane`.
+        excesses: (P,) to write to.
+    """
     # |n1 - n2| < d of unit vectors; either sign of a normal will do.
-    if abs(cosine) <= 1.0 - 0.5 * normal_limit * normal_limit:
-        return False
-    from_i = 0.0
-    from_j = 0.0
-    for axis in range(3):
-        offset = centers[j, axis] - centers[i, axis]
-        from_i += normals[i, axis] * offset
-        from_j += normals[j, axis] * offset
-    return abs(from_i) < distance_limit and abs(from_j) < distance_limit
+    min_cosine = 1.0 - 0.5 * normal_limit * normal_limit
+    x, y, z = centers[0, i], centers[1, i], centers[2, i]
+    a, b, c = normals[0, i], normals[1, i], normals[2, i]
+    for j in range(i):
+        u, v, w = normals[0, j], normals[1, j], normals[2, j]
+        cosine = abs(a * u + b * v + c * w)
+        dx, dy, dz = centers[0, j] - x, centers[1, j] - y, centers[2, j] - z
+        from_i = abs(a * dx + b * dy + c * dz)
+        from_j = abs(u * dx + v * dy + w * dz)
+        apart = max(from_i, from_j) - distance_limit
+        excesses[j] = max(apart, min_cosine - cosine)
 
 
 @compiled
