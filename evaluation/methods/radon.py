@@ -49,8 +49,10 @@ def radon(image: np.ndarray, angles: np.ndarray) -> np.ndarray:
                 # width <= 1, so that at most two rays pass near enough.
                 left = math.floor(place)
                 for ray in (left, left + 1):
-                    share = 1.0 - abs(ray - place) / width
-                    if share > 0.0 and 0 <= ray < size:
+                    # Nothing is added rather than left out: a branch would
+                    # often be predicted wrongly.
+                    share = max(1.0 - abs(ray - place) / width, 0.0)
+                    if 0 <= ray < size:
                         for channel in range(num_channels):
                             result[index, ray, channel] += (
                                 share / width * image[row, column, channel]
